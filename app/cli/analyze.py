@@ -7,34 +7,20 @@ from typing import Annotated
 
 import typer
 
-from app.cli.options import (
-    ChannelsOption,
-    PulsesOption,
-    ReferenceOption,
-    RigOption,
-    SamplingRateOption,
-    SpeedOption,
-    TachometerTimesOption,
-    TorqueOption,
-    open_recording,
-    open_reference,
-    open_rig,
-    stated_speed,
-    torque_of,
-)
+from app.cli import options
 from app.cli.quantities import quantity
 from gearsig.errors import InputError
 
 
 def analyze(
     recording: Annotated[Path, typer.Argument(help="CSV, MAT, WAV, HDF5, Parquet, TDMS or UFF58 file.")],
-    rig: RigOption = None,
-    fs: SamplingRateOption = None,
-    speed_rpm: SpeedOption = None,
-    tach_times: TachometerTimesOption = None,
-    pulses_per_revolution: PulsesOption = 1,
-    reference: ReferenceOption = None,
-    torque: TorqueOption = None,
+    rig: options.RigOption = None,
+    fs: options.SamplingRateOption = None,
+    speed_rpm: options.SpeedOption = None,
+    tach_times: options.TachometerTimesOption = None,
+    pulses_per_revolution: options.PulsesOption = 1,
+    reference: options.ReferenceOption = None,
+    torque: options.TorqueOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
     indicators: Annotated[bool, typer.Option("--indicators", help="Print the table of indicators as well.")] = False,
 ) -> None:
@@ -50,12 +36,12 @@ def analyze(
 
     from gearsig.diagnosis import analyze as run_analysis
 
-    speed = stated_speed(speed_rpm, tach_times, pulses_per_revolution)
-    machine, torque_nm = open_rig(rig, recording), torque_of(torque)
+    speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
+    machine, torque_nm = options.open_rig(rig, recording), options.torque_of(torque)
     with Console(stderr=True).status("reading") as status:  # shown on a terminal only
         result = run_analysis(
-            open_recording(recording, machine, fs, speed),
-            reference=open_reference(reference, machine, fs, speed_rpm),
+            options.open_recording(recording, machine, fs, speed),
+            reference=options.open_reference(reference, machine, fs, speed_rpm),
             torque_nm=torque_nm,
             on_stage=status.update,
         )
@@ -69,25 +55,20 @@ def analyze(
         typer.echo(analysis_text(result, with_indicators=indicators))
 
 
-# --------------------
-# `gearsig crack`: how deep a crack in a tooth root is.
-# --------------------
-
-
 def crack(
     recording: Annotated[Path, typer.Argument(help="Recording of a spur gear pair at steady speed.")],
-    rig: RigOption = None,
-    reference: ReferenceOption = None,
-    torque: TorqueOption = None,
+    rig: options.RigOption = None,
+    reference: options.ReferenceOption = None,
+    torque: options.TorqueOption = None,
     tip_relief: Annotated[
         str | None,
         typer.Option("--tip-relief", help="Metal taken off at the tips, e.g. 15um, where the drawing says it: surer."),
     ] = None,
-    channel: ChannelsOption = None,
-    fs: SamplingRateOption = None,
-    speed_rpm: SpeedOption = None,
-    tach_times: TachometerTimesOption = None,
-    pulses_per_revolution: PulsesOption = 1,
+    channel: options.ChannelsOption = None,
+    fs: options.SamplingRateOption = None,
+    speed_rpm: options.SpeedOption = None,
+    tach_times: options.TachometerTimesOption = None,
+    pulses_per_revolution: options.PulsesOption = 1,
 ) -> None:
     """Estimate the depth of a crack in a tooth root, in mm and % of the root, with a 90 % interval.
 
@@ -100,23 +81,18 @@ def crack(
     """
     from gearsig.severity import estimate_crack
 
-    speed = stated_speed(speed_rpm, tach_times, pulses_per_revolution)
-    machine = open_rig(rig, recording)
+    speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
+    machine = options.open_rig(rig, recording)
     estimate = estimate_crack(
-        open_recording(recording, machine, fs, speed),
-        reference=open_reference(reference, machine, fs, speed_rpm),
-        torque_nm=torque_of(torque),
+        options.open_recording(recording, machine, fs, speed),
+        reference=options.open_reference(reference, machine, fs, speed_rpm),
+        torque_nm=options.torque_of(torque),
         tip_relief_um=quantity(tip_relief, "um", "--tip-relief") if tip_relief else None,
         channels=tuple(dict.fromkeys(channel or ())),
     )
     typer.echo(estimate.text)
     for reason in estimate.reasons:
         typer.echo(reason)
-
-
-# --------------------
-# `gearsig demo`: the main job on the sample recordings.
-# --------------------
 
 
 def demo(
@@ -135,7 +111,7 @@ def demo(
     chosen = samples()
     first = next((s for s in chosen if "damaged" in s.recording.stem), chosen[0])
     typer.echo(f"$ gearsig analyze {first.recording}\n")
-    typer.echo(analysis_text(analyze(open_recording(first.recording, open_rig(first.rig), None))))
+    typer.echo(analysis_text(analyze(options.open_recording(first.recording, options.open_rig(first.rig), None))))
     typer.echo(f"\nThe same for all {len(chosen)} samples (they are simulated; {first.recording.parent} says how):")
     make_report([s.recording for s in chosen], output, None, None, None, None, command=f"gearsig demo -o {output}")
     typer.echo("Next: `gearsig rig example` for a rig file of your own, `gearsig dashboard` to explore.")

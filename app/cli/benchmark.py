@@ -13,7 +13,7 @@ from gearsig.errors import InputError
 if TYPE_CHECKING:
     from app.benchmark.run import BenchmarkRequest, Done
 
-benchmark_app = typer.Typer(no_args_is_help=True, help="Measure how good a diagnosis is.")
+benchmark_app = typer.Typer(name="benchmark", no_args_is_help=True, help="Measure how good a diagnosis is.")
 
 
 @benchmark_app.callback()

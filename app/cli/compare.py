@@ -7,17 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli import options
 from app.cli.console import typed_command
-from app.cli.options import (
-    PulsesOption,
-    RigOption,
-    SamplingRateOption,
-    SpeedOption,
-    TachometerTimesOption,
-    open_recording,
-    open_rig,
-    stated_speed,
-)
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,7 +33,7 @@ SimulationRigOption = Annotated[
 def compare(
     simulation: Annotated[Path, typer.Argument(help="Simulated signals: any file that gearsig reads.")],
     recording: Annotated[Path, typer.Argument(help="The recording to compare with.")],
-    rig: RigOption = None,
+    rig: options.RigOption = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {PAGE}, {DATA} and {TABLE}.")
     ] = None,
@@ -57,10 +48,10 @@ def compare(
     align: Annotated[
         str, typer.Option("--align", help="auto, marks or correlation; auto: marks where both records have them.")
     ] = "auto",
-    fs: SamplingRateOption = None,
-    speed_rpm: SpeedOption = None,
-    tach_times: TachometerTimesOption = None,
-    pulses_per_revolution: PulsesOption = 1,
+    fs: options.SamplingRateOption = None,
+    speed_rpm: options.SpeedOption = None,
+    tach_times: options.TachometerTimesOption = None,
+    pulses_per_revolution: options.PulsesOption = 1,
     simulation_rig: SimulationRigOption = None,
     simulation_fs: Annotated[
         float | None, typer.Option("--sim-fs", metavar="HZ", help="Sampling rate of the simulation, like --fs.")
@@ -87,9 +78,11 @@ def compare(
     one_of(align, "--align", ALIGN)
     if output is not None:
         check_writable(output)
-    machine = open_rig(rig, recording)
+    machine = options.open_rig(rig, recording)
     with Console(stderr=True).status("reading") as status:
-        recorded = open_recording(recording, machine, fs, stated_speed(speed_rpm, tach_times, pulses_per_revolution))
+        recorded = options.open_recording(
+            recording, machine, fs, options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
+        )
         simulated = open_simulation(simulation, simulation_rig, machine, simulation_fs, simulation_speed_rpm)
         pairs = [read_pair(text, simulated, recorded) for text in channel or ()]
         status.update("comparing")
@@ -111,11 +104,11 @@ def open_simulation(
     """
     from gearsig.comparison import for_simulation
 
-    own = open_rig(rig, path)
-    speed = stated_speed(speed_rpm, None, 1)
+    own = options.open_rig(rig, path)
+    speed = options.stated_speed(speed_rpm, None, 1)
     if own is not None or machine is None:
-        return open_recording(path, own, sampling_rate_hz, speed)
-    return open_recording(path, for_simulation(machine), sampling_rate_hz, speed)
+        return options.open_recording(path, own, sampling_rate_hz, speed)
+    return options.open_recording(path, for_simulation(machine), sampling_rate_hz, speed)
 
 
 def read_pair(text: str, simulated: Recording, recorded: Recording) -> tuple[str, str]:

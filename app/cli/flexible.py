@@ -7,16 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli import options
 from app.cli.console import progress_bar
-from app.cli.options import (
-    EffectOption,
-    FreshOption,
-    PresetOption,
-    SeedOption,
-    SetOption,
-    clear_other_versions,
-    read_request,
-)
 from app.cli.quantities import quantity
 from gearsig.errors import InputError
 
@@ -29,9 +21,9 @@ MODEL = "reduced-fe"
 
 def flexible(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures and tables.")],
-    preset: PresetOption = "",
-    settings: SetOption = None,
-    effects: EffectOption = None,
+    preset: options.PresetOption = "",
+    settings: options.SetOption = None,
+    effects: options.EffectOption = None,
     torques: Annotated[str, typer.Option("--torques", metavar="LIST", help="Of the sweeps.")] = "85,170,340Nm",
     speeds: Annotated[str, typer.Option("--speeds", metavar="RANGE", help="Of the sweeps, up and down.")] = (
         "900..4100rpm"
@@ -42,8 +34,8 @@ def flexible(
     spreading: Annotated[
         bool, typer.Option("--spreading", help="Also check contact at single nodes against patches (RBE3).")
     ] = False,
-    seed: SeedOption = 0,
-    fresh: FreshOption = False,
+    seed: options.SeedOption = 0,
+    fresh: options.FreshOption = False,
 ) -> None:
     """Study a pair of reduced finite-element gears: stiffness and transmission-error maps, sweeps with jumps, spectra.
 
@@ -55,11 +47,11 @@ def flexible(
     from sims.presets import preset as preset_named
     from sims.reduced_fe import ReducedPair
 
-    request = read_request(MODEL, preset, settings, effects, None, None, "1s", "20480Hz", seed)
+    request = options.read_request(MODEL, preset, settings, effects, None, None, "1s", "20480Hz", seed)
     first, last = _range(speeds)
     wanted = tuple(quantity(f"{t.strip().removesuffix('Nm')}Nm", "N m", "--torques") for t in torques.split(","))
     if fresh:
-        clear_other_versions(MODEL)
+        options.clear_other_versions(MODEL)
     ready = ReducedPair().prepare(
         request.parameters, request.effects, None, np.random.default_rng(seed), preset_name=request.preset
     )
@@ -94,11 +86,6 @@ def _range(text: str) -> tuple[float, float]:
     if not dots:
         raise InputError(f"--speeds is {text!r}", allowed="900..4100rpm")
     return quantity(f"{first.removesuffix('rpm')}rpm", "rpm", "--speeds"), quantity(last, "rpm", "--speeds")
-
-
-# --------------------
-# `gearsig gear-body`: one gear as finite elements.
-# --------------------
 
 
 SPRINGS = {"radial": "2e8N/m", "axial": "1e8N/m", "tilt": "1e5Nm/rad", "twist": "4e4Nm/rad"}
@@ -160,7 +147,7 @@ def gear_body(
     one_of(held, "--held", ("free", "bore", "springs"))
     springs = _springs(held, {"radial": radial, "axial": axial, "tilt": tilt, "twist": twist})
     if fresh:
-        clear_other_versions(NAME)
+        options.clear_other_versions(NAME)
     with progress_bar("mesh") as show:
         study = study_gear(
             blank,

@@ -5,13 +5,12 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import typer
 
 from app.cli.analyze import analyze, crack, demo
 from app.cli.benchmark import benchmark_app
-from app.cli.bifurcation import bifurcation
 from app.cli.compare import compare
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED
 from app.cli.dashboard import dashboard
@@ -21,7 +20,7 @@ from app.cli.motion import force, identify, start_stop
 from app.cli.report import report
 from app.cli.rig import rig_app
 from app.cli.simulate import simulate
-from app.cli.sweep import sweep
+from app.cli.sweep import bifurcation, sweep
 from gearsig import __version__
 from gearsig.errors import InputError, RefusalError
 
@@ -35,23 +34,15 @@ app = typer.Typer(
     Start with **gearsig demo**; then **gearsig analyze RECORDING --rig RIG** on a recording of your own.
     A rig file says what is known of the machine: **gearsig rig example** prints one to start from.""",
 )
-app.command()(analyze)
-app.command()(crack)
-app.command()(force)
-app.command()(start_stop)
-app.command()(identify)
-app.command()(compare)
-app.command()(report)
-app.add_typer(rig_app, name="rig")
-app.command()(simulate)
-app.command()(sweep)
-app.command()(bifurcation)
-app.command()(flexible)
-app.command()(gear_body)
-app.command()(gap)
-app.add_typer(benchmark_app, name="benchmark")
-app.command()(demo)
-app.command()(dashboard)
+COMMANDS: tuple[Callable[..., None] | typer.Typer, ...] = (
+    *(analyze, crack, force, start_stop, identify, compare, report, rig_app),
+    *(simulate, sweep, bifurcation, flexible, gear_body, gap, benchmark_app, demo, dashboard),
+)
+for command in COMMANDS:
+    if isinstance(command, typer.Typer):
+        app.add_typer(command)
+    else:
+        app.command()(command)
 
 USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 """Base of all errors of Typer's parser, which it does not export; since version 0.20 it is no longer Click's."""

@@ -8,17 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.options import (
-    BandwidthOption,
-    RigOption,
-    SamplingRateOption,
-    UnwrapOption,
-    UseOption,
-    open_motion,
-    open_rig,
-    read_bandwidth,
-    read_uses,
-)
+from app.cli import options
 from app.cli.quantities import quantity
 from gearsig.errors import InputError
 
@@ -35,11 +25,11 @@ DATA, PICTURE = "start_stop.json", "start_stop.png"
 
 def start_stop(
     recording: Annotated[Path, typer.Argument(help="Recording with the motion of both gears, better with torque.")],
-    rig: RigOption = None,
-    use: UseOption = None,
-    bandwidth: BandwidthOption = None,
-    unwrap: UnwrapOption = False,
-    fs: SamplingRateOption = None,
+    rig: options.RigOption = None,
+    use: options.UseOption = None,
+    bandwidth: options.BandwidthOption = None,
+    unwrap: options.UnwrapOption = False,
+    fs: options.SamplingRateOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {DATA} and {PICTURE}.")
@@ -58,7 +48,7 @@ def start_stop(
 
     if output is not None:
         check_writable(output)
-    opened, motion = open_motion(recording, open_rig(rig, recording), fs, use, bandwidth, unwrap)
+    opened, motion = options.open_motion(recording, options.open_rig(rig, recording), fs, use, bandwidth, unwrap)
     examined = examine_start_stop(motion)
     data = start_stop_json(examined, *tooth_levels(opened, examined))
     if output is not None:
@@ -89,11 +79,6 @@ def tooth_levels(recording: Recording, examined: StartStop) -> tuple[AngleProfil
     return found, channel.name, channel.unit, orders
 
 
-# --------------------
-# `gearsig force`: force between the teeth from the measured motion of both gears.
-# --------------------
-
-
 FORCE_DATA, TABLE, FORCE_PICTURE, NOISE_PICTURE = "force.json", "force.csv", "force.png", "noise.png"
 """Files that -o makes."""
 
@@ -109,15 +94,15 @@ DatumOption = Annotated[
 
 def force(
     recording: Annotated[Path, typer.Argument(help="Recording with the motion of both gears, better with torque.")],
-    rig: RigOption = None,
-    use: UseOption = None,
-    bandwidth: BandwidthOption = None,
-    unwrap: UnwrapOption = False,
+    rig: options.RigOption = None,
+    use: options.UseOption = None,
+    bandwidth: options.BandwidthOption = None,
+    unwrap: options.UnwrapOption = False,
     datum: DatumOption = "auto",
     noise: Annotated[
         bool, typer.Option("--noise", help="Also: how much noise until the piecewise model is no longer nearer.")
     ] = False,
-    fs: SamplingRateOption = None,
+    fs: options.SamplingRateOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
     output: Annotated[
         Path | None,
@@ -139,10 +124,10 @@ def force(
 
     if output is not None:
         check_writable(output)
-    machine = open_rig(rig, recording)
+    machine = options.open_rig(rig, recording)
     zero = read_datum(datum)
     with Console(stderr=True).status("reading") as status:
-        opened, motion = open_motion(recording, machine, fs, use, bandwidth, unwrap)
+        opened, motion = options.open_motion(recording, machine, fs, use, bandwidth, unwrap)
         estimate = estimate_forces(motion, datum=zero)
         study = None
         if noise:
@@ -152,7 +137,7 @@ def force(
 
             status.update("adding noise")
             rng = np.random.default_rng(0)
-            roles, band = read_uses(use), read_bandwidth(bandwidth)
+            roles, band = options.read_uses(use), options.read_bandwidth(bandwidth)
             study = noise_study(opened, machine, rng=rng, use=roles, bandwidth_hz=band, unwrap=unwrap, datum=zero)
         written: tuple[str, ...] = ()
         if output is not None:
@@ -190,11 +175,6 @@ def write_force(estimate: ForceEstimate, study: NoiseStudy | None, folder: Path)
     return (FORCE_DATA, TABLE, *pictures)
 
 
-# --------------------
-# `gearsig identify`: stiffness, damping, backlash, friction and inertia from a recording.
-# --------------------
-
-
 TAKEN = (
     "half_backlash_um",
     "stiffness_n_per_m_lambda",
@@ -208,11 +188,11 @@ TAKEN = (
 
 def identify(
     recording: Annotated[Path, typer.Argument(help="Recording with the motion of both gears and the driver's torque.")],
-    rig: RigOption = None,
-    use: UseOption = None,
-    bandwidth: BandwidthOption = None,
-    unwrap: UnwrapOption = False,
-    fs: SamplingRateOption = None,
+    rig: options.RigOption = None,
+    use: options.UseOption = None,
+    bandwidth: options.BandwidthOption = None,
+    unwrap: options.UnwrapOption = False,
+    fs: options.SamplingRateOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
     output: Annotated[
         Path | None,
@@ -229,10 +209,10 @@ def identify(
     from gearsig.report import identify_json, identify_text
     from gearsig.rig import write_rig
 
-    machine = open_rig(rig, recording)
+    machine = options.open_rig(rig, recording)
     if output is not None and (output.suffix.lower() != ".toml" or not output.parent.is_dir()):
         raise InputError(f"cannot write {str(output)!r}", allowed="a .toml file in a folder that exists")
-    opened, motion = open_motion(recording, machine, fs, use, bandwidth, unwrap)
+    opened, motion = options.open_motion(recording, machine, fs, use, bandwidth, unwrap)
     found = fit(motion)
     known = machine or opened.rig
     if output is not None and known is not None:  # motion could not have been measured without a rig

@@ -118,11 +118,6 @@ def torque_of(text: str | None) -> float | None:
     return positive(quantity(text, "N m", "--torque"), "--torque", "N m") if text else None
 
 
-# --------------------
-# Options that `simulate` and `sweep` share, and what they ask for.
-# --------------------
-
-
 PresetOption = Annotated[
     str,
     typer.Option(
@@ -291,11 +286,6 @@ def _split(text: str, where: str, example: str) -> tuple[str, str]:
     if not sign or not name.strip() or not value.strip():
         raise InputError(f"{text!r} is not NAME=VALUE", where=where, remedy=f"write for example {example}")
     return name.strip(), value.strip()
-
-
-# --------------------
-# What the commands share that read the motion of both gears: options, and reading it.
-# --------------------
 
 
 UseOption = Annotated[

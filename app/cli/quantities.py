@@ -114,11 +114,6 @@ def _spelt(unit: str) -> str:
     return re.sub(r"[\s·*^]", "", unit)
 
 
-# --------------------
-# Speed or torque over time as people type it: a number, a span, or a file of points.
-# --------------------
-
-
 MAX_PROFILE_BYTES = 50_000_000
 
 

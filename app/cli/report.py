@@ -7,19 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli import options
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED, EXIT_SOME_FAILED, progress_bar, typed_command
-from app.cli.options import (
-    PulsesOption,
-    ReferenceOption,
-    RigOption,
-    SamplingRateOption,
-    SpeedOption,
-    TachometerTimesOption,
-    TorqueOption,
-    open_rig,
-    stated_speed,
-    torque_of,
-)
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,13 +18,13 @@ if TYPE_CHECKING:
 def report(
     files: Annotated[list[Path], typer.Argument(help="Recordings; folders are not searched.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the pages.")],
-    rig: RigOption = None,
-    fs: SamplingRateOption = None,
-    speed_rpm: SpeedOption = None,
-    tach_times: TachometerTimesOption = None,
-    pulses_per_revolution: PulsesOption = 1,
-    reference: ReferenceOption = None,
-    torque: TorqueOption = None,
+    rig: options.RigOption = None,
+    fs: options.SamplingRateOption = None,
+    speed_rpm: options.SpeedOption = None,
+    tach_times: options.TachometerTimesOption = None,
+    pulses_per_revolution: options.PulsesOption = 1,
+    reference: options.ReferenceOption = None,
+    torque: options.TorqueOption = None,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")] = None,
 ) -> None:
     """Write one self-contained HTML page per recording, and an index page that compares them.
@@ -49,9 +38,17 @@ def report(
         raise InputError(
             f"--tach-times belong to one recording, and there are {len(files)}", remedy="make a report for each"
         )
-    speed = stated_speed(speed_rpm, tach_times, pulses_per_revolution)
+    speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
     failed = make_report(
-        files, output, rig, fs, speed, jobs, command=typed_command(), reference=reference, torque_nm=torque_of(torque)
+        files,
+        output,
+        rig,
+        fs,
+        speed,
+        jobs,
+        command=typed_command(),
+        reference=reference,
+        torque_nm=options.torque_of(torque),
     )
     if failed:
         raise typer.Exit(EXIT_INPUT_ERROR if failed == len(files) else EXIT_SOME_FAILED)
@@ -83,7 +80,7 @@ def make_report(
             result = report_many(
                 files,
                 output,
-                rig=open_rig(rig),
+                rig=options.open_rig(rig),
                 sampling_rate_hz=fs,
                 speed=speed,
                 n_processes=jobs,

@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-rig_app = typer.Typer(no_args_is_help=True, help="Describe the machine: check a rig file, or print one to start from.")
+rig_app = typer.Typer(
+    name="rig", no_args_is_help=True, help="Check a rig file, which describes the machine, or print one to start from."
+)
 
 
 @rig_app.command()

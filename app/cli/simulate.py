@@ -11,43 +11,29 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.options import (
-    DurationOption,
-    EffectOption,
-    FreshOption,
-    PresetOption,
-    RateOption,
-    SeedOption,
-    SetOption,
-    SimulatedSpeedOption,
-    SimulatedTorqueOption,
-    SimulationChoices,
-    clear_other_versions,
-    read_request,
-)
+from app.cli import options
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
-    from gearsig.recording import Recording
-    from sims.effects import Effect, EffectSetting, Option
+    from sims.effects import Effect, Option
     from sims.presets import Preset
     from sims.simulator import Parameter, Simulator
 
 
 def simulate(
     model: Annotated[str | None, typer.Argument(help="Model, e.g. cracked; --list shows them.")] = None,
-    preset: PresetOption = "",
+    preset: options.PresetOption = "",
     mode: Annotated[
         str, typer.Option("--mode", help="Of the model forging: start-stop or continuous; short for --set mode=….")
     ] = "",
-    settings: SetOption = None,
-    effects: EffectOption = None,
-    speed: SimulatedSpeedOption = None,
-    torque: SimulatedTorqueOption = None,
-    duration: DurationOption = "5s",
-    fs: RateOption = "",
-    seed: SeedOption = 0,
-    fresh: FreshOption = False,
+    settings: options.SetOption = None,
+    effects: options.EffectOption = None,
+    speed: options.SimulatedSpeedOption = None,
+    torque: options.SimulatedTorqueOption = None,
+    duration: options.DurationOption = "5s",
+    fs: options.RateOption = "",
+    seed: options.SeedOption = 0,
+    fresh: options.FreshOption = False,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="FILE", help="Recording: .csv .h5 .parquet .wav or .mat."),
@@ -68,38 +54,33 @@ def simulate(
     Example: gearsig simulate cracked --preset published_55_75 --effect root_crack=2mm,tooth=21 -o crack.h5
     """
     if listing:
-        typer.echo(_listing(model, preset))
+        from sims import presets, registry
+
+        if preset:
+            typer.echo(preset_text(presets.preset(model or next(iter(registry.simulators())), preset)))
+        else:
+            chosen = registry.simulators().values() if model is None else (registry.simulator(model),)
+            typer.echo("\n\n".join(_model_text(simulator) for simulator in chosen))
         return
     if mode:
         settings = [*(settings or []), f"mode={mode}"]
-    request = read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
+    request = options.read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
     if output is None and not check:
         raise InputError("no output file is given", remedy="give -o FILE, or --check")
     if fresh:
-        clear_other_versions(model)
+        options.clear_other_versions(model)
     if check:
         typer.echo(_convergence(request))
-    if output is not None:
-        _simulate_to(request, output, force)
-
-
-def _listing(model: str | None, preset: str) -> str:
-    from sims.presets import preset as preset_named
-    from sims.registry import simulator, simulators
-
-    if preset:
-        return preset_text(preset_named(model or next(iter(simulators())), preset))
-    return models_text(simulators().values() if model is None else (simulator(model),))
-
-
-def _simulate_to(request: SimulationChoices, output: Path, force: bool) -> None:
+    if output is None:
+        return
     from rich.console import Console
 
+    import sims
     from sims.files import file_set, write_set
 
     names = file_set(output, replace=force)
     with Console(stderr=True).status(f"simulating {request.duration_s:g} s"):
-        recording = simulate_request(request)
+        recording = sims.simulate(**vars(request))
         write_set(recording, names)
     typer.echo(f"{names.recording}: {recording.duration_s:g} s at {recording.sampling_rate_hz:g} Hz, ", nl=False)
     typer.echo(f"channels {', '.join(recording.channel_names)}")
@@ -111,24 +92,7 @@ def _simulate_to(request: SimulationChoices, output: Path, force: bool) -> None:
         typer.echo("It holds the motion of both gears: gearsig start-stop, force and identify read it as well.")
 
 
-def simulate_request(request: SimulationChoices) -> Recording:
-    """Run one simulation."""
-    import sims
-
-    return sims.simulate(
-        request.model,
-        preset=request.preset,
-        parameters=request.parameters,
-        effects=request.effects,
-        speed_rpm=request.speed_rpm,
-        torque_nm=request.torque_nm,
-        duration_s=request.duration_s,
-        sampling_rate_hz=request.sampling_rate_hz,
-        seed=request.seed,
-    )
-
-
-def _convergence(request: SimulationChoices) -> str:
+def _convergence(request: options.SimulationChoices) -> str:
     import numpy as np
 
     from sims.registry import ChecksConvergence, simulator
@@ -142,20 +106,6 @@ def _convergence(request: SimulationChoices) -> str:
     return model.check_convergence(request.parameters, request.effects, operation, rng, preset=request.preset).text
 
 
-# --------------------
-# What `gearsig simulate --list` prints.
-# --------------------
-
-
-WIDTH = 100
-"""Columns, wherever it is printed to; a narrower terminal gets less."""
-
-
-def models_text(simulators: Iterable[Simulator]) -> str:
-    """Return models, their presets, parameters and effects."""
-    return "\n\n".join(_model_text(simulator) for simulator in simulators)
-
-
 def preset_text(preset: Preset) -> str:
     """Return all that is known of a preset."""
     lines = [f"{preset.name}: {preset.title}", f"  {preset.speed_rpm:g} rpm, {preset.torque_nm:g} N m at the input"]
@@ -166,14 +116,13 @@ def preset_text(preset: Preset) -> str:
     ):
         lines += ["", title, *(_wrapped(text, "  - ", "    ") for text in texts)]
     if preset.effects:
-        lines += ["", "Effects", *(f"  {_setting(e)}" for e in preset.effects)]
+        lines += ["", "Effects"]
+        for e in preset.effects:
+            lines.append(
+                f"  {e.name}: {e.severity:g}" + "".join(f", {name} {value}" for name, value in e.options.items())
+            )
     lines += ["", "Parameters (the others have the model's defaults)"]
     return "\n".join([*lines, *(f"  {name} = {value}" for name, value in preset.parameters.items())])
-
-
-def _setting(setting: EffectSetting) -> str:
-    options = "".join(f", {name} {value}" for name, value in setting.options.items())
-    return f"{setting.name}: {setting.severity:g}{options}"
 
 
 def _model_text(simulator: Simulator) -> str:
@@ -184,7 +133,7 @@ def _model_text(simulator: Simulator) -> str:
     parts = [
         _wrapped(f"Model {simulator.name}: {simulator.title}", "", "  "),
         f"Presets (--preset NAME; details: gearsig simulate {simulator.name} --preset NAME --list)",
-        _columns([(p.name, _preset_line(p)) for p in machines.values()]),
+        _columns((p.name, f"{p.title}; {p.speed_rpm:g} rpm, {p.torque_nm:g} N m") for p in machines.values()),
         "Parameters (--set NAME=VALUE)",
         _columns([(p.name, _parameter_line(p)) for p in simulator.parameters]),
     ]
@@ -197,10 +146,6 @@ def _model_text(simulator: Simulator) -> str:
         parts.append("Effects without a meaning here")
         parts += [_wrapped(text, "  ", "  ") for text in (*lacking, *simulator.meaningless)]
     return "\n\n".join(parts)
-
-
-def _preset_line(preset: Preset) -> str:
-    return f"{preset.title}; {preset.speed_rpm:g} rpm, {preset.torque_nm:g} N m"
 
 
 def _parameter_line(p: Parameter) -> str:
@@ -250,10 +195,8 @@ def _columns(rows: Iterable[tuple[str, str]], indent: int = 2) -> str:
 
 
 def _wrapped(text: str, first: str, later: str) -> str:
-    return textwrap.fill(text, _width(), initial_indent=first, subsequent_indent=later, break_on_hyphens=False)
-
-
-def _width() -> int:
+    """Wrap to 100 columns, wherever it is printed to; a narrower terminal gets less."""
+    width = 100
     if sys.stdout.isatty():
-        return max(60, min(WIDTH, shutil.get_terminal_size().columns))
-    return WIDTH
+        width = max(60, min(width, shutil.get_terminal_size().columns))
+    return textwrap.fill(text, width, initial_indent=first, subsequent_indent=later, break_on_hyphens=False)

@@ -1,4 +1,4 @@
-"""`gearsig sweep`: a grid of simulations."""
+"""`gearsig sweep`: a grid of simulations; `gearsig bifurcation`: how the motion changes over one parameter."""
 
 from __future__ import annotations
 
@@ -8,30 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli import options
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_SOME_FAILED, progress_bar, stopped
-from app.cli.options import (
-    DurationOption,
-    EffectOption,
-    PresetOption,
-    RateOption,
-    SeedOption,
-    SetOption,
-    SimulatedSpeedOption,
-    SimulatedTorqueOption,
-    SimulationChoices,
-    read_effect_options,
-    read_request,
-)
 from app.cli.quantities import quantity, span, split_quantity
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
+    from app.bifurcation import BifurcationRequest, Found
     from sims.simulator import Simulator
-    from sims.sweep import Axis, Sweep, SweepResult
+    from sims.sweep import Axis, Sweep
 
 
 MAX_REASONS = 5
-"""Failures that are printed; the index holds them all."""
+"""Failures that are printed; the files hold them all."""
 
 
 def sweep(
@@ -46,14 +35,14 @@ def sweep(
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the recordings.")],
-    preset: PresetOption = "",
-    settings: SetOption = None,
-    effects: EffectOption = None,
-    speed: SimulatedSpeedOption = None,
-    torque: SimulatedTorqueOption = None,
-    duration: DurationOption = "5s",
-    fs: RateOption = "",
-    seed: SeedOption = 0,
+    preset: options.PresetOption = "",
+    settings: options.SetOption = None,
+    effects: options.EffectOption = None,
+    speed: options.SimulatedSpeedOption = None,
+    torque: options.SimulatedTorqueOption = None,
+    duration: options.DurationOption = "5s",
+    fs: options.RateOption = "",
+    seed: options.SeedOption = 0,
     common_seed: Annotated[
         bool,
         typer.Option(
@@ -71,9 +60,16 @@ def sweep(
 
     Example: gearsig sweep cracked --vary speed=300..1500rpm:10 --vary root_crack=0..4mm:10 --duration 1s -o grid
     """
-    request = read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
+    request = options.read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
     wanted = sweep_of(request, vary, common_seed, f".{extension.lstrip('.')}")
-    result = _run(wanted, output, jobs)
+    from sims.sweep import n_complete, run_sweep
+
+    n_points = wanted.n_points
+    try:
+        with progress_bar("simulating", n_points) as show:
+            result = run_sweep(wanted, output, n_processes=jobs, on_progress=lambda n_done, _n, _outcome: show(n_done))
+    except KeyboardInterrupt:
+        raise stopped(f"{n_complete(wanted, output)} of {n_points} points are in {output}") from None
     for failure in result.failures[:MAX_REASONS]:
         typer.echo(f"point {failure.point.index}: {failure.reason}", err=True)
     if len(result.failures) > MAX_REASONS:
@@ -85,7 +81,111 @@ def sweep(
         raise typer.Exit(EXIT_SOME_FAILED if n_made + result.n_found else EXIT_INPUT_ERROR)
 
 
-def sweep_of(request: SimulationChoices, vary: Sequence[str], common_seed: bool, extension: str) -> Sweep:
+def bifurcation(
+    model: Annotated[str, typer.Argument(help="Model, e.g. cracked; `gearsig simulate --list` shows them.")],
+    vary: Annotated[
+        str,
+        typer.Option(
+            "--vary",
+            metavar="NAME=VALUES",
+            help="speed=600..3000rpm:100 (from, to, how many), torque=5..50Nm:40, half_backlash_um=0..60:40, "
+            "root_crack=0..4mm:20. NAME is speed, torque, a parameter or an effect.",
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figure, table and summary.")
+    ],
+    preset: options.PresetOption = "",
+    settings: options.SetOption = None,
+    effects: options.EffectOption = None,
+    speed: options.SimulatedSpeedOption = None,
+    torque: options.SimulatedTorqueOption = None,
+    section: Annotated[
+        str,
+        typer.Option("--section", metavar="CYCLE", help="A point once per mesh cycle (mesh) or revolution (shaft)."),
+    ] = "mesh",
+    phase: Annotated[float, typer.Option("--phase", help="Place in the cycle at which the point lies, 0 to 1.")] = 0.0,
+    signal: Annotated[
+        str,
+        typer.Option(
+            "--signal",
+            help="transmission_error_m, 'driver y', mesh_force_n …, or a channel with its noise: a1.",
+        ),
+    ] = "transmission_error_m",
+    points: Annotated[
+        int | None, typer.Option("--points", help="Points at each value; default 100, 400 with --kind.")
+    ] = (None),
+    direction: Annotated[
+        str,
+        typer.Option(
+            "--direction",
+            help="up or down, each value from where the last one ended; both shows hysteresis; rest: each from rest.",
+        ),
+    ] = "both",
+    kind: Annotated[
+        bool,
+        typer.Option(
+            "--kind",
+            help="Also the kind of motion at each value, told over ranges: Lyapunov exponent, 0–1 test. Takes longer.",
+        ),
+    ] = False,
+    fs: options.RateOption = "20480Hz",
+    seed: options.SeedOption = 0,
+    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")] = None,
+) -> None:
+    """Draw a bifurcation diagram: Poincaré points of the steady motion over speed, load, backlash, or anything else.
+
+    At each value the transient is left out: 8 time constants of the machine's slowest decay. It can be stopped with
+    Ctrl-C at any time; the same command goes on from what is complete.
+
+    Example: gearsig bifurcation cracked --preset symmetric_50_50 --torque 20Nm --vary speed=1600..2400rpm:41 -o jump
+    """
+    from app import bifurcation as study
+    from sims.cracked import Branch
+
+    request = options.read_request(model, preset, settings, effects, speed, torque, "1s", fs, seed)
+    n_points = points if points is not None else study.MIN_FOR_KIND if kind else 100
+    varied = sweep_of(request, [vary], common_seed=True, extension=".h5")
+    wanted = study.BifurcationRequest(Branch(varied, signal, section, n_points), direction, phase, kind)
+    wanted.branch.check_signal()
+    try:
+        with progress_bar("simulating", wanted.n_values) as show:
+            values = study.run_folder(wanted, output, n_processes=jobs, on_progress=show)
+    except KeyboardInterrupt:
+        n = study.n_complete(wanted, output)
+        if n:
+            _print_bifurcation(wanted, study.complete(wanted, output), output)
+        raise stopped(f"{n} of {wanted.n_values} values are in {output}") from None
+    _print_bifurcation(wanted, values, output)
+
+
+def _print_bifurcation(wanted: BifurcationRequest, values: Found, output: Path) -> None:
+    """Write the results and say what they show."""
+    from app import bifurcation as study
+
+    paths = study.write_results(wanted, values, output)
+    reasons = [(name, one) for name, kept in values.items() for one in kept if one.reason]
+    for name, one in reasons[:MAX_REASONS]:
+        typer.echo(f"{study.NAMES[name]}, {one.value:g}: {one.reason}", err=True)
+    if len(reasons) > MAX_REASONS:
+        typer.echo(f"… and {len(reasons) - MAX_REASONS} more: see {paths[2].name}", err=True)
+    unit = study.parameter_words(wanted.branch)[1]
+    for name, kept in values.items():
+        points = study.measured_of(kept)
+        periods = sorted({one.period for one in points})
+        seen = ", ".join("none within 16 cycles" if p == 0 else str(p) for p in periods)
+        most = max((one.separated_share for one in points), default=0.0)
+        typer.echo(
+            f"{study.NAMES[name]}: {len(points)} values; periods in cycles: {seen}; teeth apart up to {most:.0%}"
+        )
+        for line in study.motion_lines(kept, unit):
+            typer.echo(f"  {line}")
+    for line in study.coexistence_lines(study.summary(wanted, values), unit):
+        typer.echo(line)
+    typer.echo(f"{paths[0]} (figure), {paths[1].name} (points), {paths[2].name} (values).")
+
+
+def sweep_of(request: options.SimulationChoices, vary: Sequence[str], common_seed: bool, extension: str) -> Sweep:
     """Return the sweep that the options ask for."""
     from sims.registry import simulator
     from sims.sweep import Sweep
@@ -98,20 +198,7 @@ def sweep_of(request: SimulationChoices, vary: Sequence[str], common_seed: bool,
             raise InputError(
                 f"{name} is given, and varied", remedy=f"leave one of --{name.split('_')[0]} and --vary out"
             )
-    return Sweep(
-        request.model,
-        axes,
-        request.preset,
-        request.parameters,
-        request.effects,
-        request.speed_rpm,
-        request.torque_nm,
-        request.duration_s,
-        request.sampling_rate_hz,
-        request.seed,
-        common_seed,
-        extension,
-    )
+    return Sweep(axes=axes, common_seed=common_seed, extension=extension, **vars(request))
 
 
 def read_axis(model: Simulator, text: str) -> Axis:
@@ -127,21 +214,19 @@ def read_axis(model: Simulator, text: str) -> Axis:
             f"{text!r} is not NAME=VALUES", where="--vary", remedy="write for example speed=300..1500rpm:10"
         )
     items = [item.strip() for item in rest.split(",")]
-    options = [item for item in items if "=" in item]
+    settings = [item for item in items if "=" in item]
     values = [item for item in items if "=" not in item]
-    if name in ("speed_rpm", "torque_nm"):
-        unit = "rpm" if name == "speed_rpm" else "N m"
-    elif name in model.effects:
-        return Axis(
-            name, read_values(values, effect(name).severity.unit, name), read_effect_options(effect(name), options)
-        )
-    else:
-        wanted = parameter(model.parameters, name)
-        if wanted.choices:
+    if name in model.effects:
+        unit = effect(name).severity.unit
+        return Axis(name, read_values(values, unit, name), options.read_effect_options(effect(name), settings))
+    unit = {"speed_rpm": "rpm", "torque_nm": "N m"}.get(name, "")
+    if not unit:
+        varied = parameter(model.parameters, name)
+        if varied.choices:
             raise InputError(f"{name} is a word", where="--vary", allowed="numbers", remedy="give it with --set")
-        unit = wanted.unit
-    if options:
-        raise InputError(f"{name} has no options", where="--vary", remedy=f"leave out {options[0]}")
+        unit = varied.unit
+    if settings:
+        raise InputError(f"{name} has no options", where="--vary", remedy=f"leave out {settings[0]}")
     return Axis(name, read_values(values, unit, name))
 
 
@@ -158,13 +243,3 @@ def read_values(items: Sequence[str], unit: str, name: str) -> tuple[float, ...]
         return tuple(first + (last - first) * i / (n - 1) for i in range(n))
     later = split_quantity(items[-1], unit, name)[1] if items else ""
     return tuple(quantity(t if split_quantity(t, unit, name)[1] else f"{t}{later}", unit, name) for t in items)
-
-
-def _run(wanted: Sweep, output: Path, jobs: int | None) -> SweepResult:
-    from sims.sweep import n_complete, run_sweep
-
-    try:
-        with progress_bar("simulating", wanted.n_points) as show:
-            return run_sweep(wanted, output, n_processes=jobs, on_progress=lambda n_done, _n, _outcome: show(n_done))
-    except KeyboardInterrupt:
-        raise stopped(f"{n_complete(wanted, output)} of {wanted.n_points} points are in {output}") from None

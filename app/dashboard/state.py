@@ -129,7 +129,9 @@ def source_key(name: str, source: str) -> str:
     return f"{name} of {source}"
 
 
-def view_key(name: str, analysis: Analysis) -> str:
-    """Key of a widget that shows one recording: its choices do not outlive the recording."""
-    recording = analysis.recording
+def view_key(name: str, source: Analysis | str) -> str:
+    """Key of a widget that shows one recording: its choices do not outlive the recording; or one view by its name."""
+    if isinstance(source, str):
+        return source_key(name, source)
+    recording = source.recording
     return f"{name} of {recording.provenance.sha256 or id(recording)} at {recording.sampling_rate_hz!r}"

@@ -10,7 +10,7 @@ import app.dashboard
 from app.dashboard import state
 from app.dashboard.laboratory.run import chosen_of
 from app.dashboard.laboratory.setup import MODELS, WIDEST, Setup, automatic_s, greatest_severity, nice_step, shown_name
-from app.dashboard.laboratory.views import NAMES, NUMBERS, TAB, change
+from app.dashboard.laboratory.views import NUMBERS, TAB, VIEWS, change
 from gearsig.errors import InputError
 from sims.effects import EffectSetting, effects
 from sims.presets import Preset, presets
@@ -46,7 +46,7 @@ def test_at_the_start_the_machine_is_healthy() -> None:
     page = opened()
     assert not page.exception
     assert page.subheader[0].value.startswith("Healthy")
-    assert [tab.label for tab in page.tabs] == list(NAMES)
+    assert [tab.label for tab in page.tabs] == list(VIEWS)
     assert len(page.get("plotly_chart")) == 1
     assert [metric.label for metric in page.metric] == list(NUMBERS)
     assert not any(metric.delta for metric in page.metric)
@@ -59,7 +59,7 @@ def test_the_crack_slider_shows_the_faulty_machine_in_every_view() -> None:
     assert "Crack in a tooth root, 1.5 mm" in shown_text(page)
     assert "burst per revolution" in shown_text(page)
     assert all("healthy" in metric.delta for metric in page.metric)
-    for tab in NAMES:
+    for tab in VIEWS:
         page.session_state[TAB] = tab
         page.run()
         assert not page.exception, tab
@@ -128,7 +128,7 @@ def test_standing_still_and_no_load_are_shown(speed: float, torque: float) -> No
     page.sidebar.toggle(key="lab typed values").set_value(True).run()
     typed(page, "Speed").set_value(speed).run()
     typed(page, "Torque").set_value(torque).run()
-    for tab in NAMES:
+    for tab in VIEWS:
         page.session_state[TAB] = tab
         page.run()
         assert not page.exception, tab

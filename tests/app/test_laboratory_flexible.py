@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.dashboard.laboratory.run import record, run_setup
+from app.dashboard.laboratory.run import run_setup
 from app.dashboard.laboratory.setup import Setup
 from app.dashboard.laboratory.views import TAB, stiffness
 from sims.effects import EffectSetting
@@ -45,7 +45,7 @@ def test_every_view_shows_the_cracked_gear_beside_the_healthy_one(page) -> None:
 
 
 def test_the_page_simulates_what_the_command_line_does() -> None:
-    run, saved = run_setup(CRACKED), record(CRACKED)
+    run, saved = run_setup(CRACKED), CRACKED.record()
     np.testing.assert_array_equal(run.recording.samples, saved.samples)
     assert run.pair is not None
     cycles = np.linspace(0.0, 2.0, 21)

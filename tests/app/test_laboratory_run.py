@@ -14,10 +14,8 @@ from app.dashboard.laboratory.run import (
     affected_sides,
     bearing_lines_hz,
     entries,
-    record,
     run_setup,
     spectrum_cursors,
-    with_complete_effects,
     zipped,
 )
 from app.dashboard.laboratory.setup import Setup
@@ -25,13 +23,13 @@ from app.dashboard.laboratory.views import portrait, stiffness, telling_band_hz
 from gearsig.errors import RefusalError
 from gearsig.recording import Channel, Recording, read_recording
 from gearsig.rig import read_rig
-from sims.effects import EffectSetting
+from sims.effects import EffectSetting, completed
 
 SMOOTH = Setup("small_30_25", 1800.0, 20.0, (("roughness_um", 0.0),), duration_s=0.3, seed=3)
 
 
 def with_effect(name: str, severity: float, **options: float | str) -> Setup:
-    return with_complete_effects(replace(SMOOTH, effects=(EffectSetting(name, severity, options),)))
+    return replace(SMOOTH, effects=completed((EffectSetting(name, severity, options),)))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +44,7 @@ def cracked() -> LaboratoryRun:
 
 def test_the_recording_is_that_of_the_command_line(cracked: LaboratoryRun) -> None:
     """Sample by sample: the page must not show another machine than `gearsig simulate` writes."""
-    same = record(cracked.setup)
+    same = cracked.setup.record()
     assert np.array_equal(cracked.recording.samples, same.samples)
     assert cracked.recording.channel_names == same.channel_names
     assert cracked.recording.warnings == same.warnings

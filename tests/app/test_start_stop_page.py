@@ -6,7 +6,8 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 import app.dashboard
-from app.dashboard.laboratory.drive import HIGHEST, NUMBERS, VIEWS, DriveSetup
+from app.dashboard.laboratory.drive import FAULTS, NUMBERS, VIEWS
+from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup
 from sims.effects import EffectSetting
 
 MAIN = Path(app.dashboard.__file__).parent / "main.py"
@@ -52,8 +53,10 @@ def test_continuous_rotation_says_what_it_cannot_tell() -> None:
 
 
 def test_a_setup_names_its_files_and_makes_the_commands_recording() -> None:
-    setup = DriveSetup("manipulator_formula", 100.0, 95.0, (), (EffectSetting("backlash", 100.0),), 3.5)
-    assert setup.file_stem == "manipulator_formula_backlash"
+    setup = Setup(
+        "manipulator_formula", 100.0, 95.0, (), (EffectSetting("backlash", 100.0),), 3.5, 1000.0, model=DRIVE_MODEL
+    )
+    assert setup.file_stem == "manipulator_formula_backlash_100"
     recording = setup.record()
     assert recording.truth is not None
     assert recording.truth["backlash_um"] == 400.0
@@ -77,7 +80,7 @@ def test_the_laboratory_goes_back_to_pairs_that_run_on() -> None:
     assert "Kurtosis" in [metric.label for metric in page.metric]
 
 
-@pytest.mark.parametrize("name", HIGHEST)
+@pytest.mark.parametrize("name", FAULTS)
 def test_every_fault_at_the_end_of_its_slider_runs_or_says_why(name: str) -> None:
     page = opened()
     slider = page.sidebar.slider(key=f"lab severity of {name} of the drive")

@@ -2,110 +2,66 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import pandas as pd
 import streamlit as st
 
-from app.dashboard import state
-from app.dashboard.laboratory.run import ANALYSIS_ENDING, ENDINGS, chosen_of_files, files_of, zip_of
-from app.dashboard.laboratory.setup import DRIVE_MODEL, choose_number, effect_text, show_typed_toggle, shown_unit
-from app.dashboard.laboratory.views import show_metrics
+from app.dashboard.laboratory.run import faulty_of, show_saving
+from app.dashboard.laboratory.setup import (
+    DRIVE_MODEL,
+    Setup,
+    choose_number,
+    choose_parameter,
+    preset_number,
+    show_typed_toggle,
+    shown_unit,
+)
+from app.dashboard.laboratory.views import show_metrics, show_title
 from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import show_picture
-from app.dashboard.widgets.messages import show_error
+from gearsig import motion as motions
+from gearsig import plot
 from gearsig.checks import FloatArray
-from gearsig.errors import GearsigError, RefusalError
-from gearsig.gap.start_stop import cut_cycles
-from gearsig.motion import (
-    ForceEstimate,
-    PairMotion,
-    StartStop,
-    estimate_forces,
-    examine_start_stop,
-    measure_motion,
-)
-from gearsig.plot import force_figure, impacts_figure, start_stop_figure, start_stop_pair_figure
-from gearsig.recording import Recording
+from gearsig.errors import RefusalError
+from gearsig.gap.start_stop import PreparedCycles, cut_cycles
 from gearsig.rig import DAMPING_LAWS
-from sims import simulate
 from sims.effects import EffectSetting, effect
-from sims.forging import MODES, PARAMETERS
+from sims.forging import MODES
 from sims.presets import Preset
-from sims.simulator import ParameterValue, parameter
+
+CRACK = "root_crack"
 
 
 @dataclass(frozen=True)
-class DriveSetup:
-    """Everything that decides a run: equal setups give equal recordings.
+class Fault:
+    """An effect of the drive: the end of its slider, what it does, and where it sits if that can be chosen."""
 
-    Parameters
-    ----------
-    preset : str
-    speed_rpm, torque_nm : float
-        Of the pinion: what the flow allows, and the motor's.
-    parameters : tuple of (name, value)
-        What differs from the preset, in the healthy drive as well.
-    effects : tuple of EffectSetting
-    duration_s, sampling_rate_hz : float
-    """
-
-    preset: str
-    speed_rpm: float
-    torque_nm: float
-    parameters: tuple[tuple[str, ParameterValue], ...] = ()
-    effects: tuple[EffectSetting, ...] = ()
-    duration_s: float = 6.0
-    sampling_rate_hz: float = 1000.0
-
-    @property
-    def healthy(self) -> DriveSetup:
-        """The same drive without effects."""
-        return replace(self, effects=())
-
-    @property
-    def file_stem(self) -> str:
-        """Name of its files, without a dot."""
-        return "_".join([self.preset, *(setting.name for setting in self.effects)])
-
-    def record(self) -> Recording:
-        """Simulate the recording that the command line makes of the same settings."""
-        return simulate(
-            DRIVE_MODEL,
-            preset=self.preset,
-            parameters=dict(self.parameters),
-            effects=self.effects,
-            speed_rpm=self.speed_rpm,
-            torque_nm=self.torque_nm,
-            duration_s=self.duration_s,
-            sampling_rate_hz=self.sampling_rate_hz,
-        )
+    highest: float
+    about: str
+    option: str = ""
+    label: str = ""
+    last: int = 1
 
 
-# --------------------
-# The sidebar of the start–stop drive: machine, cycle, teeth, load, effects, measurement.
-# --------------------
-
-
-CRACK = "root_crack"
-HIGHEST = {CRACK: 2.0, "backlash": 500.0, "tooth_wear": 200.0, "sliding_friction": 0.2, "torque_ripple": 20.0}
-"""Ends of the sliders; the crack's is in modules."""
-WORDS = {
-    CRACK: "Pairs of the cracked tooth lose stiffness, on the drive flank, where the load opens the crack.",
-    "backlash": "Both flanks move apart: longer flights, harder impacts.",
-    "tooth_wear": "Worn off the drive flanks where it is most: at their ends, by sliding; nothing at the pitch point.",
-    "sliding_friction": "Coefficient of the flanks, beside the healthy one.",
-    "torque_ripple": "Pistons of the motor, part of its torque.",
+FAULTS = {
+    CRACK: Fault(
+        2.0,  # modules
+        "Pairs of the cracked tooth lose stiffness, on the drive flank, where the load opens the crack.",
+        "tooth",
+        "Cracked tooth of the pinion",
+        20,
+    ),
+    "backlash": Fault(500.0, "Both flanks move apart: longer flights, harder impacts."),
+    "tooth_wear": Fault(
+        200.0,
+        "Worn off the drive flanks where it is most: at their ends, by sliding; nothing at the pitch point.",
+    ),
+    "sliding_friction": Fault(0.2, "Coefficient of the flanks, beside the healthy one."),
+    "torque_ripple": Fault(20.0, "Pistons of the motor, part of its torque.", "order", "Ripples per revolution", 50),
 }
-PLACES = {
-    CRACK: ("tooth", "Cracked tooth of the pinion", 20),
-    "torque_ripple": ("order", "Ripples per revolution", 50),
-}
-"""Effects that sit somewhere: their option, its words, its highest value."""
-Parameters = list[tuple[str, ParameterValue]]
 
 
-def choose_drive(chosen: Preset) -> DriveSetup:
+def choose_drive(chosen: Preset) -> Setup:
     """Return what the user set; what is not offered is the preset's."""
     with st.sidebar:
         mode = st.segmented_control("Mode", MODES, default=MODES[0], key="mode of the drive", persist_state="session")
@@ -114,95 +70,72 @@ def choose_drive(chosen: Preset) -> DriveSetup:
             "Speed that the flow allows (rpm)", "speed of the drive", chosen.speed_rpm, 300.0, low=10.0
         )
         with st.expander("Teeth", icon=":material/settings:"):
-            values = _choose_teeth(chosen)
+            law = st.selectbox(
+                "Damping law",
+                DAMPING_LAWS,
+                index=DAMPING_LAWS.index(str(chosen.parameters.get("damping_law", DAMPING_LAWS[0]))),
+                key=f"law of {chosen.name}",
+                persist_state="session",
+                help="What they really give: 0.947, 0.954 and 0.952 for a restitution of 0.95; 0.470, 0.725 and 0.663 "
+                "for 0.5.",
+            )
+            values = [
+                ("damping_law", law),
+                choose_parameter(chosen, "restitution", "Restitution", 1.0, low=0.1),
+                choose_parameter(chosen, "half_backlash_um", "Half backlash (µm)", 500.0),
+                choose_parameter(chosen, "friction_coefficient", "Friction of the flanks", 0.3),
+            ]
         with st.expander("Brake, press and load", icon=":material/weight:"):
-            values += _choose_load(chosen)
+            values += [
+                choose_parameter(chosen, "brake_nm", "Brake (N·m)", 300.0),
+                choose_parameter(chosen, "press_nm", "Blow of the press (N·m)", 6000.0),
+                choose_parameter(chosen, "piece_mass_kg", "Mass of the piece (kg)", 2000.0),
+                choose_parameter(chosen, "piece_offset_mm", "Piece off centre (mm)", 200.0),
+                choose_parameter(chosen, "load_friction_nm", "Friction of the gripper (N·m)", 600.0),
+            ]
         st.markdown("**Faults** · *the healthy drive has none*")
-        effects = _choose_effects(chosen)
+        effects = [_choose_effect(name, chosen) for name in FAULTS]
         with st.expander("Measurement", icon=":material/sensors:"):
-            measured, duration, rate = _choose_measurement(chosen)
+            duration = choose_number("Length (s)", "length of the drive", 6.0, 30.0, low=3.5)
+            rates = (1000.0, 4000.0, 10000.0)
+            rate = st.selectbox("Sampling rate (Hz)", rates, format_func="{:g}".format, key="rate of the drive")
+            counts = st.select_slider(
+                "Counts of the encoders",
+                [2**bits for bits in range(10, 25, 2)],
+                value=2**20,
+                key="counts of the drive",
+                persist_state="session",
+            )
+            noise = choose_parameter(chosen, "angle_noise_urad", "Noise of the angles (µrad rms)", 200.0)
         show_typed_toggle()
-    values.append(("mode", mode or MODES[0]))
-    return DriveSetup(chosen.name, speed, torque, tuple(values + measured), tuple(effects), duration, rate)
-
-
-def _choose_teeth(chosen: Preset) -> Parameters:
-    law = st.selectbox(
-        "Damping law",
-        DAMPING_LAWS,
-        index=DAMPING_LAWS.index(str(chosen.parameters.get("damping_law", DAMPING_LAWS[0]))),
-        key=f"law of {chosen.name}",
-        persist_state="session",
-        help="What they really give: 0.947, 0.954 and 0.952 for a restitution of 0.95; 0.470, 0.725 and 0.663 for 0.5.",
+    values += [("encoder_counts", float(counts)), noise, ("mode", mode or MODES[0])]
+    return Setup(
+        chosen.name,
+        speed,
+        torque,
+        tuple(values),
+        tuple(setting for setting in effects if setting.severity > 0.0),
+        duration,
+        float(rate),
+        model=DRIVE_MODEL,
     )
-    return [
-        ("damping_law", law),
-        _value(chosen, "restitution", "Restitution", 1.0, low=0.1),
-        _value(chosen, "half_backlash_um", "Half backlash (µm)", 500.0),
-        _value(chosen, "friction_coefficient", "Friction of the flanks", 0.3),
-    ]
-
-
-def _choose_load(chosen: Preset) -> Parameters:
-    return [
-        _value(chosen, "brake_nm", "Brake (N·m)", 300.0),
-        _value(chosen, "press_nm", "Blow of the press (N·m)", 6000.0),
-        _value(chosen, "piece_mass_kg", "Mass of the piece (kg)", 2000.0),
-        _value(chosen, "piece_offset_mm", "Piece off centre (mm)", 200.0),
-        _value(chosen, "load_friction_nm", "Friction of the gripper (N·m)", 600.0),
-    ]
-
-
-def _choose_effects(chosen: Preset) -> list[EffectSetting]:
-    """Return the faults whose sliders do not stand at 0."""
-    settings = [_choose_effect(name, chosen) for name in HIGHEST]
-    return [setting for setting in settings if setting.severity > 0.0]
 
 
 def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
-    chosen_effect, high = effect(name), HIGHEST[name]
-    s = chosen_effect.severity
+    chosen_effect, fault = effect(name), FAULTS[name]
+    high, last = fault.highest, fault.last
     if name == CRACK:
-        high *= float(chosen.parameters.get("module_mm") or parameter(PARAMETERS, "module_mm").default or 1.0)
-    unit = shown_unit(s.unit)
+        high *= preset_number(chosen, "module_mm") or 1.0
+        last = int(preset_number(chosen, "teeth_driver") or last)
+    unit = shown_unit(chosen_effect.severity.unit)
     label = capitalised(chosen_effect.title) + (f" ({unit})" if unit else "")
-    severity = choose_number(label, f"severity of {name} of the drive", 0.0, high, about=WORDS[name])
-    if name not in PLACES or severity == 0.0:
+    severity = choose_number(label, f"severity of {name} of the drive", 0.0, high, about=fault.about)
+    if not fault.option or severity == 0.0:
         return EffectSetting(name, severity)
-    option, words, highest = PLACES[name]
-    if name == CRACK:
-        highest = int(float(chosen.parameters.get("teeth_driver") or highest))
-    default = next(int(float(o.default or 1)) for o in chosen_effect.options if o.name == option)
-    place = st.number_input(
-        words, 1, highest, min(default, highest), key=f"{option} of {name} of the drive", persist_state="session"
-    )
-    return EffectSetting(name, severity, {option: float(place)})
-
-
-def _choose_measurement(chosen: Preset) -> tuple[Parameters, float, float]:
-    duration = choose_number("Length (s)", "length of the drive", 6.0, 30.0, low=3.5)
-    rate = st.selectbox(
-        "Sampling rate (Hz)", (1000.0, 4000.0, 10000.0), format_func="{:g}".format, key="rate of the drive"
-    )
-    counts = st.select_slider(
-        "Counts of the encoders",
-        [2**bits for bits in range(10, 25, 2)],
-        value=2**20,
-        key="counts of the drive",
-        persist_state="session",
-    )
-    noise = _value(chosen, "angle_noise_urad", "Noise of the angles (µrad rms)", 200.0)
-    return [("encoder_counts", float(counts)), noise], duration, float(rate)
-
-
-def _value(chosen: Preset, name: str, label: str, high: float, *, low: float = 0.0) -> tuple[str, ParameterValue]:
-    own = chosen.parameters.get(name, parameter(PARAMETERS, name).default)
-    return name, choose_number(label, f"{name} of {chosen.name}", float(own or 0.0), high, low=low)
-
-
-# --------------------
-# A run of the start–stop drive, once for equal setups: recording, what its motion shows, the force from it.
-# --------------------
+    default = next(int(float(o.default or 1)) for o in chosen_effect.options if o.name == fault.option)
+    key = f"{fault.option} of {name} of the drive"
+    place = st.number_input(fault.label, 1, last, min(default, last), key=key, persist_state="session")
+    return EffectSetting(name, severity, {fault.option: float(place)})
 
 
 @dataclass(frozen=True)
@@ -211,20 +144,18 @@ class DriveRun:
 
     Parameters
     ----------
-    setup : DriveSetup
-    recording : Recording
-    examined : StartStop
-    force : ForceEstimate or None
+    setup : Setup
+    examined : motions.StartStop
+    force : motions.ForceEstimate or None
     refusal : str
         Why there is no force.
     curve_um : array or None
         Profile of the compression over the mesh cycle on the drive flank; None where nothing starts and stops.
     """
 
-    setup: DriveSetup
-    recording: Recording
-    examined: StartStop
-    force: ForceEstimate | None
+    setup: Setup
+    examined: motions.StartStop
+    force: motions.ForceEstimate | None
     refusal: str = ""
     curve_um: FloatArray | None = None
 
@@ -234,7 +165,7 @@ class DriveRun:
 
 
 @st.cache_resource(max_entries=12, show_spinner="Simulating …")
-def run_drive(setup: DriveSetup) -> DriveRun:
+def run_drive(setup: Setup) -> DriveRun:
     """Simulate, measure, examine.
 
     Raises
@@ -243,24 +174,17 @@ def run_drive(setup: DriveSetup) -> DriveRun:
         If a value does not fit.
     """
     recording = setup.record()
-    motion = measure_motion(recording)
+    motion = motions.measure_motion(recording)
     try:
-        force, refusal = estimate_forces(motion), ""
+        force, refusal = motions.estimate_forces(motion), ""
     except RefusalError as error:
         force, refusal = None, str(error)
-    return DriveRun(setup, recording, examine_start_stop(motion), force, refusal, _curve_um(motion))
-
-
-def _curve_um(motion: PairMotion) -> FloatArray | None:
     try:
-        return cut_cycles(motion).features().curve_um
+        cycles = PreparedCycles(cut_cycles(motion))
+        curve_um = cycles.features(cycles.every).contact.curve_um
     except RefusalError:
-        return None
-
-
-# --------------------
-# What the page of the start–stop drive shows: numbers beside the healthy drive's, pictures, impacts, files.
-# --------------------
+        curve_um = None
+    return DriveRun(setup, motions.examine_start_stop(motion), force, refusal, curve_um)
 
 
 NUMBERS = {
@@ -273,16 +197,6 @@ NUMBERS = {
 """Indicators on top of the page, with the unit for people."""
 TOGETHER = "Healthy beside faulty"
 VIEWS = ("Motion", "Force between the teeth", "Impacts", "Indicators")
-
-
-def show_numbers(healthy: DriveRun, faulty: DriveRun | None) -> None:
-    """Show the indicators, of the faulty drive with the healthy one's below."""
-    show_metrics(
-        {
-            name: (unit, healthy.number(name), None if faulty is None else faulty.number(name))
-            for name, unit in NUMBERS.items()
-        }
-    )
 
 
 def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
@@ -300,52 +214,23 @@ def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
             ) or "Faulty"  # fmt: skip
     run = healthy if faulty is None or which == "Healthy" else faulty
     if view == TOGETHER and faulty is not None:
-        _show_together(healthy, faulty)
-    elif view == VIEWS[1]:
-        _show_force(run)
-    elif view == VIEWS[2]:
-        _show_impacts(run)
-    elif view == VIEWS[3]:
-        st.dataframe(
-            pd.DataFrame([{"indicator": i.name, "value": i.value, "unit": i.unit} for i in run.examined.indicators]),
-            hide_index=True,
+        curves = None if healthy.curve_um is None or faulty.curve_um is None else (healthy.curve_um, faulty.curve_um)
+        words = (
+            "Healthy and faulty drive: speed, phase plane, torque over twist, drive flank over the mesh cycle, teeth"
         )
+        show_picture(plot.start_stop_pair_figure(healthy.examined, faulty.examined, curves_um=curves), words)
+    elif view == "Force between the teeth":
+        _show_force(run)
+    elif view == "Impacts":
+        _show_impacts(run)
+    elif view == "Indicators":
+        rows = [{"indicator": i.name, "value": i.value, "unit": i.unit} for i in run.examined.indicators]
+        st.dataframe(rows, hide_index=True)
     else:
-        _show_motion(run)
-    for text in run.examined.refusals:
-        st.caption(f":material/info: {as_typed(f'Cannot tell the {text}')}")
-    for text in run.examined.notes:
+        words = "Speed of the pinion with the impacts, phase plane of the teeth, torque over twist"
+        show_picture(plot.start_stop_figure(run.examined, title=run.setup.preset), words)
+    for text in (*(f"Cannot tell the {text}" for text in run.examined.refusals), *run.examined.notes):
         st.caption(f":material/info: {as_typed(text)}")
-
-
-def show_saving(run: DriveRun) -> None:
-    """Offer the files, and the way to the analysis page."""
-    with st.container(horizontal=True, horizontal_alignment="right"):
-        with st.popover("Save as recording", icon=":material/save:"):
-            ending = st.selectbox("Format", ENDINGS, key="ending of the drive", persist_state="session")
-            st.download_button(
-                "Download",
-                data=lambda: zip_of(files_of(run.recording, run.setup.file_stem, ending)),
-                file_name=f"{run.setup.file_stem}.zip",
-                mime="application/zip",
-                icon=":material/download:",
-                on_click="ignore",
-                type="primary",
-            )
-        if st.button("Open in the analysis page", icon=":material/troubleshoot:", key="analyse the drive"):
-            state.open_simulated(chosen_of_files(files_of(run.recording, run.setup.file_stem, ANALYSIS_ENDING)))
-            st.switch_page(state.ANALYSIS_PAGE)
-
-
-def _show_motion(run: DriveRun) -> None:
-    words = "Speed of the pinion with the impacts, phase plane of the teeth, torque over twist"
-    show_picture(start_stop_figure(run.examined, title=run.setup.preset), words)
-
-
-def _show_together(healthy: DriveRun, faulty: DriveRun) -> None:
-    curves = None if healthy.curve_um is None or faulty.curve_um is None else (healthy.curve_um, faulty.curve_um)
-    words = "Healthy and faulty drive: speed, phase plane, torque over twist, drive flank over the mesh cycle, teeth"
-    show_picture(start_stop_pair_figure(healthy.examined, faulty.examined, curves_um=curves), words)
 
 
 def _show_force(run: DriveRun) -> None:
@@ -353,7 +238,7 @@ def _show_force(run: DriveRun) -> None:
         st.info(as_typed(run.refusal))
         return
     words = "Force between the teeth: measured, piecewise model, Hunt–Crossley; below, the errors"
-    show_picture(force_figure(run.force, title=run.setup.preset), words)
+    show_picture(plot.force_figure(run.force, title=run.setup.preset), words)
     rows = [
         {
             "model": e.model,
@@ -363,7 +248,7 @@ def _show_force(run: DriveRun) -> None:
         }
         for e in run.force.errors
     ]
-    st.dataframe(pd.DataFrame(rows), hide_index=True)
+    st.dataframe(rows, hide_index=True)
 
 
 def _show_impacts(run: DriveRun) -> None:
@@ -371,7 +256,7 @@ def _show_impacts(run: DriveRun) -> None:
         st.info("No impacts were seen.")
         return
     motion = run.examined.motion
-    figure = impacts_figure(run.examined.impacts, motion.path.teeth[0], restitution=motion.contact.restitution)
+    figure = plot.impacts_figure(run.examined.impacts, motion.path.teeth[0], restitution=motion.contact.restitution)
     show_picture(figure, "Energy of the impacts over time and over the tooth, restitution over speed")
     rows = [
         {
@@ -384,33 +269,26 @@ def _show_impacts(run: DriveRun) -> None:
         }
         for i in run.examined.impacts
     ]
-    st.dataframe(pd.DataFrame(rows), hide_index=True)
+    st.dataframe(rows, hide_index=True)
 
 
 def show_drive(preset: Preset) -> None:
     """Choose, simulate, show."""
     setup = choose_drive(preset)
-    healthy = run_drive(setup.healthy)
-    faulty = faulty_run(setup)
+    healthy, faulty = run_drive(setup.healthy), faulty_of(setup, run_drive)
     head, buttons = st.columns((3, 2), vertical_alignment="top")
     with head:
-        titles = [effect_text(setting) for setting in setup.effects] if faulty else []
-        title = " + ".join(titles)
-        st.subheader(as_typed(capitalised(title) or "Healthy: nothing is switched on"), anchor=False)
+        show_title(setup, is_shown=faulty is not None)
         st.caption(
             "Forging manipulator: pinion and wheel with gripper and piece. Every number is read from the recording, as "
             "of a measured one."
         )
     with buttons:
-        show_saving(faulty or healthy)
-    show_numbers(healthy, faulty)
+        show_saving(setup if faulty else setup.healthy)
+    show_metrics(
+        {
+            name: (unit, healthy.number(name), None if faulty is None else faulty.number(name))
+            for name, unit in NUMBERS.items()
+        }
+    )
     show_views(healthy, faulty)
-
-
-def faulty_run(setup: DriveSetup) -> DriveRun | None:
-    """Return the run with effects; None, with the reason on the page, where there is none."""
-    try:
-        return run_drive(setup) if setup.effects else None
-    except GearsigError as error:
-        show_error(error)
-        return None

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TypeVar
 
 import numpy as np
 import streamlit as st
@@ -17,7 +18,9 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.laboratory.setup import MODEL, Setup
 from app.dashboard.state import AnalysisRequest, Chosen
+from app.dashboard.widgets.messages import show_error
 from gearsig.checks import FloatArray
+from gearsig.errors import GearsigError
 from gearsig.plot import Cursor, order_cursors
 from gearsig.recording import Recording
 from gearsig.rig import Rig, order_lines
@@ -27,6 +30,7 @@ from sims.gear_pair import build_rig
 from sims.machine import Machine, Operation
 from sims.reduced_fe import FlexiblePair, FlexResponse
 
+R = TypeVar("R")
 MOTION = (
     "driver angle",
     "driven angle",
@@ -91,59 +95,39 @@ def run_setup(setup: Setup) -> LaboratoryRun:
         If a value is out of its range, or the machine allows less.
     """
     from sims.cracked import CrackedPair
-
-    if setup.model != MODEL:
-        return _run_flexible(setup)
-    operation = Operation.steady(setup.speed_rpm, setup.torque_nm)
-    rng = np.random.default_rng(setup.seed)
-    ready = CrackedPair().prepare(
-        dict(setup.parameters),
-        setup.effects,
-        operation,
-        rng,
-        preset_name=setup.preset,
-        sampling_rate_hz=setup.sampling_rate_hz,
-    )
-    recording, response = simulate_with_motion(
-        ready.machine,
-        operation,
-        rng=rng,
-        sampling_rate_hz=setup.sampling_rate_hz,
-        duration_s=setup.duration_s,
-        rig=build_rig(ready.machine, operation, name=f"simulated: {setup.preset}"),
-        truth=ready.truth(),
-        also=MOTION,
-    )
-    return LaboratoryRun(setup, ready.machine, recording, _shown_part(response, setup.duration_s))
-
-
-def _run_flexible(setup: Setup) -> LaboratoryRun:
-    """Simulate the pair of finite-element gears."""
     from sims.reduced_fe import ReducedPair, simulate_pair
 
-    operation = Operation.steady(setup.speed_rpm, setup.torque_nm)
-    rng = np.random.default_rng(setup.seed)
-    ready = ReducedPair().prepare(
-        dict(setup.parameters),
-        setup.effects,
-        operation,
-        rng,
-        preset_name=setup.preset,
-        sampling_rate_hz=setup.sampling_rate_hz,
-    )
-    machine = ready.pair.machine
-    recording, response = simulate_pair(
-        ready.pair,
+    operation, rng = Operation.steady(setup.speed_rpm, setup.torque_nm), np.random.default_rng(setup.seed)
+    rate_hz, duration_s = setup.sampling_rate_hz, setup.duration_s
+    asked = (dict(setup.parameters), setup.effects, operation, rng)
+    rig_name = f"simulated: {setup.preset}"
+    if setup.model == MODEL:
+        ready = CrackedPair().prepare(*asked, preset_name=setup.preset, sampling_rate_hz=rate_hz)
+        recording, response = simulate_with_motion(
+            ready.machine,
+            operation,
+            rng=rng,
+            sampling_rate_hz=rate_hz,
+            duration_s=duration_s,
+            rig=build_rig(ready.machine, operation, name=rig_name),
+            truth=ready.truth(),
+            also=MOTION,
+        )
+        return LaboratoryRun(setup, ready.machine, recording, _shown_part(response, duration_s))
+    flexible = ReducedPair().prepare(*asked, preset_name=setup.preset, sampling_rate_hz=rate_hz)
+    pair, machine = flexible.pair, flexible.pair.machine
+    recording, bent = simulate_pair(
+        pair,
         operation,
         rng=rng,
-        sampling_rate_hz=setup.sampling_rate_hz,
-        duration_s=setup.duration_s,
-        rig=build_rig(machine, operation, name=f"simulated: {setup.preset}"),
-        truth=ready.truth(),
-        step_s=ready.step_s,
+        sampling_rate_hz=rate_hz,
+        duration_s=duration_s,
+        rig=build_rig(machine, operation, name=rig_name),
+        truth=flexible.truth(),
+        step_s=flexible.step_s,
         also=MOTION,
     )
-    return LaboratoryRun(setup, machine, recording, _shown_part(response, setup.duration_s), ready.pair)
+    return LaboratoryRun(setup, machine, recording, _shown_part(bent, duration_s), pair)
 
 
 def _shown_part(response: Response | FlexResponse, duration_s: float) -> Response:
@@ -167,45 +151,37 @@ def times_of(run: LaboratoryRun, phase: FloatArray, wanted: FloatArray | Sequenc
     return result
 
 
-# --------------------
-# Simulations, done once for equal setups and shared between sessions; the number kept is bounded.
-# --------------------
-
-
-N_RUNS = 12
-"""Each holds some MB: a recording and eight signals of the motion at 80 kHz."""
+_ready: list[bool] = []
 
 
 def simulated(setup: Setup) -> LaboratoryRun:
-    """Return the run of a setup; it is frozen, so that sessions may share it.
+    """Return the run of a setup, simulated once; it is frozen, so that sessions may share it.
 
     Raises
     ------
     InputError
         If a value is out of its range, or the machine allows less.
     """
-    words = "Simulating …" if _is_ready() else "Preparing the simulator; the first time takes half a minute …"
+    words = "Simulating …" if _ready else "Preparing the simulator; the first time takes half a minute …"
     with st.spinner(words, show_time=True):
         run = _cached(setup)
     _ready.append(True)
     return run
 
 
-@st.cache_resource(max_entries=N_RUNS, show_spinner=False)
+# Each holds some MB: a recording and eight signals of the motion at 80 kHz.
+@st.cache_resource(max_entries=12, show_spinner=False)
 def _cached(setup: Setup) -> LaboratoryRun:
     return run_setup(setup)
 
 
-_ready: list[bool] = []
-
-
-def _is_ready() -> bool:
-    return bool(_ready)
-
-
-# --------------------
-# Where theory expects what is switched on: lines of the spectra, and the moments a faulty tooth enters the mesh.
-# --------------------
+def faulty_of(setup: Setup, simulate: Callable[[Setup], R]) -> R | None:
+    """Return the run with every effect complete; None, with the reason on the page if there is one, without."""
+    try:
+        return None if setup.is_healthy else simulate(replace(setup, effects=completed(setup.effects)))
+    except GearsigError as error:
+        show_error(error)
+        return None
 
 
 N_MESH_HARMONICS, N_SIDEBANDS, N_BEARING_HARMONICS, N_SHAFT_HARMONICS = 5, 3, 4, 8
@@ -294,34 +270,30 @@ def entries(run: LaboratoryRun) -> tuple[Cursor, ...]:
     return tuple(found)
 
 
-def with_complete_effects(setup: Setup) -> Setup:
-    """Return the setup with every option of its effects that has a default."""
-    return replace(setup, effects=completed(setup.effects))
-
-
-# --------------------
-# The simulated machine as a recording: files to keep, or straight to the analysis page.
-# --------------------
-
-
 ENDINGS = (".h5", ".csv", ".parquet", ".mat", ".wav")
-LENGTHS_S = (2.0, 5.0, 10.0, 20.0)
-ANALYSIS_ENDING = ".h5"
 
 
-def show_saving(setup: Setup) -> None:
-    """Offer the files, and the way to the analysis page."""
+def show_saving(setup: Setup, lengths_s: Sequence[float] = ()) -> None:
+    """Offer the simulated recording as files, and the way to the analysis page.
+
+    Parameters
+    ----------
+    setup : Setup
+    lengths_s : sequence of float
+        Lengths to choose from; empty: the setup's own.
+    """
     with st.container(horizontal=True, horizontal_alignment="right"):
         with st.popover("Save as recording", icon=":material/save:"):
-            length = st.segmented_control(
-                "Length (s)", LENGTHS_S, default=5.0, key="length of the saved recording", persist_state="session"
-            )
+            if lengths_s:
+                length = st.segmented_control(
+                    "Length (s)", lengths_s, default=5.0, key="length of the saved recording", persist_state="session"
+                )
+                setup = replace(setup, duration_s=float(length or 5.0))
             ending = st.selectbox("Format", ENDINGS, key="ending of the saved recording", persist_state="session")
             twin = st.toggle("With its healthy twin", key="twin of the saved recording", persist_state="session")
-            kept = replace(setup, duration_s=float(length or 5.0))
             st.download_button(
                 "Download",
-                data=lambda: zipped((kept, kept.healthy) if twin else (kept,), ending),
+                data=lambda: zipped((setup, setup.healthy) if twin else (setup,), ending),
                 file_name=f"{setup.file_stem}.zip",
                 mime="application/zip",
                 icon=":material/download:",
@@ -331,67 +303,32 @@ def show_saving(setup: Setup) -> None:
             st.caption("A zip with the recording, its rig file, and what was put in (truth).")
         if st.button("Open in the analysis page", icon=":material/troubleshoot:"):
             with st.spinner("Simulating the recording …"):
-                state.open_simulated(chosen_of(replace(setup, duration_s=float(length or 5.0))))
+                state.open_simulated(chosen_of(setup))
             st.switch_page(state.ANALYSIS_PAGE)
-
-
-def record(setup: Setup) -> Recording:
-    """Simulate the recording that the command line makes of the same settings."""
-    from sims import simulate
-
-    return simulate(
-        setup.model,
-        preset=setup.preset,
-        parameters=dict(setup.parameters),
-        effects=setup.effects,
-        speed_rpm=setup.speed_rpm,
-        torque_nm=setup.torque_nm,
-        duration_s=setup.duration_s,
-        sampling_rate_hz=setup.sampling_rate_hz,
-        seed=setup.seed,
-    )
 
 
 def zipped(setups: tuple[Setup, ...], ending: str) -> bytes:
     """Return a zip file with recording, rig file and truth of each setup."""
-    return zip_of({name: content for setup in _distinct(setups) for name, content in files(setup, ending).items()})
-
-
-def zip_of(contents: dict[str, bytes]) -> bytes:
-    """Return files as one zip file."""
     buffer = BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in contents.items():
-            archive.writestr(name, content)
+        for place, setup in enumerate(setups):
+            for name, content in files(setup, ending).items() if setup not in setups[:place] else ():
+                archive.writestr(name, content)
     return buffer.getvalue()
 
 
 def files(setup: Setup, ending: str) -> dict[str, bytes]:
     """Return recording, rig file and truth, in this order, by file name."""
-    return files_of(record(setup), setup.file_stem, ending)
-
-
-def files_of(recording: Recording, stem: str, ending: str) -> dict[str, bytes]:
-    """Return a simulated recording, its rig file and its truth, in this order, by file name."""
     from sims.files import file_set, write_set
 
     with TemporaryDirectory(prefix="gearsig-") as folder:
-        names = file_set(Path(folder) / f"{stem}{ending}")
-        write_set(recording, names)
+        names = file_set(Path(folder) / f"{setup.file_stem}{ending}")
+        write_set(setup.record(), names)
         return {path.name: path.read_bytes() for path in names}
 
 
 def chosen_of(setup: Setup) -> Chosen:
-    """Return the recording as the analysis page takes an upload."""
-    return chosen_of_files(files(setup, ANALYSIS_ENDING))
-
-
-def chosen_of_files(contents: dict[str, bytes]) -> Chosen:
-    """Return recording and rig file as the analysis page takes an upload."""
-    (name, content), (rig_name, rig), _ = contents.items()
+    """Return the recording and its rig file as the analysis page takes an upload."""
+    (name, content), (rig_name, rig), _ = files(setup, ".h5").items()
     request = AnalysisRequest(name, sha256(content).hexdigest(), rig_name, rig.decode("utf-8"))
     return Chosen(request, memoryview(content))
-
-
-def _distinct(setups: tuple[Setup, ...]) -> tuple[Setup, ...]:
-    return tuple(setup for place, setup in enumerate(setups) if setup not in setups[:place])

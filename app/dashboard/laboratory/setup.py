@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import streamlit as st
 
+import sims
 from app.dashboard.theme import capitalised
 from gearsig.errors import InputError
+from gearsig.recording import Recording
 from sims.effects import Effect, EffectSetting, Option, effect, effects
 from sims.presets import Preset, preset, presets
 from sims.registry import simulator
@@ -46,7 +48,7 @@ class Setup:
     seed : int
         The same for the healthy twin, so that the two differ by the effects only.
     model : str
-        One of `MODELS`.
+        One of `MODELS`, or `DRIVE_MODEL`.
     """
 
     preset: str
@@ -74,6 +76,20 @@ class Setup:
         """Of the input shaft."""
         return self.speed_rpm / 60.0
 
+    def record(self) -> Recording:
+        """Simulate the recording that the command line makes of the same settings."""
+        return sims.simulate(
+            self.model,
+            preset=self.preset,
+            parameters=dict(self.parameters),
+            effects=self.effects,
+            speed_rpm=self.speed_rpm,
+            torque_nm=self.torque_nm,
+            duration_s=self.duration_s,
+            sampling_rate_hz=self.sampling_rate_hz,
+            seed=self.seed,
+        )
+
     @property
     def file_stem(self) -> str:
         """Name of its files, without a dot: preset and effects.
@@ -99,11 +115,6 @@ def shown_unit(unit: str) -> str:
     from gearsig.plot import unit_text
 
     return unit_text(severity_unit(unit))
-
-
-# --------------------
-# A number of the page: a slider over the usual range, or typed, without any bounds but the simulator's.
-# --------------------
 
 
 PREFIX, SUFFIX, TYPED = "lab ", " typed", "lab typed values"
@@ -150,6 +161,19 @@ def choose_number(label: str, name: str, default: float, high: float, *, low: fl
     return float(st.slider(label, *ends, step=step, format="%g", key=key, help=about or None, persist_state="session"))
 
 
+def choose_parameter(
+    preset: Preset, name: str, label: str, high: float, *, low: float = 0.0
+) -> tuple[str, ParameterValue]:
+    """Return a parameter's name and the number that the user chooses, at first the preset's or the model's default."""
+    return name, choose_number(label, f"{name} of {preset.name}", preset_number(preset, name), high, low=low)
+
+
+def preset_number(preset: Preset, name: str) -> float:
+    """Return a number of the preset, or else the model's default."""
+    value = preset.parameters.get(name, parameter(simulator(preset.model).parameters, name).default)
+    return float(value or 0.0)
+
+
 def slider_step(low: float, high: float) -> float:
     """Return the step of a slider: some 150 of them from end to end."""
     return nice_step((high - low) / 150.0)
@@ -179,11 +203,6 @@ def _carry_over() -> None:
             st.session_state[key.removesuffix(SUFFIX)] = value
         elif typed and not key.endswith(SUFFIX):
             st.session_state[key + SUFFIX] = value
-
-
-# --------------------
-# How far a machine lets an effect go: where its slider ends.
-# --------------------
 
 
 Options = tuple[tuple[str, float | str], ...]
@@ -253,11 +272,6 @@ def _machine(model: str, preset_name: str) -> tuple[Machine, tuple[ReducedGear, 
     return pair.machine, pair.gears
 
 
-# --------------------
-# Sliders of the effects: severity with unit and a typical value, options on demand.
-# --------------------
-
-
 CRACK = "root_crack"
 WIDEST = 5.0
 """Sliders end at so many times the typical value: the catalogue's ranges reach far beyond it. Where the machine ends
@@ -272,31 +286,28 @@ GROUP_WORDS = {
 }
 
 
-def choose_crack(preset: Preset) -> list[EffectSetting]:
-    """Return the root crack, whose slider is always there; none while it stands at 0."""
-    setting = _choose_severity(effect(CRACK), preset, start=0.0)
-    return [setting] if setting.severity != 0 else []
-
-
 def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSetting]:
-    """Return the other effects that the user switched on, of those the model knows; each at its typical value first."""
-    known = {name: known for name, known in effects().items() if name in meaningful}
+    """Return the effects that are on, of those the model knows.
+
+    The root crack's slider is always there, and stands at 0 first; others start at their typical value.
+    """
+    crack = _choose_severity(effect(CRACK), preset, start=0.0)
+    others = {name: known for name, known in effects().items() if name in meaningful and name != CRACK}
     names = st.multiselect(
         "More effects",
-        [name for name in known if name != CRACK],
-        format_func=_shown_name,
+        list(others),
+        format_func=lambda name: f"{GROUP_WORDS.get(others[name].group, others[name].group)}: {others[name].title}",
         key="effects of the laboratory",
         placeholder="Choose what is wrong …",
         persist_state="session",
         help="Any number at once. Each gets a slider of its own.",
     )
-    ordered = [known[name] for name in known if name in names]
-    return [_choose_severity(each, preset, start=each.severity.typical) for each in ordered]
-
-
-def _shown_name(name: str) -> str:
-    shown = effect(name)
-    return f"{GROUP_WORDS.get(shown.group, shown.group)}: {shown.title}"
+    chosen = [
+        _choose_severity(other, preset, start=other.severity.typical)
+        for other in others.values()
+        if other.name in names
+    ]
+    return [crack, *chosen] if crack.severity != 0 else chosen
 
 
 def _choose_severity(chosen: Effect, preset: Preset, *, start: float) -> EffectSetting:
@@ -315,7 +326,8 @@ def _choose_severity(chosen: Effect, preset: Preset, *, start: float) -> EffectS
     options: dict[str, float | str] = {}
     if chosen.options and severity != 0:
         with st.expander("Where and how", icon=":material/tune:"):
-            options = _choose_options(chosen)
+            values = {option.name: _choose_option(option, _option_key(chosen, option)) for option in chosen.options}
+        options = {name: value for name, value in values.items() if value is not None}
     return EffectSetting(chosen.name, severity, options)
 
 
@@ -329,13 +341,8 @@ def _option_key(of: Effect, option: Option) -> str:
     return f"{option.name} of {of.name}"
 
 
-def _choose_options(of: Effect) -> dict[str, float | str]:
-    """Return the options; one that is left to be drawn is not in it."""
-    values = {option.name: _choose_option(option, _option_key(of, option)) for option in of.options}
-    return {name: value for name, value in values.items() if value is not None}
-
-
 def _choose_option(option: Option, key: str) -> float | str | None:
+    """Return the value of an option; None where it is left to be drawn."""
     unit = shown_unit(option.unit)
     words = option.name.removesuffix("_deg").removesuffix("_percent").removesuffix("_um").removesuffix("_hz")
     label = words.replace("_", " ").capitalize() + (f" ({unit})" if unit else "")
@@ -349,11 +356,6 @@ def _choose_option(option: Option, key: str) -> float | str | None:
         return float(st.number_input(label, min_value=int(option.low or 0), value=value, step=1, **looks))  # type: ignore[call-overload]
     number = st.number_input(label, value=option.default, placeholder="drawn", format="%g", **looks)  # type: ignore[call-overload]
     return None if number is None else float(number)
-
-
-# --------------------
-# The sidebar of the laboratory: machine and operating point, flanks and oil, faults, measurement.
-# --------------------
 
 
 Parameters = tuple[tuple[str, ParameterValue], ...]
@@ -370,7 +372,7 @@ def choose_setup(preset: Preset) -> Setup:
         with st.expander("Flanks and oil", icon=":material/opacity:"):
             parameters = _choose_flanks(preset)
         st.markdown("**Faults** · *the healthy twin has none*")
-        switched_on = (*choose_crack(preset), *choose_effects(preset, simulator(preset.model).effects))
+        switched_on = tuple(choose_effects(preset, simulator(preset.model).effects))
         with st.expander("Measurement", icon=":material/sensors:"):
             measured, duration, rate, seed = _choose_measurement(preset, speed)
         show_typed_toggle()
@@ -417,25 +419,17 @@ def _choose_operation(preset: Preset) -> tuple[float, float]:
 
 def _choose_flanks(preset: Preset) -> Parameters:
     st.caption("Of the healthy and the faulty machine alike.")
-    rough = choose_number(
-        "Flank roughness, rms (µm)", f"roughness of {preset.name}", _preset_number(preset, "roughness_um"), 2.0
-    )
-    if not _has(preset, "friction"):
-        return (("roughness_um", rough),)
-    oil = choose_number(
-        "Oil viscosity at the inlet (cP)",
-        f"oil of {preset.name}",
-        _preset_number(preset, "viscosity_cp"),
-        100.0,
-        low=1.0,
-    )
+    rough = choose_parameter(preset, "roughness_um", "Flank roughness, rms (µm)", 2.0)
+    if not any(p.name == "friction" for p in simulator(preset.model).parameters):
+        return (rough,)
+    oil = choose_parameter(preset, "viscosity_cp", "Oil viscosity at the inlet (cP)", 100.0, low=1.0)
     friction = st.toggle(
         "Sliding friction",
         value=preset.parameters.get("friction", "on") == "on",
         key=f"friction of {preset.name}",
         persist_state="session",
     )
-    return ("roughness_um", rough), ("viscosity_cp", oil), ("friction", "on" if friction else "off")
+    return rough, oil, ("friction", "on" if friction else "off")
 
 
 def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float, float, int]:
@@ -455,8 +449,8 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
         format_func="{:g}".format,
         key="rate of the laboratory",
     )
-    usual = _preset_number(preset, "noise_mps2")
-    noise = choose_number("Background noise, rms (m/s²)", f"noise of {preset.name}", usual, max(2.0, 4.0 * usual))
+    loudest = max(2.0, 4.0 * preset_number(preset, "noise_mps2"))
+    noise = choose_parameter(preset, "noise_mps2", "Background noise, rms (m/s²)", loudest)
     seed = st.number_input(
         "Seed",
         min_value=0,
@@ -466,26 +460,13 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
         persist_state="session",
         help="Another one draws other roughness, other noise, other angles. Healthy and faulty always share it.",
     )
-    limit = choose_number(
-        "Range of the sensors (m/s²)", f"range of {preset.name}", _preset_number(preset, "sensor_range_mps2"), 5e3
-    )
-    measured: Parameters = (("noise_mps2", noise), ("sensor_range_mps2", limit))
+    limit = choose_parameter(preset, "sensor_range_mps2", "Range of the sensors (m/s²)", 5e3)
     length = float(duration) if isinstance(duration, float) else automatic_s(preset, speed)
-    return measured, length, float(rate), int(seed)
+    return (noise, limit), length, float(rate), int(seed)
 
 
 def automatic_s(preset: Preset, speed_rpm: float) -> float:
     """Return the shortest of `DURATIONS_S` that shows enough revolutions, or the longest that is still quick."""
-    ratio = _preset_number(preset, "teeth_driver") / _preset_number(preset, "teeth_driven")
+    ratio = preset_number(preset, "teeth_driver") / preset_number(preset, "teeth_driven")
     eight_revolutions_s = 8.0 * 60.0 / max(speed_rpm * min(ratio, 1.0), 1e-6)
     return next((d for d in DURATIONS_S if eight_revolutions_s <= d < MAX_AUTOMATIC_S), MAX_AUTOMATIC_S)
-
-
-def _preset_number(preset: Preset, name: str) -> float:
-    """Return a number of the preset, or else the model's default."""
-    value = preset.parameters.get(name, parameter(simulator(preset.model).parameters, name).default)
-    return float(value or 0.0)
-
-
-def _has(preset: Preset, name: str) -> bool:
-    return any(p.name == name for p in simulator(preset.model).parameters)

@@ -4,42 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import streamlit as st
 
+from app.dashboard.laboratory import run as runs
 from app.dashboard.laboratory.bifurcation import show_safely
-from app.dashboard.laboratory.run import (
-    LaboratoryRun,
-    bearing_lines_hz,
-    entries,
-    envelope_cursors,
-    faulty_teeth,
-    lines_per_period,
-    shaft_lines_hz,
-    spectrum_cursors,
-    times_of,
-)
-from app.dashboard.laboratory.setup import effect_text
+from app.dashboard.laboratory.run import LaboratoryRun
+from app.dashboard.laboratory.setup import Setup, effect_text
 from app.dashboard.theme import as_typed, capitalised, palette
-from app.dashboard.widgets.charts import CONFIG, Axes, ChartLine, padded_limits, show_lines
+from app.dashboard.widgets.charts import FAULT, MEASURED, Axes, ChartLine, padded_limits, show_chart, show_lines
+from app.dashboard.widgets.spectrum import show_spectrum
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.indicators import crest_factor, kurtosis, rms
-from gearsig.plot import Cursor, above_zero, envelope, thin, with_unit
+from gearsig.plot import Cursor, thin
 from gearsig.recording import Recording
 from gearsig.spectra import Spectrum, amplitude_spectrum, band_envelope, envelope_spectrum
-from sims.effects import EffectSetting, effect
+from sims.effects import effect
 from sims.mesh import mesh_stiffness
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
-
-
-# --------------------
-# Signals over time: healthy beside faulty on one scale, and what the effect adds.
-# --------------------
 
 
 HEIGHT_PX = 300
@@ -79,12 +66,12 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     st.markdown("**What the effect adds**: faulty less healthy")
     difference = faulty_line[1] - healthy_line[1]
     axes = Axes("time (s)", label, (0.0, end), padded_limits([difference]))
-    _show_line((healthy_line[0], difference), "difference", axes, cursors=entries(faulty), height_px=HEIGHT_PX)
+    _show_line((healthy_line[0], difference), "difference", axes, cursors=runs.entries(faulty), height_px=HEIGHT_PX)
 
 
 def _show_line(line: tuple[FloatArray, FloatArray], name: str, axes: Axes, **looks: Any) -> None:
-    colour: Literal["measured", "fault"] = "measured" if name == "healthy" else "fault"
-    show_lines([ChartLine(*thin(*line, 3000), name, colour=colour)], axes, f"time of {name}", **looks)
+    colour = MEASURED if name == "healthy" else FAULT
+    show_lines([ChartLine(*thin(*line, 3000), name, colour)], axes, f"time of {name}", **looks)
 
 
 def signal_of(run: LaboratoryRun, name: str, end_s: float) -> tuple[tuple[FloatArray, FloatArray], str]:
@@ -106,11 +93,6 @@ def _shown(name: str) -> str:
 def _end_s(run: LaboratoryRun, revolutions: float) -> float:
     turns = run.setup.revolutions_per_s
     return min(revolutions / turns if turns > 0 else float("inf"), run.setup.duration_s)
-
-
-# --------------------
-# The band whose envelope shows expected lines best: the answer is known here, so the choice may use it.
-# --------------------
 
 
 def telling_band_hz(recording: Recording, channel: str, expected_hz: Sequence[float]) -> tuple[float, float]:
@@ -154,54 +136,34 @@ def _height(values: FloatArray, rate_hz: float, band_hz: tuple[float, float], li
     return sum(heights) / floor
 
 
-# --------------------
-# Spectra of both machines over each other: amplitude with mesh and sideband marks, envelope with bearing marks.
-# --------------------
-
-
-N_COLUMNS = 1500
-KIND_NAMES = {
-    "mesh": "mesh",
-    "sideband": "sidebands",
-    "shaft": "shafts",
-    "bearing": "bearings",
-    "finding": "mains",
-}
-ENVELOPE_SHAFTS = 12.0
-"""Envelope spectra first show so many revolutions of the input shaft, or all marked bearing lines."""
-
-
 def show_amplitude(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
     """Show the amplitude spectra of a channel."""
-    runs = _runs(healthy, faulty)
-    spectra = [amplitude_spectrum(run.recording, channel) for run in runs]
-    cursors = spectrum_cursors(runs[-1])
+    both = [healthy] if faulty is None else [healthy, faulty]
+    spectra = [amplitude_spectrum(run.recording, channel) for run in both]
+    cursors = runs.spectrum_cursors(both[-1])
     mesh = max((c.position for c in cursors if c.kind == "mesh"), default=0.0)
-    _show_spectra(spectra, cursors, "spectrum", logarithmic=True, first_end=1.04 * mesh)
+    _show_spectra(spectra, cursors, "spectrum", "amplitude", "Logarithmic", 1.04 * mesh)
 
 
 def show_envelope(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
     """Show the spectra of the envelope about the band in which the marked lines stand out most."""
-    runs = _runs(healthy, faulty)
-    cursors = envelope_cursors(runs[-1])
+    both = [healthy] if faulty is None else [healthy, faulty]
+    cursors = runs.envelope_cursors(both[-1])
     marked = [c.position for c in cursors if c.kind == "bearing"]
     try:
-        band = telling_band_hz(runs[-1].recording, channel, marked or shaft_lines_hz(runs[-1]))
+        band = telling_band_hz(both[-1].recording, channel, marked or runs.shaft_lines_hz(both[-1]))
     except RefusalError as error:
         st.info(f"There is no envelope spectrum: {error}")
         return
-    spectra = [_envelope_spectrum(run.recording, channel, band) for run in runs]
+    spectra = [_envelope_spectrum(run.recording, channel, band) for run in both]
     lines = "defect" if marked else "shaft"
     st.markdown(
         f"Squared envelope of {channel} in the band **{band[0]:.0f} to {band[1]:.0f} Hz**, "
         f"where the lines of the {lines} stand out most."
     )
-    end = max([ENVELOPE_SHAFTS * healthy.setup.revolutions_per_s, *(1.08 * f for f in marked)])
-    _show_spectra(spectra, cursors, "envelope", logarithmic=False, first_end=end)
-
-
-def _runs(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> list[LaboratoryRun]:
-    return [healthy] if faulty is None else [healthy, faulty]
+    # at first 12 revolutions of the input shaft, or all marked bearing lines
+    end = max([12.0 * healthy.setup.revolutions_per_s, *(1.08 * f for f in marked)])
+    _show_spectra(spectra, cursors, "envelope", "squared envelope", "Linear", end)
 
 
 def _envelope_spectrum(recording: Recording, channel: str, band_hz: tuple[float, float]) -> Spectrum:
@@ -210,58 +172,20 @@ def _envelope_spectrum(recording: Recording, channel: str, band_hz: tuple[float,
 
 
 def _show_spectra(
-    spectra: Sequence[Spectrum], cursors: Sequence[Cursor], name: str, *, logarithmic: bool, first_end: float
+    spectra: Sequence[Spectrum], cursors: Sequence[Cursor], name: str, quantity: str, scale: str, first_end: float
 ) -> None:
-    kinds = [kind for kind in KIND_NAMES if any(c.kind == kind for c in cursors)]
-    left, right = st.columns(2)
-    chosen = left.pills(
-        "Marked",
-        kinds,
-        default=kinds,
-        selection_mode="multi",
-        format_func=KIND_NAMES.__getitem__,
-        key=f"{name} marks {kinds} of the laboratory",
+    """Show both over each other, at first up to what is marked; another machine or speed begins anew."""
+    end = min(first_end, float(spectra[0].positions[-1])) or float(spectra[0].positions[-1])
+    show_spectrum(
+        "the laboratory",
+        spectra,
+        cursors,
+        f"{name}, first {first_end:.4g}",
+        names=("healthy", "faulty"),
+        shown=(0.0, end),
+        scale=scale,
+        quantity=quantity,
     )
-    end = float(spectra[0].positions[-1])
-    limits = right.slider(
-        "Frequency shown (Hz)",
-        0.0,
-        end,
-        (0.0, min(first_end, end) or end),
-        step=end / 1000.0,
-        format="%.5g",
-        key=f"{name} range to {end:g}, first {first_end:.4g}",
-    )
-    if limits[1] <= limits[0]:
-        limits = (0.0, end)
-    lines = [_line(s, limits, i, logarithmic=logarithmic) for i, s in enumerate(spectra)]
-    highest = max(float(line.y.max()) for line in lines)
-    lowest = min(float(np.percentile(line.y, 2)) for line in lines) if logarithmic else 0.0
-    axes = Axes(
-        "frequency (Hz)",
-        with_unit("amplitude" if logarithmic else "squared envelope", spectra[0].unit),
-        limits,
-        (max(lowest, 1e-7 * highest) / 2, 2 * highest) if logarithmic else (0.0, 1.06 * highest or 1.0),
-        logarithmic=logarithmic,
-    )
-    # The faulty machine lies behind: it shows where it stands above the healthy one.
-    show_lines(lines[::-1], axes, f"{name} of the laboratory", cursors=[c for c in cursors if c.kind in chosen])
-    resolution = spectra[0].resolution
-    st.caption(f"Resolution {resolution:.3g} Hz, {spectra[0].window} window. A longer signal refines it.")
-
-
-def _line(spectrum: Spectrum, limits: tuple[float, float], place: int, *, logarithmic: bool) -> ChartLine:
-    start, stop = spectrum.index_of(limits[0]), spectrum.index_of(limits[1]) + 1
-    start = max(start, 2)  # an offset is no vibration
-    stop = max(stop, start + 4)
-    values = above_zero(spectrum.values) if logarithmic else spectrum.values
-    at, _, top = envelope(spectrum.positions[start:stop], values[start:stop], N_COLUMNS)
-    return ChartLine(at, top, ("healthy", "faulty")[place], colour="fault" if place else "measured")
-
-
-# --------------------
-# Mesh stiffness and mesh force over mesh cycles, where the faulty tooth passes.
-# --------------------
 
 
 BEFORE, AFTER = 1.5, 5.5
@@ -270,13 +194,13 @@ POINTS_PER_CYCLE = 250
 
 def show_mesh(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show stiffness and dynamic force of both machines over the same mesh cycles."""
-    runs = _runs(healthy, faulty)
-    shown, marks = _segment(runs[-1])
+    both = [healthy] if faulty is None else [healthy, faulty]
+    shown, marks = _segment(both[-1])
     cycles = np.linspace(*shown, round((shown[1] - shown[0]) * POINTS_PER_CYCLE) + 1)
     x = "mesh cycles (tooth k of the driver enters at k − 1)"
     st.markdown("**Mesh stiffness** of the tooth pairs in contact")
-    if runs[0].setup.torque_nm > 0:
-        curves = [stiffness(run, cycles) * 1e-8 for run in runs]
+    if both[0].setup.torque_nm > 0:
+        curves = [stiffness(run, cycles) * 1e-8 for run in both]
         axes = Axes(x, "mesh stiffness (10⁸ N/m)", shown, padded_limits(curves, flat=0.1))
         show_lines(_lines(cycles, curves), axes, "stiffness of the laboratory", cursors=marks, height_px=HEIGHT_PX)
         if len(curves) > 1 and np.allclose(curves[0], curves[1], rtol=1e-6):
@@ -284,7 +208,7 @@ def show_mesh(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     else:
         st.info("Without a load no tooth is pressed on another: there is no stiffness to show.")
     st.markdown("**Dynamic mesh force** over the same teeth")
-    forces = [_force_kn(run, cycles) for run in runs]
+    forces = [_force_kn(run, cycles) for run in both]
     axes = Axes(x, "mesh force (kN)", shown, padded_limits(forces, flat=0.1))
     show_lines(_lines(cycles, forces), axes, "force of the laboratory", cursors=marks, height_px=HEIGHT_PX)
 
@@ -300,7 +224,7 @@ def stiffness(run: LaboratoryRun, cycles: FloatArray) -> FloatArray:
 
 def _segment(run: LaboratoryRun) -> tuple[tuple[float, float], list[Cursor]]:
     """Return the mesh cycles about the first faulty tooth that passes in the run; without one, the run's first."""
-    teeth, cycles = faulty_teeth(run.setup), run.mesh_cycles
+    teeth, cycles = runs.faulty_teeth(run.setup), run.mesh_cycles
     pair = run.machine.mesh.pair
     first = float(np.ceil(cycles[0])) + BEFORE
     if not teeth:
@@ -324,14 +248,8 @@ def _lines(x: FloatArray, curves: list[FloatArray]) -> list[ChartLine]:
     for place, values in enumerate(curves):
         known = np.isfinite(values)
         if known.any():
-            name, colour = (("healthy", "measured"), ("faulty", "fault"))[place]
-            lines.append(ChartLine(*thin(x[known], values[known]), name, colour=colour))  # type: ignore[arg-type]
+            lines.append(ChartLine(*thin(x[known], values[known]), ("healthy", "faulty")[place], place))
     return lines
-
-
-# --------------------
-# Phase portraits beside each other: displacement against velocity of a gear, with the points of a Poincaré section.
-# --------------------
 
 
 MESH_PERIOD = "mesh period"
@@ -359,14 +277,14 @@ def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
         persist_state="session",
     )
     n = STROBES[strobe or MESH_PERIOD] or healthy.machine.mesh.pair.driver.teeth
-    runs = _runs(healthy, faulty)
-    portraits = [portrait(run, GEARS[gear or "Driver"], n) for run in runs]
+    both = [healthy] if faulty is None else [healthy, faulty]
+    portraits = [portrait(run, GEARS[gear or "Driver"], n) for run in both]
     limits = [padded_limits([p[axis] for p in portraits]) for axis in (0, 1)]
     for column, shown, name in zip(st.columns(2), portraits, ("healthy", "faulty"), strict=False):
         figure = portrait_figure(shown, (limits[0], limits[1]), faulty=name == "faulty")
         words = f"Velocity over displacement of the {name} machine with its Poincaré points"
         with column:
-            st.plotly_chart(figure, width="stretch", key=f"phase of {name}", config=CONFIG, alt=words)
+            show_chart(figure, f"phase of {name}", words)
     st.caption(
         "Along the line of action. A closed curve repeats every mesh period, and its points fall together; "
         "scattered points mean a motion that does not repeat."
@@ -377,7 +295,7 @@ def portrait(run: LaboratoryRun, signal: str, n_per_revolution: float) -> Portra
     """Return displacement (µm) and velocity (mm/s), and both at the strobes."""
     response = run.response
     y, v = 1e6 * response[signal], 1e3 * response[f"{signal} velocity"]
-    index = times_of(run, response.time_s, lines_per_period(run, n_per_revolution))
+    index = runs.times_of(run, response.time_s, runs.lines_per_period(run, n_per_revolution))
     points = [np.interp(index, response.time_s, values) for values in (y, v)]
     turned = float(np.ptp(response["driver angle"])) / (2.0 * np.pi)
     n = len(y) if turned <= REVOLUTIONS else round(len(y) * REVOLUTIONS / turned)
@@ -417,38 +335,24 @@ def portrait_figure(shown: Portrait, limits: Limits, *, faulty: bool) -> Figure:
     return figure
 
 
-NAMES = ("Time", "Spectrum", "Envelope", "Phase portrait", "Bifurcation", "Mesh")
+View = Callable[[LaboratoryRun, LaboratoryRun | None, str], None]
+VIEWS: dict[str, View] = {
+    "Time": lambda healthy, faulty, _: show_time(healthy, faulty),
+    "Spectrum": show_amplitude,
+    "Envelope": show_envelope,
+    "Phase portrait": lambda healthy, faulty, _: show_phase(healthy, faulty),
+    "Bifurcation": lambda healthy, faulty, _: show_safely(healthy, faulty),
+    "Mesh": lambda healthy, faulty, _: show_mesh(healthy, faulty),
+}
 TAB = "tab of the laboratory"
 
 
 def show_views(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
-    """Show the views as tabs."""
-    for name, tab in zip(NAMES, st.tabs(NAMES, key=TAB, on_change="rerun"), strict=True):
+    """Show the views as tabs; what the user changes in one reruns only this."""
+    for name, tab in zip(VIEWS, st.tabs(list(VIEWS), key=TAB, on_change="rerun"), strict=True):
         if tab.open:
             with tab:
-                _show_view(name, healthy, faulty, channel)
-
-
-@st.fragment
-def _show_view(name: str, healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
-    """Show one view; what the user changes in it reruns only this."""
-    if name == "Time":
-        show_time(healthy, faulty)
-    elif name == "Spectrum":
-        show_amplitude(healthy, faulty, channel)
-    elif name == "Envelope":
-        show_envelope(healthy, faulty, channel)
-    elif name == "Phase portrait":
-        show_phase(healthy, faulty)
-    elif name == "Bifurcation":
-        show_safely(healthy, faulty)
-    else:
-        show_mesh(healthy, faulty)
-
-
-# --------------------
-# The answer on top of the laboratory: what is switched on, where theory expects it, and what changed in numbers.
-# --------------------
+                st.fragment(VIEWS[name])(healthy, faulty, channel)
 
 
 Number = Callable[[LaboratoryRun, str], float]
@@ -467,32 +371,26 @@ NUMBERS: dict[str, tuple[str, Number]] = {
 }
 
 
-def show_title(healthy: LaboratoryRun, faulty: LaboratoryRun | None, *, impossible: bool) -> None:
-    """Show what is on, and how the machine runs; `impossible` if the faulty machine cannot be."""
-    title = " + ".join(effect_text(setting) for setting in _switched_on(faulty))
-    otherwise = "The healthy machine alone" if impossible else "Healthy: nothing is switched on"
+def show_title(setup: Setup, *, is_shown: bool) -> None:
+    """Show what is switched on; `is_shown` if the faulty machine could be simulated."""
+    title = " + ".join(effect_text(s) for s in setup.effects if s.severity > 0) if is_shown else ""
+    otherwise = "Healthy: nothing is switched on" if setup.is_healthy else "The healthy machine alone"
     st.subheader(as_typed(capitalised(title) or otherwise), anchor=False)
-    st.caption(" · ".join(frequencies(faulty or healthy)))
 
 
 def show_expectation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show where theory expects what is on, and what to mind."""
-    on = _switched_on(faulty)
+    on = [effect(setting.name) for setting in faulty.setup.effects if setting.severity > 0] if faulty else []
     if not on:
         st.markdown("Pull the crack slider or choose an effect: the faulty machine appears beside this one.")
     elif len(on) == 1:
-        st.markdown(as_typed(effect(on[0].name).signature))
+        st.markdown(as_typed(on[0].signature))
     else:
         with st.expander("Where theory expects them", icon=":material/menu_book:"):
-            for setting in on:
-                known = effect(setting.name)
+            for known in on:
                 st.markdown(f"**{as_typed(capitalised(known.title))}.** {as_typed(known.signature)}")
     for note in (faulty or healthy).recording.warnings:
         st.caption(f":material/info: {as_typed(note)}")
-
-
-def _switched_on(faulty: LaboratoryRun | None) -> list[EffectSetting]:
-    return [setting for setting in faulty.setup.effects if setting.severity > 0] if faulty else []
 
 
 def frequencies(run: LaboratoryRun) -> list[str]:
@@ -502,7 +400,7 @@ def frequencies(run: LaboratoryRun) -> list[str]:
     words = [f"{run.setup.speed_rpm:g} rpm, {run.setup.torque_nm:g} N·m"]
     words.append(f"mesh {(rig.mesh_order(pair) or 0.0) * turns:.5g} Hz")
     words += [f"{name} shaft {(rig.ratio(name) or 0.0) * turns:.4g} Hz" for name in rig.shaft_names]
-    words += [f"{as_typed(name)} {frequency:.4g} Hz" for name, frequency in bearing_lines_hz(run).items()]
+    words += [f"{as_typed(name)} {frequency:.4g} Hz" for name, frequency in runs.bearing_lines_hz(run).items()]
     # A number and its unit stay on one line.
     return [word.replace(" Hz", "\u00a0Hz") for word in words]
 

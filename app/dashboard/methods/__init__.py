@@ -6,10 +6,9 @@ from collections.abc import Callable
 
 import streamlit as st
 
-from app.dashboard import state
 from app.dashboard.methods.crack import show_crack
 from app.dashboard.methods.envelope import show_coherence, show_kurtogram
-from app.dashboard.methods.frame import MethodPage, choose_one
+from app.dashboard.methods.frame import MethodPage
 from app.dashboard.methods.modes import show_modes
 from app.dashboard.methods.orders import show_order_tracking
 from app.dashboard.methods.phase import show_embedding, show_phase_plane
@@ -69,7 +68,7 @@ METHODS: dict[str, tuple[Callable[[MethodPage], None], str]] = {
 
 def show_methods(analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show the chosen method's parameters and its answer for one channel."""
-    name = choose_one("Method", list(METHODS), state.view_key("method", analysis), named=False)
+    name = MethodPage(analysis, channel, "").choose(st, "Method", list(METHODS), named=False)
     show, about = METHODS[name]
     st.caption(about)
     try:

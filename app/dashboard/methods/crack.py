@@ -9,7 +9,7 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import recorded
-from app.dashboard.methods.frame import MethodPage, cached
+from app.dashboard.methods.frame import MethodPage, cached, show_table
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import show_picture
 from app.dashboard.widgets.chooser import choose_file, choose_sample
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NONE, FILE, SAMPLE, SIDEBAR = "None", "Own file", "Sample", "As in the sidebar"
-EVERY_CHANNEL = "All accelerations"
+TO_MPS2 = {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": 9.80665}
+severity = cached(8, "Looking at every tooth …")(estimate_crack)
 
 
 def show_crack(page: MethodPage) -> None:
@@ -36,14 +37,13 @@ def show_crack(page: MethodPage) -> None:
     recording = page.analysis.recording
     channels: tuple[str, ...] = ()
     if sum(c.quantity == "acceleration" for c in recording.channels) > 1:
-        names = (EVERY_CHANNEL, "The chosen channel")
-        channels = () if page.choose(st, "Channels", names) == EVERY_CHANNEL else (page.channel.channel,)
+        channels = page.choose(st, "Channels", {"All accelerations": (), "The chosen channel": (page.channel.channel,)})
     chosen = state.chosen()
     torque_nm = chosen.request.torque_nm if chosen is not None else None
     torque = _torque_text(page.analysis, torque_nm)
     st.caption(f"Analysed: 0 to {recording.duration_s:.4g} s, the whole recording. {torque}.")
     try:
-        estimate = severity(recording, reference, torque_nm, channels)
+        estimate = severity(recording, reference=reference, torque_nm=torque_nm, channels=channels)
     except RefusalError as refusal:  # which is an answer, too
         remedy = f"\n\nWhat would help: {as_typed(refusal.remedy)}." if refusal.remedy else ""
         text = f"**The depth cannot be told**: {as_typed(refusal.reason)}.{remedy}"
@@ -53,9 +53,7 @@ def show_crack(page: MethodPage) -> None:
     if isinstance(estimate, CrackEstimate):
         _show_figure(recording, reference, estimate, page.channel.channel)
     with st.expander("What the answer rests on"):
-        columns = {"feature": list(estimate.features), "value": list(estimate.features.values())}
-        number = st.column_config.NumberColumn(format="%.4g")
-        st.dataframe(columns, hide_index=True, column_config={"value": number})
+        show_table({"feature": list(estimate.features), "value": list(estimate.features.values())})
 
 
 def _choose_reference(page: MethodPage) -> Recording | None:
@@ -101,20 +99,6 @@ def _torque_text(analysis: Analysis, stated_nm: float | None) -> str:
     return f"Torque {known:g} N·m, of the rig; another one is stated {place}" if known else f"State the torque {place}"
 
 
-@cached(8, "Looking at every tooth …")
-def severity(
-    recording: Recording, reference: Recording | None, torque_nm: float | None, channels: tuple[str, ...]
-) -> CrackEstimate | NoCrackSeen:
-    """Return the estimate from some of the accelerations; `channels` empty for all of them.
-
-    Raises
-    ------
-    GearsigError
-        See `estimate_crack`.
-    """
-    return estimate_crack(recording, reference=reference, torque_nm=torque_nm, channels=channels)
-
-
 def _show_answer(estimate: CrackEstimate | NoCrackSeen) -> None:
     if isinstance(estimate, NoCrackSeen):
         st.success(as_typed(estimate.text), icon=":material/check_circle:")
@@ -124,38 +108,23 @@ def _show_answer(estimate: CrackEstimate | NoCrackSeen) -> None:
         )
     else:
         st.error(as_typed(estimate.text), icon=":material/error:")
-        _show_numbers(estimate)
+        low, high = estimate.interval_mm
+        tooth = f"tooth {estimate.tooth}" if estimate.tooth is not None else "not known"
+        gear = f"{estimate.gear}{'' if estimate.gear_is_certain else ' or its mate'}"
+        kinds = ", ".join(f"{kind} {100.0 * share:.0f} %" for kind, share in estimate.kind_probabilities.items())
+        reach = f"{estimate.reach_cycles:.1f} mesh cycles; {estimate.squeezed_rise_db:+.1f} dB"
+        numbers = (
+            ("Depth of a crack", f"{estimate.depth_mm:.2f} mm, {estimate.depth_percent:.0f} % of the root"),
+            ("90 % interval", f"{low:.2f} to {high:.2f} mm"),
+            ("Place", f"{tooth}, {estimate.angle_deg:.0f}°, {gear}"),
+            ("Looks like", kinds or estimate.kind),
+            ("Chance of as much on healthy gears", f"{estimate.p_value:.2g}"),
+            ("Felt for; squeezed energy there", reach),
+        )
+        for column, (name, text) in zip((*st.columns(3), *st.columns(3)), numbers, strict=True):
+            column.caption(name)
+            column.markdown(f"**{as_typed(text)}**")
     st.markdown("\n".join(f"- {as_typed(reason)}" for reason in estimate.reasons))
-
-
-def _show_numbers(estimate: CrackEstimate) -> None:
-    low, high = estimate.interval_mm
-    tooth = f"tooth {estimate.tooth}" if estimate.tooth is not None else "not known"
-    gear = f"{estimate.gear}{'' if estimate.gear_is_certain else ' or its mate'}"
-    kinds = ", ".join(f"{kind} {100.0 * share:.0f} %" for kind, share in estimate.kind_probabilities.items())
-    reach = f"{estimate.reach_cycles:.1f} mesh cycles; {estimate.squeezed_rise_db:+.1f} dB"
-    numbers = (
-        ("Depth of a crack", f"{estimate.depth_mm:.2f} mm, {estimate.depth_percent:.0f} % of the root"),
-        ("90 % interval", f"{low:.2f} to {high:.2f} mm"),
-        ("Place", f"{tooth}, {estimate.angle_deg:.0f}°, {gear}"),
-        ("Looks like", kinds or estimate.kind),
-        ("Chance of as much on healthy gears", f"{estimate.p_value:.2g}"),
-        ("Felt for; squeezed energy there", reach),
-    )
-    for column, (name, text) in zip((*st.columns(3), *st.columns(3)), numbers, strict=True):
-        column.caption(name)
-        column.markdown(f"**{as_typed(text)}**")
-
-
-# --------------------
-# The mean revolution of the gear with the crack, beside that of the healthy gear where both count from a mark.
-# --------------------
-
-TO_MPS2 = {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": 9.80665}
-HALF_CONTACT = 0.8
-"""Pitches from a tooth's entry to the middle of its engagement, at a contact ratio of 1.6."""
-N_TURNS = 3
-"""The mean revolution is repeated, so that the tooth in the middle has a whole neighbourhood."""
 
 
 def _show_figure(recording: Recording, reference: Recording | None, estimate: CrackEstimate, channel: str) -> None:
@@ -196,13 +165,15 @@ def crack_figure(recording: Recording, reference: Recording | None, estimate: Cr
     if reference is not None:
         healthy = _mean_residual(reference, estimate, channel, n_angles=len(mean))
         cases, change = {"reference": healthy, "recording": mean}, {"recording": mean - healthy}
-    entry = (estimate.angle_deg / 360.0 - HALF_CONTACT / n_teeth) % 1.0
+    # 0.8 pitches from a tooth's entry to the middle of its engagement, at a contact ratio of 1.6
+    entry = (estimate.angle_deg / 360.0 - 0.8 / n_teeth) % 1.0
+    n_turns = 3  # so that the tooth in the middle has a whole neighbourhood
     return crack_comparison_figure(
-        np.arange(N_TURNS * len(mean)) / len(mean),
-        {name: np.tile(values, N_TURNS) for name, values in cases.items()},
-        impacts_rev=[turn + entry for turn in range(N_TURNS)],
+        np.arange(n_turns * len(mean)) / len(mean),
+        {name: np.tile(values, n_turns) for name, values in cases.items()},
+        impacts_rev=[turn + entry for turn in range(n_turns)],
         n_teeth=n_teeth,
-        change_mps2={name: np.tile(values, N_TURNS) for name, values in change.items()} or None,
+        change_mps2={name: np.tile(values, n_turns) for name, values in change.items()} or None,
     )
 
 

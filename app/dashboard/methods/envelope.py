@@ -2,95 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import streamlit as st
 
-from app.dashboard.methods.frame import (
-    MethodPage,
-    SignalSegment,
-    Waveforms,
-    cached,
-    highest_of_interest,
-    modulation_cursors,
-    of_segment,
-)
+from app.dashboard.methods.frame import Columns, MethodPage, SignalSegment, Waveforms, cached, of_segment
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import choose_range, show_picture
+from app.dashboard.widgets.charts import show_picture
 from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.spectrum import SLIP_SHARE, show_spectrum
+from gearsig import spectra
 from gearsig.angle import resample_to_angle
 from gearsig.errors import InputError
 from gearsig.orders import order_spectrum
 from gearsig.plot import Cursor, coherence_figure, kurtogram_figure
 from gearsig.recording import Channel, Recording
-from gearsig.report import marked_positions, speed_is_constant
-from gearsig.spectra import (
-    ChosenBand,
-    EnhancedEnvelope,
-    Kurtogram,
-    Preparation,
-    SpectralCoherence,
-    Spectrum,
-    enhanced_envelope,
-    kurtogram_envelope,
-    order_coherence,
-    spectral_coherence,
-)
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+from gearsig.report import bearing_cursors, line_cursors, marked_positions, speed_is_constant
+from gearsig.rig import order_lines
 
 PREPARATIONS = {"As recorded": "none", "Tones removed": "tones removed", "Whitened": "whitened"}
-
-
-def _choose_over(
-    page: MethodPage, place: Any, label: str, names: tuple[str, str], segment: SignalSegment, about: str
-) -> bool:
-    """Return whether orders are chosen, at first where the speed varies; never where it is not known."""
-    if segment.angle is None:
-        return False
-    first = names[0] if speed_is_constant(of_segment(page.analysis, segment)) else names[1]
-    return page.choose(place, label, names, default=first, about=about) == names[1]
-
-
-def _choose_highest(
-    page: MethodPage, place: Any, label: str, segment: SignalSegment, about: str, *, of_orders: bool = False
-) -> float:
-    usual = float(f"{highest_of_interest(page.analysis, segment, of_orders=of_orders):.3g}")
-    key = f"{label} {usual!r}"
-    highest = page.ask(place.number_input, label, value=usual, step=usual / 10.0, format="%g", key=key, about=about)
-    return float(highest)
-
-
-# --------------------
-# Kurtogram, the band that it chooses or the user, and the envelope spectrum there.
-# --------------------
-
-
-@dataclass(frozen=True)
-class BandSettings:
-    """Settings of kurtogram and envelope; `band_hz` None is the kurtogram's own choice."""
-
-    preparation: Preparation
-    n_levels: int
-    highest_modulation_hz: float
-    band_hz: tuple[float, float] | None
+kurtogram_of = cached(4, "Computing the kurtogram …")(spectra.kurtogram_envelope)
+coherence_of = cached(3, "Computing the coherence …")(spectra.spectral_coherence)
+order_coherence_of = cached(3, "Computing the coherence …")(spectra.order_coherence)
 
 
 def show_kurtogram(page: MethodPage) -> None:
     """Show the kurtogram of one channel, the chosen band and its envelope spectrum."""
     segment = page.segment(n_first=1_000_000, n_max=10_000_000)
     settings = _choose_band(page, segment)
-    chosen = band_of(segment, settings)
-    figure = kurtogram_figure(chosen.kurtogram, chosen.band, height_in=3.8)
+    chosen = kurtogram_of(segment.recording, segment.channel, **settings)
+    grid, band, envelope = chosen.kurtogram, chosen.band, chosen.envelope
+    figure = kurtogram_figure(grid, band, height_in=3.8)
     show_picture(figure, f"Kurtogram of {segment.channel} with the band of the envelope")
-    band, who = chosen.band, "The kurtogram's band" if settings.band_hz is None else "Your band"
+    whose = "The kurtogram's" if settings["band_hz"] is None else "Your"
     st.markdown(
-        f"{who}: **{band.low_hz:.5g} to {band.high_hz:.5g} Hz**, spectral kurtosis **{band.kurtosis:.3g}** "
+        f"{whose} band: **{band.low_hz:.5g} to {band.high_hz:.5g} Hz**, spectral kurtosis **{band.kurtosis:.3g}** "
         f"(of noise alone: 0 ± {band.standard_error:.2g})"
     )
     caption = f"{chosen.reason} " if chosen.reason else ""
@@ -102,27 +50,41 @@ def show_kurtogram(page: MethodPage) -> None:
     if caption:
         st.caption(caption)
     show_warnings(chosen.warnings)
-    spectrum = _show_envelope_spectrum(page, segment, chosen, settings)
-    envelope = chosen.envelope
-    step = f"{envelope.source} from {segment.start_s:.6g} to {segment.end_s:.6g} s, {settings.preparation}"
+
+    about = "Over orders, a change of speed does not smear the lines that follow it."
+    names = ("Modulation frequency", "Modulation order")
+    spectrum = chosen.spectrum
+    if _choose_over_orders(page, st, "Envelope spectrum over", names, segment, about):
+        spectrum = _envelope_orders(chosen, segment, settings["highest_modulation_hz"])
+    cursors, _ = _show_modulation(page, segment, spectrum)
+    if segment.angle is not None and spectrum.axis == "frequency" and not cursors:
+        st.caption("The speed changes, so lines that follow it are smeared over frequency: look over order.")
+
+    step = f"{envelope.source} from {segment.start_s:.6g} to {segment.end_s:.6g} s, {settings['preparation']}"
     columns = {envelope.source: envelope.values}
+    bands = {
+        "bands": np.round(2.0**grid.level).astype(int),
+        "from (Hz)": grid.low_hz,
+        "to (Hz)": grid.high_hz,
+        "spectral kurtosis": grid.kurtosis,
+        "standard error": grid.standard_error,
+        "noise's limit": grid.noise_limit,
+    }
     page.offer(
         Waveforms(columns, envelope.sampling_rate_hz, segment.start_s, envelope.unit, "unknown", step),
-        {
-            "Envelope spectrum": lambda: _spectrum_columns(spectrum),
-            "Kurtogram": lambda: _kurtogram_columns(chosen.kurtogram),
-        },
+        {"Envelope spectrum": _spectrum_columns(spectrum), "Kurtogram": bands},
     )
 
 
-def _choose_band(page: MethodPage, segment: SignalSegment) -> BandSettings:
+def _choose_band(page: MethodPage, segment: SignalSegment) -> dict[str, Any]:
+    """Return the arguments of `kurtogram_envelope`; a band of None is the kurtogram's own choice."""
     one, two = st.columns(2)
     three, four = st.columns(2)
     about = (
         "Tones removed: steady lines, such as mesh harmonics, are cut down to the floor. Whitened: every line is made "
         "equally strong, which takes out resonances as well."
     )
-    preparation = PREPARATIONS[page.choose(one, "Signal", list(PREPARATIONS), about=about)]
+    preparation = page.choose(one, "Signal", PREPARATIONS, about=about)
     max_levels = max(1, int(np.log2(max(segment.recording.n_samples / 512.0, 2.0))))
     about = "The spectrum is cut into up to 2 to the power of it bands, and into thirds of these."
     n_levels, key = max_levels, f"levels {max_levels}"
@@ -131,46 +93,13 @@ def _choose_band(page: MethodPage, segment: SignalSegment) -> BandSettings:
     about = "The fastest rhythm sought. Bands must be three times as wide, and the envelope's spectrum ends there."
     highest = _choose_highest(page, four, "Highest modulation (Hz)", segment, about)
     band = None
-    if page.choose(two, "Band", ("The kurtogram's", "My own")) == "My own":
+    if page.choose(two, "Band", {"The kurtogram's": False, "My own": True}):
         top = segment.recording.sampling_rate_hz / 2.0
-        label = "Band of the envelope (Hz)"
-        band = choose_range(label, page.analysis, top, shown=(0.5 * top, 0.75 * top), name=page.name)
-    return BandSettings(cast("Preparation", preparation), n_levels, highest, band)
+        band = page.range("Band of the envelope (Hz)", top, shown=(0.5 * top, 0.75 * top))
+    return {"preparation": preparation, "n_levels": n_levels, "highest_modulation_hz": highest, "band_hz": band}
 
 
-@cached(4, "Computing the kurtogram …")
-def band_of(segment: SignalSegment, settings: BandSettings) -> ChosenBand:
-    """Return band, kurtogram and envelope."""
-    return kurtogram_envelope(
-        segment.recording,
-        segment.channel,
-        n_levels=settings.n_levels,
-        preparation=settings.preparation,
-        highest_modulation_hz=settings.highest_modulation_hz,
-        band_hz=settings.band_hz,
-    )
-
-
-def _show_envelope_spectrum(
-    page: MethodPage, segment: SignalSegment, chosen: ChosenBand, settings: BandSettings
-) -> Spectrum:
-    """Show the envelope spectrum over frequency, or over order where the speed is known, and return it."""
-    about = "Over orders, a change of speed does not smear the lines that follow it."
-    names = ("Modulation frequency", "Modulation order")
-    over_orders = _choose_over(page, st, "Envelope spectrum over", names, segment, about)
-    spectrum = chosen.spectrum
-    if over_orders:
-        spectrum = _envelope_orders(chosen, segment, settings.highest_modulation_hz)
-    cursors = modulation_cursors(page.analysis, segment, spectrum)
-    here = of_segment(page.analysis, segment)
-    marked = marked_positions(here, spectrum, segment.channel, of_bearings=True)
-    show_spectrum(page.analysis, spectrum, cursors, f"{page.name} {spectrum.axis}", marked=marked, scale="Linear")
-    if segment.angle is not None and spectrum.axis == "frequency" and not cursors:
-        st.caption("The speed changes, so lines that follow it are smeared over frequency: look over order.")
-    return spectrum
-
-
-def _envelope_orders(chosen: ChosenBand, segment: SignalSegment, highest_hz: float) -> Spectrum:
+def _envelope_orders(chosen: spectra.ChosenBand, segment: SignalSegment, highest_hz: float) -> spectra.Spectrum:
     """Return the spectrum of an envelope over orders, up to what the highest modulation is at the mean speed."""
     envelope, angle = chosen.envelope, segment.angle
     assert angle is not None  # noqa: S101 - the caller's condition, said to the type checker
@@ -183,126 +112,82 @@ def _envelope_orders(chosen: ChosenBand, segment: SignalSegment, highest_hz: flo
     return order_spectrum(signal, envelope.source)
 
 
-def _spectrum_columns(spectrum: Spectrum) -> Mapping[str, ArrayLike]:
-    name = "value" if spectrum.scaling == "dimensionless" else spectrum.scaling
-    return {spectrum.axis_label: spectrum.positions, f"{name} ({spectrum.unit or 1})": spectrum.values}
-
-
-def _kurtogram_columns(grid: Kurtogram) -> Mapping[str, ArrayLike]:
-    return {
-        "bands": np.round(2.0**grid.level).astype(int),
-        "from (Hz)": grid.low_hz,
-        "to (Hz)": grid.high_hz,
-        "spectral kurtosis": grid.kurtosis,
-        "standard error": grid.standard_error,
-        "noise's limit": grid.noise_limit,
-    }
-
-
-# --------------------
-# Cyclic coherence: which carriers are modulated at which frequency or order, and the mean over the carriers.
-# --------------------
-
-PROBABILITIES = {"1 line in 20": 0.05, "1 line in 100": 0.01, "1 line in 1000": 1e-3, "1 line in 10 000": 1e-4}
-MAX_CELLS = 1 << 22
-"""100 MB of results."""
-
-
-@dataclass(frozen=True)
-class CoherenceSettings:
-    """Settings of the coherence; `highest` in Hz, or orders where it runs over them."""
-
-    over_orders: bool
-    highest: float
-    n_bands: int
-    preparation: Preparation
-
-
 def show_coherence(page: MethodPage) -> None:
-    """Show the coherence of one channel as a map, and its mean over the carriers."""
+    """Show the cyclic coherence of one channel: which carriers are modulated at which frequency or order."""
     segment = page.segment(n_first=262_144, n_max=4_000_000)
-    settings = _choose_coherence(page, segment)
-    _check_size(segment, settings)
-    coherence = coherence_of(segment, settings)
-    mean = _choose_mean(page, coherence)
-    cursors = modulation_cursors(page.analysis, segment, mean.spectrum)
-    here = of_segment(page.analysis, segment)
-    limits = show_spectrum(
-        page.analysis,
-        mean.spectrum,
-        cursors,
-        f"{page.name} {coherence.alpha_axis}",
-        marked=marked_positions(here, mean.spectrum, segment.channel, of_bearings=True),
-        scale="Linear",
-        quantity="mean squared coherence",
-    )
-    st.caption(
-        f"Mean squared coherence over the carriers from {mean.band_hz[0]:.5g} to {mean.band_hz[1]:.5g} Hz. "
-        f"Stationary noise exceeds **{mean.level:.3g}** in 1 line of {1 / mean.probability:.5g}."
-    )
-    _show_coherence_map(coherence, mean, cursors, limits)
-    page.offer(None, {"Enhanced spectrum": lambda: _spectrum_columns(mean.spectrum)})
-
-
-def _choose_coherence(page: MethodPage, segment: SignalSegment) -> CoherenceSettings:
     one, two = st.columns(2)
     three, four = st.columns(2)
     about = "Over orders, modulation that is locked to the shaft stays on one line when the speed changes."
-    over_orders = _choose_over(page, one, "Over", ("Cyclic frequency", "Cyclic order"), segment, about)
-    preparation = "none"
+    over_orders = _choose_over_orders(page, one, "Over", ("Cyclic frequency", "Cyclic order"), segment, about)
+    preparation: Any = "none"
     if not over_orders:
         about = "Steady tones are coherent with each other: remove them, or mesh harmonics fill the picture."
-        name = page.choose(two, "Signal", list(PREPARATIONS), default="Tones removed", about=about)
-        preparation = PREPARATIONS[name]
+        preparation = page.choose(two, "Signal", PREPARATIONS, default="Tones removed", about=about)
     label = f"Highest cyclic {'order' if over_orders else 'frequency (Hz)'}"
     about = "The fastest rhythm sought. Carriers below half of it are left out."
     highest = _choose_highest(page, three, label, segment, about, of_orders=over_orders)
     about = "Fewer bands average more and find weaker modulation; more show better where its carrier is."
     n_bands = page.ask(four.select_slider, "Carrier bands", (8, 16, 32, 64, 128, 256), value=64, about=about)
-    return CoherenceSettings(over_orders, highest, n_bands, cast("Preparation", preparation))
+
+    recording, angle = segment.recording, segment.angle
+    if over_orders and angle is not None:
+        _check_size(highest * angle.n_revolutions, n_bands)
+        coherence = order_coherence_of(recording, segment.channel, angle, highest_order=highest, n_bands=n_bands)
+    else:
+        _check_size(highest * recording.duration_s, n_bands)
+        coherence = coherence_of(
+            recording, segment.channel, highest_alpha_hz=highest, n_bands=n_bands, preparation=preparation
+        )
+    mean = _choose_mean(page, coherence)
+    cursors, limits = _show_modulation(page, segment, mean.spectrum, "mean squared coherence")
+    st.caption(
+        f"Mean squared coherence over the carriers from {mean.band_hz[0]:.5g} to {mean.band_hz[1]:.5g} Hz. "
+        f"Stationary noise exceeds **{mean.level:.3g}** in 1 line of {1 / mean.probability:.5g}."
+    )
+    _show_coherence_map(coherence, mean, cursors, limits)
+    page.offer(None, {"Enhanced spectrum": _spectrum_columns(mean.spectrum)})
 
 
-def _check_size(segment: SignalSegment, settings: CoherenceSettings) -> None:
-    """Refuse results that a browser session should not hold."""
-    length = segment.recording.duration_s
-    if settings.over_orders and segment.angle is not None:
-        length = segment.angle.n_revolutions
-    if settings.highest * length * settings.n_bands > MAX_CELLS:
+def _check_size(n_frequencies: float, n_bands: int) -> None:
+    """Refuse results that a browser session should not hold: 100 MB."""
+    if n_frequencies * n_bands > 1 << 22:
         raise InputError(
-            f"{settings.highest * length:.0f} cyclic frequencies × {settings.n_bands} bands are too many cells",
-            allowed=f"at most {MAX_CELLS} on this page",
+            f"{n_frequencies:.0f} cyclic frequencies × {n_bands} bands are too many cells",
+            allowed=f"at most {1 << 22} on this page",
             remedy="lower the highest cyclic frequency or order, take fewer bands or a shorter segment",
         )
 
 
-@cached(3, "Computing the coherence …")
-def coherence_of(segment: SignalSegment, settings: CoherenceSettings) -> SpectralCoherence:
-    """Return the coherence over frequency or order."""
-    recording, name, highest, n_bands = segment.recording, segment.channel, settings.highest, settings.n_bands
-    if settings.over_orders and segment.angle is not None:
-        return order_coherence(recording, name, segment.angle, highest_order=highest, n_bands=n_bands)
-    return spectral_coherence(
-        recording, name, highest_alpha_hz=highest, n_bands=n_bands, preparation=settings.preparation
-    )
-
-
-def _choose_mean(page: MethodPage, coherence: SpectralCoherence) -> EnhancedEnvelope:
+def _choose_mean(page: MethodPage, coherence: spectra.SpectralCoherence) -> spectra.EnhancedEnvelope:
     left, right = st.columns((2, 1))
     low, high = float(coherence.frequency_hz[0]), float(coherence.frequency_hz[-1])
     band = (low, high)
     if low < high:
         with left:
-            band = choose_range("Carriers averaged (Hz)", page.analysis, high, start=low, name=page.name)
+            band = page.range("Carriers averaged (Hz)", high, start=low)
     about = "How often noise alone passes the dashed line."
-    odds = page.ask(right.selectbox, "Noise passes the level in", list(PROBABILITIES), index=2, about=about)
-    return enhanced_envelope(coherence, band, probability=PROBABILITIES[odds])
+    odds = (20, 100, 1000, 10_000)
+    n = page.ask(right.selectbox, "Noise passes the level in", odds, 2, format_func="1 line in {}".format, about=about)
+    return spectra.enhanced_envelope(coherence, band, probability=1.0 / n)
 
 
 def _show_coherence_map(
-    coherence: SpectralCoherence, mean: EnhancedEnvelope, cursors: Sequence[Cursor], limits: tuple[float, float]
+    coherence: spectra.SpectralCoherence,
+    mean: spectra.EnhancedEnvelope,
+    cursors: Sequence[Cursor],
+    limits: tuple[float, float],
 ) -> None:
-    low, high = limits
-    shown = [c for c in _above_noise(cursors, mean) if low <= c.position <= high]
+    """Show the map with the lines of shafts and bearings that stand above noise's level, and name these."""
+    spectrum, (low, high) = mean.spectrum, limits
+    first, end = float(spectrum.positions[0]), float(spectrum.positions[-1])
+    peaks: dict[Cursor, float] = {}
+    for cursor in cursors:
+        if cursor.kind in ("bearing", "shaft") and first <= cursor.position <= end:
+            slip = SLIP_SHARE * cursor.position if cursor.kind == "bearing" else 0.0
+            at, height = spectrum.largest_near(cursor.position, slip + spectrum.resolution)
+            if height > mean.level:
+                peaks[cursor] = at
+    shown = [c for c in peaks if low <= c.position <= high]
     step = coherence.alpha_resolution
     around = (min(low, high - 2.5 * step), max(high, float(coherence.alpha[0]) + 2.5 * step))
     figure = coherence_figure(coherence, mean, marked=[c.position for c in shown], limits=around, height_in=5.0)
@@ -310,11 +195,17 @@ def _show_coherence_map(
     if not shown:
         st.caption("No line of a shaft or bearing stands above noise's level.")
         return
-    shared = _on_shaft_multiples(cursors, mean)
+    # A bearing line whose peak lies on a multiple of a shaft's speed may be a mesh or its sidebands.
+    speeds = [c.position / c.number for c in cursors if c.kind == "shaft"]
+
+    def on_multiple(cursor: Cursor) -> bool:
+        distances = (abs(peaks[cursor] - max(1, round(peaks[cursor] / f)) * f) for f in speeds)
+        return cursor.kind == "bearing" and any(distance <= spectrum.resolution for distance in distances)
+
     text = "Above noise's level means that there is modulation, not that there is damage: healthy gears modulate too. "
-    if names := _names([c for c in shown if c not in shared]):
+    if names := _names([c for c in shown if not on_multiple(c)]):
         text += f"Dotted, lines that stand above noise's level, bearings' within 1 % for their slip: {names}. "
-    if names := _names([c for c in shown if c in shared]):
+    if names := _names([c for c in shown if on_multiple(c)]):
         text += (
             f"Bearing lines whose peak lies on a multiple of a shaft's speed, which meshes and shafts cause as well: "
             f"{names}."
@@ -322,26 +213,62 @@ def _show_coherence_map(
     st.caption(text)
 
 
-def _above_noise(cursors: Sequence[Cursor], mean: EnhancedEnvelope) -> list[Cursor]:
-    """Return the lines of shafts and bearings at which the mean is above noise's level, within a bearing's slip."""
-    first, end = float(mean.spectrum.positions[0]), float(mean.spectrum.positions[-1])
-    inside = [c for c in cursors if c.kind in ("bearing", "shaft") and first <= c.position <= end]
-    return [c for c in inside if _peak(c, mean)[1] > mean.level]
-
-
-def _peak(cursor: Cursor, mean: EnhancedEnvelope) -> tuple[float, float]:
-    """Return place and height of the largest value at a line, a bearing's within its slip."""
-    slack = SLIP_SHARE * cursor.position if cursor.kind == "bearing" else 0.0
-    return mean.spectrum.largest_near(cursor.position, slack + mean.spectrum.resolution)
-
-
-def _on_shaft_multiples(cursors: Sequence[Cursor], mean: EnhancedEnvelope) -> set[Cursor]:
-    """Return the bearing lines whose peak lies on a multiple of a shaft's speed, as meshes and their sidebands do."""
-    speeds = [c.position / c.number for c in cursors if c.kind == "shaft"]
-    peaks = {c: _peak(c, mean)[0] for c in _above_noise(cursors, mean) if c.kind == "bearing"}
-    near = mean.spectrum.resolution
-    return {c for c, at in peaks.items() if any(abs(at - max(1, round(at / f)) * f) <= near for f in speeds)}
-
-
 def _names(cursors: Sequence[Cursor]) -> str:
     return as_typed(", ".join(dict.fromkeys(f"{cursor.label} ({cursor.position:.5g})" for cursor in cursors)))
+
+
+# What both pages ask and show: a choice between frequency and order, the highest modulation, a spectrum over it.
+
+
+def _choose_over_orders(
+    page: MethodPage, place: Any, label: str, names: tuple[str, str], segment: SignalSegment, about: str
+) -> bool:
+    """Return whether orders are chosen, at first where the speed varies; never where it is not known."""
+    if segment.angle is None:
+        return False
+    first = names[0] if speed_is_constant(of_segment(page.analysis, segment)) else names[1]
+    return bool(page.choose(place, label, names, default=first, about=about) == names[1])
+
+
+def _choose_highest(
+    page: MethodPage, place: Any, label: str, segment: SignalSegment, about: str, *, of_orders: bool = False
+) -> float:
+    """Return the highest modulation frequency in Hz, or order of the reference shaft, that the user chooses.
+
+    At first three harmonics of the fastest bearing line and what slip makes of the last; 12 orders where no bearing is
+    known, and 1/128 of the sampling rate where the speed is not.
+    """
+    rate, rig, highest = segment.recording.sampling_rate_hz, page.analysis.rig, 0.0
+    if segment.angle is None:
+        highest = rate / 128.0
+    else:
+        lines = order_lines(rig, n_sidebands=0) if rig is not None and rig.shafts else ()
+        order = max((3.3 * line.order for line in lines if line.kind == "bearing"), default=12.0)
+        per_order_hz = max(segment.angle.mean_speed_rpm / 60.0, 1e-9)
+        order = min(order, rate / 16.0 / per_order_hz)
+        highest = order if of_orders else order * per_order_hz
+    usual = float(f"{highest:.3g}")
+    key = f"{label} {usual!r}"
+    return float(page.ask(place.number_input, label, value=usual, step=usual / 10.0, format="%g", key=key, about=about))
+
+
+def _show_modulation(
+    page: MethodPage, segment: SignalSegment, spectrum: spectra.Spectrum, quantity: str = ""
+) -> tuple[tuple[Cursor, ...], tuple[float, float]]:
+    """Show a spectrum over modulation frequency or order; return the lines of shafts, bearings, meshes and the limits.
+
+    There are no lines where they would smear.
+    """
+    here, cursors = of_segment(page.analysis, segment), tuple[Cursor, ...]()
+    if segment.angle is not None and (spectrum.axis != "frequency" or speed_is_constant(here)):
+        meshes = [cursor for cursor in line_cursors(here, spectrum, n_sidebands=0) if cursor.kind == "mesh"]
+        cursors = (*bearing_cursors(here, spectrum), *meshes)
+    marked = marked_positions(here, spectrum, segment.channel, of_bearings=True)
+    name = f"{page.name} {spectrum.axis}"
+    limits = show_spectrum(page.analysis, spectrum, cursors, name, marked=marked, scale="Linear", quantity=quantity)
+    return cursors, limits
+
+
+def _spectrum_columns(spectrum: spectra.Spectrum) -> Columns:
+    name = "value" if spectrum.scaling == "dimensionless" else spectrum.scaling
+    return {spectrum.axis_label: spectrum.positions, f"{name} ({spectrum.unit or 1})": spectrum.values}

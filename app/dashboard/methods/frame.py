@@ -16,17 +16,14 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import safe_file_name
-from app.dashboard.theme import as_plot_text, as_typed, capitalised, palette
-from app.dashboard.widgets.charts import CONFIG, Axes, choose_range
+from app.dashboard.theme import capitalised
+from app.dashboard.widgets import charts
 from gearsig.angle import PASSBAND, ShaftAngle, resample_to_angle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.errors import RefusalError
-from gearsig.plot import Cursor, thin, with_unit
+from gearsig.plot import thin, with_unit
 from gearsig.recording import Channel, Provenance, Recording, write_recording
-from gearsig.report import bearing_cursors, line_cursors, speed_is_constant
-from gearsig.rig import order_lines
-from gearsig.spectra import Spectrum
 from gearsig.timefreq import Axis, UniformSignal, at_label, uniform
 
 if TYPE_CHECKING:
@@ -34,17 +31,11 @@ if TYPE_CHECKING:
 
 P = ParamSpec("P")
 R = TypeVar("R")
-Table = Callable[[], "Mapping[str, ArrayLike]"]
+Columns = Mapping[str, "ArrayLike"]
+"""A table to take along: title → values."""
 MIN_SAMPLES = 16
-N_CYCLES = 5.0
-"""Mesh cycles that a waveform's first view shows: its shape is seen."""
-N_REVOLUTIONS = 3.0
-"""Of the reference shaft, where no mesh is known or an envelope is drawn."""
-
-
-# --------------------
-# Answers, computed once for equal arguments.
-# --------------------
+OVER_TIME, OVER_ANGLE = (".csv", ".h5", ".wav", ".parquet", ".mat"), (".csv",)
+"""What waveforms are written to: recordings, which run over time; signals over angle are plain columns."""
 
 
 def cached(n_kept: int, spinner: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
@@ -59,6 +50,10 @@ def cached(n_kept: int, spinner: str) -> Callable[[Callable[P, R]], Callable[P, 
         Answers kept; most are several times as long as the segment.
     spinner : str
         Shown while it computes.
+
+    Examples
+    --------
+    >>> separated = cached(4, "Separating the orders …")(track_vold_kalman)  # doctest: +SKIP
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -102,11 +97,6 @@ def _feed(digest: blake2b, value: object) -> None:
         _feed(digest, list(value.items()))
     else:
         digest.update(f"{value!r};".encode())
-
-
-# --------------------
-# The segment of one channel that a method works on.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -199,11 +189,6 @@ def of_segment(analysis: Analysis, segment: SignalSegment) -> Analysis:
     return analysis if segment.angle is None else replace(analysis, shaft_angle=segment.angle)
 
 
-# --------------------
-# Signals that a method made of the segment.
-# --------------------
-
-
 @dataclass(frozen=True)
 class Waveforms:
     """Signals of equal length at equal steps of time or angle.
@@ -265,108 +250,47 @@ def waveforms_of(
     return Waveforms(columns, signal.rate, signal.start, signal.unit, quantity, step, signal.axis, signal.shaft)
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A curve, already thinned; nan where it has a gap.
+def waveforms_file(waveforms: Waveforms, ending: str) -> bytes:
+    """Return a recording of the waveforms in a file's format, or columns over angle.
 
-    Parameters
-    ----------
-    x, y : array, (n,)
-    name : str
-        In the legend.
-    colour : int
-        Which of the page's colours; -1 is grey.
-    dotted : bool
+    Raises
+    ------
+    InputError
+        If the format cannot hold them.
     """
+    if waveforms.axis == "order":
+        return table_csv({at_label("order", waveforms.shaft): waveforms.at(), **waveforms.columns})
+    with TemporaryDirectory(prefix="gearsig-") as folder:
+        path = Path(folder) / f"waveforms{ending}"
+        write_recording(recording_of(waveforms), path)
+        return path.read_bytes()
 
-    x: FloatArray
-    y: FloatArray
-    name: str
-    colour: int = 0
-    dotted: bool = False
 
-
-def show_curves(curves: Sequence[Curve], axes: Axes, key: str, *, height_px: int = 320) -> None:
-    """Show curves in one chart with a legend; `key` is the widget's, unique on the page."""
-    from plotly.graph_objects import Figure
-
-    colours, figure = palette(), Figure()
-    cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
-    for curve in curves:
-        colour = colours.quiet if curve.colour < 0 else cycle[curve.colour % len(cycle)]
-        figure.add_scatter(
-            x=curve.x,
-            y=curve.y,
-            name=as_plot_text(curve.name),
-            mode="lines",
-            line={"color": colour, "width": 1.3, "dash": "dot" if curve.dotted else "solid"},
-            hovertemplate="%{x:.5g}, %{y:.4g}",
-        )
-    legend_px, left_px = 40, 76  # the same left margin for all charts, so that those below each other share their axis
-    figure.update_layout(
-        height=height_px + legend_px,
-        margin={"l": left_px, "r": 8, "t": 8, "b": 8},
-        hovermode="closest",
-        showlegend=len(curves) > 1,
-        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0, "xanchor": "left"},
-        xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "none"},
-        yaxis={
-            "title": as_plot_text(axes.y),
-            "range": axes.y_limits,
-            "exponentformat": "e",
-            "minexponent": 4,
-            "automargin": False,
-        },
+def recording_of(waveforms: Waveforms) -> Recording:
+    """Return waveforms over time as a recording, one channel each; its time begins at 0."""
+    return Recording(
+        np.stack(list(waveforms.columns.values())),
+        waveforms.rate,
+        tuple(Channel(name, waveforms.quantity, waveforms.unit) for name in waveforms.columns),
+        provenance=Provenance(history=(waveforms.step,)),
     )
-    st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt=as_typed(f"{axes.y} over {axes.x}"))
 
 
-# --------------------
-# The page: its controls, charts and downloads.
-# --------------------
+def table_csv(columns: Mapping[str, ArrayLike]) -> bytes:
+    """Return columns of equal length as CSV, numbers with all their digits."""
+    import pyarrow as pa
+    from pyarrow import csv
+
+    buffer = BytesIO()
+    csv.write_csv(pa.table({name: pa.array(np.asarray(values)) for name, values in columns.items()}), buffer)
+    return buffer.getvalue()
 
 
-def choose_one(
-    label: str,
-    options: Sequence[str],
-    key: str,
-    *,
-    default: str = "",
-    about: str = "",
-    named: bool = True,
-    place: Any = st,
-    as_written: bool = False,
-) -> str:
-    """Return the option chosen among few, `default` or else the first one at first.
-
-    Parameters
-    ----------
-    label : str
-    options : sequence of str
-    key : str
-        Of the widget.
-    default : str
-    about : str
-        Shown on demand.
-    named : bool
-        Whether the label is shown; screen readers get it in any case.
-    place : container
-    as_written : bool
-        Show the options as they are, without a capital first letter.
-    """
-    first = default or options[0]
-    chosen = place.segmented_control(
-        label,
-        list(options),
-        default=first,
-        format_func=str if as_written else capitalised,
-        key=key,
-        help=about or None,
-        label_visibility="visible" if named else "collapsed",
-        persist_state="session",
-        required=True,
-    )
-    return str(chosen or first)
+def show_table(columns: Mapping[str, Any]) -> None:
+    """Show a table whose first column is text and whose others are numbers."""
+    number = st.column_config.NumberColumn(format="%.4g")
+    config = dict.fromkeys(list(columns)[1:], number)
+    st.dataframe(columns, hide_index=True, width="stretch", column_config=config)
 
 
 @dataclass(frozen=True)
@@ -399,9 +323,62 @@ class MethodPage:
         """
         return widget(label, *values, key=self.key(key or label), help=about or None, persist_state="session", **looks)
 
-    def choose(self, place: Any, label: str, options: Sequence[str], *, key: str = "", **looks: Any) -> str:
-        """Return the option chosen among few; see `choose_one`."""
-        return choose_one(label, options, self.key(key or label), place=place, **looks)
+    def choose(
+        self,
+        place: Any,
+        label: str,
+        options: Sequence[str] | Mapping[str, Any],
+        *,
+        default: str = "",
+        key: str = "",
+        about: str = "",
+        named: bool = True,
+        as_written: bool = False,
+    ) -> Any:
+        """Return the option chosen among few, `default` or else the first one at first.
+
+        Parameters
+        ----------
+        place : container
+        label : str
+        options : sequence of str, or mapping
+            A mapping gives the value of what is chosen.
+        default, key, about : str
+            See `ask`.
+        named : bool
+            Whether the label is shown; screen readers get it in any case.
+        as_written : bool
+            Show the options as they are, without a capital first letter.
+        """
+        first = default or next(iter(options))
+        chosen = self.ask(
+            place.segmented_control,
+            label,
+            list(options),
+            key=key,
+            about=about,
+            default=first,
+            format_func=str if as_written else capitalised,
+            label_visibility="visible" if named else "collapsed",
+            required=True,
+        )
+        return options[chosen or first] if isinstance(options, Mapping) else str(chosen or first)
+
+    def asked(self, name: str, content: object, label: str, *, icon: str, about: str) -> bool:
+        """Return whether the user has asked a slow question of this content; where not, show the button that asks."""
+        key, question = self.key(name), content_key(content)
+        if st.session_state.get(key) == question:
+            return True
+        ask = st.session_state.__setitem__
+        st.button(label, icon=icon, key=f"{key} button", on_click=ask, args=(key, question), help=about)
+        return False
+
+    def range(
+        self, label: str, end: float, *, start: float = 0.0, shown: tuple[float, float] | None = None, name: str = ""
+    ) -> tuple[float, float]:
+        """Return a range of an axis that the user chooses; see `charts.choose_range`."""
+        name = f"{self.name} {name}".strip()
+        return charts.choose_range(label, self.analysis, end, start=start, shown=shown, name=name)
 
     def segment(self, *, n_first: int, n_max: int = 1_000_000) -> SignalSegment:
         """Let the user choose what is analysed, and say what it is.
@@ -416,9 +393,7 @@ class MethodPage:
         recording = self.analysis.recording
         rate = recording.sampling_rate_hz
         shown = (0.0, min(recording.duration_s, n_first / rate))
-        low, high = choose_range(
-            "Segment analysed (s)", self.analysis, recording.duration_s, shown=shown, name=self.name
-        )
+        low, high = self.range("Segment analysed (s)", recording.duration_s, shown=shown)
         start = min(round(low * rate), max(0, recording.n_samples - MIN_SAMPLES))
         stop = min(max(round(high * rate), start + MIN_SAMPLES), recording.n_samples)
         segment = segment_of(self.analysis, self.channel.channel, start, min(stop, start + n_max))
@@ -433,95 +408,85 @@ class MethodPage:
             place.caption("Over time: there is no shaft angle, as the speed is not known.")
             return False
         about = "Over the shaft's angle, lines are orders: a change of speed does not smear them."
-        return self.choose(place, "Over", ("Time", "Shaft angle"), about=about) == "Shaft angle"
+        return bool(self.choose(place, "Over", {"Time": False, "Shaft angle": True}, about=about))
 
     def first_length(self, segment: SignalSegment, *, over_angle: bool, of_mesh: bool = True) -> float | None:
-        """Return the length of a waveform's first view in s, or in revolutions; None where the speed is not known."""
+        """Return the length of a waveform's first view in s, or in revolutions; None where the speed is not known.
+
+        Five mesh cycles, so that their shape is seen; three revolutions where no mesh is known or an envelope is drawn.
+        """
         if segment.angle is None:
             return None
-        revolutions, rig = N_REVOLUTIONS, self.analysis.rig
+        revolutions, rig = 3.0, self.analysis.rig
         if of_mesh and rig is not None and rig.shafts:
             orders = [rig.mesh_order(pair, segment.angle.shaft) for pair in rig.pairs]
-            revolutions = next((N_CYCLES / order for order in orders if order), N_REVOLUTIONS)
+            revolutions = next((5.0 / order for order in orders if order), revolutions)
         return revolutions if over_angle else revolutions * 60.0 / max(segment.angle.mean_speed_rpm, 1e-9)
-
-    def window(
-        self, waveforms: Waveforms, *, shown: float | None = None, in_middle: bool = False
-    ) -> tuple[float, float]:
-        """Return the time or angle that is drawn.
-
-        Parameters
-        ----------
-        waveforms : Waveforms
-        shown : float or None
-            Length at first, in s or revolutions; None: 3000 samples.
-        in_middle : bool
-            Begin in the middle instead of at the start.
-        """
-        start, end = waveforms.start, waveforms.end
-        length = min(3000 / waveforms.rate if shown is None else shown, end - start)
-        first = (start + end - length) / 2.0 if in_middle else start
-        label = f"Waveforms shown ({'s' if waveforms.axis == 'frequency' else 'revolutions'})"
-        return choose_range(label, self.analysis, end, start=start, shown=(first, first + length), name=self.name)
 
     def draw(
         self,
         waveforms: Waveforms,
-        limits: tuple[float, float],
-        colours: Mapping[str, int],
+        chosen: str,
+        residual: str = "",
         *,
-        label: str = "signal",
-        last: bool = True,
-        height_px: int = 240,
+        shown: float | None = None,
+        in_middle: bool = False,
+        place: Any = st,
     ) -> None:
-        """Draw some of the waveforms in one chart.
+        """Draw one waveform over the signal, and what remains of the signal below.
 
         Parameters
         ----------
         waveforms : Waveforms
-        limits : (float, float)
-            From `window`.
-        colours : mapping
-            Column → colour as in `Curve`.
-        label : str
-            Of the value axis; charts of one page differ in it.
-        last : bool
-            Whether the lower axis is named.
-        height_px : int
+        chosen, residual : str
+            Columns; an empty one is not drawn.
+        shown : float or None
+            Length shown at first, in s or revolutions; None: 3000 samples.
+        in_middle : bool
+            Begin in the middle instead of at the start.
+        place : container
+            Of the range that is shown.
         """
+        start, end = waveforms.start, waveforms.end
+        length = min(3000 / waveforms.rate if shown is None else shown, end - start)
+        first = (start + end - length) / 2.0 if in_middle else start
+        with place.container():
+            label = f"Waveforms shown ({'s' if waveforms.axis == 'frequency' else 'revolutions'})"
+            limits = self.range(label, end, start=start, shown=(first, first + length))
         part = waveforms.part(limits)
-        at = waveforms.at(part)
-        curves = [Curve(*thin(at, waveforms.columns[name][part]), name, colour) for name, colour in colours.items()]
-        below = at_label(waveforms.axis, waveforms.shaft) if last else ""
-        axes = Axes(below, with_unit(label, waveforms.unit), limits)
-        show_curves(curves, axes, self.key(f"waveforms {label}"), height_px=height_px)
+        at, axis = waveforms.at(part), at_label(waveforms.axis, waveforms.shaft)
+        rows = [("signal", {"signal": charts.QUIET, chosen: charts.MEASURED}, 240)]
+        if residual:
+            rows.append((residual.split(maxsplit=1)[0], {residual: charts.FAULT}, 180))
+        for label, colours, height_px in rows:
+            lines = [charts.ChartLine(*thin(at, waveforms.columns[c][part]), c, colours[c]) for c in colours]
+            below = axis if label == rows[-1][0] else ""
+            axes = charts.Axes(below, with_unit(label, waveforms.unit), limits)
+            charts.show_lines(lines, axes, self.key(f"waveforms {label}"), height_px=height_px, legend=True)
 
-    def offer(self, waveforms: Waveforms | None, tables: Mapping[str, Table] | None = None) -> None:
+    def offer(self, waveforms: Waveforms | None, tables: Mapping[str, Columns] | None = None) -> None:
         """Offer waveforms in a choice of formats, and tables as CSV: whole, not thinned as on the page.
 
         Parameters
         ----------
         waveforms : Waveforms or None
         tables : mapping or None
-            What the table holds → function that returns its columns; called only on download.
+            What the table holds → its columns.
         """
         with (
             st.container(horizontal=True, horizontal_alignment="right"),
             st.popover("Download", icon=":material/download:"),
         ):
             if waveforms is not None:
-                self._offer_waveforms(waveforms)
-            for what, table in (tables or {}).items():
-                self._offer_file(f"{what} (CSV)", partial(_table_file, table), what, ".csv")
-
-    def _offer_waveforms(self, waveforms: Waveforms) -> None:
-        endings = OVER_TIME if waveforms.axis == "frequency" else OVER_ANGLE
-        ending = self.ask(st.selectbox, "Format", endings, key=f"format {endings[-1]}")
-        n = len(waveforms.columns) * waveforms.n_samples
-        label = f"Waveforms: {len(waveforms.columns)} × {waveforms.n_samples} samples"
-        self._offer_file(label, lambda: waveforms_file(waveforms, ending), "waveforms", ending)
-        if ending == ".csv" and n > 2_000_000:
-            st.caption(f"About {20e-6 * n:.0f} MB as CSV; .h5 is less than half of it.")
+                endings = OVER_TIME if waveforms.axis == "frequency" else OVER_ANGLE
+                ending = self.ask(st.selectbox, "Format", endings, key=f"format {endings[-1]}")
+                n = len(waveforms.columns) * waveforms.n_samples
+                label = f"Waveforms: {len(waveforms.columns)} × {waveforms.n_samples} samples"
+                self._offer_file(label, partial(waveforms_file, waveforms, ending), "waveforms", ending)
+                if ending == ".csv" and n > 2_000_000:
+                    st.caption(f"About {20e-6 * n:.0f} MB as CSV; .h5 is less than half of it.")
+            for what, columns in (tables or {}).items():
+                self._offer_file(f"{what} (CSV)", partial(table_csv, columns), what, ".csv")
 
     def _offer_file(self, label: str, content: Callable[[], bytes], what: str, ending: str) -> None:
         source = safe_file_name(self.analysis.recording.provenance.source).split(".")[0]
@@ -534,99 +499,3 @@ class MethodPage:
             icon=":material/download:",
             key=self.key(f"download {what}"),
         )
-
-
-def show_table(columns: Mapping[str, Any], *, precision: str = "%.4g") -> None:
-    """Show a table whose first column is text and whose others are numbers."""
-    number = st.column_config.NumberColumn(format=precision)
-    config = dict.fromkeys(list(columns)[1:], number)
-    st.dataframe(columns, hide_index=True, width="stretch", column_config=config)
-
-
-# --------------------
-# Files.
-# --------------------
-
-
-OVER_TIME = (".csv", ".h5", ".wav", ".parquet", ".mat")
-"""What recordings are written to; `gearsig.recording` reads all of them."""
-OVER_ANGLE = (".csv",)
-"""A recording runs over time: signals over angle are plain columns."""
-
-
-def waveforms_file(waveforms: Waveforms, ending: str) -> bytes:
-    """Return a recording of the waveforms in a file's format, or columns over angle.
-
-    Raises
-    ------
-    InputError
-        If the format cannot hold them.
-    """
-    if waveforms.axis == "order":
-        return table_csv({at_label("order", waveforms.shaft): waveforms.at(), **waveforms.columns})
-    with TemporaryDirectory(prefix="gearsig-") as folder:
-        path = Path(folder) / f"waveforms{ending}"
-        write_recording(recording_of(waveforms), path)
-        return path.read_bytes()
-
-
-def recording_of(waveforms: Waveforms) -> Recording:
-    """Return waveforms over time as a recording, one channel each; its time begins at 0."""
-    return Recording(
-        np.stack(list(waveforms.columns.values())),
-        waveforms.rate,
-        tuple(Channel(name, waveforms.quantity, waveforms.unit) for name in waveforms.columns),
-        provenance=Provenance(history=(waveforms.step,)),
-    )
-
-
-def _table_file(table: Table) -> bytes:
-    return table_csv(table())
-
-
-def table_csv(columns: Mapping[str, ArrayLike]) -> bytes:
-    """Return columns of equal length as CSV, numbers with all their digits."""
-    import pyarrow as pa
-    from pyarrow import csv
-
-    buffer = BytesIO()
-    csv.write_csv(pa.table({name: pa.array(np.asarray(values)) for name, values in columns.items()}), buffer)
-    return buffer.getvalue()
-
-
-# --------------------
-# Which modulation frequencies or orders a machine's bearings and gears may show, and how high they reach.
-# --------------------
-
-
-def modulation_cursors(analysis: Analysis, segment: SignalSegment, spectrum: Spectrum) -> tuple[Cursor, ...]:
-    """Return lines of shafts, bearings and meshes on the axis of an envelope's spectrum; none where they would smear.
-
-    Parameters
-    ----------
-    analysis : Analysis
-    segment : SignalSegment
-    spectrum : Spectrum
-        Over modulation frequency or order.
-    """
-    here = of_segment(analysis, segment)
-    if segment.angle is None or (spectrum.axis == "frequency" and not speed_is_constant(here)):
-        return ()
-    meshes = [cursor for cursor in line_cursors(here, spectrum, n_sidebands=0) if cursor.kind == "mesh"]
-    return (*bearing_cursors(here, spectrum), *meshes)
-
-
-def highest_of_interest(analysis: Analysis, segment: SignalSegment, *, of_orders: bool) -> float:
-    """Return the highest modulation frequency in Hz, or order of the reference shaft, worth a look at first.
-
-    Three harmonics of the fastest bearing line and what slip makes of the last; 12 orders where no bearing is known,
-    and 1/128 of the sampling rate where the speed is not.
-    """
-    rate, rig = segment.recording.sampling_rate_hz, analysis.rig
-    if segment.angle is None:
-        return rate / 128.0
-    lines = order_lines(rig, n_sidebands=0) if rig is not None and rig.shafts else ()
-    order = max((3.3 * line.order for line in lines if line.kind == "bearing"), default=12.0)
-    per_order_hz = max(segment.angle.mean_speed_rpm / 60.0, 1e-9)
-    order = min(order, rate / 16.0 / per_order_hz)
-    return order if of_orders else order * per_order_hz

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast, get_args
+from typing import cast, get_args
 
 import streamlit as st
 
-from app.dashboard.methods.frame import MethodPage, SignalSegment, cached, content_key, signal_of, waveforms_of
+from app.dashboard.methods.frame import Columns, MethodPage, SignalSegment, cached, signal_of, waveforms_of
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import choose_range, show_picture
+from app.dashboard.widgets.charts import show_picture
 from app.dashboard.widgets.messages import show_warnings
-from gearsig.decompose import Modes, ModeSuggestion, ModeTrial, StartName, VmdEngine, VmdSettings, suggest_modes, vmd
+from gearsig.decompose import Modes, ModeSuggestion, VmdEngine, VmdSettings, suggest_modes, vmd
 from gearsig.plot import modes_figure
 from gearsig.spectra import band_envelope
 from gearsig.timefreq import UniformSignal
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 N_PER_BLOCK = 2**18
 """Longer segments are taken block by block."""
@@ -28,6 +24,7 @@ PENALTIES = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_00
 """A logarithmic scale that holds whatever is suggested."""
 SUGGESTED = ("K", "penalty", "start")
 """Keys of the widgets that a suggestion sets."""
+suggestion_of = cached(16, "Trying numbers of modes and penalties …")(suggest_modes)
 
 
 def show_modes(page: MethodPage) -> None:
@@ -54,7 +51,14 @@ def show_modes(page: MethodPage) -> None:
     names = [f"mode {k + 1}, {modes.centres[k]:.5g} {signal.position_unit}" for k in range(modes.n_modes)]
     columns = dict(zip(names, modes.waveforms, strict=True)) | {"residual": modes.residual}
     step = f"{modes.n_modes} variational modes, penalty {settings.penalty:g}, of {modes.source} less {offset:g}"
-    page.offer(waveforms_of(segment, signal, columns, step), {"Modes": lambda: _mode_columns(modes)})
+    unit = "Hz" if modes.axis == "frequency" else "orders"
+    table: Columns = {
+        "mode": [k + 1 for k in range(modes.n_modes)],
+        f"centre ({unit})": modes.centres,
+        f"bandwidth ({unit})": modes.bandwidths,
+        f"rms ({modes.unit or 1})": modes.rms,
+    }
+    page.offer(waveforms_of(segment, signal, columns, step), {"Modes": table})
 
 
 def _choose_signal(page: MethodPage, segment: SignalSegment) -> tuple[UniformSignal, float]:
@@ -67,8 +71,7 @@ def _choose_signal(page: MethodPage, segment: SignalSegment) -> tuple[UniformSig
     rate, channel = segment.recording.sampling_rate_hz, page.channel
     # where the analysis found no band that carries impacts, the upper part of the spectrum
     usual = channel.envelope_band_hz or (0.25 * rate, 0.45 * rate)
-    name = f"{page.name} {channel.channel}"
-    band = choose_range("Band of the envelope (Hz)", page.analysis, rate / 2.0, shown=usual, name=name)
+    band = page.range("Band of the envelope (Hz)", rate / 2.0, shown=usual, name=channel.channel)
     envelope = band_envelope(segment.values, rate, band, kind="magnitude", unit=segment.unit)
     # Its mean would be a mode of its own that outweighs the others.
     mean = float(envelope.values.mean())
@@ -109,7 +112,7 @@ def _choose_settings(page: MethodPage, engine: VmdEngine) -> VmdSettings:
         float(penalty),
         dual_step=float(dual_step),
         zero_mode=zero_mode,
-        start=cast("StartName", start),
+        start=start,
         max_iterations=499 if disabled else max_iterations,
         engine=engine,
     )
@@ -137,43 +140,20 @@ def _show_figure(page: MethodPage, segment: SignalSegment, signal: UniformSignal
     end = float(modes.positions[-1])
     with left:
         label = f"Waveforms shown ({'revolutions' if over_angle else 's from the start of the segment'})"
-        limits = choose_range(label, page.analysis, end, shown=(0.0, min(end, length)), name=page.name)
+        limits = page.range(label, end, shown=(0.0, min(end, length)))
     with right:
         label = "Orders shown" if over_angle else "Frequencies shown (Hz)"
-        lines = choose_range(label, page.analysis, modes.sampling_rate / 2.0, name=page.name)
+        lines = page.range(label, modes.sampling_rate / 2.0)
     figure = modes_figure(modes, limits=limits, spectrum_limits=lines)
     show_picture(figure, f"Waveforms and spectra of {modes.n_modes} modes of {modes.source}")
 
 
-def _mode_columns(modes: Modes) -> Mapping[str, ArrayLike]:
-    unit = "Hz" if modes.axis == "frequency" else "orders"
-    return {
-        "mode": [k + 1 for k in range(modes.n_modes)],
-        f"centre ({unit})": modes.centres,
-        f"bandwidth ({unit})": modes.bandwidths,
-        f"rms ({modes.unit or 1})": modes.rms,
-    }
-
-
-# --------------------
-# How many modes a signal supports: the suggestion with its reasons, everything tried, and a button to apply it.
-# --------------------
-
-
 def _show_suggestion(page: MethodPage, signal: UniformSignal) -> None:
     """Show the suggestion for a signal once it is asked for."""
-    asked, key = page.key("suggested"), content_key(signal)
-    if st.session_state.get(asked) != key:
-        st.button(
-            "Suggest K and penalty",
-            icon=":material/lightbulb:",
-            key=f"{asked} button",
-            on_click=st.session_state.__setitem__,
-            args=(asked, key),
-            help="Tries up to 8 modes at 6 penalties on up to 16 384 samples: a few seconds.",
-        )
+    about = "Tries up to 8 modes at 6 penalties on up to 16 384 samples: a few seconds."
+    if not page.asked("suggested", signal, "Suggest K and penalty", icon=":material/lightbulb:", about=about):
         return
-    suggestion = suggestion_of(signal)
+    suggestion = suggestion_of(signal.values, signal.rate, axis=signal.axis, source=signal.source)
     settings = suggestion.settings
     with st.container(border=True):
         head, button = st.columns((4, 1), vertical_alignment="center")
@@ -194,39 +174,31 @@ def _show_suggestion(page: MethodPage, signal: UniformSignal) -> None:
         )
         st.markdown("\n".join(f"- {as_typed(reason)}" for reason in suggestion.reasons))
         with st.expander(f"Everything that was tried ({len(suggestion.trials)})"):
-            _show_trials(suggestion)
+            numbers = ("residual (% of rms)", "separation", "widest", "weakest (% of energy)")
+            st.dataframe(
+                _trial_rows(suggestion),
+                hide_index=True,
+                width="stretch",
+                column_config=dict.fromkeys(numbers, st.column_config.NumberColumn(format="%.3g")),
+            )
+            st.caption(
+                "Separation: closest centres over the distance at which a mode's gain is one half; below 1, modes "
+                "share lines. Widest: largest bandwidth over that of white noise; near 1 it is noise."
+            )
 
 
-@cached(16, "Trying numbers of modes and penalties …")
-def suggestion_of(signal: UniformSignal) -> ModeSuggestion:
-    """Return the suggestion."""
-    return suggest_modes(signal.values, signal.rate, axis=signal.axis, source=signal.source)
-
-
-def _show_trials(suggestion: ModeSuggestion) -> None:
-    number = st.column_config.NumberColumn(format="%.3g")
-    numbers = ("residual (% of rms)", "separation", "widest", "weakest (% of energy)")
-    st.dataframe(
-        [_trial_row(trial, chosen=trial is suggestion.chosen) for trial in suggestion.trials],
-        hide_index=True,
-        width="stretch",
-        column_config=dict.fromkeys(numbers, number),
-    )
-    st.caption(
-        "Separation: closest centres over the distance at which a mode's gain is one half; below 1, modes share "
-        "lines. Widest: largest bandwidth over that of white noise; near 1 it is noise."
-    )
-
-
-def _trial_row(trial: ModeTrial, *, chosen: bool) -> dict[str, object]:
-    return {
-        "": "➤" if chosen else "",
-        "penalty": int(trial.penalty),
-        "modes": trial.n_modes,
-        "start": str(trial.settings.start),
-        "residual (% of rms)": 100.0 * trial.reconstruction_error,
-        "separation": trial.separation if trial.n_modes > 1 else None,
-        "widest": trial.widest,
-        "weakest (% of energy)": 100.0 * trial.smallest_share,
-        "objection": trial.objection or "none",
-    }
+def _trial_rows(suggestion: ModeSuggestion) -> list[dict[str, object]]:
+    return [
+        {
+            "": "➤" if trial is suggestion.chosen else "",
+            "penalty": int(trial.penalty),
+            "modes": trial.n_modes,
+            "start": str(trial.settings.start),
+            "residual (% of rms)": 100.0 * trial.reconstruction_error,
+            "separation": trial.separation if trial.n_modes > 1 else None,
+            "widest": trial.widest,
+            "weakest (% of energy)": 100.0 * trial.smallest_share,
+            "objection": trial.objection or "none",
+        }
+        for trial in suggestion.trials
+    ]

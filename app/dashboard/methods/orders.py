@@ -3,59 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Any
 
 import numpy as np
 import streamlit as st
 
-from app.dashboard.methods.frame import (
-    N_CYCLES,
-    Curve,
-    MethodPage,
-    SignalSegment,
-    cached,
-    show_curves,
-    show_table,
-    signal_of,
-    waveforms_of,
-)
+from app.dashboard.methods.frame import MethodPage, SignalSegment, cached, show_table, signal_of, waveforms_of
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import Axes
+from app.dashboard.widgets.charts import Axes, ChartLine, show_lines
 from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.views import show_unknown_speed
+from gearsig import orders as order_methods
 from gearsig.angle import resample_to_angle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, CannotTell
 from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import readable
-from gearsig.orders import Generation, OrderSeparation, SeparatedOrder, TrackedOrder, track_orders, track_vold_kalman
 from gearsig.plot import unit_text, with_unit
 from gearsig.report import speed_is_constant
 from gearsig.rig import order_lines
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
 MIN_LENGTH, MAX_EFFORT = 2**16, 1_600_000
 """Coupled orders take time as their number squared: so many samples times orders squared, but not less than that."""
 KINDS = ("mesh", "shaft", "bearing", "sideband")
-COUPLINGS: dict[str, bool | Literal["automatic"]] = {"Automatic": "automatic", "All": True, "None": False}
 HANN_BANDWIDTH = 1.5
 """Noise bandwidth of a Hann window in lines: blocks of 1.5/B revolutions collect over B orders."""
 RESIDUAL = "residual without all chosen orders"
-
-
-@dataclass(frozen=True)
-class OrderSettings:
-    """Settings of the filter; one of both bandwidths is None."""
-
-    orders: tuple[float, ...]
-    bandwidth_hz: float | None
-    bandwidth_orders: float | None
-    n_poles: int
-    generation: Generation
-    coupled: bool | Literal["automatic"]
+separated = cached(4, "Separating the orders …")(order_methods.track_vold_kalman)
+angle_signal = cached(4, "Resampling over the shaft's angle …")(resample_to_angle)
 
 
 def show_order_tracking(page: MethodPage) -> None:
@@ -69,17 +44,30 @@ def show_order_tracking(page: MethodPage) -> None:
     with right:
         n_max = max(MIN_LENGTH, MAX_EFFORT // max(2, len(orders)) ** 2)
         segment = page.segment(n_first=250_000, n_max=n_max)
-    settings = _choose_settings(page, tuple(orders.values()))
+    settings = _choose_settings(page)
     if segment.angle is None:
         st.info("The shaft's angle is not known in this segment.")
         return
-    separation = separated(segment, settings)
-    tracks, reason = _tracks(settings, segment)
-    separated_orders = dict(zip(orders, separation.orders, strict=True))
-    _show_levels(page, segment, separated_orders, separation, tracks)
+    values = tuple(orders.values())
+    separation = separated(segment.recording, segment.channel, values, shaft_angle=segment.angle, **settings)
+    tracks, reason = _tracks(segment, values, settings)
+    by_name = dict(zip(orders, separation.orders, strict=True))
+    _show_levels(page, segment, by_name, separation, tracks)
     show_warnings(separation.notes, quiet=True)
-    _show_rms(segment, separated_orders, separation)
-    _show_waveforms(page, segment, separated_orders, separation)
+    _show_rms(segment, by_name, separation)
+
+    columns = {"signal": segment.values, **{name: order.waveform for name, order in by_name.items()}}
+    columns[RESIDUAL] = separation.residual
+    waveforms = waveforms_of(segment, signal_of(segment), columns, f"Vold-Kalman orders {', '.join(orders)}")
+    chosen = st.selectbox("Waveform of", list(orders), key=page.key(f"waveform of {list(orders)}"))
+    five_cycles_s = 5.0 / max(float(np.median(by_name[chosen].frequency_hz)), 1e-9)
+    page.draw(waveforms, chosen, RESIDUAL, shown=five_cycles_s, in_middle=True)
+    levels = {
+        "time (s)": segment.start_s + separation.time_s(),
+        "speed of the reference shaft (rpm)": _speed_rpm(separation.orders[0]),
+        **{with_unit(f"{name}, amplitude peak", segment.unit): order.amplitude for name, order in by_name.items()},
+    }
+    page.offer(waveforms, {"Levels": levels})
     if reason:
         st.caption(f"No resampling-based track: {as_typed(reason)}")
 
@@ -121,94 +109,68 @@ def _number(text: str) -> float:
         ) from None
 
 
-def _choose_settings(page: MethodPage, orders: tuple[float, ...]) -> OrderSettings:
+def _choose_settings(page: MethodPage) -> dict[str, Any]:
+    """Return the settings of the filter as `track_vold_kalman` takes them."""
     one, two, three = st.columns(3)
     four, five, _ = st.columns(3)
-    in_hz = page.choose(one, "Bandwidth in", ("Orders", "Hz")) == "Hz"
-    first = 5.0 if in_hz else 0.5
+    unit, first = page.choose(one, "Bandwidth in", {"Orders": ("orders", 0.5), "Hz": ("Hz", 5.0)})
     about = "Between the -3 dB points. Narrow bands tell close orders apart and smooth changes of level."
-    label = f"Bandwidth ({'Hz' if in_hz else 'orders'})"
+    label = f"Bandwidth ({unit})"
     width = float(page.ask(two.number_input, label, value=first, step=first / 5.0, format="%g", about=about))
     about = "More poles: steeper skirts, longer settling. The first generation has two."
-    poles = page.choose(three, "Poles", ("1", "2", "3"), default="2", about=about)
+    n_poles = page.choose(three, "Poles", {"1": 1, "2": 2, "3": 3}, default="2", about=about)
     about = "The second generation has 1 to 3 poles; the first has two and a fixed shape."
-    generation = page.choose(four, "Generation", ("Second", "First"), about=about)
+    generation = page.choose(four, "Generation", {"Second": "second", "First": "first"}, about=about)
     about = "Orders solved for together share the signal where they cross or lie close: automatic where it matters."
-    coupling = page.choose(five, "Coupling", tuple(COUPLINGS), about=about)
-    return OrderSettings(
-        orders,
-        width if in_hz else None,
-        None if in_hz else width,
-        int(poles),
-        "second" if generation == "Second" else "first",
-        COUPLINGS[coupling],
-    )
+    coupled = page.choose(five, "Coupling", {"Automatic": "automatic", "All": True, "None": False}, about=about)
+    return {f"bandwidth_{unit.lower()}": width, "n_poles": n_poles, "generation": generation, "coupled": coupled}
 
 
-@cached(4, "Separating the orders …")
-def separated(segment: SignalSegment, settings: OrderSettings) -> OrderSeparation:
-    """Return the separated orders."""
-    return track_vold_kalman(
-        segment.recording,
-        segment.channel,
-        settings.orders,
-        bandwidth_hz=settings.bandwidth_hz,
-        bandwidth_orders=settings.bandwidth_orders,
-        n_poles=settings.n_poles,
-        generation=settings.generation,
-        coupled=settings.coupled,
-        shaft_angle=segment.angle,
-    )
-
-
-def _tracks(settings: OrderSettings, segment: SignalSegment) -> tuple[tuple[TrackedOrder, ...], str]:
+def _tracks(
+    segment: SignalSegment, orders: tuple[float, ...], settings: Mapping[str, Any]
+) -> tuple[Sequence[order_methods.TrackedOrder], str]:
     """Return resampling-based tracks, of the same bandwidth where the segment allows it, or why there are none."""
-    if segment.angle is None:
-        return (), "the shaft's angle is not known"
-    bandwidth_orders = settings.bandwidth_orders
-    if bandwidth_orders is None:
-        bandwidth_orders = 60.0 * (settings.bandwidth_hz or 1.0) / max(segment.angle.mean_speed_rpm, 1e-9)
-    revolutions = min(max(HANN_BANDWIDTH / bandwidth_orders, 1.0), 0.25 * segment.angle.n_revolutions)
+    angle = segment.angle
+    assert angle is not None  # noqa: S101 - the caller's condition, said to the type checker
+    bandwidth = settings.get("bandwidth_orders")
+    if bandwidth is None:
+        bandwidth = 60.0 * (settings["bandwidth_hz"] or 1.0) / max(angle.mean_speed_rpm, 1e-9)
+    n_revolutions = min(max(HANN_BANDWIDTH / bandwidth, 1.0), 0.25 * angle.n_revolutions)
     try:
-        return resampled(segment, settings.orders, round(revolutions, 6)), ""
+        signal = angle_signal(segment.recording, angle, channels=[segment.channel])
+        return order_methods.track_orders(
+            signal, segment.channel, orders, revolutions_per_block=round(n_revolutions, 6)
+        ), ""
     except GearsigError as error:
         return (), str(error)
-
-
-@cached(4, "Resampling over the shaft's angle …")
-def resampled(
-    segment: SignalSegment, orders: tuple[float, ...], revolutions_per_block: float
-) -> tuple[TrackedOrder, ...]:
-    """Return levels from blocks of revolutions."""
-    assert segment.angle is not None  # noqa: S101 - the caller's condition, said to the type checker
-    signal = resample_to_angle(segment.recording, segment.angle, channels=[segment.channel])
-    return track_orders(signal, segment.channel, orders, revolutions_per_block=revolutions_per_block)
 
 
 def _show_levels(
     page: MethodPage,
     segment: SignalSegment,
-    orders: Mapping[str, SeparatedOrder],
-    separation: OrderSeparation,
-    tracks: Sequence[TrackedOrder],
+    orders: Mapping[str, order_methods.SeparatedOrder],
+    separation: order_methods.OrderSeparation,
+    tracks: Sequence[order_methods.TrackedOrder],
 ) -> None:
     first = "Time" if speed_is_constant(page.analysis) else "Speed"
-    over_speed = page.choose(st, "Levels over", ("Time", "Speed"), default=first) == "Speed"
+    over_speed = page.choose(st, "Levels over", {"Time": False, "Speed": True}, default=first)
     step = max(1, len(separation.residual) // 2000)
-    curves = []
+    lines = []
     for i, (name, order) in enumerate(orders.items()):
         x = (_speed_rpm(order) if over_speed else segment.start_s + separation.time_s())[::step]
         # where the filter has settled; where it nowhere has, all of it
         y = np.where(order.settled, order.amplitude, np.nan) if order.settled.any() else order.amplitude
-        curves.append(Curve(x, y[::step], name, i))
+        lines.append(ChartLine(x, y[::step], name, i))
     for i, (name, track) in enumerate(zip(orders, tracks, strict=False)):
         x = track.speed_rpm if over_speed else segment.start_s + track.time_s
-        curves.append(Curve(x, track.amplitude, f"{name}, resampled", i, dotted=True))
-    shown = np.concatenate([curve.x for curve in curves])
+        lines.append(ChartLine(x, track.amplitude, f"{name}, resampled", i, dotted=True))
+    shown = np.concatenate([line.x for line in lines])
+    # An order that begins or ends in the segment is not known well there: the highest few of the points are left out.
+    tops = [float(np.nanpercentile(line.y, 99.5)) for line in lines if np.isfinite(line.y).any()]
     label = "speed of the reference shaft (rpm)" if over_speed else "time (s)"
     limits = float(shown.min()), float(shown.max())
-    axes = Axes(label, with_unit("amplitude peak", segment.unit), limits, _level_limits(curves))
-    show_curves(curves, axes, page.key("levels"))
+    axes = Axes(label, with_unit("amplitude peak", segment.unit), limits, (0.0, 1.15 * max(tops, default=0.0) or 1.0))
+    show_lines(lines, axes, page.key("levels"), height_px=320, legend=True)
     st.caption("Levels end where the filter has not settled yet: at the ends, and where an order begins or ends.")
     if tracks:
         bandwidth = tracks[0].bandwidth_orders
@@ -218,18 +180,16 @@ def _show_levels(
         )
 
 
-def _level_limits(curves: Sequence[Curve]) -> tuple[float, float]:
-    """Leave out the highest few of the points: an order that begins or ends in the segment is not known well there."""
-    tops = [float(np.nanpercentile(curve.y, 99.5)) for curve in curves if np.isfinite(curve.y).any()]
-    return 0.0, 1.15 * max(tops, default=0.0) or 1.0
-
-
-def _speed_rpm(order: SeparatedOrder) -> FloatArray:
+def _speed_rpm(order: order_methods.SeparatedOrder) -> FloatArray:
     speed: FloatArray = 60.0 * order.frequency_hz / order.order
     return speed
 
 
-def _show_rms(segment: SignalSegment, orders: Mapping[str, SeparatedOrder], separation: OrderSeparation) -> None:
+def _show_rms(
+    segment: SignalSegment,
+    orders: Mapping[str, order_methods.SeparatedOrder],
+    separation: order_methods.OrderSeparation,
+) -> None:
     power = float(np.var(segment.values.astype(np.float64))) or 1.0
     rms = [float(np.sqrt(np.mean(np.square(order.waveform)))) for order in orders.values()]
     unit = unit_text(segment.unit) or "1"
@@ -246,31 +206,3 @@ def _show_rms(segment: SignalSegment, orders: Mapping[str, SeparatedOrder], sepa
         f"The residual has an rms of {readable(residual)} {unit}: {100.0 * residual**2 / power:.3g} % of the energy. "
         f"Expected error of the solution: {separation.expected_error:.1g} of the largest component."
     )
-
-
-def _show_waveforms(
-    page: MethodPage, segment: SignalSegment, orders: Mapping[str, SeparatedOrder], separation: OrderSeparation
-) -> None:
-    signal = signal_of(segment)
-    columns = {"signal": signal.values, **{name: order.waveform for name, order in orders.items()}}
-    columns[RESIDUAL] = separation.residual
-    waveforms = waveforms_of(segment, signal, columns, f"Vold-Kalman orders {', '.join(orders)}")
-    chosen = st.selectbox("Waveform of", list(orders), key=page.key(f"waveform of {list(orders)}"))
-    shown = N_CYCLES / max(float(np.median(orders[chosen].frequency_hz)), 1e-9)
-    limits = page.window(waveforms, shown=shown, in_middle=True)
-    page.draw(waveforms, limits, {"signal": -1, chosen: 0}, last=False)
-    page.draw(waveforms, limits, {RESIDUAL: 1}, label="residual", height_px=180)
-    page.offer(waveforms, {"Levels": lambda: _level_columns(segment, orders, separation)})
-
-
-def _level_columns(
-    segment: SignalSegment, orders: Mapping[str, SeparatedOrder], separation: OrderSeparation
-) -> Mapping[str, ArrayLike]:
-    """Return time, speed, and the amplitude of each order, at every sample."""
-    columns: dict[str, ArrayLike] = {
-        "time (s)": segment.start_s + separation.time_s(),
-        "speed of the reference shaft (rpm)": _speed_rpm(separation.orders[0]),
-    }
-    for name, order in orders.items():
-        columns[with_unit(f"{name}, amplitude peak", segment.unit)] = order.amplitude
-    return columns

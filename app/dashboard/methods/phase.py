@@ -3,53 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, cast
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import streamlit as st
 
-from app.dashboard.methods.frame import MethodPage, SignalSegment, cached, content_key
+from app.dashboard.methods.frame import MethodPage, SignalSegment, cached
 from app.dashboard.theme import as_plot_text, as_typed, one_line, palette
-from app.dashboard.widgets.charts import CONFIG, show_picture
+from app.dashboard.widgets.charts import show_chart, show_picture
+from gearsig import phase, plot
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase import (
-    CycleLock,
-    EmbeddingDimension,
-    MotionKind,
-    MotionQuantity,
-    MutualInformation,
-    PhasePortrait,
-    PoincareSection,
-    average_mutual_information,
-    delay_embedding,
-    embedding_dimension,
-    find_lock,
-    kind_of_motion,
-    largest_lyapunov_exponent,
-    lowest_low_cut_hz,
-    phase_plane,
-    poincare_section,
-    recurrence_measures,
-    recurrence_plot,
-    translation_walk,
-    zero_one_test,
-    zero_one_test_of_section,
-)
-from gearsig.plot import (
-    chaos_test_figure,
-    divergence_figure,
-    embedding_figure,
-    phase_portrait_figure,
-    recurrence_figure,
-)
 
-# --------------------
-# Poincaré section and kind of motion, of the phase plane and of the embedding.
-# --------------------
+MAX_DRAWN, MAX_DRAWN_IN_SPACE = 20_000, 6_000
+"""Points of a path: more is a blot, and a browser without a graphics card turns it slowly in space."""
+kind_of = cached(4, "Looking at section, exponent and 0–1 test …")(phase.kind_of_motion)
+plane_of = cached(4, "Integrating …")(phase.phase_plane)
+information_of = cached(6, "Looking for the delay …")(phase.average_mutual_information)
+dimension_of = cached(6, "Looking for the dimension …")(phase.embedding_dimension)
+exponent_of = cached(4, "Following neighbours …")(phase.largest_lyapunov_exponent)
+recurrence_of = cached(4, "Comparing points …")(phase.recurrence_plot)
+measures_of = cached(4, "Comparing points …")(phase.recurrence_measures)
 
 
-def _choose_lock(page: MethodPage, place: Any, segment: SignalSegment) -> CycleLock | None:
+def _choose_lock(page: MethodPage, place: Any, segment: SignalSegment) -> phase.CycleLock | None:
     """Return what gives a point per cycle; None where the speed is not known."""
     if segment.angle is None:
         place.info("There is no Poincaré section: it takes a shaft angle, and the speed is not known.")
@@ -68,7 +45,7 @@ def _choose_lock(page: MethodPage, place: Any, segment: SignalSegment) -> CycleL
         locks |= {f"revolution of {one_line(name)}": ("", name) for name in rig.shaft_names}
     locks = locks or {"revolution of the shaft": ("", "")}
     pair, shaft = locks[page.ask(place.selectbox, "A point once per", list(locks), key=f"lock {list(locks)}")]
-    return find_lock(segment.recording, pair=pair, shaft=shaft, rig=rig, angle=segment.angle)
+    return phase.find_lock(segment.recording, pair=pair, shaft=shaft, rig=rig, angle=segment.angle)
 
 
 def _choose_phase(page: MethodPage, place: Any) -> float:
@@ -76,24 +53,20 @@ def _choose_phase(page: MethodPage, place: Any) -> float:
     return float(page.ask(place.slider, "Place in the cycle (0 to 1)", 0.0, 1.0, 0.0, step=0.05, about=about))
 
 
-def _section(path: PhasePortrait, lock: CycleLock | None, phase_cycles: float) -> PoincareSection | None:
+def _section(
+    path: phase.PhasePortrait, lock: phase.CycleLock | None, phase_cycles: float
+) -> phase.PoincareSection | None:
     """Return the section; None, with the reason on the page, where there is none."""
     if lock is None:
         return None
     try:
-        return poincare_section(path, lock, phase_cycles=phase_cycles)
+        return phase.poincare_section(path, lock, phase_cycles=phase_cycles)
     except RefusalError as error:
         st.info(as_typed(error), icon=":material/help:")
         return None
 
 
-@cached(4, "Looking at section, exponent and 0–1 test …")
-def kind_of(path: PhasePortrait, lock: CycleLock) -> MotionKind:
-    """Return the kind of motion."""
-    return kind_of_motion(path, lock)
-
-
-def _show_kind(kind: MotionKind, scope: str) -> None:
+def _show_kind(kind: phase.MotionKind, scope: str) -> None:
     """Say what kind of motion it is, of which signal, and why."""
     with st.container(border=True):
         after = f" after {kind.period} cycles" if kind.kind == "subharmonic" else ""
@@ -106,23 +79,6 @@ def _show_kind(kind: MotionKind, scope: str) -> None:
         )
 
 
-# --------------------
-# The phase plane.
-# --------------------
-
-QUANTITIES = ("acceleration", "velocity", "displacement")
-MAX_DRAWN = 20_000
-
-
-@dataclass(frozen=True)
-class PlaneSettings:
-    """Settings of `phase_plane`."""
-
-    low_cut_hz: float | None
-    high_cut_hz: float | None
-    quantity: MotionQuantity | None
-
-
 def show_phase_plane(page: MethodPage) -> None:
     """Show displacement and velocity of one channel."""
     left, right = st.columns(2)
@@ -131,9 +87,9 @@ def show_phase_plane(page: MethodPage) -> None:
     settings = _choose_band(page, segment)
     with right.container():
         lock = _choose_lock(page, st, segment)
-    phase, n_drawn = _choose_view(page, segment, lock)
-    plane = plane_of(segment, settings)
-    figure = phase_portrait_figure(plane, _section(plane, lock, phase), n_points=n_drawn)
+    phase_cycles, n_drawn = _choose_view(page, segment, lock)
+    plane = plane_of(segment.recording, segment.channel, **settings)
+    figure = plot.phase_portrait_figure(plane, _section(plane, lock, phase_cycles), n_points=n_drawn)
     show_picture(figure, f"Velocity over displacement, {plane.source}, with its Poincaré points")
     low, high = plane.band_hz
     st.caption(
@@ -141,24 +97,20 @@ def show_phase_plane(page: MethodPage) -> None:
         "ends an integral rests on what is not known. Motion that repeats with the lock falls onto one point; scatter "
         "is noise, modulation, or motion that does not repeat."
     )
-    if lock is not None:
-        _offer_kind(page, plane, lock)
+    about = "Takes some seconds: does the section repeat, the largest Lyapunov exponent, the 0–1 test for chaos."
+    question = "What kind of motion is it?"
+    if lock is not None and page.asked(
+        "kind asked", (plane, lock), question, icon=":material/psychology_alt:", about=about
+    ):
+        _show_kind(
+            kind_of(plane, lock),
+            f"Looked at: displacement and velocity, {plane.source}. Integration makes slow motion weigh more; "
+            "“Embedding and chaos” asks the same of the signal as measured, and the answers may differ.",
+        )
 
 
-@cached(4, "Integrating …")
-def plane_of(segment: SignalSegment, settings: PlaneSettings) -> PhasePortrait:
-    """Return the phase plane."""
-    return phase_plane(
-        segment.recording,
-        segment.channel,
-        low_cut_hz=settings.low_cut_hz,
-        high_cut_hz=settings.high_cut_hz,
-        quantity=settings.quantity,
-    )
-
-
-def _choose_band(page: MethodPage, segment: SignalSegment) -> PlaneSettings:
-    """Let the user choose the band, and say what the channel measures where the recording does not.
+def _choose_band(page: MethodPage, segment: SignalSegment) -> dict[str, Any]:
+    """Return band and quantity as `phase_plane` takes them; the user says what the recording does not.
 
     Raises
     ------
@@ -166,7 +118,8 @@ def _choose_band(page: MethodPage, segment: SignalSegment) -> PlaneSettings:
         If the channel measures something else than motion.
     """
     known = segment.recording.channels[0].quantity
-    if known not in (*QUANTITIES, "transmission_error", "unknown"):
+    quantities = ("acceleration", "velocity", "displacement")
+    if known not in (*quantities, "transmission_error", "unknown"):
         raise InputError(
             f"channel {segment.channel!r} measures {known.replace('_', ' ')}: displacement and velocity do not follow "
             "from it",
@@ -174,10 +127,9 @@ def _choose_band(page: MethodPage, segment: SignalSegment) -> PlaneSettings:
             remedy="choose another channel, or correct its quantity in the rig's [[sensor]] table",
         )
     left, right = st.columns(2)
-    quantity: MotionQuantity | None = None
+    quantity = None
     if known == "unknown":
-        chosen = page.choose(right, "The channel measures", QUANTITIES, key=f"quantity {segment.channel}")
-        quantity = cast("MotionQuantity", chosen)
+        quantity = page.choose(right, "The channel measures", quantities, key=f"quantity {segment.channel}")
     low = None
     if (quantity or known) in ("acceleration", "velocity"):
         suggested, why = suggested_low_cut_hz(page, segment)
@@ -193,7 +145,7 @@ def _choose_band(page: MethodPage, segment: SignalSegment) -> PlaneSettings:
     about = f"Up to {half:.5g} Hz. A lower one shows the slower motion alone, without resonances."
     placeholder = f"{0.8 * half:.5g}"
     high = page.ask(right.number_input, "Highest frequency (Hz)", value=None, placeholder=placeholder, about=about)
-    return PlaneSettings(low, None if high is None else float(high), quantity)
+    return {"low_cut_hz": low, "high_cut_hz": None if high is None else float(high), "quantity": quantity}
 
 
 def suggested_low_cut_hz(page: MethodPage, segment: SignalSegment) -> tuple[float, str]:
@@ -201,7 +153,7 @@ def suggested_low_cut_hz(page: MethodPage, segment: SignalSegment) -> tuple[floa
 
     Far below the mesh, integrated noise outgrows the motion of the teeth and makes a cloud of the section.
     """
-    possible = 1.05 * lowest_low_cut_hz(segment.recording.duration_s)
+    possible = 1.05 * phase.lowest_low_cut_hz(segment.recording.duration_s)
     rig = page.analysis.rig
     meshes = [order for pair in rig.pairs if (order := rig.mesh_order(pair))] if rig is not None else []
     ratios = [ratio for name in rig.shaft_names if (ratio := rig.ratio(name))] if rig is not None else []
@@ -217,73 +169,35 @@ def suggested_low_cut_hz(page: MethodPage, segment: SignalSegment) -> tuple[floa
     return float(f"{low:.3g}"), why
 
 
-def _choose_view(page: MethodPage, segment: SignalSegment, lock: CycleLock | None) -> tuple[float, int]:
+def _choose_view(page: MethodPage, segment: SignalSegment, lock: phase.CycleLock | None) -> tuple[float, int]:
     """Return where in the cycle the path is looked at, and how many samples of the path are drawn."""
     if lock is None or segment.angle is None:
         return 0.0, 4000
     left, right = st.columns(2)
-    phase = _choose_phase(page, left)
+    phase_cycles = _choose_phase(page, left)
     about = "The points are of the whole segment."
     revolutions = page.ask(
         right.select_slider, "Path drawn (revolutions)", (1, 2, 5, 10, 20, 50, 100), value=2, about=about
     )
     per_revolution = 60.0 * segment.recording.sampling_rate_hz / max(segment.angle.mean_speed_rpm, 1e-9)
-    return phase, int(min(max(2.0, revolutions * per_revolution), MAX_DRAWN))
-
-
-def _offer_kind(page: MethodPage, plane: PhasePortrait, lock: CycleLock) -> None:
-    """Say what kind of motion it is once that is asked for: it takes some seconds."""
-    asked, question = page.key("kind asked"), content_key((plane, lock))
-    if st.session_state.get(asked) != question:
-        st.button(
-            "What kind of motion is it?",
-            icon=":material/psychology_alt:",
-            key=f"{asked} button",
-            on_click=st.session_state.__setitem__,
-            args=(asked, question),
-            help="Looks whether the section repeats, for the largest Lyapunov exponent, and the 0–1 test for chaos: "
-            "some seconds.",
-        )
-        return
-    _show_kind(
-        kind_of(plane, lock),
-        f"Looked at: displacement and velocity, {plane.source}. Integration makes slow motion weigh more; “Embedding "
-        "and chaos” asks the same of the signal as measured, and the answers may differ.",
-    )
-
-
-# --------------------
-# One channel embedded by delays: delay and dimension with their curves, and what can be measured on the path.
-# --------------------
-
-MAX_DRAWN_IN_SPACE = 6_000
-"""Points of a path in space: more is a blot, and a browser without a graphics card turns it slowly."""
-
-
-@dataclass(frozen=True)
-class EmbeddingSettings:
-    """What is embedded, and how; None: the curves decide."""
-
-    low_cut_hz: float | None
-    high_cut_hz: float | None
-    delay_samples: int | None
-    dimension: int | None
+    return phase_cycles, int(min(max(2.0, revolutions * per_revolution), MAX_DRAWN))
 
 
 def show_embedding(page: MethodPage) -> None:
-    """Show the parameters, and the chosen view of the path."""
+    """Show the parameters of the embedding by delays, and the chosen view of the path."""
     segment = page.segment(n_first=40_000, n_max=200_000)
     with st.expander("Band, delay and dimension", icon=":material/tune:"):
-        settings = _choose_embedding(page, segment)
+        low, high, own_delay, own_dimension = _choose_embedding(page, segment)
     view = VIEWS[page.choose(st, "View", list(VIEWS), named=False)]
-    signal = signal_in_band(segment, settings.low_cut_hz, settings.high_cut_hz)
-    information = information_of(signal)
-    delay = settings.delay_samples or information.delay_samples
-    dimension = dimension_of(signal, delay)
+    signal = _signal_in_band(segment, low, high)
+    values, rate_hz, source = signal.points[:, 0], signal.sampling_rate_hz, signal.source
+    information = information_of(values, rate_hz, source=source)
+    delay = own_delay or information.delay_samples
+    dimension = dimension_of(values, rate_hz, delay_samples=delay, source=source)
     if view is None:
-        _show_curves(information, dimension, settings)
+        _show_curves(information, dimension, own_delay)
         return
-    n_axes = settings.dimension or dimension.dimension
+    n_axes = own_dimension or dimension.dimension
     if n_axes == 0:
         n_axes = dimension.dimensions[-1]
         st.info(
@@ -291,13 +205,8 @@ def show_embedding(page: MethodPage) -> None:
             "taken; a narrower band or a dimension of your own may say more.",
             icon=":material/help:",
         )
-    path = delay_embedding(
-        signal.points[:, 0],
-        signal.sampling_rate_hz,
-        delay_samples=delay,
-        dimension=n_axes,
-        unit=segment.unit,
-        source=signal.source,
+    path = phase.delay_embedding(
+        values, rate_hz, delay_samples=delay, dimension=n_axes, unit=segment.unit, source=source
     )
     view(page, segment, replace(path, start_s=signal.start_s))
 
@@ -320,7 +229,10 @@ def _whole_number(
     return number
 
 
-def _choose_embedding(page: MethodPage, segment: SignalSegment) -> EmbeddingSettings:
+def _choose_embedding(
+    page: MethodPage, segment: SignalSegment
+) -> tuple[float | None, float | None, int | None, int | None]:
+    """Return lowest and highest frequency in Hz, delay in samples, dimension; None: the curves decide."""
     one, two, three, four = st.columns(4)
     half = segment.recording.sampling_rate_hz / 2.0
     about = f"Up to {half:.5g} Hz. Noise above the motion of interest hides its neighbours."
@@ -331,13 +243,15 @@ def _choose_embedding(page: MethodPage, segment: SignalSegment) -> EmbeddingSett
     delay = _whole_number(page, three, "Delay (samples)", "from the curve", about=about)
     about = "None: the smallest without false neighbours."
     dimension = _whole_number(page, four, "Dimension", "from the curve", max_value=20, about=about)
-    return EmbeddingSettings(low or None, high or None, delay, dimension)
+    return low or None, high or None, delay, dimension
 
 
-def _show_curves(information: MutualInformation, dimension: EmbeddingDimension, settings: EmbeddingSettings) -> None:
-    figure = embedding_figure(information, dimension)
+def _show_curves(
+    information: phase.MutualInformation, dimension: phase.EmbeddingDimension, own_delay: int | None
+) -> None:
+    figure = plot.embedding_figure(information, dimension)
     show_picture(figure, "Mutual information over delay, false neighbours over dimension")
-    yours = f" Neighbours are those at your delay of {dimension.delay_samples}." if settings.delay_samples else ""
+    yours = f" Neighbours are those at your delay of {dimension.delay_samples}." if own_delay else ""
     st.caption(
         f"Delay {information.delay_samples} samples by the curve ({information.rule}); a dimension unfolds the path "
         f"where fewer than {dimension.threshold:.0%} of the nearest neighbours are false.{yours} E2 near 1 at every "
@@ -345,8 +259,7 @@ def _show_curves(information: MutualInformation, dimension: EmbeddingDimension, 
     )
 
 
-@cached(6, "Filtering …")
-def signal_in_band(segment: SignalSegment, low_cut_hz: float | None, high_cut_hz: float | None) -> PhasePortrait:
+def _signal_in_band(segment: SignalSegment, low_cut_hz: float | None, high_cut_hz: float | None) -> phase.PhasePortrait:
     """Return the channel as it is, or within a band; a path of one axis."""
     channel, unit, rate_hz = segment.channel, segment.unit, segment.recording.sampling_rate_hz
     if low_cut_hz is None and high_cut_hz is None:
@@ -355,36 +268,19 @@ def signal_in_band(segment: SignalSegment, low_cut_hz: float | None, high_cut_hz
             raise InputError(
                 f"channel {channel!r} has values that are not numbers here", remedy="choose a segment without gaps"
             )
-        return PhasePortrait(points, rate_hz, (channel,), (unit,), "states", channel)
-    plane = phase_plane(
+        return phase.PhasePortrait(points, rate_hz, (channel,), (unit,), "states", channel)
+    plane = plane_of(
         segment.values, rate_hz, quantity="displacement", low_cut_hz=low_cut_hz, high_cut_hz=high_cut_hz, source=channel
     )
-    points = np.ascontiguousarray(plane.points[:, :1])
-    return PhasePortrait(points, rate_hz, (channel,), (unit,), "states", plane.source, plane.start_s, plane.band_hz)
+    return replace(
+        plane, points=np.ascontiguousarray(plane.points[:, :1]), axis_names=(channel,), units=(unit,), kind="states"
+    )
 
 
-@cached(6, "Looking for the delay …")
-def information_of(signal: PhasePortrait) -> MutualInformation:
-    """Return the mutual information."""
-    return average_mutual_information(signal.points[:, 0], signal.sampling_rate_hz, source=signal.source)
-
-
-@cached(6, "Looking for the dimension …")
-def dimension_of(signal: PhasePortrait, delay_samples: int) -> EmbeddingDimension:
-    """Return the false neighbours over dimension."""
-    values, rate_hz = signal.points[:, 0], signal.sampling_rate_hz
-    return embedding_dimension(values, rate_hz, delay_samples=delay_samples, source=signal.source)
-
-
-# --------------------
-# Views of the embedded path.
-# --------------------
-
-
-def _show_portrait(page: MethodPage, segment: SignalSegment, path: PhasePortrait) -> None:
+def _show_portrait(page: MethodPage, segment: SignalSegment, path: phase.PhasePortrait) -> None:
     """Show the path in the plane or in space, with the points of its section."""
     left, middle, right = st.columns((1, 2, 2))
-    in_space = page.choose(left, "Drawn in", ("plane", "space")) == "space"
+    in_space = page.choose(left, "Drawn in", {"plane": False, "space": True})
     with middle.container():
         lock = _choose_lock(page, st, segment)
     section = _section(path, lock, _choose_phase(page, right))
@@ -396,11 +292,11 @@ def _show_portrait(page: MethodPage, segment: SignalSegment, path: PhasePortrait
     if path.n_axes == 1:
         st.info("One dimension makes no portrait: give a larger one.")
         return
-    figure = phase_portrait_figure(path, section, n_points=MAX_DRAWN_IN_SPACE)
+    figure = plot.phase_portrait_figure(path, section, n_points=MAX_DRAWN_IN_SPACE)
     show_picture(figure, f"Delay embedding of {path.source} with its Poincaré points")
 
 
-def _show_space(page: MethodPage, path: PhasePortrait, section: PoincareSection | None) -> None:
+def _show_space(page: MethodPage, path: phase.PhasePortrait, section: phase.PoincareSection | None) -> None:
     from plotly.graph_objects import Figure
 
     colours, figure = palette(), Figure()
@@ -418,12 +314,12 @@ def _show_space(page: MethodPage, path: PhasePortrait, section: PoincareSection 
     }
     margin = {"l": 0, "r": 0, "t": 0, "b": 0}
     figure.update_layout(height=560, margin=margin, showlegend=False, scene={**titles, "aspectmode": "cube"})
-    st.plotly_chart(figure, width="stretch", key=page.key("space"), config=CONFIG, alt="Path in space")
+    show_chart(figure, page.key("space"), "Path in space")
     shown_s = min(MAX_DRAWN_IN_SPACE, path.n_points) / path.sampling_rate_hz
     st.caption(f"The last {shown_s:.4g} s of the path as a line; the points are of the whole segment. Drag to turn it.")
 
 
-def _show_divergence(page: MethodPage, segment: SignalSegment, path: PhasePortrait) -> None:
+def _show_divergence(page: MethodPage, segment: SignalSegment, path: phase.PhasePortrait) -> None:
     """Show how neighbours part, and the slope of it."""
     del segment
     one, two, three, four = st.columns(4)
@@ -440,12 +336,9 @@ def _show_divergence(page: MethodPage, segment: SignalSegment, path: PhasePortra
         "distance nears that of unrelated points."
     )
     fit = page.ask(four.text_input, "Fit from, to (s)", placeholder="by the rule", about=about)
-    with st.spinner("Following neighbours …", show_time=True):
-        exponent = largest_lyapunov_exponent(
-            path, method=method, theiler_samples=theiler, n_steps=steps, fit_s=two_numbers(fit)
-        )
+    exponent = exponent_of(path, method=method, theiler_samples=theiler, n_steps=steps, fit_s=two_numbers(fit))
     text = f"Mean logarithm of the distance of neighbours over time, {path.source}"
-    show_picture(divergence_figure(exponent), text)
+    show_picture(plot.divergence_figure(exponent), text)
     st.caption(
         f"{exponent.n_references} pairs of neighbours, at least {exponent.theiler_samples} samples apart in time. The "
         "dashed line is the distance of unrelated points; shaded is what was fitted."
@@ -463,7 +356,7 @@ def two_numbers(text: str | None) -> tuple[float, float] | None:
     return first, second
 
 
-def _show_recurrence(page: MethodPage, segment: SignalSegment, path: PhasePortrait) -> None:
+def _show_recurrence(page: MethodPage, segment: SignalSegment, path: phase.PhasePortrait) -> None:
     """Show which points come back close to which, and what that measures."""
     del segment
     one, two, three, four = st.columns(4)
@@ -472,20 +365,19 @@ def _show_recurrence(page: MethodPage, segment: SignalSegment, path: PhasePortra
     n_points = page.ask(two.select_slider, "Points drawn", (200, 500, 1000, 2000, 3000), value=1000)
     stride = _whole_number(page, three, "Every so-many-th sample", "16 per mean period")
     shortest = page.ask(four.number_input, "Shortest line (points)", min_value=2, value=2, step=1)
-    with st.spinner("Comparing points …", show_time=True):
-        plot = recurrence_plot(path, recurrence_rate=rate, n_points=n_points, stride=stride)
-        measures = recurrence_measures(path, recurrence_rate=rate, shortest_line=shortest, stride=stride)
-    show_picture(recurrence_figure(plot, measures), f"Recurrence plot of {path.source}", width=900)
+    pairs = recurrence_of(path, recurrence_rate=rate, n_points=n_points, stride=stride)
+    measures = measures_of(path, recurrence_rate=rate, shortest_line=shortest, stride=stride)
+    show_picture(plot.recurrence_figure(pairs, measures), f"Recurrence plot of {path.source}", width=900)
     st.caption(
         f"The measures are of {measures.n_points} points, {measures.duration_s:.4g} s, pairs nearer in time than "
         f"{measures.theiler_points} points left out. Lines along the diagonal are motion that repeats."
     )
 
 
-def _show_chaos_test(page: MethodPage, segment: SignalSegment, path: PhasePortrait) -> None:
+def _show_chaos_test(page: MethodPage, segment: SignalSegment, path: phase.PhasePortrait) -> None:
     """Show K of the 0–1 test, and the walk it rests on."""
     one, two, three, four = st.columns(4)
-    of_section = page.choose(one, "Of the", ("Poincaré points", "signal"), key="test of") == "Poincaré points"
+    of_section = page.choose(one, "Of the", {"Poincaré points": True, "signal": False}, key="test of")
     about = "Keeps noise on regular motion from being read as chaos; 0 is the plain test."
     damping = float(page.ask(two.number_input, "Damping", min_value=0.0, value=1.0, step=0.5, about=about))
     if of_section:
@@ -493,16 +385,16 @@ def _show_chaos_test(page: MethodPage, segment: SignalSegment, path: PhasePortra
             lock = _choose_lock(page, st, segment)
         if lock is None:
             return
-        section = poincare_section(path, lock)
+        section = phase.poincare_section(path, lock)
         values = np.ascontiguousarray(section.points[:, 0])
-        test = zero_one_test_of_section(section, damping=damping)
+        test = phase.zero_one_test_of_section(section, damping=damping)
     else:
         every = _whole_number(page, three, "Every so-many-th sample", "from the mutual information")
         values = np.ascontiguousarray(path.points[:, 0])
-        test = zero_one_test(values, damping=damping, every=every, source=path.source)
+        test = phase.zero_one_test(values, damping=damping, every=every, source=path.source)
     c = float(page.ask(four.slider, "Walk at c (rad)", 0.63, 2.51, 1.2, step=0.01))
-    walk = translation_walk(values, c, every=test.every)
-    show_picture(chaos_test_figure(test, walk, c), f"K of the 0–1 test over c, and its walk, {path.source}")
+    walk = phase.translation_walk(values, c, every=test.every)
+    show_picture(plot.chaos_test_figure(test, walk, c), f"K of the 0–1 test over c, and its walk, {path.source}")
     st.caption(
         "K near 0: regular, a bounded walk. K near 1: chaos or noise, a walk like Brownian motion; only the false "
         "neighbours tell these two apart." + (f" Every {test.every}-th value is used." if test.every > 1 else "")
@@ -511,7 +403,7 @@ def _show_chaos_test(page: MethodPage, segment: SignalSegment, path: PhasePortra
         st.warning(f"Undecided: {as_typed(test.reason)}.")
 
 
-def _show_motion(page: MethodPage, segment: SignalSegment, path: PhasePortrait) -> None:
+def _show_motion(page: MethodPage, segment: SignalSegment, path: phase.PhasePortrait) -> None:
     """Ask what the section is locked to, and say what kind of motion it is."""
     lock = _choose_lock(page, st, segment)
     if lock is not None:
@@ -522,7 +414,7 @@ def _show_motion(page: MethodPage, segment: SignalSegment, path: PhasePortrait) 
         )
 
 
-View = Callable[[MethodPage, SignalSegment, PhasePortrait], None]
+View = Callable[[MethodPage, SignalSegment, phase.PhasePortrait], None]
 VIEWS: dict[str, View | None] = {
     "Delay and dimension": None,
     "Portrait and section": _show_portrait,

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import streamlit as st
 
+from app.dashboard.laboratory import views
 from app.dashboard.laboratory.drive import show_drive
-from app.dashboard.laboratory.run import LaboratoryRun, show_saving, simulated, with_complete_effects
-from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup, choose_preset, choose_setup
-from app.dashboard.laboratory.views import show_expectation, show_legend, show_numbers, show_title, show_views
+from app.dashboard.laboratory.run import LaboratoryRun, faulty_of, show_saving, simulated
+from app.dashboard.laboratory.setup import DRIVE_MODEL, choose_preset, choose_setup
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 from sims.presets import Preset
+
+LENGTHS_S = (2.0, 5.0, 10.0, 20.0)
+"""Of recordings to keep."""
 
 
 def show() -> None:
@@ -25,17 +28,18 @@ def show() -> None:
 def show_pair(preset: Preset) -> None:
     """Choose, simulate, show a pair that runs at a steady speed."""
     setup = choose_setup(preset)
-    healthy = simulated(setup.healthy)
-    faulty = faulty_run(setup)
+    healthy, faulty = simulated(setup.healthy), faulty_of(setup, simulated)
+    shown = faulty or healthy
     head, buttons = st.columns((3, 2), vertical_alignment="top")
     with head:
-        show_title(healthy, faulty, impossible=faulty is None and not setup.is_healthy)
+        views.show_title(setup, is_shown=faulty is not None)
+        st.caption(" · ".join(views.frequencies(shown)))
     with buttons:
-        show_saving(faulty.setup if faulty else healthy.setup)
-    show_expectation(healthy, faulty)
+        show_saving(shown.setup, LENGTHS_S)
+    views.show_expectation(healthy, faulty)
     channel = choose_channel(healthy, faulty)
-    show_numbers(healthy, faulty, channel)
-    show_views(healthy, faulty, channel)
+    views.show_numbers(healthy, faulty, channel)
+    views.show_views(healthy, faulty, channel)
 
 
 def choose_channel(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> str:
@@ -52,17 +56,8 @@ def choose_channel(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> str:
             persist_state="session",
         )
         if faulty is not None:
-            show_legend()
+            views.show_legend()
     return channel or channels[0]
-
-
-def faulty_run(setup: Setup) -> LaboratoryRun | None:
-    """Return the faulty twin; None, with the reason on the page, where there is none."""
-    try:
-        return None if setup.is_healthy else simulated(with_complete_effects(setup))
-    except GearsigError as error:
-        show_error(error)
-        return None
 
 
 try:

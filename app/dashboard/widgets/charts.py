@@ -1,4 +1,4 @@
-"""Lines over one axis that the user can zoom and read off, with named cursors across them (plotly)."""
+"""Lines over one axis that can be zoomed and read off, with named cursors across them (plotly); pictures; ranges."""
 
 from __future__ import annotations
 
@@ -20,23 +20,35 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as PictureFigure
     from plotly.graph_objects import Figure
 
-
 WIDTH_IN = 10.5
 """Width for which labels are placed; they keep apart on wider pages as well."""
-HEIGHT_PX = 400
-ROW_PX = 17
+ROW_PX, LEGEND_PX = 17, 40
 CONFIG = {"displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"], "scrollZoom": False}
+MEASURED, FAULT, QUIET = 0, 1, -1
+"""Colours of lines by meaning; further numbers are further colours."""
 
 
 @dataclass(frozen=True)
 class ChartLine:
-    """A line to draw, already thinned, a pale band (low, high) behind it, and its colour by meaning."""
+    """A line to draw, already thinned; nan where it has a gap.
+
+    Parameters
+    ----------
+    x, y : array, (n,)
+    name : str
+    colour : int
+        See `MEASURED`.
+    band : (low, high) or None
+        A pale band behind it.
+    dotted : bool
+    """
 
     x: FloatArray
     y: FloatArray
     name: str
+    colour: int = MEASURED
     band: tuple[FloatArray, FloatArray] | None = None
-    colour: Literal["measured", "fault"] = "measured"
+    dotted: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,6 +72,11 @@ def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[f
     return low - margin, high + margin
 
 
+def show_chart(figure: Figure, key: str, alternative: str) -> None:
+    """Show a figure of plotly; `key` is the widget's, unique on the page."""
+    st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt=as_typed(alternative))
+
+
 def show_lines(
     lines: Sequence[ChartLine],
     axes: Axes,
@@ -67,13 +84,14 @@ def show_lines(
     *,
     cursors: Sequence[Cursor] = (),
     marked: Sequence[tuple[float, float]] = (),
-    height_px: int = HEIGHT_PX,
+    height_px: int = 400,
+    legend: bool = False,
 ) -> None:
     """Show lines with cursors and marked points.
 
     Parameters
     ----------
-    lines : sequence of Line
+    lines : sequence of ChartLine
     axes : Axes
     key : str
         Of the widget, unique on the page.
@@ -82,38 +100,40 @@ def show_lines(
     marked : sequence of (x, y)
         Points that findings name.
     height_px : int
+        Without labels and legend.
+    legend : bool
+        Name several lines above the chart; all such charts have the same left margin, so that those below each other
+        share their axis.
     """
-    figure = line_figure(lines, axes, cursors=cursors, marked=marked, height_px=height_px)
-    words = as_typed(f"{axes.y} over {axes.x}")
-    st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt=words)
-
-
-def line_figure(
-    lines: Sequence[ChartLine],
-    axes: Axes,
-    *,
-    cursors: Sequence[Cursor] = (),
-    marked: Sequence[tuple[float, float]] = (),
-    height_px: int = HEIGHT_PX,
-) -> Figure:
-    """Return the figure that `show_lines` shows."""
     from plotly.graph_objects import Figure
 
-    colours = palette()
-    figure = Figure()
+    colours, figure = palette(), Figure()
+    cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
     for line in lines:
-        _add_line(figure, line, colours)
+        colour = colours.quiet if line.colour == QUIET else cycle[line.colour % len(cycle)]
+        _add_line(figure, line, colour, tag="" if legend else "<extra></extra>")
     n_rows = _add_cursors(figure, cursors, axes.x_limits, colours)
     if marked:
         ring = {"symbol": "circle-open", "size": 13, "color": colours.fault, "line": {"width": 2}}
         x, y = zip(*marked, strict=True)
         figure.add_scatter(x=x, y=y, yaxis="y2", mode="markers", marker=ring, name="finding", hoverinfo="skip")
-    _lay_out(figure, axes, n_rows, height_px)
-    return figure
+    above_px = LEGEND_PX if legend else ROW_PX * n_rows
+    figure.update_layout(
+        height=height_px + above_px,
+        margin={"l": 76 if legend else 8, "r": 8, "t": 8 if legend else 12 + above_px, "b": 8},
+        hovermode="closest",
+        showlegend=legend and len(lines) > 1,
+        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0, "xanchor": "left"},
+        dragmode="zoom",
+        xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "none", "dtick": axes.x_step},
+        yaxis={"range": [0, 1], "visible": False, "fixedrange": True},  # of the cursors, behind the lines
+        yaxis2={"automargin": not legend, **_value_axis(axes)},
+    )
+    show_chart(figure, key, f"{axes.y} over {axes.x}")
 
 
-def _add_line(figure: Figure, line: ChartLine, colours: Palette) -> None:
-    name, colour = as_plot_text(line.name), colours.fault if line.colour == "fault" else colours.measured
+def _add_line(figure: Figure, line: ChartLine, colour: str, *, tag: str) -> None:
+    pale = f"rgba({','.join(str(int(colour[i : i + 2], 16)) for i in (1, 3, 5))},0.22)"
     for edge, fill in zip(line.band or (), (None, "tonexty"), strict=False):
         figure.add_scatter(
             x=line.x,
@@ -122,7 +142,7 @@ def _add_line(figure: Figure, line: ChartLine, colours: Palette) -> None:
             mode="lines",
             line={"width": 0},
             fill=fill,
-            fillcolor=_pale(colour),
+            fillcolor=pale,
             hoverinfo="skip",
         )
     figure.add_scatter(
@@ -130,9 +150,9 @@ def _add_line(figure: Figure, line: ChartLine, colours: Palette) -> None:
         y=line.y,
         yaxis="y2",
         mode="lines",
-        name=name,
-        line={"width": 1.1, "color": colour},
-        hovertemplate="%{x:.6g}: %{y:.4g}<extra></extra>",
+        name=as_plot_text(line.name),
+        line={"width": 1.1, "color": colour, "dash": "dot" if line.dotted else "solid"},
+        hovertemplate="%{x:.6g}: %{y:.4g}" + tag,
     )
 
 
@@ -170,51 +190,27 @@ def _add_cursors(figure: Figure, cursors: Sequence[Cursor], limits: tuple[float,
     return rows
 
 
-def _lay_out(figure: Figure, axes: Axes, n_rows: int, height_px: int) -> None:
-    top = 12 + ROW_PX * n_rows
-    # plotly takes the limits of a logarithmic axis as powers of ten
-    limits = axes.y_limits
-    if limits is not None and axes.logarithmic:
-        limits = (float(np.log10(limits[0])), float(np.log10(limits[1])))
-    figure.update_layout(
-        height=height_px + ROW_PX * n_rows,
-        margin={"l": 8, "r": 8, "t": top, "b": 8},
-        hovermode="closest",
-        showlegend=False,
-        dragmode="zoom",
-        xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "none", "dtick": axes.x_step},
-        yaxis2={
-            "overlaying": "y",
-            "side": "left",
-            "title": as_plot_text(axes.y),
-            "type": "log" if axes.logarithmic else "linear",
-            "range": limits,
-            "exponentformat": "e",
-            "minexponent": 4,
-            **_ticks(axes),
-        },
-        yaxis={"range": [0, 1], "visible": False, "fixedrange": True},  # of the cursors, behind the lines
-    )
-
-
-def _ticks(axes: Axes) -> dict[str, object]:
-    """Return the ticks of the value axis: whole decades where there are several, else plotly's choice of its own.
+def _value_axis(axes: Axes) -> dict[str, object]:
+    """Return the value axis, with ticks at whole decades where there are several, else where plotly chooses.
 
     Left alone, an overlaying axis would take its ticks from the one below, wherever they fall.
     """
-    low, high = axes.y_limits or (1.0, 1.0)
-    several = axes.logarithmic and high > 100 * low
-    return {"tickmode": "linear", "tick0": 0, "dtick": 1} if several else {"tickmode": "auto"}
-
-
-def _pale(colour: str) -> str:
-    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
-    return f"rgba({red},{green},{blue},0.22)"
-
-
-# --------------------
-# A figure of `gearsig.plot` on the page, turned over on dark ground.
-# --------------------
+    limits, ticks = axes.y_limits, dict[str, object](tickmode="auto")
+    if limits is not None and axes.logarithmic:
+        if limits[1] > 100 * limits[0]:
+            ticks = {"tickmode": "linear", "tick0": 0, "dtick": 1}
+        # plotly takes the limits of a logarithmic axis as powers of ten
+        limits = (float(np.log10(limits[0])), float(np.log10(limits[1])))
+    return {
+        "overlaying": "y",
+        "side": "left",
+        "title": as_plot_text(axes.y),
+        "type": "log" if axes.logarithmic else "linear",
+        "range": limits,
+        "exponentformat": "e",
+        "minexponent": 4,
+        **ticks,
+    }
 
 
 DOTS_PER_INCH = 180
@@ -244,17 +240,9 @@ def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:
     return buffer.getvalue()
 
 
-# --------------------
-# A segment of an axis, chosen with two handles.
-# --------------------
-
-
-N_STEPS = 1000
-
-
 def choose_range(
     label: str,
-    analysis: Analysis,
+    source: Analysis | str,
     end: float,
     *,
     start: float = 0.0,
@@ -267,7 +255,8 @@ def choose_range(
     ----------
     label : str
         Not from a file.
-    analysis : Analysis
+    source : Analysis or str
+        What the view is of, see `state.view_key`.
     start, end : float
         Of the axis.
     shown : (float, float) or None
@@ -275,24 +264,19 @@ def choose_range(
     name : str
         Of the view, where the same label occurs in several.
     """
-    step = (end - start) / N_STEPS
+    step = (end - start) / 1000
     first = shown if shown is not None else (start, end)
     value = (max(start, first[0]), min(end, first[1]))
-    key = state.view_key(f"{name} {label} {start!r} to {end!r}", analysis)
+    key = state.view_key(f"{name} {label} {start!r} to {end!r}", source)
     low, high = st.slider(label, start, end, value=value, step=step, format="%.5g", key=key)
     return (low, high) if high > low else (max(start, high - step), min(end, high + step))
 
 
 def choose_end(label: str, analysis: Analysis, end: float, shown: float) -> float:
     """Return the chosen end of what is shown from zero, `shown` at first."""
-    step = end / N_STEPS
+    step = end / 1000
     key = state.view_key(f"{label} to {end!r}", analysis)
     return st.slider(label, step, end, value=min(shown, end), step=step, format="%.5g", key=key)
-
-
-# --------------------
-# A button that saves what a page shows.
-# --------------------
 
 
 def download(label: str, data: Any, name: str, mime: str, *, primary: bool = False) -> None:

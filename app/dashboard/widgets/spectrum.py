@@ -1,4 +1,4 @@
-"""A spectrum with cursors, thinned to the segment that is shown."""
+"""Spectra with cursors, thinned to the segment that is shown; the synchronous average."""
 
 from __future__ import annotations
 
@@ -21,9 +21,6 @@ from gearsig.spectra import Spectrum
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
 N_COLUMNS = 1600
 """Points of a line sent to the browser: more than a page has pixel columns."""
-N_OFFSET_LINES = 3
-"""Lines over which a window spreads a constant."""
-OFFSET_SHARE = 0.005
 SLIP_SHARE = 0.01
 """Bearings slip by a percent or so: a finding that near to a cursor is the cursor's."""
 KIND_NAMES = {
@@ -32,30 +29,36 @@ KIND_NAMES = {
     "shaft": "shafts",
     "bearing": "bearings",
     "hunting": "hunting tooth",
+    "finding": "mains",
 }
 
 
 def show_spectrum(
-    analysis: Analysis,
-    spectrum: Spectrum,
+    source: Analysis | str,
+    spectra: Spectrum | Sequence[Spectrum],
     cursors: Sequence[Cursor],
     name: str,
     *,
+    names: Sequence[str] = (),
     marked: Sequence[float] = (),
     shown: tuple[float, float] | None = None,
     scale: str = "Logarithmic",
     quantity: str = "",
 ) -> tuple[float, float]:
-    """Show a spectrum and what can be changed about its view; return the segment that is shown.
+    """Show spectra over each other and what can be changed about the view; return the segment that is shown.
 
     Parameters
     ----------
-    analysis : Analysis
-    spectrum : Spectrum
+    source : Analysis or str
+        What the view is of, see `state.view_key`.
+    spectra : Spectrum, or sequence of them
+        Of one axis and unit; the first lies in front.
     cursors : sequence of Cursor
-        On the spectrum's axis.
+        On the spectra's axis.
     name : str
         Of the view, for the keys of its widgets.
+    names : sequence of str
+        Of several spectra.
     marked : sequence of float
         Positions that findings name.
     shown : (float, float) or None
@@ -65,68 +68,64 @@ def show_spectrum(
     quantity : str
         Name of the values; empty: by their scaling.
     """
+    spectra = (spectra,) if isinstance(spectra, Spectrum) else spectra
+    first = spectra[0]
     kinds = [kind for kind in KIND_NAMES if any(cursor.kind == kind for cursor in cursors)]
     left, right = st.columns((2, 3), vertical_alignment="bottom")
-    with left:
-        label = st.segmented_control(
-            "Amplitude", list(SCALES), default=scale, key=state.view_key(f"{name} scale", analysis)
+    key = state.view_key(f"{name} scale", source)
+    label = left.segmented_control("Amplitude", list(SCALES), default=scale, key=key)
+    chosen = kinds
+    if kinds:
+        chosen = right.pills(
+            "Cursors",
+            kinds,
+            default=[kind for kind in kinds if kind != "hunting"],
+            selection_mode="multi",
+            format_func=KIND_NAMES.__getitem__,
+            key=state.view_key(f"{name} cursors {kinds}", source),
         )
-    with right:
-        chosen = kinds
-        if kinds:
-            chosen = st.pills(
-                "Cursors",
-                kinds,
-                default=[kind for kind in kinds if kind != "hunting"],
-                selection_mode="multi",
-                format_func=KIND_NAMES.__getitem__,
-                key=state.view_key(f"{name} cursors {kinds}", analysis),
-            )
-    unit = {"frequency": "Frequency shown (Hz)", "order": "Orders shown"}.get(spectrum.axis, "Quefrency shown (s)")
-    limits = choose_range(f"{unit}", analysis, float(spectrum.positions[-1]), shown=shown, name=name)
-    shown_cursors = [_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen]
-    _draw(analysis, spectrum, SCALES[label or scale], limits, shown_cursors, marked, name, quantity)
-    return limits
+    unit = {"frequency": "Frequency shown (Hz)", "order": "Orders shown"}.get(first.axis, "Quefrency shown (s)")
+    low, high = choose_range(unit, source, float(first.positions[-1]), shown=shown, name=name)
+
+    scaled, lines, shown_values = SCALES[label or scale], [], []
+    for i, spectrum in enumerate(spectra):
+        start, stop = spectrum.index_of(low), max(spectrum.index_of(high) + 1, spectrum.index_of(low) + 4)
+        values = _displayed(spectrum, scaled)[start:stop]
+        at, lowest, top = envelope(spectrum.positions[start:stop], values, N_COLUMNS)
+        # of several spectra, a band would hide the other lines
+        band = (lowest, top) if len(at) < len(values) and len(spectra) == 1 else None
+        lines.append(ChartLine(at, top, names[i] if names else spectrum.source, i, band))
+        # the lines at zero are an offset or a drift, not vibration: they must not squeeze the rest
+        n_offset = max(3, int(0.005 * len(values))) if start == 0 and len(values) > 9 else 0
+        shown_values.append(values[n_offset:])
+    text = quantity or ("value" if first.scaling == "dimensionless" else first.scaling)
+    in_db = f"{text} (dB re 1 {unit_text(first.unit)}".rstrip() + ")"
+    axes = Axes(
+        first.axis_label,
+        in_db if scaled == "decibel" else with_unit(text, first.unit),
+        (low, high),
+        _value_limits(np.concatenate(shown_values), scaled),
+        logarithmic=scaled == "log",
+    )
+    values = _displayed(first, scaled)
+    show_lines(
+        lines[::-1],
+        axes,
+        state.view_key(f"{name} chart", source),
+        cursors=[_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen],
+        marked=[(p, float(values[first.index_of(p)])) for p in marked if low <= p <= high],
+    )
+    resolution = f"{first.resolution:.4g} {'Hz' if first.axis == 'frequency' else 'orders'}"
+    averages = f", {first.n_averages} averages" if first.n_averages > 1 else ""
+    joined = " Peaks are joined; the pale band reaches down to the lowest line of each pixel." if lines[0].band else ""
+    st.caption(f"Resolution {resolution}, {first.window} window{averages}.{joined}")
+    return low, high
 
 
 def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:
     """Give the cursor of a finding the first right to its label."""
     found = any(abs(cursor.position - position) <= SLIP_SHARE * position for position in marked)
     return replace(cursor, number=0) if found else cursor
-
-
-def _draw(
-    analysis: Analysis,
-    spectrum: Spectrum,
-    scale: Scale,
-    limits: tuple[float, float],
-    cursors: Sequence[Cursor],
-    marked: Sequence[float],
-    name: str,
-    quantity: str,
-) -> None:
-    start, stop = spectrum.index_of(limits[0]), spectrum.index_of(limits[1]) + 1
-    values = _displayed(spectrum, scale)
-    x, high = spectrum.positions[start:stop], values[start:stop]
-    at, low, top = envelope(x, high, N_COLUMNS)
-    thinned = len(at) < len(x)
-    points = [(p, float(values[spectrum.index_of(p)])) for p in marked if limits[0] <= p <= limits[1]]
-    # the lines at zero are an offset or a drift, not vibration: they must not squeeze the rest
-    n_offset = max(N_OFFSET_LINES, int(OFFSET_SHARE * len(high))) if start == 0 and len(high) > 9 else 0
-    y_limits = _value_limits(high[n_offset:], scale)
-    show_lines(
-        [ChartLine(at, top, spectrum.source, (low, top) if thinned else None)],
-        Axes(
-            spectrum.axis_label, _value_label(spectrum, scale, quantity), limits, y_limits, logarithmic=scale == "log"
-        ),
-        state.view_key(f"{name} chart", analysis),
-        cursors=cursors,
-        marked=points,
-    )
-    resolution = f"{spectrum.resolution:.4g} {'Hz' if spectrum.axis == 'frequency' else 'orders'}"
-    more = " Peaks are joined; the pale band reaches down to the lowest line of each pixel." if thinned else ""
-    averages = f", {spectrum.n_averages} averages" if spectrum.n_averages > 1 else ""
-    st.caption(f"Resolution {resolution}, {spectrum.window} window{averages}.{more}")
 
 
 def _displayed(spectrum: Spectrum, scale: Scale) -> FloatArray:
@@ -144,20 +143,6 @@ def _value_limits(values: FloatArray, scale: Scale) -> tuple[float, float]:
         return max(low, high * 1e-8) / 2, high * 2
     return max(low, high - 160) - 6, high + 6
 
-
-def _value_label(spectrum: Spectrum, scale: Scale, quantity: str) -> str:
-    name = quantity or ("value" if spectrum.scaling == "dimensionless" else spectrum.scaling)
-    if scale == "decibel":
-        return f"{name} (dB re 1 {unit_text(spectrum.unit)}".rstrip() + ")"
-    return with_unit(name, spectrum.unit)
-
-
-# --------------------
-# The synchronous average of a shaft as a polar tooth picture, and unrolled over the angle.
-# --------------------
-
-
-N_ANGLES = 2000
 
 KINDS = {
     "residual": "Without the mesh harmonics: a single damaged tooth stands out here.",
@@ -217,13 +202,13 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) 
 
 def _show_unrolled(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, marks: list[Cursor]) -> None:
     """Show the same over the angle, with its largest swing in words."""
-    chosen = np.arange(0, len(average.values), max(1, len(average.values) // N_ANGLES))
+    chosen = np.arange(0, len(average.values), max(1, len(average.values) // 2000))
     values, error = average.values[chosen], 2 * average.standard_error[chosen]
     angle = chosen * 360 / len(average.values)
     axes = Axes(
         f"angle of {average.shaft or 'the shaft'} (deg)", with_unit(average.kind, average.unit), (0.0, 360.0), x_step=45
     )
-    line = ChartLine(angle, values, average.kind, (values - error, values + error))
+    line = ChartLine(angle, values, average.kind, band=(values - error, values + error))
     key = state.view_key(f"average {average.channel} {average.shaft} {average.kind}", analysis)
     show_lines([line], axes, key, cursors=marks, height_px=360)
     largest = int(np.argmax(np.abs(average.values)))
