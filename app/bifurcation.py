@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, wait
+from concurrent.futures import wait
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from io import StringIO
@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearsig import phase
 from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray, count, one_of, within
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.phase import BifurcationDiagram, PhasePortrait, PoincareSection
 from gearsig.processes import n_processors, process_pool
 from sims.cracked import DECAYS, SIGNALS, TRANSMISSION_ERROR, Branch, End, PairState, SteadyRun
 from sims.gear_pair import COORDINATES
@@ -27,14 +27,6 @@ from sims.sweep import claimed, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from gearsig.phase import CycleLock
-
-
-# --------------------
-# One value of a bifurcation: from a steady run to its Poincaré points and what kind of motion they speak for.
-# --------------------
-
 
 MIN_FOR_KIND = 400
 """Cycles that the 0–1 test and the exponent need to say something."""
@@ -65,7 +57,7 @@ class Measured:
     """
 
     value: float
-    section: PoincareSection
+    section: phase.PoincareSection
     period: int
     settled_s: float
     separated_share: float
@@ -76,29 +68,19 @@ class Measured:
 
 def measured(run: SteadyRun, branch: Branch, *, phase_cycles: float = 0.0, with_kind: bool = False) -> Measured:
     """Take the Poincaré points of a steady run and, for some seconds more, the kind of motion."""
-    from gearsig.phase import kind_of_motion, poincare_section, section_period
-
     portrait, lock = portrait_of(run, branch), lock_of(run, branch)
-    section = poincare_section(portrait, lock, phase_cycles=phase_cycles)
-    kind = kind_of_motion(portrait, lock, noise_free=_is_noise_free(run, branch)) if with_kind else None
-    return Measured(
-        run.value,
-        section,
-        section_period(section),
-        run.settled_s,
-        run.separated_share,
-        kind.kind if kind else "",
-        kind.exponent.exponent_per_s if kind and kind.exponent else float("nan"),
-        kind.chaos_test.k if kind and kind.chaos_test else float("nan"),
-    )
-
-
-def diagram_of(branch: Branch, found: list[Measured]) -> BifurcationDiagram:
-    """Return the diagram of one branch."""
-    from gearsig.phase import bifurcation_diagram
-
-    name, unit = parameter_words(branch)
-    return bifurcation_diagram(((m.value, m.section) for m in found), parameter=name, unit=unit)
+    section = phase.poincare_section(portrait, lock, phase_cycles=phase_cycles)
+    exponent, k, motion = float("nan"), float("nan"), ""
+    if with_kind:
+        # Noise-free is a run in which nothing random acts: no sensor noise, no roughness that never returns.
+        rough = run.machine.roughness
+        noise_free = branch.signal in SIGNALS and not (rough.locked_to == "time" and rough.rms_um > 0.0)
+        kind = phase.kind_of_motion(portrait, lock, noise_free=noise_free)
+        motion = kind.kind
+        exponent = kind.exponent.exponent_per_s if kind.exponent else exponent
+        k = kind.chaos_test.k if kind.chaos_test else k
+    period = phase.section_period(section)
+    return Measured(run.value, section, period, run.settled_s, run.separated_share, motion, exponent, k)
 
 
 def parameter_words(branch: Branch) -> tuple[str, str]:
@@ -119,9 +101,17 @@ def parameter_words(branch: Branch) -> tuple[str, str]:
     return (name.removesuffix(ending) if unit else name).replace("_", " "), UNITS.get(unit, unit)
 
 
-def portrait_of(run: SteadyRun, branch: Branch) -> PhasePortrait:
-    """Return the path of the wanted signal, with its rate where the model knows it."""
+def portrait_of(run: SteadyRun, branch: Branch) -> phase.PhasePortrait:
+    """Return the path of the branch's signal, with its rate where the model knows it."""
     response, signal = run.response, branch.signal
+    if signal not in (TRANSMISSION_ERROR, *COORDINATES, *SIGNALS):
+        recording = run.recording
+        assert recording is not None  # noqa: S101 - said to the type checker: a channel's run always has one
+        unit = recording.channels[recording.index(signal)].unit
+        values: FloatArray = recording.values(signal)
+        return phase.PhasePortrait(values[:, None], recording.sampling_rate_hz, (signal,), (unit,), "states", signal)
+    coordinate = signal.rsplit(" ", 1)[0] if signal not in COORDINATES else signal
+    length = "rad" if coordinate in COORDINATES[:N_ROTATING] else "m"
     names: tuple[str, ...] = (signal.replace("_", " "),)
     units: tuple[str, ...]
     if signal == TRANSMISSION_ERROR:
@@ -129,19 +119,17 @@ def portrait_of(run: SteadyRun, branch: Branch) -> PhasePortrait:
         names, units = ("transmission error", "its rate"), ("m", "m/s")
     elif signal in COORDINATES:
         columns, names = [response[signal], response[f"{signal} velocity"]], (signal, f"{signal} velocity")
-        units = ("rad", "rad/s") if COORDINATES.index(signal) < N_ROTATING else ("m", "m/s")
-    elif signal in SIGNALS:
-        columns, units = [response[signal]], (_unit(signal),)
+        units = (length, f"{length}/s")
     else:
-        return _measured_path(run, signal)
+        known = {"_m": "m", "_n": "N"}.get(signal[-2:])
+        columns, units = [response[signal]], (known or f"{length}/s{'^2' if signal.endswith('acceleration') else ''}",)
     rate_hz = 1.0 / response.interval_s
-    return PhasePortrait(np.column_stack(columns), rate_hz, names, units, "states", signal, response.start_s)
+    return phase.PhasePortrait(np.column_stack(columns), rate_hz, names, units, "states", signal, response.start_s)
 
 
-def lock_of(run: SteadyRun, branch: Branch) -> CycleLock:
+def lock_of(run: SteadyRun, branch: Branch) -> phase.CycleLock:
     """Return the cycles of the driver's own angle: they stay those of the teeth whatever the shaft does."""
     from gearsig.angle import ShaftAngle
-    from gearsig.phase import CycleLock
 
     response, turn = run.response, 2.0 * pi
     angle = ShaftAngle(
@@ -152,38 +140,10 @@ def lock_of(run: SteadyRun, branch: Branch) -> CycleLock:
         "encoder",
     )
     per_revolution = float(run.machine.mesh.pair.driver.teeth) if branch.section == "mesh" else 1.0
-    return CycleLock(angle, per_revolution, CYCLES[branch.section])
+    return phase.CycleLock(angle, per_revolution, CYCLES[branch.section])
 
 
-def _measured_path(run: SteadyRun, channel: str) -> PhasePortrait:
-    recording = run.recording
-    assert recording is not None  # noqa: S101 - said to the type checker: a channel's run always has one
-    values: FloatArray = recording.values(channel)
-    unit = recording.channels[recording.index(channel)].unit
-    return PhasePortrait(values[:, None], recording.sampling_rate_hz, (channel,), (unit,), "states", channel)
-
-
-def _unit(signal: str) -> str:
-    if signal.endswith("_m"):
-        return "m"
-    if signal.endswith("_n"):
-        return "N"
-    base = signal.rsplit(" ", 1)[0]
-    length = "rad" if base in COORDINATES[:N_ROTATING] else "m"
-    return f"{length}/s^2" if signal.endswith("acceleration") else f"{length}/s"
-
-
-def _is_noise_free(run: SteadyRun, branch: Branch) -> bool:
-    """Whether nothing random acts while the machine runs: no sensor noise, no roughness that never returns."""
-    rough = run.machine.roughness
-    return branch.signal in SIGNALS and not (rough.locked_to == "time" and rough.rms_um > 0.0)
-
-
-# --------------------
-# Values of a bifurcation on disk, one small file each, so that a run can be stopped and goes on from there.
-# --------------------
-
-
+NUMBERS = ("period", "settled_s", "separated_share", "exponent_per_s", "k")
 MAX_BYTES = 1_000_000_000
 """Of one value's arrays; a usual one has some ten thousand."""
 
@@ -193,7 +153,7 @@ class KeptValue:
     """What became of one value: its points and where the run ended, or the reason why there are none."""
 
     value: float
-    found: Measured | None
+    measured: Measured | None
     end: End | None
     reason: str = ""
 
@@ -201,15 +161,17 @@ class KeptValue:
 def save(kept: KeptValue, path: Path) -> None:
     """Write one value, whole or not at all."""
     fields: dict[str, np.ndarray] = {"value": np.array(kept.value), "reason": np.array(kept.reason)}
-    if kept.found is not None and kept.end is not None:
-        found, section, end = kept.found, kept.found.section, kept.end
+    if kept.measured is not None and kept.end is not None:
+        points, section, end = kept.measured, kept.measured.section, kept.end
         fields |= {
             "points": section.points,
             "times_s": section.times_s,
             "extent": section.extent,
             "words": np.array([*section.axis_names, *section.units, section.section, section.source]),
-            "numbers": np.array([found.period, found.settled_s, found.separated_share, found.exponent_per_s, found.k]),
-            "motion": np.array(found.motion),
+            "numbers": np.array(
+                [points.period, points.settled_s, points.separated_share, points.exponent_per_s, points.k]
+            ),
+            "motion": np.array(points.motion),
             "q": end.state.q,
             "v": end.state.v,
             "end": np.array([end.state.set_angle_rad, end.speed_rpm, end.torque_nm]),
@@ -230,13 +192,13 @@ def load(path: Path) -> KeptValue | None:
         return KeptValue(value, None, None, str(data["reason"]))
     d, words = data["points"].shape[1], tuple(str(w) for w in data["words"])
     names, units, (section_name, source) = words[:d], words[d : 2 * d], words[2 * d :]
-    section = PoincareSection(
+    section = phase.PoincareSection(
         data["points"], data["times_s"], names, units, data["extent"], "locked", section_name, source
     )
-    period, settled, separated, exponent, k = (float(x) for x in data["numbers"])
-    found = Measured(value, section, int(period), settled, separated, str(data["motion"]), exponent, k)
+    numbers: dict[str, Any] = {name: float(x) for name, x in zip(NUMBERS, data["numbers"], strict=True)}
+    points = Measured(value, section, motion=str(data["motion"]), **numbers | {"period": int(numbers["period"])})
     angle, speed, torque = (float(x) for x in data["end"])
-    return KeptValue(value, found, End(PairState(data["q"], data["v"], angle), speed, torque))
+    return KeptValue(value, points, End(PairState(data["q"], data["v"], angle), speed, torque))
 
 
 DEFINITION, VALUES = "definition.json", "values"
@@ -297,7 +259,7 @@ class BifurcationRequest:
 
 
 def run_folder(
-    wanted: BifurcationRequest,
+    request: BifurcationRequest,
     folder: Path,
     *,
     n_processes: int | None = None,
@@ -305,39 +267,47 @@ def run_folder(
 ) -> dict[str, list[KeptValue]]:
     """Run whatever the folder does not hold yet; return all values by branch, ascending.
 
-    The branches run beside each other; along a branch one value waits for the other. After Ctrl-C what is complete
-    stays, and the same call goes on from there.
+    The branches run beside each other. After Ctrl-C what is complete stays, and the same call goes on from there.
     """
     workers = n_processors() if n_processes is None else count(n_processes, "n_processes")
-    claimed(folder, wanted.definition(), DEFINITION, "bifurcation")
+    claimed(folder, request.definition(), DEFINITION, "bifurcation")
     (folder / VALUES).mkdir(exist_ok=True)
-    jobs = _jobs(wanted)
+    # Along a branch one value waits for the other; from rest each stands alone.
+    places = tuple(range(len(request.branch.values)))
+    jobs = [(name, places[::-1] if name == "down" else places) for name in request.branches]
+    if request.direction == "rest":
+        jobs = [("rest", (place,)) for place in places]
     try:
         if workers == 1 or len(jobs) == 1:
-            for name, places in jobs:
-                run_places(wanted, folder, name, places, on_progress)
+            for job in jobs:
+                run_places(request, folder, *job, on_progress)
         else:
             with process_pool(min(workers, len(jobs))) as pool:
-                futures = [pool.submit(run_places, wanted, folder, name, places) for name, places in jobs]
-                _follow(futures, wanted, folder, on_progress)
+                waiting = {pool.submit(run_places, request, folder, *job) for job in jobs}
+                while waiting:
+                    done, waiting = wait(waiting, timeout=LOOK_S)
+                    for future in done:
+                        future.result()
+                    if on_progress is not None:
+                        on_progress(n_complete(request, folder))
     finally:
         for part in (folder / VALUES).glob(".*.part"):
             with suppress(OSError):
                 part.unlink()
-    return complete(wanted, folder)
+    return complete(request, folder)
 
 
-def complete(wanted: BifurcationRequest, folder: Path) -> dict[str, list[KeptValue]]:
+def complete(request: BifurcationRequest, folder: Path) -> dict[str, list[KeptValue]]:
     """Return the values that the folder holds, by branch, ascending."""
-    n = len(wanted.branch.values)
-    found = {name: [load(value_path(folder, name, place)) for place in range(n)] for name in wanted.branches}
-    return {name: [kept for kept in values if kept is not None] for name, values in found.items()}
+    n = len(request.branch.values)
+    kept = {name: [load(value_path(folder, name, place)) for place in range(n)] for name in request.branches}
+    return {name: [value for value in values if value is not None] for name, values in kept.items()}
 
 
-def n_complete(wanted: BifurcationRequest, folder: Path) -> int:
+def n_complete(request: BifurcationRequest, folder: Path) -> int:
     """Values that the folder holds."""
-    n = len(wanted.branch.values)
-    return sum(value_path(folder, name, place).exists() for name in wanted.branches for place in range(n))
+    n = len(request.branch.values)
+    return sum(value_path(folder, name, place).exists() for name in request.branches for place in range(n))
 
 
 def value_path(folder: Path, name: str, place: int) -> Path:
@@ -346,7 +316,7 @@ def value_path(folder: Path, name: str, place: int) -> Path:
 
 
 def run_places(
-    wanted: BifurcationRequest,
+    request: BifurcationRequest,
     folder: Path,
     name: str,
     places: Sequence[int],
@@ -358,49 +328,21 @@ def run_places(
         path = value_path(folder, name, place)
         kept = load(path)
         if kept is None:
-            kept = run_value(wanted, wanted.branch.values[place], before)
+            kept = run_value(request, request.branch.values[place], before)
             save(kept, path)
         before = kept.end or before
         if on_progress is not None:
-            on_progress(n_complete(wanted, folder))
+            on_progress(n_complete(request, folder))
 
 
-def run_value(wanted: BifurcationRequest, value: float, before: End | None) -> KeptValue:
+def run_value(request: BifurcationRequest, value: float, before: End | None) -> KeptValue:
     """Run one value; what cannot be answered becomes a reason."""
     try:
-        run = wanted.branch.run(value, before)
-        found = measured(run, wanted.branch, phase_cycles=wanted.phase_cycles, with_kind=wanted.with_kind)
+        run = request.branch.run(value, before)
+        points = measured(run, request.branch, phase_cycles=request.phase_cycles, with_kind=request.with_kind)
     except GearsigError as error:
         return KeptValue(value, None, None, str(error))
-    return KeptValue(value, found, run.end)
-
-
-def _jobs(wanted: BifurcationRequest) -> list[tuple[str, tuple[int, ...]]]:
-    """Return what must be run one after the other."""
-    places = tuple(range(len(wanted.branch.values)))
-    if wanted.direction == "rest":
-        return [("rest", (place,)) for place in places]
-    return [(name, places if name == "up" else places[::-1]) for name in wanted.branches]
-
-
-def _follow(
-    futures: Sequence[Future[None]],
-    wanted: BifurcationRequest,
-    folder: Path,
-    on_progress: Callable[[int], object] | None,
-) -> None:
-    waiting: set[Future[None]] = set(futures)
-    while waiting:
-        done, waiting = wait(waiting, timeout=LOOK_S)
-        for future in done:
-            future.result()
-        if on_progress is not None:
-            on_progress(n_complete(wanted, folder))
-
-
-# --------------------
-# What comes out of a bifurcation: a table of the points, a summary of the values, the figure.
-# --------------------
+    return KeptValue(value, points, run.end)
 
 
 POINTS, SUMMARY, FIGURE = "points.csv", "bifurcation.json", "bifurcation.png"
@@ -409,10 +351,10 @@ NAMES = {"up": "rising", "down": "falling", "rest": "from rest"}
 TRANSIENT = f"{DECAYS:g} time constants of the machine's slowest decay are left out at each value"
 BOUNDED = "known at the values tried only; a range that begins or ends where the sweep does may go on beyond it"
 
-Found = Mapping[str, Sequence[KeptValue]]
+Values = Mapping[str, Sequence[KeptValue]]
 
 
-def write_results(wanted: BifurcationRequest, found: Found, folder: Path) -> tuple[Path, Path, Path]:
+def write_results(request: BifurcationRequest, values: Values, folder: Path) -> tuple[Path, Path, Path]:
     """Write table, summary and figure; return their paths.
 
     Raises
@@ -420,32 +362,37 @@ def write_results(wanted: BifurcationRequest, found: Found, folder: Path) -> tup
     RefusalError
         If no value gave points.
     """
-    figure = figure_of(wanted.branch, found)
-    table = written(folder / POINTS, points_csv(wanted.branch, found))
-    text = json.dumps(summary(wanted, found), indent=2, ensure_ascii=False) + "\n"
+    figure = figure_of(request.branch, values)
+    table = written(folder / POINTS, points_csv(request.branch, values))
+    text = json.dumps(summary(request, values), indent=2, ensure_ascii=False) + "\n"
     picture = folder / FIGURE
     figure.savefig(picture, dpi=DOTS_PER_INCH)
     return picture, table, written(folder / SUMMARY, text)
 
 
-def diagrams(branch: Branch, found: Found) -> dict[str, BifurcationDiagram]:
+def diagrams(branch: Branch, values: Values) -> dict[str, phase.BifurcationDiagram]:
     """Return the diagram of each branch that has points."""
-    with_points = {name: measured_of(kept) for name, kept in found.items()}
-    return {name: diagram_of(branch, values) for name, values in with_points.items() if values}
+    parameter, unit = parameter_words(branch)
+    sections = {name: [(m.value, m.section) for m in measured_of(kept)] for name, kept in values.items()}
+    return {
+        name: phase.bifurcation_diagram(points, parameter=parameter, unit=unit)
+        for name, points in sections.items()
+        if points
+    }
 
 
 def measured_of(kept: Sequence[KeptValue]) -> list[Measured]:
     """Return the values that gave points."""
-    return [one.found for one in kept if one.found is not None]
+    return [one.measured for one in kept if one.measured is not None]
 
 
-def figure_of(branch: Branch, found: Found) -> Figure:
+def figure_of(branch: Branch, values: Values) -> Figure:
     """Draw one branch or both."""
     from gearsig.plot import bifurcation_figure
 
-    drawn = list(diagrams(branch, found).values())
+    drawn = list(diagrams(branch, values).values())
     if not drawn:
-        reasons = [one.reason for kept in found.values() for one in kept if one.reason]
+        reasons = [one.reason for kept in values.values() for one in kept if one.reason]
         raise RefusalError(
             f"no value gave points: {reasons[0] if reasons else 'none was run'}", remedy="change the range or settings"
         )
@@ -454,35 +401,33 @@ def figure_of(branch: Branch, found: Found) -> Figure:
     return bifurcation_figure(*drawn[:2], title=words)
 
 
-def points_csv(branch: Branch, found: Found) -> str:
+def points_csv(branch: Branch, values: Values) -> str:
     """Return every point: branch, value of what is varied, coordinates of the path in SI units."""
     text = StringIO()
     table = csv.writer(text, lineterminator="\n")
-    first = next(one for kept in found.values() for one in measured_of(kept))
+    first = next(one for kept in values.values() for one in measured_of(kept))
     axes = zip(first.section.axis_names, first.section.units, strict=True)
     table.writerow(["branch", branch.sweep.axes[0].name, *(f"{name} ({unit})" for name, unit in axes)])
-    for name, kept in found.items():
+    for name, kept in values.items():
         for one in measured_of(kept):
             for point in one.section.points:
                 table.writerow([name, f"{one.value:.12g}", *(f"{x:.9g}" for x in point)])
     return text.getvalue()
 
 
-def summary(wanted: BifurcationRequest, found: Found) -> dict[str, Any]:
+def summary(request: BifurcationRequest, values: Values) -> dict[str, Any]:
     """Return the values of each branch, and where branches are apart."""
-    from gearsig.phase import coexistence_ranges, step_of, values_apart
-
-    drawn = diagrams(wanted.branch, found)
+    drawn = diagrams(request.branch, values)
     result: dict[str, Any] = {
-        "definition": wanted.definition(),
+        "definition": request.definition(),
         "transient": TRANSIENT,
-        "branches": {name: [_row(one) for one in kept] for name, kept in found.items()},
+        "branches": {name: [_row(one) for one in kept] for name, kept in values.items()},
     }
     if {"up", "down"} <= drawn.keys():
         up, down = drawn["up"], drawn["down"]
-        result["coexisting_at"] = values_apart(up, down).tolist()
-        result["coexisting_ranges"] = [asdict(one) for one in coexistence_ranges(up, down)]
-        result["coexisting_step"] = step_of(up, down)
+        result["coexisting_at"] = phase.values_apart(up, down).tolist()
+        result["coexisting_ranges"] = [asdict(one) for one in phase.coexistence_ranges(up, down)]
+        result["coexisting_step"] = phase.step_of(up, down)
         result["coexisting_note"] = BOUNDED
     return result
 
@@ -519,7 +464,7 @@ def _range_text(low: float, high: float, form: str = "g") -> str:
 
 
 def _row(kept: KeptValue) -> dict[str, Any]:
-    one = kept.found
+    one = kept.measured
     if one is None:
         return {"value": kept.value, "reason": kept.reason}
     row: dict[str, Any] = {

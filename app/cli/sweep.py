@@ -14,7 +14,7 @@ from app.cli.quantities import quantity, span, split_quantity
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
-    from app.bifurcation import BifurcationRequest, Found
+    from app.bifurcation import BifurcationRequest, Values
     from sims.simulator import Simulator
     from sims.sweep import Axis, Sweep
 
@@ -159,7 +159,7 @@ def bifurcation(
     _print_bifurcation(wanted, values, output)
 
 
-def _print_bifurcation(wanted: BifurcationRequest, values: Found, output: Path) -> None:
+def _print_bifurcation(wanted: BifurcationRequest, values: Values, output: Path) -> None:
     """Write the results and say what they show."""
     from app import bifurcation as study
 

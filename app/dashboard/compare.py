@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import recorded, stated_options
-from app.dashboard.laboratory.setup import MODEL, shown_name
+from app.dashboard.laboratory.setup import MODEL, Setup, shown_name
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import download, show_picture
@@ -21,7 +19,6 @@ from gearsig.comparison import (
     ALIGN,
     ChannelComparison,
     Comparison,
-    LineLevel,
     compare,
     for_simulation,
     missing_words,
@@ -62,51 +59,70 @@ class SimulationToCompare:
     seed: int = 0
 
 
-@dataclass(frozen=True)
-class SimulatedFile:
-    """A simulation from a file: what is known of it."""
-
-    request: AnalysisRequest
+Simulation = SimulationToCompare | AnalysisRequest
+"""A request reads a simulation from a file."""
+Pairs = tuple[tuple[str, str], ...]
 
 
-Simulation = SimulationToCompare | SimulatedFile
+def simulated_of(
+    simulation: Simulation, request: AnalysisRequest, content: Content | None, recording: Recording
+) -> Recording:
+    """Return the simulation for a recording, which `request` stands for.
 
-
-def run_simulation(run: SimulationToCompare, recorded: Recording) -> Recording:
-    """Simulate the recording's machine at its speed and sampling rate.
+    A file without a rig of its own takes the gears of the recording's rig.
 
     Raises
     ------
     GearsigError
         If the speed is not known, the machine allows less, or the rig does not say enough for a twin.
     """
-    speed = run.speed_rpm if run.speed_rpm is not None else speed_of(recorded)
-    rate = min(max(recorded.sampling_rate_hz, 4096.0), 102400.0)
-    if run.machine == TWIN:
-        return _twin(run, recorded.rig, speed, rate)
-    import sims
+    if isinstance(simulation, SimulationToCompare):
+        return _simulated(simulation, request, recording)
+    assert content is not None  # noqa: S101 - a file has content, said to the type checker
+    rig = recording.rig
+    return recorded(simulation, content, None if rig is None else for_simulation(rig))
 
-    return sims.simulate(
-        MODEL,
-        preset=run.machine,
-        parameters=teeth_of(recorded.rig),
-        speed_rpm=speed,
-        torque_nm=run.torque_nm,
+
+@st.cache_resource(max_entries=3, show_spinner=False)
+def _simulated(run: SimulationToCompare, request: AnalysisRequest, _recording: Recording) -> Recording:
+    """Simulate the recording's machine at its speed and sampling rate."""
+    del request  # it stands for the recording
+    rig = _recording.rig
+    speed_rpm = run.speed_rpm if run.speed_rpm is not None else speed_of(_recording)
+    rate_hz = min(max(_recording.sampling_rate_hz, 4096.0), 102400.0)
+    if run.machine == TWIN:
+        if rig is None:
+            raise InputError(
+                "no rig is described that the simulator could be set to", remedy="give a rig file, or choose a preset"
+            )
+        torque_nm = run.torque_nm if run.torque_nm is not None else nominal_of(rig).torque_nm
+        point = OperatingCondition(speed_rpm, torque_nm)
+        twin = cracked_gap_simulator().twin_of(rig)
+        return twin.run(point, seed=run.seed, duration_s=run.duration_s, sampling_rate_hz=rate_hz)
+    setup = Setup(
+        run.machine,
+        speed_rpm,
+        presets(MODEL)[run.machine].torque_nm if run.torque_nm is None else run.torque_nm,
+        tuple(teeth_of(rig).items()),
         duration_s=run.duration_s,
-        sampling_rate_hz=rate,
+        sampling_rate_hz=rate_hz,
         seed=run.seed,
     )
+    return setup.record()
 
 
-def _twin(run: SimulationToCompare, rig: Rig | None, speed_rpm: float, sampling_rate_hz: float) -> Recording:
-    if rig is None:
-        raise InputError(
-            "no rig is described that the simulator could be set to", remedy="give a rig file, or choose a preset"
-        )
-    torque = run.torque_nm if run.torque_nm is not None else nominal_of(rig).torque_nm
-    twin = cracked_gap_simulator().twin_of(rig)
-    point = OperatingCondition(speed_rpm, torque)
-    return twin.run(point, seed=run.seed, duration_s=run.duration_s, sampling_rate_hz=sampling_rate_hz)
+@st.cache_resource(max_entries=4, show_spinner=False)
+def compared(
+    request: AnalysisRequest,
+    simulation: Simulation,
+    pairs: Pairs,
+    align_by: str,
+    _recorded: Recording,
+    _simulated: Recording,
+) -> Comparison:
+    """Return the comparison; it is frozen, so that sessions may share it."""
+    del request, simulation  # they stand for the records
+    return compare(_simulated, _recorded, channels=pairs, align_by=align_by)
 
 
 def teeth_of(rig: Rig | None) -> dict[str, float]:
@@ -137,72 +153,15 @@ def speed_of(recorded: Recording) -> float:
     return angle.mean_speed_rpm * ((rig.ratio(driver, to=angle.shaft) or 1.0) if driver else 1.0)
 
 
-# --------------------
-# Simulating and comparing, done once for equal choices and shared between sessions.
-# --------------------
-
-
-Pairs = tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
-class Both:
-    """A recording and its simulation."""
-
-    recorded: Recording
-    simulated: Recording
-
-
-def simulated_of(
-    simulation: Simulation, request: AnalysisRequest, content: Content | None, recording: Recording
-) -> Recording:
-    """Return the simulation for a recording, which `request` stands for.
-
-    A file without a rig of its own takes the gears of the recording's rig.
-    """
-    if isinstance(simulation, SimulationToCompare):
-        return _simulated(simulation, request, recording)
-    assert content is not None  # noqa: S101 - a file has content, said to the type checker
-    rig = recording.rig
-    return recorded(simulation.request, content, None if rig is None else for_simulation(rig))
-
-
-@st.cache_resource(max_entries=3, show_spinner=False)
-def _simulated(simulation: SimulationToCompare, request: AnalysisRequest, _recording: Recording) -> Recording:
-    del request  # it stands for the recording
-    return run_simulation(simulation, _recording)
-
-
-@st.cache_resource(max_entries=4, show_spinner=False)
-def compared(request: AnalysisRequest, simulation: Simulation, pairs: Pairs, align_by: str, _both: Both) -> Comparison:
-    """Return the comparison; it is frozen, so that sessions may share it."""
-    del request, simulation  # they stand for the records
-    return compare(_both.simulated, _both.recorded, channels=pairs, align_by=align_by)
-
-
-@st.cache_data(max_entries=4, show_spinner=False)
-def page_of(
-    request: AnalysisRequest, simulation: Simulation, pairs: Pairs, align_by: str, command: str, _comparison: Comparison
-) -> bytes:
-    """Return the self-contained page of a comparison."""
-    del request, simulation, pairs, align_by
-    return comparison_page(_comparison, command=command).encode("utf-8")
-
-
 def command_of(request: AnalysisRequest, simulation: Simulation, pairs: Pairs, align_by: str) -> str:
     """Return the command that gives the same comparison outside the dashboard; empty for a simulation of this page."""
-    if not isinstance(simulation, SimulatedFile):
+    if isinstance(simulation, SimulationToCompare):
         return ""
-    words = ["gearsig", "compare", simulation.request.name, request.name, *stated_options(request)]
-    if simulation.request.rig_text.strip():
-        words += ["--sim-rig", simulation.request.rig_name]
+    words = ["gearsig", "compare", simulation.name, request.name, *stated_options(request)]
+    if simulation.rig_text.strip():
+        words += ["--sim-rig", simulation.rig_name]
     words += [word for simulated, measured in pairs for word in ("--channel", f"{simulated}={measured}")]
     return shlex.join([*words, *(["--align", align_by] if align_by != "auto" else []), "-o", "comparison"])
-
-
-# --------------------
-# Choose the simulation in the sidebar, and the channels on the page.
-# --------------------
 
 
 NOW = "Simulate now"
@@ -235,7 +194,7 @@ def choose_simulation() -> tuple[Simulation, Content | None] | None:
                 rig="Its rig file (TOML), if it has one",
                 about_rig="Without one it is read as the file states, with the gears of the recording's rig.",
             )
-        return None if file is None else (SimulatedFile(file.request()), file.content)
+        return None if file is None else (file.request(), file.content)
 
 
 def choose_alignment() -> str:
@@ -303,11 +262,6 @@ def _choose_run() -> SimulationToCompare:
     return SimulationToCompare(str(machine), speed, torque, float(length or 5.0), int(seed))
 
 
-# --------------------
-# Verdict, downloads, figures, tables.
-# --------------------
-
-
 LINES = "Lines"
 
 
@@ -317,8 +271,19 @@ def show_comparison(comparison: Comparison) -> None:
     if comparison.findings:
         st.markdown("\n".join(f"- {as_typed(text)}" for text in comparison.findings))
     show_warnings(comparison.notes)
-    st.caption(as_typed(f"{_facts(comparison)} Aligned: {'; '.join(alignment_texts(comparison))}."))
-    channel = _choose_channel(comparison.channels)
+    sides = ("Recording", comparison.recorded), ("Simulation", comparison.simulated)
+    facts = " ".join(
+        f"{name}: {side.duration_s:.4g} s, {side.mean_speed_rpm:.6g} rpm, {side.n_revolutions:.4g} revolutions."
+        for name, side in sides
+    )
+    st.caption(as_typed(f"{facts} Aligned: {'; '.join(alignment_texts(comparison))}."))
+    channels = {channel.name: channel for channel in comparison.channels}
+    name: str | None = next(iter(channels))
+    if len(channels) > 1:
+        name = st.segmented_control(
+            "Channel", list(channels), default=name, key="comparison channel", label_visibility="collapsed"
+        )
+    channel = channels.get(name or "", comparison.channels[0])
     rows = channel_rows(channel)
     st.dataframe(
         {"agreement": [name for name, _ in rows], "": [text for _, text in rows]},
@@ -339,33 +304,21 @@ def show_comparison(comparison: Comparison) -> None:
                 st.caption(as_typed(drawn.caption))
 
 
-def show_downloads(comparison: Comparison, page: Any, command: str) -> None:
-    """Offer the page, the data and the lines; `page` makes the page's bytes when it is asked for."""
+def show_downloads(comparison: Comparison, command: str) -> None:
+    """Offer the page, the data and the lines, made when they are asked for."""
     with st.container(horizontal=True):
-        download("Page (HTML)", page, "compare.html", "text/html", primary=True)
+        download(
+            "Page (HTML)",
+            lambda: comparison_page(comparison, command=command).encode(),
+            "compare.html",
+            "text/html",
+            primary=True,
+        )
         download("JSON", lambda: comparison_to_json(comparison).encode(), "compare.json", "application/json")
         download("Lines (CSV)", lambda: orders_csv(comparison).encode(), "orders.csv", "text/csv")
     if command:
         with st.expander("The same from the command line", icon=":material/terminal:"):
             st.code(command, language="bash", wrap_lines=True)
-
-
-def _facts(comparison: Comparison) -> str:
-    sides = ("Recording", comparison.recorded), ("Simulation", comparison.simulated)
-    return " ".join(
-        f"{name}: {side.duration_s:.4g} s, {side.mean_speed_rpm:.6g} rpm, {side.n_revolutions:.4g} revolutions."
-        for name, side in sides
-    )
-
-
-def _choose_channel(channels: Sequence[ChannelComparison]) -> ChannelComparison:
-    if len(channels) == 1:
-        return channels[0]
-    names = [channel.name for channel in channels]
-    chosen = st.segmented_control(
-        "Channel", names, default=names[0], key="comparison channel", label_visibility="collapsed"
-    )
-    return channels[names.index(chosen)] if chosen in names else channels[0]
 
 
 def _show_lines(channel: ChannelComparison) -> None:
@@ -379,14 +332,10 @@ def _show_lines(channel: ChannelComparison) -> None:
             f"simulated (dB{unit})": [round(line.level.simulated_db, 1) for line in shown],
             "difference (dB)": [round(line.level.difference_db, 1) for line in shown],
             "±": [round(2 * line.level.repeatability_db, 1) for line in shown],
-            "remark": [_remark(line) for line in shown],
+            "remark": [missing_words(line) or ("" if line.level.is_beyond else "within the scatter") for line in shown],
         },
         hide_index=True,
         width="stretch",
         column_config={"order": st.column_config.NumberColumn(format="%.6g")},
     )
     st.caption("Levels are rms. ± is twice the standard error that follows from the halves of both records.")
-
-
-def _remark(line: LineLevel) -> str:
-    return missing_words(line) or ("" if line.level.is_beyond else "within the scatter")

@@ -93,7 +93,7 @@ def test_what_is_there_is_not_run_again(tmp_path, monkeypatch):
     monkeypatch.setattr(Branch, "run", run)
     again = run_folder(wanted, tmp_path / "out", n_processes=1)
     assert asked_for == [(20.0, 10.0)]  # from where the first value ended
-    np.testing.assert_array_equal(again["up"][0].found.section.points, first["up"][0].found.section.points)
+    np.testing.assert_array_equal(again["up"][0].measured.section.points, first["up"][0].measured.section.points)
     assert again["up"][1].reason == "enough"
 
 
@@ -113,7 +113,7 @@ def test_an_interrupted_run_goes_on_and_gives_the_same(tmp_path, monkeypatch):
     resumed = run_folder(wanted, tmp_path / "out", n_processes=1)["down"]
     whole = run_folder(wanted, tmp_path / "other", n_processes=1)["down"]
     for one, other in zip(resumed, whole, strict=True):
-        np.testing.assert_array_equal(one.found.section.points, other.found.section.points)
+        np.testing.assert_array_equal(one.measured.section.points, other.measured.section.points)
 
 
 def test_another_bifurcation_s_folder_is_refused(tmp_path):
@@ -163,9 +163,9 @@ def test_a_value_on_disk_is_what_was_saved(tmp_path):
     save(kept, tmp_path / "a.npz")
     again = load(tmp_path / "a.npz")
     np.testing.assert_array_equal(again.end.state.v, run.end.state.v)
-    np.testing.assert_array_equal(again.found.section.points, kept.found.section.points)
-    assert (again.found.motion, again.found.period) == ("periodic", 1)
-    assert again.found.section.units == ("m", "m/s")
+    np.testing.assert_array_equal(again.measured.section.points, kept.measured.section.points)
+    assert (again.measured.motion, again.measured.period) == ("periodic", 1)
+    assert again.measured.section.units == ("m", "m/s")
     assert load(tmp_path / "b.npz") is None
     (tmp_path / "a.npz").write_bytes(b"torn")
     assert load(tmp_path / "a.npz") is None

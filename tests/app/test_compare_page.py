@@ -6,7 +6,7 @@ from streamlit.testing.v1 import AppTest
 
 import app.dashboard
 from app.dashboard import state
-from app.dashboard.compare import MACHINE, ORIGIN, TWIN, SimulatedFile, SimulationToCompare, command_of, teeth_of
+from app.dashboard.compare import MACHINE, ORIGIN, TWIN, SimulationToCompare, command_of, teeth_of
 from app.dashboard.state import AnalysisRequest
 from app.samples import samples
 from gearsig.rig import GearPair, Rig, Shaft
@@ -72,7 +72,7 @@ def test_a_preset_takes_the_rigs_teeth() -> None:
 
 def test_the_command_repeats_the_comparison() -> None:
     request = AnalysisRequest("my run.csv", "0", "rig.toml", "[[pair]]", speed_rpm=1500.0)
-    file = SimulatedFile(AnalysisRequest("model.h5", "1", "model.toml", "[[pair]]"))
+    file = AnalysisRequest("model.h5", "1", "model.toml", "[[pair]]")
     words = command_of(request, file, (("a", "b"),), "correlation")
     assert words == (
         "gearsig compare model.h5 'my run.csv' --rig rig.toml --speed-rpm 1500 --sim-rig model.toml --channel a=b "

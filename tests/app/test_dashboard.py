@@ -10,7 +10,7 @@ from streamlit.testing.v1 import AppTest
 
 import app.dashboard
 from app.dashboard import state
-from app.dashboard.widgets.tabs import OF_CHANNEL, OF_RECORDING
+from app.dashboard.widgets.views import OF_CHANNEL, OF_RECORDING
 from app.samples import samples
 
 MAIN = Path(app.dashboard.__file__).parent / "main.py"

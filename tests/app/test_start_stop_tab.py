@@ -6,7 +6,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
-from app.dashboard.widgets.tabs import OF_MOTION
+from app.dashboard.widgets.views import OF_MOTION
 from sims.files import file_set, write_set
 from tests.app.test_dashboard import TABS, opened, shown_text, upload
 from tests.motion.recordings import start_stop

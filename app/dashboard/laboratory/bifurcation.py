@@ -21,17 +21,13 @@ from gearsig.errors import GearsigError, InputError
 from sims.cracked import DECAYS, RAMP_S, SECTIONS, Branch, slowest_decay_s
 from sims.effects import effect
 from sims.machine import Operation, Profile
+from sims.presets import preset
 from sims.registry import simulator
 from sims.simulator import parameter
 from sims.sweep import Axis, Sweep
 
 if TYPE_CHECKING:
     from streamlit.delta_generator import DeltaGenerator
-
-
-# --------------------
-# What a bifurcation of the laboratory varies, over which range, and what it costs.
-# --------------------
 
 
 N_CYCLES = {"mesh": 80, "shaft": 20}
@@ -118,18 +114,12 @@ def _suggested(run: LaboratoryRun, name: str) -> tuple[float, float]:
             severity = effect(name).severity
             return float(max(severity.low, 0.0)), _rounded(min(severity.high, WIDEST * severity.typical))
     known = parameter(simulator(MODEL).parameters, name)
-    values = {**_preset_values(setup), **dict(setup.parameters)}
+    values = {**preset(MODEL, setup.preset).parameters, **dict(setup.parameters)}
     usual = float(values.get(name, known.default) or 0.0)
     low, high = known.low or 0.0, known.high or 1.0
     if usual > 0.0:
         return max(low, _rounded(0.5 * usual)), min(high, _rounded(2.0 * usual))
     return low, min(high, max(_rounded(0.02 * high), low))
-
-
-def _preset_values(setup: Setup) -> dict[str, float | str]:
-    from sims.presets import preset
-
-    return dict(preset(MODEL, setup.preset).parameters)
 
 
 def _rounded(value: float) -> float:
@@ -150,9 +140,15 @@ ASKED, DONE = "bifurcation asked", "bifurcation done"
 Branches = dict[str, list[KeptValue]]
 
 
-def show_bifurcation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
-    """Choose what is varied; run it on demand; show picture and table."""
-    run = faulty or healthy
+def show_bifurcation(run: LaboratoryRun) -> None:
+    """Choose what is varied; run it on demand; show picture and table, or what is wrong with what was asked for."""
+    try:
+        _choose_and_show(run)
+    except GearsigError as error:
+        show_error(error)
+
+
+def _choose_and_show(run: LaboratoryRun) -> None:
     if run.setup.model != MODEL:
         st.info("Only the model with rigid gears has a bifurcation diagram: choose one of its machines.")
         return
@@ -196,7 +192,13 @@ def _run_and_show(run: LaboratoryRun, request: BifurcationRequest, chosen: Range
         branches = {name: [] for name in request.branches}
     more = False
     if st.session_state.get(ASKED) == question:
-        _check(run, request)
+        motion = motion_s(run, request)
+        if motion > MAX_MOTION_S:
+            raise InputError(
+                f"this needs {motion:.0f} s of motion",
+                allowed=f"up to {MAX_MOTION_S:.0f} s here",
+                remedy="take fewer values, one direction, the mesh cycle, or `gearsig bifurcation` on the command line",
+            )
         st.session_state[DONE] = (question, branches)
         more = _fill(request, branches)
     if any(measured_of(values) for values in branches.values()):
@@ -254,16 +256,6 @@ def _show(request: BifurcationRequest, branches: Branches, chosen: Range) -> Non
     )
 
 
-def _check(run: LaboratoryRun, request: BifurcationRequest) -> None:
-    motion = motion_s(run, request)
-    if motion > MAX_MOTION_S:
-        raise InputError(
-            f"this needs {motion:.0f} s of motion",
-            allowed=f"up to {MAX_MOTION_S:.0f} s here",
-            remedy="take fewer values, one direction, the mesh cycle, or `gearsig bifurcation` on the command line",
-        )
-
-
 def _ask(question: str) -> None:
     st.session_state[ASKED] = question
 
@@ -271,11 +263,3 @@ def _ask(question: str) -> None:
 def _signal_title(signal: str) -> str:
     titles = {"transmission_error_m": "transmission error", "mesh_force_n": "mesh force"}
     return titles.get(signal, signal if " " in signal else f"sensor {signal}")
-
-
-def show_safely(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
-    """Show the view, or what is wrong with what was asked for."""
-    try:
-        show_bifurcation(healthy, faulty)
-    except GearsigError as error:
-        show_error(error)

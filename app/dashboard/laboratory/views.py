@@ -10,7 +10,7 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard.laboratory import run as runs
-from app.dashboard.laboratory.bifurcation import show_safely
+from app.dashboard.laboratory.bifurcation import show_bifurcation
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import Setup, effect_text
 from app.dashboard.theme import as_typed, capitalised, palette
@@ -341,7 +341,7 @@ VIEWS: dict[str, View] = {
     "Spectrum": show_amplitude,
     "Envelope": show_envelope,
     "Phase portrait": lambda healthy, faulty, _: show_phase(healthy, faulty),
-    "Bifurcation": lambda healthy, faulty, _: show_safely(healthy, faulty),
+    "Bifurcation": lambda healthy, faulty, _: show_bifurcation(faulty or healthy),
     "Mesh": lambda healthy, faulty, _: show_mesh(healthy, faulty),
 }
 TAB = "tab of the laboratory"

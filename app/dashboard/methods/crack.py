@@ -13,7 +13,7 @@ from app.dashboard.methods.frame import MethodPage, cached, show_table
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import show_picture
 from app.dashboard.widgets.chooser import choose_file, choose_sample
-from app.dashboard.widgets.messages import show_error
+from app.dashboard.widgets.messages import show_error, show_facts
 from gearsig.angle import find_shaft_angle, resample_to_angle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
@@ -113,17 +113,15 @@ def _show_answer(estimate: CrackEstimate | NoCrackSeen) -> None:
         gear = f"{estimate.gear}{'' if estimate.gear_is_certain else ' or its mate'}"
         kinds = ", ".join(f"{kind} {100.0 * share:.0f} %" for kind, share in estimate.kind_probabilities.items())
         reach = f"{estimate.reach_cycles:.1f} mesh cycles; {estimate.squeezed_rise_db:+.1f} dB"
-        numbers = (
-            ("Depth of a crack", f"{estimate.depth_mm:.2f} mm, {estimate.depth_percent:.0f} % of the root"),
-            ("90 % interval", f"{low:.2f} to {high:.2f} mm"),
-            ("Place", f"{tooth}, {estimate.angle_deg:.0f}°, {gear}"),
-            ("Looks like", kinds or estimate.kind),
-            ("Chance of as much on healthy gears", f"{estimate.p_value:.2g}"),
-            ("Felt for; squeezed energy there", reach),
-        )
-        for column, (name, text) in zip((*st.columns(3), *st.columns(3)), numbers, strict=True):
-            column.caption(name)
-            column.markdown(f"**{as_typed(text)}**")
+        numbers = {
+            "Depth of a crack": f"{estimate.depth_mm:.2f} mm, {estimate.depth_percent:.0f} % of the root",
+            "90 % interval": f"{low:.2f} to {high:.2f} mm",
+            "Place": f"{tooth}, {estimate.angle_deg:.0f}°, {gear}",
+            "Looks like": kinds or estimate.kind,
+            "Chance of as much on healthy gears": f"{estimate.p_value:.2g}",
+            "Reach; squeezed energy there": reach,
+        }
+        show_facts((*st.columns(3), *st.columns(3)), numbers)
     st.markdown("\n".join(f"- {as_typed(reason)}" for reason in estimate.reasons))
 
 

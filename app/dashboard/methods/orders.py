@@ -11,8 +11,7 @@ import streamlit as st
 from app.dashboard.methods.frame import MethodPage, SignalSegment, cached, show_table, signal_of, waveforms_of
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import Axes, ChartLine, show_lines
-from app.dashboard.widgets.messages import show_warnings
-from app.dashboard.widgets.views import show_unknown_speed
+from app.dashboard.widgets.messages import show_unknown_speed, show_warnings
 from gearsig import orders as order_methods
 from gearsig.angle import resample_to_angle
 from gearsig.checks import FloatArray

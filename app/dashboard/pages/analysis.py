@@ -8,8 +8,8 @@ from app.dashboard import state
 from app.dashboard.cached import analysis_of
 from app.dashboard.widgets.chooser import choose_recording
 from app.dashboard.widgets.messages import show_error
-from app.dashboard.widgets.tabs import show_tabs
 from app.dashboard.widgets.verdict import show_findings, show_verdict, show_welcome
+from app.dashboard.widgets.views import show_tabs
 from gearsig.errors import GearsigError
 
 

@@ -4,19 +4,8 @@ from __future__ import annotations
 
 import streamlit as st
 
+from app.dashboard import compare
 from app.dashboard.cached import recorded
-from app.dashboard.compare import (
-    Both,
-    choose_alignment,
-    choose_pairs,
-    choose_simulation,
-    command_of,
-    compared,
-    page_of,
-    show_comparison,
-    show_downloads,
-    simulated_of,
-)
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.chooser import choose_recording
 from app.dashboard.widgets.messages import show_error
@@ -33,8 +22,8 @@ def show() -> None:
     """Choose, read or simulate, compare, show."""
     st.subheader("Simulation against recording", anchor=False)
     chosen = choose_recording(with_reference=False)
-    simulation = choose_simulation()
-    align_by = choose_alignment()
+    simulation = compare.choose_simulation()
+    align_by = compare.choose_alignment()
     if chosen is None or simulation is None:
         st.markdown(WELCOME)
         return
@@ -42,14 +31,14 @@ def show() -> None:
     with st.spinner("Reading the recording …", show_time=True):
         recording = recorded(chosen.request, chosen.content)
     with st.spinner("Reading or simulating; a first simulation takes half a minute …", show_time=True):
-        simulated = simulated_of(what, chosen.request, content, recording)
+        simulated = compare.simulated_of(what, chosen.request, content, recording)
     st.caption(as_typed(f"{simulated.provenance.source or 'simulation of this page'} beside {chosen.request.name}"))
-    pairs = choose_pairs(simulated, recording)
+    pairs = compare.choose_pairs(simulated, recording)
     with st.spinner("Comparing …", show_time=True):
-        comparison = compared(chosen.request, what, pairs, align_by, Both(recording, simulated))
-    command = command_of(chosen.request, what, pairs, align_by)
-    show_downloads(comparison, lambda: page_of(chosen.request, what, pairs, align_by, command, comparison), command)
-    show_comparison(comparison)
+        comparison = compare.compared(chosen.request, what, pairs, align_by, recording, simulated)
+    command = compare.command_of(chosen.request, what, pairs, align_by)
+    compare.show_downloads(comparison, command)
+    compare.show_comparison(comparison)
 
 
 try:

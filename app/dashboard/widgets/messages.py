@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import streamlit as st
 
 from app.dashboard.theme import as_typed
+from gearsig.diagnosis import CannotTell
 from gearsig.errors import GearsigError, InputError
 
 _PLACES = {
@@ -55,3 +57,17 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
         st.caption(text)
     else:
         st.warning(text, icon=":material/warning:")
+
+
+def show_unknown_speed(reason: CannotTell) -> None:
+    """Say why there is no speed and what would give it."""
+    remedy = f"\n\nWhat would give it: {as_typed(reason.remedy)}" if reason.remedy else ""
+    hint = "\n\nA constant speed can be given under *Not in the file?*"
+    st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
+
+
+def show_facts(columns: Iterable[Any], facts: Mapping[str, str]) -> None:
+    """Show names with what is known of them, one in each column; texts may come from files."""
+    for column, (name, text) in zip(columns, facts.items(), strict=True):
+        column.caption(name)
+        column.markdown(f"**{as_typed(text)}**")

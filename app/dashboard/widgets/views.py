@@ -1,4 +1,4 @@
-"""The views of one channel: which spectrum, which cursors, which segment."""
+"""The views of one analysis, of which only the open one is computed."""
 
 from __future__ import annotations
 
@@ -11,79 +11,54 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import channel_problems, command_of, report_page, safe_file_name
+from app.dashboard.methods import show_methods
 from app.dashboard.state import AnalysisRequest
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import Axes, ChartLine, choose_end, choose_range, show_lines, show_picture
-from app.dashboard.widgets.spectrum import show_spectrum
-from gearsig.angle import ShaftAngle
-from gearsig.checks import FloatArray
+from app.dashboard.widgets.messages import show_facts, show_unknown_speed
+from app.dashboard.widgets.spectrum import show_average, show_spectrum
+from gearsig import plot
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
 from gearsig.indicators import Indicator
-from gearsig.plot import METHODS, MIN_SPEED_SPAN, thin, unit_text, with_unit
-from gearsig.recording import Recording
 from gearsig.report import bearing_cursors, highest_order_of_interest, line_cursors, marked_positions, speed_is_constant
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 
-# --------------------
-# Shaft speed over time, and how it was found.
-# --------------------
-
-
 def show_speed(analysis: Analysis) -> None:
-    """Show the speed of the reference shaft, or why it is not known."""
+    """Show the speed of the reference shaft and how it was found, or why it is not known."""
     angle = analysis.shaft_angle
     if isinstance(angle, CannotTell):
         show_unknown_speed(angle)
         return
-    _show_numbers(angle)
-    _show_curve(analysis, angle)
-    if angle.notes:
-        st.markdown("\n".join(f"- {as_typed(note)}" for note in angle.notes))
-
-
-def show_unknown_speed(reason: CannotTell) -> None:
-    """Say why there is no speed and what would give it."""
-    remedy = f"\n\nWhat would give it: {as_typed(reason.remedy)}" if reason.remedy else ""
-    hint = "\n\nA constant speed can be given under *Not in the file?*"
-    st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
-
-
-def _show_numbers(angle: ShaftAngle) -> None:
-    low, high = angle.speed_range_rpm
-    uncertainty = angle.relative_speed_uncertainty
-    numbers = (
-        ("Mean speed", f"{angle.mean_speed_rpm:.6g} rpm"),
-        ("Lowest to highest", f"{low:.5g} – {high:.5g} rpm"),
-        ("Uncertainty of the mean", f"± {100 * uncertainty:.2g} %" if isfinite(uncertainty) else "not known"),
-        ("Revolutions", f"{angle.n_revolutions:.5g}"),
-        ("Quality", f"{angle.quality:.2f} of 1"),
-    )
-    for column, (name, text) in zip(st.columns(len(numbers)), numbers, strict=True):
-        column.caption(name)
-        column.markdown(f"**{text}**")
-    st.caption(f"Shaft {as_typed(angle.shaft or 'of reference')}, {METHODS[angle.method]}.")
-
-
-def _show_curve(analysis: Analysis, angle: ShaftAngle) -> None:
-    time, speed = thin(angle.time_s, 60 * angle.speed_rev_per_s)
+    (lowest, highest), uncertainty = angle.speed_range_rpm, angle.relative_speed_uncertainty
+    numbers = {
+        "Mean speed": f"{angle.mean_speed_rpm:.6g} rpm",
+        "Lowest to highest": f"{lowest:.5g} – {highest:.5g} rpm",
+        "Uncertainty of the mean": f"± {100 * uncertainty:.2g} %" if isfinite(uncertainty) else "not known",
+        "Revolutions": f"{angle.n_revolutions:.5g}",
+        "Quality": f"{angle.quality:.2f} of 1",
+    }
+    show_facts(st.columns(len(numbers)), numbers)
+    st.caption(f"Shaft {as_typed(angle.shaft or 'of reference')}, {plot.METHODS[angle.method]}.")
+    time, speed = plot.thin(angle.time_s, 60 * angle.speed_rev_per_s)
     low, high = float(speed.min()), float(speed.max())
     # rounding at constant speed must not look like a fluctuation
-    margin = max(0.06 * (high - low), (MIN_SPEED_SPAN * max(abs(angle.mean_speed_rpm), 1) - (high - low)) / 2)
+    margin = max(0.06 * (high - low), (plot.MIN_SPEED_SPAN * max(abs(angle.mean_speed_rpm), 1) - (high - low)) / 2)
     axes = Axes("time (s)", "speed (rpm)", (angle.start_s, angle.end_s), (low - margin, high + margin))
     show_lines([ChartLine(time, speed, "speed")], axes, state.view_key("speed chart", analysis))
+    if angle.notes:
+        st.markdown("\n".join(f"- {as_typed(note)}" for note in angle.notes))
 
 
 STARTS_AND_STOPS = (
     "The machine starts and stops: spectra, orders and averages want a speed that lasts. Backlash, impacts and forces "
     "stand on the tab Starts and stops, where the motion of both gears was recorded."
 )
-ChannelView = Callable[[Analysis, ChannelAnalysis], None]
 
 
-def show_of_channel(analysis: Analysis, view: ChannelView) -> None:
+def show_of_channel(analysis: Analysis, view: Callable[[Analysis, ChannelAnalysis], None]) -> None:
     """Show a view of the channel that the user chooses; the first is the one with the most important finding."""
     channels = {channel.channel: channel for channel in analysis.channels}
     if not channels:
@@ -95,12 +70,10 @@ def show_of_channel(analysis: Analysis, view: ChannelView) -> None:
     name = names[0]
     if len(names) > 1:
         column = st.columns(3)[0]
-        name = column.selectbox("Channel", list(channels), index=list(channels).index(name), key=_channel_key(analysis))
+        name = column.selectbox(
+            "Channel", list(channels), index=list(channels).index(name), key=state.view_key(state.CHANNEL, analysis)
+        )
     view(analysis, channels[name])
-
-
-def _channel_key(analysis: Analysis) -> str:
-    return state.view_key(state.CHANNEL, analysis)
 
 
 def show_frequency_spectrum(analysis: Analysis, channel: ChannelAnalysis) -> None:
@@ -117,7 +90,10 @@ def show_order_spectrum(analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show the spectrum over orders of the reference shaft."""
     spectrum = channel.order_spectrum
     if spectrum is None:
-        _say_why_no_orders(analysis)
+        if isinstance(analysis.shaft_angle, CannotTell):
+            show_unknown_speed(analysis.shaft_angle)
+        else:
+            st.info("There are too few revolutions for an order spectrum.")
         return
     show_spectrum(
         analysis,
@@ -147,23 +123,6 @@ def show_envelope(analysis: Analysis, channel: ChannelAnalysis) -> None:
     show_spectrum(analysis, spectrum, cursors, name, marked=marked, shown=shown, scale="Linear")
 
 
-def _say_why_no_orders(analysis: Analysis) -> None:
-    if isinstance(analysis.shaft_angle, CannotTell):
-        show_unknown_speed(analysis.shaft_angle)
-    else:
-        st.info("There are too few revolutions for an order spectrum.")
-
-
-# --------------------
-# Signals over time and what is wrong with them.
-# --------------------
-
-
-N_SHOWN = 4
-N_MOST = 12
-PANEL_PX = 190
-
-
 def show_channels(analysis: Analysis) -> None:
     """Show chosen channels over a window of time, and the table of channels with their problems."""
     recording = analysis.recording
@@ -173,32 +132,26 @@ def show_channels(analysis: Analysis) -> None:
     names = st.multiselect(
         "Channels shown",
         recording.channel_names,
-        default=recording.channel_names[:N_SHOWN],
-        max_selections=N_MOST,
+        default=recording.channel_names[:4],
+        max_selections=12,
         key=state.view_key("channels shown", analysis),
     )
     window = choose_range("Time shown (s)", analysis, recording.duration_s, name="time")
+    rate_hz, n = recording.sampling_rate_hz, recording.n_samples
+    start = min(max(int(window[0] * rate_hz), 0), max(n - 2, 0))
+    stop = min(max(int(np.ceil(window[1] * rate_hz)) + 1, start + 2), n)
     for name in names:
         channel = recording.channels[recording.index(name)]
-        time, values = segment(recording, name, window)
         st.markdown(f"**{as_typed(name)}** {as_typed(channel.position)}")
-        label = with_unit(
+        label = plot.with_unit(
             channel.quantity.replace("_", " ") if channel.quantity != "unknown" else "value", channel.unit
         )
         show_lines(
-            [ChartLine(*thin(time, values), name)],
+            [ChartLine(*plot.thin(np.arange(start, stop) / rate_hz, recording.values(name)[start:stop]), name)],
             Axes("time (s)", label, window),
             state.view_key(f"time of {name}", analysis),
-            height_px=PANEL_PX,
+            height_px=190,
         )
-
-
-def segment(recording: Recording, name: str, window_s: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return times and samples inside a window, at least two samples."""
-    rate, n = recording.sampling_rate_hz, recording.n_samples
-    start = min(max(int(window_s[0] * rate), 0), max(n - 2, 0))
-    stop = min(max(int(np.ceil(window_s[1] * rate)) + 1, start + 2), n)
-    return np.arange(start, stop) / rate, recording.values(name)[start:stop]
 
 
 def _show_quality(analysis: Analysis) -> None:
@@ -207,7 +160,7 @@ def _show_quality(analysis: Analysis) -> None:
     table = {
         "channel": recording.channel_names,
         "quantity": [c.quantity.replace("_", " ") for c in recording.channels],
-        "unit": [unit_text(c.unit) or "not known" for c in recording.channels],
+        "unit": [plot.unit_text(c.unit) or "not known" for c in recording.channels],
         "position": [c.position for c in recording.channels],
         "smallest": [float(row.min()) for row in recording.samples],
         "mean": [float(row.mean(dtype=np.float64)) for row in recording.samples],
@@ -228,35 +181,19 @@ def _show_quality(analysis: Analysis) -> None:
         st.warning(f"{text}{as_typed(problem.remedy)}.", icon=":material/warning:")
 
 
-# --------------------
-# The table of indicators, to filter and to take away.
-# --------------------
-
-
-_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
-
-
 def show_indicators(analysis: Analysis) -> None:
     """Show the indicators with filters, and offer them as CSV."""
     if not analysis.indicators:
         st.info("There are no indicators: no vibration channel could be analysed.")
         return
     table = indicator_frame(analysis.indicators, changes(analysis) if analysis.reference is not None else ())
-    words, channel, place = st.columns(3, vertical_alignment="bottom")
+    words, *choices = st.columns(3, vertical_alignment="bottom")
     text = words.text_input("Name contains", key=state.view_key("indicator words", analysis))
-    channels = channel.multiselect(
-        "Channels", _values(table, "channel"), key=state.view_key("indicator channels", analysis)
-    )
-    places = place.multiselect(
-        "Gear, shaft or band", _values(table, "of"), key=state.view_key("indicator of", analysis)
-    )
-    kept = table
-    if text:
-        kept = kept[kept["indicator"].str.contains(text, case=False, regex=False)]
-    if channels:
-        kept = kept[kept["channel"].isin(channels)]
-    if places:
-        kept = kept[kept["of"].isin(places)]
+    kept = table[table["indicator"].str.contains(text, case=False, regex=False)] if text else table
+    for column, (label, name) in zip(choices, (("Channels", "channel"), ("Gear, shaft or band", "of")), strict=True):
+        known = [str(value) for value in table[name].unique() if value]
+        chosen = column.multiselect(label, known, key=state.view_key(f"indicator {name}", analysis))
+        kept = kept[kept[name].isin(chosen)] if chosen else kept
     number = st.column_config.NumberColumn(format="%.5g")
     config = {"value": number, "reference": number, "change (dB)": st.column_config.NumberColumn(format="%+.1f")}
     st.dataframe(kept, hide_index=True, width="stretch", height=520, column_config=config)
@@ -281,7 +218,7 @@ def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[Indicator
         {
             "indicator": i.name,
             "value": i.value,
-            "unit": unit_text(i.unit),
+            "unit": plot.unit_text(i.unit),
             "channel": i.channel,
             "of": i.gear or i.bearing or i.shaft or i.band,
             "computed on": i.computed_on,
@@ -301,20 +238,12 @@ def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[Indicator
 
 def csv_text(table: DataFrame) -> str:
     """Return the table as CSV; a name that a spreadsheet would run as a formula gets a quote before it."""
+    formula_starts = ("=", "+", "-", "@", "\t", "\r")
     texts = table.select_dtypes(exclude="number").columns
     safe = table.copy()
     for name in texts:
-        safe[name] = [f"'{v}" if str(v).startswith(_FORMULA_STARTS) else v for v in table[name]]
+        safe[name] = [f"'{v}" if str(v).startswith(formula_starts) else v for v in table[name]]
     return safe.to_csv(index=False)
-
-
-def _values(table: DataFrame, column: str) -> list[str]:
-    return [str(value) for value in table[column].unique() if value]
-
-
-# --------------------
-# Levels along a run-up, over order and time.
-# --------------------
 
 
 def show_order_map(analysis: Analysis, channel: ChannelAnalysis) -> None:
@@ -323,8 +252,6 @@ def show_order_map(analysis: Analysis, channel: ChannelAnalysis) -> None:
     if order_map is None:
         st.info("The speed changes by less than 1 %, or is not known. A map is made of a run-up or coast-down.")
         return
-    from gearsig.plot import order_map_figure
-
     end = float(order_map.positions[-1])
     first = end
     if channel.order_spectrum is not None:
@@ -334,15 +261,10 @@ def show_order_map(analysis: Analysis, channel: ChannelAnalysis) -> None:
     on_orders = order_map.axis == "order"
     cursors = [c for c in line_cursors(analysis, order_map) if c.kind == "mesh"] if on_orders else []
     show_picture(
-        order_map_figure(order_map, cursors, highest=highest),
+        plot.order_map_figure(order_map, cursors, highest=highest),
         f"Levels of {channel.channel} over {order_map.axis} and time, with the speed",
     )
     st.caption("Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.")
-
-
-# --------------------
-# A machine that starts and stops: its figures, as in the report.
-# --------------------
 
 
 def show_start_stop(analysis: Analysis) -> None:
@@ -354,11 +276,6 @@ def show_start_stop(analysis: Analysis) -> None:
     for drawn in start_stop_figures(analysis.motion):
         show_picture(drawn.figure, drawn.alternative)
         st.caption(as_typed(drawn.caption))
-
-
-# --------------------
-# The report to take away.
-# --------------------
 
 
 def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
@@ -402,3 +319,41 @@ def _show_provenance(analysis: Analysis) -> None:
     table = {"provenance": [name for name, _ in rows], "": [text for _, text in rows]}
     config = {"provenance": st.column_config.TextColumn(width="small"), "": st.column_config.TextColumn(width="large")}
     st.dataframe(table, hide_index=True, width="stretch", column_config=config)
+
+
+OF_RECORDING: dict[str, Callable[[Analysis], None]] = {"Channels": show_channels, "Speed": show_speed}
+OF_MOTION: dict[str, Callable[[Analysis], None]] = {"Starts and stops": show_start_stop}
+"""Of machines that start and stop, where the teeth could be examined."""
+OF_CHANNEL: dict[str, Callable[[Analysis, ChannelAnalysis], None]] = {
+    "Spectrum": show_frequency_spectrum,
+    "Order spectrum": show_order_spectrum,
+    "Order map": show_order_map,
+    "Envelope": show_envelope,
+    "Synchronous average": show_average,
+    "More methods": show_methods,
+}
+
+
+def show_tabs(analysis: Analysis, request: AnalysisRequest) -> None:
+    """Show the views as tabs."""
+    of_motion = OF_MOTION if analysis.motion is not None else {}
+    names = (*of_motion, *OF_RECORDING, *OF_CHANNEL, "Indicators", "Report")
+    for name, tab in zip(names, st.tabs(names, key=state.TAB, on_change="rerun"), strict=True):
+        if tab.open:
+            with tab:
+                _show(name, analysis, request)
+
+
+@st.fragment
+def _show(name: str, analysis: Analysis, request: AnalysisRequest) -> None:
+    """Show one view; what the user changes in it reruns only this."""
+    if name in OF_MOTION:
+        OF_MOTION[name](analysis)
+    elif name in OF_RECORDING:
+        OF_RECORDING[name](analysis)
+    elif name in OF_CHANNEL:
+        show_of_channel(analysis, OF_CHANNEL[name])
+    elif name == "Indicators":
+        show_indicators(analysis)
+    else:
+        show_report(analysis, request)
