@@ -23,7 +23,7 @@ from gearsig import motion as motions
 from gearsig import plot
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.gap.start_stop import PreparedCycles, cut_cycles
+from gearsig.gap.start_stop import cut_cycles
 from gearsig.rig import DAMPING_LAWS
 from sims.effects import EffectSetting, effect
 from sims.forging import MODES
@@ -180,8 +180,7 @@ def run_drive(setup: Setup) -> DriveRun:
     except RefusalError as error:
         force, refusal = None, str(error)
     try:
-        cycles = PreparedCycles(cut_cycles(motion))
-        curve_um = cycles.features(cycles.every).contact.curve_um
+        curve_um = cut_cycles(motion).features().curve_um
     except RefusalError:
         curve_um = None
     return DriveRun(setup, motions.examine_start_stop(motion), force, refusal, curve_um)
