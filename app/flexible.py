@@ -10,37 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearsig import plot
 from gearsig.angle import find_shaft_angle, resample_to_angle
 from gearsig.checks import FloatArray, positive
 from gearsig.orders import OrderMap, order_map
-from gearsig.plot import (
-    contact_spreading_figure,
-    frequency_curves_figure,
-    load_sharing_figure,
-    mesh_maps_figure,
-    order_map_figure,
-    speed_spectra_figure,
-    speed_sweep_figure,
-)
+from sims import reduced_fe
 from sims.gear_pair import build_rig
 from sims.machine import Operation, Profile
-from sims.reduced_fe import (
-    MARGIN,
-    STEP_S,
-    TRANSMISSION_ERROR,
-    FlexiblePair,
-    MeshMaps,
-    SpeedSweep,
-    SpreadingCheck,
-    check_depth,
-    constants,
-    eigenfrequencies_hz,
-    respond,
-    simulate_pair,
-    speed_sweep,
-    spreading_check,
-    torsional_mode,
-)
+from sims.reduced_fe import FlexiblePair, MeshMaps, SpeedSweep, SpreadingCheck
 from sims.sweep import written
 
 if TYPE_CHECKING:
@@ -65,6 +42,10 @@ class Study:
 
     Parameters
     ----------
+    torque_nm : float
+        Of spectra and eigenfrequencies.
+    n_teeth : int
+        Of the driver.
     maps : MeshMaps
     sweeps : mapping of torque in N m to (up, down)
     spectra_hz : array, (n,)
@@ -80,6 +61,7 @@ class Study:
     """
 
     torque_nm: float
+    n_teeth: int
     maps: MeshMaps
     sweeps: dict[float, tuple[SpeedSweep, SpeedSweep]]
     spectra_hz: FloatArray
@@ -100,7 +82,7 @@ def flexible_study(
     sweep_s: float,
     first_rpm: float = 900.0,
     last_rpm: float = 4100.0,
-    step_s: float = STEP_S,
+    step_s: float = reduced_fe.STEP_S,
     check_spreading: bool = False,
     on_progress: Progress = lambda *_: None,
 ) -> Study:
@@ -123,7 +105,7 @@ def flexible_study(
     """
     positive(sweep_s, "sweep_s", "s")
     for torque in torques_nm:
-        check_depth(pair, Operation.steady(last_rpm, torque))
+        reduced_fe.check_depth(pair, Operation.steady(last_rpm, torque))
     on_progress("maps", 0.0)
     maps = pair.maps()
     sweeps, n = {}, 2 * len(torques_nm) + 1
@@ -131,24 +113,39 @@ def flexible_study(
         both = []
         for j, ends in enumerate(((first_rpm, last_rpm), (last_rpm, first_rpm))):
             on_progress(f"sweep {'up' if j == 0 else 'down'} at {torque:g} N·m", (2 * i + j) / n)
-            both.append(speed_sweep(pair, torque, *ends, sweep_s, step_s=step_s))
+            both.append(reduced_fe.speed_sweep(pair, torque, *ends, sweep_s, step_s=step_s))
         sweeps[torque] = (both[0], both[1])
     on_progress("spectra", (n - 1) / n)
     spectra = {speed: _spectrum(pair, speed, torque_nm, step_s) for speed in SPECTRUM_RPM}
-    natural = {t: torsional_mode(pair, Operation.steady(last_rpm, t)).frequency_hz for t in (*torques_nm, torque_nm)}
+    natural = {
+        t: reduced_fe.torsional_mode(pair, Operation.steady(last_rpm, t)).frequency_hz for t in (*torques_nm, torque_nm)
+    }
     cycles = (np.arange(N_ANGLES) + 0.5) / N_ANGLES
     loaded = Operation.steady(last_rpm, torque_nm)
-    own = constants(pair, loaded)
-    at_angle = eigenfrequencies_hz(pair, loaded, cycles, ready=own)
+    own = reduced_fe.constants(pair, loaded)
+    at_angle = reduced_fe.eigenfrequencies_hz(pair, loaded, cycles, ready=own)
     uncoupled = np.sort(np.concatenate([side.omega_rad_s[side.moving] for side in own.sides])) / (2.0 * np.pi)
     spreading = None
     if check_spreading:
         on_progress("contact at nodes and patches", (n - 1) / n)
-        spreading = spreading_check(pair, loaded, cycles)
+        spreading = reduced_fe.spreading_check(pair, loaded, cycles)
     axis = spectra[SPECTRUM_RPM[0]][0]
     lines = {speed: values for speed, (_, values) in spectra.items()}
     run_up = _run_up(pair, torque_nm, (first_rpm, last_rpm), min(RUN_UP_S, 2.0 * sweep_s + 0.5), step_s)
-    return Study(torque_nm, maps, sweeps, axis, lines, natural, cycles, at_angle, uncoupled, spreading, run_up)
+    return Study(
+        torque_nm,
+        pair.machine.mesh.pair.driver.teeth,
+        maps,
+        sweeps,
+        axis,
+        lines,
+        natural,
+        cycles,
+        at_angle,
+        uncoupled,
+        spreading,
+        run_up,
+    )
 
 
 def _run_up(
@@ -156,7 +153,7 @@ def _run_up(
 ) -> OrderMap:
     """Measure a run-up and return its first channel's levels over order and time."""
     operation = Operation(Profile.of([0.0, duration_s], speeds_rpm), Profile.constant(torque_nm))
-    recording, _ = simulate_pair(
+    recording, _ = reduced_fe.simulate_pair(
         pair,
         operation,
         rng=np.random.default_rng(0),
@@ -175,16 +172,16 @@ def _spectrum(pair: FlexiblePair, speed_rpm: float, torque_nm: float, step_s: fl
     from scipy.signal.windows import flattop
 
     operation = Operation.steady(speed_rpm, torque_nm)
-    run = respond(
+    run = reduced_fe.respond(
         pair,
         operation,
         duration_s=SETTLED_S + SPECTRUM_S,
-        signals=(TRANSMISSION_ERROR,),
+        signals=(reduced_fe.TRANSMISSION_ERROR,),
         step_s=step_s,
         stride=STRIDE,
-        ready=constants(pair, operation),
+        ready=reduced_fe.constants(pair, operation),
     )
-    x = run[TRANSMISSION_ERROR][-round(SPECTRUM_S / run.interval_s) :]
+    x = run[reduced_fe.TRANSMISSION_ERROR][-round(SPECTRUM_S / run.interval_s) :]
     window = flattop(len(x), sym=False)
     amplitude = 2.0 * np.abs(fft.rfft((x - x.mean()) * window)) / window.sum()
     axis = fft.rfftfreq(len(x), run.interval_s)
@@ -192,14 +189,6 @@ def _spectrum(pair: FlexiblePair, speed_rpm: float, torque_nm: float, step_s: fl
     return axis[inside], amplitude[inside]
 
 
-# --------------------
-# Figures and tables of a study of a flexible pair.
-# --------------------
-
-
-DOTS_PER_INCH = 160
-SHARING_NM = 170.0
-HIGHEST_CURVE_HZ = 12000.0
 NAMES = {"node": "line of nodes", "patch": "RBE3 patch", "section": "tooth section"}
 RANGE = (0.52, 1.25)
 """Of the torsional mode's frequency, in which its jumps are looked for."""
@@ -211,7 +200,7 @@ def write_study(study: Study, folder: Path, title: str) -> tuple[Path, ...]:
     paths = []
     for name, figure in figures(study, title).items():
         paths.append(folder / f"{name}.png")
-        figure.savefig(paths[-1], dpi=DOTS_PER_INCH)
+        figure.savefig(paths[-1], dpi=160)
     paths.append(written(folder / "sweeps.csv", sweeps_csv(study)))
     paths.append(written(folder / "maps.csv", maps_csv(study.maps)))
     paths.append(written(folder / "study.json", json.dumps(summary(study), indent=2, ensure_ascii=False) + "\n"))
@@ -227,32 +216,42 @@ def figures(study: Study, title: str) -> dict[str, Figure]:
         "secant mesh stiffness (10⁸ N/m)": np.tile(maps.secant_stiffness_n_per_m, (2, 1)) / 1e8,
     }
     error = {"static transmission error (µm)": np.tile(maps.transmission_error_m, (2, 1)) * 1e6}
-    found = {
-        "stiffness_map": mesh_maps_figure(twice, maps.torque_nm, stiffness, title=f"Mesh stiffness, {title}"),
+    drawn = {
+        "stiffness_map": plot.mesh_maps_figure(twice, maps.torque_nm, stiffness, title=f"Mesh stiffness, {title}"),
         "pair_stiffness_map": _pair_stiffness(study, title),
-        "transmission_error_map": mesh_maps_figure(
+        "transmission_error_map": plot.mesh_maps_figure(
             twice, maps.torque_nm, error, title=f"Static transmission error, {title}"
         ),
         "load_sharing": _sharing(study, title),
-        "spectra": speed_spectra_figure(
+        "spectra": plot.speed_spectra_figure(
             study.spectra_hz,
             {f"{speed:g} rpm": values for speed, values in study.spectra_m.items()},
-            mesh_hz=[speed / 60.0 * _teeth(study) for speed in study.spectra_m],
+            mesh_hz=[speed / 60.0 * study.n_teeth for speed in study.spectra_m],
             natural_hz=study.natural_hz[study.torque_nm],
             title=f"Spectra of the dynamic transmission error at {study.torque_nm:g} N·m, {title}; dashed: ωₙ",
         ),
     }
-    low = study.angle_hz[:, study.angle_hz[0] < HIGHEST_CURVE_HZ]
+    low = study.angle_hz[:, study.angle_hz[0] < HIGHEST_HZ]
     words = f"Natural frequencies over the mesh angle at {study.torque_nm:g} N·m, {title}"
-    uncoupled = study.uncoupled_hz[study.uncoupled_hz < HIGHEST_CURVE_HZ]
-    found["natural_frequencies"] = frequency_curves_figure(study.angle_cycles, low, uncoupled, title=words)
+    uncoupled = study.uncoupled_hz[study.uncoupled_hz < HIGHEST_HZ]
+    drawn["natural_frequencies"] = plot.frequency_curves_figure(study.angle_cycles, low, uncoupled, title=words)
     if study.spreading is not None:
-        found["contact_spreading"] = _spreading(study.spreading, study.torque_nm, title)
+        check = study.spreading
+        curves = {
+            f"{NAMES[spread]}: ripple {100.0 * check.ripple[spread]:.2g} %": values
+            for spread, values in check.frequency_hz.items()
+        }
+        words = f"Contact spread over nodes at {study.torque_nm:g} N·m, {title}; ripple is that of a tooth's compliance"
+        drawn["contact_spreading"] = plot.contact_spreading_figure(check.mesh_cycles, curves, title=words)
     words = f"Run-up at {study.torque_nm:g} N·m, {title}: acceleration (m/s²) at sensor {study.run_up.source}"
-    found["run_up"] = order_map_figure(replace(study.run_up, source=words), height_in=4.6)
+    drawn["run_up"] = plot.order_map_figure(replace(study.run_up, source=words), height_in=4.6)
     if study.sweeps:
-        found["sweeps"] = _sweeps(study, title)
-    return found
+        rows = [
+            (f"{torque:g} N·m", up.mesh_hz, up.rms_m, down.rms_m[::-1]) for torque, (up, down) in study.sweeps.items()
+        ]
+        natural = float(np.mean([study.natural_hz[torque] for torque in study.sweeps]))
+        drawn["sweeps"] = plot.speed_sweep_figure(rows, natural_hz=natural, title=f"Speed sweeps, {title}")
+    return drawn
 
 
 def sweeps_csv(study: Study) -> str:
@@ -321,7 +320,7 @@ def _pair_stiffness(study: Study, title: str) -> Figure:
     """Contact stiffness of one pair along its way, over the torque; it enters at 1."""
     maps = study.maps
     twice = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0, maps.mesh_cycles + 2.0))
-    slot = np.floor(twice + MARGIN).astype(np.int64) - 1
+    slot = np.floor(twice + reduced_fe.MARGIN).astype(np.int64) - 1
     place = np.tile(np.arange(len(maps.mesh_cycles)), 3)
     there = (slot >= 0) & (slot < maps.pair_forces_n.shape[2])
 
@@ -333,18 +332,18 @@ def _pair_stiffness(study: Study, title: str) -> Figure:
         "tangent contact stiffness (10⁸ N/m)": of_pair(maps.contact_tangent_n_per_m),
         "secant contact stiffness (10⁸ N/m)": of_pair(maps.contact_secant_n_per_m),
     }
-    return mesh_maps_figure(
+    return plot.mesh_maps_figure(
         twice, maps.torque_nm, kinds, title=f"Contact stiffness of the pair that enters at 1, {title}"
     )
 
 
 def _sharing(study: Study, title: str) -> Figure:
     maps = study.maps
-    place = int(np.argmin(np.abs(maps.torque_nm - SHARING_NM)))
+    place = int(np.argmin(np.abs(maps.torque_nm - 170.0)))
     n_slots = maps.force_n.shape[2]
     # Over two cycles each pair keeps its name: slot j of cycle c holds pair ⌊c − start⌋ − j.
     cycles = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0))
-    newest = np.floor(cycles + MARGIN).astype(int)
+    newest = np.floor(cycles + reduced_fe.MARGIN).astype(int)
     forces = np.tile(maps.pair_forces_n[:, place], (2, 1))
     pairs = range(int(newest.min()) - n_slots + 1, int(newest.max()) + 1)
     curves = {
@@ -354,33 +353,7 @@ def _sharing(study: Study, title: str) -> Figure:
         for k in pairs
     }
     carried = {name: force for name, force in curves.items() if force.any()}
-    errors = {f"{maps.torque_nm[i]:.3g} N·m": np.tile(maps.transmission_error_m[:, i], 2) for i in _few(maps.torque_nm)}
+    few = np.unique(np.linspace(0, len(maps.torque_nm) - 1, 5).round()).astype(int)
+    errors = {f"{maps.torque_nm[i]:.3g} N·m": np.tile(maps.transmission_error_m[:, i], 2) for i in few}
     words = f"Load sharing at {maps.torque_nm[place]:.3g} N·m, and static transmission error, {title}"
-    return load_sharing_figure(cycles, carried, errors, title=words)
-
-
-def _spreading(check: SpreadingCheck, torque_nm: float, title: str) -> Figure:
-    curves = {
-        f"{NAMES[spread]}: ripple {100.0 * check.ripple[spread]:.2g} %": values
-        for spread, values in check.frequency_hz.items()
-    }
-    words = f"Contact spread over nodes at {torque_nm:g} N·m, {title}; ripple is that of a tooth's compliance"
-    return contact_spreading_figure(check.mesh_cycles, curves, title=words)
-
-
-def _few(torques: np.ndarray[tuple[int, ...], np.dtype[np.floating]]) -> list[int]:
-    """Places of a few torques over the range."""
-    return [int(i) for i in np.unique(np.linspace(0, len(torques) - 1, 5).round())]
-
-
-def _sweeps(study: Study, title: str) -> Figure:
-    rows = []
-    for torque, (up, down) in study.sweeps.items():
-        rows.append((f"{torque:g} N·m", up.mesh_hz, up.rms_m, down.rms_m[::-1]))
-    natural = float(np.mean([study.natural_hz[t] for t in study.sweeps]))
-    return speed_sweep_figure(rows, natural_hz=natural, title=f"Speed sweeps, {title}")
-
-
-def _teeth(study: Study) -> float:
-    sweep = next(iter(study.sweeps.values()))[0]
-    return float(sweep.mesh_hz[0] / sweep.speed_rpm[0] * 60.0)
+    return plot.load_sharing_figure(cycles, carried, errors, title=words)

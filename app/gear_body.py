@@ -12,11 +12,9 @@ import numpy as np
 from gearsig.checks import FloatArray, count, within
 from gearsig.plot import gear_mesh_figure, gear_modes_figure, gear_stress_figure
 from gearsig.report import made_folder
+from sims import reduced_fe
 from sims.reduced_fe import (
-    FINER_DOF,
-    N_COMPARED,
     CraigBamptonGear,
-    CraigBamptonPlan,
     CyclicGear,
     CyclicModes,
     DiscretisationError,
@@ -25,38 +23,12 @@ from sims.reduced_fe import (
     Held,
     MeshQuality,
     ReducedGear,
-    ReductionPlan,
     SectorMesh,
     ToothLoad,
-    cached_gear,
-    check_memory,
-    check_reducible,
-    craig_bampton,
-    craig_bampton_bytes,
-    cyclic_modes,
-    discretisation_error,
-    face_view,
-    load_tooth,
-    mesh_quality,
-    mesh_size_for,
-    mode_field,
-    one_thread,
-    point_and_push,
-    rigid_part,
-    sector_bytes,
-    sector_mesh,
-    write_gear,
-    write_vtk,
 )
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-MAX_MODES = 300
-"""Beyond, the search takes many minutes, and teeth alone move."""
-N_SLICES = 5
-"""Contact patches along the face, where the mesh has layers enough."""
 
 
 @dataclass(frozen=True)
@@ -123,42 +95,51 @@ def study_gear(
     on_progress : callable
         Told what is done and how much, 0 to 1.
     """
-    within(count(n_modes, "n_modes"), "n_modes", 1, MAX_MODES)
+    # beyond 300 modes, the search takes many minutes, and teeth alone move
+    within(count(n_modes, "n_modes"), "n_modes", 1, 300)
     on_progress("mesh", 0.0)
-    size = mesh_size_for(blank, n_dof)
+    size = reduced_fe.mesh_size_for(blank, n_dof)
     if reduce:
-        check_reducible(blank, size)
-    check_memory(craig_bampton_bytes(blank, size, N_COMPARED) if reduce else sector_bytes(blank, size))
-    mesh = sector_mesh(blank, size)
+        reduced_fe.check_reducible(blank, size)
+    reduced_fe.check_memory(
+        reduced_fe.craig_bampton_bytes(blank, size, reduced_fe.N_COMPARED)
+        if reduce
+        else reduced_fe.sector_bytes(blank, size)
+    )
+    mesh = reduced_fe.sector_mesh(blank, size)
     gear = CyclicGear(mesh, springs)
     on_progress("modes", 0.05)
     elastic = held == "free" and springs is None
-    with one_thread():
-        modes = cyclic_modes(gear, n_modes, held, elastic=elastic)
+    with reduced_fe.one_thread():
+        modes = reduced_fe.cyclic_modes(gear, n_modes, held, elastic=elastic)
     on_progress("stress", 0.25 if reduce else 0.6)
-    load = load_tooth(mesh, force_n)
+    load = reduced_fe.load_tooth(mesh, force_n)
     error = None
-    if mesh.n_dof < FINER_DOF / 2:
+    if mesh.n_dof < reduced_fe.FINER_DOF / 2:
         on_progress("finer mesh", 0.3)
-        error = discretisation_error(gear, modes, load, held, elastic=elastic)
+        error = reduced_fe.discretisation_error(gear, modes, load, held, elastic=elastic)
     reduced = both = None
     if reduce:
         on_progress("free-interface reduction", 0.35)
-        reduced = cached_gear(blank, ReductionPlan(size))
+        reduced = reduced_fe.cached_gear(blank, reduced_fe.ReductionPlan(size))
         on_progress("Craig–Bampton reduction", 0.7)
-        both = craig_bampton(mesh, CraigBamptonPlan(n_slices=min(N_SLICES, mesh.tooth.shape[2])))
+        # contact patches along the face, where the mesh has layers enough
+        plan = reduced_fe.CraigBamptonPlan(n_slices=min(5, mesh.tooth.shape[2]))
+        both = reduced_fe.craig_bampton(mesh, plan)
     on_progress("done", 1.0)
     return GearBodyStudy(
-        mesh, mesh_quality(mesh), gear, held if springs is None else "springs", modes, load, error, reduced, both
+        mesh,
+        reduced_fe.mesh_quality(mesh),
+        gear,
+        held if springs is None else "springs",
+        modes,
+        load,
+        error,
+        reduced,
+        both,
     )
 
 
-# --------------------
-# Figures, files and text of a gear's finite elements.
-# --------------------
-
-
-DOTS_PER_INCH = 160
 N_SHOWN = 6
 NEIGHBOURS = (-1, 0, 1)
 PEAKS = "Peaks at the force and in sharp corners grow with a finer mesh."
@@ -172,12 +153,12 @@ def write_gear_body(study: GearBodyStudy, folder: Path, *, vtk: bool = False) ->
     paths = []
     for name, figure in figures(study).items():
         paths.append(folder / f"{name}.png")
-        figure.savefig(paths[-1], dpi=DOTS_PER_INCH)
+        figure.savefig(paths[-1], dpi=160)
     if vtk:
-        paths.append(write_vtk(folder / "gear.vtu", study.mesh, _fields(study)))
+        paths.append(reduced_fe.write_vtk(folder / "gear.vtu", study.mesh, _fields(study)))
     if study.reduced is not None:
         paths.append(folder / "reduced.npz")
-        write_gear(paths[-1], study.reduced)
+        reduced_fe.write_gear(paths[-1], study.reduced)
     if study.craig_bampton is not None:
         paths.append(folder / "craig_bampton.txt")
         paths[-1].write_text(study.craig_bampton.accuracy.table() + "\n", encoding="utf-8")
@@ -186,7 +167,7 @@ def write_gear_body(study: GearBodyStudy, folder: Path, *, vtk: bool = False) ->
 
 def figures(study: GearBodyStudy) -> dict[str, Figure]:
     """Return mesh, modes and stress by their files' names; a mesh of first order has no stress worth showing."""
-    mesh, view = study.mesh, face_view(study.mesh)
+    mesh, view = study.mesh, reduced_fe.face_view(study.mesh)
     g = mesh.blank.geometry
     name = f"{g.teeth} teeth, module {g.module_mm:g} mm"
     near = (g.root_radius_mm - 3.0 * g.module_mm, g.tip_radius_mm + 0.5 * g.module_mm)
@@ -215,7 +196,7 @@ def lines(study: GearBodyStudy) -> list[str]:
     text = [
         f"{study.mesh.n_dof} degrees of freedom; {_cells(study)}",
         f"mass {q.mass_kg:.4g} kg ({1e6 * (q.volume_m3 / q.true_volume_m3 - 1.0):+.0f} ppm of the outline's)",
-        f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², least scaled Jacobian {q.scaled_jacobian.min():.2f}",
+        f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², lowest scaled Jacobian {q.scaled_jacobian.min():.2f}",
         f"tooth compliance in mid-flank {study.load.push_m / study.load.force_n:.3g} m/N, bore held",
         f"modes, {HELD[study.held]}:",
         *(_label(study, k) for k in range(len(study.modes.frequencies_hz))),
@@ -235,7 +216,7 @@ def lines(study: GearBodyStudy) -> list[str]:
         a = study.craig_bampton.accuracy
         text.append(
             f"Craig–Bampton: {len(study.craig_bampton.mass)} degrees of freedom, worst of {len(a.full_hz)} frequencies "
-            f"{100.0 * a.worst_error:.4f} %, least subspace MAC {a.least_mac:.6f}"
+            f"{100.0 * a.worst_error:.4f} %, lowest subspace MAC {a.least_mac:.6f}"
         )
     return text
 
@@ -248,14 +229,14 @@ def _cells(study: GearBodyStudy) -> str:
 
 def _label(study: GearBodyStudy, k: int) -> str:
     n = int(study.modes.nodal_diameters[k])
-    whole = rigid_part(study.gear, study.modes, k)
+    whole = reduced_fe.rigid_part(study.gear, study.modes, k)
     kind = whole or f"{n} nodal diameter{'s' if n != 1 else ''}"
     return f"{study.modes.frequencies_hz[k]:.1f} Hz, {kind}"
 
 
 def _shape(study: GearBodyStudy, view: FaceView, k: int) -> FloatArray:
     """Motion of the view's points in the axes of the whole gear."""
-    field = mode_field(study.gear, study.modes, k)[:, view.nodes]
+    field = reduced_fe.mode_field(study.gear, study.modes, k)[:, view.nodes]
     angle = study.mesh.blank.pitch_angle_rad * np.arange(len(field))[:, None]
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = np.moveaxis(field, 2, 0)
@@ -263,8 +244,8 @@ def _shape(study: GearBodyStudy, view: FaceView, k: int) -> FloatArray:
 
 
 def _stress(study: GearBodyStudy, near: tuple[float, float, float, float], name: str) -> Figure:
-    load, view = study.load, face_view(study.mesh, NEIGHBOURS)
-    point, push = point_and_push(study.mesh.blank.geometry, load.roll_rad, 1.0)
+    load, view = study.load, reduced_fe.face_view(study.mesh, NEIGHBOURS)
+    point, push = reduced_fe.point_and_push(study.mesh.blank.geometry, load.roll_rad, 1.0)
     return gear_stress_figure(
         view.points_mm,
         view.triangles,
@@ -284,5 +265,7 @@ def _fields(study: GearBodyStudy) -> dict[str, FloatArray]:
         "von_mises_pa": np.array([study.load.von_mises_pa(k) for k in range(z)]),
     }
     for k in range(min(N_SHOWN, len(study.modes.frequencies_hz))):
-        fields[f"mode_{k + 1}_{study.modes.frequencies_hz[k]:.0f}_hz"] = mode_field(study.gear, study.modes, k)
+        fields[f"mode_{k + 1}_{study.modes.frequencies_hz[k]:.0f}_hz"] = reduced_fe.mode_field(
+            study.gear, study.modes, k
+        )
     return fields

@@ -1,28 +1,17 @@
 """The page *Simulation against recording*, run without a browser."""
 
-from pathlib import Path
-
 from streamlit.testing.v1 import AppTest
 
-import app.dashboard
 from app.dashboard import state
 from app.dashboard.compare import MACHINE, ORIGIN, TWIN, SimulationToCompare, command_of, teeth_of
 from app.dashboard.state import AnalysisRequest
-from app.samples import samples
 from gearsig.rig import GearPair, Rig, Shaft
-
-MAIN = Path(app.dashboard.__file__).parent / "main.py"
-SAMPLES = {sample.rig.stem: sample for sample in samples()}
-
-
-def shown_text(page: AppTest) -> str:
-    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.warning, *page.info]
-    return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "")
+from tests.app.pages import FOLDER, SAMPLES, shown_text
 
 
 def opened(recording: str = "root_crack_3mm", simulation: str = "root_crack_0mm") -> AppTest:
     """Choose a recording on the analysis page's own widgets, then go to the comparison."""
-    page = AppTest.from_file(str(MAIN), default_timeout=300)
+    page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=300)
     page.session_state[state.SAMPLE] = SAMPLES[recording]
     page.run()
     page.session_state[ORIGIN] = "Sample"

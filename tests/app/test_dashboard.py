@@ -1,39 +1,15 @@
 """The dashboard's pages, run without a browser."""
 
-import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
-from streamlit.testing.v1 import AppTest
 
-import app.dashboard
 from app.dashboard import state
 from app.dashboard.widgets.views import OF_CHANNEL, OF_RECORDING
-from app.samples import samples
+from tests.app.pages import METHODS_TAB, SAMPLES, charts, numbers, opened, opened_file, shown_text, upload
 
-MAIN = Path(app.dashboard.__file__).parent / "main.py"
 TABS = (*OF_RECORDING, *OF_CHANNEL, "Indicators", "Report")
-SAMPLES = {sample.rig.stem: sample for sample in samples()}
-
-
-def opened() -> AppTest:
-    return AppTest.from_file(str(MAIN), default_timeout=120).run()
-
-
-def upload(page: AppTest, name: str, content: bytes, rig: str = "") -> AppTest:
-    page.sidebar.radio(key=state.ORIGIN).set_value("Own file").run()
-    page.sidebar.file_uploader(key=state.RECORDING_FILE).upload(name, content)
-    if rig:
-        page.sidebar.file_uploader(key=state.RIG_FILE).upload("machine.toml", rig.encode())
-    return page.run()
-
-
-def shown_text(page: AppTest) -> str:
-    """Return the words of the page as a reader sees them: without escapes and invisible joiners."""
-    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.warning, *page.info]
-    return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "")
 
 
 def test_a_sample_is_open_at_the_start() -> None:
@@ -46,9 +22,8 @@ def test_a_sample_is_open_at_the_start() -> None:
 
 @pytest.mark.parametrize("name", sorted(SAMPLES))
 def test_every_sample_opens_in_every_view(name: str) -> None:
-    page = opened()
-    page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES[name]).run()
-    for tab in TABS:
+    page = opened(name)
+    for tab in (tab for tab in TABS if tab != METHODS_TAB):
         page.session_state[state.TAB] = tab
         page.run()
         assert not page.exception, (name, tab)
@@ -70,10 +45,7 @@ def test_views_draw_what_they_promise() -> None:
 
 
 def test_a_map_shows_along_a_run_up() -> None:
-    page = opened()
-    page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES["run_up"])
-    page.session_state[state.TAB] = "Order map"
-    page.run()
+    page = opened("run_up", tab="Order map")
     assert len(page.get("image")) == 1
 
 
@@ -144,35 +116,22 @@ def test_no_long_signal_goes_to_the_browser_whole() -> None:
     """A million samples: the page carries thousands; a window shows its own samples again."""
     from io import BytesIO
 
-    import numpy as np
     from scipy.io import savemat
 
     x = np.random.default_rng(0).standard_normal(1_000_000).astype(np.float32)
     x[123_456] = 99.0
     file = BytesIO()
     savemat(file, {"a1": x, "fs": 10_000.0})
-    page = upload(opened(), "long.mat", file.getvalue())
-    page.session_state[state.TAB] = "Channels"
-    page.run()
+    page = opened_file("long.mat", file.getvalue(), tab="Channels")
     assert not page.exception
     spec = page.get("plotly_chart")[0].proto.spec
     assert len(spec) < 200_000
-    assert max(points(spec)) == pytest.approx(99.0)
+    assert numbers(charts(page)[0]["data"][0]["y"]).max() == pytest.approx(99.0)
     slider = next(s for s in page.slider if s.label.startswith("Time"))
     slider.set_value((12.3, 12.4)).run()
-    near = points(page.get("plotly_chart")[0].proto.spec)
+    near = numbers(charts(page)[0]["data"][0]["y"])
     assert len(near) == pytest.approx(1000, abs=5)
-    assert max(near) == pytest.approx(99.0)
-
-
-def points(spec: str) -> list[float]:
-    """Return the values of a chart's only line."""
-    from base64 import b64decode
-
-    import numpy as np
-
-    y = json.loads(spec)["data"][0]["y"]
-    return list(np.frombuffer(b64decode(y["bdata"]), y["dtype"]))
+    assert near.max() == pytest.approx(99.0)
 
 
 def test_names_from_files_are_shown_as_typed() -> None:
@@ -180,7 +139,7 @@ def test_names_from_files_are_shown_as_typed() -> None:
     names = ("<script>alert(1)</script>", "**x** $y$ :material/delete: :smile: a->b")
     rows = "\n".join(f"{i / 1000};{(i * 37) % 101};{(i * 53) % 97}" for i in range(3000))
     rig = '[[shaft]]\nname = "<img src=x onerror=alert(1)>"\n[speed]\nsource = "constant"\nspeed_rpm = 1200\n'
-    page = upload(opened(), "[a](http://x.y) **b**.csv", f"time (s);{names[0]};{names[1]}\n{rows}\n".encode(), rig)
+    page = opened_file("[a](http://x.y) **b**.csv", f"time (s);{names[0]};{names[1]}\n{rows}\n".encode(), rig)
     for tab in TABS:
         page.session_state[state.TAB] = tab
         page.run()
@@ -202,9 +161,7 @@ def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> 
     from app.dashboard.state import AnalysisRequest
     from app.dashboard.widgets.verdict import headline_of
 
-    page = opened()
-    page.session_state[state.TAB] = "Indicators"
-    page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES["root_crack_1mm"]).run()
+    page = opened("root_crack_1mm", tab="Indicators")
     assert "reference" not in page.dataframe[0].value.columns
     next(w for w in page.sidebar.selectbox if w.label == "Compared with").set_value("Root crack 0mm").run()
     assert not page.exception
@@ -214,10 +171,10 @@ def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> 
     rms = table[table["indicator"] == "rms"]
     assert len(rms)
     np.testing.assert_allclose(rms["change (dB)"], 20.0 * np.log10(rms["value"] / rms["reference"]), atol=1e-6)
-    sample, sound = SAMPLES["root_crack_1mm"], SAMPLES["root_crack_0mm"]
-    request = AnalysisRequest("now.h5", "1", sample.rig.name, sample.rig.read_text(), reference_name="sound.h5")
+    sample, healthy = SAMPLES["root_crack_1mm"], SAMPLES["root_crack_0mm"]
+    request = AnalysisRequest("now.h5", "1", sample.rig.name, sample.rig.read_text(), reference_name="healthy.h5")
     same = read_and_analyze(
-        request, memoryview(sample.recording.read_bytes()), memoryview(sound.recording.read_bytes())
+        request, memoryview(sample.recording.read_bytes()), memoryview(healthy.recording.read_bytes())
     )
     assert headline_of(same.verdict)[0] in shown_text(page)
 
@@ -226,8 +183,8 @@ def test_an_uploaded_reference_that_does_not_fit_is_one_message() -> None:
     page = opened()
     next(w for w in page.sidebar.selectbox if w.label == "Compared with").set_value("Own file").run()
     assert not page.error
-    sound = page.sidebar.file_uploader[0]
-    sound.upload("other.csv", b"time (s);b\n" + b"\n".join(b"%g;%d" % (i / 1000, i * 37 % 101) for i in range(3000)))
+    healthy = page.sidebar.file_uploader[0]
+    healthy.upload("other.csv", b"time (s);b\n" + b"\n".join(b"%g;%d" % (i / 1000, i * 37 % 101) for i in range(3000)))
     page.run()
     assert not page.exception
     assert len(page.error) == 1

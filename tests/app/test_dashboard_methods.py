@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import json
+import csv
+import io
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,41 +13,30 @@ from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
 from app.dashboard.methods import METHODS
-from tests.app.test_dashboard import SAMPLES, opened, shown_text, upload
+from app.dashboard.methods.frame import OVER_TIME, Waveforms, recording_of, table_csv, waveforms_file
+from gearsig.recording import read_recording
+from tests.app.pages import (
+    METHODS_TAB,
+    SAMPLES,
+    charts,
+    choose,
+    curves,
+    labelled,
+    machine,
+    numbers,
+    opened_at,
+    opened_file,
+    opened_machine,
+    press,
+    shown_text,
+)
 
-TAB = "More methods"
-
-
-def opened_at(method: str, sample: str = "damaged_tooth") -> AppTest:
-    page = opened()
-    if sample != "damaged_tooth":
-        page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES[sample])
-    page.session_state[state.TAB] = TAB
-    page.run()
-    return choose(page, "Method", method)
-
-
-def choose(page: AppTest, label: str, value: str) -> AppTest:
-    next(w for w in page.segmented_control if w.label == label).set_value(value).run()
-    assert not page.exception
-    return page
-
-
-def curves(page: AppTest) -> dict[str, np.ndarray]:
-    """Return the values of all named curves of the page, those of the first chart where names return."""
-    from base64 import b64decode
-
-    found = {}
-    for chart in page.get("plotly_chart"):
-        for line in json.loads(chart.proto.spec)["data"]:
-            y = line["y"]
-            values = np.frombuffer(b64decode(y["bdata"]), y["dtype"]) if isinstance(y, dict) else np.array(y, float)
-            found.setdefault(line.get("name", ""), values)
-    return found
+OUTER_RACE_HZ = 88.2
+WITHOUT_DOWNLOADS = ("Phase plane", "Embedding and chaos", "Crack severity")
 
 
 @pytest.mark.parametrize("sample", ["run_up", "two_stage", "no_tachometer"])
-def test_every_method_answers_for_samples_of_every_kind(sample: str) -> None:
+def test_every_method_answers_for_samples_of_every_kind_and_offers_what_it_shows(sample: str) -> None:
     page = opened_at("Time–frequency", sample)
     for method in METHODS:
         choose(page, "Method", method)
@@ -54,6 +45,113 @@ def test_every_method_answers_for_samples_of_every_kind(sample: str) -> None:
         told = method == "Crack severity" and len(page.info) + len(page.success) == 1
         assert drawn > 0 or told
         assert "Analysed: 0 to" in shown_text(page)
+        known = method not in WITHOUT_DOWNLOADS and "speed is not known" not in shown_text(page)
+        assert not known or len(page.get("download_button")) >= 1, method
+
+
+DEAD = "time (s);a1;a2\n" + "\n".join(f"{i / 1000:g};1.5;{(i * 37) % 101}" for i in range(3000))
+SHORT = "time (s);a1\n" + "\n".join(f"{i / 1000:g};{(i * 37) % 101}" for i in range(700))
+
+
+@pytest.mark.parametrize("content", [DEAD, SHORT], ids=["constant channel", "short recording"])
+def test_what_cannot_be_analysed_is_at_most_one_message_in_every_method(content: str) -> None:
+    page = opened_file("bad.csv", f"{content}\n".encode(), tab=METHODS_TAB)
+    assert not page.exception
+    for method in METHODS:
+        choose(page, "Method", method)
+        assert len(page.error) <= 1, method
+
+
+def test_a_segment_that_is_too_short_is_at_most_one_message() -> None:
+    page = opened_machine("Denoising")
+    for method in METHODS:
+        choose(page, "Method", method)
+        sliders = [s for s in page.slider if s.label.startswith("Segment")]
+        for limits_s in ((2.0, 2.05), (0.0, 0.0)) if sliders else ():
+            next(s for s in page.slider if s.label.startswith("Segment")).set_value(limits_s).run()
+            assert not page.exception, method
+            assert len(page.error) <= 1, method
+
+
+def test_names_from_files_are_shown_as_typed_in_every_method() -> None:
+    content, rig = machine()
+    names = ("<script>alert(1)</script>", "**x** $y$ :smile:")
+    rig = rig.replace('"input"', f'"{names[1]}"').replace('"a1"', f'"{names[0]}"')
+    page = opened_file("names.csv", content.replace(b";a1", f";{names[0]}".encode()), rig, tab=METHODS_TAB)
+    for method in METHODS:
+        choose(page, "Method", method)
+        assert not page.error
+        raw = "\n".join(part.value for part in [*page.markdown, *page.caption, *page.info, *page.warning])
+        for markup in ("<script", "**x**", "$y$", ":smile:"):
+            assert not re.search(r"(?<!\\)" + re.escape(markup), raw), (method, markup)
+        assert all("<script" not in chart.proto.spec for chart in page.get("plotly_chart"))
+
+
+def test_waveforms_open_with_five_mesh_cycles() -> None:
+    """The crack's pair has 55 teeth on a shaft of 8.3128 Hz."""
+    page = opened_at("Denoising", "root_crack_3mm")
+    for method in ("Denoising", "Wavelet packets", "Ridges", "Modes"):
+        choose(page, "Method", method)
+        low, high = labelled(page, "slider", "Waveforms shown").value
+        assert (high - low) * 55 * 8.3128 == pytest.approx(5.0, rel=0.01), method
+
+
+@pytest.mark.parametrize(("method", "engine"), [("Modes", "vmdpy"), ("Ridges", "ssqueezepy")])
+def test_other_engines_answer_for_short_segments(method: str, engine: str) -> None:
+    pytest.importorskip(engine)
+    page = opened_machine("Denoising")
+    choose(page, "Method", method)
+    labelled(page, "slider", "Segment").set_value((0.0, 1.0)).run()
+    choose(page, "Engine", engine)
+    assert not page.error, shown_text(page)
+    assert len(page.get("image")) == 1
+
+
+def test_a_ridge_has_the_frequency_and_amplitude_that_was_put_in() -> None:
+    """The machine's order 5 has 50 Hz and an amplitude of 3."""
+    page = opened_machine("Ridges")
+    labelled(page, "slider", "Ridges").set_value(1).run()
+    shown = curves(page)
+    together = shown["component 1"] + shown["residual without all of them"]
+    np.testing.assert_allclose(together, shown["signal"], atol=1e-6)
+    for transform in ("Fourier", "Wavelet", "Squeezed Fourier", "Squeezed wavelet"):
+        choose(page, "Transform", transform)
+        assert not page.error, shown_text(page)
+        frequency, amplitude = (numbers(chart["data"][0]["y"]) for chart in charts(page)[:2])
+        middle = slice(len(frequency) // 4, -len(frequency) // 4)
+        assert np.median(frequency[middle]) == pytest.approx(50.0, abs=3.0)
+        assert 2.0 < np.median(amplitude[middle]) < 4.2  # with its neighbour of 55 Hz and amplitude 1
+    choose(page, "Over", "Shaft angle")
+    assert not page.error
+
+
+@pytest.mark.parametrize(("quantity", "n_errors"), [("sound_pressure", 1), ("unknown", 0), ("displacement", 0)])
+def test_a_channel_that_is_no_motion_is_one_message_and_an_unknown_one_is_asked_about(
+    quantity: str, n_errors: int
+) -> None:
+    page = opened_machine("Phase plane", quantity=quantity)
+    assert len(page.error) == n_errors
+    asked = [w for w in page.segmented_control if w.label == "The channel measures"]
+    assert len(asked) == (quantity == "unknown")
+
+
+def test_the_depth_of_a_crack_against_the_healthy_sample_at_the_torque_that_is_stated() -> None:
+    page = opened_at("Crack severity", "root_crack_3mm")
+    assert "give a reference" in shown_text(page)
+    choose(page, "Reference", "Sample")
+    assert len(page.error) == 1
+    at_110 = page.error[0].value
+    assert "tooth 21" in at_110
+    assert "Torque 110 N·m, of the rig" in shown_text(page)
+    interval = re.search(r"\*\*([\d.]+) to ([\d.]+) mm\*\*", shown_text(page))
+    assert interval is not None
+    low, high = (float(text) for text in interval.groups())
+    assert low <= 3.0 <= high
+    assert len(page.get("image")) == 1
+    (torque,) = (w for w in page.number_input if w.label.startswith("Torque"))
+    torque.set_value(60.0).run()
+    assert "Torque 60 N·m, as stated in the sidebar" in shown_text(page)
+    assert not page.error or page.error[0].value != at_110  # a crack's effect grows with the load
 
 
 def test_only_the_chosen_method_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,33 +183,11 @@ def test_every_transform_draws_its_map() -> None:
     assert not page.error
 
 
-def test_a_stretch_of_a_recording_is_what_is_analysed() -> None:
+def test_a_segment_of_a_recording_is_what_is_analysed() -> None:
     page = opened_at("Time–frequency")
     next(s for s in page.slider if s.label.startswith("Segment")).set_value((1.0, 2.0)).run()
     assert not page.error
     assert "Analysed: 1 to 2 s of 5 s, 12800 samples" in shown_text(page)
-
-
-def machine(rate_hz: float = 2000.0, duration_s: float = 8.0) -> tuple[bytes, str]:
-    """Return a recording whose order 5 has amplitude 3 and order 5.5 amplitude 1, and its rig."""
-    time = np.arange(round(rate_hz * duration_s)) / rate_hz
-    turns = 10.0 * time
-    x = 3.0 * np.cos(2 * np.pi * 5.0 * turns) + np.cos(2 * np.pi * 5.5 * turns)
-    x += 0.01 * np.random.default_rng(3).standard_normal(len(x))
-    rows = "\n".join(f"{t:.6f};{value:.9g}" for t, value in zip(time, x, strict=True))
-    rig = (
-        '[[shaft]]\nname = "input"\n[speed]\nsource = "constant"\nshaft = "input"\nspeed_rpm = 600\n'
-        '[[sensor]]\nchannel = "a1"\nquantity = "acceleration"\nunit = "m/s^2"\n'
-    )
-    return f"time (s);a1\n{rows}\n".encode(), rig
-
-
-def opened_machine(method: str) -> AppTest:
-    content, rig = machine()
-    page = upload(opened(), "orders.csv", content, rig)
-    page.session_state[state.TAB] = TAB
-    page.run()
-    return choose(page, "Method", method)
 
 
 def test_orders_have_the_amplitudes_that_were_put_in() -> None:
@@ -145,12 +221,6 @@ def test_a_bandwidth_that_is_too_narrow_is_one_message() -> None:
     assert len(page.error) == 1
 
 
-def press(page: AppTest, label: str) -> AppTest:
-    next(b for b in page.button if b.label == label).click().run()
-    assert not page.exception
-    return page
-
-
 def test_suggested_modes_are_taken_over() -> None:
     page = press(opened_machine("Modes"), "Suggest K and penalty")
     told = shown_text(page).split("Suggested: ")[1]
@@ -171,15 +241,6 @@ def test_modes_that_share_their_lines_are_warned_of() -> None:
     next(s for s in page.select_slider if s.label.startswith("Penalty")).set_value(50).run()
     choose(page, "Start", "zero")
     assert any("share the same lines" in w.value for w in page.warning)
-
-
-@pytest.mark.parametrize(("method", "engine"), [("Modes", "vmdpy"), ("Ridges", "ssqueezepy")])
-def test_other_engines_answer_for_short_segments(method: str, engine: str) -> None:
-    pytest.importorskip(engine)
-    page = choose(opened_machine(method), "Engine", engine)
-    assert not page.exception
-    assert not page.error, shown_text(page)
-    assert len(page.get("image")) == 1
 
 
 def test_modes_of_envelopes_and_over_angle() -> None:
@@ -205,7 +266,7 @@ def test_denoised_and_removed_make_the_signal() -> None:
     assert len(page.dataframe[0].value) == 3
     levels.set_value("14").run()
     assert not page.exception
-    assert len(page.error) == 1  # the stretch is too short for so many
+    assert len(page.error) == 1  # the segment is too short for so many
 
 
 def test_the_phase_plane_says_that_a_tone_repeats() -> None:
@@ -217,7 +278,7 @@ def test_the_phase_plane_says_that_a_tone_repeats() -> None:
     assert "Kind of motion: **subharmonic** after 2 cycles" in told, told[-900:]
 
 
-def test_the_lowest_frequency_is_half_the_slowest_shaft_or_what_the_stretch_allows() -> None:
+def test_the_lowest_frequency_is_half_the_slowest_shaft_or_what_the_segment_allows() -> None:
     page = opened_machine("Phase plane")
     low = next(n for n in page.number_input if n.label.startswith("Lowest"))
     assert low.placeholder.startswith("5, half")
@@ -231,31 +292,7 @@ def test_the_lowest_frequency_is_half_the_slowest_shaft_or_what_the_stretch_allo
     assert "the lowest frequency" in shown_text(page)
 
 
-def test_a_constant_channel_is_one_message_in_every_method() -> None:
-    rows = "\n".join(f"{i / 1000:g};1.5;{(i * 37) % 101}" for i in range(3000))
-    page = upload(opened(), "dead.csv", f"time (s);a1;a2\n{rows}\n".encode())
-    page.session_state[state.TAB] = TAB
-    page.run()
-    assert not page.exception
-    for method in METHODS:
-        choose(page, "Method", method)
-        assert len(page.error) <= 1
-
-
-def test_a_channel_that_is_no_motion_is_one_message_and_an_unknown_one_is_asked_about() -> None:
-    content, rig = machine()
-    for quantity, n_errors in (("sound_pressure", 1), ("unknown", 0), ("displacement", 0)):
-        page = upload(opened(), "other.csv", content, rig.replace('"acceleration"', f'"{quantity}"'))
-        page.session_state[state.TAB] = TAB
-        page.run()
-        choose(page, "Method", "Phase plane")
-        assert len(page.error) == n_errors, quantity
-        asked = [w for w in page.segmented_control if w.label == "The channel measures"]
-        assert len(asked) == (quantity == "unknown")
-    assert "correct its quantity" not in shown_text(page)
-
-
-def test_a_longer_stretch_than_can_be_answered_soon_is_cut_and_this_is_said() -> None:
+def test_a_longer_segment_than_can_be_answered_soon_is_cut_and_this_is_said() -> None:
     page = opened_at("Orders (Vold–Kalman)", "run_up")
     orders = page.multiselect[0]
     orders.set_value(list(orders.options[:5])).run()
@@ -263,17 +300,139 @@ def test_a_longer_stretch_than_can_be_answered_soon_is_cut_and_this_is_said() ->
     assert "Analysed: 0 to 5.12 s of 8 s, 65536 samples; a longer one would take too long." in shown_text(page)
 
 
-def test_names_from_files_are_shown_as_typed_in_every_method() -> None:
-    content, rig = machine()
-    names = ("<script>alert(1)</script>", "**x** $y$ :smile:")
-    rig = rig.replace('"input"', f'"{names[1]}"').replace('"a1"', f'"{names[0]}"')
-    page = upload(opened(), "names.csv", content.replace(b";a1", f";{names[0]}".encode()), rig)
-    page.session_state[state.TAB] = TAB
-    page.run()
-    for method in METHODS:
-        choose(page, "Method", method)
+def measured_line(page: AppTest) -> tuple[np.ndarray, np.ndarray]:
+    """Return x and y of the measured line of the page's spectrum."""
+    line = next(t for chart in charts(page) for t in chart["data"] if t.get("line", {}).get("width") == 1.1)
+    return numbers(line["x"]), numbers(line["y"])
+
+
+@pytest.mark.parametrize("preparation", ["As recorded", "Tones removed", "Whitened"])
+def test_the_kurtogram_shows_the_bearing_in_its_own_band(preparation: str) -> None:
+    page = choose(opened_at("Kurtogram", "outer_race"), "Signal", preparation)
+    assert "The kurtogram's band: " in shown_text(page)
+    at, values = measured_line(page)
+    fault = float(at[at > 5][np.argmax(values[at > 5])])
+    assert min(fault % OUTER_RACE_HZ, -fault % OUTER_RACE_HZ) < 1.0  # the race or a harmonic of it
+    choose(page, "Envelope spectrum over", "Modulation order")
+    assert not page.error
+
+
+def test_the_user_may_choose_another_band() -> None:
+    page = choose(opened_at("Kurtogram", "outer_race"), "Band", "My own")
+    labelled(page, "slider", "Band of the envelope").set_value((1000.0, 1500.0)).run()
+    assert not page.error
+    assert "Your band: **1000 to 1500 Hz**" in shown_text(page)
+    labelled(page, "number_input", "Highest modulation").set_value(1e9).run()
+    assert len(page.error) == 1
+    assert "the highest modulation is 1e+09 Hz" in shown_text(page)
+    assert not page.exception
+
+
+def test_bearing_lines_on_multiples_of_a_shaft_are_named_apart() -> None:
+    page = opened_at("Cyclic coherence", "root_crack_3mm")
+    apart = shown_text(page).split("multiple of a shaft's speed")[1].split(": ")[1]
+    assert "BSF" in apart
+    assert "1× input" not in apart
+
+
+def test_modes_are_numbered_by_rising_centre() -> None:
+    from app.dashboard.methods.modes import modes_of
+    from gearsig.decompose import VmdSettings
+    from gearsig.timefreq import UniformSignal
+
+    t = np.arange(8000) / 1000.0
+    x = np.cos(2 * np.pi * 300 * t) + 0.5 * np.cos(2 * np.pi * 60 * t)
+    signal = UniformSignal(x, 1000.0, unit="g", source="a")
+    modes = modes_of(signal, VmdSettings(2, 2000.0, start="peaks"))
+    assert modes.by_centre() == (0, 1)
+    assert modes.centres == pytest.approx([60.0, 300.0], abs=2.0)
+    assert modes.rms == pytest.approx([0.5 / np.sqrt(2), 1 / np.sqrt(2)], rel=0.05)
+    assert modes.centre_history[-1, 0] < modes.centre_history[-1, 1]
+
+
+def test_coherence_names_the_lines_that_stand_out() -> None:
+    page = opened_at("Cyclic coherence", "outer_race")
+    at, values = measured_line(page)
+    assert values[np.abs(at - OUTER_RACE_HZ) <= 1.0].max() > 0.3
+    assert "stand above noise's level" in shown_text(page)
+    named = shown_text(page).split("for their slip: ")[1].split("Bearing lines whose peak")[0]
+    assert "BPFO bearing" in named
+    assert "not that there is damage" in shown_text(page)
+    choose(page, "Over", "Cyclic order")
+    assert not page.error
+    labelled(page, "number_input", "Highest cyclic order").set_value(1e9).run()
+    assert len(page.error) == 1
+    assert not page.exception
+
+
+def test_wavelet_packets_share_the_energy_and_add_up_to_the_signal() -> None:
+    page = opened_at("Wavelet packets")
+    shares = numbers(charts(page)[0]["data"][0]["y"])
+    assert shares.sum() == pytest.approx(100.0)
+    nodes = labelled(page, "multiselect", "Waveform of the nodes")
+    nodes.set_value(list(range(16))).run()
+    shown = curves(page)
+    whole = next(values for name, values in shown.items() if name.startswith("nodes"))
+    np.testing.assert_allclose(whole, shown["signal"], atol=1e-9)
+    for ordering in ("filter tree", "energy"):
+        choose(page, "Order of the nodes", ordering)
         assert not page.error
-        raw = "\n".join(part.value for part in [*page.markdown, *page.caption, *page.info, *page.warning])
-        for markup in ("<script", "**x**", "$y$", ":smile:"):
-            assert not re.search(r"(?<!\\)" + re.escape(markup), raw), (method, markup)
-        assert all("<script" not in chart.proto.spec for chart in page.get("plotly_chart"))
+    labelled(page, "multiselect", "Waveform of the nodes").set_value([]).run()
+    assert len(page.error) == 1
+
+
+def test_the_reference_may_be_an_own_file() -> None:
+    page = choose(opened_at("Crack severity", "root_crack_3mm"), "Reference", "Own file")
+    healthy = SAMPLES["root_crack_0mm"].recording
+    uploader = next(w for w in page.file_uploader if w.label == "Recording of the healthy gears")
+    uploader.upload(healthy.name, healthy.read_bytes())
+    page.run()
+    assert "tooth 21" in page.error[0].value
+
+
+def test_what_crack_severity_cannot_tell_is_said() -> None:
+    page = opened_at("Crack severity", "two_stage")
+    assert not page.error
+    assert "The depth cannot be told" in shown_text(page)
+    assert "What would help" in shown_text(page)
+
+
+def some_waveforms(axis: str = "frequency") -> Waveforms:
+    rng = np.random.default_rng(2)
+    columns = {"1× mesh, (29)": rng.normal(size=3000).astype(np.float32).astype(float), "rest": np.zeros(3000)}
+    return Waveforms(columns, 1000.0, 2.0, "m/s^2", "acceleration", "orders", axis, "input")
+
+
+@pytest.mark.parametrize("ending", OVER_TIME)
+def test_waveforms_come_back_from_every_format(ending: str, tmp_path) -> None:
+    kept = some_waveforms()
+    path = tmp_path / f"kept{ending}"
+    path.write_bytes(waveforms_file(kept, ending))
+    found, put_in = read_recording(path), recording_of(kept)
+    assert found.channels == put_in.channels
+    assert found.sampling_rate_hz == 1000.0
+    np.testing.assert_array_equal(found.samples, put_in.samples)
+    assert "orders" in found.provenance.history[0]
+
+
+def test_waveforms_over_angle_are_columns() -> None:
+    kept = replace(some_waveforms("order"), rate=64.0)
+    rows = list(csv.reader(io.StringIO(waveforms_file(kept, ".csv").decode())))
+    assert rows[0] == ["angle (revolutions of input)", *kept.columns]
+    assert len(rows) == 3001
+    assert float(rows[1][0]) == 2.0
+    assert float(rows[65][0]) == 3.0
+    assert float(rows[7][1]) == kept.columns["1× mesh, (29)"][6]
+
+
+def test_names_that_hold_separators_stay_one_column() -> None:
+    rows = list(csv.reader(io.StringIO(table_csv({'a,"b"\nc': [1.5], "d": ["x;y"]}).decode())))
+    assert rows == [['a,"b"\nc', "d"], ["1.5", "x;y"]]
+
+
+def test_numbers_that_are_none_are_refused_when_the_file_is_read() -> None:
+    rows = "\n".join(f"{i / 1000:g};{'nan' if i == 900 else (i * 37) % 101}" for i in range(3000))
+    page = opened_file("holes.csv", f"time (s);a1\n{rows}\n".encode())
+    assert not page.exception
+    assert len(page.error) == 1
+    assert "What to do" in shown_text(page)

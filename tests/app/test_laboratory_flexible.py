@@ -8,7 +8,8 @@ from app.dashboard.laboratory.setup import Setup
 from app.dashboard.laboratory.views import TAB, stiffness
 from sims.effects import EffectSetting
 from sims.presets import presets
-from tests.app.test_laboratory import opened, shown_text, slider
+from tests.app.pages import shown_text
+from tests.app.test_laboratory import opened, slider
 
 NAME = "flexible_50_50"
 CRACKED = Setup(

@@ -6,8 +6,7 @@ from app.dashboard.laboratory import bifurcation as bifurcation_view
 from app.dashboard.laboratory.views import TAB
 from app.dashboard.methods.phase import VIEWS, two_numbers
 from gearsig.errors import InputError
-from tests.app.test_dashboard import shown_text
-from tests.app.test_dashboard_methods import choose, opened_at
+from tests.app.pages import choose, opened_at, shown_text
 from tests.app.test_laboratory import opened
 
 METHOD = "Embedding and chaos"

@@ -1,36 +1,31 @@
 """The page of the start–stop drive, run without a browser."""
 
-from pathlib import Path
-
 import pytest
 from streamlit.testing.v1 import AppTest
 
-import app.dashboard
 from app.dashboard.laboratory.drive import FAULTS, NUMBERS, VIEWS
 from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup
 from sims.effects import EffectSetting
-
-MAIN = Path(app.dashboard.__file__).parent / "main.py"
-
-
-def opened() -> AppTest:
-    page = AppTest.from_file(str(MAIN), default_timeout=120).run()
-    page.switch_page("pages/laboratory.py").run()
-    page.sidebar.selectbox(key="machine of the laboratory").set_value("manipulator_formula").run()
-    return page
+from tests.app.pages import FOLDER
 
 
-@pytest.mark.parametrize("view", VIEWS)
-def test_every_view_of_the_healthy_drive(view: str) -> None:
+def opened(machine: str = "manipulator_formula") -> AppTest:
+    page = AppTest.from_file(str(FOLDER / "pages" / "laboratory.py"), default_timeout=120)
+    page.session_state["machine of the laboratory"] = machine
+    return page.run()
+
+
+def test_every_view_of_the_healthy_drive() -> None:
     page = opened()
-    page.session_state["view of the healthy drive"] = view
-    page.run()
-    assert not page.exception
-    assert not page.error
+    for view in VIEWS:
+        page.session_state["view of the healthy drive"] = view
+        page.run()
+        assert not page.exception
+        assert not page.error
+        assert len(page.get("image")) + len(page.dataframe) >= 1
     assert [metric.label for metric in page.metric] == [name[:1].upper() + name[1:] for name in NUMBERS]
     backlash = next(m for m in page.metric if m.label == "Backlash")
     assert float(backlash.value.split()[0]) == pytest.approx(300.0, rel=0.02)
-    assert len(page.get("image")) + len(page.dataframe) >= 1
 
 
 def test_an_effect_shows_beside_the_healthy_drive() -> None:

@@ -8,7 +8,8 @@ from streamlit.testing.v1 import AppTest
 from app.dashboard import state
 from app.dashboard.widgets.views import OF_MOTION
 from sims.files import file_set, write_set
-from tests.app.test_dashboard import TABS, opened, shown_text, upload
+from tests.app.pages import opened, opened_file, shown_text
+from tests.app.test_dashboard import TABS
 from tests.motion.recordings import start_stop
 
 
@@ -16,7 +17,7 @@ from tests.motion.recordings import start_stop
 def page(tmp_path: Path) -> AppTest:
     names = file_set(tmp_path / "drive.h5")
     write_set(start_stop(), names)
-    return upload(opened(), "drive.h5", names.recording.read_bytes(), names.rig.read_text())
+    return opened_file("drive.h5", names.recording.read_bytes(), names.rig.read_text())
 
 
 def test_its_figures_have_a_tab_and_the_others_say_why_they_are_empty(page: AppTest) -> None:

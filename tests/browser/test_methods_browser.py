@@ -10,7 +10,7 @@ import pytest
 from app.dashboard.methods import METHODS
 from gearsig.decompose import denoise
 from gearsig.recording import read_recording
-from tests.app.test_dashboard import SAMPLES
+from tests.app.pages import SAMPLES
 from tests.browser.conftest import CHROMIUM, settle
 
 pytestmark = [

@@ -1,0 +1,137 @@
+"""Pages of the dashboard run without a browser: opened as a session would find them, and what they show."""
+
+from __future__ import annotations
+
+import json
+from base64 import b64decode
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from streamlit import config
+from streamlit.testing.v1 import AppTest
+
+import app.dashboard
+from app.dashboard import state
+from app.dashboard.state import AnalysisRequest, Chosen
+from app.samples import samples
+from gearsig.recording import read_recording, sha256_of
+from gearsig.rig import read_rig
+
+FOLDER = Path(app.dashboard.__file__).parent
+SAMPLES = {sample.rig.stem: sample for sample in samples()}
+METHODS_TAB = "More methods"
+
+# Tests set widgets ahead of the first run, which Streamlit would remark upon.
+config.set_option("global.disableWidgetStateDuplicationWarning", True)
+
+
+def opened(sample: str = "damaged_tooth", *, tab: str = "", **values: Any) -> AppTest:
+    """Open the analysis page on a sample and a tab, with values of its session."""
+    page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=120)
+    page.session_state[state.SAMPLE] = SAMPLES[sample]
+    if tab:
+        page.session_state[state.TAB] = tab
+    for key, value in values.items():
+        page.session_state[key] = value
+    return page.run()
+
+
+def upload(page: AppTest, name: str, content: bytes, rig: str = "") -> AppTest:
+    page.sidebar.radio(key=state.ORIGIN).set_value("Own file").run()
+    page.sidebar.file_uploader(key=state.RECORDING_FILE).upload(name, content)
+    if rig:
+        page.sidebar.file_uploader(key=state.RIG_FILE).upload("machine.toml", rig.encode())
+    return page.run()
+
+
+def opened_file(name: str, content: bytes, rig: str = "", *, tab: str = "", **values: Any) -> AppTest:
+    """Open a recording as the laboratory hands it over: in one run, without the steps of an upload."""
+    request = AnalysisRequest(name, sha256(content).hexdigest(), "machine.toml", rig)
+    chosen = {"simulated": Chosen(request, memoryview(content)), state.ORIGIN: state.OF_LABORATORY}
+    return opened(tab=tab, **chosen, **values)
+
+
+def method_key(digest: str, rate_hz: float) -> str:
+    return f" Method of {digest} at {rate_hz!r}"
+
+
+@cache
+def _sample_key(sample: str) -> str:
+    chosen = SAMPLES[sample]
+    rate_hz = read_recording(chosen.recording, rig=read_rig(chosen.rig)).sampling_rate_hz
+    return method_key(sha256_of(chosen.recording), rate_hz)
+
+
+def opened_at(method: str, sample: str = "damaged_tooth") -> AppTest:
+    """Open a sample at a method, in one run."""
+    page = opened(sample, tab=METHODS_TAB, **{_sample_key(sample): method})
+    assert not page.exception
+    return page
+
+
+@cache
+def machine(rate_hz: float = 2000.0, duration_s: float = 8.0) -> tuple[bytes, str]:
+    """Return a recording whose order 5 has amplitude 3 and order 5.5 amplitude 1, and its rig."""
+    time = np.arange(round(rate_hz * duration_s)) / rate_hz
+    turns = 10.0 * time
+    x = 3.0 * np.cos(2 * np.pi * 5.0 * turns) + np.cos(2 * np.pi * 5.5 * turns)
+    x += 0.01 * np.random.default_rng(3).standard_normal(len(x))
+    rows = "\n".join(f"{t:.6f};{value:.9g}" for t, value in zip(time, x, strict=True))
+    rig = (
+        '[[shaft]]\nname = "input"\n[speed]\nsource = "constant"\nshaft = "input"\nspeed_rpm = 600\n'
+        '[[sensor]]\nchannel = "a1"\nquantity = "acceleration"\nunit = "m/s^2"\n'
+    )
+    return f"time (s);a1\n{rows}\n".encode(), rig
+
+
+def opened_machine(method: str, *, quantity: str = "acceleration", **values: Any) -> AppTest:
+    """Open the recording of `machine` at a method."""
+    content, rig = machine()
+    rig = rig.replace('"acceleration"', f'"{quantity}"')
+    values[method_key(sha256(content).hexdigest(), 2000.0)] = method
+    return opened_file("orders.csv", content, rig, tab=METHODS_TAB, **values)
+
+
+def choose(page: AppTest, label: str, value: str) -> AppTest:
+    next(w for w in page.segmented_control if w.label == label).set_value(value).run()
+    assert not page.exception
+    return page
+
+
+def press(page: AppTest, label: str) -> AppTest:
+    labelled(page, "button", label).click().run()
+    assert not page.exception
+    return page
+
+
+def labelled(page: AppTest, kind: str, label: str) -> Any:
+    return next(w for w in page.get(kind) if w.label.startswith(label))
+
+
+def shown_text(page: AppTest) -> str:
+    """Return the words of the page as a reader sees them: without escapes and invisible joiners."""
+    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.warning, *page.info]
+    return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "").replace("\u00a0", " ")
+
+
+def charts(page: AppTest) -> list[dict[str, Any]]:
+    return [json.loads(chart.proto.spec) for chart in page.get("plotly_chart")]
+
+
+def numbers(values: dict[str, str] | list[float]) -> np.ndarray:
+    """Return the numbers of a plotly trace, which may be packed."""
+    if isinstance(values, dict):
+        return np.frombuffer(b64decode(values["bdata"]), values["dtype"]).astype(float)
+    return np.array(values, float)
+
+
+def curves(page: AppTest) -> dict[str, np.ndarray]:
+    """Return the values of all named curves of the page, those of the first chart where names return."""
+    found: dict[str, np.ndarray] = {}
+    for chart in charts(page):
+        for line in chart["data"]:
+            found.setdefault(line.get("name", ""), numbers(line["y"]))
+    return found
