@@ -1,7 +1,8 @@
-"""`gearsig start-stop`: what the motion of a machine that starts, stops and reverses shows."""
+"""`gearsig start-stop`, `force`, `identify`: what the measured motion of both gears shows."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -69,14 +70,12 @@ def tooth_levels(recording: Recording, examined: StartStop) -> tuple[AngleProfil
     fitting = [c for q in ("acceleration", "torque") for c in recording.channels if c.quantity == q]
     if not fitting:
         return None, "", "", None
-    channel, motion = fitting[0], examined.motion
-    values, angle = recording.values(channel.name), motion.driver_angle_rad
-    found = angle_profile(values, angle, examined.segments, motion.path.teeth[0])
-    try:
-        orders = segment_order_spectrum(values, angle, examined.segments, unit=channel.unit, source=channel.name)
-    except RefusalError:  # no stretch holds a revolution
-        return found, channel.name, channel.unit, None
-    return found, channel.name, channel.unit, orders
+    name, unit, motion = fitting[0].name, fitting[0].unit, examined.motion
+    values, angle = recording.values(name), motion.driver_angle_rad
+    orders = None
+    with suppress(RefusalError):  # where no segment holds a revolution
+        orders = segment_order_spectrum(values, angle, examined.segments, unit=unit, source=name)
+    return angle_profile(values, angle, examined.segments, motion.path.teeth[0]), name, unit, orders
 
 
 FORCE_DATA, TABLE, FORCE_PICTURE, NOISE_PICTURE = "force.json", "force.csv", "force.png", "noise.png"
@@ -196,7 +195,7 @@ def identify(
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Rig file (.toml) to write, with all that could be told."),
+        typer.Option("--output", "-o", metavar="FILE", help="Rig file (.toml) to write, with all that was identified."),
     ] = None,
 ) -> None:
     """Fit the contact of the teeth and the load to a recording, with 95 % intervals and what it cannot tell.
@@ -219,14 +218,13 @@ def identify(
         write_rig(with_fitted(known, found), output)
     typer.echo(identify_json(found) if json else identify_text(found))
     if output is not None and not json:
-        typer.echo(f"\n{output.name}: the rig with what could be told.")
+        typer.echo(f"\n{output.name}: the rig with what could be identified.")
 
 
 def with_fitted(rig: Rig, found: Identification) -> Rig:
-    """Return the rig with the fitted values in its contact, as far as they could be told."""
+    """Return the rig with the fitted values in its contact, as far as they could be identified."""
     assert rig.contact is not None  # noqa: S101  motion could not have been measured without it
-    told = {p.name: p.value for p in found.parameters if p.is_told and p.name in TAKEN}
-    values = {name: max(value, 0.0) for name, value in told.items()}
+    values = {p.name: max(p.value, 0.0) for p in found.parameters if p.is_told and p.name in TAKEN}
     return replace(
         rig,
         contact=replace(rig.contact, **values),  # type: ignore[arg-type]  # all of them are numbers

@@ -393,7 +393,7 @@ def test_the_reference_may_be_an_own_file() -> None:
 def test_what_crack_severity_cannot_tell_is_said() -> None:
     page = opened_at("Crack severity", "two_stage")
     assert not page.error
-    assert "The depth cannot be told" in shown_text(page)
+    assert "The depth cannot be estimated" in shown_text(page)
     assert "What would help" in shown_text(page)
 
 

@@ -145,9 +145,9 @@ def lines_per_period(run: LaboratoryRun, n_per_revolution: float) -> FloatArray:
     return times_of(run, turned, np.arange(np.ceil(turned[0]), np.floor(turned[-1]) + 1.0))
 
 
-def times_of(run: LaboratoryRun, phase: FloatArray, wanted: FloatArray | Sequence[float]) -> FloatArray:
-    """Times at which a rising phase takes the wanted values."""
-    result: FloatArray = np.interp(wanted, phase, run.response.time_s)
+def times_of(run: LaboratoryRun, phase: FloatArray, values: FloatArray | Sequence[float]) -> FloatArray:
+    """Times at which a rising phase takes values."""
+    result: FloatArray = np.interp(values, phase, run.response.time_s)
     return result
 
 
@@ -239,7 +239,7 @@ def shaft_lines_hz(run: LaboratoryRun) -> list[float]:
 
 def bearing_lines_hz(run: LaboratoryRun) -> dict[str, float]:
     """Return the frequencies at which rolling elements strike defects, less slip: name → Hz."""
-    found = {}
+    lines_hz = {}
     for support in run.machine.bearings:
         if support.defect is None:
             continue
@@ -248,8 +248,8 @@ def bearing_lines_hz(run: LaboratoryRun) -> dict[str, float]:
         # A cage that slips falls behind: fewer elements pass the standing race, and as many more the turning one.
         slip = support.defect.slip * orders["BPFO"]
         order = orders[name] + (slip if name == "BPFI" else -slip)
-        found[f"{name} {support.bearing.name}"] = order * turns * run.setup.revolutions_per_s
-    return found
+        lines_hz[f"{name} {support.bearing.name}"] = order * turns * run.setup.revolutions_per_s
+    return lines_hz
 
 
 def faulty_teeth(setup: Setup) -> tuple[tuple[str, int], ...]:
@@ -261,13 +261,13 @@ def faulty_teeth(setup: Setup) -> tuple[tuple[str, int], ...]:
 def entries(run: LaboratoryRun) -> tuple[Cursor, ...]:
     """Return the times at which faulty teeth enter the mesh, in s."""
     pair, cycles = run.machine.mesh.pair, run.mesh_cycles
-    found = []
+    cursors = []
     for side, tooth in faulty_teeth(run.setup):
         n_teeth = pair.driver.teeth if side == "driver" else pair.driven.teeth
         first = np.ceil((cycles[0] - (tooth - 1)) / n_teeth) * n_teeth + tooth - 1
         times = times_of(run, cycles, np.arange(first, cycles[-1], n_teeth))
-        found += [Cursor(float(t), "finding", f"{side} tooth {tooth} enters", i) for i, t in enumerate(times)]
-    return tuple(found)
+        cursors += [Cursor(float(t), "finding", f"{side} tooth {tooth} enters", i) for i, t in enumerate(times)]
+    return tuple(cursors)
 
 
 ENDINGS = (".h5", ".csv", ".parquet", ".mat", ".wav")

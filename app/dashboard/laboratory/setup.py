@@ -254,8 +254,8 @@ def _meshed(machine: Machine, gears: tuple[ReducedGear, ...]) -> bool:
     cracks = (machine.mesh.cracks_1, machine.mesh.cracks_2)
     return all(
         crack.depth_mm <= deepest_followed_mm(gear.blank, crack_size(gear), crack.angle_deg)
-        for gear, own in zip(gears, cracks, strict=False)
-        for crack in own
+        for gear, cracks_of_gear in zip(gears, cracks, strict=False)
+        for crack in cracks_of_gear
     )
 
 

@@ -48,7 +48,7 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
         "Shown, of the input shaft",
         list(SEGMENTS),
         default="3 revolutions",
-        key="stretch of the laboratory",
+        key="segment of the laboratory",
         persist_state="session",
     )
     end = _end_s(healthy, SEGMENTS[shown or "3 revolutions"])

@@ -32,7 +32,7 @@ severity = cached(8, "Looking at every tooth …")(estimate_crack)
 
 
 def show_crack(page: MethodPage) -> None:
-    """Show the depth of a crack, or how deep one may be that does not show, or why neither can be told."""
+    """Show the depth of a crack, or how deep one may be that does not show, or why neither can be estimated."""
     reference = _choose_reference(page)
     recording = page.analysis.recording
     channels: tuple[str, ...] = ()
@@ -46,7 +46,7 @@ def show_crack(page: MethodPage) -> None:
         estimate = severity(recording, reference=reference, torque_nm=torque_nm, channels=channels)
     except RefusalError as refusal:  # which is an answer, too
         remedy = f"\n\nWhat would help: {as_typed(refusal.remedy)}." if refusal.remedy else ""
-        text = f"**The depth cannot be told**: {as_typed(refusal.reason)}.{remedy}"
+        text = f"**The depth cannot be estimated**: {as_typed(refusal.reason)}.{remedy}"
         st.info(text, icon=":material/help:")
         return
     _show_answer(estimate)

@@ -104,7 +104,7 @@ def show_phase_plane(page: MethodPage) -> None:
     ):
         _show_kind(
             kind_of(plane, lock),
-            f"Looked at: displacement and velocity, {plane.source}. Integration makes slow motion weigh more; "
+            f"Analysed: displacement and velocity, {plane.source}. Integration makes slow motion weigh more; "
             "“Embedding and chaos” asks the same of the signal as measured, and the answers may differ.",
         )
 
@@ -409,7 +409,7 @@ def _show_motion(page: MethodPage, segment: SignalSegment, path: phase.PhasePort
     if lock is not None:
         _show_kind(
             kind_of(path, lock),
-            f"Looked at: the signal as measured, {path.source}, embedded by delays. The phase plane asks the same of "
+            f"Analysed: the signal as measured, {path.source}, embedded by delays. The phase plane asks the same of "
             "displacement, where slow motion weighs more; the answers may differ.",
         )
 

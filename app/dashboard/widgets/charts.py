@@ -160,12 +160,12 @@ def _add_cursors(figure: Figure, cursors: Sequence[Cursor], limits: tuple[float,
     """Draw each kind of cursor as one line of many pieces, on a hidden axis from 0 to 1; return the rows of labels."""
     placed = place(cursors, limits, WIDTH_IN)
     for kind in dict.fromkeys(cursor.kind for cursor, _ in placed):
-        own = [cursor for cursor, _ in placed if cursor.kind == kind]
-        x = [v for cursor in own for v in (cursor.position, cursor.position, None)]
-        words = [v for cursor in own for v in [as_plot_text(f"{cursor.label}: {cursor.position:.6g}")] * 3]
+        same = [cursor for cursor, _ in placed if cursor.kind == kind]
+        x = [v for cursor in same for v in (cursor.position, cursor.position, None)]
+        words = [v for cursor in same for v in [as_plot_text(f"{cursor.label}: {cursor.position:.6g}")] * 3]
         figure.add_scatter(
             x=x,
-            y=[0, 1, None] * len(own),
+            y=[0, 1, None] * len(same),
             mode="lines",
             name=kind,
             text=words,

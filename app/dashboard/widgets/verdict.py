@@ -96,7 +96,7 @@ def show_findings(analysis: Analysis) -> None:
     for i, finding in enumerate(weighty[:N_OPEN]):
         _show_card(finding, with_evidence=i == 0)
     _show_folded("More findings", [f for f in findings if f not in weighty[:N_OPEN]])
-    _show_folded("Remarks", [f for f in analysis.findings if f.kind is Kind.INFORMATION])
+    _show_folded("Further information", [f for f in analysis.findings if f.kind is Kind.INFORMATION])
 
 
 def _show_folded(title: str, findings: Sequence[Finding]) -> None:
