@@ -12,8 +12,8 @@ from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 from sims.presets import Preset
 
+# Of recordings to keep. Streamlit shows texts that stand alone on a page: no docstrings of constants here.
 LENGTHS_S = (2.0, 5.0, 10.0, 20.0)
-"""Of recordings to keep."""
 
 
 def show() -> None:
