@@ -33,7 +33,7 @@ CRACK = "root_crack"
 
 
 @dataclass(frozen=True)
-class Fault:
+class DriveFault:
     """An effect of the drive: the end of its slider, what it does, and where it sits if that can be chosen."""
 
     highest: float
@@ -44,20 +44,22 @@ class Fault:
 
 
 FAULTS = {
-    CRACK: Fault(
+    CRACK: DriveFault(
         2.0,  # modules
         "Pairs of the cracked tooth lose stiffness, on the drive flank, where the load opens the crack.",
         "tooth",
         "Cracked tooth of the pinion",
         20,
     ),
-    "backlash": Fault(500.0, "Both flanks move apart: longer flights, harder impacts."),
-    "tooth_wear": Fault(
+    "backlash": DriveFault(500.0, "Both flanks move apart: longer flights, harder impacts."),
+    "tooth_wear": DriveFault(
         200.0,
         "Worn off the drive flanks where it is most: at their ends, by sliding; nothing at the pitch point.",
     ),
-    "sliding_friction": Fault(0.2, "Coefficient of the flanks, beside the healthy one."),
-    "torque_ripple": Fault(20.0, "Pistons of the motor, part of its torque.", "order", "Ripples per revolution", 50),
+    "sliding_friction": DriveFault(0.2, "Coefficient of the flanks, beside the healthy one."),
+    "torque_ripple": DriveFault(
+        20.0, "Pistons of the motor, part of its torque.", "order", "Ripples per revolution", 50
+    ),
 }
 
 
