@@ -253,7 +253,7 @@ def test_modes_of_envelopes_and_over_angle() -> None:
 
 
 def test_denoised_and_removed_make_the_signal() -> None:
-    page = opened_machine("Denoising")
+    page = opened_at("Denoising")
     shown = curves(page)
     np.testing.assert_allclose(shown["without noise"] + shown["removed"], shown["signal"], atol=1e-9)
     assert np.std(shown["removed"]) > 0.0
