@@ -17,41 +17,196 @@ from typing import Any
 import numpy as np
 import typer
 
-from app.studies import crack_cases as rigs
-from app.studies.crack_cases import (
-    CHIP_HEIGHT_MODULES,
-    OTHER_FLANKS_SHARE,
-    RELIEF_ERROR,
-    SPALL_LENGTH_MODULES,
-    SPALL_WIDTH_PERCENT,
-    SPEED_DIFFERENCE,
-    TORQUE_DIFFERENCE,
-    CaseFeatures,
-    draw_case,
-    draw_other_fault,
-    observe,
-)
+from app.studies import drawn_rigs
+from app.studies.drawn_rigs import DrawnRig, draw_rig, simulate_rig
 from app.studies.pool import answers_of
 from gearsig.checks import FloatArray
-from gearsig.errors import RefusalError
+from gearsig.errors import InputError, RefusalError
+from gearsig.recording import Recording
 from gearsig.severity import (
     ALONE,
+    CHIPPED,
     CRACKED,
     FEATURES,
     FILE,
     KINDS,
+    LARGEST_SPEED_DIFFERENCE,
+    LARGEST_TORQUE_CHANGE,
     MIN_SPREAD,
     RELIEF,
     RELIEF_KNOWN,
     RISING,
     SHAPE,
     SHAPED,
+    SPALLED,
     WITH_REFERENCE,
     DepthModel,
+    GearEvidence,
     KindModel,
+    ShaftLines,
+    gear_evidence,
     kind_vector,
+    pair_facts,
+    pair_lines,
+    percent_per_mm,
+    reach_of,
     segments,
 )
+
+# --------------------
+# One case of the calibration: a drawn rig, its recording and its reference, and what they show of either gear.
+# --------------------
+
+
+OTHER_FLANKS_SHARE = 0.15
+"""Sound machines whose flanks are others than in the reference: run in, or ground again."""
+
+RELIEF_ERROR = 0.2
+"""Largest one of the tip relief that the estimator is told, relative: tips are never ground as they were drawn."""
+
+CHIP_HEIGHT_MODULES = (0.25, 1.5)
+SPALL_WIDTH_PERCENT, SPALL_LENGTH_MODULES = (20.0, 90.0), (0.3, 1.2)
+
+
+@dataclass(frozen=True)
+class CrackCase:
+    """A drawn rig with its recording, a reference of the healthy gears, and the healthy gears once more."""
+
+    drawn: DrawnRig
+    recording: Recording
+    reference: Recording
+    healthy: Recording
+
+
+@dataclass(frozen=True)
+class CaseFeatures:
+    """What a case shows.
+
+    Parameters
+    ----------
+    drawn : DrawnRig
+    gear : int
+        0 or 1: which gear has the crack.
+    percent : float
+        Depth of the crack in percent of the root; 0: none.
+    with_reference, alone, healthy, healthy_with_reference : arrays, (2, n_features)
+        Of both gears: the recording against its reference, by itself, the reference by itself, and the healthy gears
+        once more against the reference.
+    looks : mapping
+        (kind, "with_reference" or "alone") → features, (n_features,), and event's shape, (n_shape,), of the cracked
+        gear, and of the gear with the other fault.
+    lag_pitches : float
+        By how much the event, with a reference, follows the middle of the cracked tooth's engagement; nan where no
+        mark tells.
+    reach : mapping
+        Quantities that limit the calibration.
+    """
+
+    drawn: DrawnRig
+    gear: int
+    percent: float
+    with_reference: FloatArray
+    alone: FloatArray
+    healthy: FloatArray
+    healthy_with_reference: FloatArray
+    looks: dict[tuple[str, str], tuple[FloatArray, FloatArray]]
+    lag_pitches: float
+    reach: dict[str, float]
+
+
+def draw_case(seed: int, index: int, *, for_the_check: bool, even: bool = False) -> CrackCase | None:
+    """Draw and simulate a case; None where the drawn gears cannot be made (undercut, a crack past the tooth)."""
+    rng = np.random.default_rng([seed, index, int(for_the_check)])
+    drawn = draw_rig(rng, for_the_check=for_the_check, even=even)
+    speed = float(rng.uniform(1.0 - LARGEST_SPEED_DIFFERENCE, 1.0 + LARGEST_SPEED_DIFFERENCE))
+    torque = float(rng.uniform(1.0 - LARGEST_TORQUE_CHANGE, 1.0 + LARGEST_TORQUE_CHANGE))
+    flanks = 1 if rng.uniform() < OTHER_FLANKS_SHARE else 0
+    try:
+        return CrackCase(
+            drawn,
+            simulate_rig(drawn),
+            simulate_rig(drawn, severity=0.0, run=1, speed_factor=speed, torque_factor=torque),
+            simulate_rig(drawn, severity=0.0, run=2, flanks=flanks),
+        )
+    except (InputError, RefusalError):
+        return None
+
+
+def draw_other_fault(drawn: DrawnRig, rng: np.random.Generator) -> tuple[str, Recording] | None:
+    """Draw and simulate a chip or a spall on the tooth that has the crack otherwise; return its kind and the recording.
+
+    None where the gears do not allow its size.
+    """
+    module = float(drawn.parameters["module_mm"])
+    if rng.uniform() < 0.5:
+        kind, effect = CHIPPED, "chipped_tooth"
+        severity = module * float(np.exp(rng.uniform(*np.log(CHIP_HEIGHT_MODULES))))
+        options = {"width_percent": 100.0 if rng.uniform() < 0.4 else float(rng.uniform(30.0, 90.0))}
+    else:
+        kind, effect = SPALLED, "tooth_spall"
+        severity = float(rng.uniform(*SPALL_WIDTH_PERCENT))
+        options = {"length_mm": module * float(rng.uniform(*SPALL_LENGTH_MODULES)), "depth_um": 100.0}
+    try:
+        return kind, simulate_rig(drawn, effect=effect, severity=severity, options=options)
+    except (InputError, RefusalError):
+        return None
+
+
+def observe(case: CrackCase, other: tuple[str, Recording] | None = None, relief_error: float = 0.0) -> CaseFeatures:
+    """Return what a case shows, without any fitted model.
+
+    Parameters
+    ----------
+    case : Case
+    other : (str, Recording) or None
+        See `draw_other_fault`.
+    relief_error : float
+        Of the tip relief that the estimator is told, relative.
+    """
+    drawn, rig = case.drawn, case.recording.rig
+    if rig is None:
+        raise InputError("a simulated recording has no rig")
+    facts = pair_facts(rig, None)
+    relief_um = float(drawn.parameters["tip_relief_um"]) * (1.0 + relief_error)
+
+    def lines(recording: Recording) -> tuple[ShaftLines, ...]:
+        return pair_lines(recording, rig, facts.pair, case.recording.vibration_names())
+
+    def seen(a: tuple[ShaftLines, ...], b: tuple[ShaftLines, ...] | None) -> tuple[GearEvidence, ...]:
+        return gear_evidence(a, b, facts.module_mm, facts.load_mpa, relief_um)
+
+    now, healthy = lines(case.recording), lines(case.reference)
+    compared, alone, good = seen(now, healthy), seen(now, None), seen(healthy, None)
+    gear = ("driver", "driven").index(drawn.gear)
+    looks = {(CRACKED, WITH_REFERENCE): _looks(compared[gear]), (CRACKED, ALONE): _looks(alone[gear])}
+    if other is not None:
+        kind, damaged = other[0], lines(other[1])
+        looks[kind, WITH_REFERENCE] = _looks(seen(damaged, healthy)[gear])
+        looks[kind, ALONE] = _looks(seen(damaged, None)[gear])
+    return CaseFeatures(
+        drawn=drawn,
+        gear=gear,
+        percent=drawn.depth_mm * percent_per_mm(drawn.teeth[gear], facts.module_mm),
+        with_reference=np.stack([e.features for e in compared]),
+        alone=np.stack([e.features for e in alone]),
+        healthy=np.stack([e.features for e in good]),
+        healthy_with_reference=np.stack([e.features for e in seen(lines(case.healthy), healthy)]),
+        looks=looks,
+        lag_pitches=_lag(compared[gear], drawn.tooth),
+        reach=reach_of(facts, now[0].order_hz * facts.driver_teeth),
+    )
+
+
+def _looks(evidence: GearEvidence) -> tuple[FloatArray, FloatArray]:
+    return evidence.features, evidence.shape
+
+
+def _lag(evidence: GearEvidence, tooth: int) -> float:
+    if not evidence.shaft.has_mark:
+        return float("nan")
+    z = evidence.shaft.teeth
+    return (evidence.event.centre_rev * z - tooth - 0.5 + z / 2) % z - z / 2
+
 
 # --------------------
 # From the features of simulated cracks to a model of their depth.
@@ -332,10 +487,10 @@ def cases_of(observed: Sequence[tuple[int, CaseFeatures]], kind: str) -> Cases:
 def kind_of(observed: Sequence[tuple[int, CaseFeatures]], way: str, model: DepthModel) -> KindModel:
     """Return the model of the kind, from the events that are seen."""
     seen = [
-        (kind, kind_vector(looks.features, looks.shape))
+        (kind, kind_vector(*looks))
         for _, o in observed
         for (kind, name), looks in o.looks.items()
-        if name == way and (kind != CRACKED or o.percent > 0) and model.score(looks.features) >= model.threshold
+        if name == way and (kind != CRACKED or o.percent > 0) and model.score(looks[0]) >= model.threshold
     ]
     return fit_kind(np.array([vector for _, vector in seen]), [kind for kind, _ in seen])
 
@@ -381,10 +536,10 @@ def _provenance(observed: Sequence[tuple[int, CaseFeatures]], n_drawn: int, simu
         "n_cracked": len(cracked),
         "even_every": EVEN_EVERY,
         "false_alarms": FALSE_ALARMS,
-        "depths_mm": list(rigs.DEPTHS_MM),
-        "modules_mm": list(rigs.CALIBRATION_MODULES_MM),
-        "speed_difference": SPEED_DIFFERENCE,
-        "torque_difference": TORQUE_DIFFERENCE,
+        "depths_mm": list(drawn_rigs.DEPTHS_MM),
+        "modules_mm": list(drawn_rigs.CALIBRATION_MODULES_MM),
+        "speed_difference": LARGEST_SPEED_DIFFERENCE,
+        "torque_difference": LARGEST_TORQUE_CHANGE,
         "other_flanks_share": OTHER_FLANKS_SHARE,
         "tip_relief_error": RELIEF_ERROR,
         "chip_height_modules": list(CHIP_HEIGHT_MODULES),
@@ -392,7 +547,7 @@ def _provenance(observed: Sequence[tuple[int, CaseFeatures]], n_drawn: int, simu
         "spall_length_modules": list(SPALL_LENGTH_MODULES),
         "crack": "straight, 45 degrees, through the whole face width",
         "teeth": "18 to 100, no pair whose teeth add up to a multiple of three",
-        "least_revolutions": rigs.MIN_REVOLUTIONS,
+        "least_revolutions": drawn_rigs.MIN_REVOLUTIONS,
     }
 
 

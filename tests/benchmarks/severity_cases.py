@@ -17,7 +17,8 @@ from math import sqrt
 
 import numpy as np
 
-from app.studies.crack_cases import RELIEF_ERROR, CrackCase, draw_case, draw_other_fault, simulate_rig
+from app.studies.crack_severity import RELIEF_ERROR, CrackCase, draw_case, draw_other_fault
+from app.studies.drawn_rigs import simulate_rig
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.recording import Recording
 from gearsig.severity import CRACKED, KINDS, CrackEstimate, NoCrackSeen, estimate_crack
@@ -135,7 +136,8 @@ def print_kinds(cases: list[CrackCase], seed: int, *, with_reference: bool) -> N
             rows[CRACKED][said(ask(case.recording, reference))] += 1
         other = draw_other_fault(case.drawn, np.random.default_rng([seed, i, 2]))
         if other is not None:
-            rows[other.kind][said(ask(other.recording, reference))] += 1
+            kind, damaged = other
+            rows[kind][said(ask(damaged, reference))] += 1
     print(f"\nKinds, {'with a reference' if with_reference else 'alone'}:")
     for kind, counts in rows.items():
         print(f"  {kind}: " + ", ".join(f"{n} {text}" for text, n in counts.most_common()))

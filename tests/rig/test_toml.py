@@ -56,7 +56,7 @@ def test_round_trip(name, channel, teeth, module, speed, tmp_path_factory) -> No
         assumed=("teeth",),
     )
     assert rig_from_dict(rig_to_dict(rig)) == rig
-    path = tmp_path_factory.mktemp("rig") / "rig.toml"
+    path = tmp_path_factory.getbasetemp() / "round_trip.toml"
     write_rig(rig, path)
     assert read_rig(path) == rig
 

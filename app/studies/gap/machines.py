@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.studies.crack_cases import DrawnHousingMode, DrawnRig, draw_rig
+from app.studies.drawn_rigs import DrawnHousingMode, DrawnRig, draw_rig
 from app.studies.gap.by_hand import SIGNATURES, scene_of, vibrations
 from gearsig.checks import FloatArray
 from gearsig.recording import Recording

@@ -19,7 +19,7 @@ from math import cos, pi, radians, sqrt, tan
 
 import numpy as np
 
-from app.studies.crack_cases import DrawnRig
+from app.studies.drawn_rigs import DrawnRig
 from app.studies.gap.by_hand import made_by_hand, with_foreign_vibration, with_signature
 from app.studies.gap.machines import draw_machine
 from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, reduced, samples_of

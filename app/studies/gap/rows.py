@@ -11,7 +11,7 @@ from zlib import crc32
 import numpy as np
 import typer
 
-from app.studies.crack_cases import SAMPLING_RATE_HZ, DrawnRig, simulate_rig, turns_before
+from app.studies.drawn_rigs import SAMPLING_RATE_HZ, DrawnRig, simulate_rig, turns_before
 from app.studies.gap.by_hand import made_by_hand, rig_of, vibrations, with_foreign_vibration, with_signature
 from app.studies.gap.machines import OperatingDay, Ordinary, another_day, draw_machine, first_day, mounted_anew
 from gearsig.cache import write_whole

@@ -1,6 +1,7 @@
 """Two recordings of one rig, begun wherever it stood: what is fixed to a gear turns with that gear."""
 
 from dataclasses import replace
+from functools import cache
 from math import gcd, lcm
 
 import numpy as np
@@ -93,13 +94,18 @@ def test_angles_tell_which_teeth_meet() -> None:
         np.testing.assert_allclose(between, scene.offsets[1], atol=0.2)
 
 
+@cache
+def healthy_motion(seed: int) -> BlindMotion:
+    return run(begun(COPRIME, seed))
+
+
 @pytest.mark.parametrize("gear", [0, 1])
 def test_a_bad_tooth_is_bad_on_any_day(gear: int) -> None:
     """The change lies at the tooth that is named, counted on either gear, the driver's from the tachometer's pulse."""
     pair, name = COPRIME.pair, "chipped_tooth"
     z = (pair.z1, pair.z2)[gear]
-    for seed in SEEDS:
-        healthy, chipped = begun(COPRIME, seed), begun(COPRIME, seed)
+    for seed in SEEDS[:2]:
+        chipped = begun(COPRIME, seed)
         choice = next(
             i
             for i in range(100)
@@ -108,8 +114,7 @@ def test_a_bad_tooth_is_bad_on_any_day(gear: int) -> None:
         )
         place = EVERY[name].apply(chipped, EVERY[name].severity(COPRIME, 1.0), np.random.default_rng(choice))
         turns = []
-        for scene in (healthy, chipped):
-            motion = run(scene)
+        for motion in (healthy_motion(seed), run(chipped)):
             angle = motion.theta[gear] / (2 * np.pi)
             at = np.ceil(angle[0]) + np.arange(int(angle[-1] - angle[0] - 1) * 40 * z) / (40 * z)
             turns.append(np.interp(at, angle, motion.squeeze_m).reshape(-1, 40 * z).mean(axis=0))
@@ -140,17 +145,16 @@ def test_marked_teeth_stay_marked(rig: BlindRig) -> None:
 
 def test_a_recording_begins_in_full_swing() -> None:
     """No ring of the sensors' paths where a recording was cut out of a steady run."""
-    for i in range(8):
+    for i in range(5):
         rig = draw_rig(np.random.default_rng([77, i]), "development")
         scene = begun(rig, 40 + i, duration_s=0.5)
-        later = begun(rig, 40 + i, duration_s=0.5)
-        motion, whole = run(scene), run(later)
+        motion = run(scene)
         signal = accelerations(scene, motion)
         n = motion.lead_n.shape[1]
         cut = replace(
-            whole,
-            lead_n=whole.bearing_n[:, :n],
-            bearing_n=whole.bearing_n[:, n:],
-            casing=whole.casing[:, n:],
+            motion,
+            lead_n=motion.bearing_n[:, :n],
+            bearing_n=motion.bearing_n[:, n:],
+            casing=motion.casing[:, n:],
         )
-        np.testing.assert_allclose(accelerations(later, cut), signal[:, n:], atol=0.02 * np.abs(signal).max())
+        np.testing.assert_allclose(accelerations(scene, cut), signal[:, n:], atol=0.02 * np.abs(signal).max())

@@ -8,7 +8,7 @@ import pytest
 from sims.blind import BlindRig, RunCondition, coloured_noise, draw_rig, measure, path_response, run, scene_of
 from tests.sims.blind.order_domain import by_angle, order_power, pulse_times_s
 
-SEEDS = range(8)
+SEEDS = range(5)
 
 
 def steady(rig: BlindRig, rpm: float = 1300.0, share: float = 0.6, duration_s: float = 2.0) -> RunCondition:

@@ -5,7 +5,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
 BLIND = sorted((ROOT / "sims" / "blind").rglob("*.py"))
-OTHERS = sorted(p for room in ("gearsig", "sims", "app") for p in (ROOT / room).rglob("*.py") if p not in BLIND)
+OTHERS = sorted(
+    p
+    for room in ("gearsig", "sims", "app")
+    for p in (ROOT / room).rglob("*.py")
+    if p not in BLIND and "blind" in p.read_text(encoding="utf-8")
+)
 ALLOWED = ("gearsig.rig", "gearsig.recording", "gearsig.errors", "gearsig.checks", "sims.blind")
 
 

@@ -22,8 +22,8 @@ def short_case(seed: int, **wishes: object) -> BlindCase:
     case = draw_case(np.random.default_rng(seed), "calibration", n_conditions=2, with_reference=True, **wishes)
     return replace(
         case,
-        conditions=tuple(replace(c, duration_s=0.7) for c in case.conditions),
-        references=tuple(replace(c, duration_s=0.7) for c in case.references),
+        conditions=tuple(replace(c, duration_s=0.4) for c in case.conditions),
+        references=tuple(replace(c, duration_s=0.4) for c in case.references),
     )
 
 
