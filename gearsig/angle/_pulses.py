@@ -525,13 +525,9 @@ def pulse_train_angle(
 def _check_order(t: FloatArray) -> None:
     where = "tachometer pulse times"
     if len(t) < 2:
-        problem = "there are no pulses" if len(t) == 0 else "there is only one pulse"
-        raise InputError(
-            problem,
-            where=where,
-            allowed="at least two pulses",
-            remedy="check the channel, its threshold and its cabling",
-        )
+        problem = "there is only one pulse" if len(t) else "there are no pulses"
+        remedy = "check the channel, its threshold and its cabling"
+        raise InputError(problem, where=where, allowed="at least two pulses", remedy=remedy)
     backwards = np.flatnonzero(np.diff(t) <= 0)
     if len(backwards):
         k = int(backwards[0]) + 1
@@ -581,10 +577,7 @@ def _notes(counted: PulseCount, n_pulses: int, tick_s: float, late_s: FloatArray
     places = (
         (f"{len(counted.spurious_s)} of {n_pulses} pulses were spurious and left out", counted.spurious_s),
         (f"{counted.n_missed} missed pulse(s) were counted in", counted.missed_s),
-        (
-            f"the machine stands still or nearly so within {len(counted.pauses_s)} interval(s)",
-            counted.pauses_s,
-        ),
+        (f"the machine stands still or nearly so within {len(counted.pauses_s)} interval(s)", counted.pauses_s),
         (clock, np.empty(int(tick_s > 0))),
         (f"{len(late_s)} single pulse(s) lie more than that off their neighbours and are bridged", late_s),
     )

@@ -479,35 +479,26 @@ def _constant_speed(search: SpeedSearch) -> SpeedCandidate | None:
 
 def _finished(search: SpeedSearch, candidate: SpeedCandidate) -> ShaftAngle:
     decision, angle = candidate.decision, candidate.angle
-    constant = len(angle.time_s) == 2
-    notes = [
-        f"estimated from the vibration of {', '.join(search.channels)}: "
-        + decision.evidence("rev/s" if constant else "times the angle's speed")
-    ]
+    constant, duration_s, meshes = len(angle.time_s) == 2, search.recording.duration_s, search.comb.meshes
+    smeared = constant and decision.bin_width * duration_s > 1.5
+    # A tenth of a bin at the mesh order where its line was sharp, half a bin where it was not.
+    uncertainty = 0.1 / (duration_s * meshes[-1] * angle.mean_speed_rpm / 60.0)
+    unit = "rev/s" if constant else "times the angle's speed"
+    notes = [f"estimated from the vibration of {', '.join(search.channels)}: {decision.evidence(unit)}"]
     if not constant:
         notes.append("the speed varies; its course follows the phase of the mesh harmonics")
     notes.append("the angle's zero is arbitrary")
-    if constant and decision.bin_width * search.recording.duration_s > 1.5:
-        share = 50.0 * decision.bin_width / (search.comb.meshes[0] * decision.speed)
-        notes.append(
-            f"the lines are wider than the recording's length explains: the speed may wander by ± {share:.2g} %"
-        )
+    if smeared:
+        uncertainty = 0.5 * decision.bin_width / (meshes[0] * decision.speed)
+        wander = f"the speed may wander by ± {100.0 * uncertainty:.2g} %"
+        notes.append(f"the lines are wider than the recording's length explains: {wander}")
     return replace(
         angle,
         shaft=search.shaft,
-        relative_speed_uncertainty=_uncertainty(search, candidate),
+        relative_speed_uncertainty=float(uncertainty),
         quality=decision.quality,
         notes=tuple(notes),
     )
-
-
-def _uncertainty(search: SpeedSearch, candidate: SpeedCandidate) -> float:
-    """A tenth of a bin at the mesh order where its line was sharp, half a bin where it was not."""
-    decision, mesh = candidate.decision, search.comb.meshes[-1]
-    if len(candidate.angle.time_s) == 2 and decision.bin_width * search.recording.duration_s > 1.5:
-        return float(0.5 * decision.bin_width / (search.comb.meshes[0] * decision.speed))
-    speed = candidate.angle.mean_speed_rpm / 60.0
-    return float(0.1 / (search.recording.duration_s * mesh * speed))
 
 
 def _refusal(search: SpeedSearch, best: SpeedCandidate | None, rig: Rig) -> RefusalError:

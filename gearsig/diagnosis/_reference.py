@@ -12,11 +12,6 @@ from gearsig.errors import InputError
 from gearsig.indicators import Indicator
 from gearsig.rig import Rig
 
-SAME_ORDER = 0.02
-"""Relative: a bearing's slip differs from day to day."""
-
-_CLAIMS = (Kind.FAULT, Kind.SUSPICION)
-
 
 @dataclass(frozen=True)
 class IndicatorChange:
@@ -87,7 +82,8 @@ def changes(analysis: Analysis) -> tuple[IndicatorChange | None, ...]:
 
 def beside_reference(findings: Iterable[Finding], reference: Analysis) -> list[Finding]:
     """Return the findings, each fault or suspicion with a sentence on what the reference shows of it."""
-    return [replace(f, evidence=(*f.evidence, _then(f, reference))) if f.kind in _CLAIMS else f for f in findings]
+    claims = (Kind.FAULT, Kind.SUSPICION)
+    return [replace(f, evidence=(*f.evidence, _then(f, reference))) if f.kind in claims else f for f in findings]
 
 
 def in_reference(finding: Finding, reference: Analysis) -> Earlier | None:
@@ -104,13 +100,12 @@ def _then(finding: Finding, reference: Analysis) -> str:
     if earlier is None or not (earlier.is_comparable or _is_placed(finding)):
         return "The reference does not show it."
     if not earlier.is_comparable:
-        return f"The reference shows it as well, but in {_seen_in(earlier.finding)}: the levels do not compare."
-    return _as_well(earlier, finding)
-
-
-def _as_well(earlier: Earlier, new: Finding) -> str:
+        where = earlier.finding.where
+        seen_in = ", ".join(where.channels) or "another channel"
+        seen_in += f", {where.band_hz[0]:.0f} to {where.band_hz[1]:.0f} Hz" if where.band_hz else ""
+        return f"The reference shows it as well, but in {seen_in}: the levels do not compare."
     change = earlier.change_db
-    if new.where.angle_deg is not None and not _names_tooth(earlier.finding, new):
+    if finding.where.angle_deg is not None and not _names_tooth(earlier.finding, finding):
         since = "" if change is None else f", {change:+.1f} dB since then"
         return f"The reference shows such an event on that shaft{since}; whether at the same tooth, no mark tells."
     since = "." if change is None else f"; since then it has changed by {change:+.1f} dB."
@@ -142,9 +137,10 @@ def _has_same_witness(old: Finding, new: Finding) -> bool:
     What a mesh's sidebands say is a ratio, the median of all channels: of them the channel is no witness.
     """
     then, now = old.where, new.where
-    if (then.band_hz is None) != (now.band_hz is None):
-        return False
-    if then.band_hz is not None and now.band_hz is not None and not _overlap(then.band_hz, now.band_hz):
+    if then.band_hz is not None and now.band_hz is not None:
+        if max(then.band_hz[0], now.band_hz[0]) >= min(then.band_hz[1], now.band_hz[1]):
+            return False
+    elif then.band_hz is not now.band_hz:  # one of both has none
         return False
     rests_on_channel = now.band_hz is not None or now.angle_deg is not None or not _is_placed(new)
     return not rests_on_channel or then.channels == now.channels or bool(set(then.channels) & set(now.channels))
@@ -157,11 +153,7 @@ def _is_placed(finding: Finding) -> bool:
 def _is_near(then: float | None, now: float | None) -> bool:
     if then is None or now is None:
         return then is now
-    return abs(then - now) <= SAME_ORDER * abs(now)
-
-
-def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    return max(one[0], other[0]) < min(one[1], other[1])
+    return abs(then - now) <= 0.02 * abs(now)  # a bearing's slip differs from day to day
 
 
 def _names_tooth(old: Finding, new: Finding) -> bool:
@@ -176,12 +168,6 @@ def _is_same_tooth(then: Where, now: Where, rig: Rig | None) -> bool:
         (pair.teeth(now.shaft) for pair in (rig.pairs if rig else ()) if now.gear == f"{pair.name}/{now.shaft}"), None
     )
     return min(off, teeth - off if teeth is not None else off) <= 1
-
-
-def _seen_in(finding: Finding) -> str:
-    where = finding.where
-    channels = ", ".join(where.channels) or "another channel"
-    return channels + (f", {where.band_hz[0]:.0f} to {where.band_hz[1]:.0f} Hz" if where.band_hz else "")
 
 
 def _key(i: Indicator) -> tuple[str, ...]:

@@ -32,17 +32,19 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     unused = [f for f in findings if f.code == DEPTH_UNKNOWN]
     if outcome in (Outcome.FAULT, Outcome.SUSPICION):
         kind = Kind.FAULT if outcome is Outcome.FAULT else Kind.SUSPICION
-        claims = _first_and_number([f for f in findings if f.kind is kind])
-        return " ".join(
-            [f"{kind.value.capitalize()}: {_ended(claims) if unused else claims}", *(f.title for f in unused)]
-        )
+        first, *more = (f for f in findings if f.kind is kind)
+        claim = first.title + (f" (at most {100 * first.confidence:.0f} % sure)" if kind is Kind.FAULT else "")
+        claim += f", and {len(more)} more." if more else ""
+        if unused and not claim.endswith("."):
+            claim += "."
+        return " ".join([f"{kind.value.capitalize()}: {claim}", *(f.title for f in unused)])
     said = [f.title for f in findings if f.code in EXAMINED]
-    if outcome is Outcome.CANNOT_TELL:
-        others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
-        gaps = [*unused, *others]
-        why = " ".join(f.title for f in gaps[:2]) or "Nothing was examined that would show a fault."
-        return " ".join(["Cannot tell.", why, *said, *_remedy(gaps)])
-    return " ".join(["No fault shows.", *said, WITH_REFERENCE if has_reference else WITHOUT_REFERENCE])
+    if outcome is Outcome.NO_FAULT:
+        return " ".join(["No fault shows.", *said, WITH_REFERENCE if has_reference else WITHOUT_REFERENCE])
+    others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
+    gaps = [*unused, *others]
+    why = " ".join(f.title for f in gaps[:2]) or "Nothing was examined that would show a fault."
+    return " ".join(["Cannot tell.", why, *said, *_remedy(gaps)])
 
 
 def _remedy(gaps: list[Finding]) -> list[str]:
@@ -54,22 +56,6 @@ def _remedy(gaps: list[Finding]) -> list[str]:
     if first.code == DEPTH_UNKNOWN:  # says what to do, not what to have
         return [f"What would help: {surer[:1].lower()}{surer[1:]}."]
     return [f"Surer with: {surer}."]
-
-
-def _ended(sentence: str) -> str:
-    return sentence if sentence.endswith(".") else f"{sentence}."
-
-
-def _first_and_number(findings: list[Finding]) -> str:
-    more = len(findings) - 1
-    sure = f" (at most {100 * findings[0].confidence:.0f} % sure)" if findings[0].kind is Kind.FAULT else ""
-    first = findings[0].title + sure
-    return first + (f", and {more} more." if more else "")
-
-
-# --------------------
-# What is wrong with the recording itself.
-# --------------------
 
 
 def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset[str]]:
