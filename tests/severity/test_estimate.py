@@ -12,6 +12,13 @@ from gearsig.severity import CrackEstimate, NoCrackSeen, estimate_crack
 from tests.severity.gearbox import SPEED_RPM, Record
 
 DEPTHS_MM = (1.0, 2.0, 3.0)
+Answers = dict[float, CrackEstimate | NoCrackSeen]
+
+
+@pytest.fixture(scope="module")
+def answers(record: Record, healthy: Recording) -> Answers:
+    """What is said of cracks of several depths."""
+    return {depth: estimate_crack(record(depth), reference=healthy) for depth in (0.0, 0.5, *DEPTHS_MM, 4.0)}
 
 
 def crack(answer: CrackEstimate | NoCrackSeen) -> CrackEstimate:
@@ -25,8 +32,8 @@ def with_pair(recording: Recording, **changes: object) -> Recording:
     return replace(recording, rig=replace(recording.rig, pairs=(pair,)))
 
 
-def test_estimates_rise_with_the_depth(record: Record, healthy: Recording) -> None:
-    found = [crack(estimate_crack(record(depth), reference=healthy)) for depth in DEPTHS_MM]
+def test_estimates_rise_with_the_depth(answers: Answers) -> None:
+    found = [crack(answers[depth]) for depth in DEPTHS_MM]
     depths = [f.depth_mm for f in found]
     assert depths == sorted(depths)
     assert len(set(depths)) == len(depths)
@@ -37,18 +44,16 @@ def test_estimates_rise_with_the_depth(record: Record, healthy: Recording) -> No
         assert answer.depth_percent / answer.depth_mm == pytest.approx(found[0].depth_percent / found[0].depth_mm)
 
 
-def test_neither_estimate_nor_bound_falls_from_half_a_millimetre_on(record: Record, healthy: Recording) -> None:
-    answers = [estimate_crack(record(depth), reference=healthy) for depth in (0.5, 1.0, 3.0, 4.0)]
-    sizes = [(a.depth_mm, a.interval_mm[1]) if isinstance(a, CrackEstimate) else (0.0, 0.0) for a in answers]
+def test_neither_estimate_nor_bound_falls_from_half_a_millimetre_on(answers: Answers) -> None:
+    deeper = [answers[depth] for depth in (0.5, *DEPTHS_MM, 4.0)]
+    sizes = [(a.depth_mm, a.interval_mm[1]) if isinstance(a, CrackEstimate) else (0.0, 0.0) for a in deeper]
     assert [size for size, _ in sizes] == sorted(size for size, _ in sizes)
     assert [bound for _, bound in sizes] == sorted(bound for _, bound in sizes)
-    assert sum(isinstance(answer, CrackEstimate) for answer in answers) >= 3
+    assert sum(isinstance(answer, CrackEstimate) for answer in deeper) >= 4
 
 
-def test_knowing_the_tip_relief_changes_depth_not_place(record: Record, healthy: Recording) -> None:
-    unknown, known = (
-        crack(estimate_crack(record(2.0), reference=healthy, tip_relief_um=relief)) for relief in (None, 12.0)
-    )
+def test_knowing_the_tip_relief_changes_depth_not_place(record: Record, healthy: Recording, answers: Answers) -> None:
+    unknown, known = crack(answers[2.0]), crack(estimate_crack(record(2.0), reference=healthy, tip_relief_um=12.0))
     assert known.tooth == unknown.tooth
     assert known.features["relief_share"] > 0 == unknown.features["relief_share"]
     assert known.depth_mm != unknown.depth_mm
@@ -56,8 +61,8 @@ def test_knowing_the_tip_relief_changes_depth_not_place(record: Record, healthy:
         estimate_crack(record(2.0), reference=healthy, tip_relief_um=-1.0)
 
 
-def test_gear_and_tooth_are_named(record: Record, healthy: Recording) -> None:
-    answer = crack(estimate_crack(record(2.0), reference=healthy))
+def test_gear_and_tooth_are_named(answers: Answers) -> None:
+    answer = crack(answers[2.0])
     assert (answer.gear, answer.tooth, answer.gear_is_certain) == ("stage 1/input", 12, True)
     assert int(answer.angle_deg / 360 * 29) == 11
     assert "tooth 12 of stage 1/input" in answer.text
@@ -70,16 +75,15 @@ def test_driven_gear_has_an_angle_but_no_tooth(record: Record, healthy: Recordin
     assert any("no mark on this shaft" in reason for reason in answer.reasons)
 
 
-def test_sound_gears_are_bounded(record: Record, healthy: Recording) -> None:
-    answer = estimate_crack(record(0.0), reference=healthy)
+def test_healthy_gears_are_bounded(answers: Answers) -> None:
+    answer = answers[0.0]
     assert isinstance(answer, NoCrackSeen)
     assert 0 < answer.below_mm < 3
     assert "No crack seen: below" in answer.text
 
 
-def test_float32_and_another_length_say_the_same(record: Record, healthy: Recording) -> None:
-    whole = record(2.0)
-    expected = crack(estimate_crack(whole, reference=healthy))
+def test_float32_and_another_length_say_the_same(record: Record, healthy: Recording, answers: Answers) -> None:
+    whole, expected = record(2.0), crack(answers[2.0])
     single = replace(whole, samples=whole.samples.astype(np.float32))
     shorter = replace(whole, samples=whole.samples[:, :-1])
     for other in (single, shorter):
