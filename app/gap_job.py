@@ -1,13 +1,14 @@
 """A gap diagnosis from files to a folder of results, here or in a process of its own that can be stopped.
 
-A page starts `python -P -m app.gap_job FOLDER`. The folder holds request.json; progress.json, and in the end results or
-error.json, come beside it. The process ends when its standard input does: nothing goes on for a parent that is gone.
+A page starts `python -P -m app.gap_job FOLDER`. The folder holds the request; progress.json, and in the end results or
+an error, come beside it. The process ends when its standard input does: nothing goes on for a parent that is gone.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import pickle
 import secrets
 import shutil
 import signal
@@ -17,7 +18,6 @@ import sysconfig
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 from tempfile import mkdtemp
 from threading import Thread
@@ -25,7 +25,7 @@ from time import monotonic
 from typing import Any
 
 from app.stopping import stop
-from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.errors import GearsigError, InputError
 from gearsig.gap import GapReport, GapRequest, read_gap_inputs
 from gearsig.report import check_writable, read_gap_json, write_gap_json, write_gap_page, write_text
 
@@ -79,13 +79,8 @@ def run_gap(
     )
 
 
-# --------------------
-# What a gap diagnosis leaves in a folder: gap.json, gap.html and, where an effect is named, twin.toml; all or none.
-# --------------------
-
-
 JSON, PAGE, TWIN = "gap.json", "gap.html", "twin.toml"
-NAMES = (JSON, PAGE, TWIN)
+"""What a gap diagnosis leaves in a folder, the last where an effect is named; all or none."""
 
 
 def check_folder(folder: Path) -> None:
@@ -98,7 +93,7 @@ def check_folder(folder: Path) -> None:
     """
     check_writable(folder)
     if folder.is_dir():
-        found = [path for path in folder.iterdir() if path.name not in NAMES]
+        found = [path for path in folder.iterdir() if path.name not in (JSON, PAGE, TWIN)]
         if found or (any(folder.iterdir()) and not _is_ours(folder / JSON)):
             raise InputError(
                 "holds files that belong to no gap diagnosis", where=str(folder), remedy="choose another with -o"
@@ -153,12 +148,7 @@ def _is_ours(path: Path) -> bool:
     return isinstance(found, dict) and found.get("schema") == "gearsig.gap"
 
 
-# --------------------
-# The process beside a page: what it is asked, what it says, what it leaves.
-# --------------------
-
-
-REQUEST, PROGRESS, ERROR, RESULTS, LOG = "request.json", "progress.json", "error.json", "results", "log.txt"
+REQUEST, PROGRESS, ERROR, RESULTS, LOG = "request.pickle", "progress.json", "error.pickle", "results", "log.txt"
 EXIT_REFUSED = 2
 EVERY_S = 0.2
 """Progress is written no oftener."""
@@ -181,7 +171,7 @@ class Job:
 
     def __init__(self, folder: Path, asked: GapRequest, model: str, *, cache: Path | None, command: str = "") -> None:
         self.folder, self.was_stopped = folder, False
-        write_request(folder, asked, model, cache, command)
+        _write(folder / REQUEST, (asked, model, cache, command))
         log = (folder / LOG).open("w", encoding="utf-8")
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "app.gap_job", str(folder)],  # -P: a user's own app.py there is not ours
@@ -222,7 +212,7 @@ class Job:
             Why there is none.
         """
         if (self.folder / ERROR).exists():
-            raise error_from_dict(json.loads((self.folder / ERROR).read_text(encoding="utf-8")))
+            raise _read(self.folder / ERROR)
         if not (self.folder / RESULTS / JSON).exists():
             raise JobFailedError(f"the diagnosis ended without a result ({self._last_words()})")
         return read_gap_json(self.folder / RESULTS / JSON)
@@ -267,41 +257,15 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
             process.stdin.close()
 
 
-def write_request(folder: Path, asked: GapRequest, model: str, cache: Path | None, command: str) -> None:
-    """Write what the process is to do."""
-    found = {"asked": asdict(asked), "model": model, "cache": cache, "command": command}
-    write_text(folder / REQUEST, json.dumps(found, default=str))
+def _write(path: Path, value: object) -> None:
+    """Write what the other process reads; the file appears only when it is complete."""
+    unfinished = path.with_suffix(".part")
+    unfinished.write_bytes(pickle.dumps(value))
+    unfinished.replace(path)
 
 
-def error_to_dict(error: GearsigError) -> dict[str, str]:
-    """Return an error as texts."""
-    if isinstance(error, InputError):
-        return {"what": error.what, "where": error.where, "allowed": error.allowed, "remedy": error.remedy}
-    if isinstance(error, RefusalError):
-        return {"reason": error.reason, "remedy": error.remedy}
-    return {"reason": str(error), "remedy": ""}
-
-
-def error_from_dict(found: dict[str, str]) -> GearsigError:
-    """Return the error that `error_to_dict` made the texts of."""
-    if "what" in found:
-        return InputError(found["what"], where=found["where"], allowed=found["allowed"], remedy=found["remedy"])
-    return RefusalError(found["reason"], remedy=found["remedy"])
-
-
-def _request(folder: Path) -> tuple[GapRequest, str, Path | None, str]:
-    found: dict[str, Any] = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
-    given = found["asked"]
-    asked = GapRequest(
-        tuple(map(Path, given["recordings"])),
-        tuple(map(Path, given["references"])),
-        Path(given["rig"]) if given["rig"] else None,
-        tuple(given["torques_nm"]),
-        given["sampling_rate_hz"],
-        tuple(given["names"]),
-        tuple(given["reference_names"]),
-    )
-    return asked, found["model"], Path(found["cache"]) if found["cache"] else None, found["command"]
+def _read(path: Path) -> Any:
+    return pickle.loads(path.read_bytes())  # noqa: S301 - of a folder that only this user can write to
 
 
 class _Progress:
@@ -319,12 +283,12 @@ class _Progress:
 
 def main(folder: Path) -> int:
     """Diagnose what the folder asks for."""
-    asked, model, cache, command = _request(folder)
+    asked, model, cache, command = _read(folder / REQUEST)
     try:
         report = run_gap(asked, model, cache=cache, on_stage=_Progress(folder / PROGRESS))
         write_results(report, folder / RESULTS, command=command)
     except GearsigError as error:
-        write_text(folder / ERROR, json.dumps(error_to_dict(error)))
+        _write(folder / ERROR, error)
         return EXIT_REFUSED
     return 0
 

@@ -225,7 +225,7 @@ def diagnose_forest(seen: VisibleCase) -> GapReport:
     conditions, _ = conditions_of(
         seen.recordings, seen.rigs, seen.references, seen.reference_rigs, twin, seen.names, lambda *_: None
     )
-    weighed = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, most_tried=0)
+    weighed = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=0)
     probabilities = weighed.probabilities()
     changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
     shafts = {name: told_options(name, changes, teeth) for name in probabilities}

@@ -3,7 +3,7 @@
 from gearsig.gap._attribution import (
     CALIBRATION_FILE,
     LIGHT_LOAD_N_PER_MM,
-    MOST_TRIED,
+    MAX_TRIED,
     NOT_SEEN,
     Attribution,
     GapCalibration,
@@ -194,8 +194,8 @@ __all__ = [
     "LEAST_SURPRISE",
     "LIGHT_LOAD_N_PER_MM",
     "MAX_OF_A_SIGN",
+    "MAX_TRIED",
     "MOST_OF_A_FAMILY",
-    "MOST_TRIED",
     "NAMING",
     "NONE",
     "NOT_SEEN",

@@ -254,7 +254,7 @@ class Attribution(Generic[TriedT]):
         return shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
 
 
-MOST_TRIED, LEAST_TRIED_PROBABILITY = 3, 0.06
+MAX_TRIED, MIN_TRIED_PROBABILITY = 3, 0.06
 """Effects that are simulated: so many of the likeliest, none less likely than this."""
 
 
@@ -280,10 +280,10 @@ def attribute(
     cache: Path | None,
     on_progress: Callable[[str, float], object],
     *,
-    most_tried: int = MOST_TRIED,
+    max_tried: int = MAX_TRIED,
     fresh: bool = False,
 ) -> Attribution[TriedEffect]:
-    """Ask the forests, then simulate, fit and score the likeliest effects, `most_tried` at most.
+    """Ask the forests, then simulate, fit and score the likeliest effects, `max_tried` at most.
 
     Effects that the forests do not know are tried as well, unless nothing is.
 
@@ -297,9 +297,9 @@ def attribute(
     size = max(condition.size.structural.value for condition in conditions)
     calibration = load_gap_calibration(with_reference=with_reference)
     first = calibration.probabilities(forest, {}, size)
-    likely = [name for name, p in first.items() if name in known and p >= LEAST_TRIED_PROBABILITY][:most_tried]
+    likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
     heard_of = _known_to_forests(conditions)
-    own = [name for name in effects or known if name not in heard_of] if most_tried else []
+    own = [name for name in effects or known if name not in heard_of] if max_tried else []
     likely += own
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_where_none_ran(tried, likely, twin)

@@ -20,9 +20,6 @@ FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
 ENOUGH = 1.2
 """Times the distance that there is now, from which a further point is worth naming."""
 
-MOST = 5
-"""Recordings that are named."""
-
 OWN = ""
 """Stands for the rig's own sensors together among names of channels."""
 
@@ -71,7 +68,7 @@ def next_recordings(
             place = places.get(channel, "")
             text = _text(point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in here)
             found.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
-    return tuple(sorted(found, key=lambda one: -one.standard_deviations)[:MOST])
+    return tuple(sorted(found, key=lambda one: -one.standard_deviations)[:5])
 
 
 def _rounded(speed_rpm: float, torque_nm: float) -> OperatingCondition:

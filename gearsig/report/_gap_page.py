@@ -41,11 +41,6 @@ from gearsig.gap import (
 from gearsig.report._files import render, write_text
 from gearsig.report._sections import Rows
 
-# --------------------
-# The texts and tables of a gap page: places, causes with their evidence, steps, recordings to make, facts.
-# --------------------
-
-
 N_DETAILED = 3
 """Causes whose evidence is shown."""
 MIN_SHOWN = 0.01
@@ -242,16 +237,9 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
 
 
 def _evidence_row(one: Evidence) -> EvidenceRow:
-    sign, look = ("✓", "for") if one.speaks_for else ("↗", "further") if one.is_further else ("✗", "against")
-    return EvidenceRow(
-        one.feature,
-        signed(one.predicted_db),
-        signed(one.observed_db),
-        readable(one.floor_db, 2),
-        stance_words(one),
-        sign,
-        look,
-    )
+    look = ("✓", "for") if one.speaks_for else ("↗", "further") if one.is_further else ("✗", "against")
+    predicted, observed, floor = signed(one.predicted_db), signed(one.observed_db), readable(one.floor_db, 2)
+    return EvidenceRow(one.feature, predicted, observed, floor, stance_words(one), *look)
 
 
 def group_texts(report: GapReport) -> tuple[str, ...]:
@@ -354,11 +342,6 @@ def percent(share: float) -> str:
 
 def _bar(share: float) -> float:
     return round(100 * min(max(share, 0.0), 1.0), 3) if isfinite(share) else 0.0
-
-
-# --------------------
-# Which figures show a gap, under which question, and what to look at in each: of the page and of the dashboard.
-# --------------------
 
 
 Question = Literal["where", "which", "how far"]
@@ -571,11 +554,6 @@ def is_finite(value: Any) -> bool:
     if is_dataclass(value):
         return all(is_finite(getattr(value, field.name)) for field in fields(value))
     return not isinstance(value, (float, np.ndarray)) or bool(np.isfinite(value).all())
-
-
-# --------------------
-# A gap report in a few lines: the verdict, and what a further operating condition would give.
-# --------------------
 
 
 CHECK_FIRST = "Check first"

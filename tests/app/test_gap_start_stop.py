@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import jsonschema
@@ -30,11 +31,13 @@ def run(arguments: list[str]) -> int:
     return int(end.value.code or 0)
 
 
-def made(seed: int, effects: dict[str, float] | None = None, mode: str = "start-stop", **parameters):
+@cache
+def made(seed: int, *effects: tuple[str, float], mode: str = "start-stop", **parameters: float):
+    parameters = {"mode": mode, **parameters}
     return simulate(
         "forging",
-        effects=effects,
-        parameters={"mode": mode, **parameters},
+        effects=dict(effects) or None,
+        parameters=parameters,
         duration_s=12.0,
         sampling_rate_hz=1000.0,
         seed=seed,
@@ -51,7 +54,7 @@ def written(recording, path: Path) -> str:
 def folder(tmp_path_factory) -> Path:
     place = tmp_path_factory.mktemp("drives")
     written(made(1), place / "sound.h5")
-    written(made(2, {"backlash": 120.0}), place / "wide.h5")
+    written(made(2, ("backlash", 120.0)), place / "wide.h5")
     written(made(1, mode="continuous"), place / "continuous.h5")
     written(made(1, drag_nm=200.0), place / "stands.h5")
     return place
@@ -85,7 +88,7 @@ def test_more_play_is_named_measured_and_simulated_again(folder, tmp_path, capsy
 @pytest.fixture(scope="module")
 def wider():
     """All that the report of a drive with more play is made of."""
-    now, healthy = made(2, {"backlash": 120.0}), made(1)
+    now, healthy = made(2, ("backlash", 120.0)), made(1)
     effects = SIMULATOR.gap_effects()
     return diagnose_start_stop([now], [now.rig], [healthy], [healthy.rig], SIMULATOR, effects, ["now"], ["reference 1"])
 
@@ -116,11 +119,16 @@ def test_a_heavier_load_is_named_by_its_own_name():
     assert report.references == ("reference 1",)
 
 
-def test_a_sound_drive_has_no_gap():
+def test_a_sound_drive_has_no_gap_and_it_is_said_what_would_not_show():
+    """A crack that would not stand out of the other teeth is named with its depth."""
     report = diagnosed(made(5), made(6))
     assert report.outcome is GapOutcome.NO_GAP
     assert report.causes[0].name == NONE
     assert not report.twin_toml
+    told = next(text for text in report.notices if "would not show" in text)
+    depth = float(told.partition("crack in a tooth root below ")[2].split()[0])
+    assert 1.0 < depth < 8.0
+    assert "more backlash below" in told
 
 
 WITHOUT_TORQUE = {name for name, tried in TRIED.items() if not tried.needs_torque}
@@ -136,7 +144,7 @@ def without_torque(recording):
 
 
 def test_without_torque_the_play_can_still_be_told():
-    now, sound = made(7, {"backlash": 150.0}), made(8)
+    now, sound = made(7, ("backlash", 150.0)), made(8)
     report = diagnosed(without_torque(now), without_torque(sound))
     ranked = [c.name for c in report.causes if c.severity is not None]
     assert set(ranked) == WITHOUT_TORQUE
@@ -146,7 +154,7 @@ def test_without_torque_the_play_can_still_be_told():
 
 def test_a_second_recording_without_torque_is_told_about():
     """Causes are weighed on all recordings, so that what one of them cannot tell is weighed on none."""
-    recordings = [made(7, {"backlash": 150.0}), without_torque(made(8, {"backlash": 150.0}))]
+    recordings = [made(7, ("backlash", 150.0)), without_torque(made(8, ("backlash", 150.0)))]
     report = diagnose_gap(recordings, SIMULATOR, references=[made(9)], names=["first", "second"])
     assert {c.name for c in report.causes if c.severity is not None} == WITHOUT_TORQUE
     told = next(text for text in report.notices if text.startswith("Not weighed, as no torque was recorded in second:"))
@@ -193,7 +201,7 @@ def test_worn_flanks_touch_later_where_they_slide_most(by_its_rig):
     assert twin.worn_curve_um(20.0, 0.0, 20) == pytest.approx(np.zeros(len(curve)), abs=1e-6)
 
 
-@pytest.mark.parametrize("depth_um", [30.0, 60.0, 120.0])
+@pytest.mark.parametrize("depth_um", [30.0, 120.0])
 def test_a_worn_drive_runs_as_its_teeth_at_rest_say(by_its_rig, depth_um):
     """The course of the compression from the balance of forces of two worn pairs, against the drive in motion."""
     drive = by_its_rig
@@ -206,12 +214,10 @@ def test_a_worn_drive_runs_as_its_teeth_at_rest_say(by_its_rig, depth_um):
     assert worn.play_um - sound.play_um == pytest.approx(expected.mean(), abs=1.5)
 
 
-@pytest.mark.parametrize("gain", [0.8, 1.3])
-def test_a_sensor_that_misreads_is_not_taken_for_another_load(gain):
-    answer = diagnosed(made(2, torque_gain=gain), made(1))
-    first = answer.causes[0]
+def test_a_sensor_that_misreads_is_not_taken_for_another_load():
+    first = diagnosed(made(2, torque_gain=0.8), made(1)).causes[0]
     assert first.name == "torque_gain"
-    assert first.severity.value == pytest.approx(100.0 * (gain - 1.0), rel=0.15)
+    assert first.severity.value == pytest.approx(-20.0, rel=0.15)
 
 
 def without_force(recording):
@@ -230,11 +236,3 @@ def test_without_a_reference_another_load_and_another_reading_are_not_taken_for_
     else:
         assert answer.outcome is GapOutcome.CANNOT_SEPARATE
         assert set(answer.inseparable) == {"torque_gain", "load_inertia"}
-
-
-def test_what_a_recording_would_not_show_is_said():
-    """A crack that would not stand out of the other teeth is named with its depth."""
-    told = next(text for text in diagnosed(made(2), made(1)).notices if "would not show" in text)
-    depth = float(told.partition("crack in a tooth root below ")[2].split()[0])
-    assert 1.0 < depth < 8.0
-    assert "more backlash below" in told

@@ -44,6 +44,11 @@ REPORTS = all_reports()
 DATE = datetime(2026, 3, 4, 5, 6, tzinfo=UTC)
 
 
+def without_curves(report):
+    """Drawing takes long; what is not of the figures needs none."""
+    return replace(report, spectra=(), angles=(), averages=(), steps=())
+
+
 def parsed(html):
     """Return the page's tree; strict: any fault of the markup raises."""
     return html5lib.HTMLParser(strict=True, tree=html5lib.getTreeBuilder("etree"), namespaceHTMLElements=False).parse(
@@ -120,7 +125,7 @@ def test_only_three_causes_have_their_evidence_shown():
         GapCause(f"e{i}", "flank", f"effect {i}", "mm", 0.2, shrinkage=shrinkage(0.5, 0.4, 0.6), evidence=evidence)
         for i in range(5)
     )
-    assert gap_page_html(replace(effect_report(), causes=many)).count("some feature") == 3
+    assert gap_page_html(replace(without_curves(effect_report()), causes=many)).count("some feature") == 3
 
 
 @pytest.mark.parametrize("outcome", list(REPORTS))
@@ -164,7 +169,8 @@ def evil_report(text):
 
 @pytest.mark.parametrize("text", [EVIL, QUOTES, "{{ 7 * 7 }}", "$\\frac{1}$ \x07"])
 def test_texts_from_files_are_never_markup(text):
-    html = gap_page_html(evil_report(text), command=text)
+    report = evil_report(text)
+    html = gap_page_html(report if "$" in text else without_curves(report), command=text)
     tree = html5lib.parse(html, namespaceHTMLElements=False)
     assert "<script" not in html
     assert not {element.tag for element in tree.iter()} & {"script", "b" if text == QUOTES else "script"}
@@ -186,11 +192,11 @@ def test_what_is_not_finite_is_a_dash(bad):
     cause = replace(report.causes[0], severity=strange, shrinkage=replace(shrinkage(bad, bad, bad), slope=bad),
                     evidence=(Evidence("feature", bad, bad, bad, speaks_for=False),), probability=bad)  # fmt: skip
     place = replace(report.places[0], change_db=bad, share=bad, structural=bad, repeatability=bad, angle_deg=bad)
-    spectra = tuple(replace(s, measured=np.full_like(s.measured, bad)) for s in report.spectra)
+    spectra = (replace(report.spectra[0], measured=np.full_like(report.spectra[0].measured, bad)),)
     angles = tuple(replace(a, measured=np.full_like(a.measured, bad)) for a in report.angles)
     html = gap_page_html(
         replace(report, size=strange, causes=(cause,), places=(place,), steps=(GapStep("s", strange),),
-                groups={"flank": bad}, spectra=spectra, angles=angles)
+                groups={"flank": bad}, spectra=spectra, angles=angles, averages=())
     )  # fmt: skip
     body = html[html.index("<h2>Where") :]
     assert not re.search(r"\b(nan|inf)\b", re.sub(r'"data:[^"]+"', "", body))
@@ -198,7 +204,7 @@ def test_what_is_not_finite_is_a_dash(bad):
 
 
 def test_the_page_appears_whole(tmp_path):
-    path = write_gap_page(effect_report(), tmp_path / "new" / "gap.html")
+    path = write_gap_page(without_curves(effect_report()), tmp_path / "new" / "gap.html")
     assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
     assert [p.name for p in path.parent.iterdir()] == ["gap.html"]
 
@@ -273,11 +279,11 @@ def test_no_line_is_marked_where_the_whole_gap_is_within_a_floor():
     assert gearless_report().is_beyond
 
 
-def test_doubts_stand_right_under_the_verdict():
+def test_doubts_stand_right_under_the_verdict(pages):
     doubt = "now: the teeth <do not> fit."
-    report = replace(effect_report(), doubts=(doubt,))
+    report = replace(without_curves(effect_report()), doubts=(doubt,))
     text = text_of(gap_page_html(report))
     last = report.verdict[-1].partition(": ")[2]
     assert text.index(last[1:]) < text.index(f"Check first {doubt}") < text.index(report.notices[0])
     assert gap_text(report).splitlines()[4] == f"Check first: {doubt}"
-    assert "Check first" not in text_of(gap_page_html(effect_report()))
+    assert "Check first" not in text_of(pages["effect"])

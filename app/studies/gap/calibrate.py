@@ -27,7 +27,7 @@ from gearsig.errors import GearsigError
 from gearsig.gap import (
     CALIBRATION_FILE,
     INDEPENDENT,
-    MOST_TRIED,
+    MAX_TRIED,
     NAMING,
     NONE,
     UNKNOWN,
@@ -150,7 +150,7 @@ def main() -> None:
     done = _read(given.work)
     wanted = [*range(given.cases), *range(FIRST_STRANGE, FIRST_STRANGE + given.strange)]
     missing = [i for i in wanted if i not in done]
-    jobs = [(i, MOST_TRIED if i < given.tried else 0) for i in missing]
+    jobs = [(i, MAX_TRIED if i < given.tried else 0) for i in missing]
     with given.work.open("a", encoding="utf-8") as file:
         for (i, _), rows in answers_of(weigh_case, jobs, given.processes):
             file.write(json.dumps({"case": i, "rows": rows}) + "\n")
@@ -180,7 +180,7 @@ def weigh_case(job: tuple[int, int]) -> list[dict[str, Any]]:
     from sims.blind import CATALOGUE, draw_case, record_case
     from sims.cracked import cracked_gap_simulator
 
-    index, most_tried = job
+    index, max_tried = job
     rng = np.random.default_rng([SEED, index])
     place, names = index % ROUND, list(CATALOGUE)
     kind = "single" if place < len(names) else "none" if place < len(names) + 4 else "unknown"
@@ -203,7 +203,7 @@ def weigh_case(job: tuple[int, int]) -> list[dict[str, Any]]:
                 with without_machines_of(left_out):
                     known = [replace(c, change=compare(c.now, c.simulated, c.reference)) for c in conditions]
                     weighed = attribute(
-                        known, simulator.gap_effects(), (), twin, None, lambda *_: None, most_tried=most_tried
+                        known, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=max_tried
                     )
                 rows.append(
                     {

@@ -49,8 +49,9 @@ def collect(role: str, seed: int, number: int, plan: tuple[str, str, float]) -> 
     label, recording, healthy = labelled_recordings(role, seed, number, plan)
     simulator = forging_gap_simulator()
     rows: list[Row] = []
-    now, then = read_cycles(recording), read_cycles(healthy)
-    for references in ([then],) if needs_reference(plan[1]) else ([then], []):
+    now = read_cycles(recording)
+    ways = [] if healthy is None else [[read_cycles(healthy)]]
+    for references in ways if needs_reference(plan[1]) else [*ways, []]:
         compared = compare_drive(now, references, simulator)
         seen = compared.evidence(predict(compared, simulator.gap_effects()))
         rows.append(({**label, "with_reference": bool(references)}, seen))
