@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -28,7 +27,7 @@ from gearsig.comparison import (
 from gearsig.formatting import readable, rounded
 from gearsig.plot import Captioned, Cursor, Picture, embed, unit_text
 from gearsig.report._files import render
-from gearsig.report._json import Json, members, plain
+from gearsig.report._json import Layout, document, plain
 
 # --------------------
 # The pictures of a comparison, and what to look at in each.
@@ -425,7 +424,6 @@ def _signed(value: float) -> str:
     return f"{value:+.1f}".replace("-", "−")
 
 
-# --------------------
 # A comparison as JSON, in a schema that stays.
 #
 # The object has these members; names end in their unit, numbers carry nine significant digits, and what is not known or
@@ -449,56 +447,15 @@ def _signed(value: float) -> str:
 # - a level: ``simulated_db``, ``recorded_db``, ``difference_db``, ``repeatability_db``, ``is_beyond``
 # - an agreement: ``complex_frac`` and ``magnitude_frac`` with ``value`` and ``repeatability``, ``complex_by_chance``,
 #   ``n_lines``
-# --------------------
-
-
-SCHEMA, SCHEMA_VERSION = "gearsig.comparison", 1
+LAYOUTS = {
+    ChannelComparison: Layout(left_out=("simulated_spectrum", "recorded_spectrum")),
+    ShaftComparison: Layout(left_out=("simulated", "recorded")),
+    LineLevel: Layout(inline=("level",)),
+    BandLevel: Layout(inline=("level",)),
+    LevelPair: Layout(properties=("difference_db", "is_beyond")),
+}
 
 
 def comparison_to_json(comparison: Comparison) -> str:
-    """Return a comparison as JSON text."""
-    return json.dumps(comparison_to_dict(comparison), indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def comparison_to_dict(comparison: Comparison) -> Json:
-    """Return a comparison as plain dictionaries, see the module's description. Waveforms and spectra are left out."""
-    return {
-        "schema": SCHEMA,
-        "schema_version": SCHEMA_VERSION,
-        "gearsig_version": __version__,
-        **members(comparison, "verdict", "findings", "notes"),
-        **members(comparison, "simulated", "recorded", "machine", "reference_shaft", "mesh_orders", "highest_order"),
-        "alignments": plain(comparison.alignments),
-        "channels": [_channel(channel) for channel in comparison.channels],
-    }
-
-
-def _channel(channel: ChannelComparison) -> Json:
-    return {
-        **members(channel, "simulated_name", "recorded_name", "quantity", "unit", "levels_compare"),
-        "overall": _level(channel.overall),
-        "locked": members(channel.locked, "simulated", "recorded"),
-        "lines": [_line(line) for line in channel.lines],
-        "other_lines": [_line(line) for line in channel.other_lines],
-        "order_bands": [_band(band) for band in channel.order_bands],
-        "third_octaves": [_band(band) for band in channel.third_octaves],
-        "shafts": [_shaft(shaft) for shaft in channel.shafts],
-    }
-
-
-def _line(line: LineLevel) -> Json:
-    names = ("label", "kind", "order", "shaft", "simulated_is_seen", "recorded_is_seen")
-    return members(line, *names) | _level(line.level)
-
-
-def _band(band: BandLevel) -> Json:
-    return members(band, "label", "low", "high", "axis") | _level(band.level) | members(band, "agreement")
-
-
-def _shaft(shaft: ShaftComparison) -> Json:
-    names = ("shaft", "n_teeth", "correlation", "simulated_reliability", "recorded_reliability", "agreement")
-    return members(shaft, *names) | {"tooth_levels": [_level(level) for level in shaft.tooth_levels]}
-
-
-def _level(level: LevelPair) -> Json:
-    return members(level, "simulated_db", "recorded_db", "difference_db", "repeatability_db", "is_beyond")
+    """Return a comparison as JSON text; waveforms and spectra are left out."""
+    return document("gearsig.comparison", 1, plain(comparison, layouts=LAYOUTS))

@@ -5,6 +5,7 @@ Numbers carry nine significant digits; nan and infinity, which JSON does not kno
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from enum import Enum
@@ -16,6 +17,7 @@ from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from gearsig import __version__
 from gearsig.errors import InputError
 from gearsig.formatting import rounded
 
@@ -34,15 +36,27 @@ class Layout:
         Fields that are dataclasses whose members stand among the others.
     null_if_empty : tuple of str
         Fields with texts or arrays that are written as null where they are empty.
+    left_out : tuple of str
+        Fields that are not written; such a file is not read again.
+    properties : tuple of str
+        Properties that are written after the fields, for other programs.
     """
 
     names: Mapping[str, str] = field(default_factory=dict)
     inline: tuple[str, ...] = ()
     null_if_empty: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    properties: tuple[str, ...] = ()
 
 
 Layouts = Mapping[type, Layout]
 _AS_FIELDS = Layout()
+
+
+def document(schema: str, version: int, content: Json, *, indent: int | None = 2) -> str:
+    """Return a file's text: what it is, in which version, made by which gearsig, and its content."""
+    head = {"schema": schema, "schema_version": version, "gearsig_version": __version__}
+    return json.dumps(head | plain(content), indent=indent, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def members(value: object, *names: str) -> Json:
@@ -80,10 +94,10 @@ def plain(value: Any, *, arrays: bool = True, layouts: Layouts | None = None) ->
             part = getattr(value, item.name)
             if item.name in layout.inline:
                 result |= written(part)
-            else:
+            elif item.name not in layout.left_out:
                 is_null = item.name in layout.null_if_empty and not len(part)
                 result[layout.names.get(item.name, item.name)] = None if is_null else written(part)
-        return result
+        return result | {name: written(getattr(value, name)) for name in layout.properties}
     if isinstance(value, Mapping):
         return {str(key): written(part) for key, part in value.items()}
     if isinstance(value, (list, tuple)):

@@ -16,33 +16,28 @@ is null. Members may be added within a version, never renamed or removed.
 from __future__ import annotations
 
 import csv
-import json
-from dataclasses import asdict
+from functools import partial
 from io import StringIO
 from textwrap import fill
-from typing import Any
 
 import numpy as np
 
-from gearsig import __version__
-from gearsig.formatting import readable, rounded
+from gearsig.formatting import readable
 from gearsig.gap import severity_unit
 from gearsig.motion import (
     AngleProfile,
     FittedParameter,
     ForceEstimate,
     Identification,
-    Impact,
     NoiseStudy,
     StartStop,
     acceleration_limit_rad_s2,
 )
 from gearsig.plot import unit_text
+from gearsig.report._json import document, members
 from gearsig.spectra import Spectrum
 
-SCHEMA, SCHEMA_VERSION = "gearsig.force", 1
 WIDTH = 100
-Json = dict[str, Any]
 
 
 def force_text(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
@@ -50,57 +45,69 @@ def force_text(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
     motion, datum = estimate.motion, estimate.datum
     zero = f"{1e6 * datum.compression_m:.4g} µm"
     spread = "" if datum.uncertainty_m != datum.uncertainty_m else f" ± {1e6 * datum.uncertainty_m:.2g}"
-    n = len(motion.driver_angle_rad)
+    paragraph = partial(fill, width=WIDTH, initial_indent="  ", subsequent_indent="    ")
     lines = [
-        f"{motion.source or 'recording'}: {n} samples at {motion.sampling_rate_hz:g} Hz",
+        f"{motion.source or 'recording'}: {len(motion.driver_angle_rad)} samples at {motion.sampling_rate_hz:g} Hz",
         "",
         "Motion",
         *(f"  {role:<20} {text}" for role, text in motion.methods.items()),
         f"  {'middle of the play':<20} at {zero}{spread} of the compression: {datum.method}",
-        *(_wrapped(f"Note: {note}", "  ") for note in motion.notes),
+        *(paragraph(f"Note: {note}") for note in motion.notes),
         "",
         "Models",
-        *(_wrapped(f"{name}: {text}", "  ") for name, text in estimate.descriptions.items()),
+        *(paragraph(f"{name}: {text}") for name, text in estimate.descriptions.items()),
         "",
-        *_error_lines(estimate),
     ]
-    if noise is not None:
-        lines += ["", *_noise_lines(noise), *_acceleration_line(estimate, noise)]
+    if estimate.errors:
+        lines.append(
+            f"{'model':<24} {'against':<14} {'rms N':>10} {'rms %':>8} {'bias N':>10} {'largest N':>11} {'r':>7}"
+        )
+        lines += [
+            f"{e.model:<24} {e.reference:<14} {e.rms_n:>10.1f} {100 * e.relative_rms:>8.1f} {e.bias_n:>10.1f} "
+            f"{e.largest_n:>11.1f} {e.correlation:>7.3f}"
+            for e in estimate.errors
+        ]
+    else:
+        lines.append("Nothing was measured to compare with: neither torque nor force.")
+    if noise is None:
+        return "\n".join(lines)
+    lines += ["", f"{'noise added (µm rms)':<24}" + "".join(f"{level:>9g}" for level in noise.levels_um)]
+    lines += [f"{model:<24}" + "".join(f"{value:>9.0f}" for value in rms) for model, rms in noise.rms_n.items()]
+    lines += [f"(rms error in N against {noise.reference})", fill(noise.text, WIDTH)]
+    # Noise of the angle is what the study adds; what the acceleration's does follows from the inertia.
+    limit = acceleration_limit_rad_s2(noise, motion)
+    if limit is not None:
+        each = motion.contact.driver_inertia_kg_m2 / motion.path.base_radii_m[0]
+        text = (
+            f"Noise on the driver's acceleration adds J1/rb1 = {each:.3g} N per rad/s²: the piecewise model is nearer "
+            f"up to {limit:.0f} rad/s² rms. Noise on the speeds moves the damping alone."
+        )
+        lines.append(fill(text, WIDTH))
     return "\n".join(lines)
 
 
 def force_json(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
     """Return an estimate as JSON, see the module's description; the samples are in the table."""
     motion, datum = estimate.motion, estimate.datum
-    data: Json = {
-        "schema": SCHEMA,
-        "schema_version": SCHEMA_VERSION,
-        "gearsig_version": __version__,
-        "source": motion.source,
-        "sampling_rate_hz": rounded(motion.sampling_rate_hz),
-        "n_samples": len(motion.driver_angle_rad),
-        "duration_s": rounded(len(motion.driver_angle_rad) / motion.sampling_rate_hz),
-        "methods": dict(motion.methods),
-        "notes": list(motion.notes),
+    n = len(motion.driver_angle_rad)
+    content = {
+        **members(motion, "source", "sampling_rate_hz", "methods", "notes"),
+        "n_samples": n,
+        "duration_s": n / motion.sampling_rate_hz,
         "datum": {
-            "compression_um": rounded(1e6 * datum.compression_m),
-            "uncertainty_um": rounded(1e6 * datum.uncertainty_m),
+            "compression_um": 1e6 * datum.compression_m,
+            "uncertainty_um": 1e6 * datum.uncertainty_m,
             "method": datum.method,
         },
         "models": [
-            {"name": name, "description": text, "largest_n": rounded(float(estimate.forces_n[name].max())),
-             "lowest_n": rounded(float(estimate.forces_n[name].min()))}
+            {"name": name, "description": text, "largest_n": force.max(), "lowest_n": force.min()}
             for name, text in estimate.descriptions.items()
+            for force in (estimate.forces_n[name],)
         ],
-        "errors": [
-            {"model": e.model, "reference": e.reference, "rms_n": rounded(e.rms_n),
-             "relative_rms": rounded(e.relative_rms), "bias_n": rounded(e.bias_n), "largest_n": rounded(e.largest_n),
-             "correlation": rounded(e.correlation)}
-            for e in estimate.errors
-        ],
-        "noise": None if noise is None else _noise_json(noise),
-    }  # fmt: skip
-    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        "errors": estimate.errors,
+        "noise": noise and members(noise, "reference", "levels_um", "rms_n", "crossover_um", "text"),
+    }
+    return document("gearsig.force", 1, content)
 
 
 def force_csv(estimate: ForceEstimate) -> str:
@@ -118,53 +125,6 @@ def force_csv(estimate: ForceEstimate) -> str:
     return text.getvalue()
 
 
-def _error_lines(estimate: ForceEstimate) -> list[str]:
-    if not estimate.errors:
-        return ["Nothing was measured to compare with: neither torque nor force."]
-    head = f"{'model':<24} {'against':<14} {'rms N':>10} {'rms %':>8} {'bias N':>10} {'largest N':>11} {'r':>7}"
-    rows = [
-        f"{e.model:<24} {e.reference:<14} {e.rms_n:>10.1f} {100 * e.relative_rms:>8.1f} {e.bias_n:>10.1f} "
-        f"{e.largest_n:>11.1f} {e.correlation:>7.3f}"
-        for e in estimate.errors
-    ]
-    return [head, *rows]
-
-
-def _noise_lines(noise: NoiseStudy) -> list[str]:
-    head = f"{'noise added (µm rms)':<24}" + "".join(f"{level:>9g}" for level in noise.levels_um)
-    rows = [f"{model:<24}" + "".join(f"{value:>9.0f}" for value in rms) for model, rms in noise.rms_n.items()]
-    return [head, *rows, f"(rms error in N against {noise.reference})", fill(noise.text, WIDTH)]
-
-
-def _acceleration_line(estimate: ForceEstimate, noise: NoiseStudy) -> list[str]:
-    """Noise of the angle is what the study adds; what the acceleration's does follows from the inertia."""
-    motion = estimate.motion
-    limit = acceleration_limit_rad_s2(noise, motion)
-    if limit is None:
-        return []
-    each = motion.contact.driver_inertia_kg_m2 / motion.path.base_radii_m[0]
-    text = (
-        f"Noise on the driver's acceleration adds J1/rb1 = {each:.3g} N per rad/s²: the piecewise model is nearer up "
-        f"to {limit:.0f} rad/s² rms. Noise on the speeds moves the damping alone."
-    )
-    return [fill(text, WIDTH)]
-
-
-def _noise_json(noise: NoiseStudy) -> Json:
-    return {
-        "reference": noise.reference,
-        "levels_um": [rounded(level) for level in noise.levels_um],
-        "rms_n": {model: [rounded(v) for v in rms] for model, rms in noise.rms_n.items()},
-        "crossover_um": None if noise.crossover_um is None else rounded(noise.crossover_um),
-        "text": noise.text,
-    }
-
-
-def _wrapped(text: str, indent: str) -> str:
-    return fill(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "  ")
-
-
-# --------------------
 # Fitted parameters as text and as JSON.
 #
 # The JSON object has these members; names end in their unit, numbers carry nine significant digits, and what is not
@@ -174,10 +134,6 @@ def _wrapped(text: str, indent: str) -> str:
 # - ``parameters``: each with ``name``, ``unit``, ``value``, ``low``, ``high`` (95 %), ``is_told``, ``why_not``,
 #   ``rig_value``, ``most_like``
 # - ``equations``: each with ``name``, ``text``, ``condition``
-# --------------------
-
-
-IDENTIFY_TEXT_SCHEMA, IDENTIFY_TEXT_SCHEMA_VERSION = "gearsig.identify", 1
 
 
 def identify_text(found: Identification) -> str:
@@ -198,23 +154,18 @@ def identify_text(found: Identification) -> str:
 
 def identify_json(found: Identification) -> str:
     """Return the same as JSON, see the module's description."""
-    data = {
-        "schema": IDENTIFY_TEXT_SCHEMA,
-        "schema_version": IDENTIFY_TEXT_SCHEMA_VERSION,
-        "gearsig_version": __version__,
-        "source": found.source,
-        "parameters": [
-            {"name": p.name, "unit": p.unit, "value": rounded(p.value), "low": rounded(p.interval[0]),
-             "high": rounded(p.interval[1]), "is_told": p.is_told, "why_not": p.why_not,
-             "rig_value": None if p.rig_value is None else rounded(p.rig_value), "most_like": p.most_like}
-            for p in found.parameters
-        ],
-        "equations": [
-            {"name": name, "text": text, "condition": rounded(found.condition.get(name, float("nan")))}
-            for name, text in found.equations.items()
-        ],
-    }  # fmt: skip
-    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    parameters = [
+        members(p, "name", "unit", "value")
+        | {"low": p.interval[0], "high": p.interval[1]}
+        | members(p, "is_told", "why_not", "rig_value", "most_like")
+        for p in found.parameters
+    ]
+    equations = [
+        {"name": name, "text": text, "condition": found.condition.get(name, float("nan"))}
+        for name, text in found.equations.items()
+    ]
+    content = {"source": found.source, "parameters": parameters, "equations": equations}
+    return document("gearsig.identify", 1, content)
 
 
 def _row(p: FittedParameter) -> str:
@@ -224,7 +175,6 @@ def _row(p: FittedParameter) -> str:
     return f"{p.name:<26} {readable(p.value, 5):>11} {low:>11} {high:>11} {rig:>11}  {unit}".rstrip()
 
 
-# --------------------
 # Start–stop motion as text and as JSON.
 #
 # The JSON object has these members; names end in their unit, numbers carry nine significant digits, and what is not
@@ -244,51 +194,42 @@ def _row(p: FittedParameter) -> str:
 # - ``orders``: of the same signal, forwards: ``order`` and ``amplitude`` (peak) as lists; null where no stretch holds a
 #   revolution
 # - ``refusals``: what could not be told; ``notes``: what was told in part
-# --------------------
-
-
-START_STOP_TEXT_SCHEMA, START_STOP_TEXT_SCHEMA_VERSION = "gearsig.start_stop", 1
-MOST_ROWS = 12
-"""Of stretches and impacts on a terminal; the JSON has all."""
+MAX_ROWS = 12
+"""Of segments and impacts on a terminal; the JSON has all."""
 
 
 def start_stop_text(examined: StartStop) -> str:
     """Return stretches, backlash, the hardest impacts and the indicators, in plain text."""
+    segments, impacts = examined.segments.segments, examined.impacts
     lines = [f"{examined.motion.source or 'recording'}: {examined.segments.summary}", ""]
-    lines += ["stretch           from s     to s   turned rev   top rpm"]
-    for s in examined.segments.segments[:MOST_ROWS]:
-        name = {1: "forwards", -1: "backwards", 0: "at rest"}[s.direction]
-        lines.append(
-            f"{name:<14} {s.start_s:>9.3f} {s.end_s:>8.3f} {s.turned_rad / (2 * np.pi):>12.4f} "
-            f"{s.top_speed_rad_s * 30 / np.pi:>9.2f}"
-        )
-    lines += _more(len(examined.segments.segments))
-    if examined.backlash is not None:
-        b = examined.backlash
-        lines += [
-            "",
-            fill(
-                f"Backlash {b.backlash_um:.4g} ± {b.uncertainty_um:.2g} µm along the line of action: {b.method}.", 100
-            ),
-        ]
+    lines += ["segment           from s     to s   turned rev   top rpm"]
+    lines += [
+        f"{ {1: 'forwards', -1: 'backwards', 0: 'at rest'}[s.direction]:<14} {s.start_s:>9.3f} {s.end_s:>8.3f} "
+        f"{s.turned_rad / (2 * np.pi):>12.4f} {s.top_speed_rad_s * 30 / np.pi:>9.2f}"
+        for s in segments[:MAX_ROWS]
+    ]
+    lines += [f"… {len(segments) - MAX_ROWS} more"] if len(segments) > MAX_ROWS else []
+    if (b := examined.backlash) is not None:
+        text = f"Backlash {b.backlash_um:.4g} ± {b.uncertainty_um:.2g} µm along the line of action: {b.method}."
+        lines += ["", fill(text, WIDTH)]
     if examined.teeth is not None:
         weak = ", ".join(map(str, examined.teeth.weak_teeth))
         lines.append(f"Teeth of the driver that yield more than the others: {weak or 'none'}.")
-    if examined.impacts:
-        lines += ["", f"{len(examined.impacts)} impacts, the hardest:"]
+    if impacts:
+        lines += ["", f"{len(impacts)} impacts, the hardest:"]
         lines += ["   time s  flank  tooth    speed m/s   energy J  restitution   force N"]
-        hardest = sorted(examined.impacts, key=lambda i: -i.speed_mps)[:MOST_ROWS]
-        lines += [_impact_row(impact) for impact in sorted(hardest, key=lambda i: i.time_s)]
-        lines += _more(len(examined.impacts))
-    lines += [
-        "",
-        *(
-            f"{i.name:<24} {readable(i.value, 5):>12} {unit_text(severity_unit(i.unit))}".rstrip()
-            for i in examined.indicators
-        ),
-    ]
-    lines += [fill(f"Cannot tell: {text}", 100) for text in examined.refusals]
-    lines += [fill(f"Note: {text}", 100) for text in examined.notes]
+        hardest = sorted(impacts, key=lambda i: -i.speed_mps)[:MAX_ROWS]
+        lines += [
+            f"{i.time_s:>9.4f}  {'drive' if i.flank > 0 else 'back':<5}  {i.driver_tooth:>5} {i.speed_mps:>12.4f} "
+            f"{readable(i.energy_j, 3):>10} {readable(i.restitution, 3):>12} {i.peak_force_n:>9.0f}"
+            for i in sorted(hardest, key=lambda i: i.time_s)
+        ]
+        lines += [f"… {len(impacts) - MAX_ROWS} more"] if len(impacts) > MAX_ROWS else []
+    lines.append("")
+    for i in examined.indicators:
+        lines.append(f"{i.name:<24} {readable(i.value, 5):>12} {unit_text(severity_unit(i.unit))}".rstrip())
+    lines += [fill(f"Cannot tell: {text}", WIDTH) for text in examined.refusals]
+    lines += [fill(f"Note: {text}", WIDTH) for text in examined.notes]
     return "\n".join(lines)
 
 
@@ -300,73 +241,22 @@ def start_stop_json(
     orders: Spectrum | None = None,
 ) -> str:
     """Return the same as JSON, see the module's description."""
-    backlash = None
-    if examined.backlash is not None:
-        backlash = {k: _number(v) for k, v in asdict(examined.backlash).items() if k != "datum_m"}
-    data: Json = {
-        "schema": START_STOP_TEXT_SCHEMA,
-        "schema_version": START_STOP_TEXT_SCHEMA_VERSION,
-        "gearsig_version": __version__,
+    levels = ("passes_forwards", "passes_backwards", "rms_forwards", "rms_backwards")
+    play = ("backlash_um", "uncertainty_um", "stiffness_n_per_m_lambda", "n_drive", "n_back", "scatter_um", "method")
+    content = {
         "source": examined.motion.source,
         "stretches": [
-            {"direction": s.direction, "start_s": rounded(s.start_s), "end_s": rounded(s.end_s),
-             "turned_rad": rounded(s.turned_rad), "top_speed_rpm": rounded(s.top_speed_rad_s * 30 / np.pi)}
+            members(s, "direction", "start_s", "end_s", "turned_rad")
+            | {"top_speed_rpm": s.top_speed_rad_s * 30 / np.pi}
             for s in examined.segments.segments
         ],
-        "backlash": backlash,
-        "impacts": [{k: _number(v) for k, v in asdict(impact).items()} for impact in examined.impacts],
-        "indicators": [
-            {"name": i.name, "value": rounded(i.value), "unit": i.unit, "computed_on": i.computed_on}
-            for i in examined.indicators
-        ],
-        "teeth": None if profile is None else _teeth(profile, signal, unit),
-        "compliance": _compliance(examined),
-        "orders": None if orders is None else _orders(orders),
-        "refusals": list(examined.refusals),
-        "notes": list(examined.notes),
-    }  # fmt: skip
-    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _teeth(profile: AngleProfile, signal: str, unit: str) -> Json:
-    return {
-        "signal": signal,
-        "unit": unit,
-        "passes_forwards": profile.passes_forwards.tolist(),
-        "passes_backwards": profile.passes_backwards.tolist(),
-        "rms_forwards": [rounded(v) for v in profile.rms_forwards],
-        "rms_backwards": [rounded(v) for v in profile.rms_backwards],
+        "backlash": examined.backlash and members(examined.backlash, *play),
+        "impacts": examined.impacts,
+        "indicators": [members(i, "name", "value", "unit", "computed_on") for i in examined.indicators],
+        "teeth": profile and {"signal": signal, "unit": unit, **members(profile, *levels)},
+        "compliance": examined.teeth,
+        "orders": orders and {"order": orders.positions, "amplitude": orders.values},
+        "refusals": examined.refusals,
+        "notes": examined.notes,
     }
-
-
-def _compliance(examined: StartStop) -> Json | None:
-    found = examined.teeth
-    if found is None:
-        return None
-    return {
-        "extra_um": [rounded(v) for v in found.extra_um],
-        "uncertainty_um": [rounded(v) for v in found.uncertainty_um],
-        "n_samples": found.n_samples.tolist(),
-        "deflection_um": rounded(found.deflection_um),
-        "weak_teeth": list(found.weak_teeth),
-    }
-
-
-def _orders(orders: Spectrum) -> Json:
-    return {"order": [rounded(v) for v in orders.positions], "amplitude": [rounded(v) for v in orders.values]}
-
-
-def _impact_row(i: Impact) -> str:
-    flank = "drive" if i.flank > 0 else "back"
-    return (
-        f"{i.time_s:>9.4f}  {flank:<5}  {i.driver_tooth:>5} {i.speed_mps:>12.4f} {readable(i.energy_j, 3):>10} "
-        f"{readable(i.restitution, 3):>12} {i.peak_force_n:>9.0f}"
-    )
-
-
-def _more(n: int) -> list[str]:
-    return [f"… {n - MOST_ROWS} more"] if n > MOST_ROWS else []
-
-
-def _number(value: float | int | str) -> float | int | str | None:
-    return rounded(value) if isinstance(value, float) else value
+    return document("gearsig.start_stop", 1, content)

@@ -9,14 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
+from gearsig import plot
 from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray
-from gearsig.diagnosis import Analysis, ChannelAnalysis, Kind, OrderLevel, changes
+from gearsig.diagnosis import Analysis, ChannelAnalysis, Kind, Where, changes
 from gearsig.errors import RefusalError
 from gearsig.formatting import readable
 from gearsig.motion import StartStop
-from gearsig.orders import OrderMap, SynchronousAverage
+from gearsig.orders import OrderMap
 from gearsig.plot import Captioned, Cursor, Picture, embed, order_cursors, unit_text
+from gearsig.recording import SI_FACTORS
 from gearsig.report._files import render, write_text
 from gearsig.report._sections import (
     css_class,
@@ -31,16 +33,7 @@ from gearsig.report._sections import (
 from gearsig.severity import CrackEstimate
 from gearsig.spectra import Spectrum
 
-# --------------------
-# Which lines of a spectrum a page marks, and which stretch of it is shown.
-# --------------------
-
-
-CONSTANT_SPEED = 0.01
-"""Relative range of speed up to which lines over frequency may be marked."""
-MOST_PAIRS = 3
 WITHOUT_MESH = 50.0  # highest order shown where no mesh is known
-N_MESH_HARMONICS = 3
 
 
 def speed_is_constant(analysis: Analysis) -> bool:
@@ -49,7 +42,7 @@ def speed_is_constant(analysis: Analysis) -> bool:
     if not isinstance(angle, ShaftAngle) or angle.mean_speed_rpm == 0:
         return False
     low, high = angle.speed_range_rpm
-    return high - low <= CONSTANT_SPEED * angle.mean_speed_rpm
+    return high - low <= 0.01 * angle.mean_speed_rpm
 
 
 def line_cursors(analysis: Analysis, spectrum: Spectrum | OrderMap, *, n_sidebands: int = 2) -> tuple[Cursor, ...]:
@@ -90,7 +83,7 @@ def mesh_windows(analysis: Analysis, spectrum: Spectrum) -> list[tuple[str, floa
     if analysis.rig is None or _per_order(analysis, spectrum) is None:
         return []
     result = []
-    for pair in analysis.rig.pairs[:MOST_PAIRS]:
+    for pair in analysis.rig.pairs[:3]:
         mesh = analysis.rig.mesh_order(pair, spectrum.shaft)
         ratios = [analysis.rig.ratio(shaft, to=spectrum.shaft) for shaft in (pair.driver, pair.driven)]
         known = [ratio for ratio in ratios if ratio is not None]
@@ -108,36 +101,29 @@ def marked_positions(
 
     Bearing findings live in the envelope spectrum, all others in the spectrum itself.
     """
-    found = []
-    for finding in analysis.findings:
-        where = finding.where
-        if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or bool(where.bearing) != of_bearings:
-            continue
-        if where.channels and channel not in where.channels:
-            continue
-        position = _position(analysis, spectrum, where.order, where.order_shaft, where.frequency_hz)
-        if position is not None:
-            found.append(position)
-    return tuple(found)
+    return tuple(
+        position
+        for finding in analysis.findings
+        if finding.kind in (Kind.FAULT, Kind.SUSPICION)
+        and bool(finding.where.bearing) == of_bearings
+        and (not finding.where.channels or channel in finding.where.channels)
+        and (position := _position(analysis, spectrum, finding.where)) is not None
+    )
 
 
-def _position(
-    analysis: Analysis, spectrum: Spectrum, order: float | None, order_shaft: str, frequency_hz: float | None
-) -> float | None:
-    if spectrum.axis == "frequency" and frequency_hz is not None:
-        return frequency_hz
+def _position(analysis: Analysis, spectrum: Spectrum, where: Where) -> float | None:
+    if spectrum.axis == "frequency" and where.frequency_hz is not None:
+        return where.frequency_hz
     scale = _per_order(analysis, spectrum)
-    if order is None or scale is None:
-        return None
-    if spectrum.axis == "frequency" and not speed_is_constant(analysis):
+    if where.order is None or scale is None or (spectrum.axis == "frequency" and not speed_is_constant(analysis)):
         return None
     base = spectrum.shaft or _reference(analysis)
-    if not order_shaft or order_shaft == base:
-        return order * scale
-    if analysis.rig is None or not {order_shaft, base} <= set(analysis.rig.shaft_names):
+    if where.order_shaft in ("", base):
+        return where.order * scale
+    if analysis.rig is None or not {where.order_shaft, base} <= set(analysis.rig.shaft_names):
         return None
-    ratio = analysis.rig.ratio(order_shaft, to=base)
-    return None if ratio is None else order * ratio * scale
+    ratio = analysis.rig.ratio(where.order_shaft, to=base)
+    return None if ratio is None else where.order * ratio * scale
 
 
 def _per_order(analysis: Analysis, spectrum: Spectrum | OrderMap) -> float | None:
@@ -152,34 +138,6 @@ def _reference(analysis: Analysis) -> str:
     return analysis.shaft_angle.shaft if isinstance(analysis.shaft_angle, ShaftAngle) else ""
 
 
-# --------------------
-# The picture of a crack: the gear's average over a revolution, beside that of the reference, and its change.
-# --------------------
-
-
-MPS2 = {"m/s^2": 1.0, "m/s²": 1.0, "g": 9.80665}
-N_TURNS = 3
-"""The average is drawn so many times on end: the middle blow then has room on either side."""
-
-ENGAGEMENT_PITCHES = 0.5
-"""From the entry of a tooth to the middle of its own pitch."""
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """The average now and that of the reference on the same angles, in m/s²."""
-
-    channel: str
-    now: FloatArray
-    then: FloatArray | None
-
-    @property
-    def change(self) -> float:
-        """Rms of the change against that of the average."""
-        size = float(np.std(self.now))
-        return 0.0 if self.then is None or size == 0 else float(np.std(self.now - self.then)) / size
-
-
 def crack_picture(analysis: Analysis) -> Picture | None:
     """Return the picture of a crack that was seen; None without one, or where no channel is an acceleration."""
     crack = analysis.crack
@@ -187,122 +145,89 @@ def crack_picture(analysis: Analysis) -> Picture | None:
         return None
     pair = next((p for p in analysis.rig.pairs if crack.gear == f"{p.name}/{crack.shaft}"), None)
     teeth = pair.teeth(crack.shaft) if pair is not None else None
-    found = _pairs(analysis, crack)
-    if teeth is None or not found:
+    references = {} if analysis.reference is None else {c.channel: c for c in analysis.reference.channels}
+    averages: list[tuple[float, str, FloatArray, FloatArray | None]] = []
+    for channel in analysis.channels:
+        average = channel.averages.get((crack.shaft, "average"))
+        factor = SI_FACTORS["acceleration"].get(average.unit) if average is not None else None
+        if average is None or factor is None:
+            continue
+        now, then = average.values * factor, None
+        size = float(np.std(now))
+        other = references.get(channel.channel)
+        reference = other.averages.get((crack.shaft, "average")) if other is not None else None
+        if reference is not None and reference.unit == average.unit:
+            then = factor * _on_angles_of(average.values, reference.values, turn=crack.tooth is None)
+        change = float(np.std(now - then)) / size if then is not None and size > 0 else 0.0
+        averages.append((change, channel.channel, now, then))
+    if teeth is None or not averages:
         return None
-    return _drawn(max(found, key=lambda p: p.change), crack, teeth)
-
-
-def _drawn(shown: _Pair, crack: CrackEstimate, teeth: int) -> Picture:
-    from gearsig.plot import crack_comparison_figure
-
-    entry = (crack.angle_deg / 360.0 - ENGAGEMENT_PITCHES / teeth) % 1.0
-    cases = {"reference": shown.then, "now": shown.now} if shown.then is not None else {"now": shown.now}
-    figure = crack_comparison_figure(
-        np.arange(N_TURNS * len(shown.now)) / len(shown.now),
-        {name: np.tile(values, N_TURNS) for name, values in cases.items()},
-        impacts_rev=[turn + entry for turn in range(N_TURNS)],
+    _, name, now, then = max(averages, key=lambda entry: entry[0])
+    n_turns = 3  # the middle blow then has room on either side
+    entry = (crack.angle_deg / 360.0 - 0.5 / teeth) % 1.0  # a tooth enters half a pitch before the middle of its own
+    cases = {"now": now} if then is None else {"reference": then, "now": now}
+    figure = plot.crack_comparison_figure(
+        np.arange(n_turns * len(now)) / len(now),
+        {case: np.tile(values, n_turns) for case, values in cases.items()},
+        impacts_rev=[turn + entry for turn in range(n_turns)],
         n_teeth=teeth,
-        change_mps2={"now": np.tile(shown.now - shown.then, N_TURNS)} if shown.then is not None else None,
-        title=f"Average over a revolution of {crack.shaft}, {N_TURNS} times on end, {shown.channel}",
+        change_mps2=None if then is None else {"now": np.tile(now - then, n_turns)},
+        title=f"Average over a revolution of {crack.shaft}, {n_turns} times on end, {name}",
     )
-    beside = " beside the reference" if shown.then is not None else ""
+    beside = " beside the reference" if then is not None else ""
     caption = (
         "A crack changes the few mesh cycles after its tooth enters, and nothing else; a change all round is another "
         "load, speed or sensor."
-        if shown.then is not None
+        if then is not None
         else "A crack swings the few mesh cycles after its tooth enters out of the pattern of the others."
     )
-    return embed(figure, caption, f"Average of {shown.channel} over {crack.shaft}{beside}; marked: {crack.text}")
+    return embed(figure, caption, f"Average of {name} over {crack.shaft}{beside}; marked: {crack.text}")
 
 
-def _pairs(analysis: Analysis, crack: CrackEstimate) -> list[_Pair]:
-    then = {} if analysis.reference is None else {c.channel: c for c in analysis.reference.channels}
-    key = crack.shaft, "average"
-    found = []
-    for channel in analysis.channels:
-        own = channel.averages.get(key)
-        if own is None or own.unit not in MPS2:
-            continue
-        other = then[channel.channel].averages.get(key) if channel.channel in then else None
-        found.append(_Pair(channel.channel, own.values * MPS2[own.unit], _turned(own, other, crack)))
-    return found
-
-
-def _turned(own: SynchronousAverage, other: SynchronousAverage | None, crack: CrackEstimate) -> FloatArray | None:
-    """Return the reference's average on the other's angles; without a mark turned to where the two agree best."""
-    if other is None or other.unit != own.unit:
-        return None
-    n = len(own.values)
-    lines = np.fft.rfft(other.values)[: n // 2 + 1] * (n / len(other.values))
-    values = np.fft.irfft(np.pad(lines, (0, n // 2 + 1 - len(lines))), n)
-    if crack.tooth is None:
-        agreement = np.fft.irfft(np.fft.rfft(own.values) * np.conj(np.fft.rfft(values)), n)
-        values = np.roll(values, int(np.argmax(agreement)))
-    return np.asarray(values) * MPS2[own.unit]
-
-
-# --------------------
-# The figures of a machine that starts and stops: its course, the teeth in their play, impacts, force from motion.
-# --------------------
+def _on_angles_of(values: FloatArray, reference: FloatArray, *, turn: bool) -> FloatArray:
+    """Return the reference's average on the angles of another; without a mark turned to where the two agree best."""
+    n = len(values)
+    lines = np.fft.rfft(reference)[: n // 2 + 1] * (n / len(reference))
+    result = np.fft.irfft(np.pad(lines, (0, n // 2 + 1 - len(lines))), n)
+    if turn:
+        agreement = np.fft.irfft(np.fft.rfft(values) * np.conj(np.fft.rfft(result)), n)
+        result = np.roll(result, int(np.argmax(agreement)))
+    return np.asarray(result)
 
 
 def start_stop_figures(examined: StartStop) -> Iterator[Captioned]:
     """Draw the figures; what the record does not show has none."""
-    yield _course(examined)
-    yield _planes(examined)
-    if examined.impacts:
-        yield _impacts(examined)
-    yield from _forces(examined)
+    from gearsig.motion import FROM_TORQUE, HUNT_CROSSLEY, PIECEWISE, estimate_forces
 
-
-def _course(examined: StartStop) -> Captioned:
-    from gearsig.plot import course_figure
-
-    return Captioned(
-        course_figure(examined, title="Speed, torque and compression in their phases"),
+    motion, impacts = examined.motion, examined.impacts
+    yield Captioned(
+        plot.course_figure(examined, title="Speed, torque and compression in their phases"),
         "Look when the compression changes sides: between the dashed lines the flanks do not touch, beyond them they "
         "carry. A run-down that grows shorter tells of friction.",
-        f"Driver's speed, torque and compression over {examined.motion.time_s[-1]:.4g} s, phases shaded.",
+        f"Driver's speed, torque and compression over {motion.time_s[-1]:.4g} s, phases shaded.",
     )
-
-
-def _planes(examined: StartStop) -> Captioned:
-    from gearsig.plot import start_stop_figure
-
-    return Captioned(
-        start_stop_figure(examined, title="Speed with the impacts"),
+    yield Captioned(
+        plot.start_stop_figure(examined, title="Speed with the impacts"),
         "The walls of the phase plane stand a backlash apart. Torque over twist at the driver: the flat middle is the "
         "play, the slopes are the teeth's stiffness, the area is what is lost.",
         "Speed with impacts, phase plane of the teeth, torque over twist.",
     )
-
-
-def _impacts(examined: StartStop) -> Captioned:
-    from gearsig.plot import impacts_figure
-
-    motion = examined.motion
-    return Captioned(
-        impacts_figure(examined.impacts, motion.path.teeth[0], restitution=motion.contact.restitution),
-        "Look whether the same teeth meet each time the machine starts or stops: they wear first. Energies are on a "
-        "logarithmic scale; a restitution is missing where the flanks stayed together.",
-        f"{len(examined.impacts)} impacts: energy over time and tooth, restitution over speed.",
-    )
-
-
-def _forces(examined: StartStop) -> Iterator[Captioned]:
-    from gearsig.motion import FROM_TORQUE, HUNT_CROSSLEY, PIECEWISE, estimate_forces
-    from gearsig.plot import force_figure
-
-    if examined.motion.torque_nm is None:
+    if impacts:
+        yield Captioned(
+            plot.impacts_figure(impacts, motion.path.teeth[0], restitution=motion.contact.restitution),
+            "Look whether the same teeth meet each time the machine starts or stops: they wear first. Energies are on "
+            "a logarithmic scale; a restitution is missing where the flanks stayed together.",
+            f"{len(impacts)} impacts: energy over time and tooth, restitution over speed.",
+        )
+    if motion.torque_nm is None:
         return
     try:
-        estimate = estimate_forces(examined.motion)
+        estimate = estimate_forces(motion)
     except RefusalError:  # no sample carries a load
         return
     shares = [100.0 * estimate.error(model, FROM_TORQUE).relative_rms for model in (PIECEWISE, HUNT_CROSSLEY)]
     yield Captioned(
-        force_figure(estimate, title="Force from the motion, beside the torque's"),
+        plot.force_figure(estimate, title="Force from the motion, beside the torque's"),
         f"The piecewise model, which knows both flanks and one or two pairs, is {shares[0]:.3g} % rms off torque over "
         f"base radius; Hunt–Crossley, one pair on one flank, {shares[1]:.3g} %. Where the first is far off, the rig's "
         "[contact] table does not fit, or the encoders are too coarse (gearsig force --noise).",
@@ -310,14 +235,6 @@ def _forces(examined: StartStop) -> Iterator[Captioned]:
     )
 
 
-# --------------------
-# Which figures a page shows, and what to look at in each.
-# --------------------
-
-
-MOST_BYTES = 2_500_000
-"""Of all pictures of a page, as text: the page stays below 3 MB."""
-MOST_DETAILED = 3
 MOST_TIME_PANELS = 6
 
 
@@ -350,63 +267,41 @@ class Gallery:
 
 def gallery(analysis: Analysis) -> Gallery:
     """Make the pictures of a page: the recording, then each channel, those with findings first and in most detail."""
-    groups = [PictureGroup("Recording", tuple(_recording_pictures(analysis)))]
-    crack = crack_picture(analysis)
-    if crack is not None:
-        groups.insert(0, PictureGroup("The damaged tooth", (crack,)))
+    groups = []
     if analysis.motion is not None:
         drawn = (embed(f.figure, f.caption, f.alternative) for f in start_stop_figures(analysis.motion))
-        groups.insert(0, PictureGroup("Starts and stops", tuple(drawn)))
-    left_out: list[str] = []
-    n_bytes = sum(_size(group) for group in groups)
-    detailed = _detailed_channels(analysis)
-    for channel in sorted(analysis.channels, key=lambda c: c.channel not in detailed):
-        if n_bytes > MOST_BYTES:
-            left_out.append(channel.channel)
-            continue
-        group = _channel_group(analysis, channel, detailed=channel.channel in detailed)
-        n_bytes += _size(group)
-        groups.append(group)
-    return Gallery(tuple(group for group in groups if group.wide or group.small), _remark(left_out, detailed, analysis))
-
-
-def _size(group: PictureGroup) -> int:
-    return sum(len(picture.uri) for picture in (*group.wide, *group.small))
-
-
-def _detailed_channels(analysis: Analysis) -> tuple[str, ...]:
-    """Return the channels of faults and suspicions; the first one if there are none."""
-    present = [channel.channel for channel in analysis.channels]
-    named = [
-        name
-        for finding in analysis.findings
-        if finding.kind in (Kind.FAULT, Kind.SUSPICION)
-        for name in finding.where.channels
-    ]
-    return tuple(dict.fromkeys(name for name in named if name in present))[:MOST_DETAILED] or tuple(present[:1])
-
-
-def _remark(left_out: list[str], detailed: tuple[str, ...], analysis: Analysis) -> str:
-    others = [c.channel for c in analysis.channels if c.channel not in detailed]
+        groups.append(PictureGroup("Starts and stops", tuple(drawn)))
+    if (crack := crack_picture(analysis)) is not None:
+        groups.append(PictureGroup("The damaged tooth", (crack,)))
+    groups.append(PictureGroup("Recording", tuple(_recording_pictures(analysis))))
+    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION)]
+    channels = {channel.channel: channel for channel in analysis.channels}
+    named = dict.fromkeys(name for f in claims for name in f.where.channels if name in channels)
+    detailed = list(named)[:3] or list(channels)[:1]  # the first one where no finding names any
+    left_out = []
+    for name in sorted(channels, key=lambda channel: channel not in detailed):
+        # As text; the page then stays below 3 MB.
+        if sum(len(picture.uri) for group in groups for picture in (*group.wide, *group.small)) > 2_500_000:
+            left_out.append(name)
+        else:
+            groups.append(_channel_group(analysis, channels[name], detailed=name in detailed))
+    remark, others = "", [name for name in channels if name not in detailed]
     if left_out:
-        return f"To keep the page small there are no pictures of {', '.join(left_out)}; their numbers are in the table."
-    if others:
-        return f"{', '.join(others)}: main pictures only; {', '.join(detailed)} in detail."
-    return ""
+        remark = (
+            f"To keep the page small there are no pictures of {', '.join(left_out)}; their numbers are in the table."
+        )
+    elif others:
+        remark = f"{', '.join(others)}: main pictures only; {', '.join(detailed)} in detail."
+    return Gallery(tuple(group for group in groups if group.wide or group.small), remark)
 
 
 def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
-    from gearsig.plot import speed_figure, time_figure
-
     recording = analysis.recording
-    names = recording.channel_names[:MOST_TIME_PANELS]
-    more = (
-        f" The first {len(names)} of {len(recording.channels)} channels."
-        if len(names) < len(recording.channels)
-        else ""
-    )
+    names = recording.channel_names[:6]
+    n = len(recording.channels)
+    more = f" The first {len(names)} of {n} channels." if len(names) < n else ""
     yield embed(
-        time_figure(recording, names),
+        plot.time_figure(recording, names),
         f"Look for steps, spikes, flat stretches and clipped tops: they are the recording's, not the machine's.{more}",
         f"Signals over {recording.duration_s:.4g} s: {', '.join(names)}.",
     )
@@ -414,7 +309,7 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
     if isinstance(angle, ShaftAngle):
         low, high = angle.speed_range_rpm
         yield embed(
-            speed_figure(angle),
+            plot.speed_figure(angle),
             "Look whether the speed held still: where it changes, only orders keep their lines sharp.",
             f"Speed over time, {low:.6g} to {high:.6g} rpm.",
             vector=True,
@@ -422,31 +317,29 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
 
 
 def _channel_group(analysis: Analysis, channel: ChannelAnalysis, *, detailed: bool) -> PictureGroup:
-    makers: list[Callable[[Analysis, ChannelAnalysis], Iterator[Picture]]] = [_order_or_frequency]
-    if detailed:
-        makers += [_order_levels, _whole_spectrum, _mesh_zooms, _envelope, _kurtogram, _map, _averages]
+    makers: list[Callable[[Analysis, ChannelAnalysis], Iterator[Picture]]]
+    makers = [_spectra_in_detail, _envelope, _kurtogram, _map, _averages] if detailed else [_spectrum]
     wide = tuple(picture for maker in makers for picture in maker(analysis, channel))
     return PictureGroup(f"Channel {channel.channel}", wide, tuple(_polar(analysis, channel)), is_folded=not detailed)
 
 
-def _order_or_frequency(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
+def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
     """The order spectrum where the speed is known, else the spectrum over frequency."""
-    from gearsig.plot import spectrum_figure
-
     spectrum = channel.order_spectrum
     if spectrum is None:
-        yield _frequency_picture(analysis, channel)
+        yield from _frequency(analysis, channel)
         return
     highest = highest_order_of_interest(analysis, spectrum)
     cursors = line_cursors(analysis, spectrum)
+    figure = plot.spectrum_figure(
+        spectrum,
+        cursors,
+        limits=(0.0, highest),
+        marked=marked_positions(analysis, spectrum, channel.channel),
+        title=f"Order spectrum of {channel.channel}",
+    )
     yield embed(
-        spectrum_figure(
-            spectrum,
-            cursors,
-            limits=(0.0, highest),
-            marked=marked_positions(analysis, spectrum, channel.channel),
-            title=f"Order spectrum of {channel.channel}",
-        ),
+        figure,
         "Look whether the mesh harmonics stand alone or carry sidebands, and whether a tall line lies off every mark."
         if any(cursor.kind == "mesh" for cursor in cursors)
         else "Look which orders stand out: what keeps its order turns with the shaft.",
@@ -454,50 +347,44 @@ def _order_or_frequency(analysis: Analysis, channel: ChannelAnalysis) -> Iterato
     )
 
 
-def _whole_spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    if channel.order_spectrum is not None:
-        yield _frequency_picture(analysis, channel)
+def _spectra_in_detail(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
+    """The order spectrum, the levels over speed, the spectrum over frequency and the surroundings of each mesh."""
+    yield from _spectrum(analysis, channel)
+    yield from _order_levels(analysis, channel)
+    spectrum = channel.order_spectrum
+    if spectrum is None:
+        return
+    yield from _frequency(analysis, channel)
+    for pair, low, high in mesh_windows(analysis, spectrum):
+        figure = plot.spectrum_figure(
+            spectrum,
+            line_cursors(analysis, spectrum, n_sidebands=4),
+            limits=(low, high),
+            marked=marked_positions(analysis, spectrum, channel.channel),
+            title=f"Around the mesh of {pair}, {channel.channel}",
+        )
+        yield embed(
+            figure,
+            "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear.",
+            f"Order spectrum of {channel.channel} from order {low:.4g} to {high:.4g}, around the mesh of {pair}.",
+        )
 
 
-def _frequency_picture(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
-    from gearsig.plot import spectrum_figure
-
+def _frequency(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
     cursors: tuple[Cursor, ...] = ()
     smeared = " The speed changes, so lines that follow it are smeared here."
     if speed_is_constant(analysis):
         smeared = ""
         cursors = tuple(c for c in line_cursors(analysis, channel.spectrum) if c.kind == "mesh")
     marked = marked_positions(analysis, channel.spectrum, channel.channel)
-    return embed(
-        spectrum_figure(channel.spectrum, cursors, marked=marked, title=f"Spectrum of {channel.channel}"),
+    yield embed(
+        plot.spectrum_figure(channel.spectrum, cursors, marked=marked, title=f"Spectrum of {channel.channel}"),
         f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}",
         f"Amplitude spectrum of {channel.channel} over frequency.",
     )
 
 
-def _mesh_zooms(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    from gearsig.plot import spectrum_figure
-
-    spectrum = channel.order_spectrum
-    if spectrum is None:
-        return
-    for pair, low, high in mesh_windows(analysis, spectrum):
-        yield embed(
-            spectrum_figure(
-                spectrum,
-                line_cursors(analysis, spectrum, n_sidebands=4),
-                limits=(low, high),
-                marked=marked_positions(analysis, spectrum, channel.channel),
-                title=f"Around the mesh of {pair}, {channel.channel}",
-            ),
-            "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear.",
-            f"Order spectrum of {channel.channel} from order {low:.4g} to {high:.4g}, around the mesh of {pair}.",
-        )
-
-
 def _envelope(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    from gearsig.plot import spectrum_figure
-
     spectrum = channel.envelope_spectrum
     if spectrum is None:
         return
@@ -508,7 +395,7 @@ def _envelope(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]
     band = channel.envelope_band_hz
     where = f" ({band[0]:.0f} to {band[1]:.0f} Hz)" if band is not None else ""
     yield embed(
-        spectrum_figure(
+        plot.spectrum_figure(
             spectrum,
             cursors,
             scale="linear",
@@ -522,14 +409,12 @@ def _envelope(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]
 
 
 def _kurtogram(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    from gearsig.plot import kurtogram_figure
-
     del analysis  # a maker of pictures is given it, and this one needs none of it
     if channel.kurtogram is None or channel.kurtogram_band is None:
         return
     low, high = channel.kurtogram_band.band_hz
     yield embed(
-        kurtogram_figure(channel.kurtogram, channel.kurtogram_band),
+        plot.kurtogram_figure(channel.kurtogram, channel.kurtogram_band),
         f"How impulsive each band is. The outlined one, {low:.0f} to {high:.0f} Hz, is the most impulsive that is wide "
         "enough for the bearing's harmonics; its envelope bears the finding out.",
         f"Kurtogram of {channel.channel} with its best band.",
@@ -537,35 +422,26 @@ def _kurtogram(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture
 
 
 def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    from gearsig.plot import order_levels_figure
-
-    if not channel.order_levels:
+    levels = channel.order_levels
+    if not levels:
         return
-    found = [f.where for f in analysis.findings if f.code == "resonance" and channel.channel in f.where.channels]
-    resonances = [where.frequency_hz for where in found if where.frequency_hz is not None]
-    largest = "; ".join(_largest_text(level) for level in channel.order_levels)
-    look = (
-        "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance."
-    )
+    places = [f.where for f in analysis.findings if f.code == "resonance" and channel.channel in f.where.channels]
+    resonances = [where.frequency_hz for where in places if where.frequency_hz is not None]
+    largest = []
+    for level in levels:
+        amplitude, rpm, hertz = level.largest
+        unit = f" {unit_text(level.unit)}" if level.unit else ""
+        largest.append(f"{level.name} {readable(amplitude, 3)}{unit} at {rpm:.0f} rpm ({hertz:.4g} Hz)")
     yield embed(
-        order_levels_figure(
-            channel.order_levels, resonances_hz=resonances, title=f"Levels over speed, {channel.channel}"
-        ),
-        f"{look} Largest: {largest}.",
-        f"Amplitudes of {len(channel.order_levels)} orders of {channel.channel} over speed.",
+        plot.order_levels_figure(levels, resonances_hz=resonances, title=f"Levels over speed, {channel.channel}"),
+        "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance. "
+        f"Largest: {'; '.join(largest)}.",
+        f"Amplitudes of {len(levels)} orders of {channel.channel} over speed.",
         vector=True,
     )
 
 
-def _largest_text(level: OrderLevel) -> str:
-    amplitude, rpm, hertz = level.largest
-    unit = f" {unit_text(level.unit)}" if level.unit else ""
-    return f"{level.name} {readable(amplitude, 3)}{unit} at {rpm:.0f} rpm ({hertz:.4g} Hz)"
-
-
 def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    from gearsig.plot import order_map_figure
-
     order_map = channel.order_map
     if order_map is None:
         return
@@ -575,15 +451,13 @@ def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
         cursors = tuple(c for c in line_cursors(analysis, order_map) if c.kind == "mesh")
         highest = highest_order_of_interest(analysis, order_map)
     yield embed(
-        order_map_figure(order_map, cursors, highest=highest),
+        plot.order_map_figure(order_map, cursors, highest=highest),
         "Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.",
         f"Levels of {channel.channel} over {order_map.axis} and time.",
     )
 
 
 def _averages(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    from gearsig.plot import average_figure, marks_of
-
     for shaft in dict.fromkeys(shaft for shaft, _ in channel.averages):
         chosen = [
             channel.averages[shaft, kind] for kind in ("average", "residual") if (shaft, kind) in channel.averages
@@ -592,36 +466,28 @@ def _averages(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]
             continue
         teeth = _teeth(analysis, shaft)
         yield embed(
-            average_figure(chosen, n_teeth=teeth, marks=marks_of(analysis.findings, shaft, teeth)),
+            plot.average_figure(chosen, n_teeth=teeth, marks=plot.marks_of(analysis.findings, shaft, teeth)),
             "Grey: ± 2 standard errors. Where it stays clear of zero, something comes back at that angle every turn.",
             f"Synchronous {' and '.join(a.kind for a in chosen)} of {channel.channel} over one revolution of {shaft}.",
         )
 
 
 def _polar(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    from gearsig.plot import marks_of, polar_figure
-
     for shaft in dict.fromkeys(shaft for shaft, _ in channel.averages):
-        average = _best_for_teeth(channel, shaft)
-        if average is None:
+        kind = next((k for k in ("residual", "difference", "average") if (shaft, k) in channel.averages), None)
+        if kind is None:
             continue
+        average = channel.averages[shaft, kind]
         teeth = _teeth(analysis, shaft)
-        marks = marks_of(analysis.findings, shaft, teeth)
+        marks = plot.marks_of(analysis.findings, shaft, teeth)
         seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
         yield embed(
-            polar_figure(average, n_teeth=teeth, marks=marks),
+            plot.polar_figure(average, n_teeth=teeth, marks=marks),
             f"{shaft}: sound teeth draw an even ring, a damaged one swings out. Grey is ± 2 standard errors."
             if teeth
             else f"{shaft}: what leaves the ring comes back at that angle every turn. Grey is ± 2 standard errors.",
             f"Polar picture of the {average.kind} of {channel.channel} over one revolution of {shaft}{seen}.",
         )
-
-
-def _best_for_teeth(channel: ChannelAnalysis, shaft: str) -> SynchronousAverage | None:
-    for kind in ("residual", "difference", "average"):
-        if (shaft, kind) in channel.averages:
-            return channel.averages[shaft, kind]
-    return None
 
 
 def _teeth(analysis: Analysis, shaft: str) -> int | None:
