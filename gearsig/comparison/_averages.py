@@ -15,12 +15,6 @@ from gearsig.orders import average_lines
 from gearsig.prepared import shift_scores, turned_lines
 from gearsig.spectra import ComplexArray
 
-NEIGHBOURS = 9
-"""Lines over which noise is averaged: one line's own scatter of two halves says little."""
-
-SEEN = 3.0
-"""A line is seen where its amplitude exceeds so many times its noise: noise alone does so in one line of 8000."""
-
 
 @dataclass(frozen=True)
 class HalvedLines:
@@ -58,9 +52,9 @@ class HalvedLines:
         """
         own = 0.25 * np.abs(self.first - self.second) ** 2
         own[:, 0] = own[:, 1]  # a sensor's drift is no measure of what surrounds the shaft's lines
-        reach = NEIGHBOURS // 2
+        reach = 4  # nine lines: one line's own scatter of two halves says little
         padded = np.pad(own, ((0, 0), (reach, reach)), mode="reflect" if own.shape[1] > reach else "edge")
-        kernel = np.ones(NEIGHBOURS) / NEIGHBOURS
+        kernel = np.ones(9) / 9
         smooth = np.stack([np.convolve(row, kernel, mode="valid") for row in padded])
         result: FloatArray = np.sqrt(np.maximum(own, smooth))
         return result
@@ -82,18 +76,6 @@ def waveform(lines: ComplexArray, n_angles: int) -> FloatArray:
     full[1 : len(lines)] = lines[1:]
     values: FloatArray = np.fft.irfft(full, n_angles) * (n_angles / np.sqrt(2.0))
     return values
-
-
-# --------------------
-# The angle by which the simulation is turned so that the same teeth meet.
-# --------------------
-
-
-PER_CYCLE = 16
-"""Shifts tried per cycle of the highest order, before the best one is refined."""
-
-MIN_ALIKE = 0.5
-"""Correlation of what tells teeth apart; patterns of different gears reach 0.3 to 0.4 at the best of all teeth."""
 
 
 def align(
@@ -146,7 +128,7 @@ def _best_shift(cross: ComplexArray) -> float:
 
     if not np.any(cross):
         return 0.0
-    n = next_fast_len(PER_CYCLE * len(cross))
+    n = next_fast_len(16 * len(cross))  # 16 per cycle of the highest order, before the best is refined
     start = int(np.argmax(np.real(ifft(cross, n)))) / n
     refined = minimize_scalar(
         lambda s: -float(shift_scores(cross, np.array([s]))[0]),
@@ -171,12 +153,7 @@ def _is_certain(x: ComplexArray, y: ComplexArray, best: float, shifts: list[floa
         return False
     telling = np.arange(x.shape[1]) % n_teeth != 0
     alike = shift_scores(_cross(np.where(telling, x, 0.0), np.where(telling, y, 0.0)), np.array([best]))[0]
-    return bool(alike > MIN_ALIKE)
-
-
-# --------------------
-# How alike two aligned averages are: correlation and FRAC, whole or by band, and each tooth's energy.
-# --------------------
+    return bool(alike > 0.5)  # patterns of different gears reach 0.3 to 0.4 at the best of all teeth
 
 
 Figure = Callable[[ComplexArray, ComplexArray], float]

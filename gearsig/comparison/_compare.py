@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.fft import next_fast_len
 
-from gearsig.angle import AngleSignal
+from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray, one_of
 from gearsig.comparison._averages import (
     HalvedLines,
@@ -40,7 +41,6 @@ from gearsig.comparison._sides import (
     usable_speed,
 )
 from gearsig.comparison._types import (
-    Alignment,
     ChannelComparison,
     Comparison,
     Locked,
@@ -57,200 +57,29 @@ from gearsig.recording import Recording
 from gearsig.rig import Rig
 from gearsig.spectra import Spectrum
 
-# --------------------
-# One channel of the simulation beside one of the recording.
-# --------------------
-
-
-ERROR_WINDOW_REV = 1.0 / 64.0
-"""Angle over which the scatter of an average is taken from its two halves."""
-
+Sides = tuple[ComparedSide, ComparedSide]
+"""Simulation and recording."""
 HalvedSpectra = Mapping[str, tuple[Spectrum, Spectrum]]
 """Mean square per line over order, by channel: of the first and of the second half."""
 
 
 @dataclass(frozen=True)
-class ChannelContext:
-    """What all channels share.
-
-    Parameters
-    ----------
-    rig : Rig
-    reference : str
-    ratios : dict
-        Shaft → revolutions per revolution of the reference shaft, which comes first.
-    lines : dict
-        Shaft → aligned lines of the simulation and of the recording.
-    revolutions_per_block : int
-    highest_order : float
-    """
+class _Shared:
+    """What all channels share; pairs and lists are of the simulation and of the recording."""
 
     rig: Rig
-    reference: str
     ratios: dict[str, float]
+    sides: Sides
     lines: dict[str, tuple[HalvedLines, HalvedLines]]
-    revolutions_per_block: int
+    spectra: list[HalvedSpectra]
     highest_order: float
 
     @property
-    def mesh(self) -> tuple[float | None, str]:
-        """Order and name of the first pair whose teeth are known and whose mesh both records hold."""
-        for pair in self.rig.pairs:
-            order = self.rig.mesh_order(pair, self.reference)
-            if order is not None and 1.5 * order <= self.highest_order:
-                return order, pair.name if len(self.rig.pairs) > 1 else ""
-        return None, ""
+    def mesh_orders(self) -> tuple[float, ...]:
+        """Of the pairs whose teeth are known."""
+        orders = (self.rig.mesh_order(pair, next(iter(self.ratios))) for pair in self.rig.pairs)
+        return tuple(order for order in orders if order is not None)
 
-
-def halved_spectra(halves: tuple[AngleSignal, AngleSignal], material: ChannelContext) -> HalvedSpectra:
-    """Return the order spectra of both halves, by channel, up to the order that both records hold."""
-    spectra_of = {}
-    for name in halves[0].channel_names:
-        spectra = [
-            order_spectrum(half, name, scaling="power", revolutions_per_block=material.revolutions_per_block)
-            for half in halves
-        ]
-        n = int(material.highest_order * material.revolutions_per_block) + 1
-        first, second = (replace(s, values=s.values[:n], positions=s.positions[:n]) for s in spectra)
-        spectra_of[name] = (first, second)
-    return spectra_of
-
-
-def compare_channel(
-    i: int,
-    pair: ChannelPair,
-    simulated_side: ComparedSide,
-    recorded_side: ComparedSide,
-    spectra: Sequence[HalvedSpectra],
-    material: ChannelContext,
-) -> ChannelComparison:
-    """Compare one pair of channels, the i-th of both sides."""
-    simulated, recorded = spectra[0][pair.simulated], spectra[1][pair.recorded]
-    densities = [tuple(_density(half) for half in halves) for halves in (simulated, recorded)]
-    mesh, mesh_name = material.mesh
-    limits = order_band_limits(mesh, mesh_name, material.highest_order)
-    whole = [(0.5, material.highest_order)]
-    totals = [np.stack([band_powers(half, whole) for half in halves]) for halves in densities]
-    averages = material.lines
-    return ChannelComparison(
-        simulated_name=pair.simulated,
-        recorded_name=pair.recorded,
-        quantity=pair.quantity,
-        unit=pair.unit,
-        levels_compare=pair.levels_compare,
-        simulated_spectrum=_amplitudes(simulated, pair.simulated, pair.unit),
-        recorded_spectrum=_amplitudes(recorded, pair.recorded, pair.unit),
-        lines=line_levels(
-            material.rig,
-            material.reference,
-            {shaft: lines[0] for shaft, lines in averages.items()},
-            {shaft: lines[1] for shaft, lines in averages.items()},
-            i,
-        ),
-        other_lines=other_lines(
-            simulated, recorded, tuple(material.ratios.values()), _meshes(material), material.highest_order
-        ),
-        order_bands=order_bands(limits, densities[0], densities[1], averages[material.reference], i),
-        third_octaves=third_octaves(
-            time_halves(simulated_side.recording, i),
-            simulated_side.recording.sampling_rate_hz,
-            time_halves(recorded_side.recording, i),
-            recorded_side.recording.sampling_rate_hz,
-        ),
-        shafts=tuple(_shaft(shaft, i, pair, material) for shaft in averages),
-        overall=power_levels(totals[0], totals[1])[0],
-        locked=Locked(*(_locked(side, i, totals[side][:, 0], material) for side in (0, 1))),
-    )
-
-
-def _meshes(material: ChannelContext) -> tuple[float, ...]:
-    orders = (material.rig.mesh_order(pair, material.reference) for pair in material.rig.pairs)
-    return tuple(order for order in orders if order is not None)
-
-
-def _density(power: Spectrum) -> Spectrum:
-    """Return mean squares per line as a density over order, whose integral is the mean square."""
-    return replace(power, values=power.values / power.noise_bandwidth, scaling="power density")
-
-
-def _amplitudes(halves: tuple[Spectrum, Spectrum], name: str, unit: str) -> Spectrum:
-    mean = 0.5 * (halves[0].values + halves[1].values)
-    return replace(halves[0], values=np.sqrt(mean), scaling="amplitude rms", unit=unit, source=name)
-
-
-def _shaft(shaft: str, i: int, pair: ChannelPair, material: ChannelContext) -> ShaftComparison:
-    simulated, recorded = material.lines[shaft]
-    every = slice(1, simulated.first.shape[1])
-    teeth = teeth_on(material.rig, shaft)
-    n_angles = _n_angles(simulated.first.shape[1])
-    resolved = teeth is not None and simulated.first.shape[1] > teeth
-    return ShaftComparison(
-        shaft=shaft,
-        n_teeth=teeth,
-        simulated=_average(simulated, i, n_angles, shaft, pair.simulated, pair.unit),
-        recorded=_average(recorded, i, n_angles, shaft, pair.recorded, pair.unit),
-        correlation=repeated(correlation, simulated, recorded, i, every),
-        simulated_reliability=reliability(simulated, i),
-        recorded_reliability=reliability(recorded, i),
-        agreement=agreement(simulated, recorded, i, every),
-        tooth_levels=tooth_levels(simulated, recorded, i, teeth, n_angles) if teeth is not None and resolved else (),
-    )
-
-
-def _n_angles(n_lines: int) -> int:
-    """Angles of an average: enough for its highest order, and some more, so that its peaks are drawn as they are."""
-    from scipy.fft import next_fast_len
-
-    return int(next_fast_len(max(4 * n_lines, 360), real=True) // 2 * 2)
-
-
-def _average(lines: HalvedLines, i: int, n_angles: int, shaft: str, channel: str, unit: str) -> SynchronousAverage:
-    difference = waveform(0.5 * (lines.first[i] - lines.second[i]), n_angles)
-    return SynchronousAverage(
-        values=waveform(lines.whole[i], n_angles),
-        standard_error=_running_rms(difference, max(1, round(ERROR_WINDOW_REV * n_angles))),
-        n_revolutions=lines.n_revolutions,
-        shaft=shaft,
-        channel=channel,
-        unit=unit,
-        kind="average",
-        highest_order=float(lines.first.shape[1] - 1),
-    )
-
-
-def _running_rms(values: FloatArray, n: int) -> FloatArray:
-    """Rms over n neighbours around the circle."""
-    around = np.concatenate([values[-n:], values, values[:n]]) ** 2
-    smooth = np.convolve(around, np.ones(n) / n, mode="same")[n : n + len(values)]
-    result: FloatArray = np.sqrt(np.maximum(smooth, 0.0))
-    return result
-
-
-def _locked(side: int, i: int, totals: FloatArray, material: ChannelContext) -> Repeated:
-    """Return the share of energy that both halves have in common, line by line: Σ Re(a b*) over the mean square.
-
-    The noise of one half has nothing to do with that of the other, and adds nothing. An order of several shafts
-    counts once.
-    """
-    counted: set[float] = set()
-    powers = np.zeros(3)
-    for shaft, pair in material.lines.items():
-        lines, ratio = pair[side], material.ratios[shaft]
-        n = np.arange(1, lines.first.shape[1])
-        orders = np.round(n * ratio, 6)
-        fresh = n[[order not in counted and order <= material.highest_order for order in orders]]
-        counted |= set(orders.tolist())
-        a, b = lines.first[i, fresh], lines.second[i, fresh]
-        powers += [np.sum(np.real(a * np.conj(b))), np.sum(np.abs(a) ** 2), np.sum(np.abs(b) ** 2)]
-    mean = float(totals.mean())
-    if mean <= 0:
-        return Repeated(0.0, 0.0)
-    shares = np.clip(powers[1:] / np.maximum(totals, 1e-300), 0.0, 1.0)
-    return Repeated(float(np.clip(powers[0] / mean, 0.0, 1.0)), float(abs(shares[0] - shares[1])) / 2.0)
-
-
-MAX_REVOLUTIONS_PER_BLOCK = 64
-"""Of the order spectra: lines 1/64 of an order apart tell slow shafts and bearings from the shaft's own orders."""
 
 ALIGN = ("auto", "marks", "correlation")
 
@@ -303,111 +132,90 @@ def compare(
     W. Heylen, S. Lammens, "FRAC: a consistent way of comparing frequency response functions", 1996.
     """
     one_of(align_by, "align_by", ALIGN)
-    sides = prepare(simulated), prepare(recorded)
-    simulated, recorded = (side.recording for side in sides)
+    prepared = prepare(simulated), prepare(recorded)
+    simulated, recorded = (side.recording for side in prepared)
     pairs = pair_channels(simulated, recorded, channels)
     check_live(simulated, [p.simulated for p in pairs], "simulation")
     check_live(recorded, [p.recorded for p in pairs], "recording")
     machine = common_machine(simulated, recorded, rig)
-    ratios = _ratios(machine.recorded)
+    rig, reference = machine.recorded, machine.recorded.reference_shaft
+    # Revolutions of each shaft per revolution of the reference shaft, which comes first.
+    ratios = {reference: 1.0} | {name: ratio for name in rig.shaft_names if (ratio := rig.ratio(name)) is not None}
     simulated_rig = replace(machine.simulated, speed=usable_speed(machine.simulated, simulated))
-    simulated_side = make_side(
-        sides[0].with_rig(simulated_rig), {p.simulated: p.factor for p in pairs}, machine.names, ratios, "simulation"
+    factors = {p.simulated: p.factor for p in pairs}
+    sides = (
+        make_side(prepared[0].with_rig(simulated_rig), factors, machine.names, ratios, "simulation"),
+        make_side(prepared[1].with_rig(rig), {p.recorded: 1.0 for p in pairs}, {}, ratios, "recording"),
     )
-    recorded_side = make_side(
-        sides[1].with_rig(machine.recorded), {p.recorded: 1.0 for p in pairs}, {}, ratios, "recording"
-    )
-    lines = _lines(simulated_side, recorded_side, ratios)
+    lines = _common_lines(sides, ratios)
+    marked = sides[0].marked & sides[1].marked & set(lines)
+    if align_by == "marks" and not marked:
+        raise RefusalError(
+            "no shaft has a mark (one tachometer pulse per revolution) in both records", remedy="align by correlation"
+        )
     alignments = tuple(
-        _align(shaft, simulated_side, recorded_side, lines, machine.recorded, align_by) for shaft in lines
+        align(shaft, *pair, teeth_on(rig, shaft), by_marks=shaft in marked and align_by != "correlation")
+        for shaft, pair in lines.items()
     )
     turned = {a.shaft: (lines[a.shaft][0].turned(a.shift_deg / 360.0), lines[a.shaft][1]) for a in alignments}
-    reference = next(iter(ratios))
-    material = ChannelContext(
-        machine.recorded,
-        reference,
-        {shaft: ratios[shaft] for shaft in turned},
-        turned,
-        _block(simulated_side, recorded_side, reference),
-        min(float(side.signals[reference][0].highest_order) for side in (simulated_side, recorded_side)),
+    halves = [side.signals[reference] for side in sides]
+    highest = min(float(first.highest_order) for first, _ in halves)
+    shared = _Shared(
+        rig, {shaft: ratios[shaft] for shaft in turned}, sides, turned, _order_spectra(halves, highest), highest
     )
-    spectra = tuple(halved_spectra(side.signals[reference], material) for side in (simulated_side, recorded_side))
-    compared = tuple(
-        compare_channel(i, p, simulated_side, recorded_side, spectra, material) for i, p in enumerate(pairs)
-    )
+    compared = tuple(_compare_channel(shared, i, pair) for i, pair in enumerate(pairs))
     return Comparison(
-        simulated=_facts(simulated, simulated_side),
-        recorded=_facts(recorded, recorded_side),
-        machine=machine.recorded.name,
+        simulated=_facts(simulated, sides[0].angle),
+        recorded=_facts(recorded, sides[1].angle),
+        machine=rig.name,
         reference_shaft=reference,
-        mesh_orders=tuple(m for p in machine.recorded.pairs if (m := machine.recorded.mesh_order(p)) is not None),
-        highest_order=material.highest_order,
+        mesh_orders=shared.mesh_orders,
+        highest_order=highest,
         alignments=alignments,
         channels=compared,
-        notes=(*machine.notes, *notes_of(simulated_side, recorded_side, alignments, compared, ratios)),
+        notes=(*machine.notes, *notes_of(*sides, alignments, compared, ratios)),
         verdict=verdict_of(compared),
         findings=findings_of(compared),
     )
 
 
-def _ratios(rig: Rig) -> dict[str, float]:
-    """Return revolutions of each shaft per revolution of the reference shaft, which comes first."""
-    reference = rig.reference_shaft
-    known = {name: ratio for name in rig.shaft_names if (ratio := rig.ratio(name)) is not None}
-    return {reference: 1.0} | known
-
-
-def _lines(
-    simulated_side: ComparedSide, recorded_side: ComparedSide, ratios: Mapping[str, float]
-) -> dict[str, tuple[HalvedLines, HalvedLines]]:
+def _common_lines(sides: Sides, ratios: Mapping[str, float]) -> dict[str, tuple[HalvedLines, HalvedLines]]:
     """Return the averages' lines of each shaft that both records know, up to the same order."""
-    lines_of = {}
+    result = {}
     for shaft in ratios:
-        if shaft in simulated_side.signals and shaft in recorded_side.signals:
-            pair = tuple(halved_lines(side.signals[shaft]) for side in (simulated_side, recorded_side))
-            highest = min(lines.first.shape[1] for lines in pair) - 1
+        if all(shaft in side.signals for side in sides):
+            simulated, recorded = (halved_lines(side.signals[shaft]) for side in sides)
+            highest = min(simulated.first.shape[1], recorded.first.shape[1]) - 1
             if highest >= 1:
-                lines_of[shaft] = (pair[0].up_to(highest), pair[1].up_to(highest))
-    if next(iter(ratios)) not in lines_of:
+                result[shaft] = (simulated.up_to(highest), recorded.up_to(highest))
+    if next(iter(ratios)) not in result:
         raise RefusalError(
             "not even the first order of the reference shaft is within both sampling rates",
             remedy="check speed and sampling rates",
         )
-    return lines_of
+    return result
 
 
-def _align(
-    shaft: str,
-    simulated_side: ComparedSide,
-    recorded_side: ComparedSide,
-    lines: Mapping[str, tuple[HalvedLines, HalvedLines]],
-    rig: Rig,
-    align_by: str,
-) -> Alignment:
-    marked = shaft in simulated_side.marked and shaft in recorded_side.marked
-    if align_by == "marks" and not any(s in simulated_side.marked and s in recorded_side.marked for s in lines):
-        raise RefusalError(
-            "no shaft has a mark (one tachometer pulse per revolution) in both records", remedy="align by correlation"
-        )
-    by_marks = marked and align_by != "correlation"
-    return align(shaft, *lines[shaft], teeth_on(rig, shaft), by_marks=by_marks)
+def _order_spectra(halves: Sequence[tuple[AngleSignal, AngleSignal]], highest: float) -> list[HalvedSpectra]:
+    """Return the order spectra of the halves of both sides, by channel, from blocks of equally many revolutions."""
+    # As many as the shortest half holds; lines 1/64 of an order apart tell slow shafts from the shaft's own orders.
+    block = int(min(64, *(half.samples.shape[1] // half.samples_per_revolution for pair in halves for half in pair)))
+    n = int(highest * block) + 1
+
+    def spectrum(half: AngleSignal, name: str) -> Spectrum:
+        full = order_spectrum(half, name, scaling="power", revolutions_per_block=block)
+        return replace(full, values=full.values[:n], positions=full.positions[:n])
+
+    return [
+        {name: (spectrum(first, name), spectrum(second, name)) for name in first.channel_names}
+        for first, second in halves
+    ]
 
 
-def _block(simulated_side: ComparedSide, recorded_side: ComparedSide, reference: str) -> int:
-    """Revolutions per block of the order spectra: as many as the shortest half holds, at most 64."""
-    shortest = min(
-        half.samples.shape[1] // half.samples_per_revolution
-        for side in (simulated_side, recorded_side)
-        for half in side.signals[reference]
-    )
-    return int(min(shortest, MAX_REVOLUTIONS_PER_BLOCK))
-
-
-def _facts(recording: Recording, side: ComparedSide) -> RecordFacts:
-    angle, provenance = side.angle, recording.provenance
+def _facts(recording: Recording, angle: ShaftAngle) -> RecordFacts:
     return RecordFacts(
-        source=provenance.source or "made in memory",
-        sha256=provenance.sha256,
+        source=recording.provenance.source or "made in memory",
+        sha256=recording.provenance.sha256,
         duration_s=recording.duration_s,
         sampling_rate_hz=recording.sampling_rate_hz,
         mean_speed_rpm=angle.mean_speed_rpm,
@@ -416,3 +224,100 @@ def _facts(recording: Recording, side: ComparedSide) -> RecordFacts:
         speed_method=angle.method,
         notes=(*recording.warnings, *angle.notes),
     )
+
+
+def _compare_channel(shared: _Shared, i: int, pair: ChannelPair) -> ChannelComparison:
+    """Compare one pair of channels, the i-th of both sides."""
+    rig, reference, highest = shared.rig, next(iter(shared.ratios)), shared.highest_order
+    simulated, recorded = shared.spectra[0][pair.simulated], shared.spectra[1][pair.recorded]
+    # Mean squares per line as a density over order, whose integral is the mean square.
+    densities = [
+        [replace(half, values=half.values / half.noise_bandwidth, scaling="power density") for half in halves]
+        for halves in (simulated, recorded)
+    ]
+    totals = [np.stack([band_powers(half, [(0.5, highest)]) for half in halves]) for halves in densities]
+    meshes = ((rig.mesh_order(p, reference), p.name if len(rig.pairs) > 1 else "") for p in rig.pairs)
+    mesh, name = next((m for m in meshes if m[0] is not None and 1.5 * m[0] <= highest), (None, ""))
+    limits = order_band_limits(mesh, name, highest)
+    third = [(time_halves(side.recording, i), side.recording.sampling_rate_hz) for side in shared.sides]
+    return ChannelComparison(
+        simulated_name=pair.simulated,
+        recorded_name=pair.recorded,
+        quantity=pair.quantity,
+        unit=pair.unit,
+        levels_compare=pair.levels_compare,
+        simulated_spectrum=_amplitudes(simulated, pair.simulated, pair.unit),
+        recorded_spectrum=_amplitudes(recorded, pair.recorded, pair.unit),
+        lines=line_levels(rig, reference, shared.lines, i),
+        other_lines=other_lines(simulated, recorded, tuple(shared.ratios.values()), shared.mesh_orders, highest),
+        order_bands=order_bands(limits, densities[0], densities[1], shared.lines[reference], i),
+        third_octaves=third_octaves(*third[0], *third[1]),
+        shafts=tuple(_compare_shaft(rig, shaft, i, pair, lines) for shaft, lines in shared.lines.items()),
+        overall=power_levels(totals[0], totals[1])[0],
+        locked=Locked(*(_locked(shared, side, i, totals[side][:, 0]) for side in (0, 1))),
+    )
+
+
+def _amplitudes(halves: tuple[Spectrum, Spectrum], name: str, unit: str) -> Spectrum:
+    mean = 0.5 * (halves[0].values + halves[1].values)
+    return replace(halves[0], values=np.sqrt(mean), scaling="amplitude rms", unit=unit, source=name)
+
+
+def _compare_shaft(
+    rig: Rig, shaft: str, i: int, pair: ChannelPair, lines: tuple[HalvedLines, HalvedLines]
+) -> ShaftComparison:
+    simulated, recorded = lines
+    n_lines, teeth = simulated.first.shape[1], teeth_on(rig, shaft)
+    every = slice(1, n_lines)
+    # Enough angles for the highest order, and some more, so that the average's peaks are drawn as they are.
+    n_angles = int(next_fast_len(max(4 * n_lines, 360), real=True) // 2 * 2)
+    return ShaftComparison(
+        shaft=shaft,
+        n_teeth=teeth,
+        simulated=_average(simulated, i, n_angles, shaft, pair.simulated, pair.unit),
+        recorded=_average(recorded, i, n_angles, shaft, pair.recorded, pair.unit),
+        correlation=repeated(correlation, simulated, recorded, i, every),
+        simulated_reliability=reliability(simulated, i),
+        recorded_reliability=reliability(recorded, i),
+        agreement=agreement(simulated, recorded, i, every),
+        tooth_levels=tooth_levels(simulated, recorded, i, teeth, n_angles) if teeth and n_lines > teeth else (),
+    )
+
+
+def _average(lines: HalvedLines, i: int, n_angles: int, shaft: str, channel: str, unit: str) -> SynchronousAverage:
+    difference = waveform(0.5 * (lines.first[i] - lines.second[i]), n_angles)
+    n = max(1, round(n_angles / 64.0))  # the scatter is taken over 1/64 of a revolution
+    around = np.concatenate([difference[-n:], difference, difference[:n]]) ** 2
+    power = np.convolve(around, np.ones(n) / n, mode="same")[n : n + n_angles]
+    return SynchronousAverage(
+        values=waveform(lines.whole[i], n_angles),
+        standard_error=np.sqrt(np.maximum(power, 0.0)),
+        n_revolutions=lines.n_revolutions,
+        shaft=shaft,
+        channel=channel,
+        unit=unit,
+        kind="average",
+        highest_order=float(lines.first.shape[1] - 1),
+    )
+
+
+def _locked(shared: _Shared, side: int, i: int, totals: FloatArray) -> Repeated:
+    """Return the share of energy that both halves have in common, line by line: Σ Re(a b*) over the mean square.
+
+    The noise of one half has nothing to do with that of the other, and adds nothing. An order of several shafts
+    counts once.
+    """
+    counted: set[float] = set()
+    powers = np.zeros(3)
+    for shaft, pair in shared.lines.items():
+        n = np.arange(1, pair[side].first.shape[1])
+        orders = np.round(n * shared.ratios[shaft], 6)
+        fresh = n[[order not in counted and order <= shared.highest_order for order in orders]]
+        counted |= set(orders.tolist())
+        a, b = pair[side].first[i, fresh], pair[side].second[i, fresh]
+        powers += [np.sum(np.real(a * np.conj(b))), np.sum(np.abs(a) ** 2), np.sum(np.abs(b) ** 2)]
+    mean = float(totals.mean())
+    if mean <= 0:
+        return Repeated(0.0, 0.0)
+    shares = np.clip(powers[1:] / np.maximum(totals, 1e-300), 0.0, 1.0)
+    return Repeated(float(np.clip(powers[0] / mean, 0.0, 1.0)), float(abs(shares[0] - shares[1])) / 2.0)

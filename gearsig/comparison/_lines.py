@@ -7,9 +7,10 @@ from itertools import pairwise
 from math import ceil, floor, log10
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from gearsig.checks import FloatArray
-from gearsig.comparison._averages import SEEN, HalvedLines, agreement
+from gearsig.comparison._averages import HalvedLines, agreement
 from gearsig.comparison._types import (
     BandLevel,
     LevelPair,
@@ -23,33 +24,31 @@ from gearsig.prepared import line_excess
 from gearsig.rig import OrderLine, Rig, order_lines
 from gearsig.spectra import Spectrum, noise_floor, power_density
 
-MAX_MESH_HARMONICS, N_SHAFT_ORDERS, N_SIDEBANDS = 10, 4, 3
-N_WITHOUT_GEARS = 12
-"""Shaft orders where no gears are known."""
-N_OTHER = 5
 OTHER_OVER_FLOOR_DB = 15.0
 """A line that belongs to nothing must stand out so far: noise does so in one line of 10¹³."""
-SKIRT_ORDERS, SKIRT_DB = 1.0, 20.0
-"""A peak so near to a line so much stronger is that line's foot, smeared by a wandering speed."""
 _PRIORITY = {"mesh": 0, "shaft": 1, "sideband": 2}
 
 
 def line_levels(
-    rig: Rig, reference: str, simulated: Mapping[str, HalvedLines], recorded: Mapping[str, HalvedLines], channel: int
+    rig: Rig, reference: str, lines: Mapping[str, tuple[HalvedLines, HalvedLines]], channel: int
 ) -> tuple[LineLevel, ...]:
     """Return mesh harmonics, sidebands and shaft orders of one channel, by rising order; each order once."""
     levels: dict[float, LineLevel] = {}
     for line in sorted(expected_lines(rig, reference), key=lambda expected: _PRIORITY[expected.kind]):
-        shaft = _shaft_of(line, rig, simulated)
+        shaft, order = _shaft_of(line, rig, lines), round(line.order, 6)
         ratio = rig.ratio(shaft, to=reference) if rig.shafts else 1.0
-        if shaft not in simulated or ratio is None:
+        if shaft not in lines or ratio is None:
             continue
         n = round(line.order / ratio)
-        if abs(n * ratio - line.order) > 1e-6 * line.order or round(line.order, 6) in levels:
+        if abs(n * ratio - line.order) > 1e-6 * line.order or order in levels:
             continue
-        if 1 <= n < simulated[shaft].first.shape[1]:
+        if 1 <= n < lines[shaft][0].first.shape[1]:
             kind: LineKind = line.kind  # type: ignore[assignment]  # `expected_lines` has no others
-            levels[round(line.order, 6)] = _level(line.label, kind, line.order, shaft, n, simulated, recorded, channel)
+            (simulated_db, simulated_error, simulated_seen), (recorded_db, recorded_error, recorded_seen) = (
+                _read(side, channel, n) for side in lines[shaft]
+            )
+            level = LevelPair(simulated_db, recorded_db, float(np.hypot(simulated_error, recorded_error)))
+            levels[order] = LineLevel(line.label, kind, line.order, shaft, level, simulated_seen, recorded_seen)
     return tuple(levels[order] for order in sorted(levels))
 
 
@@ -57,18 +56,18 @@ def expected_lines(rig: Rig, reference: str) -> tuple[OrderLine, ...]:
     """Return the lines that turn with the shafts; the reference shaft's harmonics alone where no gears are known."""
     if not rig.shafts:
         name = reference or "shaft"
-        return tuple(OrderLine(float(k), "shaft", f"{k}× {name}", name, k) for k in range(1, N_WITHOUT_GEARS + 1))
+        return tuple(OrderLine(float(k), "shaft", f"{k}× {name}", name, k) for k in range(1, 13))
     lines = order_lines(
         rig,
         reference,
-        n_mesh_harmonics=MAX_MESH_HARMONICS,
-        n_shaft_harmonics=N_SHAFT_ORDERS if rig.pairs else N_WITHOUT_GEARS,
-        n_sidebands=N_SIDEBANDS,
+        n_mesh_harmonics=10,
+        n_shaft_harmonics=4 if rig.pairs else 12,
+        n_sidebands=3,
     )
     return tuple(line for line in lines if line.kind in _PRIORITY and line.order > 0)
 
 
-def _shaft_of(line: OrderLine, rig: Rig, averages: Mapping[str, HalvedLines]) -> str:
+def _shaft_of(line: OrderLine, rig: Rig, averages: Mapping[str, object]) -> str:
     """Return the shaft in whose average a line is a whole order."""
     if not rig.shafts:
         return next(iter(averages))
@@ -80,27 +79,11 @@ def _shaft_of(line: OrderLine, rig: Rig, averages: Mapping[str, HalvedLines]) ->
     return next((s for s in (pair.driver, pair.driven) if pair.teeth(s) is not None and s in averages), pair.driver)
 
 
-def _level(
-    label: str,
-    kind: LineKind,
-    order: float,
-    shaft: str,
-    n: int,
-    simulated: Mapping[str, HalvedLines],
-    recorded: Mapping[str, HalvedLines],
-    channel: int,
-) -> LineLevel:
-    values = [_read(lines[shaft], channel, n) for lines in (simulated, recorded)]
-    (simulated_db, simulated_error, simulated_seen), (recorded_db, recorded_error, recorded_seen) = values
-    level = LevelPair(simulated_db, recorded_db, float(np.hypot(simulated_error, recorded_error)))
-    return LineLevel(label, kind, order, shaft, level, simulated_seen, recorded_seen)
-
-
 def _read(lines: HalvedLines, channel: int, n: int) -> tuple[float, float, bool]:
     """Return level, its standard error, and whether the line is seen."""
     amplitudes, noise = np.abs(lines.whole[channel]), lines.noise()[channel, n]
     strongest = float(np.max(amplitudes[1:] ** 2, initial=0.0))
-    seen = bool(amplitudes[n] > SEEN * noise)
+    seen = bool(amplitudes[n] > 3.0 * noise)  # noise alone is so high in one line of 8000
     # What is not seen is at most the noise: the level is a bound then.
     shown = amplitudes[n] if seen else max(amplitudes[n], noise)
     level = float(decibel(np.array([shown**2]), strongest)[0])
@@ -138,13 +121,13 @@ def other_lines(
     kept = sorted(
         (level for _, level in levels), key=lambda level: -max(level.level.recorded_db, level.level.simulated_db)
     )
-    return tuple(kept[: 2 * N_OTHER])
+    return tuple(kept[:10])
 
 
 def _strongest(
     halves: Sequence[Spectrum], ratios: Sequence[float], mesh_orders: Sequence[float], highest: float
 ) -> list[int]:
-    """Return the strongest local maxima outside of the shafts' own lines that both halves show, at most `N_OTHER`."""
+    """Return the strongest local maxima outside of the shafts' own lines that both halves show, at most five."""
     ratios_db, masked = [], None
     for half in halves:
         excess = line_excess(half, noise_floor(half).values)
@@ -158,9 +141,10 @@ def _strongest(
     is_peak = np.r_[False, (inner >= power[:-2]) & (inner > power[2:]), False] & ~np.asarray(masked)
     is_peak &= np.min(ratios_db, axis=0) > OTHER_OVER_FLOOR_DB
     is_peak &= np.arange(len(power)) * halves[0].resolution <= highest
-    is_peak &= power > _strongest_around(power, round(SKIRT_ORDERS / halves[0].resolution)) * 10 ** (-SKIRT_DB / 10)
+    # A peak within one order of a line 20 dB stronger is that line's foot, smeared by a wandering speed.
+    is_peak &= power > 0.01 * maximum_filter1d(power, 2 * round(1.0 / halves[0].resolution) + 1)
     lines = np.flatnonzero(is_peak)
-    return [int(line) for line in lines[np.argsort(-power[lines])][:N_OTHER]]
+    return [int(line) for line in lines[np.argsort(-power[lines])][:5]]
 
 
 def other_label(order: float, mesh_orders: Sequence[float]) -> str:
@@ -177,13 +161,6 @@ def other_label(order: float, mesh_orders: Sequence[float]) -> str:
     _, k, mesh = min(near)
     off = order - k * mesh
     return f"order {order:.5g} ({k}× mesh {'+' if off > 0 else '−'} {abs(off):.4g})"
-
-
-def _strongest_around(power: FloatArray, reach: int) -> FloatArray:
-    from scipy.ndimage import maximum_filter1d
-
-    strongest: FloatArray = maximum_filter1d(power, 2 * reach + 1)
-    return strongest
 
 
 def _other_level(
@@ -204,17 +181,7 @@ def _other_level(
     return LineLevel(label, "other", order, "", level, seen[0], seen[1])
 
 
-# --------------------
-# Levels of bands: third octaves over frequency, and bands around the mesh harmonics over order.
-# --------------------
-
-
 OCTAVE_RATIO = 10.0**0.3
-HIGHEST_SHARE = 0.45
-"""Of the sampling rate: above it, anti-aliasing filters have taken over."""
-LONGEST_BLOCK_S = 4.0
-LINES_PER_BAND = 4
-MAX_ORDER_BANDS = 10
 _NOMINAL = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)
 
 
@@ -254,9 +221,10 @@ def third_octaves(
     Power densities of equally long blocks are summed over each band; lines on an edge count by their share.
     """
     shortest_s = min(len(simulated[0]) / simulated_rate_hz, len(recorded[0]) / recorded_rate_hz)
-    block_s = min(LONGEST_BLOCK_S, shortest_s / 2.0)
-    lowest = LINES_PER_BAND / block_s / (OCTAVE_RATIO ** (1 / 6) - OCTAVE_RATIO ** (-1 / 6))
-    limits = third_octave_limits(lowest, HIGHEST_SHARE * min(simulated_rate_hz, recorded_rate_hz))
+    block_s = min(4.0, shortest_s / 2.0)
+    # Four lines in the lowest band; above 45 % of the sampling rate anti-aliasing filters have taken over.
+    lowest = 4 / block_s / (OCTAVE_RATIO ** (1 / 6) - OCTAVE_RATIO ** (-1 / 6))
+    limits = third_octave_limits(lowest, 0.45 * min(simulated_rate_hz, recorded_rate_hz))
     if not limits:
         return ()
     powers = []
@@ -265,7 +233,7 @@ def third_octaves(
         powers.append(np.stack([band_powers(d, [(low, high) for _, low, high in limits]) for d in densities]))
     levels = power_levels(*powers)
     return tuple(
-        BandLevel(_hertz(nominal), low, high, "frequency", level)
+        BandLevel(f"{nominal / 1000:g} kHz" if nominal >= 1000 else f"{nominal:.4g} Hz", low, high, "frequency", level)
         for (nominal, low, high), level in zip(limits, levels, strict=True)
     )
 
@@ -281,13 +249,13 @@ def band_powers(density: Spectrum, limits: Sequence[tuple[float, float]]) -> Flo
 def order_band_limits(mesh_order: float | None, name: str, highest: float) -> tuple[tuple[str, float, float], ...]:
     """Return (label, low, high): bands of one mesh order around its harmonics; ten equal bands without a mesh."""
     if mesh_order is not None and 1.5 * mesh_order <= highest:
-        n = min(int(highest / mesh_order - 0.5), MAX_ORDER_BANDS)
+        n = min(int(highest / mesh_order - 0.5), 10)
         around = [(f"around {k}× mesh {name}".rstrip(), (k - 0.5) * mesh_order) for k in range(1, n + 1)]
         return (
             ("below the mesh", 0.5, 0.5 * mesh_order),
             *((label, low, low + mesh_order) for label, low in around),
         )
-    edges = np.linspace(0.5, highest, MAX_ORDER_BANDS + 1)
+    edges = np.linspace(0.5, highest, 11)
     return tuple((f"orders {a:.4g} to {b:.4g}", float(a), float(b)) for a, b in pairwise(edges))
 
 
@@ -319,7 +287,3 @@ def order_bands(
         alike = agreement(*lines, channel, inside) if inside.stop > inside.start + 1 else None
         bands.append(BandLevel(label, low, high, "order", level, alike))
     return tuple(bands)
-
-
-def _hertz(nominal: float) -> str:
-    return f"{nominal / 1000:g} kHz" if nominal >= 1000 else f"{nominal:.4g} Hz"

@@ -144,11 +144,6 @@ def time_halves(recording: Recording, row: int) -> tuple[FloatArray, FloatArray]
     return values[:n], values[n : 2 * n]
 
 
-# --------------------
-# Which channel of the simulation belongs to which of the recording, and in what unit.
-# --------------------
-
-
 @dataclass(frozen=True)
 class ChannelPair:
     """Two channels that measure the same.
@@ -260,11 +255,6 @@ def check_live(recording: Recording, channels: Sequence[str], which: str) -> Non
                 f"channel {problem.channel} of the {which} is dead ({problem.evidence})",
                 remedy="check sensor, cable and input, or name other channels with --channel SIM=RECORDED",
             )
-
-
-# --------------------
-# The machine that both records are of: the recording's rig, and the names its shafts have in the simulation's.
-# --------------------
 
 
 @dataclass(frozen=True)

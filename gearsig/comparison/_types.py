@@ -332,11 +332,6 @@ class Comparison:
     findings: tuple[str, ...]
 
 
-# --------------------
-# Levels in dB, and how well they repeat.
-# --------------------
-
-
 DEEPEST_DB = 160.0
 """Below the strongest level of a channel, nothing is told apart: that is rounding."""
 

@@ -173,11 +173,6 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
-# --------------------
-# What the reader of a comparison should know before believing a figure.
-# --------------------
-
-
 SAME_SPEED, OTHER_SPEED = 0.03, 0.10
 """Relative differences of speed: not worth a word; and so large that resonances meet other orders."""
 

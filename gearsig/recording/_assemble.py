@@ -10,14 +10,9 @@ import numpy as np
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory
-from gearsig.recording._table import NumberArray, RawColumn, RawTable, rate_of_time, seconds_per_unit
+from gearsig.recording._table import RawTable, rate_of_time, seconds_per_unit
 from gearsig.recording._types import RPM_UNITS, Channel, Provenance, Recording, quantity_of
 from gearsig.rig import Rig, SpeedChannel, SpeedSource
-
-MAX_CHANNELS = 4096
-RATE_TOLERANCE = 1e-3
-"""Two statements of a sampling rate that differ by more are a contradiction."""
-_RATE_REMEDY = "give --fs or sampling_rate_hz in the rig file"
 
 
 def assemble(
@@ -46,17 +41,14 @@ def assemble(
         On columns of unequal length, names that occur twice, text, complex numbers, NaN, a time column that is not
         uniform, or if no sampling rate is known.
     """
-    _check_names(table, source)
-    table = _with_time(table, source)
-    _check_columns(table, source)
+    table = _checked(table, source)
     rate_hz, rate_warnings = _sampling_rate(table, source, rig, sampling_rate_hz)
-    samples = _stack(table, source)
     channels = tuple(
         Channel(c.name, c.quantity or quantity_of(c.name, c.unit), c.unit, c.position) for c in table.columns
     )
     speed, speed_warnings = _speed(table, channels, rig, speed)
     recording = Recording(
-        samples,
+        _stack(table, source),
         rate_hz,
         channels,
         speed=speed,
@@ -67,7 +59,8 @@ def assemble(
     return recording if rig is None else recording.with_rig(rig)
 
 
-def _check_names(table: RawTable, source: str) -> None:
+def _checked(table: RawTable, source: str) -> RawTable:
+    """Return the table with a column that is named like a time moved out of the channels; refuse what is no signal."""
     counts = Counter(c.name for c in (*table.columns, *([table.time] if table.time else [])))
     doubled = [name for name, n in counts.items() if n > 1]
     if doubled:
@@ -77,35 +70,25 @@ def _check_names(table: RawTable, source: str) -> None:
             allowed="names that differ",
             remedy="rename the columns",
         )
-
-
-def _with_time(table: RawTable, source: str) -> RawTable:
-    """Move a column that is named like a time out of the channels."""
-    if table.time is not None or table.is_own_layout:
-        return table
-    for column in table.columns:
-        if seconds_per_unit(column.name, column.unit) is not None:
-            others = tuple(c for c in table.columns if c is not column)
-            if not others:
-                raise InputError(
-                    f"the only column, {column.name!r}, is a time",
-                    where=source,
-                    allowed="at least one channel",
-                    remedy="pulse times are read as such, not as a recording",
-                )
-            return replace(table, columns=others, time=column)
-    return table
-
-
-def _check_columns(table: RawTable, source: str) -> None:
-    columns = table.columns if table.time is None else (table.time, *table.columns)
-    if not 0 < len(table.columns) <= MAX_CHANNELS:
+    if table.time is None and not table.is_own_layout:
+        time = next((c for c in table.columns if seconds_per_unit(c.name, c.unit) is not None), None)
+        if time is not None and len(table.columns) == 1:
+            raise InputError(
+                f"the only column, {time.name!r}, is a time",
+                where=source,
+                allowed="at least one channel",
+                remedy="pulse times are read as such, not as a recording",
+            )
+        if time is not None:
+            table = replace(table, columns=tuple(c for c in table.columns if c is not time), time=time)
+    if not 0 < len(table.columns) <= 4096:
         raise InputError(
             f"{len(table.columns)} channels were found",
             where=source,
-            allowed=f"1 to {MAX_CHANNELS}",
+            allowed="1 to 4096",
             remedy="check that the file holds signals over time",
         )
+    columns = table.columns if table.time is None else (table.time, *table.columns)
     for column in columns:
         if column.values.dtype.kind not in "fiub" or column.values.ndim != 1:
             raise InputError(
@@ -125,85 +108,72 @@ def _check_columns(table: RawTable, source: str) -> None:
         )
     if not len(columns[0].values):
         raise InputError(
-            "there are no samples", where=source, allowed="at least one", remedy="check that it was written completely"
+            "there are no samples",
+            where=source,
+            allowed="at least one",
+            remedy="check that it was written completely",
         )
+    return table
 
 
 def _sampling_rate(
     table: RawTable, source: str, rig: Rig | None, explicit_hz: float | None
 ) -> tuple[float, tuple[str, ...]]:
     """Return the rate by precedence (argument, file, rig) and what contradicts it."""
-    file_hz, contradiction = _rate_of_file(table, source)
+
+    def differ(a: float, b: float) -> bool:
+        return abs(a - b) > 1e-3 * abs(b)
+
+    file_hz, timed_hz = table.sampling_rate_hz, None
     rig_hz = None if rig is None else rig.sampling_rate_hz
+    if table.time is not None:
+        scale_s = seconds_per_unit(table.time.name, table.time.unit) or 1.0
+        timed_hz = rate_of_time(table.time.values, scale_s, f"{source}, column {table.time.name!r}", table.row_place)
+    if file_hz is None:
+        file_hz = timed_hz
+    else:
+        positive(file_hz, f"{source}: sampling rate in the file", "Hz", remedy="correct it there")
     if explicit_hz is not None:
         chosen_hz = positive(explicit_hz, f"{source}: sampling rate given", "Hz", remedy="give --fs above zero")
-        if file_hz is not None and _differ(chosen_hz, file_hz):
+        if file_hz is not None and differ(chosen_hz, file_hz):
             return chosen_hz, (f"the sampling rate {chosen_hz:g} Hz was given; the file states {file_hz:.9g} Hz",)
         return chosen_hz, ()
-    if contradiction:
+    if file_hz is not None and timed_hz is not None and differ(file_hz, timed_hz):
         raise InputError(
-            contradiction,
+            f"a rate of {file_hz:g} Hz is stated, the time column gives {timed_hz:.9g} Hz",
             where=source,
             allowed="statements that agree within 0.1 %",
             remedy="give the true one as --fs",
         )
-    if file_hz is not None:
-        if rig_hz is not None and _differ(file_hz, rig_hz):
-            return file_hz, (
-                f"the rig states a sampling rate of {rig_hz:g} Hz, the file {file_hz:.9g} Hz: the file's was taken",
-            )
-        return file_hz, ()
-    if rig_hz is not None:
-        return rig_hz, ()
-    raise InputError("states no sampling rate", where=source, allowed="above 0 Hz", remedy=_RATE_REMEDY)
-
-
-def _rate_of_file(table: RawTable, source: str) -> tuple[float | None, str]:
-    """Return the rate that the file states, and in words how its time column contradicts it."""
-    timed_hz = None
-    if table.time is not None:
-        scale_s = seconds_per_unit(table.time.name, table.time.unit) or 1.0
-        timed_hz = rate_of_time(table.time.values, scale_s, f"{source}, column {table.time.name!r}", table.row_place)
-    stated_hz = table.sampling_rate_hz
-    if stated_hz is None:
-        return timed_hz, ""
-    positive(stated_hz, f"{source}: sampling rate in the file", "Hz", remedy="correct it there")
-    if timed_hz is not None and _differ(stated_hz, timed_hz):
-        return stated_hz, f"a rate of {stated_hz:g} Hz is stated, the time column gives {timed_hz:.9g} Hz"
-    return stated_hz, ""
-
-
-def _differ(a: float, b: float) -> bool:
-    return abs(a - b) > RATE_TOLERANCE * abs(b)
+    if file_hz is None and rig_hz is None:
+        remedy = "give --fs or sampling_rate_hz in the rig file"
+        raise InputError("states no sampling rate", where=source, allowed="above 0 Hz", remedy=remedy)
+    if file_hz is not None and rig_hz is not None and differ(file_hz, rig_hz):
+        text = f"the rig states a sampling rate of {rig_hz:g} Hz, the file {file_hz:.9g} Hz: the file's was taken"
+        return file_hz, (text,)
+    return file_hz or rig_hz or 0.0, ()
 
 
 def _stack(table: RawTable, source: str) -> FloatArray:
     """Return (channel, time) in float32 where that loses nothing, else in float64."""
     kinds = {c.values.dtype for c in table.columns}
-    exact = all(np.can_cast(kind, np.float32, "safe") for kind in kinds)
-    dtype = np.float32 if exact else np.float64
+    dtype = np.float32 if all(np.can_cast(kind, np.float32, "safe") for kind in kinds) else np.float64
     n_samples = len(table.columns[0].values)
     check_memory(n_samples * len(table.columns) * np.dtype(dtype).itemsize, source)
     samples = np.empty((len(table.columns), n_samples), dtype)
     for row, column in zip(samples, table.columns, strict=True):
         with np.errstate(invalid="ignore"):  # a signalling NaN, which is found in the next line
             row[:] = column.values
-        _check_finite(row, column, table, source)
+        bad = np.flatnonzero(~np.isfinite(row))
+        if len(bad):
+            place = table.row_place(int(bad[0]))
+            raise InputError(
+                f"channel {column.name!r} holds {len(bad)} NaN or infinite value(s), the first at {place}",
+                where=source,
+                allowed="finite numbers",
+                remedy="cut out the gap or interpolate it before the analysis, knowingly",
+            )
     return samples
-
-
-def _check_finite(values: NumberArray, column: RawColumn, table: RawTable, source: str) -> None:
-    finite = np.isfinite(values)
-    if finite.all():
-        return
-    bad = np.flatnonzero(~finite)
-    place = table.row_place(int(bad[0]))
-    raise InputError(
-        f"channel {column.name!r} holds {len(bad)} NaN or infinite value(s), the first at {place}",
-        where=source,
-        allowed="finite numbers",
-        remedy="cut out the gap or interpolate it before the analysis, knowingly",
-    )
 
 
 def _speed(

@@ -13,11 +13,6 @@ from pathlib import Path
 
 from gearsig.errors import GearsigError, InputError
 
-# --------------------
-# Memory that programs can still take: of the system, and of the container they run in.
-# --------------------
-
-
 CGROUPS = Path("/sys/fs/cgroup")
 """Where Linux shows the limits of containers."""
 
@@ -194,11 +189,6 @@ def _from_utf16(path: Path) -> bytes:
             allowed="plain text",
             remedy="export it as UTF-8",
         ) from None
-
-
-# --------------------
-# Turns the many exceptions of file-format libraries into one-line input errors.
-# --------------------
 
 
 @contextmanager

@@ -30,13 +30,15 @@ def metadata_json(recording: Recording) -> str:
 
     The rig is not part of it: it is a file of its own.
     """
+    speed = recording.speed
+    kind = next((kind for kind, source in _SPEED_KINDS.items() if isinstance(speed, source)), "")
     return json.dumps(
         {
             "layout": LAYOUT,
             "sampling_rate_hz": float(recording.sampling_rate_hz),
             "dtype": recording.samples.dtype.name,
             "channels": [asdict(channel) for channel in recording.channels],
-            "speed": _speed_to_dict(recording.speed),
+            "speed": None if speed is None else {"kind": kind, **asdict(speed)},
             "truth": None if recording.truth is None else dict(recording.truth),
             "warnings": list(recording.warnings),
             "history": list(recording.provenance.history),
@@ -63,13 +65,16 @@ def table_from_metadata(
             RawColumn(str(c["name"]), v, str(c["unit"]), str(c["quantity"]), str(c["position"]))
             for c, v in zip(channels, values, strict=True)
         )
+        speed: SpeedSource | None = None
+        if (source := facts["speed"]) is not None:
+            speed = _SPEED_KINDS[source["kind"]](**{key: part for key, part in source.items() if key != "kind"})
         return RawTable(
             columns,
             reader,
             sampling_rate_hz=float(facts["sampling_rate_hz"]),
             is_own_layout=True,
             warnings=tuple(map(str, facts["warnings"])),
-            speed=_speed_from_dict(facts["speed"]),
+            speed=speed,
             truth=facts["truth"],
             history=tuple(map(str, facts["history"])),
             row_place=row_place,
@@ -97,21 +102,6 @@ def _check_own(layout: str, n_described: int, n_held: int, where: str) -> None:
             allowed="as many columns as are described",
             remedy="the columns were changed after writing: remove the description",
         )
-
-
-def _speed_to_dict(speed: SpeedSource | None) -> dict[str, Any] | None:
-    if speed is None:
-        return None
-    kind = next(kind for kind, cls in _SPEED_KINDS.items() if isinstance(speed, cls))
-    return {"kind": kind, **asdict(speed)}
-
-
-def _speed_from_dict(facts: Mapping[str, Any] | None) -> SpeedSource | None:
-    if facts is None:
-        return None
-    arguments = dict(facts)
-    speed: SpeedSource = _SPEED_KINDS[arguments.pop("kind")](**arguments)
-    return speed
 
 
 def _plain_value(value: Any) -> Any:

@@ -7,12 +7,11 @@ import os
 import re
 import stat
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, count
+from gearsig.checks import closest_match_hint, count
 from gearsig.errors import InputError
 from gearsig.recording._assemble import assemble
 from gearsig.recording._limits import CHUNK_BYTES, read_text_bytes
@@ -72,17 +71,11 @@ def sha256_of(path: Path) -> str:
     return digest.hexdigest()
 
 
-# --------------------
-# Which format a file has: by its extension and by its first bytes, which must agree.
-# --------------------
-
-
 FORMAT_OF_EXTENSION = {ending: file_format for file_format in FORMATS for ending in file_format.endings}
 """What the extension promises."""
 
 ALLOWED_EXTENSIONS = " ".join(FORMAT_OF_EXTENSION) + ", text also with .gz"
 
-HEAD_BYTES = 4096
 
 # What is no recording, so that the error can name it.
 _FOREIGN = (
@@ -100,8 +93,7 @@ _FOREIGN = (
     (b"\x28\xb5\x2f\xfd", "a Zstandard archive"),
     (b"7z\xbc\xaf", "a 7-Zip archive"),
 )
-_PICKLE_STARTS = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
-# Pickle protocols 0 and 1 are text: an opening mark, or a global "cmodule\nname\n".
+# Pickle protocols 2 to 5 begin with a number; 0 and 1 are text: an opening mark, or a global "cmodule\nname\n".
 _TEXT_PICKLE = re.compile(rb"\A(?:\((?:dp|lp|[dl]|i)\d*\n|c[\w.]+\n[\w.]+\n|[\])}]q|\(c[\w.]+\n[\w.]+\n)")
 _MARKUP = re.compile(rb"\A\s*<(?:!doctype|html|\?xml|svg|script)", re.IGNORECASE)
 
@@ -115,10 +107,41 @@ def identify(path: Path) -> FileFormat:
         If there is no such file, it is empty or no regular file, its extension is unknown, or its content is of
         another kind than the extension says.
     """
-    _check_regular(path)
-    promised = _promised(path)
-    head = _head(path)
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as error:
+        hint = ""
+        if path.parent.is_dir() and path.name:
+            hint = closest_match_hint(path.name, (other.name for other in path.parent.iterdir()))
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            f"cannot be opened ({reason})", where=path.name or str(path), allowed="a readable file", remedy=hint
+        ) from None
+    if not stat.S_ISREG(status.st_mode):
+        kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+        raise InputError(f"is {kind}", where=path.name or str(path), allowed="one file", remedy="name the file itself")
+    if status.st_size == 0:
+        raise InputError("is empty", where=path.name, allowed="a file with data", remedy="copy or export it again")
+    endings = [suffix.lower() for suffix in path.suffixes] or [""]
+    packed = endings[-1] == ".gz"
+    promised = FORMAT_OF_EXTENSION.get(endings[-2] if packed and len(endings) > 1 else endings[-1])
+    if packed and promised is not CSV:
+        raise InputError(
+            "only text files are read compressed",
+            where=path.name,
+            allowed=ALLOWED_EXTENSIONS,
+            remedy="unpack it with gunzip",
+        )
+    with path.open("rb") as file:
+        head = file.read(4096)
     kind = content_kind(head)
+    if promised is None:
+        raise InputError(
+            f"extension {path.suffix or '(none)'!r} is not known; the content looks like {kind}",
+            where=path.name,
+            allowed=ALLOWED_EXTENSIONS,
+            remedy="rename or convert the file",
+        )
     if promised.sniff(head) == kind:
         return promised
     hint = "rename it if only the extension is wrong, or export it again"
@@ -136,72 +159,19 @@ def identify(path: Path) -> FileFormat:
 
 def content_kind(head: bytes) -> str:
     """Name the kind of content from a file's first bytes, never by trying to open it."""
-    kind = _foreign_kind(head) or next((kind for f in reversed(FORMATS) if (kind := f.sniff(head))), "")
-    if not kind and b"\0" not in head.rstrip(b"\0"):
-        return "text followed by zero bytes" if b"\0" in head else "binary data of an unknown kind"
-    return kind or "binary data of an unknown kind"
-
-
-def _foreign_kind(head: bytes) -> str:
     if not head.strip(b"\0"):
         return "zero bytes"
-    if head[:2] in _PICKLE_STARTS or _TEXT_PICKLE.match(head):
+    if head[:2] in (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05") or _TEXT_PICKLE.match(head):
         return "a Python pickle"
     if head[:4] in (b"RIFF", b"RIFX", b"RF64") and head[8:12] != b"WAVE":
         return "RIFF but not WAVE"
     if _MARKUP.match(head):
         return "HTML or XML"
-    return next((kind for start, kind in _FOREIGN if head.startswith(start)), "")
-
-
-def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(HEAD_BYTES)
-
-
-def _check_regular(path: Path) -> None:
-    try:
-        status = path.stat()
-    except (OSError, ValueError) as error:
-        hint = ""
-        if path.parent.is_dir() and path.name:
-            hint = closest_match_hint(path.name, (other.name for other in path.parent.iterdir()))
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(
-            f"cannot be opened ({reason})", where=path.name or str(path), allowed="a readable file", remedy=hint
-        ) from None
-    if not stat.S_ISREG(status.st_mode):
-        kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-        raise InputError(f"is {kind}", where=path.name or str(path), allowed="one file", remedy="name the file itself")
-    if status.st_size == 0:
-        raise InputError("is empty", where=path.name, allowed="a file with data", remedy="copy or export it again")
-
-
-def _promised(path: Path) -> FileFormat:
-    suffixes = [suffix.lower() for suffix in path.suffixes]
-    if suffixes[-1:] == [".gz"]:
-        if len(suffixes) > 1 and FORMAT_OF_EXTENSION.get(suffixes[-2]) is CSV:
-            return CSV
-        raise InputError(
-            "only text files are read compressed",
-            where=path.name,
-            allowed=ALLOWED_EXTENSIONS,
-            remedy="unpack it with gunzip",
-        )
-    promised = FORMAT_OF_EXTENSION.get(suffixes[-1] if suffixes else "")
-    if promised is None:
-        raise InputError(
-            f"extension {path.suffix or '(none)'!r} is not known; the content looks like {content_kind(_head(path))}",
-            where=path.name,
-            allowed=ALLOWED_EXTENSIONS,
-            remedy="rename or convert the file",
-        )
-    return promised
-
-
-# --------------------
-# Writes a recording to CSV, HDF5, Parquet, WAV or MAT.
-# --------------------
+    kinds = (*(kind for start, kind in _FOREIGN if head.startswith(start)), *(f.sniff(head) for f in reversed(FORMATS)))
+    kind = next(filter(None, kinds), "")
+    if not kind and b"\0" in head and b"\0" not in head.rstrip(b"\0"):
+        return "text followed by zero bytes"
+    return kind or "binary data of an unknown kind"
 
 
 WRITERS = {ending: f.write for f in FORMATS if f.write is not None for ending in f.written_endings}
@@ -259,25 +229,15 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     unfinished = Path(name)
     try:
         writer(recording, unfinished)
-        unfinished.chmod(0o666 & ~_umask())
+        mask = os.umask(0)  # of the process, which temporary files do not follow
+        os.umask(mask)
+        unfinished.chmod(0o666 & ~mask)
         unfinished.replace(target)
     except OSError as error:
         raise InputError(f"cannot be written ({error})", where=target.name, remedy="check the disk") from error
     finally:
         unfinished.unlink(missing_ok=True)
     return target
-
-
-def _umask() -> int:
-    """Return the process's file mode mask, which temporary files do not follow."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
-# --------------------
-# Reads tachometer pulse times from a text file.
-# --------------------
 
 
 def read_pulse_times(path: str | Path, pulses_per_revolution: int = 1, shaft: str = "") -> PulseTimes:
@@ -323,23 +283,10 @@ def read_pulse_times(path: str | Path, pulses_per_revolution: int = 1, shaft: st
             f"has {layout.n_columns} columns", where=where, allowed="one column of times", remedy="keep the times alone"
         )
     (times,) = parse_rows(data, layout, ("time",), where)
-    _check_times(times, where, lambda row: line_of_row(data, layout, row))
-    unit = split_unit(layout.header[0])[1].casefold() if layout.header else ""
-    if unit not in SECONDS_PER_UNIT:
-        raise InputError(
-            f"the unit of the times is {unit!r}",
-            where=where,
-            allowed="s, ms, us, min",
-            remedy="convert them to seconds",
-        )
-    return PulseTimes(times * SECONDS_PER_UNIT[unit], pulses_per_revolution, shaft)
-
-
-def _check_times(times: FloatArray, where: str, line_of: Callable[[int], int]) -> None:
     bad = np.flatnonzero(~np.isfinite(times))
     if len(bad):
         raise InputError(
-            f"line {line_of(int(bad[0]))}: the time is {times[bad[0]]}",
+            f"line {line_of_row(data, layout, int(bad[0]))}: the time is {times[bad[0]]}",
             where=where,
             allowed="finite numbers",
             remedy="remove the line knowingly",
@@ -356,8 +303,17 @@ def _check_times(times: FloatArray, where: str, line_of: Callable[[int], int]) -
         i = int(back[0])
         verb = "runs backwards" if times[i + 1] < times[i] else "stands still"
         raise InputError(
-            f"line {line_of(i + 1)}: time {verb}, {times[i]:.9g} is followed by {times[i + 1]:.9g}",
+            f"line {line_of_row(data, layout, i + 1)}: time {verb}, {times[i]:.9g} is followed by {times[i + 1]:.9g}",
             where=where,
             allowed="strictly increasing times",
             remedy="sort out where the counter restarted, or cut the file there",
         )
+    unit = split_unit(layout.header[0])[1].casefold() if layout.header else ""
+    if unit not in SECONDS_PER_UNIT:
+        raise InputError(
+            f"the unit of the times is {unit!r}",
+            where=where,
+            allowed="s, ms, us, min",
+            remedy="convert them to seconds",
+        )
+    return PulseTimes(times * SECONDS_PER_UNIT[unit], pulses_per_revolution, shaft)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -79,11 +79,6 @@ class RawTable:
     row_place: Callable[[int], str] = sample_place
 
 
-# --------------------
-# Time columns: how they are recognised, and whether they are uniform enough to stand for a sampling rate.
-# --------------------
-
-
 TIME_NAMES = frozenset(
     (
         *("time", "t", "zeit", "temps", "tiempo", "tempo", "seconds", "sec", "timestamp", "elapsed_time"),
@@ -106,8 +101,6 @@ SECONDS_PER_UNIT = {
     "min": 60.0,
     "h": 3600.0,
 }
-MAX_JITTER = 0.01
-"""Largest deviation of a time stamp from the uniform grid, in sampling steps."""
 
 
 def seconds_per_unit(name: str, unit: str) -> float | None:
@@ -153,24 +146,6 @@ def rate_of_time(values: NumberArray, scale_s: float, where: str, row_place: Cal
         the column's own rounding.
     """
     t: FloatArray = np.asarray(values, dtype=np.float64)
-    _check_usable(t, where, row_place)
-    step = (t[-1] - t[0]) / (len(t) - 1)
-    steps = np.diff(t)
-    worst = int(np.argmin(steps))
-    if steps[worst] <= 0:
-        raise InputError(
-            f"time does not increase at {row_place(worst + 1)}: {t[worst]:.9g} is followed by {t[worst + 1]:.9g}",
-            where=where,
-            allowed="strictly increasing time",
-            remedy="remove doubled rows, export time with more digits, or drop the column and give --fs",
-        )
-    allowed = max(MAX_JITTER * step, 0.51 * _resolution(values, t))
-    if _worst_deviation(t) > allowed:
-        _raise_not_uniform(t, steps, where, row_place)
-    return float(1.0 / (step * scale_s))
-
-
-def _check_usable(t: FloatArray, where: str, row_place: Callable[[int], str]) -> None:
     if len(t) < 2:
         raise InputError(
             f"the time column has {len(t)} value(s)",
@@ -186,14 +161,38 @@ def _check_usable(t: FloatArray, where: str, row_place: Callable[[int], str]) ->
             allowed="finite numbers",
             remedy="cut the file there or export it again",
         )
-
-
-def _worst_deviation(t: FloatArray) -> float:
-    """Largest distance of the times from the straight line fitted to them."""
-    k = np.arange(len(t)) - (len(t) - 1) / 2
-    centred = t - t.mean()
-    slope = (k @ centred) / (k @ k)
-    return float(np.abs(centred - slope * k).max())
+    step = (t[-1] - t[0]) / (len(t) - 1)
+    steps = np.diff(t)
+    i = int(np.argmin(steps))
+    if steps[i] <= 0:
+        raise InputError(
+            f"time does not increase at {row_place(i + 1)}: {t[i]:.9g} is followed by {t[i + 1]:.9g}",
+            where=where,
+            allowed="strictly increasing time",
+            remedy="remove doubled rows, export time with more digits, or drop the column and give --fs",
+        )
+    # Distance of the stamps from the straight line fitted to them.
+    k, centred = np.arange(len(t)) - (len(t) - 1) / 2, t - t.mean()
+    jitter = float(np.abs(centred - (k @ centred) / (k @ k) * k).max())
+    if jitter <= max(0.01 * step, 0.51 * _resolution(values, t)):
+        return float(1.0 / (step * scale_s))
+    median = float(np.median(steps))
+    i = int(np.argmax(np.abs(steps - median)))
+    if steps[i] > 1.5 * median:
+        raise InputError(
+            f"a gap of {steps[i]:.6g} before {row_place(i + 1)} (time {t[i]:.9g} to {t[i + 1]:.9g}); "
+            f"the usual step is {median:.6g}",
+            where=where,
+            allowed="time without gaps",
+            remedy="cut the file at the gap and read the parts",
+        )
+    raise InputError(
+        f"time is not uniform: the worst step, {steps[i]:.6g}, ends at {row_place(i + 1)}; "
+        f"the usual step is {median:.6g}",
+        where=where,
+        allowed="time stamps within 1 % of a step of a uniform grid",
+        remedy="resample to a uniform rate knowingly, or drop the time column and give --fs",
+    )
 
 
 def _resolution(values: NumberArray, t: FloatArray) -> float:
@@ -209,35 +208,6 @@ def _resolution(values: NumberArray, t: FloatArray) -> float:
         if np.abs(scaled - np.round(scaled)).max() < 1e-5:
             return float(10.0**-digits)
     return 0.0
-
-
-def _raise_not_uniform(t: FloatArray, steps: FloatArray, where: str, row_place: Callable[[int], str]) -> None:
-    median = float(np.median(steps))
-    worst = int(np.argmax(np.abs(steps - median)))
-    place = row_place(worst + 1)
-    if steps[worst] > 1.5 * median:
-        raise InputError(
-            f"a gap of {steps[worst]:.6g} before {place} (time {t[worst]:.9g} to {t[worst + 1]:.9g}); "
-            f"the usual step is {median:.6g}",
-            where=where,
-            allowed="time without gaps",
-            remedy="cut the file at the gap and read the parts",
-        )
-    raise InputError(
-        f"time is not uniform: the worst step, {steps[worst]:.6g}, ends at {place}; the usual step is {median:.6g}",
-        where=where,
-        allowed="time stamps within 1 % of a step of a uniform grid",
-        remedy="resample to a uniform rate knowingly, or drop the time column and give --fs",
-    )
-
-
-# --------------------
-# Sorts the named arrays of a MAT or HDF5 file into signals, sampling rate and the rest.
-# --------------------
-
-
-SHORT_SHARE = 0.1
-"""A vector shorter than this share of the longest is no signal beside it but a setting or a result."""
 
 
 @dataclass(frozen=True)
@@ -286,12 +256,15 @@ def table_from_arrays(found: NamedArrays, reader: str, where: str) -> RawTable:
         )
     rate_hz = _one_rate(scalars, found.rates_hz, where)
     longest = max(max(a.shape) for a in signals.values())
-    short = [path for path, a in signals.items() if max(a.shape) < SHORT_SHARE * longest]
+    short = [path for path, a in signals.items() if max(a.shape) < 0.1 * longest]  # a setting or a result
     columns = [c for path, a in signals.items() if path not in short for c in _columns(path, a, found, where)]
+    # A channel is called by the last part of its path where that is unique.
+    leaves = [c.name.rpartition(".")[2] for c in columns]
+    columns = [replace(c, name=leaf) if leaves.count(leaf) == 1 else c for c, leaf in zip(columns, leaves, strict=True)]
     warnings = [*found.warnings, *_speed_hints(scalars)]
     if short:
         warnings.append(f"shorter than a tenth of the longest signal and left out: {', '.join(short[:8])}")
-    return RawTable(tuple(_with_short_names(columns)), reader, sampling_rate_hz=rate_hz, warnings=tuple(warnings))
+    return RawTable(tuple(columns), reader, sampling_rate_hz=rate_hz, warnings=tuple(warnings))
 
 
 def _columns(path: str, array: NumberArray, found: NamedArrays, where: str) -> list[RawColumn]:
@@ -307,16 +280,6 @@ def _columns(path: str, array: NumberArray, found: NamedArrays, where: str) -> l
             remedy="save each channel as a vector",
         )
     return [RawColumn(f"{path}_{i + 1}", row, unit) for i, row in enumerate(over_time)]
-
-
-def _with_short_names(columns: list[RawColumn]) -> list[RawColumn]:
-    """Call a channel by the last part of its path where that is unique."""
-    from dataclasses import replace
-
-    leaves = [c.name.rpartition(".")[2] for c in columns]
-    return [
-        replace(c, name=leaf if leaves.count(leaf) == 1 else c.name) for c, leaf in zip(columns, leaves, strict=True)
-    ]
 
 
 def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: Mapping[str, float], where: str) -> float | None:

@@ -17,10 +17,6 @@ from gearsig.rig import QUANTITIES, Rig, SpeedSource
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-# --------------------
-# What names and units of columns mean: sampling rates, quantities, units in brackets.
-# --------------------
-
 
 RATE_NAMES = frozenset(
     (
@@ -40,49 +36,20 @@ INTERVAL_NAMES = frozenset(
 SPEED_NAMES = frozenset(("rpm", "rate", "speed", "shaftspeed", "rotspeed", "speedrpm", "drehzahl", "shaftrate", "hz"))
 """Names of scalars that may be a shaft speed; told to the user, never used."""
 
-_QUANTITY_OF_UNIT = {
-    "m/s^2": "acceleration",
-    "m/s2": "acceleration",
-    "m/s²": "acceleration",
-    "m/s**2": "acceleration",
-    "ms-2": "acceleration",
-    "mm/s^2": "acceleration",
-    "mm/s²": "acceleration",
-    "g": "acceleration",
-    "gn": "acceleration",
-    "g_n": "acceleration",
-    "mg": "acceleration",
-    "m/s": "velocity",
-    "mm/s": "velocity",
-    "in/s": "velocity",
-    "ips": "velocity",
-    "mm": "displacement",
-    "µm": "displacement",
-    "μm": "displacement",
-    "um": "displacement",
-    "mil": "displacement",
-    "pa": "sound_pressure",
-    "n": "force",
-    "kn": "force",
-    "nm": "torque",
-    "n*m": "torque",
-    "n·m": "torque",
-    "rpm": "rotational_speed",
-    "r/min": "rotational_speed",
-    "tr/min": "rotational_speed",
-    "u/min": "rotational_speed",
-    "1/min": "rotational_speed",
-    "min^-1": "rotational_speed",
-    "rad/s": "rotational_speed",
-    "rad": "angle",
-    "rad/s^2": "angular_acceleration",
-    "rad/s2": "angular_acceleration",
-    "rad/s²": "angular_acceleration",
-    "°c": "temperature",
-    "degc": "temperature",
-    "v": "voltage",
-    "mv": "voltage",
+UNITS_OF_QUANTITY = {
+    "acceleration": ("m/s^2", "m/s2", "m/s²", "m/s**2", "ms-2", "mm/s^2", "mm/s²", "g", "gn", "g_n", "mg"),
+    "velocity": ("m/s", "mm/s", "in/s", "ips"),
+    "displacement": ("mm", "µm", "μm", "um", "mil"),
+    "sound_pressure": ("pa",),
+    "force": ("n", "kn"),
+    "torque": ("nm", "n*m", "n·m"),
+    "rotational_speed": ("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1", "rad/s"),
+    "angle": ("rad",),
+    "angular_acceleration": ("rad/s^2", "rad/s2", "rad/s²"),
+    "temperature": ("°c", "degc"),
+    "voltage": ("v", "mv"),
 }
+_QUANTITY_OF_UNIT = {unit: quantity for quantity, units in UNITS_OF_QUANTITY.items() for unit in units}
 RPM_UNITS = frozenset(("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1"))
 
 _RATE_LINE = re.compile(
@@ -417,11 +384,6 @@ class Recording:
     def _changed(self, step: str, **changes: Any) -> Recording:
         provenance = replace(self.provenance, history=(*self.provenance.history, step))
         return replace(self, provenance=provenance, **changes)
-
-
-# --------------------
-# Units that files use, in SI units.
-# --------------------
 
 
 SI_FACTORS = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -10,17 +11,13 @@ from pathlib import Path
 from urllib.parse import quote
 
 from gearsig import __version__
-from gearsig.diagnosis import Analysis, Finding, Kind, Outcome
+from gearsig.diagnosis import Analysis, Kind, Outcome
 from gearsig.formatting import readable
 from gearsig.indicators import Indicator
-from gearsig.plot import Picture, embed, unit_text
+from gearsig.plot import Picture, embed, unit_text, with_unit
 from gearsig.report._files import render, write_text
 from gearsig.report._sections import css_class
 from gearsig.severity import CrackEstimate
-
-# --------------------
-# What the index page needs to know of each recording; small, so that it travels between processes.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -69,6 +66,10 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
     """Sum up an analysis for the index page."""
     claims = (f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION))
     top = min(claims, key=lambda finding: finding.kind is not Kind.FAULT, default=None)
+    crack_mm, crack = None, analysis.crack
+    if isinstance(crack, CrackEstimate) and not crack.likelier_other and top is not None:
+        is_of_crack = (top.where.gear, top.where.angle_deg) == (crack.gear, crack.angle_deg)
+        crack_mm = crack.depth_mm if is_of_crack else None
     return Entry(
         name,
         page,
@@ -77,16 +78,8 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         top.confidence if top is not None else None,
         top.strength.ratio_db if top is not None and top.strength is not None else None,
         analysis.indicators,
-        _crack_mm(analysis, top),
+        crack_mm,
     )
-
-
-def _crack_mm(analysis: Analysis, top: Finding | None) -> float | None:
-    """Return the depth of a crack, where it is what the verdict is about."""
-    crack = analysis.crack
-    if not isinstance(crack, CrackEstimate) or crack.likelier_other or top is None:
-        return None
-    return crack.depth_mm if top.where.gear == crack.gear and top.where.angle_deg == crack.angle_deg else None
 
 
 def by_severity(entry: Entry) -> tuple[int, float, float, float, str]:
@@ -97,15 +90,14 @@ def by_severity(entry: Entry) -> tuple[int, float, float, float, str]:
 
 KEY_INDICATORS = ("FM4", "kurtosis", "sideband index", "NA4", "sideband level", "FM0", "rms", "crest factor")
 """Indicators the index compares, where they were computed: tooth-local first, then impulsive, modulation, level."""
-_SUMMARY = {
+
+
+OUTCOME_WORDS = {
     Outcome.FAULT: "with a fault",
     Outcome.SUSPICION: "with a suspicion",
     Outcome.CANNOT_TELL: "without an answer",
     Outcome.NO_FAULT: "without a fault found",
 }
-N_COLUMNS = 3
-N_PANELS = 6
-MOST_IN_FIGURE = 40
 
 
 @dataclass(frozen=True)
@@ -156,15 +148,30 @@ def write_index(
         Of the page.
     """
     ordered = sorted(entries, key=by_severity)
-    names = _key_names(ordered)
-    columns = names[:N_COLUMNS]
+    present = {i.name for entry in ordered for i in entry.indicators if isfinite(i.value)}
+    names = [name for name in KEY_INDICATORS if name in present]
+    columns = [_column(ordered, name) for name in names[:3]]
+    rows = [
+        IndexRow(
+            entry,
+            css_class(entry.outcome),
+            quote(entry.page),
+            f"{100 * entry.confidence:.0f} %" if entry.confidence is not None else "",
+            _size_text(entry),
+            tuple(cells[i] for _, cells in columns),
+        )
+        for i, entry in enumerate(ordered)
+    ]
+    counts = Counter(OUTCOME_WORDS[entry.outcome] for entry in ordered)
+    parts = [f"{n} {words}" for words, n in counts.items()] + ([f"{len(failures)} not analysed"] if failures else [])
+    n_files = len(ordered) + len(failures)
     html = render(
         "index.html.j2",
-        rows=_rows(ordered, columns),
-        columns=[_heading(ordered, name) for name in columns],
-        summary=_summary(ordered, failures),
+        rows=rows,
+        columns=[heading for heading, _ in columns],
+        summary=f"{n_files} recording{'s' * (n_files != 1)}: {', '.join(parts)}" if parts else "No recordings",
         failures=failures,
-        picture=_picture(ordered, names[:N_PANELS]),
+        picture=_picture(ordered, names[:6]),
         command=command,
         version=__version__,
         date=(date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip(),
@@ -172,72 +179,44 @@ def write_index(
     return write_text(Path(path), html)
 
 
-def _key_names(entries: Sequence[Entry]) -> list[str]:
-    """Return the key indicators that have a value somewhere."""
-    present = {i.name for entry in entries for i in entry.indicators if isfinite(i.value)}
-    return [name for name in KEY_INDICATORS if name in present]
+def _column(entries: Sequence[Entry], name: str) -> tuple[str, list[IndexCell]]:
+    """Return an indicator's heading, and its largest value in each recording.
 
-
-def _rows(entries: Sequence[Entry], columns: Sequence[str]) -> list[IndexRow]:
-    largest = {name: [_largest(entry, name) for entry in entries] for name in columns}
-    return [
-        IndexRow(
-            entry,
-            css_class(entry.outcome),
-            quote(entry.page),
-            f"{100 * entry.confidence:.0f} %" if entry.confidence is not None else "",
-            _size(entry),
-            tuple(_cell(values[i], values) for values in largest.values()),
+    Bars begin at zero: they stand where the column has one unit and no negative value.
+    """
+    known = [[i for i in entry.indicators if i.name == name and isfinite(i.value)] for entry in entries]
+    units = {i.unit for items in known for i in items}
+    largest = [max(items, key=lambda i: i.value, default=None) for items in known]
+    values = [i.value for i in largest if i is not None]
+    top = max(values)
+    shown = {i.unit for i in largest if i is not None}
+    has_bars = len(shown) == 1 and min(values) >= 0 and top > 0
+    cells = [
+        IndexCell("–", 0.0)
+        if i is None
+        else IndexCell(
+            readable(i.value, 3) + ("" if len(shown) == 1 else f" {unit_text(i.unit)}"),
+            round(100 * i.value / top, 1) if has_bars else 0.0,
         )
-        for i, entry in enumerate(entries)
+        for i in largest
     ]
+    return with_unit(name, units.pop() if len(units) == 1 else ""), cells
 
 
-def _size(entry: Entry) -> str:
+def _size_text(entry: Entry) -> str:
     """Return the depth of a crack, or how far a finding is over its floor."""
     if entry.crack_mm is not None:
         return f"{entry.crack_mm:.1f} mm"
     return f"{readable(entry.ratio_db, 3)} dB" if entry.ratio_db is not None else "–"
 
 
-def _largest(entry: Entry, name: str) -> Indicator | None:
-    found = [i for i in entry.indicators if i.name == name and isfinite(i.value)]
-    return max(found, key=lambda i: i.value, default=None)
-
-
-def _cell(own: Indicator | None, column: Sequence[Indicator | None]) -> IndexCell:
-    """Return an indicator with a bar from zero, where the column has one unit and no negative value."""
-    if own is None:
-        return IndexCell("–", 0.0)
-    known = [i for i in column if i is not None]
-    comparable = len({i.unit for i in known}) == 1 and all(i.value >= 0 for i in known)
-    top = max(i.value for i in known)
-    unit = "" if len({i.unit for i in known}) == 1 else f" {unit_text(own.unit)}"
-    return IndexCell(readable(own.value, 3) + unit, round(100 * own.value / top, 1) if comparable and top > 0 else 0.0)
-
-
-def _heading(entries: Sequence[Entry], name: str) -> str:
-    units = {i.unit for entry in entries for i in entry.indicators if i.name == name and isfinite(i.value)}
-    unit = units.pop() if len(units) == 1 else ""
-    return f"{name} ({unit_text(unit)})" if unit else name
-
-
-def _summary(entries: Sequence[Entry], failures: Sequence[Failure]) -> str:
-    counts: dict[str, int] = {}
-    for entry in entries:
-        counts[_SUMMARY[entry.outcome]] = counts.get(_SUMMARY[entry.outcome], 0) + 1
-    parts = [f"{n} {words}" for words, n in counts.items()] + ([f"{len(failures)} not analysed"] if failures else [])
-    n_files = len(entries) + len(failures)
-    return f"{n_files} recording{'s' if n_files != 1 else ''}: {', '.join(parts)}" if parts else "No recordings"
-
-
 def _picture(entries: Sequence[Entry], names: Sequence[str]) -> Picture | None:
     """Return the dots of the key indicators, where there are recordings to compare."""
-    if len(entries) < 2 or not names:
-        return None
     from gearsig.plot import trend_figure
 
-    shown = entries[:MOST_IN_FIGURE]
+    if len(entries) < 2 or not names:
+        return None
+    shown = entries[:40]
     rest = f" The {len(shown)} most severe of {len(entries)} recordings." if len(shown) < len(entries) else ""
     faulty = [entry.name for entry in shown if entry.outcome is Outcome.FAULT]
     return embed(

@@ -25,8 +25,8 @@ def recordings(tmp_path) -> list[Path]:
     rng = np.random.default_rng(3)
     paths = []
     for name in ("one", "two"):
-        time_s = np.arange(4096) / RATE_HZ
-        table = np.column_stack([time_s, np.sin(2 * np.pi * 200 * time_s) + 0.1 * rng.normal(size=4096)])
+        time_s = np.arange(2048) / RATE_HZ
+        table = np.column_stack([time_s, np.sin(2 * np.pi * 200 * time_s) + 0.1 * rng.normal(size=2048)])
         paths.append(tmp_path / f"{name}.csv")
         np.savetxt(paths[-1], table, delimiter=",", header="time (s),a1 (m/s^2)", comments="", fmt="%.9f")
     return paths
