@@ -12,15 +12,6 @@ from gearsig.comparison._types import Alignment, ChannelComparison, LineLevel
 WITHIN_DB = 3.0
 """Levels this close are called agreement: a factor of √2."""
 
-LARGE_GAIN_DB = 3.0
-"""A common gain beyond it is named on its own: it is the path's or the sensor's, not the gears'."""
-
-WORTH_NAMING_DB = 40.0
-"""A line that one record lacks is named if it is so close to the other's strongest, or closer."""
-
-LACKING_DB = 6.0
-"""And if the other record's noise would let a line half as large be seen."""
-
 
 MIN_REPEATED = 0.3
 """Correlation that two averages could reach, below which they say nothing of each other: their halves differ."""
@@ -40,7 +31,8 @@ def missing_words(line: LineLevel) -> str:
 def _is_hidden(line: LineLevel) -> bool:
     """Whether the record that does not show a line would not show it either if it were there."""
     difference_db = line.level.difference_db
-    return (difference_db if line.simulated_is_seen else -difference_db) <= LACKING_DB
+    # 6 dB: a line half as large would be seen above the other record's noise.
+    return (difference_db if line.simulated_is_seen else -difference_db) <= 6.0
 
 
 def verdict_of(channels: Sequence[ChannelComparison]) -> str:
@@ -102,7 +94,8 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
         return f"Simulation and recording agree within {largest:.1f} dB at {n}."
     spread = float(np.max(np.abs(differences - gain)))
     text = f"Simulation and recording differ by up to {largest:.1f} dB at {n}{_worst(worst, 0.0)}"
-    if len(lines) > 1 and abs(gain) > LARGE_GAIN_DB and spread < largest:
+    # A common gain beyond 3 dB is named on its own: it is the path's or the sensor's, not the gears'.
+    if len(lines) > 1 and abs(gain) > 3.0 and spread < largest:
         text += f"; a common gain of {_decibels(-gain)} would bring them within {spread:.1f} dB"
     return f"{text}."
 
@@ -126,7 +119,8 @@ def _missing_texts(channel: ChannelComparison) -> list[str]:
         ]
         side = "recorded_db" if seen.startswith("recorded") else "simulated_db"
         strongest = max(getattr(line.level, side) for line in (*channel.lines, *channel.other_lines))
-        missing = [line for line in missing if getattr(line.level, side) > strongest - WORTH_NAMING_DB]
+        # A line that one record lacks is named if it is within 40 dB of the other's strongest.
+        missing = [line for line in missing if getattr(line.level, side) > strongest - 40.0]
         missing.sort(key=lambda line: -float(getattr(line.level, side)))
         if missing:
             texts.append(f"{words} {', '.join(line.label for line in missing[:3])}{_more(len(missing) - 3)}.")
@@ -178,9 +172,6 @@ SAME_SPEED, OTHER_SPEED = 0.03, 0.10
 
 STEADY = 0.03
 """Relative range of speed within one record up to which one average stands for all of it."""
-
-WORTH_SAYING = 0.1
-"""Correlation that a turned mark would gain."""
 
 
 def notes_of(
@@ -256,7 +247,7 @@ def _speed_words(side: ComparedSide, name: str) -> str:
 def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:
     texts = []
     for alignment in alignments:
-        if alignment.method == "marks" and alignment.gain > WORTH_SAYING:
+        if alignment.method == "marks" and alignment.gain > 0.1:
             turned = f"{alignment.best_shift_deg:+.4g}°".replace("-", "−")
             texts.append(
                 f"The averages{_of([alignment])} are aligned by their marks; with the simulation turned by {turned} "

@@ -12,15 +12,8 @@ from gearsig.errors import RefusalError
 from gearsig.motion._segments import MotionSegments
 from gearsig.motion._types import PairMotion
 
-LOADED = 0.1
-"""Part of the ordinary load from which on a sample tells where a flank is."""
 MIN_SAMPLES = 12
 """On either flank."""
-FAR = 4.0
-"""Standard deviations from the fit beyond which a sample is left out: the middle of a blow, a slipped count."""
-MAX_ROUNDS = 20
-MIN_PART = 0.5
-"""Of the rig's play: without torque, less is the deflection of one flank and not the way to the other."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +67,8 @@ def estimate_backlash(motion: PairMotion) -> BacklashEstimate:
     force = motion.tooth_force_from_torque_n
     if force is None:
         return _lost_motion(motion)
-    loaded = np.abs(force) > LOADED * float(np.quantile(np.abs(force), 0.9))
+    # From a tenth of the ordinary load on a sample tells where a flank is.
+    loaded = np.abs(force) > 0.1 * float(np.quantile(np.abs(force), 0.9))
     side = np.sign(force)
     _check_sides(int(np.sum(loaded & (side > 0))), int(np.sum(loaded & (side < 0))))
     n_pairs = motion.path.n_pairs(motion.driver_angle_rad, side)
@@ -86,11 +80,12 @@ def estimate_backlash(motion: PairMotion) -> BacklashEstimate:
 def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -> BacklashEstimate:
     q = motion.compression_m
     keep = loaded
-    for _ in range(MAX_ROUNDS):
+    for _ in range(20):
         x, *_ = np.linalg.lstsq(design[keep], q[keep], rcond=None)
         residual = q - design @ x
         scatter = 1.4826 * float(np.median(np.abs(residual[keep]))) or float(np.finfo(float).tiny)
-        again = loaded & (np.abs(residual) < FAR * scatter)
+        # What is four standard deviations off is left out: the middle of a blow, a slipped count.
+        again = loaded & (np.abs(residual) < 4.0 * scatter)
         _check_sides(int(np.sum(again & (design[:, 1] > 0))), int(np.sum(again & (design[:, 1] < 0))))
         if np.array_equal(again, keep):
             break
@@ -145,7 +140,8 @@ def _lost_motion(motion: PairMotion) -> BacklashEstimate:
     _check_sides(len(drive), len(back))
     scatter = 1.4826 * float(np.median(np.abs(drive - np.median(drive))))
     drawn = 2e-6 * motion.contact.half_backlash_um
-    if high - low < max(6.0 * scatter, MIN_PART * drawn):
+    # Less than half of the rig's play is the deflection of one flank and not the way to the other.
+    if high - low < max(6.0 * scatter, 0.5 * drawn):
         raise RefusalError(
             f"the flanks move by {1e6 * (high - low):.3g} µm against each other, the play drawn is {1e6 * drawn:.3g} "
             f"µm and the noise {1e6 * scatter:.2g} µm: only one flank was loaded, or it cannot be told",
@@ -170,11 +166,6 @@ def _check_sides(n_drive: int, n_back: int) -> None:
             f"{n_drive} samples load the drive flank and {n_back} the back flank: the play between them does not show",
             remedy="record a reversal, or a stop with a brake: both flanks must carry",
         )
-
-
-# --------------------
-# Torque over twist: the loop that play and friction make, and the work it takes.
-# --------------------
 
 
 LIGHT = (0.1, 0.5)

@@ -14,14 +14,6 @@ from gearsig.motion._types import Datum, ForceError, ForceEstimate, PairMotion
 from gearsig.recording import Recording
 from gearsig.rig import Rig, ToothContact, contact_pair, path_of_contact
 
-# --------------------
-# Force of a contact from depth and closing speed, sample by sample.
-# --------------------
-
-
-SLIDING_SIGN_MPS = 2e-3
-"""Sliding speed below which the sign of friction is brought over smoothly: bristles that bend are not followed."""
-
 
 def depth(compression_m: FloatArray, half_backlash_m: float) -> FloatArray:
     """g: beyond the backlash, with the flank's sign; 0 in the gap."""
@@ -67,7 +59,8 @@ def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArr
     for younger in (0.0, 1.0):
         rho_1 = path.driver_lever_m(first + younger)
         sliding = flank * (motion.driven_speed_rad_s * (path.length_m - rho_1) - motion.driver_speed_rad_s * rho_1)
-        sign = np.clip(sliding / SLIDING_SIGN_MPS, -1.0, 1.0)
+        # Below 2 mm/s the sign of friction is brought over smoothly: bristles that bend are not followed.
+        sign = np.clip(sliding / 2e-3, -1.0, 1.0)
         lever = (rho_1, path.length_m - rho_1)[gear]
         share = 1.0 - motion.contact.friction_coefficient * sign * lever / path.base_radii_m[gear]
         total += np.where((younger == 0.0) | (n > 1.5), share, 0.0)
@@ -75,16 +68,7 @@ def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArr
     return result
 
 
-# --------------------
-# The zero of the compression: encoders start anywhere, and a loaded flank gives way by hundredths of a millimetre.
-# --------------------
-
-
-LOADED = 0.2
-"""Part of the load of one sample in twenty from which on a sample counts as loaded: no single blow decides."""
 MIN_SAMPLES = 20
-AGREEMENT = 0.35
-"""How far the width between both flanks may be from the rig's backlash, as a part of it, for a datum without torque."""
 
 
 def find_datum(motion: PairMotion, wanted: str | float = "auto") -> Datum:
@@ -124,7 +108,8 @@ def elastic_depth(motion: PairMotion, force_n: FloatArray) -> FloatArray:
 def _from_torque(motion: PairMotion) -> Datum:
     """Median of q − sgn(F) a − g(F) over loaded samples: the mean depth then carries the measured torque."""
     _, force = motion.torque_and_tooth_force()
-    loaded = np.abs(force) > LOADED * np.quantile(np.abs(force), 0.95)
+    # Loaded: above a fifth of what one sample in twenty carries, so that no single blow decides.
+    loaded = np.abs(force) > 0.2 * np.quantile(np.abs(force), 0.95)
     if np.count_nonzero(loaded) < MIN_SAMPLES or not np.any(force):
         raise RefusalError(
             f"{np.count_nonzero(loaded)} samples carry a load: the zero of the compression cannot be found",
@@ -140,7 +125,7 @@ def _from_torque(motion: PairMotion) -> Datum:
 def _between_flanks(motion: PairMotion) -> Datum:
     low, high = np.quantile(motion.compression_m, [0.01, 0.99])
     play = 2e-6 * motion.contact.half_backlash_um
-    if not play or abs(high - low - play) > AGREEMENT * play:
+    if not play or abs(high - low - play) > 0.35 * play:
         raise RefusalError(
             f"there is no torque, and the distance between the flanks spans {1e6 * (high - low):.4g} µm where the "
             f"backlash is {1e6 * play:.4g} µm: which flank touches cannot be told",
@@ -303,11 +288,6 @@ def _descriptions(motion: PairMotion, stiffness: float, damping: float, names: s
         KELVIN_VOIGT: f"one pair, drive flank; {stiffness:.4g} N/m and {damping:.4g} N s/m, at the median load",
     }
     return {name: text for name, text in texts.items() if name in names}
-
-
-# --------------------
-# Noise of the motion at which the piecewise model is no better than Hunt–Crossley.
-# --------------------
 
 
 LEVELS_UM = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)

@@ -16,15 +16,6 @@ from gearsig.motion._impacts import meeting_speeds
 from gearsig.motion._types import PairMotion
 from gearsig.rig import damping_ratio_s_per_m
 
-# --------------------
-# Nonlinear least squares without far samples, with a covariance that knows the noise's colour.
-# --------------------
-
-
-FAR = 5.0
-"""Standard deviations beyond which a sample is left out: flanks that just part, counts that slipped."""
-MAX_ROUNDS = 8
-ALIKE = 0.9
 N_BLOCKS = 8
 """Of the jackknife."""
 
@@ -73,7 +64,7 @@ class RobustFit:
         correlation = self.covariance[i] / (deviations[i] * deviations)
         correlation[i] = 0.0
         j = int(np.argmax(np.abs(correlation)))
-        return (self.names[j], float(correlation[j])) if abs(correlation[j]) > ALIKE else ("", 0.0)
+        return (self.names[j], float(correlation[j])) if abs(correlation[j]) > 0.9 else ("", 0.0)
 
 
 def robust_fit(
@@ -108,12 +99,13 @@ def robust_fit(
     """
     keep: NDArray[np.bool_] = usable
     x: FloatArray = first / scale
-    for _ in range(MAX_ROUNDS):
+    for _ in range(8):
         _check_samples(keep, len(names))
         x, jacobian = _solve(residuals, x, scale, keep)
         residual = residuals(x * scale)
         scatter = 1.4826 * float(np.median(np.abs(residual[keep])))
-        again = usable & (np.abs(residual) <= FAR * max(scatter, min_scatter))
+        # What is five standard deviations off is left out: flanks that just part, counts that slipped.
+        again = usable & (np.abs(residual) <= 5.0 * max(scatter, min_scatter))
         if np.array_equal(again, keep):
             break
         keep = again
@@ -184,11 +176,6 @@ def _check_samples(keep: NDArray[np.bool_], n_parameters: int) -> None:
         )
 
 
-# --------------------
-# The equation of the loaded flanks, for a fit: compression from torque.
-# --------------------
-
-
 EDGE = 0.09
 """Base pitches around the entry and exit of a pair that are left out: there it carries a part of its load."""
 PITCH_POINT, SLOW = 0.1, 0.15
@@ -196,8 +183,6 @@ PITCH_POINT, SLOW = 0.1, 0.15
 known: bristles bend."""
 LOADED = 0.1
 """Part of the ordinary load from which on a sample is taken."""
-MIN_SCATTER_M = 2e-8
-"""What the equation leaves out: bristles that bend, a damping that is latched a little early."""
 LONG_CONTACT, MAX_LONG = 40, 8
 """Samples from which on a contact whose speed of meeting is not known gets a damping of its own, and how many do."""
 NAMES = ("datum", "half_backlash", "log stiffness", "damping", "driver inertia", "friction")
@@ -259,13 +244,14 @@ class ContactEquation:
         rows = list(self.free)
         inertia = max(self.motion.contact.driver_inertia_kg_m2, 1e-3)
         scale = np.array([1e-6, 1e-6, 1.0, 0.01, inertia, 0.05, *[1.0] * (len(self.start) - len(NAMES))])
+        # The equation leaves out 20 nm: bristles that bend, a damping that is latched a little early.
         return robust_fit(
             self.residuals,
             self.start[rows],
             scale[rows],
             self.usable,
             tuple(names[i] for i in rows),
-            min_scatter=MIN_SCATTER_M,
+            min_scatter=2e-8,
             with_jackknife=with_jackknife,
         )
 
@@ -344,11 +330,6 @@ def _clear(motion: PairMotion, side: FloatArray) -> NDArray[np.bool_]:
     return clear
 
 
-# --------------------
-# Parameters of a drive from data, with intervals and what cannot be told.
-# --------------------
-
-
 @dataclass(frozen=True)
 class FittedParameter:
     """One parameter.
@@ -409,10 +390,6 @@ class Identification:
 TOLD = 0.5
 """Half width of the interval over the value beyond which a parameter cannot be told."""
 NORMAL_95 = 1.96
-TURNING = 0.1
-"""Part of the ordinary speed of the driven gear from which on its friction slides."""
-MIN_SCATTER = 1e-3
-"""Part of the ordinary acceleration that the load's equation leaves out."""
 ONE_FLANK = "only one flank was loaded: play and zero of the angles cannot be told apart; record a stop with a brake"
 ONE_ZERO = "only one flank was loaded: it is told from the zero of the angles by little; record a stop with a brake"
 NAMES_OF_RESULT = {
@@ -496,7 +473,8 @@ def _fit_load(motion: PairMotion, inertia_kg_m2: float) -> RobustFit:
     (torque, _), w = motion.torque_and_tooth_force(), motion.driven_speed_rad_s
     force = (torque - inertia_kg_m2 * motion.driver_acceleration_rad_s2) / r1
     drive = r2 * force * friction_share(motion, force, 1) / friction_share(motion, force, 0)
-    turning = np.abs(w) > TURNING * float(np.quantile(np.abs(w), 0.95))
+    # From a tenth of the ordinary speed on the driven gear's friction slides.
+    turning = np.abs(w) > 0.1 * float(np.quantile(np.abs(w), 0.95))
     if np.sum(turning) < 10 * MIN_SAMPLES:
         raise RefusalError("the driven gear hardly turns", remedy="record a start or a stop")
 
@@ -507,13 +485,14 @@ def _fit_load(motion: PairMotion, inertia_kg_m2: float) -> RobustFit:
 
     guess = motion.contact.driven_inertia_kg_m2 or 10.0
     ordinary = float(np.quantile(np.abs(drive), 0.9)) or 1.0
+    # The load's equation leaves out a thousandth of the ordinary acceleration.
     return robust_fit(
         residuals,
         np.array([1.0 / guess, 0.5 * ordinary, 0.05 * ordinary]),
         np.array([1.0 / guess, ordinary, ordinary]),
         turning,
         ("inverse inertia", "load_friction_nm", "load_viscous_nm_s_per_rad"),
-        min_scatter=MIN_SCATTER * ordinary / guess,
+        min_scatter=1e-3 * ordinary / guess,
     )
 
 
@@ -598,11 +577,6 @@ def _alike(fit: RobustFit, own: str) -> str:
 def _why(fit: RobustFit, own: str) -> str:
     like = _alike(fit, own)
     return "the record hardly depends on it" + (f", and it is mistaken for {like}" if like else "")
-
-
-# --------------------
-# Teeth that yield more than the others: from the compression that the fitted contact does not explain.
-# --------------------
 
 
 CERTAIN = 5.0

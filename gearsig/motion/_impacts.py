@@ -13,13 +13,6 @@ from gearsig.errors import RefusalError
 from gearsig.motion._force import depth
 from gearsig.motion._types import PairMotion
 
-# --------------------
-# The flight of the flanks through the play: a parabola, and the speed at which it meets a flank.
-# --------------------
-
-
-LONGEST_S = 3e-3
-"""Next to the flank: further away, a valve that moves or a friction that turns has changed the acceleration."""
 MAX_SAMPLES = 60
 
 
@@ -75,7 +68,8 @@ def fit_flight(
         Standard deviations of compression and rate.
     at_end : bool
     """
-    most = int(np.clip(round(LONGEST_S * sampling_rate_hz), 3, MAX_SAMPLES))
+    # 3 ms next to the flank: before that, a valve that moves or friction that turns has changed the acceleration.
+    most = int(np.clip(round(3e-3 * sampling_rate_hz), 3, MAX_SAMPLES))
     chosen = np.arange(max(first, last - most), last) if at_end else np.arange(first, min(last, first + most))
     t = (chosen - chosen[0]) / sampling_rate_hz
     rows = [np.stack([np.ones_like(t), t, t**2], axis=1) / max(scatter[0], 1e-12)]
@@ -94,8 +88,6 @@ NOISE_DEPTH = 4.0
 """Depth that counts as touching, in standard deviations of the compression's noise."""
 MIN_FLIGHT_SAMPLES = 2
 """In the play ahead of a contact: fewer, and the speed of impact is that of a contact that never ended."""
-LONGEST_BOUNCE = 6.0
-"""In times of a free elastic impact: a longer contact is carried, not bounced off."""
 
 
 @dataclass(frozen=True)
@@ -290,7 +282,8 @@ def _impact(motion: PairMotion, flights: _Flights, g: FloatArray, before: Run, t
     angle = float(np.interp(time, [(first - 1) * step, first * step], motion.driver_angle_rad[first - 1 : first + 1]))
     restitution, note = float("nan"), ""
     bounced = after is not None and after[0] == 0 and after[2] - after[1] >= MIN_FLIGHT_SAMPLES
-    if bounced and speed > 0.0 and (last - first - 1) * step < LONGEST_BOUNCE * _bounce_s(motion, speed, mass):
+    # A contact longer than six free elastic impacts is carried, not bounced off.
+    if bounced and speed > 0.0 and (last - first - 1) * step < 6.0 * _bounce_s(motion, speed, mass):
         assert after is not None  # noqa: S101  bounced says so
         restitution = max(flights.leaves(after, flank), 0.0) / speed
         if restitution > 1.0:

@@ -14,11 +14,6 @@ from gearsig.motion._types import PairMotion, stands
 from gearsig.recording import Channel, Recording
 from gearsig.rig import EncoderChannel, GearPair, PathOfContact, Rig, contact_pair, path_of_contact
 
-# --------------------
-# Which channel measures which motion of which gear.
-# --------------------
-
-
 QUANTITY_OF = {
     "angle": ("angle", "encoder"),
     "speed": ("rotational_speed",),
@@ -127,16 +122,6 @@ def _side_of(channel: Channel, pair: GearPair) -> str:
     return ""
 
 
-# --------------------
-# Speed and acceleration channels whose scale is wrong: told by the angle, which a counter cannot misread.
-# --------------------
-
-
-WINDOW_S = 0.05
-"""Over which changes are compared: longer than flanks ring, shorter than a start."""
-MIN_WINDOWS = 8
-MAX_OF_ONE = 0.5
-"""Of the sum of squares that a single window may have."""
 ALLOWED = {1: 0.03, 2: 0.06}
 """Parts by which scales of speeds and of accelerations may differ."""
 MIN_RATE_HZ = {1: 0.0, 2: 4000.0}
@@ -169,9 +154,10 @@ def channel_scale(
     scale, standard_error : float
         1 where both agree; nan and nan where hardly anything moved, or in one window alone.
     """
-    step = max(2, round(WINDOW_S * sampling_rate_hz))
+    # Changes over 50 ms are compared: longer than flanks ring, shorter than a start.
+    step = max(2, round(0.05 * sampling_rate_hz))
     edges = np.arange(0, len(angle_rad), step)
-    if len(edges) <= MIN_WINDOWS:
+    if len(edges) <= 8:
         return float("nan"), float("nan")
     summed = rate
     for _ in range(order):
@@ -179,7 +165,8 @@ def channel_scale(
     x, y = np.diff(angle_rad[edges], order), np.diff(summed[edges], order)
     powers, products = x * x, x * y
     total = float(np.sum(powers))
-    if float(np.max(powers)) >= MAX_OF_ONE * total:
+    # A single window may have half of the sum of squares at most.
+    if float(np.max(powers)) >= 0.5 * total:
         return float("nan"), float("nan")
     without = (np.sum(products) - products) / (total - powers)
     error = sqrt((len(x) - 1.0) * float(np.var(without)))
@@ -221,21 +208,6 @@ def check_scale(
     )
 
 
-# --------------------
-# Angle channels that wrap or jump: told, not repaired.
-# --------------------
-
-
-MIN_JUMP_RAD = 2e-3 * pi
-"""A thousandth of a revolution: no gear with its load gets there and stays within one sample."""
-SCATTER = 50.0
-"""Of the ordinary change of the angle's increments: an impact reaches a tenth of that."""
-QUANTA = 4.0
-"""Of a coarse encoder's step."""
-NEARLY = 0.1
-"""Of a revolution, by which a step may differ from a whole one that is an encoder's new beginning."""
-
-
 def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where: str = "") -> None:
     """Raise where an angle that should run on does not.
 
@@ -255,7 +227,9 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where
     steps, beyond = _steps(angle_rad)
     moving = np.abs(steps[steps != 0.0])
     quantum = float(moving.min()) if len(moving) else 0.0
-    limit = max(MIN_JUMP_RAD, SCATTER * 1.4826 * float(np.median(beyond)), QUANTA * quantum)
+    # A thousandth of a revolution: no gear with its load gets there and stays within one sample; fifty times the
+    # ordinary change of the increments, of which an impact reaches a tenth; four steps of a coarse encoder.
+    limit = max(2e-3 * pi, 50.0 * 1.4826 * float(np.median(beyond)), 4.0 * quantum)
     found = np.flatnonzero(beyond > limit)
     if len(found):
         i = int(found[0])
@@ -286,7 +260,8 @@ def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where:
     if len(angle_rad) < 4:
         raise InputError(f"channel {name!r} has {len(angle_rad)} samples", where=where, allowed="at least 4")
     turns = _steps(angle_rad)[1] / (2.0 * pi)
-    found = np.flatnonzero(np.abs(turns - 1.0) < NEARLY)
+    # An encoder's new beginning is a whole revolution, within a tenth.
+    found = np.flatnonzero(np.abs(turns - 1.0) < 0.1)
     if len(found):
         i = int(found[0])
         raise InputError(
@@ -310,11 +285,6 @@ def _steps(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _when(step: int, sampling_rate_hz: float) -> str:
     return f"from {step / sampling_rate_hz:.6g} to {(step + 1) / sampling_rate_hz:.6g} s"
-
-
-# --------------------
-# Derivatives of sampled motion by Savitzky–Golay filters of stated bandwidth.
-# --------------------
 
 
 ORDER = 3
@@ -405,8 +375,6 @@ def local_polynomial(sampling_rate_hz: float, bandwidth_hz: float | None = None)
 
 
 RATIO_TOLERANCE = 0.02
-MIN_TURN_RAD = 0.2
-"""Turn of the driver below which the ratio of both angles says nothing."""
 MAX_PLAY_TEETH = 0.5
 """Of a tooth pitch: both angles may differ by the backlash."""
 
@@ -560,7 +528,8 @@ def _check_ratio(driver_rad: FloatArray, driven_rad: FloatArray, path: PathOfCon
     first, last = int(np.argmin(driver_rad)), int(np.argmax(driver_rad))
     turned, follows = driver_rad[last] - driver_rad[first], driven_rad[last] - driven_rad[first]
     expected = turned * z1 / z2
-    if turned < MIN_TURN_RAD or abs(follows - expected) < RATIO_TOLERANCE * expected + MAX_PLAY_TEETH * 2.0 * pi / z2:
+    # Below 0.2 rad of the driver the ratio of both angles says nothing.
+    if turned < 0.2 or abs(follows - expected) < RATIO_TOLERANCE * expected + MAX_PLAY_TEETH * 2.0 * pi / z2:
         return
     against = abs(follows + expected) < RATIO_TOLERANCE * expected + MAX_PLAY_TEETH * 2.0 * pi / z2
     raise InputError(

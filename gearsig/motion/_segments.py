@@ -14,14 +14,6 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.motion._measure import local_polynomial
 from gearsig.spectra import Spectrum, amplitude_spectrum
 
-STANDING_PART = 0.02
-"""Of the ordinary highest speed: below it a shaft stands."""
-STANDING_SCATTER = 5.0
-"""Or below so many standard deviations of the speed's own scatter."""
-SHORTEST_S = 0.03
-"""A shorter rest is the turning point of a swing, a shorter motion a tremor."""
-MIN_TURN = 0.02
-"""Of the longest segment's angle: a standing machine that is knocked has not been started."""
 AT_ONCE, FIRST_S = 0.15, 0.01
 """Of the top speed of the first segment: slower on average in its first hundredth of a second, it begins from rest."""
 
@@ -153,12 +145,14 @@ def motion_segments(
     if len(angle_rad) != len(speed_rad_s) or len(speed_rad_s) < 8:
         raise InputError(f"{len(angle_rad)} angles for {len(speed_rad_s)} speeds", allowed="as many, at least 8")
     scatter = 1.4826 * float(np.median(np.abs(np.diff(speed_rad_s, 2)))) / np.sqrt(6.0)
-    threshold = max(STANDING_PART * float(np.quantile(np.abs(speed_rad_s), 0.95)), STANDING_SCATTER * scatter, 1e-12)
+    threshold = max(0.02 * float(np.quantile(np.abs(speed_rad_s), 0.95)), 5.0 * scatter, 1e-12)
     directions = np.where(np.abs(speed_rad_s) < threshold, 0, np.sign(speed_rad_s)).astype(np.int64)
-    shortest = max(2, round(SHORTEST_S * sampling_rate_hz))
+    # A shorter rest is the turning point of a swing, a shorter motion a tremor.
+    shortest = max(2, round(0.03 * sampling_rate_hz))
     _absorb(directions, shortest)
     segments = _cut(directions, angle_rad, speed_rad_s, sampling_rate_hz)
-    min_turned_rad = MIN_TURN * max(abs(s.turned_rad) for s in segments)
+    # What turns by less than 2 % of the longest segment is a standing machine that is knocked, not started.
+    min_turned_rad = 0.02 * max(abs(s.turned_rad) for s in segments)
     for segment in segments:
         if abs(segment.turned_rad) < min_turned_rad:
             directions[segment.first : segment.last] = 0
@@ -214,16 +208,7 @@ def _segment(
     return MotionSegment(direction, first, last, first / rate_hz, last / rate_hz, turned, top)
 
 
-# --------------------
-# Phases of a machine that starts and stops: run-up, running, run-down, rest.
-# --------------------
-
-
-RUNNING_PART = 0.9
-"""Of a segment's highest speed: from when it is first reached until it is last seen, the machine runs."""
 RUN_UP, RUNNING, RUN_DOWN, AT_REST = "run-up", "running", "run-down", "at rest"
-SPEED_BANDWIDTH_HZ = 50.0
-"""In which a shaft starts and stops; what is faster is ringing."""
 
 
 @dataclass(frozen=True)
@@ -237,7 +222,8 @@ class Phase:
 
 def shaft_speed_rad_s(angle_rad: FloatArray, sampling_rate_hz: float) -> FloatArray:
     """Return the speed of a shaft within 50 Hz, (n,), from its angle."""
-    smoother = local_polynomial(sampling_rate_hz, min(SPEED_BANDWIDTH_HZ, 0.1 * sampling_rate_hz))
+    # A shaft starts and stops within 50 Hz; what is faster is ringing.
+    smoother = local_polynomial(sampling_rate_hz, min(50.0, 0.1 * sampling_rate_hz))
     return smoother.apply(angle_rad, 1)
 
 
@@ -267,15 +253,10 @@ def find_phases(segments: MotionSegments, speed_rad_s: FloatArray, sampling_rate
 
 
 def _of_motion(segment: MotionSegment, speed_rad_s: FloatArray, rate_hz: float) -> list[Phase]:
-    fast = np.flatnonzero(speed_rad_s >= RUNNING_PART * float(speed_rad_s.max()))
+    fast = np.flatnonzero(speed_rad_s >= 0.9 * float(speed_rad_s.max()))
     up, down = segment.start_s + fast[0] / rate_hz, segment.start_s + (fast[-1] + 1) / rate_hz
     edges = [(RUN_UP, segment.start_s, up), (RUNNING, up, down), (RUN_DOWN, down, segment.end_s)]
     return [Phase(name, float(a), float(b)) for name, a, b in edges if b - a > 0.5 / rate_hz]
-
-
-# --------------------
-# Signals over the angle of a shaft that stops and turns back: no revolution need be complete.
-# --------------------
 
 
 @dataclass(frozen=True)
@@ -336,13 +317,6 @@ def angle_profile(values: FloatArray, angle_rad: FloatArray, segments: MotionSeg
     return AngleProfile(n_teeth, rms[0], rms[1], passes[0], passes[1])
 
 
-# --------------------
-# Order spectra of a motion that stops and turns back: segment by segment, over angle alone.
-# --------------------
-
-
-HIGHEST_PART = 0.25
-"""Highest order over samples per revolution: the mean over a step of angle has lost a tenth there, which is made up."""
 MIN_SAMPLES = 16
 """Per revolution."""
 
@@ -448,7 +422,8 @@ def _mean(spectra: list[Spectrum], per_revolution: int, unit: str, source: str, 
     weights = np.array([s.n_averages for s in spectra], dtype=np.float64)
     power = np.average([s.values for s in spectra], axis=0, weights=weights)
     first = spectra[0]
-    keep = first.positions <= HIGHEST_PART * per_revolution
+    # At a quarter of the samples per revolution the mean over a step of angle has lost a tenth, which is made up.
+    keep = first.positions <= 0.25 * per_revolution
     lost = np.sinc(first.positions[keep] / per_revolution)
     amplitude = np.sqrt(2.0 * power[keep]) / lost
     amplitude[0] /= np.sqrt(2.0)  # of a mean the amplitude is the value itself
@@ -465,22 +440,6 @@ def _mean(spectra: list[Spectrum], per_revolution: int, unit: str, source: str, 
         source,
         shaft,
     )
-
-
-# --------------------
-# Blows in a vibration signal of a machine that starts and stops: when, and at which angle.
-# --------------------
-
-
-WINDOW_S = 2e-3
-DEAD_S = 4e-3
-"""A blow rings; the next one is looked for after this time, where it stands out of the ringing."""
-FACTOR = 8.0
-"""Over the quiet level: white noise does not reach it in an hour."""
-RISE = 2.0
-"""Over the level just before: a blow begins at once, ringing does not."""
-MIN_PART = 0.35
-"""Of the hardest blow: below it teeth that merely take up their load are counted as well."""
 
 
 @dataclass(frozen=True)
@@ -505,7 +464,7 @@ def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     if sampling_rate_hz < 2000.0:
         raise InputError(f"sampling_rate_hz is {sampling_rate_hz:g} Hz", allowed="2 kHz and more")
-    n = max(2, round(WINDOW_S * sampling_rate_hz))
+    n = max(2, round(2e-3 * sampling_rate_hz))
     if len(values) < 20 * n:
         raise InputError(f"{len(values)} samples are too few", allowed=f"{20 * n} or more")
     centred = values - np.median(values)
@@ -513,9 +472,11 @@ def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...
     level = np.sqrt((power[n:] - power[:-n]) / n)  # level[i] covers samples i to i + n
     quiet = float(np.quantile(level, 0.2))
     ahead, behind = level[n:], level[:-n]
-    rises = (ahead > FACTOR * quiet) & (ahead > RISE * behind)
+    # White noise does not reach 8 times the quiet level in an hour; a blow begins at once, ringing does not.
+    rises = (ahead > 8.0 * quiet) & (ahead > 2.0 * behind)
     found: list[Burst] = []
-    dead, next_free = round(DEAD_S * sampling_rate_hz), 0
+    # A blow rings; the next one is looked for after 4 ms, where it stands out of the ringing.
+    dead, next_free = round(4e-3 * sampling_rate_hz), 0
     for i in map(int, np.flatnonzero(rises)):
         if i < next_free:
             continue
@@ -524,4 +485,5 @@ def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...
         found.append(Burst(begin / sampling_rate_hz, float(segment.max())))
         next_free = i + dead
     hardest = max((burst.peak for burst in found), default=0.0)
-    return tuple(burst for burst in found if burst.peak >= MIN_PART * hardest)
+    # Below a third of the hardest blow, teeth that merely take up their load are counted as well.
+    return tuple(burst for burst in found if burst.peak >= 0.35 * hardest)

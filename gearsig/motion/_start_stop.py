@@ -16,9 +16,6 @@ from gearsig.motion._segments import MotionSegments, motion_segments
 from gearsig.motion._types import PairMotion, check_turns
 from gearsig.phase import PhasePortrait
 
-ENOUGH_HZ = 4000.0
-"""All hard impacts of the manipulator are found from here on."""
-
 
 @dataclass(frozen=True)
 class StartStop:
@@ -180,7 +177,8 @@ def _notes(impacts: tuple[Impact, ...], rate_hz: float) -> tuple[str, ...]:
     if not n:
         return ()
     known = n + sum(not np.isnan(i.restitution) for i in impacts)
-    remedy = "; record at 4 kHz or more" if rate_hz < ENOUGH_HZ else ""
+    # From 4 kHz on all hard impacts of the manipulator are found.
+    remedy = "; record at 4 kHz or more" if rate_hz < 4000.0 else ""
     text = (
         f"The restitution of {n} of {known} bounces cannot be read: they part faster than they met, as noise is too "
         f"large or samples at {rate_hz:g} Hz are too few for their flights{remedy}."

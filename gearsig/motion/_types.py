@@ -178,18 +178,10 @@ class ForceEstimate:
         return next(e for e in self.errors if (e.model, e.reference) == (model, reference))
 
 
-# --------------------
-# A machine that only stands: nothing of its motion can be told.
-# --------------------
-
-
-MIN_PITCHES = 0.25
-"""Of the driver's teeth: a machine that turns by less than that beyond its play stands, though a blow may rattle it."""
-
-
 def stands(driver_angle_rad: FloatArray, path: PathOfContact, contact: ToothContact) -> bool:
     """Say whether the driver turns by less than its play and a quarter of a tooth pitch."""
-    return float(np.ptp(driver_angle_rad)) < _play_rad(path, contact) + 2.0 * pi / path.teeth[0] * MIN_PITCHES
+    # A machine that turns by less than that stands, though a blow may rattle it.
+    return float(np.ptp(driver_angle_rad)) < _play_rad(path, contact) + 2.0 * pi / path.teeth[0] * 0.25
 
 
 def check_turns(motion: PairMotion) -> None:

@@ -11,14 +11,6 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.recording._types import Channel, Recording
 
-# --------------------
-# The levels a channel's samples take: a converter's steps, if there are any.
-# --------------------
-
-
-GRID_TOLERANCE = 0.02
-"""Largest distance of a level from the grid, in steps: scaling in float32 moves levels a little."""
-
 
 @dataclass(frozen=True)
 class SampleLevels:
@@ -56,30 +48,15 @@ def find_levels(x: FloatArray) -> SampleLevels:
     # The smallest distance is one of many and a little wrong; the span divided by its number of steps is not.
     step = span / round(span / step)
     numbers = (values - values[0]) / step
-    if np.abs(numbers - np.round(numbers)).max() > GRID_TOLERANCE:
+    # Scaling in float32 moves levels a little off their grid.
+    if np.abs(numbers - np.round(numbers)).max() > 0.02:
         return SampleLevels(len(values), None, len(values))
     return SampleLevels(len(values), step, round(span / step) + 1)
-
-
-# --------------------
-# Clipping: a signal that was held at a limit instead of turning round there.
-# --------------------
 
 
 MIN_RUN = 3
 CORNER_DROP = 8.0
 """Twice the drop of a parabola, see below."""
-HELD_RATIO = 3.0
-PAIR_RATIO = 20.0
-"""How much more frequent than the average value the extreme must be for pairs to count as runs. A tone whose period
-is a whole number of samples has equal pairs too, but of all its values."""
-PILE_WIDTH = 0.005
-"""Width of the bands in the pile-up test, in parts of the range."""
-PILE_RATIO = 6.0
-MIN_PILE_SAMPLES = 20
-MAX_REST_SHARE = 0.48
-"""A level that holds half of the samples is where the signal rests (a pulse train's base, a square wave's level), not
-a limit that it runs into."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +100,9 @@ def find_clipping(x: FloatArray, levels: SampleLevels, *, rest: float | None = N
             continue
         distance = sign * (extreme - x)  # 0 at the extreme, positive elsewhere
         n = max(_n_held(distance, levels), _n_piled(distance, high - low, levels.step))
-        if n and n < MAX_REST_SHARE * len(x):
+        # A level that holds half of the samples is where the signal rests (a pulse train's base, a square wave's
+        # level), not a limit that it runs into.
+        if n and n < 0.48 * len(x):
             ends[extreme] = n
     if not ends:
         return None
@@ -136,21 +115,23 @@ def _n_held(distance: FloatArray, levels: SampleLevels) -> int:
     q = levels.step if levels.step is not None else float(np.finfo(distance.dtype).eps) * float(distance.max())
     held = distance == 0
     usual = len(held) / levels.n_used
-    min_run = MIN_RUN if np.count_nonzero(held) < PAIR_RATIO * usual else 2
+    # Pairs count as runs where the extreme is twenty times as frequent as the average value: a tone whose period is a
+    # whole number of samples has equal pairs too, but of all its values.
+    min_run = MIN_RUN if np.count_nonzero(held) < 20.0 * usual else 2
     n = _n_in_cornered_runs(held, distance, q, min_run)
     n_next = int(np.count_nonzero((distance > 0) & (distance <= 1.5 * q)))
-    return int(np.count_nonzero(held)) if n > HELD_RATIO * n_next else 0
+    return int(np.count_nonzero(held)) if n > 3.0 * n_next else 0
 
 
 def _n_piled(distance: FloatArray, span: float, step: float | None) -> int:
     """Count the samples in the last band, 0 if it holds not far more than the one before."""
-    width = PILE_WIDTH * span
+    width = 0.005 * span
     if step is not None and width < 2 * step:
         return 0  # the bands would hold one level or none
     in_last = distance < width
     n_last = _n_in_cornered_runs(in_last, distance, width, MIN_RUN)
     n_before = int(np.count_nonzero((distance >= width) & (distance < 2 * width)))
-    return int(np.count_nonzero(in_last)) if n_last >= max(MIN_PILE_SAMPLES, PILE_RATIO * n_before) else 0
+    return int(np.count_nonzero(in_last)) if n_last >= max(20, 6.0 * n_before) else 0
 
 
 def _n_in_cornered_runs(at_limit: NDArray[np.bool_], distance: FloatArray, width: float, min_run: int) -> int:
@@ -168,15 +149,6 @@ def _n_in_cornered_runs(at_limit: NDArray[np.bool_], distance: FloatArray, width
 
 ProblemKind = Literal["dead", "clipped", "stuck", "offset", "quantised"]
 
-MAX_DEAD_LEVELS = 4
-"""An open input flickers by a step or two of the converter: so many levels at most."""
-DEAD_SHARE = 1e-3
-"""… and far below the channels beside it."""
-MAX_QUANTISED_LEVELS = 64
-"""6 bits: the noise of the rounding is then 37 dB below a full-scale sine, above many a sideband."""
-MAX_OFFSET_RATIO = 3.0
-MIN_STUCK_SAMPLES = 16
-STUCK_RATIO = 10
 CORNER_DISTANCE = 8
 MIN_SAMPLES = 64
 _OFFSET_QUANTITIES = frozenset(("acceleration", "velocity", "sound_pressure", "unknown"))
@@ -266,7 +238,8 @@ def _dead(
     if spread == 0:  # values so small that their squares vanish
         evidence = f"the samples differ, by {np.ptp(x):.2g} at most, too little for a standard deviation"
         return ChannelProblem(channel.name, "dead", 1.0, evidence, remedy)
-    if not others or levels.n_spanned > MAX_DEAD_LEVELS or spread > DEAD_SHARE * float(np.median(others)):
+    # An open input flickers by a step or two of the converter, far below the channels beside it.
+    if not others or levels.n_spanned > 4 or spread > 1e-3 * float(np.median(others)):
         return None
     evidence = (
         f"only {levels.n_used} levels, standard deviation {spread:.3g}; "
@@ -292,7 +265,7 @@ def _stuck(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProb
     starts = np.concatenate(([0], ends + 1))
     inside = (x[starts] != x.min()) & (x[starts] != x.max())
     usual = float(np.percentile(lengths, 99))
-    long = inside & (lengths >= max(MIN_STUCK_SAMPLES, STUCK_RATIO * usual))
+    long = inside & (lengths >= max(16, 10 * usual))
     step = levels.step or float(np.finfo(x.dtype).eps * np.abs(x).max())
     before, after = starts - CORNER_DISTANCE, starts + lengths - 1 + CORNER_DISTANCE
     long &= (before >= 0) & (after < len(x))
@@ -313,7 +286,7 @@ def _stuck(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProb
 
 def _offset(channel: Channel, x: FloatArray, spread: float) -> ChannelProblem | None:
     mean = float(np.mean(x, dtype=np.float64))
-    if channel.quantity not in _OFFSET_QUANTITIES or abs(mean) <= MAX_OFFSET_RATIO * spread:
+    if channel.quantity not in _OFFSET_QUANTITIES or abs(mean) <= 3.0 * spread:
         return None
     evidence = f"the mean, {mean:.4g} {channel.unit}".rstrip() + f", is {abs(mean) / spread:.3g} times the rms about it"
     return ChannelProblem(
@@ -322,7 +295,8 @@ def _offset(channel: Channel, x: FloatArray, spread: float) -> ChannelProblem | 
 
 
 def _quantised(channel: Channel, levels: SampleLevels) -> ChannelProblem | None:
-    if levels.step is None or levels.n_spanned >= MAX_QUANTISED_LEVELS:
+    # 6 bits: the noise of the rounding is then 37 dB below a full-scale sine, above many a sideband.
+    if levels.step is None or levels.n_spanned >= 64:
         return None
     evidence = f"only {levels.n_spanned} levels of {levels.step:.3g} are in use ({np.log2(levels.n_spanned):.1f} bits)"
     remedy = "measure again with a smaller input range: weak sidebands drown in the rounding"

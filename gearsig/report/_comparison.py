@@ -34,7 +34,6 @@ from gearsig.report._json import Layout, document, plain
 # --------------------
 
 
-MESH_HARMONICS_SHOWN = 5.6
 WITHOUT_MESH = 50.0
 """Highest order drawn, in mesh orders, and where there is no mesh."""
 MOST_CURSORS = 10
@@ -141,7 +140,7 @@ def mesh_cursors(comparison: Comparison) -> tuple[Cursor, ...]:
 def shown_orders(comparison: Comparison) -> float:
     """Return the order up to which spectra are drawn."""
     meshes = [mesh for mesh in comparison.mesh_orders if mesh <= comparison.highest_order]
-    return min(comparison.highest_order, MESH_HARMONICS_SHOWN * max(meshes) if meshes else WITHOUT_MESH)
+    return min(comparison.highest_order, 5.6 * max(meshes) if meshes else WITHOUT_MESH)
 
 
 # --------------------
@@ -150,7 +149,6 @@ def shown_orders(comparison: Comparison) -> float:
 
 
 WIDTH = 100
-MOST_LINES = 12
 ORDER_COLUMNS = (
     "channel",
     "kind",
@@ -239,7 +237,7 @@ def _channel_table(channel: ChannelComparison) -> list[str]:
     unit = f" re 1 {unit_text(channel.unit)}" if channel.unit else ""
     rows = [f"{channel.name:<30} {'recorded':>10} {'simulated':>10} {'difference':>11}   (dB{unit}, rms)"]
     rows.append(_level_row("overall", channel.overall))
-    rows += [_level_row(line.label, line.level, line) for line in mesh_lines(channel)[:MOST_LINES]]
+    rows += [_level_row(line.label, line.level, line) for line in mesh_lines(channel)[:12]]
     for shaft in channel.shafts:
         best = shaft.best_correlation
         possible = f"at most {best:.3f}" if best >= MIN_REPEATED else "its halves do not repeat"
@@ -262,9 +260,6 @@ def _level_row(label: str, level: LevelPair, line: LineLevel | None = None) -> s
 
 
 Rows = tuple[tuple[str, str], ...]
-N_SIDEBANDS_SHOWN = 40
-MOST_ILLUSTRATED = 4
-"""Channels with pictures: a page of more is too large to send."""
 
 
 @dataclass(frozen=True)
@@ -325,13 +320,14 @@ def _section(comparison: Comparison, channel: ChannelComparison, i: int) -> Chan
     main = [line for line in (*channel.lines, *channel.other_lines) if line.kind != "sideband" and line.is_seen]
     sidebands = [line for line in channel.lines if line.kind == "sideband" and line.is_seen]
     sidebands.sort(key=lambda line: -abs(line.level.difference_db))
+    # Pictures of four channels: a page of more is too large to send.
     return ChannelSection(
         channel.name,
         f"dB re 1 {unit_text(channel.unit)}, rms" if channel.unit else "dB, unit not known",
         channel_rows(channel),
-        tuple(channel_pictures(comparison, channel)) if i < MOST_ILLUSTRATED else (),
+        tuple(channel_pictures(comparison, channel)) if i < 4 else (),
         tuple(_line_row(line) for line in main),
-        tuple(_line_row(line) for line in sidebands[:N_SIDEBANDS_SHOWN]),
+        tuple(_line_row(line) for line in sidebands[:40]),
     )
 
 

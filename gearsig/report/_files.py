@@ -124,11 +124,6 @@ def _unique(name: str, taken: set[str]) -> str:
     return choice
 
 
-# --------------------
-# Templates to HTML. Everything that is put in is escaped: texts from files are never markup.
-# --------------------
-
-
 def render(template: str, **values: Any) -> str:
     """Return the page that a template makes of `values`."""
     return _environment().get_template(template).render(**values)

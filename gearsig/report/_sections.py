@@ -198,11 +198,6 @@ def truth_rows(truth: Mapping[str, object] | None) -> Rows:
     return tuple((name, str(value)[:200]) for name, value in (truth or {}).items())
 
 
-# --------------------
-# Indicators as tables: one per gear or shaft, channels side by side.
-# --------------------
-
-
 Key = tuple[str, str, str, str]
 Compared = tuple[Indicator, IndicatorChange | None]
 
@@ -279,11 +274,6 @@ def _reference_text(change: IndicatorChange | None) -> str:
         return text
     sign = "+" if change.change_db >= 0 else "−"
     return f"{text}, {sign}{abs(change.change_db):.1f} dB"
-
-
-# --------------------
-# An analysis as text for the terminal.
-# --------------------
 
 
 WIDTH = 100
