@@ -65,13 +65,7 @@ def text_of(html):
 
 @pytest.fixture(scope="module")
 def pages():
-    drawn = ("effect", "cannot separate", "gearless")  # of these the figures are looked at
-    return {
-        outcome: gap_page_html(
-            report if outcome in drawn else without_figures(report), command="gearsig gap", date=DATE
-        )
-        for outcome, report in REPORTS.items()
-    }
+    return {outcome: gap_page_html(report, command="gearsig gap", date=DATE) for outcome, report in REPORTS.items()}
 
 
 @pytest.mark.parametrize("outcome", list(REPORTS))
