@@ -85,6 +85,24 @@ def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> F
     return view
 
 
+def freeze(result: object, *names: str, ndim: int | None = 1) -> None:
+    """Make array fields of a frozen dataclass read-only, as `frozen_array` does.
+
+    Parameters
+    ----------
+    result : dataclass
+    names : str
+        Its fields.
+    ndim : int or None
+        Dimensions; None: arrays of any shape and type, such as complex or bool, which are kept as they are.
+    """
+    for name in names:
+        value = getattr(result, name)
+        array = np.asarray(value).view() if ndim is None else frozen_array(value, name, ndim=ndim)
+        array.flags.writeable = False
+        object.__setattr__(result, name, array)
+
+
 def _is_finite(array: FloatArray) -> bool:
     """Whether all values are finite; a finite sum proves it at once, and costs a third of looking at each."""
     with np.errstate(over="ignore", invalid="ignore"):

@@ -4,7 +4,6 @@ from gearsig.decompose._long_signals import joined, long_modes, modes_by_block, 
 from gearsig.decompose._suggestion import ModeSuggestion, ModeTrial, noise_width, suggest_modes
 from gearsig.decompose._types import ModeAxis, Modes, StartName, VmdEngine, VmdSettings
 from gearsig.decompose._vmd import (
-    envelope_modes,
     mode_spectra,
     peak_centres,
     variational_modes,
@@ -35,7 +34,6 @@ __all__ = [
     "bayes",
     "deepest_level",
     "denoise",
-    "envelope_modes",
     "joined",
     "long_modes",
     "mode_spectra",

@@ -102,11 +102,6 @@ class ModeSuggestion:
         return "\n".join(lines)
 
 
-# --------------------
-# How many modes a signal supports, and at which penalty.
-# --------------------
-
-
 PENALTIES = (500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)
 USUAL_PENALTY = 2000.0
 NOISE_LIKE = 0.75

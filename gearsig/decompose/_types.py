@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, frozen_array, not_negative, one_of, positive
+from gearsig.checks import FloatArray, count, freeze, not_negative, one_of, positive
 from gearsig.errors import InputError
 
 StartName = Literal["uniform", "zero", "random", "peaks"]
@@ -146,8 +146,8 @@ class Modes:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, ndim in (("waveforms", 2), ("residual", 1), ("centres", 1), ("bandwidths", 1), ("centre_history", 2)):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=ndim))
+        freeze(self, "waveforms", "centre_history", ndim=2)
+        freeze(self, "residual", "centres", "bandwidths")
         expected = (len(self.centres), len(self.residual))
         if self.waveforms.shape != expected or len(self.bandwidths) != len(self.centres):
             raise InputError(f"waveforms of shape {self.waveforms.shape} for (modes, samples) of {expected}")
@@ -204,11 +204,6 @@ def _root_mean_square(x: FloatArray) -> float:
     """Divide by the largest value first: squares of very small or large values leave the range of numbers."""
     largest = float(np.abs(x).max(initial=0.0))
     return largest * float(np.sqrt(np.mean(np.square(x / largest)))) if largest > 0.0 else 0.0
-
-
-# --------------------
-# What a signal must bring for a number of modes, and what to tell the reader of the modes.
-# --------------------
 
 
 SAMPLES_PER_MODE = 4

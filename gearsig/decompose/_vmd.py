@@ -11,12 +11,7 @@ from gearsig.checks import FloatArray, positive
 from gearsig.decompose._types import ModeAxis, Modes, VmdSettings, check_supported, mode_notes
 from gearsig.engines import engine_module
 from gearsig.errors import InputError, RefusalError
-from gearsig.spectra import Envelope, Spectrum, amplitude_spectrum, checked_signal
-
-# --------------------
-# Where the modes' centre frequencies start.
-# --------------------
-
+from gearsig.spectra import Spectrum, amplitude_spectrum, checked_signal
 
 _MAX_CELLS = 2000
 
@@ -310,7 +305,6 @@ def _bandwidths(solution: _Solution) -> FloatArray:
     return widths
 
 
-# --------------------
 # Iterations of variational mode decomposition in one real cosine spectrum.
 #
 # The signal f is mirrored at both ends, period 2n. The mirrored signal's spectrum at line q is a cosine transform C[q]
@@ -318,7 +312,6 @@ def _bandwidths(solution: _Solution) -> FloatArray:
 # multiplier keep that phase. Only their real factors on the n non-negative lines are computed.
 #
 # Memory traffic decides the speed. Lines lie in blocks, all modes of a block together, and are updated in place.
-# --------------------
 
 
 # Reordering sums lets the compiler use vector instructions; divisions stay exact.
@@ -427,30 +420,6 @@ def _rows(blocks, n, space):  # type: ignore[no-untyped-def]
         for k in range(blocks.shape[1]):
             rows[k, start : start + m] = blocks[b, k, :m]
     return rows
-
-
-# --------------------
-# Modes of an envelope.
-# --------------------
-
-
-def envelope_modes(envelope: Envelope, settings: VmdSettings, *, rng: np.random.Generator | None = None) -> Modes:
-    """Return the modes of an envelope, its mean taken out first and kept as `offset`.
-
-    Centres are modulation frequencies, the sampling rate is the envelope's own. Without its mean the envelope shows
-    the modulation alone; the mean would be a mode of its own that outweighs the others. Take the magnitude, whose modes
-    are the amplitude modulation's own lines; a squared envelope adds their sums and differences.
-    """
-    mean = float(envelope.values.mean(dtype=np.float64))
-    modes = variational_modes(
-        envelope.values - mean, envelope.sampling_rate_hz, settings, rng=rng, unit=envelope.unit, source=envelope.source
-    )
-    return replace(modes, offset=mean)
-
-
-# --------------------
-# Amplitude spectra of modes and of what they leave.
-# --------------------
 
 
 def mode_spectra(modes: Modes) -> tuple[Spectrum, ...]:

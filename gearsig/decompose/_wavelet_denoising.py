@@ -7,15 +7,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
+from gearsig.checks import FloatArray, count, freeze, one_of, positive
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from gearsig.spectra import named_signal
-
-# --------------------
-# Thresholds of wavelet coefficients, and the rules that apply them.
-# --------------------
-
 
 MEDIAN_OF_NORMAL = 0.674489750196081743
 """Median of the magnitude of a standard normal variable."""
@@ -78,11 +73,6 @@ def apply(d: FloatArray, threshold: float, rule: str) -> FloatArray:
         return np.subtract(d, np.copysign(threshold, d), out=shrunk, where=kept)
     ratio = np.divide(threshold, d, out=shrunk, where=kept)
     return np.where(kept, d - threshold * ratio, 0.0) if kept.any() else ratio
-
-
-# --------------------
-# A signal with its noise taken out by wavelet thresholds, and what was taken out.
-# --------------------
 
 
 ThresholdName = Literal["universal", "sure", "bayes"]
@@ -201,8 +191,7 @@ class Denoised:
     source: str
 
     def __post_init__(self) -> None:
-        for name in ("values", "removed"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "values", "removed")
 
     @property
     def removed_share(self) -> float:

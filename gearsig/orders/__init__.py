@@ -14,33 +14,23 @@ from gearsig.orders._separate import SeparatedAverage, band_passed_mesh, mesh_mo
 from gearsig.orders._spectrum import frequency_map, order_map, order_spectrum
 from gearsig.orders._track import amplitude_at_speeds, track_order_bands, track_orders
 from gearsig.orders._types import AverageLines, OrderMap, SynchronousAverage, TrackedOrder
-from gearsig.orders.vold_kalman._banded import eliminate, rotate, solve_band
 from gearsig.orders.vold_kalman._filter import separate_frequencies, track_vold_kalman
 from gearsig.orders.vold_kalman._joint import (
     accuracy_of,
     closeness,
+    eliminate,
     error_alone,
     expected_error,
+    rotate,
     samples_per_cell,
+    solve_band,
     solve_by_splines,
     solve_envelopes,
     solve_waveforms,
 )
+from gearsig.orders.vold_kalman._kernels import cosine_and_sine, envelope_weight, settling_time, waveform_weight
 from gearsig.orders.vold_kalman._single import envelope_alone, oscillator, waveform_alone
-from gearsig.orders.vold_kalman._tracks import (
-    FrequencyTrack,
-    Generation,
-    OrderSeparation,
-    SeparatedOrder,
-    bandwidth_of_weight,
-    cosine_and_sine,
-    envelope_response,
-    envelope_weight,
-    settling_time,
-    waveform_weight,
-    waveform_weight_of_bandwidth,
-    weight_of_bandwidth,
-)
+from gearsig.orders.vold_kalman._tracks import FrequencyTrack, Generation, OrderSeparation, SeparatedOrder
 
 __all__ = [
     "AverageLines",
@@ -57,12 +47,10 @@ __all__ = [
     "amplitude_at_speeds",
     "average_lines",
     "band_passed_mesh",
-    "bandwidth_of_weight",
     "closeness",
     "cosine_and_sine",
     "eliminate",
     "envelope_alone",
-    "envelope_response",
     "envelope_weight",
     "error_alone",
     "expected_error",
@@ -90,7 +78,5 @@ __all__ = [
     "track_vold_kalman",
     "waveform_alone",
     "waveform_weight",
-    "waveform_weight_of_bandwidth",
-    "weight_of_bandwidth",
     "whole_revolutions",
 ]

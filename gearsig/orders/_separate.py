@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, frozen_array
+from gearsig.checks import FloatArray, count, freeze
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._types import SynchronousAverage
 
@@ -218,8 +218,7 @@ class MeshModulation:
     unit: str
 
     def __post_init__(self) -> None:
-        for name in ("amplitude", "phase_rad"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "amplitude", "phase_rad")
 
 
 def mesh_modulation(

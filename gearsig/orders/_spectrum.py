@@ -18,10 +18,10 @@ from gearsig.spectra import (
     Spectrum,
     block_powers,
     checked_signal,
-    mean_power,
     plan_blocks,
     scaled,
     scaled_unit,
+    spectrum_of_blocks,
 )
 
 ORDER_SCALINGS = ("amplitude peak", "amplitude rms", "power", "power density")
@@ -96,26 +96,17 @@ def order_spectrum(
             raise InputError(f"revolutions_per_block is {revolutions_per_block}", allowed=f"1 to {n_rev}")
         n_rev = revolutions_per_block
     plan = plan_blocks(revolutions.size, n_rev * per_rev, overlap, window)
-    bandwidth = plan.window.noise_bandwidth_bins / n_rev
-    lines = scaled(mean_power(revolutions.reshape(-1), plan), scaling, bandwidth, plan.n_per_block)
-    orders = np.arange(len(lines)) / n_rev
-    n_valid = int(np.searchsorted(orders, signal.highest_order * (1 + 1e-12), side="right"))
-    return Spectrum(
-        values=lines[:n_valid],
-        positions=orders[:n_valid],
+    return spectrum_of_blocks(
+        revolutions.reshape(-1),
+        per_rev,
+        plan,
+        scaling,
+        unit_of(signal, channel),
+        channel,
         axis="order",
-        scaling=scaling,
-        unit=scaled_unit(unit_of(signal, channel), scaling, per="order"),
-        resolution=1.0 / n_rev,
-        noise_bandwidth=bandwidth,
-        window=plan.window.name,
-        n_averages=plan.n_averages,
-        source=channel,
+        highest=signal.highest_order,
         shaft=signal.shaft_angle.shaft,
     )
-
-
-# Speed–order and speed–frequency maps: spectra of block after block.
 
 
 def order_map(

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array
+from gearsig.checks import FloatArray, freeze
 from gearsig.errors import InputError
 from gearsig.spectra import ComplexArray, Scaling
 
@@ -43,9 +43,8 @@ class OrderMap:
     shaft: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen_array(self.values, "values (block, line)", ndim=2))
-        for name in ("positions", "time_s", "speed_rpm"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "values", ndim=2)
+        freeze(self, "positions", "time_s", "speed_rpm")
         if self.values.shape != (len(self.time_s), len(self.positions)):
             raise InputError(
                 f"values of shape {self.values.shape} for {len(self.time_s)} blocks × {len(self.positions)} lines"
@@ -80,8 +79,7 @@ class TrackedOrder:
     shaft: str
 
     def __post_init__(self) -> None:
-        for name in ("time_s", "speed_rpm", "amplitude", "phase_rad"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "time_s", "speed_rpm", "amplitude", "phase_rad")
 
 
 @dataclass(frozen=True)
@@ -114,8 +112,7 @@ class SynchronousAverage:
     highest_order: float
 
     def __post_init__(self) -> None:
-        for name in ("values", "standard_error"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "values", "standard_error")
         if len(self.values) != len(self.standard_error):
             raise InputError(f"{len(self.values)} values, {len(self.standard_error)} standard errors")
 

@@ -3,8 +3,6 @@
 from gearsig.phase._bifurcation import (
     TwoMotions,
     bifurcation_diagram,
-    bifurcation_of_recordings,
-    bifurcation_of_runs,
     coexistence_ranges,
     step_of,
     values_apart,
@@ -60,8 +58,6 @@ __all__ = [
     "TwoMotions",
     "average_mutual_information",
     "bifurcation_diagram",
-    "bifurcation_of_recordings",
-    "bifurcation_of_runs",
     "coexistence_ranges",
     "constant_period_lock",
     "delay_embedding",

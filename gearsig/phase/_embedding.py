@@ -56,7 +56,9 @@ def delay_embedding(
     values, rate, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=1)
     x = checked_series(values, minimum=16)
     tau = chosen_delay(x, rate) if delay_samples is None else count(delay_samples, "delay_samples")
-    d = _chosen_dimension(x, rate, tau) if dimension is None else _checked_dimension(dimension)
+    d = _chosen_dimension(x, rate, tau) if dimension is None else count(dimension, "dimension")
+    if d > 20:
+        raise InputError(f"dimension is {d}", allowed="1 to 20")
     return PhasePortrait(
         points=delay_vectors(x, tau, d),
         sampling_rate_hz=rate,
@@ -95,15 +97,7 @@ def chosen_delay(x: FloatArray, rate: float) -> int:
     return average_mutual_information(x, rate).delay_samples
 
 
-def _checked_dimension(dimension: int) -> int:
-    d = count(dimension, "dimension")
-    if d > 20:
-        raise InputError(f"dimension is {d}", allowed="1 to 20")
-    return d
-
-
 def _chosen_dimension(x: FloatArray, rate: float, tau: int) -> int:
-
     found = embedding_dimension(x, rate, delay_samples=tau)
     if found.dimension == 0:
         raise RefusalError(
@@ -112,11 +106,6 @@ def _chosen_dimension(x: FloatArray, rate: float, tau: int) -> int:
             remedy="filter to the motion of interest, average synchronously, or give dimension= knowingly",
         )
     return found.dimension
-
-
-# --------------------
-# The delay of an embedding: first minimum of the average mutual information.
-# --------------------
 
 
 N_SAMPLES = 200_000
@@ -232,11 +221,6 @@ def first_minimum(information: FloatArray, scatter: float) -> int:
     return 0
 
 
-# --------------------
-# Joint histograms of a signal and its delayed self.
-# --------------------
-
-
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def mutual_information(bins, n_bins, delays, out):  # type: ignore[no-untyped-def]
     """out[k] = Σ p(i, j) ln(p(i, j) / (p(i) p(j))) of bins[t], bins[t + delays[k]], less its bias.
@@ -262,11 +246,6 @@ def mutual_information(bins, n_bins, delays, out):  # type: ignore[no-untyped-de
                     total += c * np.log(c * float(n) / (float(rows[i]) * float(columns[j])))
         bias = (filled - np.count_nonzero(rows) - np.count_nonzero(columns) + 1) / (2.0 * n)
         out[k] = max(total / n - bias, 0.0)
-
-
-# --------------------
-# The dimension of an embedding: false nearest neighbours, with Cao's test for randomness beside it.
-# --------------------
 
 
 N_LIBRARY, N_REFERENCES = 20_000, 2_000
@@ -339,7 +318,7 @@ def embedding_dimension(
         )
     x = (x - x.mean()) / x.std()
     library, references = spaced(n, N_LIBRARY), spaced(n, N_REFERENCES)
-    finest = _resolution(x[library])
+    finest = float(np.diff(np.unique(x[library])).min())
     steps = [_step(x, tau, d, library, references, window, finest) for d in range(1, largest + 1)]
     false_fraction = np.array([step[0] for step in steps])
     growth, determinism = _ratios([step[1] for step in steps]), _ratios([step[2] for step in steps])
@@ -372,21 +351,15 @@ def _step(
     Distances below the signal's resolution are taken as that: a coarse converter makes many points equal.
     """
     vectors = delay_vectors(x, tau, d)
-    distance, near = nearest_apart(vectors, library, references, window, equal_counts=True)
-    found = near >= 0
-    here, there, r = references[found], near[found], np.maximum(distance[found], finest)
-    step = np.abs(x[here + d * tau] - x[there + d * tau])
+    steps = []
+    for norm in (2.0, np.inf):  # Kennel's distance, then Cao's
+        distance, near = nearest_apart(vectors, library, references, window, norm, equal_counts=True)
+        known = near >= 0
+        r = np.maximum(distance[known], finest)
+        steps.append((r, np.abs(x[references[known] + d * tau] - x[near[known] + d * tau])))
+    (r, step), (largest, change) = steps
     false = (step > DISTANCE_RATIO * r) | (np.hypot(r, step) > SIZE_RATIO)
-    largest, near = nearest_apart(vectors, library, references, window, np.inf, equal_counts=True)
-    found = near >= 0
-    here, there, r = references[found], near[found], np.maximum(largest[found], finest)
-    change = np.abs(x[here + d * tau] - x[there + d * tau])
-    return float(false.mean()), float(np.mean(np.maximum(r, change) / r)), float(change.mean())
-
-
-def _resolution(x: FloatArray) -> float:
-    """Return the smallest step between different values."""
-    return float(np.diff(np.unique(x)).min())
+    return float(false.mean()), float(np.mean(np.maximum(largest, change) / largest)), float(change.mean())
 
 
 def _ratios(values: list[float]) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, not_negative
 from gearsig.errors import GearsigError, InputError
-from gearsig.phase._embedding import delay_embedding, embedding_dimension
+from gearsig.phase._embedding import chosen_delay, delay_embedding, embedding_dimension
 from gearsig.phase._lyapunov import largest_lyapunov_exponent
 from gearsig.phase._measures import (
     ChaosTest,
@@ -23,15 +23,9 @@ from gearsig.phase._measures import (
 from gearsig.phase._section import CycleLock, poincare_section, section_period
 from gearsig.phase._types import PhasePortrait, PoincareSection
 
-# --------------------
-# The 0–1 test for chaos.
-# --------------------
-
-
 MIN_VALUES, MAX_VALUES = 200, 20_000
 LOWEST_C, HIGHEST_C = np.pi / 5.0, 4.0 * np.pi / 5.0
 REGULAR, IRREGULAR = 0.2, 0.8
-GOLDEN = 0.6180339887498949
 
 
 def zero_one_test(
@@ -79,7 +73,7 @@ def zero_one_test(
     alpha = not_negative(damping, "damping")
     count(n_frequencies, "n_frequencies", minimum=10)
     x = checked_series(values, minimum=MIN_VALUES)
-    step = _step(x) if every is None else count(every, "every")
+    step = min(chosen_delay(x, 1.0), len(x) // MIN_VALUES) if every is None else count(every, "every")
     phi = x[::step][:MAX_VALUES]
     if len(phi) < MIN_VALUES:
         raise InputError(
@@ -87,7 +81,9 @@ def zero_one_test(
             allowed=f"at least {MIN_VALUES}",
             remedy="record longer",
         )
-    c = LOWEST_C + (HIGHEST_C - LOWEST_C) * ((np.arange(n_frequencies) + 0.5) * GOLDEN % 1.0)
+    c = LOWEST_C + (HIGHEST_C - LOWEST_C) * (
+        (np.arange(n_frequencies) + 0.5) * 0.6180339887498949 % 1.0
+    )  # the golden ratio
     scale = float(phi.std())
     k_of_c = np.array([_k(phi / scale, float(one), alpha) for one in c])
     k = float(np.median(k_of_c))
@@ -189,12 +185,6 @@ def _verdict(k: float, oversampled: bool, step: int) -> tuple[ChaosVerdict, str]
     if k < REGULAR:
         return "regular", ""
     return ("irregular", "") if k > IRREGULAR else ("undecided", f"K lies between {REGULAR:g} and {IRREGULAR:g}")
-
-
-def _step(x: FloatArray) -> int:
-    from gearsig.phase._embedding import chosen_delay
-
-    return min(chosen_delay(x, 1.0), len(x) // MIN_VALUES)
 
 
 T = TypeVar("T")

@@ -14,11 +14,6 @@ from gearsig.phase._measures import LyapunovExponent, checked_series, mean_perio
 from gearsig.phase._neighbours import IndexArray, nearest_apart, spaced
 from gearsig.phase._types import PhasePortrait
 
-# --------------------
-# Divergence curves: the mean logarithm of the distance of neighbours over time.
-# --------------------
-
-
 N_LIBRARY, N_REFERENCES, N_BLOCKS = 100_000, 4_000, 12
 MAX_NEIGHBOURS = 10
 N_UNRELATED = 20_000
@@ -308,11 +303,6 @@ def _comparable(portrait: PhasePortrait) -> FloatArray:
     if portrait.kind == "delay embedding":
         return portrait.points
     return np.ascontiguousarray(portrait.points / np.where(portrait.extent > 0.0, portrait.extent, 1.0))
-
-
-# --------------------
-# How neighbouring stretches of a path part.
-# --------------------
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]

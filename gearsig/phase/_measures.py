@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, frozen_array
+from gearsig.checks import FloatArray, freeze, frozen_array
 from gearsig.errors import InputError, RefusalError
 
 BoolArray = NDArray[np.bool_]
@@ -43,7 +43,7 @@ class MutualInformation:
     source: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "information_nats", frozen_array(self.information_nats, "information_nats", ndim=1))
+        freeze(self, "information_nats")
 
     @property
     def delays_s(self) -> FloatArray:
@@ -91,8 +91,7 @@ class EmbeddingDimension:
     source: str
 
     def __post_init__(self) -> None:
-        for name in ("false_fraction", "growth", "determinism"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "false_fraction", "growth", "determinism")
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ class LyapunovExponent:
     source: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "log_distance", frozen_array(self.log_distance, "log_distance", ndim=1))
+        freeze(self, "log_distance")
 
     @property
     def times_s(self) -> FloatArray:
@@ -176,8 +175,7 @@ class ChaosTest:
     reason: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("k_of_c", "c_rad"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "k_of_c", "c_rad")
 
 
 @dataclass(frozen=True)
@@ -203,10 +201,8 @@ class RecurrencePlot:
     source: str
 
     def __post_init__(self) -> None:
-        view = np.asarray(self.recurrent, dtype=np.bool_).view()
-        view.flags.writeable = False
-        object.__setattr__(self, "recurrent", view)
-        object.__setattr__(self, "times_s", frozen_array(self.times_s, "times_s", ndim=1))
+        freeze(self, "recurrent", ndim=None)
+        freeze(self, "times_s")
 
 
 @dataclass(frozen=True)
@@ -250,11 +246,6 @@ class RecurrenceMeasures:
     n_points: int
     duration_s: float
     source: str
-
-
-# --------------------
-# Checks of a series before it is embedded, and its mean period.
-# --------------------
 
 
 MAX_PERIOD_SAMPLES = 1 << 20

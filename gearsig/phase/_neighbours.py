@@ -158,11 +158,9 @@ def _query(tree: Any, points: FloatArray, k: int, norm: float) -> tuple[FloatArr
     return distance.reshape(len(points), k), index.reshape(len(points), k)
 
 
-# --------------------
 # The nearest neighbour that is none in time: a walk through a k-d tree that leaves out what is near in time.
 #
 # A tree that knows nothing of time would have to be asked for hundreds of neighbours, to find one that is apart.
-# --------------------
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]

@@ -14,19 +14,8 @@ from gearsig.phase._types import PhasePortrait
 from gearsig.recording import Recording
 from gearsig.spectra import named_signal
 
-# --------------------
-# Integration and differentiation of a signal inside a frequency band.
-# --------------------
-
-
-FADE_PERIODS, SETTLING_PERIODS = 2.0, 5.0
-"""Periods of the low cut over which either end is faded, and after which the result has settled."""
-
-MIN_PERIODS = 4.0
-"""Periods of the low cut that must be left between the disturbed ends."""
-
-FADE_SAMPLES, SETTLING_SAMPLES = 64, 256
-"""The same where there is no low cut."""
+SETTLING_PERIODS, MIN_PERIODS = 5.0, 4.0
+"""Periods of the low cut after which the result has settled at either end, and that must be left between the ends."""
 
 
 def lowest_low_cut_hz(duration_s: float) -> float:
@@ -36,7 +25,7 @@ def lowest_low_cut_hz(duration_s: float) -> float:
 
 def n_unsettled(sampling_rate_hz: float, low_cut_hz: float) -> int:
     """Return how many samples at either end of an integrated signal rest on what is not known beyond it."""
-    return ceil(SETTLING_PERIODS * sampling_rate_hz / low_cut_hz) if low_cut_hz > 0.0 else SETTLING_SAMPLES
+    return ceil(SETTLING_PERIODS * sampling_rate_hz / low_cut_hz) if low_cut_hz > 0.0 else 256
 
 
 def integrate_band(
@@ -72,30 +61,22 @@ def integrate_band(
     from scipy import fft
 
     n, (low, high) = len(values), band_hz
-    line = np.zeros(2) if low > 0.0 else _line(values, sampling_rate_hz)
-    n_fade = ceil(FADE_PERIODS * sampling_rate_hz / low) if low > 0.0 else FADE_SAMPLES
-    time = np.arange(n) / sampling_rate_hz
-    x = _faded(values - (values.mean() if low > 0.0 else line[0] + line[1] * time), n_fade)
+    offset, slope = 0.0, 0.0  # of the line through the first and the last sample
+    if low == 0.0:
+        offset, slope = float(values[0]), float((values[-1] - values[0]) * sampling_rate_hz / (n - 1))
+    line = offset + slope * (np.arange(n) / sampling_rate_hz)
+    x = values - (values.mean() if low > 0.0 else line)
+    n_fade = ceil(2.0 * sampling_rate_hz / low) if low > 0.0 else 64  # two periods of the low cut
+    ramp = _smooth_step((np.arange(n_fade) + 0.5) / n_fade)
+    x[:n_fade] *= ramp
+    x[-n_fade:] *= ramp[::-1]
     n_fft = fft.next_fast_len(n + n_unsettled(sampling_rate_hz, low), real=True)
     lines = fft.rfft(x, n_fft)
     lines *= _gain(np.arange(len(lines)) * (sampling_rate_hz / n_fft), sampling_rate_hz, n_times, low, high)
     y: FloatArray = fft.irfft(lines, n_fft, overwrite_x=True)[:n]
     if n_times == 0 and low == 0.0:
-        y = y + line[0] + line[1] * time
-    return y + line[1] if n_times == -1 else y
-
-
-def _line(values: FloatArray, rate: float) -> FloatArray:
-    """Offset and slope per second of the line through the first and the last sample."""
-    return np.array([values[0], (values[-1] - values[0]) * rate / (len(values) - 1)])
-
-
-def _faded(x: FloatArray, n_fade: int) -> FloatArray:
-    """Return x, which is overwritten, with both ends brought to zero."""
-    ramp = _smooth_step((np.arange(n_fade) + 0.5) / n_fade)
-    x[:n_fade] *= ramp
-    x[-n_fade:] *= ramp[::-1]
-    return x
+        y = y + line
+    return y + slope if n_times == -1 else y
 
 
 def _gain(f: FloatArray, rate: float, n_times: int, low: float, high: float) -> np.ndarray:

@@ -192,11 +192,6 @@ def _radius(points: FloatArray, rate: float, radius: float | None, theiler: int)
     return found if found > 0.0 else float(np.nextafter(0.0, 1.0))
 
 
-# --------------------
-# Recurrent pairs and the lines they form, without the matrix.
-# --------------------
-
-
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def recurrence_matrix(points, radius, out):  # type: ignore[no-untyped-def]
     """out[i, j] = |x(i) - x(j)| < radius, Euclidean."""

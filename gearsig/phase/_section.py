@@ -13,10 +13,6 @@ from gearsig.phase._types import PhasePortrait, PoincareSection
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 
-# --------------------
-# What a Poincaré section is locked to: the cycles of a mesh or the revolutions of a shaft.
-# --------------------
-
 
 @dataclass(frozen=True)
 class CycleLock:
@@ -192,7 +188,8 @@ def _locked_section(portrait: PhasePortrait, lock: CycleLock, phase_cycles: floa
             remedy="lock to a slower shaft or sample faster",
         )
     points = _interpolated(portrait.points, (times - portrait.start_s) * rate)
-    return _section(portrait, points, times, "locked", lock.name)
+    names, units, extent = portrait.axis_names, portrait.units, portrait.extent
+    return PoincareSection(points, times, names, units, extent, "locked", lock.name, portrait.source)
 
 
 def _geometric_section(
@@ -204,7 +201,10 @@ def _geometric_section(
     if len(n) != portrait.n_axes or not n.any():
         raise InputError(f"normal is {n.tolist()}", allowed=f"{portrait.n_axes} numbers, not all zero")
     distance = np.asarray(portrait.points @ n, dtype=np.float64) - offset
-    before = _crossings(distance, direction)
+    # The samples before a change of sign that have one more on either side.
+    change = np.diff((distance >= 0.0).astype(np.int8))
+    before = np.flatnonzero(change != 0 if direction == 0 else change == direction)
+    before = before[(before >= 1) & (before + 2 < len(distance))]
     if len(before) == 0:
         raise RefusalError(
             f"the path never crosses the plane {n.tolist()}·x = {offset:g}; n·x runs from "
@@ -215,7 +215,9 @@ def _geometric_section(
     weights = _lagrange(u)
     points = np.einsum("ki,kij->kj", weights, portrait.points[before[:, None] + np.arange(-1, 3)])
     times = portrait.start_s + (before + u) / portrait.sampling_rate_hz
-    return _section(portrait, points, times, "geometric", f"{np.round(n, 6).tolist()}·x = {offset:g}")
+    names, units, extent = portrait.axis_names, portrait.units, portrait.extent
+    plane = f"{np.round(n, 6).tolist()}·x = {offset:g}"
+    return PoincareSection(points, times, names, units, extent, "geometric", plane, portrait.source)
 
 
 def section_period(section: PoincareSection, *, longest: int = 16, tolerance: float = 0.05) -> int:
@@ -257,30 +259,6 @@ def _interpolated(points: FloatArray, positions: FloatArray) -> FloatArray:
         interpolate(x - mean, positions, doubling_filter(), delay_table(), values)
         found[:, axis] = values + mean
     return found
-
-
-def _section(
-    portrait: PhasePortrait, points: FloatArray, times: FloatArray, kind: str, section: str
-) -> PoincareSection:
-    return PoincareSection(
-        points,
-        times,
-        portrait.axis_names,
-        portrait.units,
-        portrait.extent,
-        "locked" if kind == "locked" else "geometric",
-        section,
-        portrait.source,
-    )
-
-
-def _crossings(distance: FloatArray, direction: int) -> np.ndarray:
-    """Indices of the samples before a change of sign that have one more on either side."""
-    above = distance >= 0.0
-    change = above[1:].astype(np.int8) - above[:-1].astype(np.int8)
-    wanted = change != 0 if direction == 0 else change == direction
-    before = np.flatnonzero(wanted)
-    return before[(before >= 1) & (before + 2 < len(distance))]
 
 
 def _cubic_roots(distance: FloatArray, before: np.ndarray) -> FloatArray:

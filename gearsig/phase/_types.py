@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array, positive
+from gearsig.checks import FloatArray, freeze, positive
 from gearsig.errors import InputError
 
 PortraitKind = Literal["phase plane", "delay embedding", "states"]
@@ -47,7 +47,7 @@ class PhasePortrait:
     delay_samples: int = 0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", frozen_array(self.points, "points (sample, axis)", ndim=2))
+        freeze(self, "points", ndim=2)
         positive(self.sampling_rate_hz, "sampling_rate_hz", "Hz")
         if not self.points.shape[1] == len(self.axis_names) == len(self.units):
             raise InputError(
@@ -122,9 +122,8 @@ class PoincareSection:
     source: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", frozen_array(self.points, "points (crossing, axis)", ndim=2))
-        for name in ("times_s", "extent"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "points", ndim=2)
+        freeze(self, "times_s", "extent")
         if len(self.points) != len(self.times_s) or self.points.shape[1] != len(self.extent):
             raise InputError(f"points of shape {self.points.shape} for {len(self.times_s)} times")
 
@@ -165,8 +164,7 @@ class BifurcationDiagram:
     extents: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        for name in ("parameter", "points", "values", "extents"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "parameter", "points", "values", "extents")
         if len(self.parameter) != len(self.points) or len(self.values) != len(self.periods):
             raise InputError(f"{len(self.parameter)} parameter values for {len(self.points)} points")
         if len(self.extents) not in (0, len(self.values)):

@@ -5,6 +5,7 @@ from gearsig.spectra._amplitude import (
     find_lines,
     noise_floor,
     power_density,
+    spectrum_of_blocks,
 )
 from gearsig.spectra._cepstrum import cepstrum, lifter_families
 from gearsig.spectra._coherence import (
@@ -21,7 +22,6 @@ from gearsig.spectra._envelope import (
     EnvelopeKind,
     Preparation,
     band_envelope,
-    choose_band,
     envelope_recording,
     envelope_spectrum,
     prepared_signal,
@@ -74,7 +74,6 @@ __all__ = [
     "block_powers",
     "cepstrum",
     "checked_signal",
-    "choose_band",
     "enhanced_envelope",
     "envelope_recording",
     "envelope_spectrum",
@@ -93,6 +92,7 @@ __all__ = [
     "scaled",
     "scaled_unit",
     "spectral_coherence",
+    "spectrum_of_blocks",
     "splitter",
     "window_response",
 ]

@@ -11,6 +11,8 @@ from gearsig.checks import FloatArray, one_of, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra._types import (
+    Axis,
+    BlockPlan,
     Scaling,
     Spectrum,
     mean_power,
@@ -20,8 +22,6 @@ from gearsig.spectra._types import (
     scaled_unit,
     window_response,
 )
-
-AMPLITUDE_SCALINGS = ("amplitude peak", "amplitude rms", "power")
 
 
 def amplitude_spectrum(
@@ -79,30 +79,9 @@ def amplitude_spectrum(
     >>> round(float(spectrum.values[50]), 9)
     3.0
     """
+    one_of(scaling, "scaling", ("amplitude peak", "amplitude rms", "power"))
     x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source)
-    one_of(scaling, "scaling", AMPLITUDE_SCALINGS)
-    plan = plan_blocks(len(x), n_per_block, overlap, window)
-    resolution = fs / plan.n_per_block
-    bandwidth = plan.window.noise_bandwidth_bins * resolution
-    power = mean_power(x, plan)
-    return Spectrum(
-        values=scaled(power, scaling, bandwidth, plan.n_per_block),
-        positions=np.arange(len(power)) * resolution,
-        axis="frequency",
-        scaling=scaling,
-        unit=scaled_unit(unit, scaling),
-        resolution=resolution,
-        noise_bandwidth=bandwidth,
-        window=plan.window.name,
-        n_averages=plan.n_averages,
-        source=source,
-    )
-
-
-# Power spectral density over frequency by Welch's method.
-
-
-DEFAULT_BLOCK = 8192
+    return spectrum_of_blocks(x, fs, plan_blocks(len(x), n_per_block, overlap, window), scaling, unit, source)
 
 
 def power_density(
@@ -153,30 +132,45 @@ def power_density(
     P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", 1967.
     """
     x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source)
-    n = n_per_block if n_per_block is not None else min(DEFAULT_BLOCK, max(2, len(x) // 8))
-    plan = plan_blocks(len(x), n, overlap, window)
-    resolution = fs / plan.n_per_block
+    n = n_per_block if n_per_block is not None else min(8192, max(2, len(x) // 8))
+    return spectrum_of_blocks(x, fs, plan_blocks(len(x), n, overlap, window), "power density", unit, source)
+
+
+def spectrum_of_blocks(
+    x: FloatArray,
+    rate: float,
+    plan: BlockPlan,
+    scaling: Scaling,
+    unit: str,
+    source: str,
+    *,
+    axis: Axis = "frequency",
+    highest: float = np.inf,
+    shaft: str = "",
+) -> Spectrum:
+    """Return the mean power over blocks in a scaling, up to `highest`; rate in Hz, or samples per revolution."""
+    resolution = rate / plan.n_per_block
     bandwidth = plan.window.noise_bandwidth_bins * resolution
-    power = mean_power(x, plan)
+    values = scaled(mean_power(x, plan), scaling, bandwidth, plan.n_per_block)
+    positions = np.arange(len(values)) * resolution
+    n_kept = int(np.searchsorted(positions, highest * (1 + 1e-12), side="right"))
     return Spectrum(
-        values=scaled(power, "power density", bandwidth, plan.n_per_block),
-        positions=np.arange(len(power)) * resolution,
-        axis="frequency",
-        scaling="power density",
-        unit=scaled_unit(unit, "power density"),
+        values=values[:n_kept],
+        positions=positions[:n_kept],
+        axis=axis,
+        scaling=scaling,
+        unit=scaled_unit(unit, scaling, per="order" if axis == "order" else "Hz"),
         resolution=resolution,
         noise_bandwidth=bandwidth,
         window=plan.window.name,
         n_averages=plan.n_averages,
         source=source,
+        shaft=shaft,
     )
 
 
-# Local noise floor of a spectrum, robust against its lines.
-
-
 MIN_LINES = 16
-"""Fewer lines than that per block make the quantile too uncertain (35 % with one average)."""
+"""Fewer lines than that per block make a floor's quantile too uncertain (35 % with one average)."""
 
 
 def noise_floor(spectrum: Spectrum, *, width: float | None = None, quantile: float = 0.5) -> Spectrum:
@@ -228,15 +222,20 @@ def noise_floor(spectrum: Spectrum, *, width: float | None = None, quantile: flo
     if n_lines < MIN_LINES:
         raise RefusalError(f"{n_lines} lines are too few for a floor", remedy="take a longer block")
     q = within(quantile, "quantile", 0.05, 0.95)
-    block = _block_lines(spectrum, width)
     power = line_powers(spectrum)
-    floor = _running_quantile(power, block, q) / gamma_quantile(q, spectrum.n_averages)
+    floor = _running_quantile(power, _block_lines(spectrum, width), q) / gamma_quantile(q, spectrum.n_averages)
     is_amplitude = spectrum.scaling in ("amplitude peak", "amplitude rms")
     return replace(
         spectrum,
         values=np.sqrt(floor) if is_amplitude else floor,
         source=f"noise floor of {spectrum.source or 'spectrum'}",
     )
+
+
+def floor_of_powers(power: FloatArray) -> FloatArray:
+    """Return the floor that `noise_floor` finds by default under the powers of a single block's lines."""
+    positions = np.arange(float(len(power)))
+    return noise_floor(Spectrum(power, positions, "frequency", "power", "", 1.0, 1.0, "rectangular", 1, "")).values
 
 
 def line_powers(spectrum: Spectrum) -> FloatArray:
@@ -295,14 +294,8 @@ def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
     return result
 
 
-# Lines of a spectrum that stand above its noise floor.
-
-
 SKIRT_BINS = 200
 """How far a strong line's leakage is followed."""
-
-SKIRT_MARGIN = 2.0
-"""Leakage is tested against this times its envelope, in amplitude: noise on top of a skirt is not a line."""
 
 
 @dataclass(frozen=True)
@@ -424,7 +417,7 @@ def _without_leakage(
     peaks: np.ndarray[tuple[int], np.dtype[np.intp]], power: FloatArray, mean_noise: FloatArray, window: str
 ) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     """Drop peaks that a stronger one's leakage explains: power below margin² · envelope² · that peak's power."""
-    envelope = (SKIRT_MARGIN * _leakage_envelope(window)) ** 2
+    envelope = (2.0 * _leakage_envelope(window)) ** 2  # noise on top of a skirt is not a line
     explained = np.zeros_like(power)
     strong = peaks[power[peaks] * envelope[2] > mean_noise[peaks]]  # others leak less than the noise
     for k in strong[np.argsort(-power[strong])]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.angle import ShaftAngle
-from gearsig.checks import FloatArray, count, frozen_array, positive, within
+from gearsig.checks import FloatArray, count, freeze, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra._envelope import Preparation, prepared_signal
@@ -132,11 +132,9 @@ class SpectralCoherence:
     shaft: str = ""
 
     def __post_init__(self) -> None:
-        for name, ndim in (("coherence_squared", 2), ("alpha", 1), ("frequency_hz", 1)):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=ndim))
-        correlation = np.asarray(self.correlation).view()
-        correlation.flags.writeable = False
-        object.__setattr__(self, "correlation", correlation)
+        freeze(self, "coherence_squared", ndim=2)
+        freeze(self, "alpha", "frequency_hz")
+        freeze(self, "correlation", ndim=None)
         shape = (len(self.alpha), len(self.frequency_hz))
         if not self.coherence_squared.shape == self.correlation.shape == shape:
             raise InputError(f"values of shape {self.coherence_squared.shape} for {shape[0]} α × {shape[1]} bands")

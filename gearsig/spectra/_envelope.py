@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array, not_negative, one_of, positive, within
-from gearsig.errors import InputError, RefusalError
+from gearsig.checks import FloatArray, freeze, one_of, positive, within
+from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
-from gearsig.spectra._amplitude import amplitude_spectrum, noise_floor
+from gearsig.spectra._amplitude import amplitude_spectrum, floor_of_powers
 from gearsig.spectra._types import ComplexArray, Scaling, Spectrum, checked_signal, named_signal, squared_unit
 
 EnvelopeKind = Literal["magnitude", "squared"]
@@ -39,7 +39,7 @@ class Envelope:
     source: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen_array(self.values, "values", ndim=1))
+        freeze(self, "values")
 
 
 def band_envelope(
@@ -244,13 +244,6 @@ def band_taper(n_lines: int, edge_fraction: float) -> FloatArray:
     return taper
 
 
-# Choice of the demodulation band by the kurtosis of its complex envelope.
-
-
-MIN_ENVELOPE_SAMPLES = 256
-"""Below it the kurtosis of Gaussian noise alone scatters by more than 0.25."""
-
-
 @dataclass(frozen=True)
 class BandCandidate:
     """A frequency band and how impulsive it is.
@@ -278,131 +271,8 @@ class BandCandidate:
         return self.low_hz, self.high_hz
 
 
-def choose_band(
-    values: FloatArray,
-    sampling_rate_hz: float,
-    *,
-    narrowest_hz: float | None = None,
-    lowest_hz: float = 0.0,
-    tone_limit_db: float | None = 20.0,
-) -> tuple[BandCandidate, ...]:
-    """Return the bands of a dyadic-and-thirds grid, the most impulsive first.
-
-    The spectrum from 0 to half the sampling rate is cut into 2, 3, 4, 6, 8, 12 … bands; each one's complex envelope z
-    comes from its lines of one Fourier transform, and K = E|z|⁴/(E|z|²)² - 2 says how impulsive it is.
-
-    Parameters
-    ----------
-    values : array, (n_samples,)
-    sampling_rate_hz : float
-    narrowest_hz : float or None
-        Bands are not narrower than that: at least three times the highest modulation frequency sought. None goes on
-        to 64 bands. Envelopes always have at least 256 samples.
-    lowest_hz : float
-        Bands that start below it are left out.
-    tone_limit_db : float or None
-        The spectrum is whitened by its noise floor, and lines more than this above the floor are cut down to it, so
-        that steady mesh harmonics do not hide impulses in their band. None takes the signal as it is.
-
-    Returns
-    -------
-    tuple of BandCandidate
-        Sorted by falling kurtosis. A candidate within three standard errors of 0 is noise.
-
-    Raises
-    ------
-    RefusalError
-        If the signal is too short for any band.
-    InputError
-        On a wrong shape or rate.
-
-    Notes
-    -----
-    One stray shock wins over a train of small ones: look at the envelope before believing the band.
-    A train of impulses that repeats exactly is itself made of lines; the limit reduces, but keeps them.
-
-    References
-    ----------
-    J. Antoni, "Fast computation of the kurtogram for the detection of transient faults", 2007. Antoni's filter bank
-    is replaced by bands of the Fourier transform with raised-cosine edges.
-    """
-    x = checked_signal(values)
-    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    low_limit = not_negative(lowest_hz, "lowest_hz", "Hz")
-    lines = _whitened(x, fs, tone_limit_db)
-    counts = _band_counts(len(lines), fs, narrowest_hz)
-    candidates = [
-        candidate
-        for n_bands in counts
-        for candidate in _candidates(lines, fs, n_bands)
-        if candidate.low_hz >= low_limit - 1e-9
-    ]
-    if not candidates:
-        raise RefusalError(
-            f"{len(x)} samples are too few to compare bands", remedy=f"take {8 * MIN_ENVELOPE_SAMPLES} or more"
-        )
-    return tuple(sorted(candidates, key=lambda c: -c.kurtosis))
-
-
-def _band_counts(n_lines: int, fs: float, narrowest_hz: float | None) -> list[int]:
-    """Return 2, 3, 4, 6, 8, 12 … up to 64 bands or the narrowest allowed."""
-    n_max = 64 if narrowest_hz is None else fs / 2 / positive(narrowest_hz, "narrowest_hz", "Hz")
-    n_max = min(n_max, n_lines / MIN_ENVELOPE_SAMPLES)
-    grid = sorted({2**k for k in range(1, 15)} | {3 * 2**k for k in range(14)})
-    return [n for n in grid if n <= n_max * (1 + 1e-9)]
-
-
-def _whitened(x: FloatArray, fs: float, tone_limit_db: float | None) -> ComplexArray:
-    """Return the transform over its noise floor, its lines limited; without DC and Nyquist."""
-    from scipy.fft import rfft
-
-    lines: ComplexArray = rfft(x.astype(np.float64))[1 : (len(x) + 1) // 2]
-    if tone_limit_db is None or len(lines) < 64:
-        return lines
-    power = lines.real**2 + lines.imag**2
-    resolution = fs / len(x)
-    raw = Spectrum(power, np.arange(len(power)) * resolution, "frequency", "power", "", resolution, 1.0, "", 1, "")
-    floor = noise_floor(raw).values
-    largest = 10.0 ** (not_negative(tone_limit_db, "tone_limit_db", "dB") / 10.0)
-    gain: FloatArray = 1.0 / np.sqrt(np.maximum(floor, power / largest))
-    lines *= gain
-    return lines
-
-
-def _candidates(lines: ComplexArray, fs: float, n_bands: int) -> list[BandCandidate]:
-    from scipy.fft import ifft, next_fast_len
-
-    per_band = len(lines) // n_bands
-    taper = band_taper(per_band, 0.1)
-    # Twice the band's lines: |z|² is then free of aliasing, and so is its mean square.
-    padded = np.zeros((n_bands, next_fast_len(2 * per_band)), dtype=np.complex64)
-    padded[:, :per_band] = _unit_power(lines[: n_bands * per_band]).reshape(n_bands, per_band) * taper
-    z = ifft(padded, axis=1, overwrite_x=True)
-    square = (z.real**2 + z.imag**2).astype(np.float64)
-    mean = square.mean(axis=1)
-    kurtosis = np.divide((square**2).mean(axis=1), mean**2, out=np.full(n_bands, 2.0), where=mean > 0) - 2.0
-    # Var K ≈ 4/M for M independent complex Gaussian samples; the taper leaves Σw² of them.
-    error = 2.0 / np.sqrt(float((taper**2).sum()))
-    width = fs / 2 / n_bands
-    return [
-        BandCandidate(i * width, (i + 1) * width, float(np.log2(n_bands)), float(kurtosis[i]), error)
-        for i in range(n_bands)
-    ]
-
-
-def _unit_power(lines: ComplexArray) -> ComplexArray:
-    """Scale to a root mean square of 1 so that fourth powers fit single precision."""
-    rms = np.sqrt(np.mean(lines.real**2 + lines.imag**2))
-    return lines / rms if rms > 0 else lines
-
-
-# What a signal may be rid of before its kurtogram: steady tones, or the colour of its spectrum.
-
-
 Preparation = Literal["none", "tones removed", "whitened"]
 PREPARATIONS = ("none", "tones removed", "whitened")
-TONE_LIMIT = 20.0
-"""Power over the floor from which on a line is a tone: of noise, one line in e²⁰, half a billion, gets there."""
 
 
 def prepared_signal(values: FloatArray, sampling_rate_hz: float, preparation: Preparation) -> FloatArray:
@@ -435,29 +305,19 @@ def prepared_signal(values: FloatArray, sampling_rate_hz: float, preparation: Pr
     from scipy.fft import irfft, rfft
 
     x = checked_signal(values, minimum=64)
-    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     if one_of(preparation, "preparation", PREPARATIONS) == "none":
         return x
     lines: ComplexArray = rfft(x.astype(np.float64))
     lines[0] = 0.0
-    lines *= _tone_gain(lines, fs / len(x)) if preparation == "tones removed" else _white_gain(lines)
-    result: FloatArray = irfft(lines, len(x), overwrite_x=True)
-    return result
-
-
-def _tone_gain(lines: ComplexArray, resolution: float) -> FloatArray:
     power = lines.real**2 + lines.imag**2
-    positions = np.arange(len(power)) * resolution
-    raw = Spectrum(power, positions, "frequency", "power", "", resolution, resolution, "rectangular", 1, "")
-    floor = noise_floor(raw).values
-    gain = np.ones(len(power))
-    tones = power > TONE_LIMIT * floor
-    gain[tones] = np.sqrt(floor[tones] / power[tones])
-    return gain
-
-
-def _white_gain(lines: ComplexArray) -> FloatArray:
-    magnitude = np.abs(lines)
-    level = np.sqrt(len(lines) - 1.0)  # gives a mean square of about 1
-    result: FloatArray = np.divide(level * np.sqrt(2.0), magnitude, out=np.zeros_like(magnitude), where=magnitude > 0)
+    if preparation == "tones removed":
+        floor = floor_of_powers(power)
+        tones = power > 20.0 * floor  # of noise, one line in e²⁰, half a billion, gets there
+        lines[tones] *= np.sqrt(floor[tones] / power[tones])
+    else:
+        level = np.sqrt(2.0 * (len(lines) - 1.0))  # gives a mean square of about 1
+        magnitude = np.abs(lines)
+        lines *= np.divide(level, magnitude, out=np.zeros_like(magnitude), where=magnitude > 0)
+    result: FloatArray = irfft(lines, len(x), overwrite_x=True)
     return result

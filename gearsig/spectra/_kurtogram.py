@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 
-from gearsig.checks import FloatArray, count, frozen_array, not_negative, positive
+from gearsig.checks import FloatArray, count, freeze, not_negative, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra._envelope import (
@@ -102,8 +102,7 @@ class Kurtogram:
 
     def __post_init__(self) -> None:
         arrays = ("low_hz", "high_hz", "level", "kurtosis", "standard_error", "largest_share", "n_envelope_samples")
-        for name in arrays:
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, *arrays)
         if len({len(getattr(self, name)) for name in arrays}) != 1:
             raise InputError("the arrays of a kurtogram differ in length")
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, closest_match_hint, count, frozen_array, not_negative, positive, within
+from gearsig.checks import FloatArray, closest_match_hint, count, freeze, frozen_array, not_negative, positive, within
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 
@@ -59,8 +59,7 @@ class Spectrum:
     shaft: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("values", "positions"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "values", "positions")
         if len(self.values) != len(self.positions):
             raise InputError(f"{len(self.values)} values for {len(self.positions)} positions")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array, not_negative, one_of, within
+from gearsig.checks import FloatArray, freeze, not_negative, one_of, within
 from gearsig.errors import InputError
 from gearsig.timefreq._cwt import analysis
 from gearsig.timefreq._squeezing import gather_lines, gather_near
@@ -90,10 +90,8 @@ class Component:
     source: str
 
     def __post_init__(self) -> None:
-        view = np.asarray(self.analytic).view()
-        view.flags.writeable = False
-        object.__setattr__(self, "analytic", view)
-        object.__setattr__(self, "at", frozen_array(self.at, "at", ndim=1))
+        freeze(self, "analytic", ndim=None)
+        freeze(self, "at")
 
     @property
     def values(self) -> FloatArray:

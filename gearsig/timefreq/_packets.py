@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, count, frozen_array, one_of
+from gearsig.checks import FloatArray, count, freeze, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._types import Axis, Reduction, TimeFrequencyMap
 from gearsig.timefreq._uniform import Columns, LinePlan, Source, plan_columns, uniform
@@ -46,7 +46,7 @@ class WaveletPackets:
     shaft: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen_array(self.values, "values (band, coefficient)", ndim=2))
+        freeze(self, "values", ndim=2)
 
     @property
     def n_bands(self) -> int:

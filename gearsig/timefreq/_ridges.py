@@ -13,11 +13,6 @@ from gearsig.checks import FloatArray, count, not_negative, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._types import Coefficients, Ridge, TimeFrequencyMap
 
-# --------------------
-# How likely each cell of a transform lies on a ridge.
-# --------------------
-
-
 SQUEEZED_REACH = 2
 """Lines on either side over which a squeezed component's share may scatter."""
 _FLOOR_OVER_MEDIAN = 4.0
@@ -75,11 +70,6 @@ def ridge_scores(power: FloatArray, n_reach: int) -> FloatArray:
         part = result[low:high]
         np.maximum(part, share * height[low - shift : high - shift], out=part)
     return result
-
-
-# --------------------
-# Which path goes on as which, where two come together.
-# --------------------
 
 
 _N_FIT = 24
@@ -510,11 +500,6 @@ def _unit(transform: Coefficients | TimeFrequencyMap) -> str:
     if isinstance(transform, TimeFrequencyMap) and transform.scaling == "power":
         return transform.unit.removesuffix("^2").removeprefix("(").removesuffix(")")
     return transform.unit
-
-
-# --------------------
-# The best smooth path through a table of scores, by dynamic programming over place and slope.
-# --------------------
 
 
 _MAX_COLUMNS_PER_NODE = 8

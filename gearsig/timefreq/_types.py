@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, frozen_array
+from gearsig.checks import FloatArray, freeze
 from gearsig.errors import InputError
 from gearsig.spectra import Scaling
 
@@ -68,9 +68,8 @@ class TimeFrequencyMap:
     shaft: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen_array(self.values, "values (column, line)", ndim=2))
-        for name in ("positions", "at", "edge"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "values", ndim=2)
+        freeze(self, "positions", "at", "edge")
         if self.values.shape != (len(self.at), len(self.positions)) or len(self.edge) != len(self.positions):
             raise InputError(
                 f"values of shape {self.values.shape} and {len(self.edge)} edges for {len(self.at)} columns × "
@@ -122,13 +121,12 @@ class Coefficients:
     shaft: str = ""
 
     def __post_init__(self) -> None:
-        view = np.asarray(self.values).view()
-        view.flags.writeable = False
-        object.__setattr__(self, "values", view)
-        for name in ("positions", "at", "weights"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
-        if view.shape != (len(self.positions), len(self.at)):
-            raise InputError(f"values of shape {view.shape} for {len(self.positions)} lines × {len(self.at)} columns")
+        freeze(self, "values", ndim=None)
+        freeze(self, "positions", "at", "weights")
+        if self.values.shape != (len(self.positions), len(self.at)):
+            raise InputError(
+                f"values of shape {self.values.shape} for {len(self.positions)} lines × {len(self.at)} columns"
+            )
 
 
 @dataclass(frozen=True)
@@ -160,12 +158,9 @@ class Ridge:
     shaft: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("at", "positions", "amplitude"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
-        shared = np.asarray(self.shared, dtype=np.bool_).view()
-        shared.flags.writeable = False
-        object.__setattr__(self, "shared", shared)
-        if not len(self.at) == len(self.positions) == len(self.amplitude) == len(shared):
+        freeze(self, "at", "positions", "amplitude")
+        freeze(self, "shared", ndim=None)
+        if not len(self.at) == len(self.positions) == len(self.amplitude) == len(self.shared):
             raise InputError("at, positions, amplitude and shared of a ridge differ in length")
 
     def position_at(self, at: FloatArray) -> FloatArray:

@@ -138,11 +138,6 @@ def admissibility(wavelet: Wavelet) -> float:
     return float(np.trapezoid(wavelet.response(np.exp(s)), s))
 
 
-# --------------------
-# Where the lines of a transform lie, and whether the signal is long enough for them.
-# --------------------
-
-
 N_OCTAVES = 10
 """Octaves that the default lines span at most."""
 
@@ -226,11 +221,6 @@ def _check_lowest(lowest: float, signal: UniformSignal, wavelet: Wavelet) -> Non
         )
 
 
-# --------------------
-# Compiled inner loops of the filter bank; they hold no state and release the interpreter.
-# --------------------
-
-
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]
 def fill(X, H, low, high, twiddle, first, out):  # type: ignore[no-untyped-def]
     """out[j, k mod M, r] = X[k] H[j, k] twiddle[k, r]: the bins of line j, ready for M-point inverse FFTs over k.
@@ -268,14 +258,12 @@ def turns(first, n_bins, n_r, step, n_block):  # type: ignore[no-untyped-def]
     return out
 
 
-# --------------------
 # Bank of analytic filters: coefficients of many lines, block by block, at any decimation.
 #
 # Each line needs few bins of a block's spectrum. With B = M R samples in a block and at most M bins, sample
 # n = R m + r is an M-point inverse FFT over m of the bins turned by e^{2πi k r / B}: R short transforms that stay in
 # the cache instead of a long one, and only as many of them as samples are wanted. Blocks overlap by the wavelet's
 # support, so that memory depends on the longest wavelet and not on the length of the signal.
-# --------------------
 
 
 IntArray = NDArray[np.int64]

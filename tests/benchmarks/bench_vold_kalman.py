@@ -26,7 +26,7 @@ from scipy.sparse.linalg import spsolve
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from gearsig.orders import separate_frequencies, solve_envelopes, solve_waveforms, waveform_weight, weight_of_bandwidth
+from gearsig.orders import separate_frequencies, solve_envelopes, solve_waveforms, waveform_weight
 from tests.orders.test_vold_kalman_exact import (
     RATE_HZ,
     differences,
@@ -34,6 +34,7 @@ from tests.orders.test_vold_kalman_exact import (
     modulated_order,
     solve_by_rotations,
     textbook_matrix,
+    weight_of,
 )
 
 N = 10**6
@@ -81,7 +82,7 @@ def _banded(band: Any, parts: Any) -> Any:
 
 
 def _one_order(y: Any, cycles: Any, z: Any, bandwidth_hz: float, p: int) -> None:
-    r = weight_of_bandwidth(bandwidth_hz, RATE_HZ, p)
+    r = weight_of(bandwidth_hz, p)
     widths = np.array([[bandwidth_hz / RATE_HZ]])
     band = _band(textbook_matrix(len(y), r, p), p)
     parts = np.stack([z.real, z.imag], axis=1)
@@ -107,7 +108,7 @@ def _two_orders(n: int, bandwidth_hz: float, p: int, *, exact: bool) -> None:
     y, cycles, _ = modulated_order(n)
     both = np.stack([cycles, 80 * np.arange(n) / RATE_HZ])  # crosses the rising order
     y = y + np.cos(2 * np.pi * both[1] + 1)
-    r, widths = weight_of_bandwidth(bandwidth_hz, RATE_HZ, p), np.full((2, 1), bandwidth_hz / RATE_HZ)
+    r, widths = weight_of(bandwidth_hz, p), np.full((2, 1), bandwidth_hz / RATE_HZ)
     phasors = np.exp(2j * np.pi * both)
     right = (phasors.conj() * y).T.ravel()
     (ours_s, ours), (mirror_s, _), (scipy_s, theirs) = _best(
@@ -152,7 +153,7 @@ def _whole_call(y: Any, cycles: Any) -> None:
     """Print the whole call's time beside spsolve alone."""
     tracks = [np.gradient(cycles) * RATE_HZ]
     z = y * np.exp(-2j * np.pi * cycles)
-    r = weight_of_bandwidth(2.0, RATE_HZ, 2)
+    r = weight_of(2.0, 2)
     (second_s, _), (first_s, _), (scipy_s, _) = _best(
         lambda: separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=2.0),
         lambda: separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=2.0, generation="first"),

@@ -20,10 +20,13 @@ from gearsig.orders import (
     solve_envelopes,
     solve_waveforms,
     waveform_weight,
-    weight_of_bandwidth,
 )
 
 RATE_HZ = 20_000.0
+
+
+def weight_of(bandwidth_hz, p):
+    return float(envelope_weight(np.array([bandwidth_hz / RATE_HZ]), p)[0])
 
 
 def exact_envelope(z, r, p):
@@ -102,7 +105,7 @@ def differences(p, shape):
 def test_the_closed_form_solves_the_textbook_matrix(p):
     """At a wide band, where the sparse solve is good."""
     z = modulated_order(3001)[2]
-    r = weight_of_bandwidth(800.0, RATE_HZ, p)
+    r = weight_of(800.0, p)
     x = exact_envelope(z, r, p)
     assert abs(x - spsolve(textbook_matrix(len(z), r, p), z)).max() < 1e-9
 
@@ -112,7 +115,7 @@ def test_the_closed_form_solves_the_textbook_matrix(p):
 @pytest.mark.parametrize("n", [100_000, 100_001])
 def test_constant_bandwidth(p, bandwidth_hz, n):
     y, cycles, z = modulated_order(n)
-    r = weight_of_bandwidth(bandwidth_hz, RATE_HZ, p)
+    r = weight_of(bandwidth_hz, p)
     x = solve_envelopes(y, cycles[None], None, np.array([[bandwidth_hz / RATE_HZ]]), p, mirror=False)[0]
     assert abs(x - 2 * exact_envelope(z, r, p)).max() < 1e-10
 
@@ -121,7 +124,7 @@ def test_constant_bandwidth(p, bandwidth_hz, n):
 def test_the_textbook_solve_is_what_loses_digits(bandwidth_hz):
     """The reason for all this: the sparse solve is off by 1e-4 and more where the closed form and ours agree."""
     z = modulated_order(20_000)[2]
-    r = weight_of_bandwidth(bandwidth_hz, RATE_HZ, 2)
+    r = weight_of(bandwidth_hz, 2)
     assert abs(spsolve(textbook_matrix(len(z), r, 2), z) - exact_envelope(z, r, 2)).max() > 1e-4
 
 
@@ -133,7 +136,7 @@ def test_any_length(p, n):
     bandwidth_hz = {2: 7.4, 3: 32.0}[p]
     d = samples_per_cell(bandwidth_hz / RATE_HZ, bandwidth_hz / RATE_HZ, p)
     assert d in {19, 20}
-    r = weight_of_bandwidth(bandwidth_hz, RATE_HZ, p)
+    r = weight_of(bandwidth_hz, p)
     x = solve_by_splines(y, cycles[None], None, np.array([[r]]), p, d, mirror=False)[0]
     assert abs(x - 2 * exact_envelope(z, r, p)).max() < 3e-7
 

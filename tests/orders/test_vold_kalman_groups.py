@@ -7,8 +7,9 @@ import pytest
 
 from gearsig.angle import AngleSignal, ShaftAngle, resample_to_angle
 from gearsig.errors import InputError
-from gearsig.orders import FrequencyTrack, envelope_response, separate_frequencies, settling_time, track_vold_kalman
+from gearsig.orders import FrequencyTrack, separate_frequencies, settling_time, track_vold_kalman
 from gearsig.recording import Channel, Recording
+from tests.orders.test_vold_kalman import gain_of
 
 RATE_HZ = 2000.0
 
@@ -94,7 +95,7 @@ def test_orders_left_out_at_different_times_never_meet():
 def test_settling_time_is_that_of_the_impulse_response(n_poles):
     """Beyond it, the envelope of the response stays below 1 % of the peak (a few times, where poles add up)."""
     f = np.linspace(-50, 50, 2**18, endpoint=False)
-    response = np.abs(np.fft.fftshift(np.fft.fft(np.fft.ifftshift(envelope_response(f, 1.0, 1e4, n_poles)))))
+    response = np.abs(np.fft.fftshift(np.fft.fft(np.fft.ifftshift(gain_of(f / 1e4, 1e-4, n_poles)))))
     lag = np.arange(-(2**17), 2**17) / 100.0
     response /= response.max()
     settled = settling_time(np.array([1.0]), n_poles)[0]

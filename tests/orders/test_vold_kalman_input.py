@@ -7,11 +7,8 @@ from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import (
     FrequencyTrack,
-    bandwidth_of_weight,
     separate_frequencies,
     track_vold_kalman,
-    waveform_weight_of_bandwidth,
-    weight_of_bandwidth,
 )
 from gearsig.recording import Channel, Recording
 from gearsig.rig import ConstantSpeed
@@ -83,15 +80,6 @@ def test_a_machine_at_rest_is_refused():
     angle = ShaftAngle("s", np.array([0.0, 4.0]), np.zeros(2), np.zeros(2), "encoder")
     with pytest.raises(RefusalError, match="stands still"):
         track_vold_kalman(RECORDING, "a", [2.0], bandwidth_hz=2.0, shaft_angle=angle)
-
-
-def test_weights():
-    with pytest.raises(InputError, match="below the sampling rate"):
-        weight_of_bandwidth(1000.0, 1000.0)
-    with pytest.raises(InputError, match="above"):
-        bandwidth_of_weight(1e-3, 1000.0)
-    with pytest.raises(InputError, match="narrow the band"):
-        waveform_weight_of_bandwidth(20.0, 10.0, 1000.0)
 
 
 def test_a_frequency_track_has_no_speed():

@@ -7,7 +7,6 @@ from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.phase import (
     PhasePortrait,
     average_mutual_information,
-    bifurcation_of_runs,
     constant_period_lock,
     delay_embedding,
     embedding_dimension,
@@ -95,10 +94,3 @@ def test_a_period_longer_than_the_path_or_faster_than_its_samples_is_refused():
         poincare_section(path, constant_period_lock(10.0, 30.0))
     with pytest.raises(RefusalError, match=r"faster than two samples per cycle.*slower shaft or sample faster"):
         poincare_section(path, constant_period_lock(0.0015, 3.0))
-
-
-def test_a_bifurcation_of_runs_that_are_too_short_is_refused():
-    with pytest.raises(InputError, match=r"series lasts 0.5 s \(allowed: more than 1 s\)"):
-        bifurcation_of_runs(
-            lambda _value: (np.arange(50.0), 0.1), [1.0], 100.0, parameter="load", transient_s=1.0, units=("m",)
-        )

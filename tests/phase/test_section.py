@@ -14,8 +14,6 @@ from gearsig.phase import (
     PoincareSection,
     TwoMotions,
     bifurcation_diagram,
-    bifurcation_of_recordings,
-    bifurcation_of_runs,
     coexistence_ranges,
     constant_period_lock,
     find_lock,
@@ -178,22 +176,14 @@ def test_bifurcations_of_the_logistic_map():
     assert len(diagram.points) == 600
 
 
-def test_bifurcation_of_a_model_called_for_each_value():
-    asked = []
+def test_bifurcations_of_the_forced_oscillator():
+    def section(force):
+        path = _states(duffing(force, 60, PER_PERIOD), DUFFING_RATE).between(5 * DUFFING_PERIOD_S, np.inf)
+        return poincare_section(path, constant_period_lock(DUFFING_PERIOD_S, path.end_s))
 
-    def run(force):
-        asked.append(force)
-        return duffing(force, 60, PER_PERIOD), DUFFING_PERIOD_S
-
-    diagram = bifurcation_of_runs(
-        run, (0.28, 0.2, 0.29), DUFFING_RATE, parameter="force", direction="down", transient_s=5 * DUFFING_PERIOD_S
-    )
-    assert asked == [0.29, 0.28, 0.2]
+    diagram = bifurcation_diagram(((force, section(force)) for force in (0.28, 0.2, 0.29)), parameter="force")
+    assert diagram.values.tolist() == [0.2, 0.28, 0.29]
     assert diagram.periods == (1, 2, 4)
-    one_channel = bifurcation_of_runs(
-        lambda force: (duffing(force, 60, PER_PERIOD)[:, 0], DUFFING_PERIOD_S), (0.2, 0.28), DUFFING_RATE, parameter="f"
-    )
-    assert one_channel.periods == (1, 2)
 
 
 def test_branches_that_go_on_from_their_last_state_show_hysteresis():
@@ -209,16 +199,13 @@ def test_branches_that_go_on_from_their_last_state_show_hysteresis():
             v += h * (0.4 * np.cos(w * i * h) - 0.1 * v - x - x**3)
             x += h * v
         state[branch] = (x, v)
-        return path[::5], constant_period_lock(1.0 / frequency, 60.0 / frequency)
+        return path[35 * steps :: 5]
 
     values = tuple(np.arange(16, 36, 2) / 100.0)
     sizes = {}
     for branch in ("up", "down"):
         for f in values if branch == "up" else values[::-1]:
-            diagram = bifurcation_of_runs(
-                lambda value, b=branch: run(value, b), [f], 80.0 * f, parameter="f", transient_s=35.0 / f
-            )
-            sizes[branch, f] = float(diagram.extents[0])
+            sizes[branch, f] = float(np.std(run(f, branch)[:, 0]))
     up, down = (
         BifurcationDiagram(np.array(values), s, "f", "Hz", "x", "m", np.array(values), (1,) * 10, "period", s)
         for s in (np.array([sizes[branch, f] for f in values]) for branch in ("up", "down"))
@@ -259,16 +246,16 @@ def test_ranges_of_two_motions_end_half_a_step_from_where_they_are_seen():
     assert coexistence_ranges(*single) == (TwoMotions(0.0, 0.0, 0.0, 0.0, True, True),)
 
 
-def test_bifurcation_of_recordings_over_load():
-    def recordings():
+def test_bifurcation_over_load_of_recorded_acceleration():
+    def section(half):
         t = np.arange(8000) / 2000.0
-        for load, half in ((100.0, 0.0), (50.0, 0.4)):
-            w = 2 * np.pi * 50.0
-            x = -(w**2) * np.cos(w * t) - half * (w / 2) ** 2 * np.cos(w / 2 * t + 0.5)
-            rig = Rig(shafts=(Shaft("s"),), speed=ConstantSpeed(3000.0, "s"))
-            yield load, Recording(x[None, :], 2000.0, (Channel("a", "acceleration", "m/s^2"),), rig=rig)
+        w = 2 * np.pi * 50.0
+        x = -(w**2) * np.cos(w * t) - half * (w / 2) ** 2 * np.cos(w / 2 * t + 0.5)
+        rig = Rig(shafts=(Shaft("s"),), speed=ConstantSpeed(3000.0, "s"))
+        recording = Recording(x[None, :], 2000.0, (Channel("a", "acceleration", "m/s^2"),), rig=rig)
+        return poincare_section(phase_plane(recording, "a", low_cut_hz=12.0), find_lock(recording))
 
-    diagram = bifurcation_of_recordings(recordings(), "a", parameter="load", unit="N·m", low_cut_hz=12.0)
+    diagram = bifurcation_diagram([(100.0, section(0.0)), (50.0, section(0.4))], parameter="load", unit="N·m")
     assert diagram.values.tolist() == [50.0, 100.0]
     assert diagram.periods == (2, 1)
     assert (diagram.axis_name, diagram.unit, diagram.section) == ("displacement", "m", "revolution")
@@ -282,8 +269,6 @@ def test_a_diagram_of_nothing_or_of_unlike_sections_is_refused():
         bifurcation_diagram([(1.0, _map_section(np.ones(9))), (2.0, other)], parameter="r")
     with pytest.raises(InputError, match="axis is 3"):
         bifurcation_diagram([(1.0, _map_section(np.ones(9)))], parameter="r", axis=3)
-    with pytest.raises(InputError, match="the series lasts"):
-        bifurcation_of_runs(lambda _: (np.ones(5), 1.0), [1.0], 1.0, parameter="r", transient_s=10.0)
 
 
 def test_a_motion_that_nearly_closes_is_not_called_periodic():

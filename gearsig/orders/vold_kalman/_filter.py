@@ -4,36 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
 
-from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, frozen_array, one_of, positive
+from gearsig.angle import AngleSignal, ShaftAngle, find_shaft_angle
+from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
 from gearsig.errors import InputError
 from gearsig.orders._average import unit_of
-from gearsig.orders.vold_kalman._grouping import (
-    Coupling,
-    Group,
-    check_distinct,
-    check_record_length,
-    coupling_notes,
-    end_notes,
-    grouped,
-    mask_notes,
-    neighbours_of,
-    settled_parts,
-)
-from gearsig.orders.vold_kalman._joint import (
-    BoolArray,
-    ComplexArray,
-    Problem,
-    accuracy_of,
-    cheap_together,
-    solve_groups,
-    waveform_accuracy_of,
-)
+from gearsig.orders.vold_kalman._joint import Group, Problem, solve_groups
+from gearsig.orders.vold_kalman._kernels import HALF_POWER, settling_time
 from gearsig.orders.vold_kalman._tracks import (
+    BoolArray,
     FrequencyTrack,
     Generation,
     OrderLike,
@@ -41,150 +24,16 @@ from gearsig.orders.vold_kalman._tracks import (
     SeparatedOrder,
     Tracks,
     bandwidths_of,
-    checked_poles,
     tracks_of_orders,
     tracks_over_angle,
     valid_parts,
 )
 from gearsig.recording import Recording
 
-# From a signal and the orders' tracks to separated orders: checks, grouping, solution, notes.
-
-
-MIN_SAMPLES = 16
-NOTED_ERROR = 1e-5
-
-
-@dataclass(frozen=True)
-class Method:
-    """How the orders are solved for; as the parameters of `track_vold_kalman`."""
-
-    n_poles: int
-    generation: Generation
-    coupled: Coupling
-    mirror: bool
-
-    def __post_init__(self) -> None:
-        one_of(self.generation, "generation", ("first", "second"))
-        if self.generation == "second":
-            checked_poles(self.n_poles)
-
-    @property
-    def p(self) -> int:
-        """Order of the structural equation."""
-        return self.n_poles if self.generation == "second" else 2
-
-    @property
-    def skirt_poles(self) -> int:
-        """Poles that the gain has on either side of the order: with two in all, the first generation has one."""
-        return self.n_poles if self.generation == "second" else 1
-
-
-def separated(
-    y: FloatArray, rate: float, tracks: Tracks, widths: FloatArray, method: Method, *, unit: str = "", source: str = ""
-) -> OrderSeparation:
-    """Return the orders and the residual.
-
-    Parameters
-    ----------
-    y : array, (n,)
-    rate : float
-        Samples per unit of the tracks' duration.
-    tracks : Tracks
-    widths : array, (n_orders, n) or (n_orders, 1)
-        Bandwidths in the unit of the tracks.
-    method : Method
-    unit, source : str
-    """
-    if len(y) < MIN_SAMPLES:
-        raise InputError(f"the signal has {len(y)} samples", allowed=f"at least {MIN_SAMPLES}")
-    valid = valid_parts(tracks, widths, rate, method.generation)
-    check_record_length(tracks, widths, valid, rate)
-    neighbours = neighbours_of(tracks, widths, valid, method.skirt_poles)
-    check_distinct(neighbours, tracks)
-    problem = Problem(
-        tracks.cycles, valid, _continued(widths, valid) / rate, method.p, method.generation, method.mirror
-    )
-    cheap = method.generation == "second" and cheap_together(
-        problem.cycles, problem.valid, problem.bandwidths, method.p
-    )
-    groups = grouped(method.coupled, neighbours, len(valid), cheap=cheap)
-    envelopes, waveforms, sweep_error = solve_groups(y, problem, groups, share=isinstance(method.coupled, str))
-    settled = settled_parts(widths, valid, rate, method.skirt_poles)
-    error = sweep_error + max(_expected_error(problem, g) for g in groups)
-    residual = y.astype(np.float64)
-    for waveform in waveforms:
-        residual -= waveform
-    orders = tuple(
-        _order(k, tracks, widths, envelopes[k], waveforms[k], valid[k], settled[k], unit, source)
-        for k in range(len(valid))
-    )
-    axis: Literal["time", "angle"] = "angle" if tracks.unit == "orders" else "time"
-    members = tuple(tuple(int(k) for k in group) for group in groups)
-    notes = (
-        *mask_notes(tracks, valid),
-        *end_notes(tracks, widths, settled, method.skirt_poles),
-        *coupling_notes(groups, neighbours, tracks),
-        *_error_notes(error),
-    )
-    return OrderSeparation(orders, residual, rate, axis, method.generation, method.p, members, error, notes)
-
-
-def _order(
-    k: int,
-    tracks: Tracks,
-    widths: FloatArray,
-    envelope: ComplexArray,
-    waveform: FloatArray,
-    valid: BoolArray,
-    settled: BoolArray,
-    unit: str,
-    source: str,
-) -> SeparatedOrder:
-    """Wrap one order; over angle, frequency and bandwidth become Hz with the speed."""
-    frequency, width = tracks.frequency_hz[k], widths[k]
-    if tracks.unit == "orders" and tracks.speed_rev_per_s is not None:
-        frequency, width = frequency * tracks.speed_rev_per_s, width * tracks.speed_rev_per_s
-    return SeparatedOrder(
-        name=tracks.names[k],
-        shaft=tracks.shafts[k],
-        order=float(tracks.orders[k]),
-        envelope=envelope,
-        waveform=waveform,
-        frequency_hz=frequency,
-        bandwidth_hz=width,
-        valid=valid,
-        settled=settled,
-        time_s=tracks.time_s,
-        unit=unit,
-        source=source,
-    )
-
-
-def _expected_error(problem: Problem, group: Group) -> float:
-    """Return the rounding error of one group's solution."""
-    widths = problem.bandwidths[group]
-    if problem.generation == "second":
-        return accuracy_of(problem.cycles[group], problem.valid[group], widths, problem.p)
-    return waveform_accuracy_of(problem.cycles[group], problem.valid[group], widths)
-
-
-def _error_notes(error: float) -> list[str]:
-    if error <= NOTED_ERROR:
-        return []
-    text = f"rounding may reach {error:.1g} of the largest component: the band is too narrow for this rate"
-    return [f"{text}, or the bandwidths differ too much for one solution"]
-
-
-def _continued(widths: FloatArray, valid: BoolArray) -> FloatArray:
-    """Return the bandwidths, those outside the valid part limited to those inside it: zero width has no weight."""
-    if widths.shape[1] == 1:
-        return widths
-    out = np.empty_like(widths)
-    for k, width in enumerate(widths):
-        inside = width[valid[k]]
-        out[k] = np.clip(width, inside.min(), inside.max())
-    return out
+Coupling = bool | Literal["automatic"] | Sequence[Sequence[int]]
+MAX_LEAK = 1e-4
+"""Share of one order that another's band may let through before both are solved for together: -80 dB."""
+NOTED_LEAK = 0.03
 
 
 def track_vold_kalman(
@@ -259,24 +108,22 @@ def track_vold_kalman(
     C. Feldbauer, R. Höldrich, "Realization of a Vold-Kalman tracking filter – a least squares problem", 2000.
     J. Tůma, "Setting the passband width in the Vold-Kalman order tracking filter", 2005.
     """
-    method = Method(n_poles, generation, coupled, mirror)
     y = recording.values(channel)
+    how = (n_poles, generation, coupled, mirror)
     if isinstance(recording, AngleSignal):
         if shaft_angle is not None:
             raise InputError("a signal over angle has its own shaft angle", where="shaft_angle", remedy="leave it out")
-        tracks = tracks_over_angle(orders, recording)
-        widths = bandwidths_of(tracks, bandwidth_hz, bandwidth_orders)
-        rate = float(recording.samples_per_revolution)
-        return separated(y, rate, tracks, widths, method, unit=unit_of(recording, channel), source=channel)
-    rate, angle = recording.sampling_rate_hz, shaft_angle
-    if angle is None and _needs_angle(orders, bandwidth_orders is not None):
-        from gearsig.angle import find_shaft_angle
-
-        angle = find_shaft_angle(recording)
-    tracks = tracks_of_orders(orders, angle, recording.rig, len(y), rate)
+        tracks, rate = tracks_over_angle(orders, recording), float(recording.samples_per_revolution)
+        unit = unit_of(recording, channel)
+    else:
+        rate, unit = recording.sampling_rate_hz, recording.channels[recording.index(channel)].unit
+        # An order, or a bandwidth in orders of a track without one, cannot be told without the shaft's angle.
+        in_orders = bandwidth_orders is not None
+        needed = any(not isinstance(o, FrequencyTrack) or (in_orders and np.isnan(o.order)) for o in orders)
+        angle = find_shaft_angle(recording) if shaft_angle is None and needed else shaft_angle
+        tracks = tracks_of_orders(orders, angle, recording.rig, len(y), rate)
     widths = bandwidths_of(tracks, bandwidth_hz, bandwidth_orders)
-    unit = recording.channels[recording.index(channel)].unit
-    return separated(y, rate, tracks, widths, method, unit=unit, source=channel)
+    return _separated(y, rate, tracks, widths, *how, unit=unit, source=channel)
 
 
 def separate_frequencies(
@@ -316,9 +163,265 @@ def separate_frequencies(
     given = [FrequencyTrack(f"component {k}", f) for k, f in enumerate(frequencies_hz, start=1)]
     tracks = tracks_of_orders(given, None, None, len(y), rate)
     widths = bandwidths_of(tracks, bandwidth_hz, None)
-    return separated(y, rate, tracks, widths, Method(n_poles, generation, coupled, mirror))
+    return _separated(y, rate, tracks, widths, n_poles, generation, coupled, mirror)
 
 
-def _needs_angle(orders: Sequence[OrderLike], in_orders: bool) -> bool:
-    """Return whether any order, or a bandwidth in orders, cannot be told without the shaft's angle."""
-    return any(not isinstance(wanted, FrequencyTrack) or (in_orders and np.isnan(wanted.order)) for wanted in orders)
+def _separated(
+    y: FloatArray,
+    rate: float,
+    tracks: Tracks,
+    widths: FloatArray,
+    n_poles: int,
+    generation: Generation,
+    coupled: Coupling,
+    mirror: bool,
+    *,
+    unit: str = "",
+    source: str = "",
+) -> OrderSeparation:
+    """Return the orders and the residual; widths (n_orders, n) or (n_orders, 1) in the unit of the tracks."""
+    one_of(generation, "generation", ("first", "second"))
+    if generation == "second" and count(n_poles, "n_poles") > 3:
+        raise InputError(f"n_poles is {n_poles}", allowed="1, 2 or 3")
+    if len(y) < 16:
+        raise InputError(f"the signal has {len(y)} samples", allowed="at least 16")
+    # The first generation's structural equation is of second order; on either side of the order it has one pole.
+    p, skirt_poles = (n_poles, n_poles) if generation == "second" else (2, 1)
+    valid = valid_parts(tracks, widths, rate, generation)
+    _check_record_length(tracks, widths, valid, rate)
+    neighbours = _neighbours(tracks, widths, valid, skirt_poles)
+    problem = Problem(tracks.cycles, valid, _continued(widths, valid) / rate, p, generation, mirror)
+    groups = _groups(coupled, neighbours, problem)
+    envelopes, waveforms, sweep_error = solve_groups(y, problem, groups, share=isinstance(coupled, str))
+    error = sweep_error + max(problem.of(group).expected_error for group in groups)
+    settled = _settled(widths, valid, rate, skirt_poles)
+    residual = y.astype(np.float64)
+    for waveform in waveforms:
+        residual -= waveform
+    over_angle = tracks.unit == "orders"
+    # Over angle, frequency and bandwidth become Hz with the speed.
+    to_hz = tracks.speed_rev_per_s if over_angle and tracks.speed_rev_per_s is not None else 1.0
+    orders = tuple(
+        SeparatedOrder(
+            name=tracks.names[k],
+            shaft=tracks.shafts[k],
+            order=float(tracks.orders[k]),
+            envelope=envelopes[k],
+            waveform=waveforms[k],
+            frequency_hz=tracks.frequency_hz[k] * to_hz,
+            bandwidth_hz=widths[k] * to_hz,
+            valid=valid[k],
+            settled=settled[k],
+            time_s=tracks.time_s,
+            unit=unit,
+            source=source,
+        )
+        for k in range(len(valid))
+    )
+    notes = (
+        *_time_notes(tracks, widths, valid, settled, skirt_poles),
+        *_coupling_notes(groups, neighbours, tracks),
+    )
+    if error > 1e-5:
+        narrow = f"rounding may reach {error:.1g} of the largest component: the band is too narrow for this rate"
+        notes = (*notes, f"{narrow}, or the bandwidths differ too much for one solution")
+    members = tuple(tuple(int(k) for k in group) for group in groups)
+    return OrderSeparation(
+        orders, residual, rate, "angle" if over_angle else "time", generation, p, members, error, notes
+    )
+
+
+def _continued(widths: FloatArray, valid: BoolArray) -> FloatArray:
+    """Return the bandwidths, those outside the valid part limited to those inside it: zero width has no weight."""
+    if widths.shape[1] == 1:
+        return widths
+    lowest = np.where(valid, widths, np.inf).min(axis=1, keepdims=True)
+    highest = np.where(valid, widths, -np.inf).max(axis=1, keepdims=True)
+    return np.clip(widths, lowest, highest)
+
+
+def _check_record_length(tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, sampling_rate: float) -> None:
+    """Raise InputError if a band is narrower than one over the time that the order is there."""
+    for k, name in enumerate(tracks.names):
+        duration = valid[k].sum() / sampling_rate
+        width = float(np.median(np.broadcast_to(bandwidth[k], valid[k].shape)[valid[k]]))
+        if width * duration < 1.0:
+            raise InputError(
+                f"the bandwidth of order {name!r} is {width:.4g} {tracks.unit}, and the order is there for "
+                f"{duration:.4g} {tracks.duration_unit} only",
+                where="bandwidth",
+                allowed=f"at least {1 / duration:.4g} {tracks.unit}",
+                remedy="widen the band or record longer",
+            )
+
+
+# Which orders lie close to each other or cross, which are solved for together, and where each is settled.
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """How close orders k and m come while both are there.
+
+    Parameters
+    ----------
+    k, m : int
+    distance : float
+        Smallest, in the unit of the tracks; infinite if they are never there together.
+    leak : float
+        Largest gain of either's filter for the other, 0 to 1.
+    close_share : float
+        Share of the common time at a distance below twice the wider bandwidth.
+    """
+
+    k: int
+    m: int
+    distance: float
+    leak: float
+    close_share: float
+
+
+def _neighbours(tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, poles: int) -> list[Neighbours]:
+    """Compare each two orders: the gain at distance d is 1/(1 + (√2 - 1)(2d/B)^2p), p being `poles`.
+
+    Raises
+    ------
+    InputError
+        If two orders never drift apart by half a cycle.
+    """
+    step = max(1, valid.shape[1] // 2**15)  # frequencies are smooth
+    there, f, cycles = valid[:, ::step], tracks.frequency_hz[:, ::step], tracks.cycles[:, ::step]
+    width = np.broadcast_to(bandwidth, valid.shape)[:, ::step]
+    pairs = []
+    for k, m in combinations(range(len(valid)), 2):
+        both = there[k] & there[m]
+        if not both.any():
+            pairs.append(Neighbours(k, m, np.inf, 0.0, 0.0))
+            continue
+        drift = float(np.ptp((cycles[k] - cycles[m])[both]))
+        if drift < 0.5:
+            raise InputError(
+                f"orders {tracks.names[k]!r} and {tracks.names[m]!r} drift apart by {drift:.3g} cycles only",
+                where="orders",
+                allowed="different orders",
+                remedy="leave one of them out or record longer",
+            )
+        difference = (f[k] - f[m])[both]
+        of_half = 2.0 * np.abs(difference) / np.maximum(width[k], width[m])[both]
+        crossing = difference.min() <= 0.0 <= difference.max()
+        nearest = 0.0 if crossing else float(of_half.min())
+        distance = 0.0 if crossing else float(np.abs(difference).min())
+        leak = 1.0 / (1.0 + float(HALF_POWER) ** 2 * nearest ** (2 * poles))
+        pairs.append(Neighbours(k, m, distance, leak, float(np.mean(of_half < 4.0))))
+    return pairs
+
+
+def _groups(coupled: Coupling, neighbours: Sequence[Neighbours], problem: Problem) -> list[Group]:
+    """Return the positions of the orders solved for together; each order is in one group.
+
+    "automatic": orders are in one group if, at any time, more than `MAX_LEAK` of one would pass through the band of
+    the other, and with them those that either is grouped with. Where that is cheap, all are.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n_orders = len(problem.valid)
+    if coupled is False:
+        return [np.array([k]) for k in range(n_orders)]
+    if isinstance(coupled, str) and coupled != "automatic":
+        raise InputError(f"coupled is {coupled!r}", allowed='True, False, "automatic" or groups of positions')
+    if coupled is True or (isinstance(coupled, str) and problem.cheap_together):
+        return [np.arange(n_orders)]
+    if isinstance(coupled, str):
+        pairs = np.array([(pair.k, pair.m) for pair in neighbours if pair.leak > MAX_LEAK], dtype=np.intp)
+        graph = coo_array((np.ones(len(pairs)), tuple(pairs.reshape(-1, 2).T)), shape=(n_orders, n_orders))
+        n_parts, labels = connected_components(graph, directed=False)
+        return [np.flatnonzero(labels == part) for part in range(n_parts)]
+    try:
+        members = [sorted(int(k) for k in group) for group in coupled]
+    except (TypeError, ValueError):
+        members = [[-1]]
+    flat = [k for group in members for k in group]
+    if any(not 0 <= k < n_orders for k in flat) or len(set(flat)) != len(flat):
+        raise InputError(
+            f"the groups are {coupled!r}",
+            where="coupled",
+            allowed=f"positions from 0 to {n_orders - 1}, each in one group at most",
+        )
+    single = [[k] for k in range(n_orders) if k not in flat]
+    return [np.array(group) for group in sorted([group for group in members if group] + single)]
+
+
+def _coupling_notes(groups: Sequence[Group], neighbours: Sequence[Neighbours], tracks: Tracks) -> list[str]:
+    """Return why close orders are solved for together, and a warning for those that are not."""
+    group_of = {int(k): i for i, group in enumerate(groups) for k in group}
+    unit = tracks.unit
+    notes = []
+    for pair in neighbours:
+        if pair.leak <= MAX_LEAK:
+            continue
+        text = (
+            f"orders {tracks.names[pair.k]!r} and {tracks.names[pair.m]!r} come as close as {pair.distance:.3g} {unit}"
+        )
+        leak = f"up to {_percent(pair.leak)} of one lies in the band of the other"
+        if group_of[pair.k] == group_of[pair.m]:
+            close = ", and told apart where they stay close for long enough to beat" if pair.leak > NOTED_LEAK else ""
+            notes.append(f"{text}, where {leak}: they are solved for together{close}")
+        else:
+            notes.append(
+                f"{text}, and leak into each other ({leak}; more than {_percent(NOTED_LEAK)} for "
+                f"{100 * pair.close_share:.1f} % of the time): couple them or narrow the band"
+            )
+    apart = [k for k in range(len(tracks.names)) if len(groups[group_of[k]]) == 1]
+    leaks = [p.leak for p in neighbours if group_of[p.k] != group_of[p.m]]
+    if len(groups) == 1 and len(tracks.names) > 1 and not notes:
+        notes.append("all orders are solved for together, though they lie far apart")
+    if len(groups) > 1 and apart and max(leaks, default=1.0) <= MAX_LEAK:
+        names = ", ".join(repr(tracks.names[k]) for k in apart)
+        notes.append(
+            f"solved for by themselves, at most {_percent(max(leaks))} of another order in their band: {names}"
+        )
+    return notes
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def _settled(bandwidth: FloatArray, valid: BoolArray, sampling_rate: float, skirt_poles: int) -> BoolArray:
+    """Return where each order has been valid for a settling time before, and stays so for one after, (n_orders, n).
+
+    Where the bandwidth varies, so does the settling time T: it has passed once ∫ dt/T has grown by one.
+    """
+    settled = np.zeros(valid.shape, dtype=bool)
+    for k, there in enumerate(valid):
+        rate = 1.0 / (settling_time(bandwidth[k], skirt_poles) * sampling_rate)
+        passed = rate[0] * np.arange(len(there)) if len(rate) == 1 else np.cumsum(rate)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).view(np.int8)))
+        for first, end in edges.reshape(-1, 2):
+            begin = first + np.searchsorted(passed[first:end], passed[first] + 1.0)
+            stop = first + np.searchsorted(passed[first:end], passed[end - 1] - 1.0, side="right")
+            settled[k, begin : max(begin, stop)] = True
+    return settled
+
+
+def _time_notes(
+    tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, settled: BoolArray, skirt_poles: int
+) -> list[str]:
+    """Return which orders are left out for how long, and over what time at the ends they are not reliable."""
+    notes = [
+        f"order {name!r} is left out for {percent:.2g} % of the time, where its band passes half the sampling rate or "
+        "zero, or the shaft angle is not known"
+        for name, percent in zip(tracks.names, 100.0 * (1.0 - valid.mean(axis=1)), strict=True)
+        if percent > 0.0
+    ]
+    times = settling_time(bandwidth, skirt_poles)
+    shortest, longest = float(times.min()), float(times.max())
+    span = f"{longest:.3g}" if longest < 1.005 * shortest else f"{shortest:.3g} to {longest:.3g}"
+    notes.append(
+        f"at the ends of the recording, and beside parts left out, levels are not reliable over {span} "
+        f"{tracks.duration_unit}, in which the filter's response decays to 1 %"
+    )
+    never = [repr(name) for name, there in zip(tracks.names, settled, strict=True) if not there.any()]
+    if never:
+        notes.append(f"the recording is too short for order(s) {', '.join(never)} to settle: widen the band")
+    return notes

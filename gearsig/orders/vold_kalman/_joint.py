@@ -1,9 +1,9 @@
-"""Envelopes and waveforms of orders by the Vold–Kalman filter, from plain arrays; which solver suits which problem."""
+"""Several orders at once: by splines on a coarse grid, or sample by sample; which solver suits which problem."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations, combinations_with_replacement
 from math import comb, factorial
 from typing import Any, Literal
@@ -14,12 +14,8 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.orders.vold_kalman._banded import eliminate, rotate, solve_band
-from gearsig.orders.vold_kalman._grouping import Group
-from gearsig.orders.vold_kalman._single import envelope_alone, waveform_alone
-from gearsig.orders.vold_kalman._tracks import (
+from gearsig.orders.vold_kalman._kernels import (
     HALF_POWER,
-    Generation,
     cosine_and_sine,
     envelope_weight,
     waveform_weight,
@@ -27,354 +23,125 @@ from gearsig.orders.vold_kalman._tracks import (
     write_modulated,
     write_phasors,
 )
-
-# Adding up the cells' parts of the coarse normal equations.
-
+from gearsig.orders.vold_kalman._single import envelope_alone, waveform_alone
+from gearsig.orders.vold_kalman._tracks import Generation
 
 Array = NDArray[Any]
 ComplexArray = NDArray[np.complex128]
 BoolArray = NDArray[np.bool_]
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def add_products(matrix: Array, k: int, m: int, first: int, pairs: NDArray[np.int64], grams: Array) -> None:
-    """Add each cell's products of pieces s <= t, (n_cells, n_pairs), to the splines that the pieces belong to.
-
-    matrix[t - s, cell + s] at unknowns k and m and, conjugate, m and k; the first cell is `first`.
-    """
-    for cell in range(grams.shape[0]):
-        for i in range(grams.shape[1]):
-            s, t = pairs[i, 0], pairs[i, 1]
-            value = grams[cell, i]
-            matrix[t - s, first + cell + s, k, m] += value
-            if m != k:
-                matrix[t - s, first + cell + s, m, k] += np.conj(value)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def add_projections(right: Array, k: int, first: int, projected: Array) -> None:
-    """Add each cell's projections on its pieces, (n_cells, n_pieces), to the splines that the pieces belong to."""
-    for cell in range(projected.shape[0]):
-        for s in range(projected.shape[1]):
-            right[first + cell + s, k] += projected[cell, s]
-
-
-# The second-generation Vold–Kalman problem on a coarse grid: the envelope as a quintic spline.
-#
-# A narrow-band envelope changes little from sample to sample. The least-squares problem is restricted to splines
-# x_k(n) = Σ_i a_ki φ(n/d - i) with one knot every d samples (Ritz–Galerkin); all sums over samples stay exact. The
-# error is that of the best spline, 2.4 (dω_h/π)^2p with ω_h half the bandwidth in rad/sample; the rounding error falls
-# from ε/ω_h^2p to ε/(dω_h)^2p. Both meet near 1e-8 where d is chosen by `samples_per_cell`.
-
-
-DEGREE = 5
-"""Of the spline: 2p - 1 for p = 3, as the error's order 2p asks; with p = 2 it is more than needed."""
-PIECES = DEGREE + 1
-CELL_ANGLE = {2: 0.0234, 3: 0.0993}
-"""d·ω_h for two and three poles where truncation 2.4 (dω_h/π)^2p and rounding ~10 ε/(dω_h)^2p are equal."""
-MAX_CELL = 2**16
-MAX_INT64_CELL = 2600
-"""Up to here 66 d⁵, the largest value of 5! d⁵ φ, fits 64 bits; that the sums before it wrap around does no harm."""
-CHUNK_SAMPLES = 2**15
-
-
-def samples_per_cell(lowest_bandwidth: float, highest_bandwidth: float, p: int) -> int:
-    """Return d, 0 for one pole; bandwidths in cycles per sample.
-
-    The geometric mean of both bandwidths shares the loss evenly between truncation and rounding.
-    """
-    if p not in CELL_ANGLE:
-        return 0
-    return min(MAX_CELL, int(CELL_ANGLE[p] / (np.pi * np.sqrt(lowest_bandwidth * highest_bandwidth))))
-
-
-def expected_error(lowest_bandwidth: float, highest_bandwidth: float, d: int, p: int) -> float:
-    """Return the sum of truncation and rounding error that d leads to, relative to the largest component."""
-    truncation = 2.4 * (d * highest_bandwidth) ** (2 * p)
-    return float(truncation + 2e-15 / (np.pi * d * lowest_bandwidth) ** (2 * p))
-
-
-def solve_by_splines(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int, d: int, *, mirror: bool
-) -> ComplexArray:
-    """Minimise Σ_n |y_n - Σ_k x_kn e^{2πi c_kn}|² + Σ_k Σ_n r_kn² |∇^p x_kn|² over splines with knots d samples apart.
-
-    With mirror images, x_k* e^{-2πi c_k} is part of the data equation as well, and of the second sum. The unknowns are
-    then the real coefficients of cos and -sin: u + iv = 2x, with weight r/√2 each.
-
-    Parameters
-    ----------
-    y : array, (n,)
-    cycles : array, (n_orders, n)
-        c.
-    active : array of bool, (n_orders, n), or None
-        Where an order is part of the data equation; None: everywhere.
-    weights : array, (n_orders, n - p) or (n_orders, 1)
-        r, of each row of the structural equation or constant.
-    p, d : int
-        Poles; samples per cell, at least p + 1.
-    mirror : bool
-
-    Returns
-    -------
-    array, (n_orders, n), complex
-        2x.
-
-    Raises
-    ------
-    RefusalError
-        If the orders cannot be told apart.
-    """
-    basis, differences = sampled_basis(d, p)
-    matrix, right = _data_terms(y, cycles, active, basis, mirror)
-    unknown_weights = np.repeat(weights, 2, axis=0) / 2**0.5 if mirror else weights
-    _add_structure(matrix, unknown_weights, differences, len(y), p)
-    # A last knot at the last sample leaves a spline that vanishes on all samples.
-    n_splines = -(-(len(y) - 1) // d) + DEGREE
-    coefficients = _solve_spline_system(matrix[:, :n_splines], right[:n_splines])
-    envelope = np.asarray(coefficients.view(np.complex128) if mirror else 2.0 * coefficients, dtype=np.complex128)
-    return _sampled(envelope, basis, len(y), len(right))
-
-
-def sampled_basis(d: int, p: int) -> tuple[FloatArray, FloatArray]:
-    """Return the B-splines' values in a cell, (d, 6), and their p-th differences, (d, 7).
-
-    Column s belongs to the spline that began 5 - s cells earlier. The difference is the forward one, so the last p rows
-    of a cell reach into the spline that begins with the next cell (column 6). Integers throughout: the difference of
-    rounded values would have few digits left.
-    """
-    kind: Any = np.int64 if d < MAX_INT64_CELL else np.object_
-    grid: NDArray[Any] = np.arange((PIECES + 2) * d).astype(kind)
-    powers = grid * grid * grid * grid * grid
-    spline: NDArray[Any] = np.zeros((PIECES + 2) * d, dtype=kind)  # one empty cell before, one after
-    for i in range(PIECES + 1):
-        spline[(i + 1) * d :] += (-1) ** i * comb(PIECES, i) * powers[: (PIECES + 1 - i) * d]
-    difference = np.append(np.diff(spline, p), np.zeros(p, dtype=kind))
-    scale = float(factorial(DEGREE) * d**DEGREE)
-
-    def cells(values: NDArray[Any]) -> FloatArray:
-        return values.astype(np.float64).reshape(-1, d)[::-1].T / scale
-
-    return np.ascontiguousarray(cells(spline)[:, 1:-1]), np.ascontiguousarray(cells(difference)[:, 1:])
-
-
-def _pairs(basis: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
-    """Return all pairs s <= t of columns, (n_pairs, 2), and their products, (d, n_pairs)."""
-    pairs = np.array(list(combinations_with_replacement(range(basis.shape[1]), 2)), dtype=np.int64)
-    return pairs, basis[:, pairs[:, 0]] * basis[:, pairs[:, 1]]
-
-
-def _data_terms(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, basis: FloatArray, mirror: bool
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the data equation's part of the normal equations of the coefficients.
-
-    matrix[o, i, k, l] couples coefficient i + o of unknown k to coefficient i of unknown l; right[i, k]. The unknowns
-    are x_k, or with mirror images the coefficients of cos and -sin of each order in turn. The matrix is real for one
-    order: its own phasor cancels.
-    """
-    n_orders, n = cycles.shape
-    d = len(basis)
-    n_cells = -(-n // d)
-    pairs, products = _pairs(basis)
-    n_unknowns = 2 * n_orders if mirror else n_orders
-    matrix = np.zeros(
-        (PIECES + 1, n_cells + PIECES, n_unknowns, n_unknowns),
-        np.float64 if mirror or n_orders == 1 else np.complex128,
-    )
-    right = np.zeros((n_cells + PIECES, n_unknowns), np.float64 if mirror else np.complex128)
-    per_chunk = max(1, CHUNK_SAMPLES // d)
-    for first in range(0, n_cells, per_chunk):
-        last = min(first + per_chunk, n_cells)
-        samples = slice(first * d, min(last * d, n))
-        values, regressors = _padded_chunk(y, cycles, active, samples, (last - first, d), mirror=mirror)
-        # Where cos² + sin² is 1 throughout, its products are the same in every cell.
-        whole = np.tile(products.sum(axis=0), (last - first, 1)) if active is None and last * d <= n else None
-        _add_data_terms(matrix, right, first, values, regressors, basis, pairs, products, whole)
-    return matrix, right
-
-
-def _add_data_terms(
-    matrix: NDArray[Any],
-    right: NDArray[Any],
-    first: int,
-    values: FloatArray,
-    regressors: list[NDArray[Any]],
-    basis: FloatArray,
-    pairs: NDArray[np.int64],
-    products: FloatArray,
-    whole: FloatArray | None,
-) -> None:
-    """Add a chunk's part: e_k* y on the right, e_k* e_m in the matrix, e a phasor, or cos and -sin of each in turn."""
-    square: FloatArray = np.zeros(0)
-    for k, e_k in enumerate(regressors):
-        add_projections(right, k, first, _summed(values * e_k.conj(), basis))
-        for m, e_m in enumerate(regressors[:k]):
-            add_products(matrix, k, m, first, pairs, _summed(e_k.conj() * e_m, products))
-        if whole is not None and np.iscomplexobj(e_k):
-            square = whole
-        elif whole is not None and k % 2:
-            square = whole - square
-        else:
-            square = _summed(e_k.real**2 + e_k.imag**2 if np.iscomplexobj(e_k) else e_k * e_k, products)
-        add_products(matrix, k, k, first, pairs, square)
-
-
-def _summed(samples: NDArray[Any], columns: FloatArray) -> NDArray[Any]:
-    """Return each cell's sums over its samples, weighted by real columns: not a complex product with zeros in it."""
-    if np.iscomplexobj(samples):
-        return np.asarray(samples.real @ columns + 1j * (samples.imag @ columns))
-    return np.asarray(samples @ columns)
-
-
-def _padded_chunk(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, samples: slice, shape: tuple[int, int], *, mirror: bool
-) -> tuple[FloatArray, list[NDArray[Any]]]:
-    """Return the signal and the regressors as (cell, sample in it); zero past the end, where inactive.
-
-    Phasors, or with mirror images Re(a e^{iΘ}) = u cos Θ - v sin Θ: cosine and minus sine of each order in turn.
-    """
-    length = samples.stop - samples.start
-    values: FloatArray = np.zeros(shape)
-    values.reshape(-1)[:length] = y[samples]
-    regressors: list[NDArray[Any]] = []
-    for k in range(len(cycles)):
-        cosine, sine = np.zeros(shape), np.zeros(shape)
-        cosine_and_sine(cycles[k, samples], cosine.reshape(-1)[:length], sine.reshape(-1)[:length])
-        if active is not None:
-            for part in (cosine, sine):
-                part.reshape(-1)[:length] *= active[k, samples]
-        regressors.extend((cosine, -sine) if mirror else (cosine + 1j * sine,))
-    return values, regressors
-
-
-def _add_structure(matrix: NDArray[Any], weights: FloatArray, differences: FloatArray, n: int, p: int) -> None:
-    """Add r²·(∇^p φ_i)(∇^p φ_j), summed over the rows that lie wholly inside the signal."""
-    d = len(differences)
-    n_cells, n_rows = -(-n // d), n - p
-    pairs, products = _pairs(differences)
-    per_chunk = max(1, CHUNK_SAMPLES // d)
-    whole = products.sum(axis=0)
-    for k, r in enumerate(weights):
-        for first in range(0, n_cells, per_chunk):
-            last = min(first + per_chunk, n_cells)
-            rows = slice(first * d, min(last * d, n_rows))
-            if len(r) == 1 and rows.stop == last * d:
-                grams = np.tile(r[0] ** 2 * whole, (last - first, 1))
-            else:
-                squares = np.zeros((last - first) * d)
-                squares[: max(0, rows.stop - rows.start)] = (r if len(r) == 1 else r[rows]) ** 2
-                grams = squares.reshape(-1, d) @ products
-            add_products(matrix, k, k, first, pairs, grams)
-
-
-def _solve_spline_system(matrix: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
-    """Solve the Hermitian banded system by Cholesky's method; unknowns ordered by spline, then by order.
-
-    A real matrix takes real and imaginary part of the right-hand side as two.
-    """
-    from scipy.linalg import LinAlgError, solveh_banded
-
-    n_offsets, n_splines, n_orders, _ = matrix.shape
-    band = np.zeros((n_offsets * n_orders, n_splines * n_orders), matrix.dtype)
-    for offset in range(n_offsets):
-        for k in range(n_orders):
-            for m in range(n_orders):
-                if (below := offset * n_orders + k - m) >= 0:
-                    band[below, m::n_orders] = matrix[offset, :, k, m]
-    b = right.reshape(-1).view(matrix.dtype).reshape(n_splines * n_orders, -1)
-    try:
-        x = solveh_banded(band, b, lower=True, overwrite_ab=True, check_finite=False)
-    except LinAlgError:
-        raise RefusalError(
-            "the orders cannot be told apart in this recording", remedy="leave one of them out or record longer"
-        ) from None
-    return np.ascontiguousarray(x).view(right.dtype).reshape(n_splines, n_orders)
-
-
-def _sampled(coefficients: ComplexArray, basis: FloatArray, n: int, n_splines: int) -> ComplexArray:
-    """Return the splines at all samples, (n_orders, n)."""
-    d = len(basis)
-    a = np.zeros((coefficients.shape[1], n_splines), np.complex128)
-    a[:, : len(coefficients)] = coefficients.T
-    x = np.empty((len(a), n), np.complex128)
-    n_cells = -(-n // d)
-    per_chunk = max(1, CHUNK_SAMPLES // d)
-    for k in range(len(a)):
-        windows = np.lib.stride_tricks.sliding_window_view(a[k], PIECES)
-        for first in range(0, n_cells, per_chunk):
-            cells = slice(first, min(first + per_chunk, n_cells))
-            samples = slice(cells.start * d, min(cells.stop * d, n))
-            both = (windows.real[cells] @ basis.T, windows.imag[cells] @ basis.T)
-            length = samples.stop - samples.start
-            x.real[k, samples], x.imag[k, samples] = both[0].reshape(-1)[:length], both[1].reshape(-1)[:length]
-    return x
-
-
-# How much worse a joint Vold–Kalman problem is conditioned for orders that stay closer than the filter is wide.
-
-
-POINTS_PER_SEGMENT = 16
-GROWTH = 1.5
-
-
-def closeness(cycles: FloatArray, active: NDArray[np.bool_] | None, bandwidths: FloatArray, p: int) -> float:
-    """Return the factor by which rounding errors grow, 1 where no two orders stay within a bandwidth.
-
-    Two orders at a distance g below the bandwidth B can exchange what they hold at the price of (g/B)^2p, which divides
-    the smallest eigenvalue of the normal equations. Within a segment W the price is that of the distance's rms or of
-    going up and down again in W, p/W, whichever is higher (factor from trials); the cheapest segment counts. Orders
-    that cross swiftly are close for too short a time to exchange much.
-
-    Parameters
-    ----------
-    cycles : array, (n_orders, n)
-        Phase of each order.
-    active : array of bool, (n_orders, n), or None
-    bandwidths : array, (n_orders, n) or (n_orders, 1)
-        -3 dB, in cycles per sample.
-    p : int
-    """
-    worst = 1.0
-    for k, m in combinations(range(len(cycles)), 2):
-        width = float(max(bandwidths[k].max(), bandwidths[m].max()))
-        together = slice(None) if active is None else np.flatnonzero(active[k] & active[m])
-        difference = cycles[k, together] - cycles[m, together]
-        distance = _smallest_distance(difference, width, p)
-        if distance < width:
-            worst = max(worst, (width / max(distance, 1e-3 * width)) ** (2 * p))
-    return worst
-
-
-def _smallest_distance(difference: FloatArray, width: float, p: int) -> float:
-    """Return the smallest of max(p/W, rms slope of the phase difference over W samples), W from 1/width on."""
-    smallest, segment = np.inf, 1.0 / width
-    while len(difference) > 1:
-        n = min(int(segment) + 1, len(difference) - 1)
-        step = max(1, n // POINTS_PER_SEGMENT)
-        slopes = np.diff(difference[::step]) / step
-        m = min(len(slopes), max(1, round(n / step)))
-        total = np.concatenate([[0.0], np.cumsum(slopes**2)])
-        rms = float(np.sqrt(max(float((total[m:] - total[:-m]).min()), 0.0) / m))
-        smallest = min(smallest, max(p / n, rms))
-        if n >= len(difference) - 1 or rms > smallest:
-            break
-        segment *= GROWTH
-    return float(smallest)
-
-
+Group = NDArray[np.intp]
 Solver = Literal["splines", "elimination", "rotations"]
 
 MAX_ELIMINATED_STRENGTH = 1.5e5
 """r·|D| up to which the normal equations are solved: their rounding error is below 5e-7 there."""
-MIN_CELL = 3
-"""Samples. Below, the band is so wide that the coarse grid saves nothing, and elimination loses no digits."""
-
-CHEAP_CELL, MAX_TOGETHER = 16, 8
-"""Samples per cell from which, and orders up to which, the coarse grid is faster than several solutions (trials)."""
-ACCURATE = 1e-7
 ENOUGH = 5e-7
 """Expected error up to which the fastest solver is taken."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """All orders: phase in cycles, where they are data, -3 dB bandwidth in cycles per sample; (n_orders, n)."""
+
+    cycles: FloatArray
+    valid: BoolArray
+    bandwidths: FloatArray
+    p: int
+    generation: Generation
+    mirror: bool
+
+    def of(self, group: Group) -> Problem:
+        """Return the part of some orders; neighbours as views, without a copy."""
+        rows = _rows(group)
+        return replace(self, cycles=self.cycles[rows], valid=self.valid[rows], bandwidths=self.bandwidths[rows])
+
+    @property
+    def expected_error(self) -> float:
+        """Of the solution for all orders together, relative to the largest component of the signal."""
+        if self.generation == "second" or len(self.bandwidths) == 1:
+            return accuracy_of(self.cycles, self.valid, self.bandwidths, self.p)
+        frequency = np.abs(np.diff(self.cycles, axis=1))[self.valid[:, 1:] & self.valid[:, :-1]]
+        narrowest = np.pi * float(self.bandwidths.min())
+        sine = min(np.sin(2 * np.pi * float(frequency.min())), np.sin(2 * np.pi * float(frequency.max())))
+        strength = 4.0 * float(HALF_POWER) / (2.0 * narrowest * max(sine, narrowest))
+        return _sample_by_sample(strength, closeness(self.cycles, self.valid, self.bandwidths, 2))[1]
+
+    @property
+    def cheap_together(self) -> bool:
+        """Whether one solution for all orders takes less time than several for groups (trials)."""
+        if self.generation == "first" or not 1 < len(self.bandwidths) <= 8:
+            return False
+        return cell_of(self.bandwidths, self.p) >= 16 and self.expected_error <= 1e-7
+
+
+def solve_groups(
+    y: FloatArray, problem: Problem, groups: Sequence[Group], *, share: bool
+) -> tuple[ComplexArray, FloatArray, float]:
+    """Return envelopes (nan where not valid), waveforms (0 there), and the remaining error relative to the signal.
+
+    Without `share`, each group sees the whole signal, and takes what leaks through its bands of the others: near the
+    ends, that is some percent even of far ones. With it, each sees the signal less the others' waveforms, in several
+    sweeps (Gauss–Seidel by groups), which lead to the solution for all orders together.
+    """
+    solutions: NDArray[Any] = np.empty(
+        problem.cycles.shape, np.complex128 if problem.generation == "second" else np.float64
+    )
+    waveforms = np.zeros(problem.cycles.shape)
+    rows, parts = [_rows(group) for group in groups], [problem.of(group) for group in groups]
+    if len(groups) == 1 or not share:
+        for g, part in zip(rows, parts, strict=True):
+            solutions[g], waveforms[g] = _solve_group(y, part)
+        return _envelopes(solutions, problem), waveforms, 0.0
+    rest = y.astype(np.float64)
+    largest = float(np.abs(rest).max()) or 1.0
+    before, error = 1.0, 1.0
+    for _ in range(20):
+        change = 0.0
+        for g, part in zip(rows, parts, strict=True):
+            rest += waveforms[g].sum(axis=0)
+            solutions[g], new = _solve_group(rest, part)
+            change = max(change, float(np.abs(new - waveforms[g]).max()) / largest)
+            waveforms[g] = new
+            rest -= new.sum(axis=0)
+        # Each sweep changes the waveforms by the same fraction of what the last one did.
+        error = change * min(1.0, change / before)
+        before = change
+        if error < 2e-7:  # of the signal's largest value: not worth a further sweep
+            break
+    return _envelopes(solutions, problem), waveforms, error
+
+
+def _rows(group: Group) -> Group | slice:
+    return slice(int(group[0]), int(group[-1]) + 1) if np.all(np.diff(group) == 1) else group
+
+
+def _solve_group(y: FloatArray, problem: Problem) -> tuple[Array, FloatArray]:
+    """Return the solution of one group (envelopes, or waveforms of the first generation), and its waveforms.
+
+    Where an order is not valid, the solution goes on all the same, and the waveform is 0.
+    """
+    cycles, valid, widths = problem.cycles, problem.valid, problem.bandwidths
+    active = None if valid.all() else valid
+    if problem.generation == "first":
+        continued = solve_waveforms(y, cycles, active, widths)
+        return continued, continued if active is None else np.where(valid, continued, 0.0)
+    envelopes = solve_envelopes(y, cycles, active, widths, problem.p, mirror=problem.mirror)
+    waveforms = np.empty(cycles.shape)
+    for envelope, angle, out in zip(envelopes, cycles, waveforms, strict=True):
+        write_modulated(envelope, angle, out)
+    if active is not None:
+        waveforms *= valid
+    return envelopes, waveforms
+
+
+def _envelopes(solutions: Array, problem: Problem) -> ComplexArray:
+    """Return the envelopes, of waveforms too; nan where not valid."""
+    envelopes = solutions.astype(np.complex128, copy=problem.generation == "first")
+    if problem.generation == "first":
+        for waveform, angle, envelope in zip(solutions, problem.cycles, envelopes, strict=True):
+            write_envelope(np.ascontiguousarray(waveform), np.ascontiguousarray(angle), envelope)
+    if not problem.valid.all():
+        envelopes[~problem.valid] = np.nan
+    return envelopes
 
 
 def solve_envelopes(
@@ -430,8 +197,20 @@ def solve_envelopes(
     solver, _ = chosen_solver(bandwidths, p, closeness(cycles, active, bandwidths, p))
     if solver == "splines":
         return solve_by_splines(y, cycles, active, weights, p, cell_of(bandwidths, p), mirror=mirror)
+    # As by splines: the complex x, or with mirror images the real coefficients of cos and -sin.
+    data: Array = np.empty(cycles.shape, np.complex128)
+    for row, angle in zip(data, cycles, strict=True):
+        write_phasors(np.ascontiguousarray(angle), row)
+    if active is not None:
+        data *= active
     weights = np.broadcast_to(weights, (len(cycles), n - p))
-    return _solve_envelopes_by_samples(y, cycles, active, weights, p, solver, mirror=mirror)
+    if mirror:
+        data = np.stack([data.real, -data.imag], axis=1).reshape(-1, n)
+        weights = np.repeat(weights, 2, axis=0) / 2**0.5
+    stencil = [(-1.0) ** (p - i) * comb(p, i) for i in range(p + 1)]
+    stencils = np.broadcast_to(stencil, (*weights.shape, p + 1))
+    x = solve_band(data, y.astype(data.dtype), weights, stencils, forward=FORWARD[solver])
+    return np.asarray(x[::2] + 1j * x[1::2] if mirror else 2.0 * x, dtype=np.complex128)
 
 
 def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray) -> FloatArray:
@@ -465,19 +244,24 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     weights = waveform_weight(width, inside)
     # |D|, the largest gain of the stencil, is 2^p for differences and for the first generation at most that.
     solver = _sample_by_sample(4.0 * float(weights.max()), closeness(cycles, active, bandwidths, 2))[0]
-    return _solve_by_samples(data, y.astype(np.float64), weights, stencils, solver)
+    return solve_band(data, y.astype(np.float64), weights, stencils, forward=FORWARD[solver])
 
 
-def _solve_by_samples(
-    data: NDArray[Any], observed: NDArray[Any], weights: FloatArray, stencils: FloatArray, solver: Solver
-) -> NDArray[Any]:
-    return solve_band(data, observed, weights, stencils, forward=eliminate if solver == "elimination" else rotate)
+def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:
+    """Return the bandwidth at the middle of each row of the structural equation."""
+    if bandwidths.shape[1] == 1:
+        return bandwidths
+    middle = p // 2
+    return bandwidths[:, middle : n - p + middle]
 
 
 def cell_of(bandwidths: FloatArray, p: int) -> int:
-    """Return the samples per cell of the coarse grid; 0 where the problem is solved sample by sample."""
+    """Return the samples per cell of the coarse grid; 0 where the problem is solved sample by sample.
+
+    With less than three, the band is so wide that the grid saves nothing, and elimination loses no digits.
+    """
     d = samples_per_cell(float(bandwidths.min()), float(bandwidths.max()), p)
-    return d if d >= MIN_CELL else 0
+    return d if d >= 3 else 0
 
 
 def chosen_solver(bandwidths: FloatArray, p: int, close: float) -> tuple[Solver, float]:
@@ -507,161 +291,506 @@ def accuracy_of(cycles: FloatArray, active: BoolArray | None, bandwidths: FloatA
     return chosen_solver(bandwidths, p, closeness(cycles, active, bandwidths, p))[1]
 
 
-def cheap_together(cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray, p: int) -> bool:
-    """Return whether one solution of the second generation for all orders takes less time than several for groups."""
-    few = 1 < len(bandwidths) <= MAX_TOGETHER
-    return few and cell_of(bandwidths, p) >= CHEAP_CELL and accuracy_of(cycles, active, bandwidths, p) <= ACCURATE
-
-
-def waveform_accuracy_of(cycles: FloatArray, active: BoolArray, bandwidths: FloatArray) -> float:
-    """Return the expected error of `solve_waveforms`, relative to the largest component of the signal."""
-    if len(bandwidths) == 1:
-        return error_alone(bandwidths)
-    frequency = np.abs(np.diff(cycles, axis=1))[active[:, 1:] & active[:, :-1]]
-    narrowest = np.pi * float(bandwidths.min())
-    sine = min(np.sin(2 * np.pi * float(frequency.min())), np.sin(2 * np.pi * float(frequency.max())))
-    strength = 4.0 * float(HALF_POWER) / (2.0 * narrowest * max(sine, narrowest))
-    return _sample_by_sample(strength, closeness(cycles, active, bandwidths, 2))[1]
-
-
 def error_alone(bandwidths: FloatArray) -> float:
     """Return the rounding error for one order: a rounding step per sample, as far as the filter's memory reaches."""
     return 1e-12 + 1e-15 / float(bandwidths.min())
 
 
-def envelopes_of_waveforms(x: FloatArray, cycles: FloatArray) -> ComplexArray:
-    """Return complex envelopes of narrow-band waveforms x = Re(a e^{2πi c}).
+def closeness(cycles: FloatArray, active: NDArray[np.bool_] | None, bandwidths: FloatArray, p: int) -> float:
+    """Return the factor by which rounding errors grow, 1 where no two orders stay within a bandwidth.
 
-    For constant a the neighbours are x(n±1) = x cos α± ∓ q sin α±, α the phase step; both give the quadrature q by
-    least squares, and a = (x + iq) e^{-2πi c}.
+    Two orders at a distance g below the bandwidth B can exchange what they hold at the price of (g/B)^2p, which divides
+    the smallest eigenvalue of the normal equations. Within a segment W the price is that of the distance's rms or of
+    going up and down again in W, p/W, whichever is higher (factor from trials); the cheapest segment counts. Orders
+    that cross swiftly are close for too short a time to exchange much.
+
+    Parameters
+    ----------
+    cycles : array, (n_orders, n)
+        Phase of each order.
+    active : array of bool, (n_orders, n), or None
+    bandwidths : array, (n_orders, n) or (n_orders, 1)
+        -3 dB, in cycles per sample.
+    p : int
     """
-    a = np.empty(x.shape, np.complex128)
-    for waveform, angle, envelope in zip(x, cycles, a, strict=True):
-        write_envelope(np.ascontiguousarray(waveform), np.ascontiguousarray(angle), envelope)
-    return a
+    worst = 1.0
+    for k, m in combinations(range(len(cycles)), 2):
+        width = float(max(bandwidths[k].max(), bandwidths[m].max()))
+        together = slice(None) if active is None else np.flatnonzero(active[k] & active[m])
+        difference = cycles[k, together] - cycles[m, together]
+        distance = _smallest_distance(difference, width, p)
+        if distance < width:
+            worst = max(worst, (width / max(distance, 1e-3 * width)) ** (2 * p))
+    return worst
 
 
-def _solve_envelopes_by_samples(
-    y: FloatArray,
-    cycles: FloatArray,
-    active: BoolArray | None,
-    weights: FloatArray,
-    p: int,
-    solver: Solver,
-    *,
-    mirror: bool,
-) -> ComplexArray:
-    """Solve for the complex x, or with mirror images for the real coefficients of cos and -sin, as by splines."""
-    data: NDArray[Any] = np.empty(cycles.shape, np.complex128)
-    for row, angle in zip(data, cycles, strict=True):
-        write_phasors(np.ascontiguousarray(angle), row)
-    if active is not None:
-        data *= active
-    if mirror:
-        data = np.stack([data.real, -data.imag], axis=1).reshape(-1, len(y))
-        weights = np.repeat(weights, 2, axis=0) / 2**0.5
-    x = _solve_by_samples(data, y.astype(data.dtype), weights, _differences(weights, p), solver)
-    return np.asarray(x[::2] + 1j * x[1::2] if mirror else 2.0 * x, dtype=np.complex128)
-
-
-def _differences(weights: FloatArray, p: int) -> FloatArray:
-    """Return the stencil of the p-th difference for every row, without copies."""
-    stencil = [(-1.0) ** (p - i) * comb(p, i) for i in range(p + 1)]
-    return np.broadcast_to(stencil, (*weights.shape, p + 1))
-
-
-def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:
-    """Return the bandwidth at the middle of each row of the structural equation."""
-    if bandwidths.shape[1] == 1:
-        return bandwidths
-    middle = p // 2
-    return bandwidths[:, middle : n - p + middle]
-
-
-# Groups of orders solved for in turn, each on the signal less the others' waveforms.
-
-
-Rows = Group | slice
-
-
-@dataclass(frozen=True)
-class Problem:
-    """All orders: phase in cycles, where they are data, -3 dB bandwidth in cycles per sample; (n_orders, n)."""
-
-    cycles: FloatArray
-    valid: BoolArray
-    bandwidths: FloatArray
-    p: int
-    generation: Generation
-    mirror: bool
-
-
-def solve_groups(
-    y: FloatArray, problem: Problem, groups: Sequence[Group], *, share: bool
-) -> tuple[ComplexArray, FloatArray, float]:
-    """Return envelopes (nan where not valid), waveforms (0 there), and the remaining error relative to the signal.
-
-    Without `share`, each group sees the whole signal, and takes what leaks through its bands of the others: near the
-    ends, that is some percent even of far ones. With it, each sees the signal less the others' waveforms, in several
-    sweeps (Gauss–Seidel by groups), which lead to the solution for all orders together.
-    """
-    solutions: NDArray[Any] = np.empty(
-        problem.cycles.shape, np.complex128 if problem.generation == "second" else np.float64
-    )
-    waveforms = np.zeros(problem.cycles.shape)
-    rows = [_rows(group) for group in groups]
-    if len(groups) == 1 or not share:
-        for g in rows:
-            solutions[g], waveforms[g] = _solve_group(y, problem, g)
-        return _envelopes(solutions, problem), waveforms, 0.0
-    rest = y.astype(np.float64)
-    largest = float(np.abs(rest).max()) or 1.0
-    before, error = 1.0, 1.0
-    for _ in range(20):
-        change = 0.0
-        for g in rows:
-            rest += waveforms[g].sum(axis=0)
-            solutions[g], new = _solve_group(rest, problem, g)
-            change = max(change, float(np.abs(new - waveforms[g]).max()) / largest)
-            waveforms[g] = new
-            rest -= new.sum(axis=0)
-        # Each sweep changes the waveforms by the same fraction of what the last one did.
-        error = change * min(1.0, change / before)
-        before = change
-        if error < 2e-7:  # of the signal's largest value: not worth a further sweep
+def _smallest_distance(difference: FloatArray, width: float, p: int) -> float:
+    """Return the smallest of max(p/W, rms slope of the phase difference over W samples), W from 1/width on."""
+    smallest, segment = np.inf, 1.0 / width
+    while len(difference) > 1:
+        n = min(int(segment) + 1, len(difference) - 1)
+        step = max(1, n // 16)
+        slopes = np.diff(difference[::step]) / step
+        m = min(len(slopes), max(1, round(n / step)))
+        total = np.concatenate([[0.0], np.cumsum(slopes**2)])
+        rms = float(np.sqrt(max(float((total[m:] - total[:-m]).min()), 0.0) / m))
+        smallest = min(smallest, max(p / n, rms))
+        if n >= len(difference) - 1 or rms > smallest:
             break
-    return _envelopes(solutions, problem), waveforms, error
+        segment *= 1.5
+    return float(smallest)
 
 
-def _rows(group: Group) -> Rows:
-    """Return neighbours as a slice, which takes no copy."""
-    return slice(int(group[0]), int(group[-1]) + 1) if np.all(np.diff(group) == 1) else group
+# The second-generation Vold–Kalman problem on a coarse grid: the envelope as a quintic spline.
+#
+# A narrow-band envelope changes little from sample to sample. The least-squares problem is restricted to splines
+# x_k(n) = Σ_i a_ki φ(n/d - i) with one knot every d samples (Ritz–Galerkin); all sums over samples stay exact. The
+# error is that of the best spline, 2.4 (dω_h/π)^2p with ω_h half the bandwidth in rad/sample; the rounding error falls
+# from ε/ω_h^2p to ε/(dω_h)^2p. Both meet near 1e-8 where d is chosen by `samples_per_cell`.
 
 
-def _solve_group(y: FloatArray, problem: Problem, g: Rows) -> tuple[NDArray[Any], FloatArray]:
-    """Return the solution of one group (envelopes, or waveforms of the first generation), and its waveforms.
+DEGREE = 5
+"""Of the spline: 2p - 1 for p = 3, as the error's order 2p asks; with p = 2 it is more than needed."""
+PIECES = DEGREE + 1
+CELL_ANGLE = {2: 0.0234, 3: 0.0993}
+"""d·ω_h for two and three poles where truncation 2.4 (dω_h/π)^2p and rounding ~10 ε/(dω_h)^2p are equal."""
+MAX_INT64_CELL = 2600
+"""Up to here 66 d⁵, the largest value of 5! d⁵ φ, fits 64 bits; that the sums before it wrap around does no harm."""
 
-    Where an order is not valid, the solution goes on all the same, and the waveform is 0.
+
+def samples_per_cell(lowest_bandwidth: float, highest_bandwidth: float, p: int) -> int:
+    """Return d, 0 for one pole; bandwidths in cycles per sample.
+
+    The geometric mean of both bandwidths shares the loss evenly between truncation and rounding.
     """
-    cycles, valid, widths = problem.cycles[g], problem.valid[g], problem.bandwidths[g]
-    active = None if valid.all() else valid
-    if problem.generation == "first":
-        continued = solve_waveforms(y, cycles, active, widths)
-        return continued, continued if active is None else np.where(valid, continued, 0.0)
-    envelopes = solve_envelopes(y, cycles, active, widths, problem.p, mirror=problem.mirror)
-    waveforms = np.empty(cycles.shape)
-    for envelope, angle, out in zip(envelopes, cycles, waveforms, strict=True):
-        write_modulated(envelope, angle, out)
-    if active is not None:
-        waveforms *= valid
-    return envelopes, waveforms
+    if p not in CELL_ANGLE:
+        return 0
+    return min(2**16, int(CELL_ANGLE[p] / (np.pi * np.sqrt(lowest_bandwidth * highest_bandwidth))))
 
 
-def _envelopes(solutions: NDArray[Any], problem: Problem) -> ComplexArray:
-    """Return the envelopes, nan where not valid."""
-    envelopes = (
-        envelopes_of_waveforms(solutions, problem.cycles) if problem.generation == "first" else solutions
-    ).astype(np.complex128, copy=False)
-    if not problem.valid.all():
-        envelopes[~problem.valid] = np.nan
-    return envelopes
+def expected_error(lowest_bandwidth: float, highest_bandwidth: float, d: int, p: int) -> float:
+    """Return the sum of truncation and rounding error that d leads to, relative to the largest component."""
+    truncation = 2.4 * (d * highest_bandwidth) ** (2 * p)
+    return float(truncation + 2e-15 / (np.pi * d * lowest_bandwidth) ** (2 * p))
+
+
+def solve_by_splines(
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, weights: FloatArray, p: int, d: int, *, mirror: bool
+) -> ComplexArray:
+    """Minimise Σ_n |y_n - Σ_k x_kn e^{2πi c_kn}|² + Σ_k Σ_n r_kn² |∇^p x_kn|² over splines with knots d samples apart.
+
+    With mirror images, x_k* e^{-2πi c_k} is part of the data equation as well, and of the second sum. The unknowns are
+    then the real coefficients of cos and -sin: u + iv = 2x, with weight r/√2 each.
+
+    Parameters
+    ----------
+    y : array, (n,)
+    cycles : array, (n_orders, n)
+        c.
+    active : array of bool, (n_orders, n), or None
+        Where an order is part of the data equation; None: everywhere.
+    weights : array, (n_orders, n - p) or (n_orders, 1)
+        r, of each row of the structural equation or constant.
+    p, d : int
+        Poles; samples per cell, at least p + 1.
+    mirror : bool
+
+    Returns
+    -------
+    array, (n_orders, n), complex
+        2x.
+
+    Raises
+    ------
+    RefusalError
+        If the orders cannot be told apart.
+    """
+    basis, differences = _sampled_basis(d, p)
+    matrix, right = _data_terms(y, cycles, active, basis, mirror)
+    unknown_weights = np.repeat(weights, 2, axis=0) / 2**0.5 if mirror else weights
+    _add_structure(matrix, unknown_weights, differences, len(y), p)
+    # A last knot at the last sample leaves a spline that vanishes on all samples.
+    n_splines = -(-(len(y) - 1) // d) + DEGREE
+    coefficients = _solve_spline_system(matrix[:, :n_splines], right[:n_splines])
+    envelope = np.asarray(coefficients.view(np.complex128) if mirror else 2.0 * coefficients, dtype=np.complex128)
+    return _sampled(envelope, basis, len(y), len(right))
+
+
+def _sampled_basis(d: int, p: int) -> tuple[FloatArray, FloatArray]:
+    """Return the B-splines' values in a cell, (d, 6), and their p-th differences, (d, 7).
+
+    Column s belongs to the spline that began 5 - s cells earlier. The difference is the forward one, so the last p rows
+    of a cell reach into the spline that begins with the next cell (column 6). Integers throughout: the difference of
+    rounded values would have few digits left.
+    """
+    kind: Any = np.int64 if d < MAX_INT64_CELL else np.object_
+    grid: Array = np.arange((PIECES + 2) * d).astype(kind)
+    powers = grid * grid * grid * grid * grid
+    spline: Array = np.zeros((PIECES + 2) * d, dtype=kind)  # one empty cell before, one after
+    for i in range(PIECES + 1):
+        spline[(i + 1) * d :] += (-1) ** i * comb(PIECES, i) * powers[: (PIECES + 1 - i) * d]
+    difference = np.append(np.diff(spline, p), np.zeros(p, dtype=kind))
+    scale = float(factorial(DEGREE) * d**DEGREE)
+
+    def cells(values: Array) -> FloatArray:
+        return values.astype(np.float64).reshape(-1, d)[::-1].T / scale
+
+    return np.ascontiguousarray(cells(spline)[:, 1:-1]), np.ascontiguousarray(cells(difference)[:, 1:])
+
+
+def _pairs(basis: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+    """Return all pairs s <= t of columns, (n_pairs, 2), and their products, (d, n_pairs)."""
+    pairs = np.array(list(combinations_with_replacement(range(basis.shape[1]), 2)), dtype=np.int64)
+    return pairs, basis[:, pairs[:, 0]] * basis[:, pairs[:, 1]]
+
+
+def _chunks(d: int, n: int, n_rows: int) -> Iterator[tuple[int, int, slice]]:
+    """Yield (first cell, one past the last, rows in them) of the cells that cover n samples, some at a time."""
+    n_cells, per_chunk = -(-n // d), max(1, 2**15 // d)
+    for first in range(0, n_cells, per_chunk):
+        last = min(first + per_chunk, n_cells)
+        yield first, last, slice(first * d, max(first * d, min(last * d, n_rows)))
+
+
+def _data_terms(
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, basis: FloatArray, mirror: bool
+) -> tuple[Array, Array]:
+    """Return the data equation's part of the normal equations of the coefficients.
+
+    matrix[o, i, k, l] couples coefficient i + o of unknown k to coefficient i of unknown l; right[i, k]. The unknowns
+    are x_k, or with mirror images the coefficients of cos and -sin of each order in turn. The matrix is real for one
+    order: its own phasor cancels.
+    """
+    n_orders, n = cycles.shape
+    d = len(basis)
+    n_splines = -(-n // d) + PIECES
+    pairs, products = _pairs(basis)
+    n_unknowns = 2 * n_orders if mirror else n_orders
+    is_real = mirror or n_orders == 1
+    matrix = np.zeros((PIECES + 1, n_splines, n_unknowns, n_unknowns), np.float64 if is_real else np.complex128)
+    right = np.zeros((n_splines, n_unknowns), np.float64 if mirror else np.complex128)
+    square: FloatArray = np.zeros(0)
+    for first, last, samples in _chunks(d, n, n):
+        values, regressors = _padded_chunk(y, cycles, active, samples, (last - first, d), mirror=mirror)
+        # Where cos² + sin² is 1 throughout, its products are the same in every cell.
+        whole = np.tile(products.sum(axis=0), (last - first, 1)) if active is None and last * d <= n else None
+        # e_k* y on the right, e_k* e_m in the matrix; e is a phasor, or cos and -sin of each order in turn.
+        for k, e_k in enumerate(regressors):
+            add_projections(right, k, first, _summed(values * e_k.conj(), basis))
+            for m, e_m in enumerate(regressors[:k]):
+                add_products(matrix, k, m, first, pairs, _summed(e_k.conj() * e_m, products))
+            if whole is not None and np.iscomplexobj(e_k):
+                square = whole
+            elif whole is not None and k % 2:
+                square = whole - square
+            else:
+                square = _summed(e_k.real**2 + e_k.imag**2 if np.iscomplexobj(e_k) else e_k * e_k, products)
+            add_products(matrix, k, k, first, pairs, square)
+    return matrix, right
+
+
+def _summed(samples: Array, columns: FloatArray) -> Array:
+    """Return each cell's sums over its samples, weighted by real columns: not a complex product with zeros in it."""
+    if np.iscomplexobj(samples):
+        return np.asarray(samples.real @ columns + 1j * (samples.imag @ columns))
+    return np.asarray(samples @ columns)
+
+
+def _padded_chunk(
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, samples: slice, shape: tuple[int, int], *, mirror: bool
+) -> tuple[FloatArray, list[Array]]:
+    """Return the signal and the regressors as (cell, sample in it); zero past the end, where inactive.
+
+    Phasors, or with mirror images Re(a e^{iΘ}) = u cos Θ - v sin Θ: cosine and minus sine of each order in turn.
+    """
+    length = samples.stop - samples.start
+    values: FloatArray = np.zeros(shape)
+    values.reshape(-1)[:length] = y[samples]
+    regressors: list[Array] = []
+    for k in range(len(cycles)):
+        cosine, sine = np.zeros(shape), np.zeros(shape)
+        cosine_and_sine(cycles[k, samples], cosine.reshape(-1)[:length], sine.reshape(-1)[:length])
+        if active is not None:
+            for part in (cosine, sine):
+                part.reshape(-1)[:length] *= active[k, samples]
+        regressors.extend((cosine, -sine) if mirror else (cosine + 1j * sine,))
+    return values, regressors
+
+
+def _add_structure(matrix: Array, weights: FloatArray, differences: FloatArray, n: int, p: int) -> None:
+    """Add r²·(∇^p φ_i)(∇^p φ_j), summed over the rows that lie wholly inside the signal."""
+    d = len(differences)
+    pairs, products = _pairs(differences)
+    whole = products.sum(axis=0)
+    for k, r in enumerate(weights):
+        for first, last, rows in _chunks(d, n, n - p):
+            if len(r) == 1 and rows.stop == last * d:
+                grams = np.tile(r[0] ** 2 * whole, (last - first, 1))
+            else:
+                squares = np.zeros((last - first) * d)
+                squares[: rows.stop - rows.start] = (r if len(r) == 1 else r[rows]) ** 2
+                grams = squares.reshape(-1, d) @ products
+            add_products(matrix, k, k, first, pairs, grams)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def add_products(matrix: Array, k: int, m: int, first: int, pairs: NDArray[np.int64], grams: Array) -> None:
+    """Add each cell's products of pieces s <= t, (n_cells, n_pairs), to the splines that the pieces belong to.
+
+    matrix[t - s, cell + s] at unknowns k and m and, conjugate, m and k; the first cell is `first`.
+    """
+    for cell in range(grams.shape[0]):
+        for i in range(grams.shape[1]):
+            s, t = pairs[i, 0], pairs[i, 1]
+            value = grams[cell, i]
+            matrix[t - s, first + cell + s, k, m] += value
+            if m != k:
+                matrix[t - s, first + cell + s, m, k] += np.conj(value)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def add_projections(right: Array, k: int, first: int, projected: Array) -> None:
+    """Add each cell's projections on its pieces, (n_cells, n_pieces), to the splines that the pieces belong to."""
+    for cell in range(projected.shape[0]):
+        for s in range(projected.shape[1]):
+            right[first + cell + s, k] += projected[cell, s]
+
+
+def _solve_spline_system(matrix: Array, right: Array) -> Array:
+    """Solve the Hermitian banded system by Cholesky's method; unknowns ordered by spline, then by order.
+
+    A real matrix takes real and imaginary part of the right-hand side as two.
+    """
+    from scipy.linalg import LinAlgError, solveh_banded
+
+    n_offsets, n_splines, n_orders, _ = matrix.shape
+    band = np.zeros((n_offsets * n_orders, n_splines * n_orders), matrix.dtype)
+    for offset in range(n_offsets):
+        for k in range(n_orders):
+            for m in range(n_orders):
+                if (below := offset * n_orders + k - m) >= 0:
+                    band[below, m::n_orders] = matrix[offset, :, k, m]
+    b = right.reshape(-1).view(matrix.dtype).reshape(n_splines * n_orders, -1)
+    try:
+        x = solveh_banded(band, b, lower=True, overwrite_ab=True, check_finite=False)
+    except LinAlgError:
+        raise RefusalError(
+            "the orders cannot be told apart in this recording", remedy="leave one of them out or record longer"
+        ) from None
+    return np.ascontiguousarray(x).view(right.dtype).reshape(n_splines, n_orders)
+
+
+def _sampled(coefficients: ComplexArray, basis: FloatArray, n: int, n_splines: int) -> ComplexArray:
+    """Return the splines at all samples, (n_orders, n)."""
+    d = len(basis)
+    a = np.zeros((coefficients.shape[1], n_splines), np.complex128)
+    a[:, : len(coefficients)] = coefficients.T
+    x = np.empty((len(a), n), np.complex128)
+    for k in range(len(a)):
+        windows = np.lib.stride_tricks.sliding_window_view(a[k], PIECES)
+        for first, last, samples in _chunks(d, n, n):
+            both = (windows.real[first:last] @ basis.T, windows.imag[first:last] @ basis.T)
+            length = samples.stop - samples.start
+            x.real[k, samples], x.imag[k, samples] = both[0].reshape(-1)[:length], both[1].reshape(-1)[:length]
+    return x
+
+
+def solve_band(
+    data: Array,
+    observed: Array,
+    weights: FloatArray,
+    stencils: FloatArray,
+    *,
+    forward: Forward,
+    triangle_bytes: int = 256 * 2**20,
+) -> Array:
+    """Minimise Σ_n |b_n - Σ_k d_kn x_kn|² + Σ_k Σ_n w_kn² |Σ_i s_kni x_k(n+i)|².
+
+    Parameters
+    ----------
+    data : array, (n_orders, n), real or complex
+        d.
+    observed : array, (n,)
+        b; the solution has its type.
+    weights : array, (n_orders, n - p)
+        w.
+    stencils : array, (n_orders, n - p, p + 1)
+        s.
+    forward : `rotate` or `eliminate`
+        Turns the rows of a part into its triangle.
+    triangle_bytes : int
+        Memory for the triangle. Longer problems keep it in parts and compute each part a second time, backwards.
+
+    Returns
+    -------
+    array, (n_orders, n)
+
+    Raises
+    ------
+    RefusalError
+        If the orders cannot be told apart.
+    """
+    n_orders, n = data.shape
+    p = stencils.shape[2] - 1
+    width = (p + 1) * n_orders
+    per_part = max(p + 1, int(triangle_bytes / (n_orders * width * data.itemsize)))
+    starts = np.arange(0, n, per_part)
+    rows = (min(per_part, n) + p) * n_orders
+    triangle, right = np.empty((rows, width), data.dtype), np.empty(rows, observed.dtype)
+    heads = np.zeros((len(starts) + 1, p * n_orders, width), data.dtype)
+    head_rights = np.zeros((len(starts) + 1, p * n_orders), observed.dtype)
+    alike = RefusalError("the orders cannot be told apart in this recording", remedy="leave one of them out")
+
+    def forwards(i: int) -> Any:
+        """Begin part i with the rows that the part before left over; return how many rows are its own."""
+        start, stop = starts[i], min(starts[i] + per_part, n)
+        triangle[:], right[:] = 0, 0
+        triangle[: p * n_orders], right[: p * n_orders] = heads[i], head_rights[i]
+        if not forward(triangle, right, start, stop, data, observed, weights, stencils):
+            raise alike
+        return (stop - start) * n_orders
+
+    for i in range(len(starts)):
+        used = forwards(i)
+        heads[i + 1], head_rights[i + 1] = triangle[used : used + p * n_orders], right[used : used + p * n_orders]
+    x = np.zeros((n + p, n_orders), observed.dtype)
+    for i in range(len(starts) - 1, -1, -1):
+        used = used if i == len(starts) - 1 else forwards(i)
+        if not _substitute(triangle, right, x.reshape(-1)[starts[i] * n_orders :], used):
+            raise alike
+    return np.ascontiguousarray(x[:n].T)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _substitute(triangle: Array, right: Array, x: Array, n: int) -> bool:
+    """Solve the triangle backwards for x[:n], given x[n:]; False if a diagonal is zero."""
+    width = triangle.shape[1]
+    for j in range(n - 1, -1, -1):
+        if triangle[j, 0].real == 0.0:
+            return False
+        rest = right[j]
+        for m in range(1, min(width, len(x) - j)):
+            rest -= triangle[j, m] * x[j + m]
+        x[j] = rest / triangle[j, 0].real
+    return True
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def eliminate(
+    triangle: Array,
+    right: Array,
+    start: int,
+    stop: int,
+    data: Array,
+    observed: Array,
+    weights: FloatArray,
+    stencils: FloatArray,
+) -> bool:
+    """Add the rows of each sample from start to stop, and eliminate its unknowns; False at a pivot not above zero.
+
+    Gauss's elimination without pivots (L D L*) of the normal equations, formed on the way. Several times faster than
+    rotations; the error grows with r², so it is for weak weights only.
+    """
+    n_orders, n = data.shape
+    p = stencils.shape[2] - 1
+    width = triangle.shape[1]
+    for t in range(start, stop):
+        first = (t - start) * n_orders
+        for k in range(n_orders):
+            own = np.conj(data[k, t])
+            right[first + k] += own * observed[t]
+            for m in range(k, n_orders):
+                triangle[first + k, m - k] += own * data[m, t]
+        if t + p < n:
+            for k in range(n_orders):
+                square = weights[k, t] * weights[k, t]
+                for i in range(p + 1):
+                    of_i = square * stencils[k, t, i]
+                    for j in range(i, p + 1):
+                        triangle[first + i * n_orders + k, (j - i) * n_orders] += of_i * stencils[k, t, j]
+        for c in range(n_orders):
+            row = first + c
+            pivot = triangle[row, 0].real
+            if not pivot > 0.0:
+                return False
+            inverse = 1.0 / pivot
+            value = right[row]
+            for i in range(1, width - c):
+                factor = np.conj(triangle[row, i]) * inverse
+                for m in range(i, width - c):
+                    triangle[row + i, m - i] -= factor * triangle[row, m]
+                right[row + i] -= factor * value
+    return True
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def rotate(
+    triangle: Array,
+    right: Array,
+    start: int,
+    stop: int,
+    data: Array,
+    observed: Array,
+    weights: FloatArray,
+    stencils: FloatArray,
+) -> bool:
+    """Rotate the data row and the structural rows of each sample from start to stop into the triangle.
+
+    Rows are rotated one after the other into a banded triangle (the square-root information filter). The normal
+    equations, whose condition is the square of this problem's, are never formed: the error is about r times the
+    rounding error, not r².
+
+    J. A. George, M. T. Heath, "Solution of sparse linear least squares problems using Givens rotations", 1980.
+    """
+    n_orders, n = data.shape
+    p = stencils.shape[2] - 1
+    row = np.zeros(triangle.shape[1], dtype=triangle.dtype)
+    nothing = observed[0] * 0
+    for t in range(start, stop):
+        first = (t - start) * n_orders
+        row[:] = 0
+        for k in range(n_orders):
+            row[k] = data[k, t]
+        _insert(triangle, right, first, row, observed[t])
+        if t + p >= n:
+            continue
+        for k in range(n_orders):
+            row[:] = 0
+            for i in range(p + 1):
+                row[i * n_orders + k] = weights[k, t] * stencils[k, t, i]
+            _insert(triangle, right, first, row, nothing)
+    return True
+
+
+@njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator,unused-ignore]
+def _insert(triangle: Array, right: Array, first: int, row: Array, value: Any) -> None:
+    """Rotate one row, with its right-hand side, into the triangle; the first empty place takes what is left.
+
+    With diagonal d (real) of triangle row R and leading entry v_c of the row: h² = d² + |v_c|²,
+    R' = (d R + v_c* v)/h, v' = (d v - v_c R)/h.
+    """
+    width = len(row)
+    for c in range(width):
+        lead = row[c]
+        size2 = lead.real * lead.real + lead.imag * lead.imag
+        if size2 == 0.0:
+            continue
+        j = first + c
+        diagonal = triangle[j, 0].real
+        h = np.sqrt(diagonal * diagonal + size2)
+        cosine = diagonal / h
+        sine = lead / h
+        turned = np.conj(sine)
+        for m in range(c, width):
+            old, new = triangle[j, m - c], row[m]
+            triangle[j, m - c] = cosine * old + turned * new
+            row[m] = cosine * new - sine * old
+        old_right = right[j]
+        right[j] = cosine * old_right + turned * value
+        value = cosine * value - sine * old_right
+        if diagonal == 0.0:
+            return
+
+
+Forward = Callable[[Array, Array, int, int, Array, Array, FloatArray, FloatArray], bool]
+FORWARD: dict[Solver, Forward] = {"elimination": eliminate, "rotations": rotate}

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.orders.vold_kalman._tracks import HALF_POWER, cosine_and_sine
+from gearsig.orders.vold_kalman._kernels import HALF_POWER, cosine_and_sine
 
 Array = NDArray[Any]
 ComplexArray = NDArray[np.complex128]
@@ -287,10 +287,8 @@ def smooth_halves(front: Array, back: Array, gains: FloatArray, a: State, b: Sta
 
 Prepare = Callable[[int, int, Array, Array], tuple[FloatArray, FloatArray, FloatArray | None]]
 """Return (data, q, kappa) of samples i to j of both halves, after writing front and back: (i, j, front, back)."""
-BLOCK_SAMPLES = 2**12
-"""Of each half: what a block needs fits the cache."""
-GAIN_BYTES = 256 * 2**20
-"""Memory for the gains. Longer signals keep those of a part only, and compute each part a second time, backwards."""
+BLOCK_SAMPLES, GAIN_BYTES = 2**12, 256 * 2**20
+"""Of each half in a block, so that it fits the cache; memory for the gains: longer signals compute parts twice."""
 SEEN_FROM_BEHIND = {
     1: np.array([[1.0]]),
     2: np.array([[1.0, -1.0], [0.0, -1.0]]),
@@ -300,7 +298,15 @@ SEEN_FROM_BEHIND = {
 
 
 def _smoothed_halves(
-    n: int, p: int, prepare: Prepare, *, middle_q: float, dtype: Any, pair: bool, gain_bytes: int
+    n: int,
+    p: int,
+    prepare: Prepare,
+    *,
+    middle_q: float,
+    dtype: Any,
+    pair: bool,
+    gain_bytes: int,
+    block_samples: int = BLOCK_SAMPLES,
 ) -> Array:
     """Return the solution of one order's problem, (n,).
 
@@ -316,6 +322,8 @@ def _smoothed_halves(
     pair : bool
         Whether the components of the state are pairs, and S of blocks of 2 by 2.
     gain_bytes : int
+        Longer signals keep the gains of a part only, and compute each part a second time, backwards.
+    block_samples : int
 
     Raises
     ------
@@ -325,18 +333,23 @@ def _smoothed_halves(
     half = -(-n // 2)
     x = np.empty(2 * half, dtype)
     front, back = x[:half], x[::-1][:half]
-    blocks = _equal_blocks(half)
+    n_blocks = -(-half // block_samples)
+    # Blocks of about the same size, so that none is a single sample.
+    blocks = [(half * m // n_blocks, half * (m + 1) // n_blocks) for m in range(n_blocks)]
     n_gains = N_GAINS[p] if pair else p
-    per_part = min(len(blocks), max(1, gain_bytes // (16 * n_gains * BLOCK_SAMPLES)))
+    per_part = min(len(blocks), max(1, gain_bytes // (16 * n_gains * block_samples)))
     parts = [blocks[m : m + per_part] for m in range(0, len(blocks), per_part)]
-    buffer = np.empty((per_part, 2 * BLOCK_SAMPLES * n_gains))
+    buffer = np.empty((per_part, 2 * block_samples * n_gains))
     zero, unit = ((0.0,) * 4, (1.0, 0.0, 0.0, 1.0)) if pair else (0.0, 1.0)
     empty = (zero,) * (p * (p + 1) // 2) + (dtype(0).item(),) * p
+
+    def gains_of(kept: FloatArray, length: int) -> FloatArray:
+        return kept[: 2 * length * n_gains].reshape(2, length, n_gains)
 
     def filter_part(part: list[tuple[int, int]], forms: tuple[State, State]) -> tuple[State, State]:
         for (i, j), kept in zip(part, buffer, strict=False):
             data, q, kappa = prepare(i, j, front[i:j], back[i:j])
-            forms = filter_halves(front[i:j], back[i:j], data, q, kappa, _gains(kept, j - i, n_gains), *forms)
+            forms = filter_halves(front[i:j], back[i:j], data, q, kappa, gains_of(kept, j - i), *forms)
         return forms
 
     entries = [(empty, empty)]
@@ -347,19 +360,8 @@ def _smoothed_halves(
         if part is not parts[-1]:
             filter_part(part, entry)
         for (i, j), kept in reversed(list(zip(part, buffer, strict=False))):
-            z = smooth_halves(front[i:j], back[i:j], _gains(kept, j - i, n_gains), *z, unit)
+            z = smooth_halves(front[i:j], back[i:j], gains_of(kept, j - i), *z, unit)
     return x[:n]
-
-
-def _equal_blocks(n: int) -> list[tuple[int, int]]:
-    """Return (first, one past the last) of blocks of about the same size, so that none is a single sample."""
-    n_blocks = -(-n // BLOCK_SAMPLES)
-    return [(n * m // n_blocks, n * (m + 1) // n_blocks) for m in range(n_blocks)]
-
-
-def _gains(buffer: FloatArray, n: int, n_gains: int) -> FloatArray:
-    """Return the part of a block's buffer that n samples take."""
-    return buffer[: 2 * n * n_gains].reshape(2, n, n_gains)
 
 
 def _joined(p: int, front: State, back: State, q: float, *, pair: bool) -> tuple[State, State]:
@@ -468,6 +470,7 @@ def envelope_alone(
     *,
     mirror: bool,
     gain_bytes: int = GAIN_BYTES,
+    block_samples: int = BLOCK_SAMPLES,
 ) -> ComplexArray:
     """Return the envelope 2x of one order, as `solve_envelopes` does for several.
 
@@ -478,8 +481,8 @@ def envelope_alone(
         r of each row of the structural equation.
     p : int
     mirror : bool
-    gain_bytes : int
-        Memory for the gains.
+    gain_bytes, block_samples : int
+        Memory for the gains; samples of each half in a block.
 
     Returns
     -------
@@ -495,7 +498,9 @@ def envelope_alone(
 
     def prepare(i: int, j: int, front: Array, back: Array) -> tuple[FloatArray, FloatArray, None]:
         level, of_steps = _levels(active, n, i, j), _of_steps(q, n, p, i, j)
-        data = _signal_and_phasor(y, cycles, level, i, j)
+        data = np.empty((3, 2, j - i))  # signal (zero where it is no data), cosine and sine
+        np.multiply(_of_samples(y, n, i, j), level, out=data[0])
+        cosine_and_sine(_of_samples(cycles, n, i, j).reshape(-1), data[1].reshape(-1), data[2].reshape(-1))
         if mirror:
             data[1:] *= level
             return data, of_steps, None
@@ -505,7 +510,16 @@ def envelope_alone(
         return level[None], of_steps, None
 
     middle = float(q[min(-(-n // 2) + 1 - p, len(q) - 1)])
-    x = _smoothed_halves(n, p, prepare, middle_q=middle, dtype=np.complex128, pair=mirror, gain_bytes=gain_bytes)
+    x = _smoothed_halves(
+        n,
+        p,
+        prepare,
+        middle_q=middle,
+        dtype=np.complex128,
+        pair=mirror,
+        gain_bytes=gain_bytes,
+        block_samples=block_samples,
+    )
     if not mirror:
         x *= 2.0
     return x
@@ -537,15 +551,6 @@ def _levels(active: BoolArray | None, n: int, i: int, j: int) -> FloatArray:
     if i == 0 and n % 2:
         level[1, 0] = 0.0
     return level
-
-
-def _signal_and_phasor(y: FloatArray, cycles: FloatArray, level: FloatArray, i: int, j: int) -> FloatArray:
-    """Return signal (zero where it is no data), cosine and sine, each folded, (3, 2, j - i)."""
-    n = len(y)
-    out = np.empty((3, 2, j - i))
-    np.multiply(_of_samples(y, n, i, j), level, out=out[0])
-    cosine_and_sine(_of_samples(cycles, n, i, j).reshape(-1), out[1].reshape(-1), out[2].reshape(-1))
-    return out
 
 
 def _of_samples(values: Array, n: int, i: int, j: int) -> FloatArray:

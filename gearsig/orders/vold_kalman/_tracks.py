@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, count, frozen_array, positive, within
+from gearsig.checks import FloatArray, count, freeze, frozen_array, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._average import times_of_revolutions
 from gearsig.orders._types import TrackedOrder
+from gearsig.orders.vold_kalman._kernels import lowest_frequency
 from gearsig.rig import Rig
-
-# What the Vold–Kalman filter takes and gives: frequency tracks, separated orders.
-
 
 Generation = Literal["first", "second"]
 
@@ -94,12 +91,8 @@ class SeparatedOrder:
     source: str
 
     def __post_init__(self) -> None:
-        for name in ("waveform", "frequency_hz", "bandwidth_hz", "time_s"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
-        for name in ("envelope", "valid", "settled"):
-            view = getattr(self, name).view()
-            view.flags.writeable = False
-            object.__setattr__(self, name, view)
+        freeze(self, "waveform", "frequency_hz", "bandwidth_hz", "time_s")
+        freeze(self, "envelope", "valid", "settled", ndim=None)
         lengths = {len(getattr(self, name)) for name in ("envelope", "waveform", "frequency_hz", "valid", "time_s")}
         if len(lengths) > 1 or len(self.bandwidth_hz) not in {1, *lengths}:
             raise InputError(f"parts of order {self.name!r} differ in length")
@@ -178,7 +171,7 @@ class OrderSeparation:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "residual", frozen_array(self.residual, "residual", ndim=1))
+        freeze(self, "residual")
 
     @property
     def coupled(self) -> bool:
@@ -188,152 +181,6 @@ class OrderSeparation:
     def time_s(self) -> FloatArray:
         """Sample times of the recording, (n_samples,)."""
         return self.orders[0].time_s
-
-
-# Bandwidth and weighting of the Vold–Kalman filter: closed forms for each pole count and generation.
-
-
-N_POLES_MAX = 3
-HALF_POWER = np.sqrt(np.sqrt(2.0) - 1.0)
-"""r·|D| at the -3 dB points, for there 1/(1 + r²|D|²) = 1/√2."""
-
-
-def weight_of_bandwidth(bandwidth_hz: float, sampling_rate_hz: float, n_poles: int = 2) -> float:
-    """Return the weighting factor r of the second generation that gives a -3 dB bandwidth.
-
-    r = √(√2 - 1)/(2 sin(πB/2f_s))^p. For narrow bands this is 0.2049/b, 0.0652/b² and 0.0208/b³ with b = B/f_s, for
-    one, two and three poles.
-
-    Parameters
-    ----------
-    bandwidth_hz : float
-        Full width between the -3 dB points, above zero and below the sampling rate.
-    sampling_rate_hz : float
-    n_poles : int
-        1 to 3.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InputError
-        On a bandwidth or a number of poles that is not allowed.
-
-    References
-    ----------
-    J. Tůma, "Setting the passband width in the Vold-Kalman order tracking filter", 2005.
-    """
-    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    width = positive(bandwidth_hz, "bandwidth_hz", "Hz")
-    if width >= rate:
-        raise InputError(f"bandwidth_hz is {width:g} Hz", allowed=f"below the sampling rate of {rate:g} Hz")
-    return float(envelope_weight(np.array([width / rate]), checked_poles(n_poles))[0])
-
-
-def bandwidth_of_weight(weight: float, sampling_rate_hz: float, n_poles: int = 2) -> float:
-    """Return the -3 dB bandwidth in Hz of a weighting factor of the second generation.
-
-    B = 2f_s/π · arcsin((√(√2 - 1)/r)^(1/p)/2), the inverse of `weight_of_bandwidth`.
-
-    Raises
-    ------
-    InputError
-        On a weight so small that no frequency is attenuated by 3 dB.
-    """
-    p = checked_poles(n_poles)
-    half_sine = 0.5 * (HALF_POWER / positive(weight, "weight")) ** (1.0 / p)
-    if half_sine >= 1.0:
-        raise InputError(f"weight is {weight:g}", allowed=f"above {HALF_POWER / 2**p:.4g} with {p} pole(s)")
-    return float(2.0 * positive(sampling_rate_hz, "sampling_rate_hz", "Hz") / np.pi * np.arcsin(half_sine))
-
-
-def envelope_response(
-    offset_hz: FloatArray, bandwidth_hz: float, sampling_rate_hz: float, n_poles: int = 2
-) -> FloatArray:
-    """Return the gain of the second generation for a component `offset_hz` away from the order.
-
-    H(f) = 1/(1 + r² (2 sin πf/f_s)^2p): real, no phase shift. It holds for constant bandwidth, away from the ends, for
-    one order or several that lie far apart.
-
-    Parameters
-    ----------
-    offset_hz : array
-    bandwidth_hz, sampling_rate_hz, n_poles
-        As in `weight_of_bandwidth`.
-
-    Returns
-    -------
-    array
-        0 to 1; 1/√2 at ± half the bandwidth.
-    """
-    r = weight_of_bandwidth(bandwidth_hz, sampling_rate_hz, n_poles)
-    difference = 2.0 * np.sin(np.pi * np.asarray(offset_hz, dtype=np.float64) / sampling_rate_hz)
-    gain: FloatArray = 1.0 / (1.0 + (r * difference**n_poles) ** 2)
-    return gain
-
-
-def waveform_weight_of_bandwidth(bandwidth_hz: float, frequency_hz: float, sampling_rate_hz: float) -> float:
-    """Return the weighting factor r of the first generation that gives a -3 dB bandwidth at an order's frequency.
-
-    With h = πB/f_s and ω = 2πf/f_s, r = √(√2 - 1)/(2 tan h √(sin²ω - sin²h)): the -3 dB points of
-    1/(1 + r²(2 cos ω' - 2 cos ω)²) then lie 2h apart, not quite symmetric about ω.
-
-    Raises
-    ------
-    InputError
-        If a -3 dB point would lie below zero frequency or above half the sampling rate.
-    """
-    rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    width = within(positive(bandwidth_hz, "bandwidth_hz", "Hz"), "bandwidth_hz", 0.0, rate / 2, "Hz")
-    lowest = float(lowest_frequency(np.array([width / rate]))[0]) * rate
-    within(frequency_hz, "frequency_hz", lowest * (1 + 1e-9), rate / 2 - lowest, "Hz", remedy="narrow the band")
-    return float(waveform_weight(np.array([width / rate]), np.array([frequency_hz / rate]))[0])
-
-
-def settling_time(bandwidth: FloatArray, skirt_poles: int) -> FloatArray:
-    """Return the time after which the filter's response has decayed to 1 %, in the inverse unit of the bandwidth.
-
-    The slowest pole of 1/(1 + (√2 - 1)(2f/B)^2p) decays as exp(-t/τ), τ = (√2 - 1)^(1/2p)/(πB sin(π/2p)); this is
-    τ ln 100: 0.94/B, 1.66/B and 2.53/B for one, two and three poles. The first generation's skirts have one. Where the
-    bandwidth is 0, as that of an order of a shaft at rest, it is infinite.
-    """
-    slowness = HALF_POWER ** (1.0 / skirt_poles) / (np.pi * np.sin(0.5 * np.pi / skirt_poles))
-    with np.errstate(divide="ignore"):
-        time: FloatArray = np.log(100.0) * slowness / bandwidth
-    return time
-
-
-def envelope_weight(bandwidth: FloatArray, p: int) -> FloatArray:
-    """Return r of the second generation; bandwidth in cycles per sample."""
-    r: FloatArray = HALF_POWER / (2.0 * np.sin(0.5 * np.pi * bandwidth)) ** p
-    return r
-
-
-def waveform_weight(bandwidth: FloatArray, frequency: FloatArray) -> FloatArray:
-    """Return r of the first generation; bandwidth and frequency in cycles per sample."""
-    h, omega = np.pi * bandwidth, 2.0 * np.pi * frequency
-    # sin²ω - sin²h as a product: no digits are lost where the band nearly touches zero frequency.
-    r: FloatArray = HALF_POWER / (2.0 * np.tan(h) * np.sqrt(np.sin(omega - h) * np.sin(omega + h)))
-    return r
-
-
-def lowest_frequency(bandwidth: FloatArray) -> FloatArray:
-    """Return the frequency below which the first generation's band reaches zero; both in cycles per sample.
-
-    cos ω = cos² h: about 0.71 bandwidths, for the band is not symmetric. The same holds below half the sampling rate.
-    """
-    f: FloatArray = np.arccos(np.cos(np.pi * bandwidth) ** 2) / (2.0 * np.pi)
-    return f
-
-
-def checked_poles(n_poles: int) -> int:
-    """Return the number of poles if it is 1, 2 or 3."""
-    p = count(n_poles, "n_poles")
-    if p > N_POLES_MAX:
-        raise InputError(f"n_poles is {p}", allowed="1, 2 or 3")
-    return p
 
 
 BoolArray = NDArray[np.bool_]
@@ -365,56 +212,50 @@ def tracks_of_orders(
     orders: Sequence[OrderLike], angle: ShaftAngle | None, rig: Rig | None, n: int, sampling_rate_hz: float
 ) -> Tracks:
     """Return the tracks of orders given as number (of the angle's shaft), (shaft, number) or frequency track."""
-    if len(orders) == 0:
-        raise InputError("no orders are given", where="orders", remedy="name at least one")
     cycles, frequency = np.empty((len(orders), n)), np.empty((len(orders), n))
-    names: list[str] = []
-    shafts: list[str] = []
-    numbers: list[float] = []
+    labels: list[tuple[str, str, float]] = []
     known = np.ones(n, dtype=bool)
-    turned: tuple[FloatArray, FloatArray] | None = None
-    for k, wanted in enumerate(orders):
-        if isinstance(wanted, FrequencyTrack):
-            cycles[k], frequency[k] = _integrated(wanted, n, sampling_rate_hz)
-            names.append(wanted.name)
-            shafts.append(wanted.shaft)
-            numbers.append(wanted.order)
+    turns, speed = (None, None) if angle is None else _sampled_angle(angle, n, sampling_rate_hz)
+    for k, order in enumerate(_given(orders)):
+        if isinstance(order, FrequencyTrack):
+            f = order.frequency_hz.astype(np.float64)
+            if len(f) != n:
+                raise InputError(
+                    f"track {order.name!r} has {len(f)} samples, the recording {n}",
+                    where="orders",
+                    remedy="interpolate the frequency to the recording's samples",
+                )
+            frequency[k], cycles[k, 0] = f, 0.0
+            np.cumsum((f[1:] + f[:-1]) / (2.0 * sampling_rate_hz), out=cycles[k, 1:])
+            labels.append((order.name, order.shaft, order.order))
             continue
-        if angle is None:
+        if angle is None or turns is None or speed is None:
             raise InputError("an order is given without a shaft angle", where="orders", remedy="give frequency tracks")
-        shaft, number = wanted if isinstance(wanted, tuple) else (angle.shaft, wanted)
-        number = positive(number, f"order {number!r}")
-        if turned is None:
-            turned = _sampled_angle(angle, n, sampling_rate_hz)
-            known = _known(angle, n, sampling_rate_hz)
-        factor = number * _ratio(angle, shaft, rig)
-        np.multiply(turned[0], factor, out=cycles[k])
-        np.multiply(turned[1], factor, out=frequency[k])
-        names.append(f"{shaft} {number:g}".strip())
-        shafts.append(shaft)
-        numbers.append(number)
-    if turned is None and angle is not None:
-        turned = _sampled_angle(angle, n, sampling_rate_hz)
-    speed = None if turned is None else turned[1]
+        shaft, number, ratio = _of_shaft(order, angle, rig)
+        # The samples within the angle's time, with one sample of tolerance at either end.
+        known[: max(0, int(np.ceil(angle.start_s * sampling_rate_hz - 1.0)))] = False
+        known[max(0, int(np.floor(angle.end_s * sampling_rate_hz + 1.0)) + 1) :] = False
+        np.multiply(turns, number * ratio, out=cycles[k])
+        np.multiply(speed, number * ratio, out=frequency[k])
+        labels.append((f"{shaft} {number:g}".strip(), shaft, number))
+    names, shafts, numbers = zip(*labels, strict=True)
     time_s = np.arange(n) / sampling_rate_hz
-    return Tracks(tuple(names), tuple(shafts), np.array(numbers), cycles, frequency, known, time_s, speed)
+    return Tracks(names, shafts, np.array(numbers), cycles, frequency, known, time_s, speed)
 
 
 def tracks_over_angle(orders: Sequence[OrderLike], signal: AngleSignal) -> Tracks:
     """Return the tracks of orders in a signal over angle, where all have a constant frequency."""
-    if len(orders) == 0:
-        raise InputError("no orders are given", where="orders", remedy="name at least one")
     angle, n = signal.shaft_angle, signal.samples.shape[1]
     numbers = []
-    for wanted in orders:
-        if isinstance(wanted, FrequencyTrack):
+    for order in _given(orders):
+        if isinstance(order, FrequencyTrack):
             raise InputError(
-                f"{wanted.name!r} is a frequency over time, the signal is one over angle",
+                f"{order.name!r} is a frequency over time, the signal is one over angle",
                 where="orders",
                 remedy="give the recording and its shaft angle",
             )
-        shaft, number = wanted if isinstance(wanted, tuple) else (angle.shaft, wanted)
-        numbers.append(positive(number, f"order {number!r}") * _ratio(angle, shaft, None))
+        _, number, ratio = _of_shaft(order, angle, None)
+        numbers.append(number * ratio)
         if numbers[-1] >= signal.highest_order:
             raise InputError(
                 f"order {numbers[-1]:g} lies above the signal's highest order",
@@ -438,64 +279,81 @@ def tracks_over_angle(orders: Sequence[OrderLike], signal: AngleSignal) -> Track
     )
 
 
+def _given(orders: Sequence[OrderLike]) -> Sequence[OrderLike]:
+    if len(orders) == 0:
+        raise InputError("no orders are given", where="orders", remedy="name at least one")
+    return orders
+
+
+def _of_shaft(order: float | tuple[str, float], angle: ShaftAngle, rig: Rig | None) -> tuple[str, float, float]:
+    """Return an order's shaft, its number, and that shaft's revolutions per revolution of the angle's."""
+    shaft, number = order if isinstance(order, tuple) else (angle.shaft, order)
+    number = positive(number, f"order {number!r}")
+    ratio = 1.0 if shaft == angle.shaft else rig.ratio(shaft, to=angle.shaft) if rig and rig.shafts else None
+    if ratio is None:
+        raise InputError(
+            f"the ratio of shaft {shaft!r} to {angle.shaft!r} is not known",
+            where="orders",
+            remedy="give a rig with the teeth between both shafts",
+        )
+    return shaft, number, ratio
+
+
+def _sampled_angle(angle: ShaftAngle, n: int, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """Return revolutions and revolutions per second at the samples."""
+    revolutions, speed = np.empty(n), np.empty(n)
+    for start in range(0, n, CHUNK_SAMPLES):
+        part = slice(start, min(start + CHUNK_SAMPLES, n))
+        t = np.arange(part.start, part.stop) / sampling_rate_hz
+        revolutions[part] = angle.revolutions_at(t)
+        speed[part] = angle.speed_rpm_at(t) / 60.0
+    # The cubic's slope may round to a little below zero where the machine stands.
+    return revolutions, np.maximum(speed, 0.0)
+
+
 def bandwidths_of(
     tracks: Tracks, hz: float | Sequence[float] | None, in_orders: float | Sequence[float] | None
 ) -> FloatArray:
     """Return the bandwidths in the unit of the tracks, (n_orders, 1) if constant, else (n_orders, n)."""
     if (hz is None) == (in_orders is None):
         raise InputError("give either bandwidth_hz or bandwidth_orders", where="bandwidth", allowed="one of both")
-    n_orders = len(tracks.names)
-    name = "bandwidth_orders" if hz is None else "bandwidth_hz"
+    n_orders, over_angle = len(tracks.names), tracks.unit == "orders"
+    name, unit = ("bandwidth_orders", "orders") if hz is None else ("bandwidth_hz", "Hz")
     given = np.atleast_1d(np.asarray(in_orders if hz is None else hz, dtype=object))
     if given.shape not in {(1,), (n_orders,)}:
         raise InputError(f"{name} has shape {given.shape}", allowed=f"one number, or one for each of {n_orders} orders")
-    widths = np.broadcast_to([_width(width, name) for width in given], (n_orders,))
-    over_angle = tracks.unit == "orders"
+    for width in given:
+        if isinstance(width, str):  # no number, even one that could be read as such
+            raise InputError(
+                f"{name} is {width!r}", allowed=f"a number above 0, in {unit}", remedy="leave the unit out"
+            )
+    widths = np.broadcast_to([positive(cast("float", width), name, unit) for width in given], (n_orders,))
+    speed = tracks.speed_rev_per_s
     if hz is not None:
-        return _over_angle(tracks, widths) if over_angle else widths[:, None].copy()
-    _check_below_order(tracks, widths)
-    if over_angle:
-        return widths[:, None].copy()
-    return np.stack([width * _speed_of(tracks, k) for k, width in enumerate(widths)])
-
-
-def _width(given: object, name: str) -> float:
-    """Return a bandwidth as float; a text is no number, even one that could be read as such."""
-    unit = name.removeprefix("bandwidth_").replace("hz", "Hz")
-    if isinstance(given, str):
-        raise InputError(f"{name} is {given!r}", allowed=f"a number above 0, in {unit}", remedy="leave the unit out")
-    return positive(cast("float", given), name, unit)
-
-
-def _check_below_order(tracks: Tracks, widths: FloatArray) -> None:
-    """Raise InputError if a bandwidth in orders reaches down to order zero."""
+        if not over_angle:
+            return widths[:, None].copy()
+        if speed is None or speed.min() <= 0.0:
+            raise InputError("the shaft stands still in between", where="bandwidth_hz", remedy="give bandwidth_orders")
+        return np.asarray(np.divide.outer(widths, speed))
     for order, width, label in zip(tracks.orders, widths, tracks.names, strict=True):
         if width >= 2 * order:
             raise InputError(
                 f"bandwidth_orders is {width:g} for order {label!r}: its band reaches down to order zero",
                 allowed=f"below {2 * order:g}",
             )
-
-
-def _over_angle(tracks: Tracks, widths_hz: FloatArray) -> FloatArray:
-    """Return bandwidths in Hz as orders, for a signal over angle."""
-    speed = tracks.speed_rev_per_s
-    if speed is None or speed.min() <= 0.0:
-        raise InputError("the shaft stands still in between", where="bandwidth_hz", remedy="give bandwidth_orders")
-    return np.asarray(np.divide.outer(widths_hz, speed))
-
-
-def _speed_of(tracks: Tracks, k: int) -> FloatArray:
-    """Return the speed in rev/s of an order's own shaft, or else of the angle's shaft."""
-    if np.isfinite(tracks.orders[k]):
-        return np.asarray(tracks.frequency_hz[k] / tracks.orders[k])
-    if tracks.speed_rev_per_s is None:
-        raise InputError(
-            f"track {tracks.names[k]!r} has no order, and there is no shaft angle",
-            where="bandwidth_orders",
-            remedy="give the track an order, a shaft angle, or bandwidth_hz",
-        )
-    return tracks.speed_rev_per_s
+    if over_angle:
+        return widths[:, None].copy()
+    rows = []
+    for k, width in enumerate(widths):  # with the speed of the order's own shaft, or else of the angle's
+        own = tracks.frequency_hz[k] / tracks.orders[k] if np.isfinite(tracks.orders[k]) else speed
+        if own is None:
+            raise InputError(
+                f"track {tracks.names[k]!r} has no order, and there is no shaft angle",
+                where="bandwidth_orders",
+                remedy="give the track an order, a shaft angle, or bandwidth_hz",
+            )
+        rows.append(width * own)
+    return np.stack(rows)
 
 
 def valid_parts(tracks: Tracks, bandwidth: FloatArray, sampling_rate: float, generation: Generation) -> BoolArray:
@@ -523,146 +381,10 @@ def valid_parts(tracks: Tracks, bandwidth: FloatArray, sampling_rate: float, gen
                 f"order {name!r} {reach}, at or above half the sampling rate of {sampling_rate:g} {tracks.unit}",
                 remedy="record at a higher rate",
             )
-        raise RefusalError(_no_room(f"order {name!r} {reach}", f[k], bandwidth[k], sampling_rate, tracks.unit))
+        room = 2.0 * float(np.minimum(f[k], sampling_rate / 2 - f[k]).max())
+        raise RefusalError(
+            f"order {name!r} {reach}: its band of {np.max(bandwidth[k]):.4g} {tracks.unit} reaches down to zero or up "
+            f"to half the sampling rate of {sampling_rate:g} {tracks.unit} all the time; narrow the bandwidth below "
+            f"{room:.4g} {tracks.unit}"
+        )
     return valid
-
-
-def _no_room(order: str, f: FloatArray, bandwidth: FloatArray, sampling_rate: float, unit: str) -> str:
-    """Return that a band does not fit between zero and half the sampling rate, and which one would."""
-    room = 2.0 * float(np.minimum(f, sampling_rate / 2 - f).max())
-    return (
-        f"{order}: its band of {np.max(bandwidth):.4g} {unit} reaches down to zero or up to half the sampling rate of "
-        f"{sampling_rate:g} {unit} all the time; narrow the bandwidth below {room:.4g} {unit}"
-    )
-
-
-def _sampled_angle(angle: ShaftAngle, n: int, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
-    """Return revolutions and revolutions per second at the samples."""
-    revolutions, speed = np.empty(n), np.empty(n)
-    for start in range(0, n, CHUNK_SAMPLES):
-        part = slice(start, min(start + CHUNK_SAMPLES, n))
-        t = np.arange(part.start, part.stop) / sampling_rate_hz
-        revolutions[part] = angle.revolutions_at(t)
-        speed[part] = angle.speed_rpm_at(t) / 60.0
-    # The cubic's slope may round to a little below zero where the machine stands.
-    return revolutions, np.maximum(speed, 0.0)
-
-
-def _known(angle: ShaftAngle, n: int, sampling_rate_hz: float) -> BoolArray:
-    """Return the samples within the angle's time; one sample of tolerance at either end."""
-    known = np.zeros(n, dtype=bool)
-    first = max(0, int(np.ceil(angle.start_s * sampling_rate_hz - 1.0)))
-    last = int(np.floor(angle.end_s * sampling_rate_hz + 1.0))
-    known[first : max(0, last + 1)] = True
-    return known
-
-
-def _ratio(angle: ShaftAngle, shaft: str, rig: Rig | None) -> float:
-    """Return revolutions of `shaft` per revolution of the angle's shaft."""
-    if shaft == angle.shaft:
-        return 1.0
-    ratio = rig.ratio(shaft, to=angle.shaft) if rig is not None and rig.shafts else None
-    if ratio is None:
-        raise InputError(
-            f"the ratio of shaft {shaft!r} to {angle.shaft!r} is not known",
-            where="orders",
-            remedy="give a rig with the teeth between both shafts",
-        )
-    return ratio
-
-
-def _integrated(track: FrequencyTrack, n: int, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
-    """Return phase in cycles (trapezoidal rule from 0) and frequency."""
-    f = track.frequency_hz.astype(np.float64)
-    if len(f) != n:
-        raise InputError(
-            f"track {track.name!r} has {len(f)} samples, the recording {n}",
-            where="orders",
-            remedy="interpolate the frequency to the recording's samples",
-        )
-    cycles = np.zeros(n)
-    np.cumsum((f[1:] + f[:-1]) / (2.0 * sampling_rate_hz), out=cycles[1:])
-    return cycles, f
-
-
-# Cosine and sine of an angle in revolutions.
-
-
-S3, S5, S7, S9, S11, S13, S15 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880, -1 / 39916800, 1 / 6227020800, -1 / 1307674368e3
-C2, C4, C6, C8 = -1 / 2, 1 / 24, -1 / 720, 1 / 40320
-C10, C12, C14, C16 = -1 / 3628800, 1 / 479001600, -1 / 87178291200, 1 / 20922789888e3
-BLOCK = 1000
-QUARTER_TURN_RAD = 1.5707963267948966
-
-
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
-def cosine_and_sine(revolutions: FloatArray, cosine: FloatArray, sine: FloatArray) -> None:
-    """Write cos 2πx and sin 2πx, to about 1e-15.
-
-    Taylor series of a quarter of the angle (at most π/4, where the terms left out are below 1e-16), then doubled twice:
-    without branches, so that the compiler runs several samples at once.
-    """
-    for i in range(len(revolutions)):
-        x = revolutions[i]
-        a = (x - round(x)) * QUARTER_TURN_RAD
-        q = a * a
-        s = a * (1 + q * (S3 + q * (S5 + q * (S7 + q * (S9 + q * (S11 + q * (S13 + q * S15)))))))
-        c = 1 + q * (C2 + q * (C4 + q * (C6 + q * (C8 + q * (C10 + q * (C12 + q * (C14 + q * C16)))))))
-        s2 = 2 * s * c
-        c2 = 1 - 2 * s * s
-        sine[i] = 2 * s2 * c2
-        cosine[i] = 1 - 2 * s2 * s2
-
-
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
-def write_phasors(revolutions: FloatArray, out: NDArray[Any]) -> None:
-    """Write e^{2πix}, by way of pieces that lie side by side in the cache: into every other place it is slow."""
-    cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
-    for start in range(0, len(revolutions), BLOCK):
-        n = min(BLOCK, len(revolutions) - start)
-        cosine_and_sine(revolutions[start : start + n], cosine[:n], sine[:n])
-        for i in range(n):
-            out[start + i] = complex(cosine[i], sine[i])
-
-
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
-def write_modulated(envelope: NDArray[Any], revolutions: FloatArray, out: FloatArray) -> None:
-    """Write Re(a e^{2πix})."""
-    cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
-    for start in range(0, len(revolutions), BLOCK):
-        n = min(BLOCK, len(revolutions) - start)
-        cosine_and_sine(revolutions[start : start + n], cosine[:n], sine[:n])
-        for i in range(n):
-            a = envelope[start + i]
-            out[start + i] = a.real * cosine[i] - a.imag * sine[i]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
-def write_envelope(waveform: FloatArray, revolutions: FloatArray, out: NDArray[Any]) -> None:
-    """Write the envelope a of x = Re(a e^{2πic}), taken as constant from a sample to its neighbours.
-
-    They are x(n±1) = x cos α± ∓ q sin α±, α± the phase step; both give the quadrature q by least squares, and
-    a = (x + iq) e^{-2πic}.
-    """
-    n = len(waveform)
-    cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
-    step_cosine, step_sine = np.empty(BLOCK + 1), np.empty(BLOCK + 1)
-    for start in range(0, n, BLOCK):
-        stop = min(start + BLOCK, n)
-        cosine_and_sine(revolutions[start:stop], cosine[: stop - start], sine[: stop - start])
-        first, last = max(start - 1, 0), min(stop, n - 1)  # steps from first to last; none beyond the ends
-        steps = revolutions[first + 1 : last + 1] - revolutions[first:last]
-        cosine_and_sine(steps, step_cosine[: last - first], step_sine[: last - first])
-        for i in range(start, stop):
-            x, q, size = waveform[i], 0.0, 0.0
-            if i > 0:
-                c, s = step_cosine[i - 1 - first], step_sine[i - 1 - first]
-                q += (waveform[i - 1] - x * c) * s
-                size += s * s
-            if i < n - 1:
-                c, s = step_cosine[i - first], step_sine[i - first]
-                q -= (waveform[i + 1] - x * c) * s
-                size += s * s
-            if size > 0.0:
-                q /= size
-            out[i] = complex(x, q) * complex(cosine[i - start], -sine[i - start])
