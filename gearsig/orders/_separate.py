@@ -185,9 +185,6 @@ def _part(average: SynchronousAverage, values: FloatArray, kind: PartKind, share
     return replace(average, values=values, standard_error=average.standard_error * np.sqrt(share), kind=kind)
 
 
-# Amplitude and phase modulation of a mesh harmonic over one revolution.
-
-
 @dataclass(frozen=True)
 class MeshModulation:
     """Modulation of one mesh harmonic over a revolution of the gear's shaft.
@@ -260,8 +257,7 @@ def mesh_modulation(
     P. D. McFadden, "Detecting fatigue cracks in gears by amplitude and phase demodulation of the meshing vibration",
     1986.
     """
-    if average.kind != "average":
-        raise InputError(f"the average is of kind {average.kind!r}", allowed="average", remedy="take it before a split")
+    _check_kind(average)
     low, high = mesh_band(average, teeth, harmonic, half_width_orders)
     centre = (low + high) // 2
     lines = np.fft.rfft(average.values)

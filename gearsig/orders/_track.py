@@ -179,9 +179,6 @@ def _checked_orders(signal: AngleSignal, orders: Sequence[float], margin: float)
     return numbers
 
 
-# Level of orders along a change of speed, as the power in a band of orders around each.
-
-
 def track_order_bands(
     signal: AngleSignal,
     channel: str,

@@ -22,9 +22,6 @@ from gearsig.spectra._types import (
     scaled_unit,
 )
 
-# Carrier bands: where they lie, how they weigh the spectrum's lines, and how many cells there may be.
-
-
 MAX_CELLS = 1 << 26
 """1.6 GB of results; beyond it a typing error is likelier than a wish."""
 MIN_PRODUCTS = 8
@@ -88,9 +85,6 @@ def lay_bands(n_lines: int, n_bands: int, n_highest: float, inflation: float, n_
             remedy="lower the highest cyclic frequency, take fewer bands or a shorter segment",
         )
     return bands
-
-
-# Spectral correlation and coherence over modulation frequency (or order) and carrier frequency.
 
 
 @dataclass(frozen=True)
@@ -290,7 +284,13 @@ def spectral_coherence(
     if preparation != "none":
         x, source = prepared_signal(x, fs, preparation), f"{source or 'signal'}, {preparation}"
         unit = "" if preparation == "whitened" else unit
-    n_alphas = _n_alphas(positive(highest_alpha_hz, "highest_alpha_hz", "Hz"), fs, len(x))
+    n_alphas = int(np.floor(positive(highest_alpha_hz, "highest_alpha_hz", "Hz") * len(x) / fs * (1 + 1e-12)))
+    if not FIRST_LINE < n_alphas < len(x) // 2:
+        raise InputError(
+            f"highest_alpha_hz is {highest_alpha_hz:g} Hz",
+            allowed=f"{(FIRST_LINE + 1) * fs / len(x):g} to below {fs / 2:g} Hz for this signal",
+            remedy="record longer for lower ones",
+        )
     window = make_window("hann", len(x)).values
     energy = float(np.dot(window, window))
     # Σ|R(d)|² of the window's own correlation between lines d apart.
@@ -356,20 +356,6 @@ def correlate_lines(lines: ComplexArray, bands: CarrierBands, n_alphas: int) -> 
     return S, gamma
 
 
-def _n_alphas(highest_hz: float, fs: float, n: int) -> int:
-    n_alphas = int(np.floor(highest_hz * n / fs * (1 + 1e-12)))
-    if not FIRST_LINE < n_alphas < n // 2:
-        raise InputError(
-            f"highest_alpha_hz is {highest_hz:g} Hz",
-            allowed=f"{(FIRST_LINE + 1) * fs / n:g} to below {fs / 2:g} Hz for this signal",
-            remedy="record longer for lower ones",
-        )
-    return n_alphas
-
-
-# Fourier sums over unequally spaced angles.
-
-
 _SPREAD = 8
 """Grid points on either side of a sample: error about 1e-8 of the sum of magnitudes."""
 
@@ -414,27 +400,6 @@ class TurnSums:
         rows = (points % self.n_grid).ravel()
         columns = np.repeat(np.arange(len(theta)), 2 * _SPREAD)
         return csr_array((weights.ravel(), (rows, columns)), shape=(self.n_grid, len(theta)))
-
-
-# Spectral coherence over cyclic order and carrier frequency, for variable speed.
-
-
-MAX_ENVELOPE_SAMPLES = 1 << 22
-"""Beyond it, spreading them over the angles would take more than 2 GB."""
-
-
-@dataclass(frozen=True)
-class _Turning:
-    """The stretch of angle that is analysed, seen at the envelopes' rate.
-
-    `weight` is Hann's window over the angle, squared, times the speed over the mean speed.
-    """
-
-    sums: TurnSums
-    weight: FloatArray
-    n_envelope: int
-    n_shift: int
-    inside: slice | np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 
 def order_coherence(
@@ -502,12 +467,13 @@ def order_coherence(
             allowed=f"up to {0.9 * order * n_lines / n_shift:.4g}, where it nears half the sampling rate at full speed",
         )
     seconds = np.arange(len(values)) / fs + start_s
-    inflation = _inflation(angle, seconds)
+    weight = _weight(angle, seconds)
+    # By so much the weight over time reduces the independent products: T ∫W²/(∫W)².
+    inflation = float(len(weight) * np.dot(weight, weight) / weight.sum() ** 2)
     bands = lay_bands(n_lines, n_bands, n_shift, inflation, n_alphas - FIRST_LINE + 1)
     lines = transform_of(values, np.ones(len(values)))
-    turning = _turning(angle, start_s, len(values), fs, bands, int(np.ceil(n_shift)), n_alphas)
     density = _whiten(lines, bands.half)
-    S, gamma = _correlate(lines, bands, turning)
+    S, gamma = _correlate_over_angle(lines, bands, angle, start_s, len(values) / fs, int(np.ceil(n_shift)), n_alphas)
     unit = recording.channels[recording.index(channel)].unit
     return SpectralCoherence(
         coherence_squared=gamma,
@@ -545,12 +511,6 @@ def _weight(angle: ShaftAngle, seconds: FloatArray) -> FloatArray:
     return result
 
 
-def _inflation(angle: ShaftAngle, seconds: FloatArray) -> float:
-    """Return by how much the weight over time reduces the independent products: T ∫W²/(∫W)²."""
-    weight = _weight(angle, seconds)
-    return float(len(weight) * np.dot(weight, weight) / weight.sum() ** 2)
-
-
 def _whiten(lines: ComplexArray, half: int) -> FloatArray:
     """Divide the lines by the root of their mean power over about two bands, in place, and return that power."""
     from scipy.ndimage import uniform_filter1d
@@ -562,40 +522,44 @@ def _whiten(lines: ComplexArray, half: int) -> FloatArray:
     return smooth
 
 
-def _turning(
-    angle: ShaftAngle, start_s: float, n: int, fs: float, bands: CarrierBands, n_shift: int, n_alphas: int
-) -> _Turning:
+def _correlate_over_angle(
+    lines: ComplexArray,
+    bands: CarrierBands,
+    angle: ShaftAngle,
+    start_s: float,
+    duration_s: float,
+    n_shift: int,
+    n_alphas: int,
+) -> tuple[ComplexArray, FloatArray]:
+    """Return the whitened signal's S and γ², (n_alphas, n_bands) each; envelopes are sampled at a rate of their own.
+
+    The weight is Hann's window over the angle, squared, times the speed over the mean speed.
+    """
     from scipy.fft import next_fast_len
 
     # Products reach from -(2 half + shift) to as much; what aliases at this rate falls beyond the shift.
     n_envelope = next_fast_len(2 * (bands.half + n_shift) + 8)
-    seconds = start_s + np.arange(n_envelope) * (n / fs / n_envelope)
-    weight = _weight(angle, seconds)
-    if n_envelope > MAX_ENVELOPE_SAMPLES:
+    if n_envelope > 1 << 22:  # spreading them over the angles would take more than 2 GB
         raise InputError(
             f"{n_envelope} envelope samples are too many", remedy="take more bands, a lower order or a shorter segment"
         )
+    envelope_s = start_s + np.arange(n_envelope) * (duration_s / n_envelope)
+    weight = _weight(angle, envelope_s)
     inside = weight > 0.0
-    turn = (angle.revolutions_at(seconds[inside]) - float(angle.revolutions[0])) / angle.n_revolutions
-    sums = TurnSums(turn, n_alphas)
-    return _Turning(sums, weight[inside] / weight.sum(), n_envelope, n_shift, inside)
-
-
-def _correlate(lines: ComplexArray, bands: CarrierBands, turning: _Turning) -> tuple[ComplexArray, FloatArray]:
-    """Return the whitened signal's S and γ², (n_alphas, n_bands) each."""
-    n_wide = bands.half + turning.n_shift
+    turn = (angle.revolutions_at(envelope_s[inside]) - float(angle.revolutions[0])) / angle.n_revolutions
+    sums, weight = TurnSums(turn, n_alphas), weight[inside] / weight.sum()
+    n_wide = bands.half + n_shift
     lines = np.concatenate([lines, np.zeros(max(0, n_wide + 1 - len(lines)), dtype=lines.dtype)])
     lines = np.concatenate([np.conj(lines[1 : n_wide + 1][::-1]), lines, np.zeros(n_wide, dtype=lines.dtype)])
-    n_rows = turning.sums.n - FIRST_LINE + 1
-    S = np.empty((n_rows, bands.n_bands), dtype=np.complex128)
+    S = np.empty((n_alphas - FIRST_LINE + 1, bands.n_bands), dtype=np.complex128)
     gamma = np.empty(S.shape)
     for i, centre in enumerate(bands.centres):
         around = lines[int(centre) : int(centre) + 2 * n_wide + 1]  # line `centre` is its middle
         narrow = np.zeros(len(around), dtype=np.complex128)
         low = n_wide - bands.half + 1
         narrow[low : low + len(bands.weight)] = around[low : low + len(bands.weight)] * bands.weight
-        product = _at_rate(narrow, turning.n_envelope) * np.conj(_at_rate(around, turning.n_envelope))
-        c = turning.sums(product[turning.inside] * turning.weight) * (turning.n_envelope**2 / bands.weight.sum())
+        product = _at_rate(narrow, n_envelope) * np.conj(_at_rate(around, n_envelope))
+        c = sums(product[inside] * weight) * (n_envelope**2 / bands.weight.sum())
         S[:, i] = c[FIRST_LINE:]
         own = abs(float(c[0].real))
         square = S[:, i].real ** 2 + S[:, i].imag ** 2

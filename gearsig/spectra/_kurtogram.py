@@ -22,13 +22,8 @@ from gearsig.spectra._envelope import (
 )
 from gearsig.spectra._types import Spectrum, named_signal
 
-# What Gaussian noise alone does to the spectral kurtosis of a kurtogram's bands.
-
-
 OVERLAP = 1.66
 """Σ|ρ(m)|⁴ over the envelope's lags for the tree's filters (1.60 to 1.75 by path): samples per independent one."""
-REAL_BIAS = 0.01
-"""Kurtosis that a real signal's bands at 0 and half the rate show: the mirror image is close."""
 
 
 def kurtosis_error(n_bands: int, n_samples: int) -> float:
@@ -38,32 +33,6 @@ def kurtosis_error(n_bands: int, n_samples: int) -> float:
     Var K = (4/n) Σ|ρ(m)|⁴. The whole real band has Hermite's H₄ instead: Var K = 24/n.
     """
     return float(np.sqrt((24.0 if n_bands == 1 else 4.0 * OVERLAP) / n_samples))
-
-
-def noise_limit(n_samples: FloatArray, standard_error: FloatArray, probability: float) -> FloatArray:
-    """Return the kurtosis that noise exceeds in any of the bands with at most about `probability`.
-
-    Bonferroni's quantile q of the normal distribution, bent by the third and fourth moments of 2 L₂: skewness 10/√m and
-    excess 294/m for m independent samples (Cornish and Fisher's expansion).
-    """
-    from scipy.special import ndtri
-
-    q = float(-ndtri(probability / len(n_samples)))
-    m = n_samples / OVERLAP
-    skewness = 10.0 / np.sqrt(m)
-    bent = q + skewness * (q**2 - 1) / 6 + 294.0 / m * (q**3 - 3 * q) / 24 - skewness**2 * (2 * q**3 - 5 * q) / 36
-    result: FloatArray = bent * standard_error + REAL_BIAS
-    return result
-
-
-# A kurtogram: how impulsive each band of a tree of bands is.
-
-
-LARGE_SHARE = 0.2
-"""Share of the fourth moment from which on a single envelope sample makes a kurtosis a doubtful guide."""
-
-WEAK_KURTOSIS = 0.3
-"""Kurtosis that is more than chance in long signals, yet no sign of impacts: slow changes of level do as much."""
 
 
 @dataclass(frozen=True)
@@ -118,8 +87,19 @@ class Kurtogram:
 
     @property
     def noise_limit(self) -> FloatArray:
-        """Kurtosis that stationary Gaussian noise exceeds in any band at all in one kurtogram of 20."""
-        return noise_limit(self.n_envelope_samples, self.standard_error, 0.05)
+        """Kurtosis that stationary Gaussian noise exceeds in any band at all in one kurtogram of 20.
+
+        Bonferroni's quantile q of the normal distribution, bent by the third and fourth moments of 2 L₂: skewness 10/√m
+        and excess 294/m for m independent samples (Cornish and Fisher's expansion).
+        """
+        from scipy.special import ndtri
+
+        n = self.n_envelope_samples
+        q, m = float(-ndtri(0.05 / len(n))), n / OVERLAP
+        skewness = 10.0 / np.sqrt(m)
+        bent = q + skewness * (q**2 - 1) / 6 + 294.0 / m * (q**3 - 3 * q) / 24 - skewness**2 * (2 * q**3 - 5 * q) / 36
+        # A real signal's bands at 0 and half the rate show a little more: the mirror image is close.
+        return np.asarray(bent * self.standard_error + 0.01)
 
     @property
     def levels(self) -> FloatArray:
@@ -170,22 +150,19 @@ class Kurtogram:
                 f"kurtosis {band.kurtosis:.2g} is what noise alone reaches ({limit:.2g} in one kurtogram of 20): "
                 "no band stands out"
             )
-        elif band.kurtosis <= max(2.0 * limit, WEAK_KURTOSIS):
+        elif band.kurtosis <= max(2.0 * limit, 0.3):  # slow changes of level do as much in long signals
             warnings.append(f"kurtosis {band.kurtosis:.2g} is small: the band hardly stands out from noise")
         if band.standard_error > 0.1:
             warnings.append(
                 f"rests on {n} envelope samples: noise alone scatters by {band.standard_error:.2g}; record longer or "
                 "allow wider bands only"
             )
-        if share > LARGE_SHARE:
+        if share > 0.2:
             warnings.append(
                 f"one envelope sample carries {100 * share:.0f} % of the fourth moment: a single event, not a train "
                 "of impulses, may have chosen the band"
             )
         return tuple(warnings)
-
-
-# Filters that split a complex band into halves and thirds.
 
 
 @dataclass(frozen=True)
@@ -215,15 +192,6 @@ class Splitter:
         """Length of the filters."""
         return 2 * len(self.cosine) - 1
 
-    def responses(self, frequencies: FloatArray) -> FloatArray:
-        """Return the magnitude of each part's filter, (n_parts, n), at `frequencies` in cycles per sample."""
-        k = np.arange(1 - len(self.cosine), len(self.cosine))
-        low_pass = np.hypot(self.cosine, self.sine)[np.abs(k)] * _sign(self, np.abs(k))
-        middles = (2 * np.arange(self.n_parts) + 1) / (4.0 * self.n_parts)
-        turned = low_pass * np.exp(2j * np.pi * middles[:, None] * k)
-        result: FloatArray = np.abs(turned @ np.exp(-2j * np.pi * np.outer(k, frequencies)))
-        return result
-
 
 @lru_cache(maxsize=2)
 def splitter(n_parts: int) -> Splitter:
@@ -242,19 +210,6 @@ def splitter(n_parts: int) -> Splitter:
     turn = np.pi * k / (2 * n_parts)
     quarter = np.where(k % 4 < 2, 1.0, -1.0) * (n_parts == 3)  # cos(πk/2) of even, sin(πk/2) of odd taps
     return Splitter(n_parts, h * np.cos(turn), h * np.sin(turn), h * quarter)
-
-
-def _sign(split: Splitter, k: FloatArray) -> FloatArray:
-    """Return the sign of the low-pass at taps k: that of the sine over k, which changes every 2 n_parts taps."""
-    result: FloatArray = np.where((k // (2 * split.n_parts)) % 2 == 0, 1.0, -1.0)
-    return result
-
-
-# The tree of halves and thirds, fed piece by piece.
-
-
-PIECE_SAMPLES = 1 << 16
-"""Samples that go down the tree at once: a level's bands stay near the caches, whatever the signal's length."""
 
 
 class Stage:
@@ -289,8 +244,8 @@ def tree_moments(x: FloatArray, n_levels: int, mean: float, scale: float) -> lis
     halves = [Stage(2**k, 2, keep=k < n_levels - 1) for k in range(n_levels)]
     thirds = [Stage(2**k, 3, keep=False) for k in range(n_levels)]
     whole = np.zeros(3)
-    for start in range(0, len(x), PIECE_SAMPLES):
-        piece = x[start : start + PIECE_SAMPLES].astype(np.float64)
+    for start in range(0, len(x), 1 << 16):  # a level's bands stay near the caches, whatever the signal's length
+        piece = x[start : start + (1 << 16)].astype(np.float64)
         piece -= mean
         piece /= scale
         power = piece * piece
@@ -309,9 +264,6 @@ def tree_moments(x: FloatArray, n_levels: int, mean: float, scale: float) -> lis
 
 MIN_SAMPLES = 512
 """Of a finest band's envelope: below it the kurtosis of noise alone scatters by more than 0.1."""
-DEFAULT_LEVELS = 7
-MIN_LINES = 8
-"""Of an envelope's spectrum."""
 
 
 @dataclass(frozen=True)
@@ -469,13 +421,19 @@ def kurtogram_envelope(
     x = prepared_signal(recording.values(channel), fs, preparation)
     grid = kurtogram(x, fs, n_levels=n_levels, source=f"{channel}, {preparation}" if preparation != "none" else channel)
     if highest_modulation_hz is not None:
-        narrowest_hz = max(narrowest_hz, 3.0 * _checked_modulation(highest_modulation_hz, fs, len(x)))
+        highest = positive(highest_modulation_hz, "highest_modulation_hz", "Hz")
+        if not 8 * fs / len(x) <= highest <= fs / 6.0:
+            raise InputError(
+                f"highest_modulation_hz is {highest:g} Hz",
+                allowed=f"{8 * fs / len(x):.4g} Hz, 8 over the length, to {fs / 6.0:.4g} Hz, a third of the spectrum",
+            )
+        narrowest_hz = max(narrowest_hz, 3.0 * highest)
     reason = ""
     if band_hz is None:
         band = grid.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
         reason = _reason(grid, band, narrowest_hz, of_modulation=highest_modulation_hz is not None)
     else:
-        band = given_band(x, fs, band_hz)
+        band = _given_band(x, fs, band_hz)
     unit = "" if preparation == "whitened" else unit
     envelope = band_envelope(x, fs, band.band_hz, kind=kind, unit=unit, source=channel)
     spectrum = envelope_spectrum(envelope, highest_hz=highest_modulation_hz)
@@ -494,17 +452,7 @@ def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_mod
     return text + "."
 
 
-def _checked_modulation(highest_hz: float, fs: float, n: int) -> float:
-    lowest = MIN_LINES * fs / n
-    if not lowest <= positive(highest_hz, "highest_modulation_hz", "Hz") <= fs / 6.0:
-        raise InputError(
-            f"highest_modulation_hz is {highest_hz:g} Hz",
-            allowed=f"{lowest:.4g} Hz, {MIN_LINES} over the length, to {fs / 6.0:.4g} Hz, a third of the spectrum",
-        )
-    return highest_hz
-
-
-def given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[float, float]) -> BandCandidate:
+def _given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[float, float]) -> BandCandidate:
     """Return the kurtosis of a band that was not chosen from the tree, see `Kurtogram` for its definition.
 
     Raises
@@ -531,7 +479,7 @@ def _checked_levels(n_samples: int, n_levels: int | None) -> int:
             f"{n_samples} samples are too few for a kurtogram", remedy=f"record at least {2 * MIN_SAMPLES} samples"
         )
     if n_levels is None:
-        return min(DEFAULT_LEVELS, n_max)
+        return min(7, n_max)
     if count(n_levels, "n_levels") > n_max:
         raise InputError(
             f"n_levels is {n_levels} for {n_samples} samples",
@@ -551,9 +499,6 @@ def _row_of_bands(fs: float, n_bands: int, moments: FloatArray, n: int) -> tuple
     edges = np.arange(n_bands + 1) * (fs / 2 / n_bands)
     full = [np.full(n_bands, value) for value in (np.log2(n_bands), kurtosis_error(n_bands, n), float(n))]
     return edges[:-1], edges[1:], full[0], ratio - gaussian, full[1], share, full[2]
-
-
-# Splitting of bands into halves or thirds, with the moments of the parts, compiled.
 
 
 # Reordering sums lets the compiler use vector instructions.

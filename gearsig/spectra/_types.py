@@ -81,9 +81,6 @@ class Spectrum:
         return float(self.positions[best]), float(self.values[best])
 
 
-# Windows with their coherent gain, equivalent noise bandwidth and transform.
-
-
 # Coefficients a_m of w[n] = sum over m of (-1)^m a_m cos(2 pi m n / N).
 COSINE_SUMS: dict[str, tuple[float, ...]] = {
     "rectangular": (1.0,),
@@ -204,9 +201,6 @@ def window_response(name: str, offset_bins: FloatArray) -> FloatArray:
     offsets = np.atleast_1d(np.asarray(offset_bins, dtype=np.float64))
     response: FloatArray = np.abs(np.exp(-2j * np.pi / n * np.outer(offsets, k)) @ w) / w.sum()
     return response
-
-
-# Mean power of windowed blocks of a signal: the one transform behind amplitude spectra and densities.
 
 
 ComplexArray = NDArray[np.complexfloating[Any, Any]]

@@ -37,16 +37,25 @@ def recording_of(x: np.ndarray) -> Recording:
     return Recording(x[None, :], FS, (Channel("a", "acceleration", "m/s^2"),))
 
 
+def responses(split, frequencies: np.ndarray) -> np.ndarray:
+    """Return the magnitude of each part's filter, (n_parts, n), at frequencies in cycles per sample."""
+    k = np.arange(1 - len(split.cosine), len(split.cosine))
+    low_pass = np.hypot(split.cosine, split.sine)[abs(k)] * np.where((abs(k) // (2 * split.n_parts)) % 2 == 0, 1, -1)
+    middles = (2 * np.arange(split.n_parts) + 1) / (4.0 * split.n_parts)
+    turned = low_pass * np.exp(2j * np.pi * middles[:, None] * k)
+    return np.abs(turned @ np.exp(-2j * np.pi * np.outer(k, frequencies)))
+
+
 @pytest.mark.parametrize("n_parts", [2, 3])
 def test_filters_split_the_band_at_half_the_amplitude(n_parts):
     s = splitter(n_parts)
     borders = np.arange(n_parts + 1) / (2 * n_parts)
     middles = (borders[1:] + borders[:-1]) / 2
-    assert s.responses(middles).diagonal() == pytest.approx(1.0, abs=1e-3)
-    for i, response in enumerate(s.responses(borders)):
+    assert responses(s, middles).diagonal() == pytest.approx(1.0, abs=1e-3)
+    for i, response in enumerate(responses(s, borders)):
         assert response[i : i + 2] == pytest.approx(0.5, abs=3e-3)
     outside = np.linspace(borders[1] + 0.35 / (2 * n_parts), 1.0 - 0.35 / (2 * n_parts), 500)
-    assert s.responses(outside)[0].max() < 3e-3
+    assert responses(s, outside)[0].max() < 3e-3
 
 
 def plain_tree(x: np.ndarray, n_levels: int) -> dict[int, list[float]]:
