@@ -13,8 +13,6 @@ from gearsig.engines import engine_module
 from gearsig.errors import InputError, RefusalError
 from gearsig.spectra import Spectrum, amplitude_spectrum, checked_signal
 
-_MAX_CELLS = 2000
-
 
 def first_centres(
     settings: VmdSettings, sampling_rate: float, spectrum: FloatArray, rng: np.random.Generator | None
@@ -34,7 +32,12 @@ def first_centres(
     if settings.start == "uniform":
         centres = 0.5 / K * np.arange(K)
     elif settings.start == "random":
-        centres = _random(K, len(spectrum), rng)
+        if rng is None:
+            remedy = "give numpy's default_rng(seed)"
+            raise InputError('start is "random" without a generator', where="rng", remedy=remedy)
+        n = len(spectrum) - len(spectrum) % 2  # as the reference program, which drops the last sample of an odd length
+        low = np.log(1.0 / n)
+        centres = np.sort(np.exp(low + (np.log(0.5) - low) * rng.random(K)))
     elif settings.start == "peaks":
         centres = peak_centres(np.square(spectrum), settings.penalty, K)
     elif settings.start != "zero":
@@ -46,14 +49,6 @@ def first_centres(
     if settings.zero_mode:
         centres[0] = 0.0
     return centres
-
-
-def _random(K: int, n_samples: int, rng: np.random.Generator | None) -> FloatArray:
-    if rng is None:
-        raise InputError('start is "random" without a generator', where="rng", remedy="give numpy's default_rng(seed)")
-    n = n_samples - n_samples % 2  # as the reference program, which drops the last sample of an odd length
-    low = np.log(1.0 / n)
-    return np.sort(np.exp(low + (np.log(0.5) - low) * rng.random(K)))
 
 
 def peak_centres(power: FloatArray, penalty: float, n_modes: int) -> FloatArray:
@@ -70,7 +65,7 @@ def peak_centres(power: FloatArray, penalty: float, n_modes: int) -> FloatArray:
     n_modes : int
     """
     # Cells of a quarter of the half-gain distance, but no more of them than lines or than a matrix can have.
-    n_cells = int(min(len(power), max(16, np.ceil(2.0 * np.sqrt(penalty))), _MAX_CELLS))
+    n_cells = int(min(len(power), max(16, np.ceil(2.0 * np.sqrt(penalty))), 2000))
     edges = np.arange(n_cells) * len(power) // n_cells
     frequency = np.arange(len(power)) * (0.5 / len(power))
     energy = np.add.reduceat(power, edges)
@@ -224,7 +219,9 @@ def _solve(x: FloatArray, fs: float, settings: VmdSettings, rng: np.random.Gener
     # A power of two leaves every digit as it is, and keeps squares of very small or large values in range.
     scale = 2.0 ** np.floor(np.log2(np.abs(x).max()))
     energy = float(np.square(x / scale).sum())  # no scalar product: threads of BLAS cost more than they save here
-    threshold = _threshold(settings.tolerance, energy, scale)
+    threshold = RELATIVE_TOLERANCE * energy
+    if settings.tolerance is not None:  # the reference program starts its sum of changes at one unit in the last place
+        threshold = float((settings.tolerance - np.spacing(1.0)) / scale / scale)
     if settings.engine == "vmdpy":
         solution = _solve_with_vmdpy(x / scale, scale, settings, threshold)
     else:
@@ -284,13 +281,6 @@ def _grid(n: int) -> FloatArray:
     Rounded as in the reference programs: where the multiplier amplifies rounding, the last digit shows in the modes.
     """
     return np.arange(n + 1, 2 * n + 1) / (2 * n) - 0.5 - 0.5 / n
-
-
-def _threshold(tolerance: float | None, energy: float, scale: float) -> float:
-    """Return the change to stop at; the reference program starts its sum of changes at one unit in the last place."""
-    if tolerance is None:
-        return RELATIVE_TOLERANCE * energy
-    return float((tolerance - np.spacing(1.0)) / scale / scale)
 
 
 def _bandwidths(solution: _Solution) -> FloatArray:

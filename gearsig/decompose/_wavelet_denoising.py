@@ -216,10 +216,6 @@ class Denoised:
         return "\n".join(lines)
 
 
-FILTER_LENGTHS_LEFT = 8
-"""The default stops at the level that has this many filter lengths of coefficients: its noise can still be told."""
-
-
 def denoise(
     signal: FloatArray | Recording,
     channel_or_rate_hz: str | float,
@@ -310,7 +306,8 @@ def _with_levels(settings: DenoiseSettings, x: FloatArray) -> DenoiseSettings:
         )
     if settings.n_levels is not None:
         return settings
-    return replace(settings, n_levels=max(1, deepest_level(len(x) // FILTER_LENGTHS_LEFT, settings.wavelet)))
+    # The level that has eight filter lengths of coefficients: its noise can still be told.
+    return replace(settings, n_levels=max(1, deepest_level(len(x) // 8, settings.wavelet)))
 
 
 def _denoise_shifted(
@@ -327,14 +324,11 @@ def _denoise_shifted(
     for i, d in enumerate(details):
         level = n_levels - i
         sigma = noise_level(d) if settings.noise == "each level" else noise
-        threshold = _threshold(d, sigma, n, settings.threshold)
+        if settings.threshold == "bayes":
+            threshold = bayes(d, sigma)
+        else:
+            threshold = sure(d, sigma, n) if settings.threshold == "sure" else universal(sigma, n)
         details[i] = apply(d, threshold, settings.rule)
         numbers[level - 1] = sigma, threshold, np.count_nonzero(details[i]) / len(d)
     clean = pywt.waverec([approximation, *details], settings.wavelet, mode="symmetric")
     return clean[shift : shift + n], numbers
-
-
-def _threshold(d: FloatArray, sigma: float, n: int, name: str) -> float:
-    if name == "universal":
-        return universal(sigma, n)
-    return sure(d, sigma, n) if name == "sure" else bayes(d, sigma)

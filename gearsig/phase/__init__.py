@@ -22,14 +22,6 @@ from gearsig.phase._kind import (
     zero_one_test_of_section,
 )
 from gearsig.phase._lyapunov import largest_lyapunov_exponent
-from gearsig.phase._measures import (
-    ChaosTest,
-    EmbeddingDimension,
-    LyapunovExponent,
-    MutualInformation,
-    RecurrenceMeasures,
-    RecurrencePlot,
-)
 from gearsig.phase._neighbours import nearest_apart, spaced
 from gearsig.phase._plane import MotionQuantity, lowest_low_cut_hz, phase_plane
 from gearsig.phase._recurrence import recurrence_measures, recurrence_plot
@@ -40,7 +32,17 @@ from gearsig.phase._section import (
     poincare_section,
     section_period,
 )
-from gearsig.phase._types import BifurcationDiagram, PhasePortrait, PoincareSection
+from gearsig.phase._types import (
+    BifurcationDiagram,
+    ChaosTest,
+    EmbeddingDimension,
+    LyapunovExponent,
+    MutualInformation,
+    PhasePortrait,
+    PoincareSection,
+    RecurrenceMeasures,
+    RecurrencePlot,
+)
 
 __all__ = [
     "BifurcationDiagram",

@@ -9,9 +9,14 @@ from numba import njit
 
 from gearsig.checks import FloatArray, count, positive, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase._measures import EmbeddingDimension, MutualInformation, checked_series, mean_period_samples
 from gearsig.phase._neighbours import nearest_apart, spaced
-from gearsig.phase._types import PhasePortrait
+from gearsig.phase._types import (
+    EmbeddingDimension,
+    MutualInformation,
+    PhasePortrait,
+    checked_series,
+    mean_period_samples,
+)
 from gearsig.recording import Recording
 from gearsig.spectra import named_signal
 

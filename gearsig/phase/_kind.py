@@ -12,16 +12,17 @@ from gearsig.checks import FloatArray, count, not_negative
 from gearsig.errors import GearsigError, InputError
 from gearsig.phase._embedding import chosen_delay, delay_embedding, embedding_dimension
 from gearsig.phase._lyapunov import largest_lyapunov_exponent
-from gearsig.phase._measures import (
+from gearsig.phase._section import CycleLock, poincare_section, section_period
+from gearsig.phase._types import (
     ChaosTest,
     ChaosVerdict,
     EmbeddingDimension,
     LyapunovExponent,
+    PhasePortrait,
+    PoincareSection,
     checked_series,
     mean_period_samples,
 )
-from gearsig.phase._section import CycleLock, poincare_section, section_period
-from gearsig.phase._types import PhasePortrait, PoincareSection
 
 MIN_VALUES, MAX_VALUES = 200, 20_000
 LOWEST_C, HIGHEST_C = np.pi / 5.0, 4.0 * np.pi / 5.0

@@ -10,9 +10,8 @@ from numba import njit
 
 from gearsig.checks import FloatArray, count, one_of
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase._measures import LyapunovExponent, checked_series, mean_period_samples
 from gearsig.phase._neighbours import IndexArray, nearest_apart, spaced
-from gearsig.phase._types import PhasePortrait
+from gearsig.phase._types import LyapunovExponent, PhasePortrait, checked_series, mean_period_samples
 
 N_LIBRARY, N_REFERENCES, N_BLOCKS = 100_000, 4_000, 12
 MAX_NEIGHBOURS = 10

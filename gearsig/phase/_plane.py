@@ -7,10 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, one_of, positive, within
+from gearsig.checks import FloatArray, positive, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase._measures import checked_series
-from gearsig.phase._types import PhasePortrait
+from gearsig.phase._types import PhasePortrait, checked_series
 from gearsig.recording import Recording
 from gearsig.spectra import named_signal
 
@@ -171,11 +170,24 @@ def phase_plane(
     else:
         measured = quantity or "an unknown quantity"
     values, rate, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=1)
-    n_times = _integrations(measured, source)
+    if measured not in _INTEGRATIONS:
+        raise InputError(
+            f"channel {source!r} measures {measured}: displacement and velocity do not follow from it",
+            allowed="acceleration, velocity, displacement",
+            remedy="say quantity='acceleration' if it is one, or embed the channel with delays instead",
+        )
+    n_times = _INTEGRATIONS[measured]
     x = checked_series(values, minimum=16)
     low, high = _band(low_cut_hz, high_cut_hz, rate, n_times)
     n_lost = n_unsettled(rate, low)
-    _check_length(len(x), n_lost, low, rate)
+    if low == 0.0 and len(x) < 4 * n_lost:
+        raise InputError(f"values has {len(x)} sample(s)", allowed=f"at least {4 * n_lost}", remedy="record longer")
+    if low > 0.0 and len(x) - 2 * n_lost < MIN_PERIODS * rate / low:
+        need = lowest_low_cut_hz(1.0) / low
+        raise RefusalError(
+            f"{len(x) / rate:.4g} s are too short for a low cut of {low:g} Hz, which needs {need:.4g} s",
+            remedy=f"raise low_cut_hz above {low * need * rate / len(x):.4g} Hz or record longer",
+        )
     factor, length_unit = _length_unit(unit, n_times)
     kept = slice(n_lost, len(x) - n_lost)
     axes = [integrate_band(x, rate, n, (low, high))[kept] * factor for n in (n_times, n_times - 1)]
@@ -191,17 +203,6 @@ def phase_plane(
     )
 
 
-def _integrations(quantity: str, source: str) -> int:
-    if quantity not in _INTEGRATIONS:
-        raise InputError(
-            f"channel {source!r} measures {quantity}: displacement and velocity do not follow from it",
-            allowed="acceleration, velocity, displacement",
-            remedy="say quantity='acceleration' if it is one, or embed the channel with delays instead",
-        )
-    one_of(quantity, "quantity", _INTEGRATIONS)
-    return _INTEGRATIONS[quantity]
-
-
 def _band(low_cut_hz: float | None, high_cut_hz: float | None, rate: float, n_times: int) -> tuple[float, float]:
     if low_cut_hz is None and n_times > 0:
         raise InputError(
@@ -214,17 +215,6 @@ def _band(low_cut_hz: float | None, high_cut_hz: float | None, rate: float, n_ti
     if not low < high:
         raise InputError(f"the band goes from {low:g} to {high:g} Hz", allowed=f"ascending, up to {0.5 * rate:g} Hz")
     return low, high
-
-
-def _check_length(n: int, n_lost: int, low: float, rate: float) -> None:
-    if low == 0.0 and n < 4 * n_lost:
-        raise InputError(f"values has {n} sample(s)", allowed=f"at least {4 * n_lost}", remedy="record longer")
-    if low > 0.0 and n - 2 * n_lost < MIN_PERIODS * rate / low:
-        need = lowest_low_cut_hz(1.0) / low
-        raise RefusalError(
-            f"{n / rate:.4g} s are too short for a low cut of {low:g} Hz, which needs {need:.4g} s",
-            remedy=f"raise low_cut_hz above {low * need * rate / n:.4g} Hz or record longer",
-        )
 
 
 def _length_unit(unit: str, n_times: int) -> tuple[float, str]:

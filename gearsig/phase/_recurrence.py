@@ -7,8 +7,7 @@ from numba import njit
 
 from gearsig.checks import FloatArray, count, positive, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase._measures import RecurrenceMeasures, RecurrencePlot, mean_period_samples
-from gearsig.phase._types import PhasePortrait
+from gearsig.phase._types import PhasePortrait, RecurrenceMeasures, RecurrencePlot, mean_period_samples
 
 N_PAIRS = 200_000
 GOLDEN = 0.6180339887498949

@@ -1,4 +1,4 @@
-"""Motion in phase space and its sections, with axes and units."""
+"""Motion in phase space, its sections, and what is measured on it: results with what is needed to read them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from math import ceil, floor
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, freeze, positive
-from gearsig.errors import InputError
+from gearsig.checks import FloatArray, freeze, frozen_array, positive
+from gearsig.errors import InputError, RefusalError
 
+BoolArray = NDArray[np.bool_]
+ChaosVerdict = Literal["regular", "irregular", "undecided"]
 PortraitKind = Literal["phase plane", "delay embedding", "states"]
 
 
@@ -169,3 +172,277 @@ class BifurcationDiagram:
             raise InputError(f"{len(self.parameter)} parameter values for {len(self.points)} points")
         if len(self.extents) not in (0, len(self.values)):
             raise InputError(f"{len(self.extents)} extents for {len(self.values)} values")
+
+
+@dataclass(frozen=True)
+class MutualInformation:
+    """Average mutual information of a signal and its delayed self, and the delay chosen from it.
+
+    Parameters
+    ----------
+    information_nats : array, (n_delays,)
+        At delays of 0, 1, 2, … × `step_samples`.
+    step_samples : int
+    sampling_rate_hz : float
+    delay_samples : int
+        The delay chosen.
+    rule : str
+        How: "first minimum", or what stood in for it.
+    n_bins : int
+        Of the histogram, per axis.
+    source : str
+    """
+
+    information_nats: FloatArray
+    step_samples: int
+    sampling_rate_hz: float
+    delay_samples: int
+    rule: str
+    n_bins: int
+    source: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "information_nats")
+
+    @property
+    def delays_s(self) -> FloatArray:
+        """Delays, (n_delays,)."""
+        return np.arange(len(self.information_nats)) * (self.step_samples / self.sampling_rate_hz)
+
+    @property
+    def delay_s(self) -> float:
+        """The delay chosen."""
+        return self.delay_samples / self.sampling_rate_hz
+
+
+@dataclass(frozen=True)
+class EmbeddingDimension:
+    """How many delayed values unfold a signal's path.
+
+    Parameters
+    ----------
+    dimensions : tuple of int
+        1, 2, …
+    false_fraction : array, (n_dimensions,)
+        Share of nearest neighbours that are false at each dimension (Kennel).
+    growth : array, (n_dimensions - 1,)
+        Cao's E1(d): reaches 1 where the path is unfolded.
+    determinism : array, (n_dimensions - 1,)
+        Cao's E2(d): 1 at every d for a random signal.
+    dimension : int
+        The one chosen; 0 where no dimension unfolds the path.
+    verdict : str
+        "deterministic", or "stochastic": no dimension up to the largest tried unfolds it.
+    threshold : float
+        Share of false neighbours that still counts as unfolded.
+    delay_samples : int
+    source : str
+    """
+
+    dimensions: tuple[int, ...]
+    false_fraction: FloatArray
+    growth: FloatArray
+    determinism: FloatArray
+    dimension: int
+    verdict: Literal["deterministic", "stochastic"]
+    threshold: float
+    delay_samples: int
+    source: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "false_fraction", "growth", "determinism")
+
+
+@dataclass(frozen=True)
+class LyapunovExponent:
+    """Largest Lyapunov exponent, with the divergence curve it was read from.
+
+    Parameters
+    ----------
+    exponent_per_s, uncertainty_per_s : float
+        Slope of the curve and one standard deviation of it: scatter between stretches of the signal, and dependence on
+        where the line is fitted.
+    log_distance : array, (n_steps,)
+        Mean logarithm of the distance of neighbours after 0, 1, 2, … steps of `step_s`.
+    step_s : float
+    fit_s : (float, float)
+        Stretch of the curve that was fitted.
+    saturation_log_distance : float
+        Mean logarithm of the distance of points that have nothing to do with each other.
+    verdict : str
+        "diverging": the exponent is above twice its uncertainty and distances grow by e or more; "not diverging": they
+        do not, although there was room; "undecided".
+    method : str
+        "rosenstein", "transverse" or "kantz".
+    n_references, theiler_samples : int
+    source : str
+    """
+
+    exponent_per_s: float
+    uncertainty_per_s: float
+    log_distance: FloatArray
+    step_s: float
+    fit_s: tuple[float, float]
+    saturation_log_distance: float
+    verdict: Literal["diverging", "not diverging", "undecided"]
+    method: str
+    n_references: int
+    theiler_samples: int
+    source: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "log_distance")
+
+    @property
+    def times_s(self) -> FloatArray:
+        """Times of the divergence curve, (n_steps,)."""
+        return np.arange(len(self.log_distance)) * self.step_s
+
+
+@dataclass(frozen=True)
+class ChaosTest:
+    """Result of the 0–1 test.
+
+    Parameters
+    ----------
+    k : float
+        Median of `k_of_c`: near 0 for regular motion, near 1 for chaos (and for noise: the test presumes determinism).
+    k_of_c, c_rad : arrays, (n_frequencies,)
+    damping : float
+        Weight of the term that keeps weak noise from being read as chaos; 0: the plain modified test.
+    n_values : int
+    verdict : str
+        "regular" (k < 0.2), "irregular" (k > 0.8), "undecided" between and where the values are oversampled.
+    oversampled : bool
+        Whether neighbouring values are so close that the test would read chaos as regular motion.
+    source : str
+    every : int
+        Every so-many-th value was used.
+    reason : str
+        Why it is undecided; empty otherwise.
+    """
+
+    k: float
+    k_of_c: FloatArray
+    c_rad: FloatArray
+    damping: float
+    n_values: int
+    verdict: ChaosVerdict
+    oversampled: bool
+    source: str
+    every: int = 1
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        freeze(self, "k_of_c", "c_rad")
+
+
+@dataclass(frozen=True)
+class RecurrencePlot:
+    """Which points of a path lie close to which.
+
+    Parameters
+    ----------
+    recurrent : array of bool, (n, n)
+        Symmetric; read-only.
+    times_s : array, (n,)
+    radius : float
+        Points closer than this are recurrent; in standard deviations of the axes.
+    stride : int
+        Every so-many-th point of the portrait was taken.
+    source : str
+    """
+
+    recurrent: BoolArray
+    times_s: FloatArray
+    radius: float
+    stride: int
+    source: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "recurrent", ndim=None)
+        freeze(self, "times_s")
+
+
+@dataclass(frozen=True)
+class RecurrenceMeasures:
+    """Recurrence quantification; lengths in seconds, shares from 0 to 1.
+
+    Parameters
+    ----------
+    recurrence_rate : float
+        RR: share of recurrent pairs.
+    determinism : float
+        DET: share of the recurrent points that lie on diagonal lines of `shortest_line` points or more.
+    mean_line_s, longest_line_s : float
+        L and Lmax of these lines.
+    entropy_nats : float
+        ENTR: Shannon entropy of their lengths.
+    laminarity : float
+        LAM: share of the recurrent points on vertical lines of `shortest_line` points or more.
+    trapping_time_s : float
+        TT: mean length of these.
+    radius : float
+        In standard deviations of the axes.
+    shortest_line, theiler_points, stride, n_points : int
+        In points taken; every `stride`-th sample was.
+    duration_s : float
+        Length of the stretch.
+    source : str
+    """
+
+    recurrence_rate: float
+    determinism: float
+    mean_line_s: float
+    longest_line_s: float
+    entropy_nats: float
+    laminarity: float
+    trapping_time_s: float
+    radius: float
+    shortest_line: int
+    theiler_points: int
+    stride: int
+    n_points: int
+    duration_s: float
+    source: str
+
+
+def checked_series(values: FloatArray, *, minimum: int, name: str = "values") -> FloatArray:
+    """Return a finite float64 series of at least `minimum` samples that is not constant.
+
+    Raises
+    ------
+    InputError
+        On NaN, a wrong shape, or too few samples.
+    RefusalError
+        If the series is constant: there is no motion to look at.
+    """
+    x = frozen_array(values, name, ndim=1)
+    if len(x) < minimum:
+        raise InputError(
+            f"{name} has {len(x)} sample(s)", allowed=f"at least {minimum}", remedy="record longer or ask for less"
+        )
+    low, high = float(x.min()), float(x.max())
+    if high - low <= 8.0 * np.finfo(x.dtype).eps * max(abs(low), abs(high)):
+        raise RefusalError(
+            f"{name} is constant at {low:g}: nothing moves, so there is nothing to embed",
+            remedy="check the sensor, or take a channel or a stretch that vibrates",
+        )
+    return np.asarray(x, dtype=np.float64)
+
+
+def mean_period_samples(x: FloatArray) -> float:
+    """Return one over the mean frequency of the power spectrum, in samples; at least 2.
+
+    T = Σ|X(f)|² / Σ f |X(f)|², the mean taken off before.
+
+    Source: M. T. Rosenstein, J. J. Collins, C. J. De Luca, *A practical method for calculating largest Lyapunov
+    exponents from small data sets*, Physica D 65 (1993).
+    """
+    from scipy import fft
+
+    part = x[: 1 << 20]
+    lines = fft.rfft(part - part.mean(), fft.next_fast_len(len(part), real=True))
+    power = np.square(lines.real) + np.square(lines.imag)
+    frequency = np.arange(len(power)) / (2.0 * (len(power) - 1))
+    return max(2.0, float(power.sum() / np.dot(frequency, power)))

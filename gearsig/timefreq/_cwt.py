@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.checks import FloatArray, one_of
-from gearsig.errors import InputError
 from gearsig.timefreq._squeezing import (
     MIN_SHARE,
     SqueezeEngine,
@@ -27,9 +26,8 @@ from gearsig.timefreq._wavelets import (
     admissibility,
     band,
     block_pieces,
-    given_lines,
     half_support,
-    logarithmic_lines,
+    lines_of,
     lowest_possible,
     pieces,
     plan_group,
@@ -67,7 +65,7 @@ def cwt(
     positions : array or None
         Lines in Hz or orders; None: `lowest` to `highest` at `n_per_octave` per octave.
     lowest, highest : float or None
-        In Hz or orders; see `logarithmic_lines`.
+        In Hz or orders; None: ten octaves, or twice the lowest possible, to what the wavelet's response allows.
     step : int
         Samples between columns; the columns are exact, not averaged.
     edges : str
@@ -92,7 +90,7 @@ def cwt(
     Source: S. Mallat, *A Wavelet Tour of Signal Processing*, 3rd ed. (2009), chapter 4.
     """
     x = uniform(signal, channel)
-    lines, spacing = _lines(x, wavelet, positions, lowest, highest, n_per_octave)
+    lines, spacing = lines_of(x, wavelet, positions, lowest, highest, n_per_octave)
     transform = _transform(x, lines, spacing, wavelet, edges)
     W = transform.room(step)
     for piece, column, thinned, _ in sampled_pieces(x, lines, wavelet, step, edges):
@@ -139,7 +137,7 @@ def cwt_map(
         As in `cwt`.
     """
     x = uniform(signal, channel)
-    lines, spacing = _lines(x, wavelet, positions, lowest, highest, n_per_octave)
+    lines, spacing = lines_of(x, wavelet, positions, lowest, highest, n_per_octave)
     transform, columns = _transform(x, lines, spacing, wavelet, edges), plan_columns(x, n_columns)
     groups = plan_groups(lines / x.rate, wavelet, x.n_samples, step=columns.largest_step, follow_band=True)
     parts = ((p.lines, p.start, p.step, p.values) for group in groups for p in pieces(x.values, group, edges))
@@ -254,24 +252,6 @@ def squeezed_cwt_map(
     return transform.level_map(columns, reduction, scaling, blocks)
 
 
-def _lines(
-    x: UniformSignal,
-    wavelet: Wavelet,
-    positions: FloatArray | None,
-    lowest: float | None,
-    highest: float | None,
-    n_per_octave: int,
-) -> tuple[FloatArray, Spacing]:
-    """Return the lines asked for and how they are spaced."""
-    if positions is None:
-        return logarithmic_lines(x, wavelet, lowest, highest, n_per_octave), "logarithmic"
-    if lowest is not None or highest is not None:
-        raise InputError("both positions and a range are given", where="positions", remedy="give one of them")
-    lines = given_lines(positions, x, wavelet)
-    even = len(lines) < 3 or bool(np.ptp(np.diff(lines)) < 1e-6 * (lines[1] - lines[0]))
-    return lines, "linear" if even else "logarithmic"
-
-
 def _transform(
     x: UniformSignal,
     lines: FloatArray,
@@ -317,7 +297,7 @@ def analysis(
     x: UniformSignal, wavelet: Wavelet, lowest: float | None, highest: float | None, n_per_octave: int
 ) -> SqueezingWavelets:
     """Return lines, and wavelets that reach as far beyond them as they answer to them."""
-    lines = logarithmic_lines(x, wavelet, lowest, highest, n_per_octave)
+    lines, _ = lines_of(x, wavelet, None, lowest, highest, n_per_octave)
     v_low, v_high = band(wavelet, _GUARD)
     n_below, n_above = (int(np.ceil(n_per_octave * np.log2(r))) for r in (v_high, 1 / v_low))
     k = np.arange(1 - len(lines) - n_below, n_above + 1)

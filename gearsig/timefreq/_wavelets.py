@@ -13,7 +13,7 @@ from scipy.fft import ifft, rfft
 
 from gearsig.checks import FloatArray, count, frozen_array, positive, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq._types import ComplexArray
+from gearsig.timefreq._types import ComplexArray, Spacing
 from gearsig.timefreq._uniform import Edges, UniformSignal, stretch
 
 TAIL = 1e-6
@@ -138,10 +138,6 @@ def admissibility(wavelet: Wavelet) -> float:
     return float(np.trapezoid(wavelet.response(np.exp(s)), s))
 
 
-N_OCTAVES = 10
-"""Octaves that the default lines span at most."""
-
-
 def footprint_periods(wavelet: Wavelet) -> float:
     """Return the periods that hold most of a wavelet's energy, 2√2 P / 2π.
 
@@ -156,15 +152,22 @@ def lowest_possible(signal: UniformSignal, wavelet: Wavelet) -> float:
     return footprint_periods(wavelet) / signal.length
 
 
-def logarithmic_lines(
-    signal: UniformSignal, wavelet: Wavelet, lowest: float | None, highest: float | None, n_per_octave: int
-) -> FloatArray:
-    """Return frequencies or orders at equal ratios, 2^(1/n_per_octave), `highest` among them.
+def lines_of(
+    x: UniformSignal,
+    wavelet: Wavelet,
+    positions: FloatArray | None,
+    lowest: float | None,
+    highest: float | None,
+    n_per_octave: int,
+) -> tuple[FloatArray, Spacing]:
+    """Return the lines asked for, or lines at equal ratios, 2^(1/n_per_octave), `highest` among them; their spacing.
 
     Parameters
     ----------
-    signal : UniformSignal
+    x : UniformSignal
     wavelet : Wavelet
+    positions : array or None
+        The lines themselves; then `lowest` and `highest` are None.
     lowest, highest : float or None
         In Hz or orders. None: ten octaves down, or twice the lowest possible; as high as the
         wavelet's response leaves a hundredth beyond what the samples carry.
@@ -177,48 +180,39 @@ def logarithmic_lines(
     RefusalError
         If the signal is too short for the lowest line.
     """
-    count(n_per_octave, "n_per_octave")
-    top = signal.highest_valid / band(wavelet, 0.01)[1] if highest is None else positive(highest, "highest")
-    _check_highest(top, signal)
-    fits = lowest_possible(signal, wavelet)
-    low = max(top / 2**N_OCTAVES, 2.0 * fits) if lowest is None else positive(lowest, "lowest")
-    low = min(low, top) if lowest is None else low
-    if low > top:
-        raise InputError(f"lowest is {low:g}, highest is {top:g} {signal.position_unit}", allowed="lowest < highest")
-    _check_lowest(low, signal, wavelet)
-    n = int(np.floor(n_per_octave * np.log2(top / low) * (1 + 1e-12))) + 1
-    return top * 2.0 ** (np.arange(1 - n, 1) / n_per_octave)
-
-
-def given_lines(positions: FloatArray, signal: UniformSignal, wavelet: Wavelet) -> FloatArray:
-    """Return the asked frequencies or orders after checking them as `logarithmic_lines` does."""
-    lines = frozen_array(positions, "positions", ndim=1)
-    if len(lines) == 0 or lines[0] <= 0 or np.any(np.diff(lines) <= 0):
-        raise InputError("positions are not positive and increasing", allowed="at least one, each above the last")
-    _check_highest(float(lines[-1]), signal)
-    _check_lowest(float(lines[0]), signal, wavelet)
-    return lines
-
-
-def _check_highest(highest: float, signal: UniformSignal) -> None:
-    if highest > signal.highest_valid * (1 + 1e-9):
+    fits, unit = lowest_possible(x, wavelet), x.position_unit
+    if positions is None:
+        count(n_per_octave, "n_per_octave")
+        top = x.highest_valid / band(wavelet, 0.01)[1] if highest is None else positive(highest, "highest")
+        low = min(max(top / 2**10, 2.0 * fits), top) if lowest is None else positive(lowest, "lowest")
+    else:
+        if lowest is not None or highest is not None:
+            raise InputError("both positions and a range are given", where="positions", remedy="give one of them")
+        lines = frozen_array(positions, "positions", ndim=1)
+        if len(lines) == 0 or lines[0] <= 0 or np.any(np.diff(lines) <= 0):
+            raise InputError("positions are not positive and increasing", allowed="at least one, each above the last")
+        low, top = float(lines[0]), float(lines[-1])
+    if top > x.highest_valid * (1 + 1e-9):
         raise InputError(
-            f"the highest line is {highest:g} {signal.position_unit}",
+            f"the highest line is {top:g} {unit}",
             where="highest",
-            allowed=f"at most {signal.highest_valid:g} {signal.position_unit}",
+            allowed=f"at most {x.highest_valid:g} {unit}",
             remedy="lower it, or sample faster",
         )
-
-
-def _check_lowest(lowest: float, signal: UniformSignal, wavelet: Wavelet) -> None:
-    fits = lowest_possible(signal, wavelet)
-    if lowest < fits * (1 - 1e-9):
-        length = "s" if signal.axis == "frequency" else "revolutions"
+    if low > top:
+        raise InputError(f"lowest is {low:g}, highest is {top:g} {unit}", allowed="lowest < highest")
+    if low < fits * (1 - 1e-9):
+        length = "s" if x.axis == "frequency" else "revolutions"
         raise RefusalError(
-            f"the signal of {signal.length:.4g} {length} is shorter than the wavelet at {lowest:.4g} "
-            f"{signal.position_unit}, which lasts {footprint_periods(wavelet) / lowest:.4g} {length}",
-            remedy=f"set lowest to {fits:.4g} {signal.position_unit} or more, take a shorter wavelet, or record longer",
+            f"the signal of {x.length:.4g} {length} is shorter than the wavelet at {low:.4g} {unit}, which lasts "
+            f"{footprint_periods(wavelet) / low:.4g} {length}",
+            remedy=f"set lowest to {fits:.4g} {unit} or more, take a shorter wavelet, or record longer",
         )
+    if positions is not None:
+        even = len(lines) < 3 or bool(np.ptp(np.diff(lines)) < 1e-6 * (lines[1] - lines[0]))
+        return lines, "linear" if even else "logarithmic"
+    n = int(np.floor(n_per_octave * np.log2(top / low) * (1 + 1e-12))) + 1
+    return top * 2.0 ** (np.arange(1 - n, 1) / n_per_octave), "logarithmic"
 
 
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]

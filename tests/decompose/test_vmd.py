@@ -92,7 +92,7 @@ def test_equals_vmdpy_on_noise(n, n_modes, penalty, seed):
     _assert_equal(x, VmdSettings(n_modes, penalty=penalty, tolerance=0.0))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 5))])
 def test_where_the_multiplier_amplifies_rounding_it_does_no_more_than_in_vmdpy(seed):
     s = VmdSettings(4, penalty=3000.0, dual_step=0.1, tolerance=0.0)
     x = np.random.default_rng(seed).normal(size=100)

@@ -103,7 +103,7 @@ def test_no_digits_are_lost_in_narrow_bands(p, bandwidth):
 
 @pytest.mark.parametrize("p", [1, 2, 3])
 @pytest.mark.parametrize("mirror", [False, True])
-@pytest.mark.parametrize("n", [4_001, 30_000])
+@pytest.mark.parametrize("n", [4_001, pytest.param(30_000, marks=pytest.mark.slow)])
 def test_blocks_and_parts_make_no_difference(p, mirror, n):
     y, cycles = noisy_order(n)
     weights = envelope_weight(np.linspace(0.001, 0.01, n - p), p)

@@ -112,7 +112,7 @@ def test_the_closed_form_solves_the_textbook_matrix(p):
 
 @pytest.mark.parametrize("p", [1, 2, 3])
 @pytest.mark.parametrize("bandwidth_hz", [0.5, 2.0, 20.0, 200.0])
-@pytest.mark.parametrize("n", [100_000, 100_001])
+@pytest.mark.parametrize("n", [50_000, pytest.param(100_001, marks=pytest.mark.slow)])
 def test_constant_bandwidth(p, bandwidth_hz, n):
     y, cycles, z = modulated_order(n)
     r = weight_of(bandwidth_hz, p)

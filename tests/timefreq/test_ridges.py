@@ -85,7 +85,7 @@ def _followed(kind, least_hz, amplitudes, phase=0.7):
 
 
 @pytest.mark.parametrize("kind", USUAL)
-@pytest.mark.parametrize("amplitudes", [(1.0, 1.0), (1.0, 0.7), (0.7, 1.0)])
+@pytest.mark.parametrize("amplitudes", [(1.0, 1.0), (1.0, 0.7), pytest.param((0.7, 1.0), marks=pytest.mark.slow)])
 def test_a_chirp_crosses_a_tone_with_usual_settings(kind, amplitudes):
     _followed(kind, 0, amplitudes)
     _followed(kind, 0, amplitudes, phase=0.7 + np.pi)
@@ -94,7 +94,7 @@ def test_a_chirp_crosses_a_tone_with_usual_settings(kind, amplitudes):
 @pytest.mark.parametrize(
     ("kind", "least_hz"), [("CWT", 100), ("squeezed CWT", 100), ("STFT", 60), ("squeezed STFT", 60), ("STFT", 40)]
 )
-@pytest.mark.parametrize("amplitudes", [(1.0, 1.0), (1.0, 0.7), (0.7, 1.0)])
+@pytest.mark.parametrize("amplitudes", [(1.0, 1.0), (1.0, 0.7), pytest.param((0.7, 1.0), marks=pytest.mark.slow)])
 def test_components_that_can_be_told_apart_turn_back(kind, least_hz, amplitudes):
     _followed(kind, least_hz, amplitudes)
 
