@@ -4,26 +4,18 @@ Prints a Markdown table: root mean square difference over the signal's largest v
 interleaved rounds), and by how much the process grew at its peak, each engine in a process of its own (Linux).
 """
 
-# ruff: noqa: E402 - the number of threads must be set before numpy is loaded
-
-import os
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[_name] = "1"
-
 import subprocess
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from interleaved import best_of
 
 from gearsig.decompose import VmdSettings, vmd
 from gearsig.timefreq import Morse, UniformSignal, inverse, squeezed_cwt, squeezed_cwt_map, squeezed_stft
 
 RATE_HZ = 10_000.0
-N_ROUNDS = 3
 
 
 def _signal(n: int) -> UniformSignal:
@@ -79,17 +71,13 @@ def main() -> None:
     """Print the table."""
     print(f"| case | engine | difference | time ratio | peak, MB | gearsig's peak, MB |\n|{'---|' * 6}")
     for name, (n, run, other) in CASES.items():
-        signal, best, results = _signal(n), dict.fromkeys(("gearsig", other), np.inf), {}
-        for _ in range(N_ROUNDS):
-            for engine in best:
-                start = time.process_time()
-                results[engine] = run(signal, engine)
-                best[engine] = min(best[engine], time.process_time() - start)
-        apart = results[other] - results["gearsig"]
+        signal = _signal(n)
+        (own_s, own), (other_s, theirs) = best_of(3, partial(run, signal, "gearsig"), partial(run, signal, other))
+        apart = theirs - own
         margin = 0 if "map" in name else apart.shape[-1] // 10  # beyond the ends each assumes something else
         apart = apart[..., margin : apart.shape[-1] - margin]
         difference = float(np.sqrt(np.mean(np.abs(apart) ** 2)) / np.abs(signal.values).max())
-        ratio, peaks = best[other] / best["gearsig"], [_growth_mb(name, e) for e in (other, "gearsig")]
+        ratio, peaks = other_s / own_s, [_growth_mb(name, e) for e in (other, "gearsig")]
         print(f"| {name} | {other} | {difference:.1e} | {ratio:.1f} | {peaks[0]:.0f} | {peaks[1]:.0f} |", flush=True)
 
 

@@ -4,24 +4,17 @@ Run: python tests/benchmarks/bench_kurtogram.py. PySDKit (0.4.54 has Antoni's fi
 installed. Times are the process' own processor time, so that other work on the machine counts less.
 """
 
-# ruff: noqa: E402 - the number of threads must be set before numpy is loaded
-
-import os
-
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[_name] = "1"
-
 import importlib.util
+import os
 import resource
-import time
 from collections.abc import Callable
 
 import numpy as np
+from interleaved import best_of
 from scipy.signal import upfirdn
 
 from gearsig.spectra import kurtogram, spectral_coherence, splitter
 
-N_ROUNDS = 5
 N_LEVELS = 7
 
 
@@ -57,17 +50,6 @@ def scipy_filter_bank(x: np.ndarray, n_levels: int) -> list[list[float]]:
     return rows
 
 
-def _compare(x: np.ndarray, others: dict[str, Callable[[], object]], ours: Callable[[], object], name: str) -> None:
-    best = dict.fromkeys(["ours", *others], np.inf)
-    for _ in range(N_ROUNDS):
-        for label, run in {"ours": ours, **others}.items():
-            start = time.process_time()
-            run()
-            best[label] = min(best[label], time.process_time() - start)
-    for label in others:
-        print(f"{name}, {len(x)} samples: {best[label] / best['ours']:5.1f} times as fast as {label}")
-
-
 def _peak_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
@@ -87,8 +69,9 @@ def main() -> None:
         from pysdkit.utils._kurtogram import fast_kurtogram
 
         others["PySDKit"] = lambda: fast_kurtogram(x, N_LEVELS, 1.0)
-    _compare(x, others, lambda: kurtogram(x, 1.0, n_levels=N_LEVELS), "kurtogram")
-    ours = kurtogram(x, 1.0, n_levels=N_LEVELS)
+    (best, ours), *rest = best_of(5, lambda: kurtogram(x, 1.0, n_levels=N_LEVELS), *others.values())
+    for label, (seconds, _) in zip(others, rest, strict=True):
+        print(f"kurtogram, {len(x)} samples: {seconds / best:5.1f} times as fast as {label}")
     halves = next(row for row in scipy_filter_bank(x, N_LEVELS) if len(row) == 2**N_LEVELS)
     difference = np.abs(ours.kurtosis[ours.level == N_LEVELS] - halves).max()
     print(f"largest difference from scipy's filters at the finest halves {difference:.1e}")
@@ -108,15 +91,12 @@ def _coherence(x: np.ndarray) -> None:
             S = np.add.reduceat(lines[k:] * np.conj(lines[:-k]), edges)
             _ = np.abs(S) ** 2 / (np.add.reduceat(power[k:], edges) * np.add.reduceat(power[:-k], edges))
 
-    ours, theirs = np.inf, np.inf
-    for _ in range(3):
-        start = time.process_time()
+    def all_alphas() -> None:
         spectral_coherence(x, 1.0, highest_alpha_hz=n_alphas / len(x), n_bands=n_bands)
-        ours = min(ours, time.process_time() - start)
-        start = time.process_time()
-        some_alphas()
-        theirs = min(theirs, (time.process_time() - start) * n_alphas / 20)
-    print(f"coherence, {n_alphas} × {n_bands} cells: {theirs / ours:5.1f} times as fast as one sum per α (20 timed)")
+
+    (ours, _), (theirs, _) = best_of(3, all_alphas, some_alphas)
+    ratio = theirs * n_alphas / 20 / ours
+    print(f"coherence, {n_alphas} × {n_bands} cells: {ratio:5.1f} times as fast as one sum per α (20 timed)")
 
 
 if __name__ == "__main__":

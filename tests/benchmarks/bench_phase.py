@@ -1,16 +1,16 @@
 """Phase-space methods beside plain implementations and nolds, one core, interleaved.
 
-Run: OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 python tests/benchmarks/bench_phase.py. Prints ratios: absolute times depend
+Run: python tests/benchmarks/bench_phase.py. Prints ratios: absolute times depend
 on what else the machine does.
 """
 
 import os
-import time
 import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from interleaved import best_of
 
 from gearsig.phase import (
     average_mutual_information,
@@ -21,8 +21,6 @@ from gearsig.phase import (
     recurrence_measures,
     zero_one_test,
 )
-
-ROUNDS = 5
 
 
 def _signal(n: int) -> np.ndarray:
@@ -103,16 +101,6 @@ def _nolds_lyapunov(x: np.ndarray) -> Callable[[], Any] | None:
     return lambda: nolds.lyap_r(x, emb_dim=3, lag=8, min_tsep=80, trajectory_len=150, fit="poly")
 
 
-def _ratio(ours: Callable[[], Any], theirs: Callable[[], Any]) -> float:
-    best = [np.inf, np.inf]
-    for _ in range(ROUNDS):
-        for i, run in enumerate((ours, theirs)):
-            start = time.perf_counter()
-            run()
-            best[i] = min(best[i], time.perf_counter() - start)
-    return best[1] / best[0]
-
-
 def main() -> None:
     """Print one ratio per method."""
     x = _signal(20_000)
@@ -157,12 +145,12 @@ def main() -> None:
             ("Lyapunov exponent (Rosenstein), 4000 points | nolds", lambda: largest_lyapunov_exponent(small), nolds)
         )
     for name, ours, theirs in cases:
-        print(f"{name:78s} {_ratio(ours, theirs):8.1f}×")
-    start = time.perf_counter()
-    embedding_dimension(x, 50.0, delay_samples=8)
-    middle = time.perf_counter()
-    average_mutual_information(x, 50.0)
-    print(f"embedding dimension in mutual informations {(middle - start) / (time.perf_counter() - middle):.1f}")
+        (own, _), (other, _) = best_of(5, ours, theirs)
+        print(f"{name:78s} {other / own:8.1f}×")
+    (dimension, _), (mutual, _) = best_of(
+        1, lambda: embedding_dimension(x, 50.0, delay_samples=8), lambda: average_mutual_information(x, 50.0)
+    )
+    print(f"embedding dimension in mutual informations {dimension / mutual:.1f}")
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 """Times for 10 s at 25.6 kHz, some beside scipy. Run: python tests/benchmarks/bench_spectra.py."""
 
-import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from interleaved import best_of
 from scipy import ndimage, signal
 
 from gearsig.angle import AngleSignal, ShaftAngle
@@ -30,18 +30,6 @@ from gearsig.spectra import (
 
 FS = 25_600.0
 N = 256_000
-
-
-def _milliseconds(function: Callable[[], Any], others: Callable[[], Any] | None = None) -> tuple[float, float]:
-    """Return the best of seven interleaved runs of each."""
-    best = [np.inf, np.inf]
-    for _ in range(7):
-        for i, run in enumerate((function, others)):
-            if run is not None:
-                start = time.perf_counter()
-                run()
-                best[i] = min(best[i], 1e3 * (time.perf_counter() - start))
-    return best[0], best[1]
 
 
 def main() -> None:
@@ -84,8 +72,8 @@ def main() -> None:
         ("separate", lambda: separate(average, 23), None),
     ]
     for name, ours, others in cases:
-        a, b = _milliseconds(ours, others)
-        print(f"{name:45s} {a:8.2f} ms" + (f"  {b:8.2f} ms  {b / a:6.1f} times" if others else ""))  # a script
+        (a, _), *rest = best_of(7, ours, *([others] if others else []))
+        print(f"{name:45s} {1e3 * a:8.2f} ms" + "".join(f"  {1e3 * b:8.2f} ms  {b / a:6.1f} times" for b, _ in rest))
 
 
 if __name__ == "__main__":

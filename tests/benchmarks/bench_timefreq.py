@@ -7,13 +7,13 @@ adds peak memories: of Python's and NumPy's allocations, and for 10⁷ samples o
 import os
 import subprocess
 import sys
-import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from interleaved import best_of
 
 from gearsig.timefreq import (
     Morlet,
@@ -35,25 +35,14 @@ MORLET = Morlet(2 * np.pi * np.sqrt(0.75))  # cmor1.5-1.0
 Case = Callable[[], Any]
 
 
-def _best(cases: dict[str, Case], n_rounds: int) -> dict[str, float]:
-    for run in cases.values():
-        run()  # compile, plan
-    best = dict.fromkeys(cases, np.inf)
-    for _ in range(n_rounds):
-        for name, run in cases.items():
-            start = time.perf_counter()
-            run()
-            best[name] = min(best[name], time.perf_counter() - start)
-    return best
-
-
 def _report(title: str, cases: dict[str, Case], n_rounds: int) -> None:
     before = os.getloadavg()[0]
-    best = _best(cases, n_rounds)
-    ours, *others = best
+    best_of(1, *cases.values())  # compile, plan
+    seconds = dict(zip(cases, (s for s, _ in best_of(n_rounds, *cases.values())), strict=True))
+    ours, *others = seconds
     print(f"{title} (load {before:.1f} to {os.getloadavg()[0]:.1f})")
     for name in others:
-        print(f"    {best[name] / best[ours]:6.1f} times as fast as {name}")
+        print(f"    {seconds[name] / seconds[ours]:6.1f} times as fast as {name}")
 
 
 def _peak_mb(run: Case) -> float:

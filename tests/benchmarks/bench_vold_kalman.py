@@ -6,20 +6,14 @@ for the first generation. For information, LAPACK's banded solver (`scipy.linalg
 band, and `separate_frequencies` as a whole: checks, phases, envelope, waveform, residual.
 """
 
-# ruff: noqa: E402 - the number of threads is fixed before numpy is loaded
 import os
-
-for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[_variable] = "1"
-
 import resource
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from interleaved import best_of
 from scipy import sparse
 from scipy.linalg import LinAlgError, solveh_banded
 from scipy.sparse.linalg import spsolve
@@ -39,19 +33,6 @@ from tests.orders.test_vold_kalman_exact import (
 
 N = 10**6
 ROUNDS = 3
-
-
-def _best(*runs: Callable[[], Any]) -> list[tuple[float, Any]]:
-    """Return (processor seconds, result) of each, the best of interleaved rounds."""
-    best: list[tuple[float, Any]] = [(np.inf, None)] * len(runs)
-    for _ in range(ROUNDS):
-        for i, run in enumerate(runs):
-            start = time.process_time()
-            result = run()
-            elapsed = time.process_time() - start
-            if elapsed < best[i][0]:
-                best[i] = (elapsed, result)
-    return best
 
 
 def _coupled_matrix(phasors: Any, r: float, p: int) -> Any:
@@ -86,7 +67,8 @@ def _one_order(y: Any, cycles: Any, z: Any, bandwidth_hz: float, p: int) -> None
     widths = np.array([[bandwidth_hz / RATE_HZ]])
     band = _band(textbook_matrix(len(y), r, p), p)
     parts = np.stack([z.real, z.imag], axis=1)
-    (ours_s, ours), (mirror_s, _), (scipy_s, theirs), (banded_s, banded) = _best(
+    (ours_s, ours), (mirror_s, _), (scipy_s, theirs), (banded_s, banded) = best_of(
+        ROUNDS,
         lambda: solve_envelopes(y, cycles[None], None, widths, p, mirror=False)[0],
         lambda: solve_envelopes(y, cycles[None], None, widths, p)[0],
         lambda: spsolve(textbook_matrix(len(y), r, p), z),
@@ -111,7 +93,8 @@ def _two_orders(n: int, bandwidth_hz: float, p: int, *, exact: bool) -> None:
     r, widths = weight_of(bandwidth_hz, p), np.full((2, 1), bandwidth_hz / RATE_HZ)
     phasors = np.exp(2j * np.pi * both)
     right = (phasors.conj() * y).T.ravel()
-    (ours_s, ours), (mirror_s, _), (scipy_s, theirs) = _best(
+    (ours_s, ours), (mirror_s, _), (scipy_s, theirs) = best_of(
+        ROUNDS,
         lambda: solve_envelopes(y, both, None, widths, p, mirror=False),
         lambda: solve_envelopes(y, both, None, widths, p),
         lambda: spsolve(_coupled_matrix(phasors, r, p), right).reshape(-1, 2).T,
@@ -139,7 +122,9 @@ def _first_generation(y: Any, cycles: Any, bandwidth_hz: float) -> None:
         return spsolve((sparse.eye(n) + ra.T @ ra).tocsc(), y)
 
     widths = np.array([[bandwidth_hz / RATE_HZ]])
-    (ours_s, ours), (scipy_s, theirs) = _best(lambda: solve_waveforms(y, cycles[None], None, widths)[0], textbook)
+    (ours_s, ours), (scipy_s, theirs) = best_of(
+        ROUNDS, lambda: solve_waveforms(y, cycles[None], None, widths)[0], textbook
+    )
     stencils = np.ones((1, n - 2, 3))
     stencils[0, :, 1] = -2 * np.cos(2 * np.pi * frequency)
     exact = solve_by_rotations(np.ones((1, n)), y, r[None], stencils)[0]
@@ -154,7 +139,8 @@ def _whole_call(y: Any, cycles: Any) -> None:
     tracks = [np.gradient(cycles) * RATE_HZ]
     z = y * np.exp(-2j * np.pi * cycles)
     r = weight_of(2.0, 2)
-    (second_s, _), (first_s, _), (scipy_s, _) = _best(
+    (second_s, _), (first_s, _), (scipy_s, _) = best_of(
+        ROUNDS,
         lambda: separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=2.0),
         lambda: separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=2.0, generation="first"),
         lambda: spsolve(textbook_matrix(len(y), r, 2), z),
