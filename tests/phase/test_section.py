@@ -178,7 +178,8 @@ def test_bifurcations_of_the_logistic_map():
 
 def test_bifurcations_of_the_forced_oscillator():
     def section(force):
-        path = _states(duffing(force, 60, PER_PERIOD), DUFFING_RATE).between(5 * DUFFING_PERIOD_S, 60 * DUFFING_PERIOD_S)
+        start_s, end_s = 5 * DUFFING_PERIOD_S, 60 * DUFFING_PERIOD_S
+        path = _states(duffing(force, 60, PER_PERIOD), DUFFING_RATE).between(start_s, end_s)
         return poincare_section(path, constant_period_lock(DUFFING_PERIOD_S, path.end_s))
 
     diagram = bifurcation_diagram(((force, section(force)) for force in (0.28, 0.2, 0.29)), parameter="force")
