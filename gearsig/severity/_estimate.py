@@ -198,15 +198,10 @@ def pair_facts(rig: Rig, torque_nm: float | None) -> PairFacts:
             remedy="describe the pair in question alone, if the others are far away",
         )
     pair, torque = rig.pairs[0], torque_nm if torque_nm is not None else rig.operating_point.torque_nm
-    known = {
-        "driver_teeth": pair.driver_teeth,
-        "driven_teeth": pair.driven_teeth,
-        "module_mm": pair.module_mm,
-        "face_width_mm": pair.face_width_mm,
-        "torque_nm of the operating point": torque,
-    }
-    missing = [name for name, value in known.items() if not value]
-    if missing or not (pair.driver_teeth and pair.driven_teeth and pair.module_mm and pair.face_width_mm and torque):
+    driver, driven, module_mm, width_mm = pair.driver_teeth, pair.driven_teeth, pair.module_mm, pair.face_width_mm
+    if not (driver and driven and module_mm and width_mm and torque):
+        known = {"driver_teeth": driver, "driven_teeth": driven, "module_mm": module_mm, "face_width_mm": width_mm}
+        missing = [name for name, value in (known | {"torque_nm of the operating point": torque}).items() if not value]
         raise RefusalError(
             f"the rig file does not give {', '.join(missing)}: the size of a crack's effect hangs on it",
             remedy="complete the rig file; the torque may be given with the call",
@@ -219,35 +214,37 @@ def pair_facts(rig: Rig, torque_nm: float | None) -> PairFacts:
         )
     shaft = rig.operating_point.shaft or rig.reference_shaft
     turns = rig.ratio(shaft, to=pair.driver) or 1.0  # same power: torque falls as speed rises
-    force_n = abs(torque) * turns / (0.5e-3 * pair.module_mm * pair.driver_teeth)
-    load_mpa = force_n / (pair.face_width_mm * pair.module_mm)
-    return PairFacts(pair, pair.driver_teeth, pair.driven_teeth, pair.module_mm, pair.face_width_mm, load_mpa)
+    force_n = abs(torque) * turns / (0.5e-3 * module_mm * driver)
+    return PairFacts(pair, driver, driven, module_mm, width_mm, force_n / (width_mm * module_mm))
 
 
-def acceleration_channels(recording: Recording, chosen: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the wanted channels, or all accelerations; other quantities weigh frequencies differently."""
+def acceleration_channels(recording: Recording, chosen: tuple[str, ...], whose: str = "") -> tuple[str, ...]:
+    """Return the chosen channels, or all accelerations; other quantities weigh frequencies differently.
+
+    Raises
+    ------
+    InputError
+        If a chosen channel is not among them.
+    RefusalError
+        If there is none, or one holds a single value only.
+    """
     accelerations = tuple(channel.name for channel in recording.channels if channel.quantity == "acceleration")
     unknown = [name for name in chosen if name not in accelerations]
     if unknown:
-        raise InputError(
-            f"{unknown[0]!r} is no acceleration channel", where="channels", allowed=", ".join(accelerations)
-        )
+        allowed = ", ".join(accelerations)
+        raise InputError(f"{unknown[0]!r} is no acceleration channel", where="channels", allowed=allowed)
     if not accelerations:
         raise RefusalError(
             "there is no acceleration channel, and the calibration has no others",
             remedy="name the channel's quantity with a [[sensor]] in the rig file",
         )
-    return chosen or accelerations
-
-
-def check_alive(recording: Recording, names: tuple[str, ...], whose: str = "") -> None:
-    """Refuse channels that hold one value only."""
-    rows = {name: recording.samples[recording.channel_names.index(name)] for name in names}
-    dead = [name for name, row in rows.items() if float(row.max()) == float(row.min())]
+    names = chosen or accelerations
+    dead = [name for name in names if float(np.ptp(recording.values(name))) == 0.0]
     if dead:
         raise RefusalError(
             f"channel {dead[0]!r} {whose}is dead: it holds one value only", remedy="check the sensor, or leave it out"
         )
+    return names
 
 
 LARGEST_TORQUE_CHANGE = 0.10
@@ -472,14 +469,12 @@ def estimate_crack(
         remedy = "give what is ground off at the tips, in µm"
         within(tip_relief_um, "tip_relief_um", 0.0, round(most), "µm", remedy=remedy)
     names = acceleration_channels(prepared.recording, tuple(channels))
-    check_alive(prepared.recording, names)
     now = pair_lines(prepared, None, facts.pair, names)
     used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
     healthy = None
     if reference is not None:
         before = prepare(reference, prepared.rig)
-        acceleration_channels(before.recording, names)
-        check_alive(before.recording, names, "of the reference ")
+        acceleration_channels(before.recording, names, "of the reference ")
         check_same_rig(prepared.rig, before.rig)
         healthy = pair_lines(before, None, facts.pair, names)
         check_same_level(now, healthy)
