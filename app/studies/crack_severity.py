@@ -297,8 +297,7 @@ def _depth_and_spread(
 
 def _predicted(depth: tuple[float, FloatArray, FloatArray], z: FloatArray, knots: FloatArray) -> FloatArray:
     intercept, coefficients, slopes = depth
-    predicted: FloatArray = intercept + z @ coefficients + _curves(z, knots) @ slopes.ravel()
-    return predicted
+    return np.asarray(intercept + z @ coefficients + _curves(z, knots) @ slopes.ravel())
 
 
 def _errors_of_others(z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]) -> FloatArray:

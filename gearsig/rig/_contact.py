@@ -231,24 +231,20 @@ class PathOfContact:
         """
         x = np.asarray(driver_angle_rad, dtype=np.float64) * self.teeth[0] / (2.0 * pi) - self.phase
         x = np.where(np.asarray(flank) < 0.0, 2.0 * self.pitch_point + 0.5 - x, x)
-        position: FloatArray = x - np.floor(x)
-        return position
+        return np.asarray(x - np.floor(x))
 
     def n_pairs(self, driver_angle_rad: FloatArray, flank: FloatArray | float = 1.0) -> FloatArray:
         """Pairs in contact: 2 where u < ε − 1, else 1, with u = frac(z1 θ1/2π − phase)."""
-        count: FloatArray = np.where(self.position(driver_angle_rad, flank) < self.contact_ratio - 1.0, 2.0, 1.0)
-        return count
+        return np.asarray(np.where(self.position(driver_angle_rad, flank) < self.contact_ratio - 1.0, 2.0, 1.0))
 
     def tooth(self, driver_angle_rad: FloatArray) -> FloatArray:
         """Tooth of the driver that entered last, from 1, as diagnoses count them."""
         x = np.asarray(driver_angle_rad, dtype=np.float64) * self.teeth[0] / (2.0 * pi) - self.phase
-        number: FloatArray = np.mod(np.floor(x), self.teeth[0]) + 1.0
-        return number
+        return np.asarray(np.mod(np.floor(x), self.teeth[0]) + 1.0)
 
     def driver_lever_m(self, position: FloatArray) -> FloatArray:
         """ρ1 of a pair at `position` base pitches behind its entry."""
-        lever: FloatArray = self.start_m + np.asarray(position, dtype=np.float64) * self.base_pitch_m
-        return lever
+        return np.asarray(self.start_m + np.asarray(position, dtype=np.float64) * self.base_pitch_m)
 
 
 def path_of_contact(rig: Rig) -> PathOfContact:

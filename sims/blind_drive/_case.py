@@ -110,8 +110,7 @@ def _readings(machine: BlindDrive, chain: Chain, found: FloatArray, rng: np.rand
 
     def read(angle: FloatArray) -> FloatArray:
         step = 2.0 * pi / chain.counts
-        counted: FloatArray = np.round((angle + noise(0.3 * step)) / step) * step
-        return counted
+        return np.asarray(np.round((angle + noise(0.3 * step)) / step) * step)
 
     full = machine.drawing.torque_nm
     torque = machine.numbers["gain"] * found[:, 6] + chain.torque_offset * full

@@ -51,8 +51,7 @@ def _slow_noise(scene: book.SyntheticScene, rng: np.random.Generator) -> FloatAr
     turns = scene.revolutions[-1] - scene.revolutions[0]
     n = int(turns * rng.uniform(2.0, 0.5 * scene.teeth[0])) + 2
     nodes = np.linspace(scene.revolutions[0], scene.revolutions[-1], n)
-    noise: FloatArray = np.interp(scene.revolutions, nodes, rng.standard_normal(n))
-    return noise
+    return np.asarray(np.interp(scene.revolutions, nodes, rng.standard_normal(n)))
 
 
 EFFECT = Effect(

@@ -33,8 +33,7 @@ def cumulative_pitch(n_teeth: int, rng: np.random.Generator) -> FloatArray:
     # Closing the circle takes one of n degrees of freedom; the factor gives its variance back.
     closed = (single - single.mean()) * np.sqrt(n_teeth / (n_teeth - 1.0))
     cumulative = np.cumsum(closed)
-    result: FloatArray = cumulative - cumulative.mean()
-    return result
+    return np.asarray(cumulative - cumulative.mean())
 
 
 def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:

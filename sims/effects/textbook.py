@@ -82,8 +82,7 @@ def ring(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
     rate = scene.sampling_rate_hz
     frequency, damping = log_uniform(rng, 700.0, 0.4 * rate), float(rng.uniform(0.02, 0.1))
     time = np.arange(int(rate * 6.0 / (2 * np.pi * frequency * damping)) + 2) / rate
-    answer: FloatArray = np.exp(-2 * np.pi * frequency * damping * time) * np.sin(2 * np.pi * frequency * time)
-    return answer
+    return np.asarray(np.exp(-2 * np.pi * frequency * damping * time) * np.sin(2 * np.pi * frequency * time))
 
 
 def struck(places: FloatArray, sizes: FloatArray, scene: SyntheticScene, answer: FloatArray) -> FloatArray:
@@ -93,8 +92,7 @@ def struck(places: FloatArray, sizes: FloatArray, scene: SyntheticScene, answer:
     n = len(scene.time_s)
     force = np.zeros(n)
     np.add.at(force, np.clip(places.astype(np.intp), 0, n - 1), sizes)
-    vibration: FloatArray = oaconvolve(force, answer)[:n]
-    return vibration
+    return np.asarray(oaconvolve(force, answer)[:n])
 
 
 def passings(scene: SyntheticScene, order: float, phase: float = 0.0) -> FloatArray:
@@ -115,16 +113,14 @@ def knocks(order: float, jitter: float, scene: SyntheticScene, rng: np.random.Ge
 
 def tone(order: float, scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Return a sine of an order, with any phase."""
-    sine: FloatArray = np.sin(2 * np.pi * (order * scene.revolutions + rng.uniform()))
-    return sine
+    return np.asarray(np.sin(2 * np.pi * (order * scene.revolutions + rng.uniform())))
 
 
 def band_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Return noise through a housing mode."""
     from scipy.signal import oaconvolve
 
-    noise: FloatArray = oaconvolve(rng.standard_normal(len(scene.time_s)), ring(scene, rng), mode="same")
-    return noise
+    return np.asarray(oaconvolve(rng.standard_normal(len(scene.time_s)), ring(scene, rng), mode="same"))
 
 
 # --------------------
@@ -162,8 +158,7 @@ class ModeChange:
         f, old, new, zeta = frequency_hz, self.frequency_hz, self.moved_hz, self.damping_ratio
         above = old**2 - f**2 + 2j * zeta * self.factor * f * old
         below = new**2 - f**2 + 2j * zeta * f * new
-        found: np.ndarray = above / below * (new / old) ** 2
-        return found
+        return np.asarray(above / below * (new / old) ** 2)
 
 
 @dataclass(frozen=True)
@@ -179,8 +174,7 @@ class PathChange:
         answer = np.full(len(frequency), self.gain, dtype=np.complex128)
         for mode in self.modes:
             answer *= mode.answer(frequency)
-        found: FloatArray = np.fft.irfft(np.fft.rfft(values) * answer, len(values))
-        return found
+        return np.asarray(np.fft.irfft(np.fft.rfft(values) * answer, len(values)))
 
 
 def path_size(strength: float) -> float:
@@ -284,15 +278,13 @@ def _cut(values: FloatArray, share: float, rng: np.random.Generator) -> FloatArr
     else:
         high = np.quantile(np.abs(values), 1.0 - share)
         low = -high
-    cut: FloatArray = np.clip(values, low, high)
-    return cut
+    return np.asarray(np.clip(values, low, high))
 
 
 def _at(values: FloatArray, advance_samples: FloatArray) -> FloatArray:
     from scipy.ndimage import map_coordinates
 
-    moved: FloatArray = map_coordinates(values, [np.arange(len(values)) + advance_samples], order=3, mode="nearest")
-    return moved
+    return np.asarray(map_coordinates(values, [np.arange(len(values)) + advance_samples], order=3, mode="nearest"))
 
 
 def _gears_change(values: FloatArray, gains: FloatArray, signature: Signature, scene: SyntheticScene) -> FloatArray:
@@ -308,8 +300,7 @@ def _about_the_mesh(values: FloatArray, gains: FloatArray, scene: SyntheticScene
     turns_hz = (scene.revolutions[-1] - scene.revolutions[0]) / (scene.time_s[-1] - scene.time_s[0])
     mesh_orders = np.fft.rfftfreq(len(values), 1.0 / scene.sampling_rate_hz) / (turns_hz * scene.teeth[0])
     logs = np.interp(mesh_orders, [0.3, *range(1, len(gains) + 1)], [0.0, *np.log(gains)])
-    found: FloatArray = np.fft.irfft(np.fft.rfft(values) * np.exp(logs), len(values))
-    return found
+    return np.asarray(np.fft.irfft(np.fft.rfft(values) * np.exp(logs), len(values)))
 
 
 def _mesh_change(values: FloatArray, gains: FloatArray, scene: SyntheticScene) -> FloatArray:
@@ -349,14 +340,12 @@ def balance(rng: np.random.Generator, n: int) -> FloatArray:
     weights = 10.0 ** (-rng.uniform(0.0, 1.5, n))
     weights[rng.uniform(size=n) < 0.25] = 0.0
     weights[int(rng.integers(n))] = 1.0
-    found: FloatArray = weights
-    return found
+    return np.asarray(weights)
 
 
 def steeply(rng: np.random.Generator) -> FloatArray:
     """Return shares of the mesh harmonics that fall with their number, from nearly not to steeply."""
-    shares: FloatArray = np.arange(1.0, N_MESH_HARMONICS + 1.0) ** -rng.uniform(0.2, 2.0)
-    return shares
+    return np.asarray(np.arange(1.0, N_MESH_HARMONICS + 1.0) ** -rng.uniform(0.2, 2.0))
 
 
 def partly(rng: np.random.Generator) -> float:
@@ -388,14 +377,12 @@ def tooth_knocks(
 
 def swollen(share: float, window: FloatArray) -> FloatArray:
     """Return a gain that is larger by a share where a window is 1."""
-    gain: FloatArray = np.maximum(1.0 + share * window, 0.0)
-    return gain
+    return np.asarray(np.maximum(1.0 + share * window, 0.0))
 
 
 def late_tooth(scene: SyntheticScene, share: float, window: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return the advance, in revolutions, of a tooth that comes too late or too early by a share of the most."""
-    late: FloatArray = sign(rng) * MAX_ADVANCE * min(share, 1.0) / scene.teeth[0] * window
-    return late
+    return np.asarray(sign(rng) * MAX_ADVANCE * min(share, 1.0) / scene.teeth[0] * window)
 
 
 def uneven(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
@@ -412,14 +399,12 @@ def uneven(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
 def at_the_mesh(scene: SyntheticScene, noise: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return noise, of unit size, that swells with the mesh more or less."""
     swelling = 1.0 + rng.uniform(0.0, 0.9) * np.cos(2 * np.pi * scene.teeth[0] * scene.revolutions)
-    found: FloatArray = noise / max(float(noise.std()), 1e-12) * swelling
-    return found
+    return np.asarray(noise / max(float(noise.std()), 1e-12) * swelling)
 
 
 def swing(scene: SyntheticScene, order: float, size: float, rng: np.random.Generator) -> FloatArray:
     """Return a gain that swings at an order."""
-    wave: FloatArray = np.maximum(1.0 + size * tone(order, scene, rng), 0.0)
-    return wave
+    return np.asarray(np.maximum(1.0 + size * tone(order, scene, rng), 0.0))
 
 
 def modulated(

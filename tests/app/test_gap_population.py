@@ -71,18 +71,16 @@ def drawn_machine() -> DrawnRig:
     )
 
 
-def test_both_models_record_a_drawn_machine() -> None:
+@pytest.mark.parametrize("model", ["cracked", pytest.param("reduced-fe", marks=pytest.mark.slow)])
+def test_both_models_record_a_drawn_machine(model: str) -> None:
     drawn = drawn_machine()
     drawn = replace(drawn, duration_s=0.5 * drawn.duration_s)
-    speeds = []
-    for model in ("cracked", "reduced-fe"):
-        recording = simulate_rig(drawn, severity=0.0, run=1, model=model)
-        assert recording.rig is not None
-        found = reduce_recording(recording, recording.rig)
-        assert found.frame.teeth == drawn.teeth
-        assert np.isfinite(recording.samples).all()
-        speeds.append(60.0 * found.speed_hz)
-    assert speeds == pytest.approx([drawn.speed_rpm] * 2, rel=0.01)
+    recording = simulate_rig(drawn, severity=0.0, run=1, model=model)
+    assert recording.rig is not None
+    reduced = reduce_recording(recording, recording.rig)
+    assert reduced.frame.teeth == drawn.teeth
+    assert np.isfinite(recording.samples).all()
+    assert 60.0 * reduced.speed_hz == pytest.approx(drawn.speed_rpm, rel=0.01)
 
 
 def test_drawn_machines_lie_every_way_and_most_stand_on_mounts() -> None:

@@ -146,16 +146,14 @@ def _whirl(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArr
     """Oil whirl or a rub below the shaft's order."""
     order = float(rng.uniform(0.38, 0.49))
     waves = [np.sin(2 * np.pi * k * order * scene.revolutions + rng.uniform(0, 6)) / k**2 for k in (1, 2, 3)]
-    whirl: FloatArray = np.sum(waves, axis=0)
-    return whirl
+    return np.asarray(np.sum(waves, axis=0))
 
 
 def _other_machine(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Lines at fixed frequencies, and their multiples."""
     first = log_uniform(rng, 17.0, 900.0)
     waves = [np.sin(2 * np.pi * k * first * scene.time_s + rng.uniform(0, 6)) / k for k in range(1, 6)]
-    machine: FloatArray = np.sum(waves, axis=0)
-    return machine
+    return np.asarray(np.sum(waves, axis=0))
 
 
 def _inverter(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:

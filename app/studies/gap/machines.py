@@ -244,8 +244,7 @@ class Ordinary:
         late_rev = spread_rev * rng.standard_normal(turn[-1] + 1)[turn]
         turns_per_sample = (scene.revolutions[-1] - scene.revolutions[0]) / (len(pulses) - 1)
         places = np.arange(len(pulses)) + late_rev / turns_per_sample
-        found: FloatArray = map_coordinates(pulses, [places], order=1, mode="nearest")
-        return found
+        return np.asarray(map_coordinates(pulses, [places], order=1, mode="nearest"))
 
 
 def mounted_anew(recording: Recording, rng: np.random.Generator) -> Recording:
@@ -267,8 +266,7 @@ def _shelf(values: FloatArray, corner_hz: float, moved_hz: float, rate_hz: float
     """Return values through a path whose corner moved: (1 + jf/f0)/(1 + jf/f1)."""
     frequency = np.fft.rfftfreq(len(values), 1.0 / rate_hz)
     answer = (1.0 + 1j * frequency / corner_hz) / (1.0 + 1j * frequency / moved_hz)
-    found: FloatArray = np.fft.irfft(np.fft.rfft(values) * answer, len(values))
-    return found
+    return np.asarray(np.fft.irfft(np.fft.rfft(values) * answer, len(values)))
 
 
 def _mains_hz(seed: int) -> float:
@@ -292,8 +290,7 @@ def _through(values: FloatArray, path: tuple[int, float], rate_hz: float) -> Flo
     steep, corner_hz = path
     if not steep or corner_hz >= 0.45 * rate_hz:
         return values
-    found: FloatArray = sosfilt(butter(steep, corner_hz, fs=rate_hz, output="sos"), values)
-    return found
+    return np.asarray(sosfilt(butter(steep, corner_hz, fs=rate_hz, output="sos"), values))
 
 
 def _tolerances(scene: textbook.SyntheticScene, rng: np.random.Generator) -> list[textbook.Signature]:

@@ -97,8 +97,7 @@ class Structure:
         for f, zeta, part in zip(self.frequency_hz, self.damping_ratio, self.parts[channel, way], strict=False):
             ratio = frequency_hz / f
             total += part / (1.0 - ratio**2 + 2j * zeta * ratio)
-        found: np.ndarray = total * -((2.0 * np.pi * frequency_hz) ** 2)
-        return found
+        return np.asarray(total * -((2.0 * np.pi * frequency_hz) ** 2))
 
 
 # --------------------
@@ -174,8 +173,7 @@ def meeting(cycle: FloatArray, path: Path, tables: tuple[FloatArray, FloatArray]
 def at_places(cycle: FloatArray, path: Path, table: FloatArray) -> FloatArray:
     """Return a table over the path where each pair is, (N_PAIRS, n)."""
     _, spot = _pairs(cycle, path)
-    values: FloatArray = np.interp(spot, np.arange(N_PATH), table)
-    return values
+    return np.asarray(np.interp(spot, np.arange(N_PATH), table))
 
 
 def _pairs(cycle: FloatArray, path: Path) -> tuple[np.ndarray, FloatArray]:
@@ -189,8 +187,7 @@ def _pairs(cycle: FloatArray, path: Path) -> tuple[np.ndarray, FloatArray]:
 def is_in_reach(cycle: FloatArray, path: Path) -> np.ndarray:
     """Return which pairs are between the table's ends."""
     _, spot = _pairs(cycle, path)
-    inside: np.ndarray = (spot >= 0.0) & (spot <= N_PATH - 1)
-    return inside
+    return np.asarray((spot >= 0.0) & (spot <= N_PATH - 1))
 
 
 def static_contact(stiffness: FloatArray, gaps: FloatArray, load: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -407,8 +404,7 @@ def _shape(path: Path, rng: np.random.Generator) -> FloatArray:
     """Return the stiffness of a pair over the path, about 1: least at the ends, not quite alike on both."""
     off = 2.0 * np.clip(path.places / path.ratio, 0.0, 1.0) - 1.0
     fall, lean = rng.uniform(0.15, 0.5), rng.uniform(-0.1, 0.1)
-    shape: FloatArray = 1.0 - fall * np.abs(off) ** rng.uniform(1.5, 3.0) + lean * off
-    return shape
+    return np.asarray(1.0 - fall * np.abs(off) ** rng.uniform(1.5, 3.0) + lean * off)
 
 
 def _profile(machine: StaticMachine, rng: np.random.Generator) -> FloatArray:
@@ -424,8 +420,7 @@ def _profile(machine: StaticMachine, rng: np.random.Generator) -> FloatArray:
     bent = sum(
         log_uniform(rng, 0.01, 0.15) * unit / k * np.cos(np.pi * k * at + rng.uniform(0, 2 * np.pi)) for k in (1, 2, 3)
     )
-    profile: FloatArray = beyond**2 / (2.0 * machine.end_radius_m) + relieved + bent
-    return profile
+    return np.asarray(beyond**2 / (2.0 * machine.end_radius_m) + relieved + bent)
 
 
 def textures(teeth: int, size_m: float, rng: np.random.Generator) -> FloatArray:
@@ -616,8 +611,7 @@ def _race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Genera
         for shift, weight in ((0.0, 1.0), (-across * period, -0.4 * falls)):
             np.add.at(force, np.clip(((at + shift) / step).astype(np.intp), 0, len(time) - 1), weight * sizes)
         pulse = np.hanning(max(3, round(width / step)) + 2)
-        found: FloatArray = np.convolve(force, pulse, mode="same")
-        return found
+        return np.asarray(np.convolve(force, pulse, mode="same"))
 
     state.knocks.append(knock)
 
@@ -748,8 +742,7 @@ def _turns(
     wander = np.zeros(len(time))
     for share, hz, phase in state.wander:
         wander += share / (2 * np.pi * hz) * np.sin(2 * np.pi * hz * time + phase + rng.uniform(0, 2 * np.pi))
-    turns: FloatArray = day.turns_before + rng.uniform() + speed_hz * (time + wander)
-    return turns
+    return np.asarray(day.turns_before + rng.uniform() + speed_hz * (time + wander))
 
 
 def _motions(
@@ -791,8 +784,7 @@ def _through_play(pressed: FloatArray, moving: FloatArray, state: QuasiStaticSta
     """Return what a bearing with play hands on of a motion about what its load presses out: √(r² + c²) − c."""
     total = pressed + moving
     play = state.play * pressed * (1.0 + RIPPLE * np.cos(2 * np.pi * state.passing * turns))
-    found: FloatArray = np.sign(total) * (np.hypot(total, play) - play)
-    return found
+    return np.asarray(np.sign(total) * (np.hypot(total, play) - play))
 
 
 def _heard(structure: Structure, channel: int, motions: dict[int, FloatArray], rate: float) -> FloatArray:
@@ -806,8 +798,7 @@ def _heard(structure: Structure, channel: int, motions: dict[int, FloatArray], r
     for way, motion in motions.items():
         lines[kept] += rfft(motion - motion.mean())[kept] * structure.accelerations(channel, frequency[kept], way)
     m = n // FINER
-    vibration: FloatArray = irfft(lines[: m // 2 + 1], m) * (m / n)
-    return vibration
+    return np.asarray(irfft(lines[: m // 2 + 1], m) * (m / n))
 
 
 def _noise(n: int, machine: StaticMachine, channel: int, rng: np.random.Generator) -> FloatArray:
@@ -817,8 +808,7 @@ def _noise(n: int, machine: StaticMachine, channel: int, rng: np.random.Generato
     slope = np.random.default_rng([machine.seed, 3, channel]).uniform(0.0, 1.0)
     frequency = np.maximum(rfftfreq(n, 1.0 / machine.rate_hz), MIN_NOISE_HZ)
     noise = irfft(rfft(rng.standard_normal(n)) * frequency ** (-slope / 2.0), n)
-    coloured: FloatArray = noise * (machine.noise_share[channel] / noise.std())
-    return coloured
+    return np.asarray(noise * (machine.noise_share[channel] / noise.std()))
 
 
 def _tachometer(turns: FloatArray, time: FloatArray, at: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -828,8 +818,7 @@ def _tachometer(turns: FloatArray, time: FloatArray, at: FloatArray, rng: np.ran
     rising = np.interp(whole, turns, time) + tacho.jitter_s * rng.standard_normal(len(whole))
     falling = np.interp(whole + tacho.duty, turns, time)
     volts = pulse_voltage(tacho, rising, falling, at) + tacho.noise_v * rng.standard_normal(len(at))
-    found: FloatArray = volts
-    return found
+    return np.asarray(volts)
 
 
 # --------------------
