@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import RefusalError
 from gearsig.rig import PathOfContact, ToothContact
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True)
@@ -172,6 +176,15 @@ class ForceEstimate:
     def __post_init__(self) -> None:
         for name in ("depth_m", "n_pairs"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+
+    def to_frame(self) -> DataFrame:
+        """Return time, references, models, depth and pairs in contact as a pandas table, one row a sample."""
+        from pandas import DataFrame
+
+        forces = {f"{name} [N]": values for name, values in {**self.references_n, **self.forces_n}.items()}
+        return DataFrame(
+            {"time_s": self.motion.time_s, **forces, "depth [um]": 1e6 * self.depth_m, "pairs in contact": self.n_pairs}
+        )
 
     def error(self, model: str, reference: str) -> ForceError:
         """Return the error of one model against one reference."""

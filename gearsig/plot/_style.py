@@ -117,28 +117,6 @@ def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
     return Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, facecolor="white")
 
 
-def panel(
-    figure: Figure,
-    *,
-    left_in: float = 0.85,
-    right_in: float = 0.2,
-    bottom_in: float = 0.55,
-    top_in: float = 0.35,
-    sharex: Axes | None = None,
-) -> Axes:
-    """Add axes with fixed margins in inches: places of labels are then known before anything is drawn."""
-    width, height = figure.get_size_inches()
-    rectangle = (
-        left_in / width,
-        bottom_in / height,
-        (width - left_in - right_in) / width,
-        (height - bottom_in - top_in) / height,
-    )
-    axes = figure.add_axes(rectangle, sharex=sharex)
-    _dress(axes)
-    return axes
-
-
 def _dress(axes: Axes) -> None:
     """Give axes the common look: quiet ticks and rules, no box."""
     axes.set_facecolor("none")

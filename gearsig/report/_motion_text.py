@@ -15,9 +15,7 @@ is null. Members may be added within a version, never renamed or removed.
 
 from __future__ import annotations
 
-import csv
 from functools import partial
-from io import StringIO
 from textwrap import fill
 
 import numpy as np
@@ -112,17 +110,8 @@ def force_json(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
 
 def force_csv(estimate: ForceEstimate) -> str:
     """Return time, references, models, depth and pairs in contact as CSV."""
-    columns = {
-        "time_s": estimate.motion.time_s,
-        **{f"{name} [N]": values for name, values in {**estimate.references_n, **estimate.forces_n}.items()},
-        "depth [um]": 1e6 * estimate.depth_m,
-        "pairs in contact": estimate.n_pairs,
-    }
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns.values(), strict=True))
-    return text.getvalue()
+    text: str = estimate.to_frame().to_csv(index=False, float_format="%.9g", lineterminator="\n")
+    return text
 
 
 # Fitted parameters as text and as JSON.

@@ -235,9 +235,6 @@ def start_stop_figures(examined: StartStop) -> Iterator[Captioned]:
     )
 
 
-MOST_TIME_PANELS = 6
-
-
 @dataclass(frozen=True)
 class PictureGroup:
     """Pictures that belong together.
