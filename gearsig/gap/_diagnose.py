@@ -23,7 +23,6 @@ from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulato
 from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, n_compared, steps_of
 from gearsig.gap._types import (
     NAMING,
-    NONE,
     GapCause,
     GapOutcome,
     GapPlace,
@@ -31,7 +30,7 @@ from gearsig.gap._types import (
     NextRecording,
     group_probabilities,
 )
-from gearsig.gap._verdict import in_order, likeliest_two, rivals
+from gearsig.gap._verdict import in_order, likeliest_two, named_cause, rivals
 from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
 from gearsig.recording import Recording, metres_per_second_squared
@@ -358,19 +357,10 @@ def _cause(
     places: Sequence[GapPlace],
 ) -> GapCause:
     if name not in known:
-        title = "nothing beyond what healthy machines differ by" if name == NONE else "nothing in the catalogue"
-        return GapCause(name, name, title, "", probability)
-    effect = known[name]
+        return named_cause(name, probability, known)
     one = tried.get(name)
-    base = GapCause(
-        name,
-        effect.group,
-        effect.title,
-        effect.unit,
-        probability,
-        place=cause_place(name, one if one is not None and one.explains else None, conditions, places),
-        is_nuisance=effect.is_nuisance,
-    )
+    place = cause_place(name, one if one is not None and one.explains else None, conditions, places)
+    base = named_cause(name, probability, known, place)
     if one is None:
         return base
     n = n_compared(conditions)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 
 import numpy as np
 
 from gearsig.gap._attribution import LIKELIER_THAN_NOT
+from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import NAMING, NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
 from gearsig.gap._words import hardly_foretold, severity_unit
 
@@ -71,6 +72,15 @@ def _which_unknown(report: GapReport) -> str:
     if best is None or best.probability <= unknown:
         return "Which: unknown; nothing in the catalogue explains it well enough."
     return f"Which: unknown; {best.title} comes nearest ({100 * best.probability:.0f} %), too little to be named."
+
+
+def named_cause(name: str, probability: float, effects: Mapping[str, GapEffect], place: str = "") -> GapCause:
+    """Return a cause by its name: one of the effects, none or unknown."""
+    if name in effects:
+        e = effects[name]
+        return GapCause(name, e.group, e.title, e.unit, probability, place=place, is_nuisance=e.is_nuisance)
+    title = "nothing beyond what healthy machines differ by" if name == NONE else "nothing in the catalogue"
+    return GapCause(name, name, title, "", probability)
 
 
 def in_order(causes: Sequence[GapCause], outcome: GapOutcome) -> tuple[GapCause, ...]:

@@ -28,8 +28,8 @@ from gearsig.gap._attribution import Attribution
 from gearsig.gap._evidence import weighed_evidence
 from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
-from gearsig.gap._types import NAMING, NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
-from gearsig.gap._verdict import in_order, likeliest_two, rivals
+from gearsig.gap._types import NAMING, GapCause, GapOutcome, GapPlace, GapReport, Interval
+from gearsig.gap._verdict import in_order, likeliest_two, named_cause, rivals
 from gearsig.gap._words import fitted_words, severity_unit
 from gearsig.gap.start_stop._attribution import (
     CRACK,
@@ -199,11 +199,7 @@ def _facts(compared: DriveComparison) -> types.ConditionFacts:
 
 
 def _cause(diagnosis: DriveDiagnosis, k: int, name: str, probability: float) -> GapCause:
-    if name in (NONE, UNKNOWN):
-        title = "nothing beyond what healthy drives differ by" if name == NONE else "nothing in the catalogue"
-        return GapCause(name, name, title, "", probability)
-    effect = diagnosis.effects[name]
-    base = GapCause(name, effect.group, effect.title, effect.unit, probability)
+    base = named_cause(name, probability, diagnosis.effects)
     if name not in diagnosis.attribution.tried:
         return base
     fitted, compared = diagnosis.attribution.tried[name], diagnosis.compared[k]
