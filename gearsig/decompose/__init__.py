@@ -1,6 +1,6 @@
 """Signals taken apart: variational modes, wavelet denoising."""
 
-from gearsig.decompose._long_signals import joined, long_modes, modes_by_block, vmd
+from gearsig.decompose._long_signals import long_modes, modes_by_block, vmd
 from gearsig.decompose._suggestion import ModeSuggestion, ModeTrial, noise_width, suggest_modes
 from gearsig.decompose._types import ModeAxis, Modes, StartName, VmdEngine, VmdSettings
 from gearsig.decompose._vmd import (
@@ -34,7 +34,6 @@ __all__ = [
     "bayes",
     "deepest_level",
     "denoise",
-    "joined",
     "long_modes",
     "mode_spectra",
     "modes_by_block",

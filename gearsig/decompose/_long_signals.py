@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, count, positive, within
 from gearsig.decompose._types import ModeAxis, Modes, VmdEngine, VmdSettings, mode_notes
 from gearsig.decompose._vmd import variational_modes
-from gearsig.errors import InputError
 from gearsig.spectra import checked_signal
 from gearsig.timefreq import Source, uniform
 
@@ -216,14 +215,6 @@ def modes_by_block(
     n_fade = max(1, int(within(overlap, "overlap", 1e-3, 1 / 3) * n_block))
     starts = _starts(len(x), n_block, n_fade)
     return _segments(x, fs, settings, starts, n_block, n_fade, rng, axis)
-
-
-def joined(segments: Iterable[ModeSegment]) -> FloatArray:
-    """Return the waveforms of consecutive segments in one array, (n_modes, n_samples)."""
-    parts = [segment.waveforms for segment in segments]
-    if not parts:
-        raise InputError("there are no segments", where="segments", remedy="give those of modes_by_block")
-    return np.concatenate(parts, axis=1)
 
 
 def _starts(n: int, n_block: int, n_fade: int) -> list[int]:

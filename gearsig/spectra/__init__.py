@@ -29,7 +29,6 @@ from gearsig.spectra._envelope import (
 from gearsig.spectra._kurtogram import (
     ChosenBand,
     Kurtogram,
-    best_band,
     kurtogram,
     kurtogram_envelope,
     splitter,
@@ -70,7 +69,6 @@ __all__ = [
     "TurnSums",
     "amplitude_spectrum",
     "band_envelope",
-    "best_band",
     "block_powers",
     "cepstrum",
     "checked_signal",

@@ -361,21 +361,6 @@ def kurtogram(
     return Kurtogram(lows, highs, level, kurtosis, error, share, n, preparation, source or "signal")
 
 
-def best_band(
-    recording: Recording,
-    channel: str,
-    *,
-    n_levels: int | None = None,
-    preparation: Preparation = "none",
-    narrowest_hz: float = 0.0,
-    lowest_hz: float = 0.0,
-    highest_hz: float | None = None,
-) -> BandCandidate:
-    """Return the most impulsive band of a channel, by its kurtogram; see `kurtogram` and `Kurtogram.best_band`."""
-    grid = kurtogram(recording, channel, n_levels=n_levels, preparation=preparation)
-    return grid.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
-
-
 def kurtogram_envelope(
     recording: Recording,
     channel: str,

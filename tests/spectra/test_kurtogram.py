@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording, read_recording
 from gearsig.spectra import (
-    best_band,
     kurtogram,
     kurtogram_envelope,
     noise_floor,
@@ -119,7 +118,7 @@ def test_standard_error_is_that_of_noise():
 @pytest.mark.parametrize("resonance_hz", [2300.0, 6000.0, 8800.0])
 def test_best_band_holds_the_resonance(resonance_hz):
     x = knocks(60_001, np.random.default_rng(1), resonance_hz=resonance_hz)
-    band = best_band(recording_of(x), "a", narrowest_hz=300)
+    band = kurtogram(recording_of(x), "a").best_band(narrowest_hz=300)
     assert band.low_hz <= resonance_hz <= band.high_hz
     assert kurtogram(x, FS).warnings(band) == ()
 
