@@ -24,6 +24,7 @@ from gearsig.gap import (
     Interval,
     ReducedRecording,
     once,
+    prepare_recordings,
     reduce_recording,
     rivals,
     rule_strengths,
@@ -222,9 +223,9 @@ def diagnose_forest(seen: VisibleCase) -> GapReport:
 
     simulator = cracked_gap_simulator()
     twin = simulator.twin_of(seen.rigs[0])
-    conditions, _ = conditions_of(
-        seen.recordings, seen.rigs, seen.references, seen.reference_rigs, twin, seen.names, lambda *_: None
-    )
+    recordings = prepare_recordings(seen.recordings, seen.rigs)
+    references = prepare_recordings(seen.references, seen.reference_rigs)
+    conditions, _ = conditions_of(recordings, references, twin, names=seen.names)
     weighed = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=0)
     probabilities = weighed.probabilities()
     changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth

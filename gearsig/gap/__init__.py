@@ -4,7 +4,6 @@ from gearsig.gap._attribution import (
     CALIBRATION_FILE,
     LIGHT_LOAD_N_PER_MM,
     MAX_TRIED,
-    NOT_SEEN,
     Attribution,
     GapCalibration,
     attribute,
@@ -16,10 +15,6 @@ from gearsig.gap._attribution import (
     tooth_load_n_per_mm,
 )
 from gearsig.gap._change import (
-    ALIKE,
-    APART,
-    LEAST_SURPRISE,
-    SURPRISE,
     alike_features,
     apart_features,
     beyond_the_mesh,
@@ -28,15 +23,16 @@ from gearsig.gap._change import (
     difference_features,
     mirrored,
     seen_rows,
-    stretch_changes,
+    segment_changes,
 )
 from gearsig.gap._conditions import (
     Condition,
-    Healthy,
+    HealthyReference,
     compare,
     conditions_of,
     exchanged,
     matching_reference,
+    prepare_recordings,
     run_length_s,
     strange_pattern,
     strange_teeth,
@@ -54,8 +50,6 @@ from gearsig.gap._curves import (
 )
 from gearsig.gap._diagnose import diagnose_gap
 from gearsig.gap._evidence import (
-    CLEAR,
-    MOST_OF_A_FAMILY,
     SIGNS,
     ShaftSigns,
     evidence_of,
@@ -64,7 +58,7 @@ from gearsig.gap._evidence import (
     told_options,
     weighed_evidence,
 )
-from gearsig.gap._features import SIDES, Features, features_of, is_synchronous, once
+from gearsig.gap._features import SIDES, Feature, Features, features_of, once
 from gearsig.gap._floors import (
     BY_HAND,
     INDEPENDENT,
@@ -83,10 +77,9 @@ from gearsig.gap._floors import (
     without_machines_of,
 )
 from gearsig.gap._gearless import Standing, beside_standing, standing_place, stood_out
-from gearsig.gap._inputs import GapInputs, GapRequest, read_gap_inputs
+from gearsig.gap._inputs import GapRequest, read_gap_inputs
 from gearsig.gap._places import gap_places, mesh_spot, ranked_places, tail_spot
 from gearsig.gap._prediction import (
-    FLOOR_IN_DEVIATIONS,
     EffectPath,
     Fit,
     Fold,
@@ -98,7 +91,6 @@ from gearsig.gap._prediction import (
     transplanted,
 )
 from gearsig.gap._recognition import (
-    MAX_OF_A_SIGN,
     Fitted,
     LinearRule,
     Recogniser,
@@ -115,12 +107,11 @@ from gearsig.gap._recognition import (
 from gearsig.gap._reduction import (
     DRIVEN,
     DRIVER,
-    SPEED_FIGURES,
     BearingFrame,
     GearFrame,
     ReducedRecording,
+    SpeedFigures,
     gear_frame,
-    joint_averages,
     mains_lines,
     reduce_recording,
     speed_figures,
@@ -182,28 +173,18 @@ from gearsig.gap._words import (
 )
 
 __all__ = [
-    "ALIKE",
-    "APART",
     "BY_HAND",
     "CALIBRATION_FILE",
-    "CLEAR",
     "DRIVEN",
     "DRIVER",
-    "FLOOR_IN_DEVIATIONS",
     "INDEPENDENT",
-    "LEAST_SURPRISE",
     "LIGHT_LOAD_N_PER_MM",
-    "MAX_OF_A_SIGN",
     "MAX_TRIED",
-    "MOST_OF_A_FAMILY",
     "NAMING",
     "NONE",
-    "NOT_SEEN",
     "POPULATION_FILE",
     "SIDES",
     "SIGNS",
-    "SPEED_FIGURES",
-    "SURPRISE",
     "UNKNOWN",
     "Added",
     "AngleCurves",
@@ -219,6 +200,7 @@ __all__ = [
     "DriveTwin",
     "EffectPath",
     "Evidence",
+    "Feature",
     "Features",
     "Fit",
     "Fitted",
@@ -226,7 +208,6 @@ __all__ = [
     "GapCalibration",
     "GapCause",
     "GapEffect",
-    "GapInputs",
     "GapOutcome",
     "GapPlace",
     "GapReport",
@@ -235,7 +216,7 @@ __all__ = [
     "GapStep",
     "GearFrame",
     "HasFurtherPlaces",
-    "Healthy",
+    "HealthyReference",
     "Interval",
     "LinearRule",
     "NextRecording",
@@ -249,6 +230,7 @@ __all__ = [
     "ShaftSigns",
     "Shrinkage",
     "SpectrumCurves",
+    "SpeedFigures",
     "Standing",
     "StructuralFloor",
     "Task",
@@ -294,8 +276,6 @@ __all__ = [
     "independent_whole",
     "is_beyond",
     "is_calibrated",
-    "is_synchronous",
-    "joint_averages",
     "joint_probabilities",
     "keep_fitted",
     "lines_beyond",
@@ -312,6 +292,7 @@ __all__ = [
     "place_of",
     "point_text",
     "pooled_scatter",
+    "prepare_recordings",
     "ranked_places",
     "read_fitted",
     "read_gap_inputs",
@@ -324,6 +305,7 @@ __all__ = [
     "same_condition",
     "score_of",
     "seen_rows",
+    "segment_changes",
     "severity_unit",
     "shaft_signs",
     "shared",
@@ -336,7 +318,6 @@ __all__ = [
     "stood_out",
     "strange_pattern",
     "strange_teeth",
-    "stretch_changes",
     "tail_spot",
     "textbook_rules",
     "textbook_strengths",

@@ -6,28 +6,27 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap._features import (
-    N_MESH_HARMONICS,
-    NOMINAL_REVOLUTIONS,
     SIDES,
     Feature,
     Features,
-    average_lines,
-    line_power,
-    mesh_lines,
-    mesh_power,
+    NamedValue,
     once,
     pattern_features,
-    residual_lines,
-    smooth_power,
-    visible_orders,
     whole_and_parts,
     whole_record_variance,
 )
-from gearsig.gap._reduction import DRIVEN, DRIVER, ChannelSums, ReducedRecording
+from gearsig.gap._reduction import (
+    DRIVEN,
+    DRIVER,
+    N_MESH_HARMONICS,
+    ComplexArray,
+    ReducedRecording,
+    ShaftAverage,
+    smooth_power,
+)
 from gearsig.severity import ShaftLines, difference_lines
 
 # --------------------
@@ -35,16 +34,13 @@ from gearsig.severity import ShaftLines, difference_lines
 #
 # A path to a sensor changes all three alike. Flanks that wear alike change the harmonic and leave the rest; friction
 # takes along what is beside it; rough flanks raise what a gear repeats and the noise, and leave the harmonic; teeth
-# that part raise the noise. So each stretch of orders from half a tooth below a harmonic to half a tooth above is
+# that part raise the noise. So each segment of orders from half a tooth below a harmonic to half a tooth above is
 # compared with what it was when the gears were sound.
 #
 # Source of the separation into what is common to all teeth, to one gear, and to nothing: R. B. Randall,
 # *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapter 5.
 # --------------------
 
-
-ALIKE = "alike."
-"""Of these features; 0 where nothing that they compare stands clear of noise."""
 
 MESH, REPEATED, NOISE = range(3)
 _PARTS = ("mesh", "repeated", "noise")
@@ -53,48 +49,50 @@ _PAIRS = ((MESH, REPEATED), (REPEATED, NOISE), (MESH, NOISE))
 CLEAR = (4.0, 0.5)
 """Power of a harmonic over the noise on its line, and of all repeated lines over the noise on them, to be compared."""
 
-MOST_DB = 30.0
-LEAST_POWER = 1.0
+MAX_DB = 30.0
+MIN_POWER = 1.0
 """dB²: changes as small as a decibel are alike by chance."""
 
 
-def alike_features(now: ReducedRecording, sound: ReducedRecording) -> Iterator[Feature]:
-    """Yield medians, spreads and differences of the three parts' changes, in dB, over stretches and channels."""
-    changes = stretch_changes(now, sound)
+def alike_features(now: ReducedRecording, sound: ReducedRecording) -> Iterator[NamedValue]:
+    """Yield medians, spreads and differences of the three parts' changes, in dB, over segments and channels.
+
+    0 where nothing that they compare stands clear of noise.
+    """
+    changes = segment_changes(now, sound)
     for part, name in enumerate(_PARTS):
         level = changes[..., part]
-        yield f"{ALIKE}{name}", _median(level)
-        yield f"{ALIKE}{name}.spread", _rms(level - _median(level))
-        yield f"{ALIKE}{name}.rise", _rise(level)
+        yield f"alike.{name}", _median(level)
+        yield f"alike.{name}.spread", _rms(level - _median(level))
+        yield f"alike.{name}.rise", _rise(level)
     for first, second in _PAIRS:
-        name = f"{ALIKE}{_PARTS[first]}_{_PARTS[second]}"
+        name = f"alike.{_PARTS[first]}_{_PARTS[second]}"
         a, b = changes[..., first], changes[..., second]
         yield f"{name}.less", _median(a - b)
         yield f"{name}.apart", _rms(a - b)
         yield f"{name}.together", _together(a, b)
 
 
-def stretch_changes(now: ReducedRecording, sound: ReducedRecording) -> FloatArray:
+def segment_changes(now: ReducedRecording, sound: ReducedRecording) -> FloatArray:
     """Return the changes in dB, (n_channels, n_harmonics, 3); nan where a part does not stand clear of noise."""
     rows = []
-    for name, sums in now.channels.items():
-        here, before = _stretches(now, sums), _stretches(sound, sound.channels[name])
-        rows.append(np.clip(here - before, -MOST_DB, MOST_DB))
+    for name in now.channels:
+        here, before = _segments(now, name), _segments(sound, name)
+        rows.append(np.clip(here - before, -MAX_DB, MAX_DB))
     changes: FloatArray = np.array(rows)
     return changes
 
 
-def _stretches(gathered: ReducedRecording, sums: ChannelSums) -> FloatArray:
-    """Return the levels of the three parts of each stretch, (n_harmonics, 3), in dB."""
+def _segments(gathered: ReducedRecording, channel: str) -> FloatArray:
+    """Return the levels of the three parts of each segment, (n_harmonics, 3), in dB."""
     power = np.zeros((N_MESH_HARMONICS, 3))
     floor = np.zeros((N_MESH_HARMONICS, 2))
     for side in (DRIVER, DRIVEN):
-        lines, noise = average_lines(sums, side)
-        square, teeth = np.abs(lines) ** 2, gathered.frame.teeth[side]
-        highest = visible_orders(gathered, side, len(square))
+        average = gathered.average(channel, side)
+        square, noise, teeth = np.abs(average.lines) ** 2, average.noise, average.teeth
         for k in range(1, N_MESH_HARMONICS + 1):
             low, high = round((k - 0.5) * teeth) + 1, round((k + 0.5) * teeth)
-            if high > highest:
+            if high > average.highest:
                 power[k - 1] = np.nan
                 continue
             own = np.arange(low, high) != k * teeth
@@ -103,7 +101,7 @@ def _stretches(gathered: ReducedRecording, sums: ChannelSums) -> FloatArray:
             floor[k - 1, 1] += float(under.sum())
             if side == DRIVER:
                 power[k - 1, MESH], floor[k - 1, 0] = max(square[k * teeth] - noise[k * teeth], 0.0), noise[k * teeth]
-                power[k - 1, NOISE] = float(under.sum()) * float(sums.counts[side].sum())
+                power[k - 1, NOISE] = float(under.sum()) * average.n_revolutions
     seen = np.column_stack([power[:, :2] > np.array(CLEAR) * floor, power[:, NOISE] > 0.0])
     levels: FloatArray = 10.0 * np.log10(np.where(seen, power, np.nan))
     return levels
@@ -135,7 +133,7 @@ def _together(a: FloatArray, b: FloatArray) -> float:
     """Return 10 (2 Σ ab)/(Σ a² + Σ b² + n): 10 where both changed alike and much, −10 where in opposite directions."""
     both = np.isfinite(a) & np.isfinite(b)
     x, y = a[both], b[both]
-    return float(20.0 * np.sum(x * y) / (np.sum(x**2 + y**2) + LEAST_POWER * max(len(x), 1)))
+    return float(20.0 * np.sum(x * y) / (np.sum(x**2 + y**2) + MIN_POWER * max(len(x), 1)))
 
 
 # --------------------
@@ -143,20 +141,16 @@ def _together(a: FloatArray, b: FloatArray) -> float:
 # --------------------
 
 
-APART = "apart."
-"""Of these features; 0 where there is one channel, which no two channels reach."""
-
-
-def apart_features(now: ReducedRecording, sound: ReducedRecording) -> Iterator[Feature]:
-    """Yield by how much the channels' changes differ from each other, rms in dB.
+def apart_features(now: ReducedRecording, sound: ReducedRecording) -> Iterator[NamedValue]:
+    """Yield by how much the channels' changes differ from each other, rms in dB; 0 where there is one channel.
 
     What drives the gears harder is seen by every sensor, each through its own path; a sensor that was mounted anew, or
     a bearing that holds its shaft less, changes the paths, and each in its own way.
     """
     here, before = _mesh_levels(now), _mesh_levels(sound)
     n = min(here.shape[1], before.shape[1])  # the faster recording shows fewer
-    yield f"{APART}mesh", _scatter(here[:, :n] - before[:, :n])
-    yield f"{APART}floor", _scatter(_floor_levels(now) - _floor_levels(sound))
+    yield "apart.mesh", _scatter(here[:, :n] - before[:, :n])
+    yield "apart.floor", _scatter(_floor_levels(now) - _floor_levels(sound))
 
 
 def _scatter(changes: FloatArray) -> float:
@@ -166,12 +160,7 @@ def _scatter(changes: FloatArray) -> float:
 
 def _mesh_levels(gathered: ReducedRecording) -> FloatArray:
     """Return the mesh harmonics' levels, (n_channels, n_harmonics), in dB."""
-    teeth, rows = gathered.frame.teeth[DRIVER], []
-    for sums in gathered.channels.values():
-        power = line_power(sums, DRIVER)
-        highest = visible_orders(gathered, DRIVER, len(power))
-        rows.append(mesh_lines(power, teeth, highest))
-    return _decibels(np.array(rows))
+    return _decibels(np.array([average.mesh_lines for average in gathered.averages(DRIVER)]))
 
 
 def _floor_levels(gathered: ReducedRecording) -> FloatArray:
@@ -184,13 +173,10 @@ def _decibels(power: FloatArray) -> FloatArray:
     return levels
 
 
-SURPRISE = "surprise."
-"""Of features that are measured in the two recordings' own noise."""
-
-LEAST_NOISE = 1e-8
+MIN_NOISE = 1e-8
 """Of all lines together over the mesh's power: two gears of equal teeth leave nothing of their own in one average."""
 
-LEAST_SURPRISE = 0.1
+MIN_SURPRISE = 0.1
 """Energy below any that a sound machine's own noise makes: of two gears of equal teeth one has no average of its own,
 and what rounding leaves in it says nothing."""
 
@@ -257,29 +243,27 @@ def _joined(
     return (*names, *patterns), np.concatenate([differences, list(patterns.values())])
 
 
-def _patterns(now: ReducedRecording, sound: ReducedRecording) -> Iterator[Feature]:
+def _patterns(now: ReducedRecording, sound: ReducedRecording) -> Iterator[NamedValue]:
     """Yield the tooth features of the difference of the averages, turned so that the same teeth meet."""
     differences = [turned_difference(now, sound, side) for side in (DRIVER, DRIVEN)]
     for side, (turned, agreement) in enumerate(differences):
-        teeth = now.frame.teeth[side]
-        residuals = difference_residuals(now, turned, side)
-        noises = []
-        for lines, name in zip(residuals, now.channels, strict=True):
-            n = turned.lines.shape[1]
-            both = average_lines(now.channels[name], side)[1][:n] + average_lines(sound.channels[name], side)[1][:n]
-            noises.append(both[lines[:n] != 0].sum() / 2.0 / mesh_power(now, now.channels[name], side))
-        shorter = min(float(g.channels[n].counts[side].sum()) for g in (now, sound) for n in now.channels)
-        longer = max(1.0, shorter / NOMINAL_REVOLUTIONS)
-        yield from pattern_features(f"change.{SIDES[side]}", residuals, teeth, float(np.mean(noises)), longer)
+        residuals, n = difference_residuals(now, turned, side), turned.lines.shape[1]
+        pairs = [(now.average(name, side), sound.average(name, side)) for name in now.channels]
+        noises = [
+            (here.noise[:n] + before.noise[:n])[lines[:n] != 0].sum() / 2.0 / here.mesh_power
+            for lines, (here, before) in zip(residuals, pairs, strict=True)
+        ]
+        longer = min(average.longer for pair in pairs for average in pair)
+        yield from pattern_features(f"change.{SIDES[side]}", residuals, turned.teeth, float(np.mean(noises)), longer)
         yield f"change.{SIDES[side]}.agreement", 10.0 * agreement
     for side, (turned, _) in enumerate(differences):
         yield from pattern_features(
-            f"{SURPRISE}{SIDES[side]}",
+            f"surprise.{SIDES[side]}",
             surprises(now, sound, turned, side),
             now.frame.teeth[side],
             noise=0.0,
             longer=0.0,
-            least=LEAST_SURPRISE,
+            least=MIN_SURPRISE,
         )
     yield from apart_features(now, sound)
     yield from alike_features(now, sound)
@@ -292,20 +276,20 @@ def turned_difference(now: ReducedRecording, sound: ReducedRecording, side: int)
     )
 
 
-def difference_residuals(now: ReducedRecording, turned: ShaftLines, side: int) -> list[NDArray[np.complex128]]:
+def difference_residuals(now: ReducedRecording, turned: ShaftLines, side: int) -> list[ComplexArray]:
     """Return each channel's difference without its smooth lines, over the mesh's amplitude."""
-    residuals = []
-    for row, sums in zip(turned.lines, now.channels.values(), strict=True):
-        full = np.zeros(sums.lines[side].shape[1], dtype=np.complex128)
-        full[: len(row)] = row
-        scale = mesh_power(now, sums, side)
-        residuals.append(residual_lines(full, turned.teeth, turned.highest_order, turned.other_teeth) / np.sqrt(scale))
-    return residuals
+    return [
+        average.residual(_filled(row, average)) / np.sqrt(average.mesh_power)
+        for row, average in zip(turned.lines, now.averages(side), strict=True)
+    ]
 
 
-def surprises(
-    now: ReducedRecording, sound: ReducedRecording, turned: ShaftLines, side: int
-) -> list[NDArray[np.complex128]]:
+def _filled(row: ComplexArray, average: ShaftAverage) -> ComplexArray:
+    """Return lines with zeros up to the average's last one."""
+    return np.pad(row, (0, len(average.lines) - len(row)))
+
+
+def surprises(now: ReducedRecording, sound: ReducedRecording, turned: ShaftLines, side: int) -> list[ComplexArray]:
     """Return each channel's difference, line by line over what noise and a mounting of its own would make of it.
 
     w[n] = d[n] / √(σ²[n] + (s |r[n]|)²), with σ² the power that noise leaves in both averages, |r|² the sound
@@ -316,25 +300,23 @@ def surprises(
     n = turned.lines.shape[1]
     own = lines_of_shaft(sound, side).lines
     for row, born, name in zip(turned.lines, own, now.channels, strict=True):
-        noise = average_lines(now.channels[name], side)[1][:n] + average_lines(sound.channels[name], side)[1][:n]
-        noise += LEAST_NOISE * mesh_power(now, now.channels[name], side) / n
-        full = np.zeros(now.channels[name].lines[side].shape[1], dtype=np.complex128)
-        full[:n] = row / np.sqrt(noise + REPEATS**2 * smooth_power(np.abs(born[:n]) ** 2))
-        kept = residual_lines(full, turned.teeth, turned.highest_order, turned.other_teeth)
+        here = now.average(name, side)
+        noise = here.noise[:n] + sound.average(name, side).noise[:n] + MIN_NOISE * here.mesh_power / n
+        expected = np.sqrt(noise + REPEATS**2 * smooth_power(np.abs(born[:n]) ** 2))
+        kept = here.residual(_filled(row / expected, here))
         found.append(kept * np.sqrt(2.0 / max(int(np.count_nonzero(kept)), 1)))
     return found
 
 
 def lines_of_shaft(gathered: ReducedRecording, side: int) -> ShaftLines:
     """Return the averages' lines in the form that the alignment takes."""
-    lines = [average_lines(sums, side)[0] for sums in gathered.channels.values()]
-    highest = visible_orders(gathered, side, min(len(row) for row in lines))
-    frame = gathered.frame
+    averages, frame = gathered.averages(side), gathered.frame
+    highest = averages[0].highest
     return ShaftLines(
         frame.shafts[side],
         frame.teeth[side],
         frame.teeth[1 - side],
-        np.stack([row[: highest + 1] for row in lines]),
+        np.stack([average.lines[: highest + 1] for average in averages]),
         int(gathered.n_revolutions * frame.shaft_orders[side]),
         highest,
         gathered.speed_hz * frame.shaft_orders[side],
@@ -372,22 +354,8 @@ def beyond_the_mesh(names: Sequence[str], distances: FloatArray) -> FloatArray:
 
 def counted_from_the_mesh(names: Sequence[str]) -> FloatArray:
     """Return +1 for levels relative to the mesh, which added to them gives a level; −1 for levels; 0 for all else."""
-    return np.array([1.0 if _is_relative(name) else -1.0 if _is_shaft_level(name) else 0.0 for name in names])
-
-
-def _is_relative(name: str) -> bool:
-    """Whether a feature is a level relative to the mesh harmonics."""
-    family, _, rest = name.partition(".")
-    last = rest.rpartition(".")[2]
-    if family == "sideband":
-        return last != "strongest"
-    if family in ("tooth", "change"):
-        return last in ("level", "elsewhere", "peak")
-    return family == "shaft" and last in ("to_mesh", "low")
-
-
-def _is_shaft_level(name: str) -> bool:
-    return name.startswith("shaft.") and name.rpartition(".")[2].isdigit()
+    features = [Feature.of(name) for name in names]
+    return np.array([1.0 if f.is_relative else -1.0 if f.is_shaft_level else 0.0 for f in features])
 
 
 # --------------------
@@ -471,5 +439,4 @@ def mirrored(names: Sequence[str]) -> np.ndarray:
     What a fault of the driver does to the driver's features, one of the driven gear does to that gear's.
     """
     place = {name: i for i, name in enumerate(names)}
-    first, second = SIDES
-    return np.array([place[name.replace(first, "\0").replace(second, first).replace("\0", second)] for name in names])
+    return np.array([place[str(Feature.of(name).mirrored)] for name in names])

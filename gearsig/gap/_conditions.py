@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,22 +14,23 @@ from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap._change import change_features, difference_features, lines_of_shaft, turned_difference
 from gearsig.gap._evidence import over_floors
-from gearsig.gap._features import (
-    STEPS_PER_TOOTH,
-    Features,
-    average_lines,
-    mesh_power,
-    residual_lines,
-    tooth_energy,
-    visible_orders,
+from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_energy
+from gearsig.gap._floors import (
+    REPEATABLE,
+    GapSize,
+    Population,
+    StructuralFloor,
+    gap_size,
+    load_population,
+    pooled_scatter,
 )
-from gearsig.gap._floors import REPEATABLE, GapSize, StructuralFloor, gap_size, load_population, pooled_scatter
 from gearsig.gap._prediction import ObservedChange
 from gearsig.gap._reduction import DRIVEN, DRIVER, GearFrame, ReducedRecording, reduce_recording
 from gearsig.gap._simulator import Added, OperatingCondition, Twin
 from gearsig.gap._types import ConditionFacts
 from gearsig.gap._words import shaft_words
-from gearsig.recording import Recording, metres_per_second_squared
+from gearsig.prepared import PreparedRecording
+from gearsig.recording import Recording, find_problems, metres_per_second_squared
 from gearsig.rig import Rig
 from gearsig.severity import (
     LARGEST_SPEED_DIFFERENCE,
@@ -63,28 +64,37 @@ class Condition:
     Parameters
     ----------
     facts : ConditionFacts
-    now, simulated : Gathered
-        The recording, and the sound twin at its point.
-    reference : Gathered or None
-    change : Features
-        Against the reference, or else against the twin.
+    now, simulated : ReducedRecording
+        The recording, and the healthy twin at its point.
+    reference : ReducedRecording or None
+    population : Population
+        By which distances are judged.
     """
 
     facts: ConditionFacts
     now: ReducedRecording
     simulated: ReducedRecording
     reference: ReducedRecording | None
-    change: Features
+    population: Population = field(repr=False)
 
     @property
     def other(self) -> ReducedRecording:
         """What it is compared with."""
         return self.reference if self.reference is not None else self.simulated
 
-    @property
+    def change_of(self, part: ReducedRecording) -> Features:
+        """Return the change of the recording, or of some of its blocks, against what it is compared with."""
+        return compare(part, self.simulated, self.reference, self.population)
+
+    @cached_property
+    def change(self) -> Features:
+        """Against the reference, or else against the twin as far as it is credible."""
+        return self.change_of(self.now)
+
+    @cached_property
     def floor(self) -> StructuralFloor:
         """How far healthy machines lie from what it is compared with."""
-        return load_population().floor(with_reference=self.reference is not None)
+        return self.population.floor(with_reference=self.reference is not None)
 
     @cached_property
     def size(self) -> GapSize:
@@ -96,7 +106,7 @@ class Condition:
         """Length of a simulation that tries an effect at this point."""
         return max(TRIAL_S, TRIAL_REVOLUTIONS / _slower_hz(self.now))
 
-    @property
+    @cached_property
     def over_floors(self) -> dict[str, float]:
         """Changes over the larger of both floors, with their signs."""
         return over_floors(self.change, self.floor, is_reference=self.reference is not None)
@@ -136,14 +146,16 @@ def with_channels_of(simulation: ReducedRecording, now: ReducedRecording) -> Red
     return simulation.with_channels({name: own[i % len(own)] for i, name in enumerate(now.channels)})
 
 
-def compare(now: ReducedRecording, simulation: ReducedRecording, reference: ReducedRecording | None) -> Features:
+def compare(
+    now: ReducedRecording, simulation: ReducedRecording, reference: ReducedRecording | None, population: Population
+) -> Features:
     """Return the change against the reference, or else against the simulation as far as it is credible."""
     if reference is not None:
         return change_features(now, reference)
-    return difference_features(now, simulation, load_population().credibility)
+    return difference_features(now, simulation, population.credibility)
 
 
-def facts_of(recording: Recording, rig: Rig, now: ReducedRecording, name: str, twin: Twin) -> ConditionFacts:
+def facts_of(prepared: PreparedRecording, now: ReducedRecording, name: str, twin: Twin) -> ConditionFacts:
     """Return what is known of a recording's operating point: measured speed, stated torque of the driver.
 
     Raises
@@ -151,7 +163,7 @@ def facts_of(recording: Recording, rig: Rig, now: ReducedRecording, name: str, t
     RefusalError
         If the stated torque is 0.
     """
-    stated_nm = _torque_nm(rig)
+    recording, stated_nm = prepared.recording, _torque_nm(prepared.rig)
     if stated_nm == 0.0:
         raise RefusalError(
             f"{name}: the rig file states a torque of 0, at which nothing presses the simulated teeth together",
@@ -168,20 +180,22 @@ def facts_of(recording: Recording, rig: Rig, now: ReducedRecording, name: str, t
 
 
 @dataclass(frozen=True)
-class Healthy:
-    """A sound machine's recording, reduced, with its rig and its name."""
+class HealthyReference:
+    """A healthy machine's recording, reduced, with its rig and its name."""
 
-    gathered: ReducedRecording
+    reduced: ReducedRecording
     rig: Rig
     name: str
 
 
-def matching_reference(now: ReducedRecording, rig: Rig, references: Sequence[Healthy]) -> tuple[Healthy | None, str]:
+def matching_reference(
+    now: ReducedRecording, rig: Rig, references: Sequence[HealthyReference]
+) -> tuple[HealthyReference | None, str]:
     """Return the reference at the recording's point, with the channels of both, or none and why."""
     if not references:
         return None, ""
     nearest = min(references, key=lambda one: _distance(now, rig, one))
-    found = nearest.gathered
+    found = nearest.reduced
     change = now.speed_hz / found.speed_hz - 1.0
     if abs(change) > LARGEST_SPEED_DIFFERENCE:
         return None, f"no reference within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
@@ -191,7 +205,7 @@ def matching_reference(now: ReducedRecording, rig: Rig, references: Sequence[Hea
     named = _with_names_of(found, now)
     if named is None:
         return None, f"the reference has the channels {', '.join(found.channels)}"
-    return replace(nearest, gathered=named), ""
+    return replace(nearest, reduced=named), ""
 
 
 def _with_names_of(reference: ReducedRecording, now: ReducedRecording) -> ReducedRecording | None:
@@ -203,8 +217,8 @@ def _with_names_of(reference: ReducedRecording, now: ReducedRecording) -> Reduce
     return None
 
 
-def _distance(now: ReducedRecording, rig: Rig, reference: Healthy) -> float:
-    speed = abs(now.speed_hz / reference.gathered.speed_hz - 1.0)
+def _distance(now: ReducedRecording, rig: Rig, reference: HealthyReference) -> float:
+    speed = abs(now.speed_hz / reference.reduced.speed_hz - 1.0)
     return 10.0 * speed + _torque_difference(rig, reference.rig)
 
 
@@ -273,7 +287,7 @@ CLEAR_CHANGE, ALONE = 10.0, 4.0
 flanks and another path to the sensor change all teeth, some of them much."""
 
 
-def doubts_of(condition: Condition) -> list[str]:
+def warnings_of(condition: Condition) -> list[str]:
     """Return what speaks strongly for a wrong rig file, or for recording and reference exchanged."""
     name, reference = condition.facts.name, condition.reference
     texts = wrong_teeth(condition.now, name)
@@ -311,9 +325,8 @@ def _explained(now: ReducedRecording, side: int) -> dict[int, float]:
     Two harmonics must be visible.
     """
     whole = []
-    for sums in now.channels.values():
-        power = np.abs(average_lines(sums, side)[0]) ** 2
-        power = power[: visible_orders(now, side, len(power)) + 1]
+    for average in now.averages(side):
+        power = np.abs(average.lines[: average.highest + 1]) ** 2
         power[: SLOW + 1] = 0.0
         whole.append(power / max(float(power.sum()), 1e-300))
     shares = np.mean(whole, axis=0)
@@ -341,7 +354,7 @@ def exchanged(now: ReducedRecording, reference: ReducedRecording, name: str) -> 
             _energy(now, side, difference, lines) for lines in (difference.lines, own, own - difference.lines)
         )
         at = int(np.argmax(changed))
-        lost_db, own_db = _decibel(there[at] / here[at]), _decibel(there[at] / np.median(there))
+        lost_db, own_db = decibel(there[at] / here[at]), decibel(there[at] / float(np.median(there)))
         elsewhere = np.roll(changed, -at)[2 * STEPS_PER_TOOTH : -2 * STEPS_PER_TOOTH]
         is_one = changed[at] >= max(CLEAR_CHANGE * float(np.median(changed)), ALONE * float(elsewhere.max()))
         if is_one and lost_db >= LOST_DB and own_db >= OWN_DB:
@@ -360,19 +373,11 @@ def exchanged(now: ReducedRecording, reference: ReducedRecording, name: str) -> 
 def _energy(now: ReducedRecording, side: int, difference: ShaftLines, lines: NDArray[np.complex128]) -> FloatArray:
     """Return the energy within one pitch of what tells the teeth apart, mean over channels."""
     rows = [
-        tooth_energy(
-            residual_lines(row, difference.teeth, difference.highest_order, difference.other_teeth)
-            / np.sqrt(mesh_power(now, sums, side)),
-            difference.teeth,
-        )
-        for row, sums in zip(lines, now.channels.values(), strict=True)
+        tooth_energy(average.residual(row) / np.sqrt(average.mesh_power), difference.teeth)
+        for row, average in zip(lines, now.averages(side), strict=True)
     ]
     energy: FloatArray = np.maximum(np.mean(rows, axis=0), 1e-300)
     return energy
-
-
-def _decibel(ratio: float) -> float:
-    return 10.0 * float(np.log10(ratio))
 
 
 def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
@@ -411,10 +416,9 @@ def strange_pattern(now: ReducedRecording, reference: ReducedRecording, name: st
 def _has_pattern(gathered: ReducedRecording, side: int) -> bool:
     """Return whether what tells a gear's teeth apart stands clear of noise in the channel where it is clearest."""
     clearest = 0.0
-    for sums in gathered.channels.values():
-        lines, noise = average_lines(sums, side)
-        used = telling_teeth_apart(np.arange(len(lines)), gathered.frame.teeth[side])
-        clearest = max(clearest, float(np.sum(np.abs(lines[used]) ** 2) / np.sum(noise[used])))
+    for average in gathered.averages(side):
+        used = telling_teeth_apart(np.arange(len(average.lines)), average.teeth)
+        clearest = max(clearest, float(np.sum(np.abs(average.lines[used]) ** 2) / np.sum(average.noise[used])))
     return clearest >= LEAST_PATTERN
 
 
@@ -422,8 +426,8 @@ def _mesh_share(now: ReducedRecording, side: int) -> float:
     """Return the share of the average's power near mesh harmonics, mean over channels."""
     teeth = now.frame.teeth[side]
     shares = []
-    for sums in now.channels.values():
-        power = np.abs(average_lines(sums, side)[0]) ** 2
+    for average in now.averages(side):
+        power = np.abs(average.lines) ** 2
         orders = np.arange(len(power))
         above = orders > SLOW
         total = float(power[above].sum())
@@ -446,58 +450,88 @@ LARGEST_DRIFT = 0.4
 Stage = Callable[[str, float], object]
 
 
+def prepare_recordings(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[PreparedRecording, ...]:
+    """Return recordings prepared, each with its rig; one that it carries already has applied its sensors."""
+    return tuple(
+        PreparedRecording(
+            replace(recording, rig=rig)
+            if recording.rig is not None and recording.rig.sensors
+            else recording.with_rig(rig)
+        )
+        for recording, rig in zip(recordings, rigs, strict=True)
+    )
+
+
 def conditions_of(
-    recordings: Sequence[Recording],
-    rigs: Sequence[Rig],
-    references: Sequence[Recording],
-    reference_rigs: Sequence[Rig],
+    recordings: Sequence[PreparedRecording],
+    references: Sequence[PreparedRecording],
     twin: Twin,
-    names: Sequence[str],
-    tell: Stage,
+    *,
+    names: Sequence[str] = (),
     reference_names: Sequence[str] = (),
+    tell: Stage = lambda _what, _done: None,
+    population: Population | None = None,
 ) -> tuple[list[Condition], list[str]]:
     """Return the conditions, and what is worth a remark.
+
+    Parameters
+    ----------
+    recordings, references : sequence of PreparedRecording
+        Each with its own rig, see `prepare_recordings`.
+    twin : Twin
+    names, reference_names : sequence of str
+    tell : callable
+        Is told what is being done, and which share of the whole is complete.
+    population : Population or None
+        Default: the one that comes with this version.
 
     Raises
     ------
     RefusalError
         If a speed cannot be known or there are too few revolutions: in a recording, or in every reference.
     """
-    found: list[Condition] = []
+    population = load_population() if population is None else population
+    conditions: list[Condition] = []
     notices: list[str] = []
-    called = reference_names or [f"reference {i + 1}" for i in range(len(references))]
-    healthy = _references(references, reference_rigs, called, notices)
-    for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
-        name = names[i] if names else f"recording {i + 1}"
-        tell(f"simulating the sound machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
-        now = _gathered(recording, rig, name, notices)
+    healthy = _references(references, reference_names or numbered("reference", references), notices)
+    for i, (recording, name) in enumerate(zip(recordings, names or numbered("recording", recordings), strict=True)):
+        tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
+        now = _reduced(recording, name, notices)
         notices += strange_teeth(now, name)
-        facts = facts_of(recording, rig, now, name, twin)
-        notices += _assumed(recording, rig, facts)
-        match, why = matching_reference(now, rig, healthy)
+        facts = facts_of(recording, now, name, twin)
+        notices += _assumed(recording, facts)
+        match, why = matching_reference(now, recording.rig, healthy)
         if why:
             notices.append(f"{name} is compared with the simulation: {why}.")
-        reference = None if match is None else match.gathered
         if match is not None:
             facts = replace(facts, reference=match.name)
-            now = _with_channels_of(now, match.gathered, healthy, name, notices)
+            now = _with_channels_of(now, match.reduced, healthy, name, notices)
+        reference = None if match is None else match.reduced
         _check_steady(now, reference, name)
-        simulation = simulated(twin, facts, now)
-        change = compare(now, simulation, reference)
-        found.append(Condition(facts, now, simulation, reference, change))
+        condition = Condition(facts, now, simulated(twin, facts, now), reference, population)
+        conditions.append(condition)
         if reference is not None:
             notices += strange_pattern(now, reference, name)
-            notices += _strange_reference(reference, simulation, name)
+            notices += _strange_reference(condition)
     if not references:
         notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
-    return found, notices
+    return conditions, notices
+
+
+def numbered(what: str, recordings: Sequence[object]) -> tuple[str, ...]:
+    """Return names for recordings that have none, for people."""
+    return tuple(f"{what} {i + 1}" for i in range(len(recordings)))
 
 
 def _with_channels_of(
-    now: ReducedRecording, reference: ReducedRecording, healthy: Sequence[Healthy], name: str, notices: list[str]
+    now: ReducedRecording,
+    reference: ReducedRecording,
+    healthy: Sequence[HealthyReference],
+    name: str,
+    notices: list[str],
 ) -> ReducedRecording:
     """Return a recording with the channels that its reference has as well, and say what was made of the others."""
-    if not any(set(reference.channels) & set(one.gathered.channels) for one in healthy):
+    if not any(set(reference.channels) & set(one.reduced.channels) for one in healthy):
         notices.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
     left_out = [channel for channel in now.channels if channel not in reference.channels]
     if left_out:
@@ -507,7 +541,7 @@ def _with_channels_of(
 
 def _check_steady(now: ReducedRecording, reference: ReducedRecording | None, name: str) -> None:
     """Refuse a run-up, but beside one of the reference's: the simulation is at one speed."""
-    drift, usual = now.speed[0], 0.0 if reference is None else reference.speed[0]
+    drift, usual = now.speed.drift, 0.0 if reference is None else reference.speed.drift
     if abs(drift - usual) > LARGEST_DRIFT:
         start, end = (60.0 * now.speed_hz * (1.0 + half * drift) for half in (-0.5, 0.5))
         raise RefusalError(
@@ -519,78 +553,68 @@ def _check_steady(now: ReducedRecording, reference: ReducedRecording | None, nam
 
 
 def _references(
-    references: Sequence[Recording], rigs: Sequence[Rig], names: Sequence[str], notices: list[str]
-) -> list[Healthy]:
+    references: Sequence[PreparedRecording], names: Sequence[str], notices: list[str]
+) -> list[HealthyReference]:
     """Reduce the references; one of several that cannot be read is left out, and said."""
-    healthy: list[Healthy] = []
-    for recording, rig, name in zip(references, rigs, names, strict=True):
+    healthy: list[HealthyReference] = []
+    for recording, name in zip(references, names, strict=True):
         try:
-            healthy.append(Healthy(_gathered(recording, rig, name, notices), rig, name))
+            healthy.append(HealthyReference(_reduced(recording, name, notices), recording.rig, name))
         except RefusalError as refusal:
             if not healthy and recording is references[-1]:
                 raise
             notices.append(f"{refusal.reason}; this reference is left out.")
             continue
-        notices += strange_teeth(healthy[-1].gathered, name)
+        notices += strange_teeth(healthy[-1].reduced, name)
     return healthy
 
 
-def _gathered(recording: Recording, rig: Rig, name: str, notices: list[str]) -> ReducedRecording:
+def _reduced(prepared: PreparedRecording, name: str, notices: list[str]) -> ReducedRecording:
     """Reduce a recording without its dead channels; a refusal names the recording."""
-    from gearsig.recording import find_problems
-
+    recording = prepared.recording
     dead = {p.channel: p for p in find_problems(recording) if p.kind == "dead"}
     live = [channel for channel in recording.vibration_names() if channel not in dead]
     if not live:
         seen = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
         raise RefusalError(f"{name}: no vibration channel is live ({seen})", remedy="check sensors, cables and inputs")
-    try:
-        found = reduce_recording(_in_si(recording, live, name, notices), rig, live)
-    except RefusalError as refusal:
-        raise RefusalError(f"{name}: {refusal.reason}", remedy=refusal.remedy) from None
-    notices += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
-    return found
-
-
-def _in_si(recording: Recording, live: Sequence[str], name: str, notices: list[str]) -> Recording:
-    """Return a recording in m/s², as simulations are; say of which channels that cannot be known."""
-    factors = {c.name: metres_per_second_squared(c) for c in recording.channels if c.name in live}
-    unknown = [channel for channel, factor in factors.items() if factor is None]
+    unknown = [c.name for c in recording.channels if c.name in live and metres_per_second_squared(c) is None]
     if unknown:
         notices.append(
             f"{name}: {', '.join(unknown)} is no acceleration in a known unit; it is compared as if it were m/s², so "
             "that without a reference its level says nothing."
         )
-    scale = np.array([factors.get(c.name) or 1.0 for c in recording.channels])
-    if np.all(scale == 1.0):
-        return recording
-    channels = tuple(replace(c, unit="m/s^2") if factors.get(c.name) else c for c in recording.channels)
-    return replace(recording, samples=recording.samples * scale[:, None], channels=channels)
+    try:
+        reduced = reduce_recording(prepared, channels=live)
+    except RefusalError as refusal:
+        raise RefusalError(f"{name}: {refusal.reason}", remedy=refusal.remedy) from None
+    notices += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
+    return reduced
 
 
-def _assumed(recording: Recording, rig: Rig, facts: ConditionFacts) -> list[str]:
+def _assumed(prepared: PreparedRecording, facts: ConditionFacts) -> list[str]:
     """Say what is doubtful of a recording, and what of its operating point was not given."""
+    recording = prepared.recording
     texts = [f"{facts.name}: {warning}." for warning in recording.warnings]
     if recording.speed_source is None:
         texts.append(
             f"{facts.name}: no tachometer and no known speed; {facts.point.speed_rpm:.4g} rpm were found in the"
             " vibration."
         )
-    if rig.nominal_torque_nm(rig.pairs[0].driver) is None:
+    if _torque_nm(prepared.rig) is None:
         texts.append(
             f"{facts.name}: the torque is not given; {facts.point.torque_nm:.3g} N·m are usual for the gears' size."
         )
     return texts
 
 
-def _strange_reference(reference: ReducedRecording, simulation: ReducedRecording, name: str) -> list[str]:
-    """Say so where the reference itself is far from the simulation of a sound machine."""
-    floor = load_population().simulation_floor
-    size = gap_size(compare(reference, simulation, None), floor).structural.value
+def _strange_reference(condition: Condition) -> list[str]:
+    """Say so where the reference itself is far from the simulation of a healthy machine."""
+    change = compare(condition.other, condition.simulated, None, condition.population)
+    size = gap_size(change, condition.population.simulation_floor).structural.value
     if size < CLEAR_WITHOUT:
         return []
     remark = (
-        f"The reference of {name} is itself {size:.1f} structural floors from the simulation of a sound machine: "
-        "if it was not healthy, only what changed since is seen."
+        f"The reference of {condition.facts.name} is itself {size:.1f} structural floors from the simulation of a "
+        "sound machine: if it was not healthy, only what changed since is seen."
     )
     return [remark]

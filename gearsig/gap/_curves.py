@@ -9,22 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.gap._change import lines_of_shaft, turned_difference
+from gearsig.gap._change import turned_difference
 from gearsig.gap._features import (
     MOST_SHAFT_ORDERS,
-    N_MESH_HARMONICS,
     SIDEBANDS,
     SIDES,
     STEPS_PER_TOOTH,
-    average_lines,
     floor_ratio,
-    mesh_power,
-    residual_lines,
-    visible_orders,
 )
 from gearsig.gap._floors import StructuralFloor
 from gearsig.gap._places import changed_pattern, own_pattern
-from gearsig.gap._reduction import DRIVEN, DRIVER, ReducedRecording
+from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ReducedRecording
 from gearsig.gap._types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap._words import shaft_words
 from gearsig.severity import load_calibration
@@ -148,10 +143,10 @@ def _of_average(side: int, runs: _Runs, names: Sequence[str], unit: str) -> Spec
 
 def _average_power(gathered: ReducedRecording, side: int, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     """Return lines' power, as squares of peaks, and that of their noise: means over channels."""
-    pairs = [average_lines(gathered.channels[name], side) for name in names]
-    n = visible_orders(gathered, side, min(len(lines) for lines, _ in pairs)) + 1
-    power: FloatArray = np.mean([np.abs(lines[:n]) ** 2 for lines, _ in pairs], axis=0)
-    noise: FloatArray = np.mean([noise[:n] for _, noise in pairs], axis=0)
+    averages = [gathered.average(name, side) for name in names]
+    n = averages[0].highest + 1
+    power: FloatArray = np.mean([np.abs(average.lines[:n]) ** 2 for average in averages], axis=0)
+    noise: FloatArray = np.mean([average.noise[:n] for average in averages], axis=0)
     return power, noise
 
 
@@ -335,18 +330,16 @@ def average_curves(now: ReducedRecording, reference: ReducedRecording, *, unit: 
 
 def _of_side(now: ReducedRecording, reference: ReducedRecording, side: int, unit: str) -> AverageCurves:
     difference, _ = turned_difference(now, reference, side)
-    n = difference.lines.shape[1]
-    own = lines_of_shaft(now, side).lines[:, :n]
-
-    def pattern(lines: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        return residual_lines(lines, difference.teeth, difference.highest_order, difference.other_teeth)
-
-    scales = [mesh_power(now, sums, side) for sums in now.channels.values()]
-    changed = [np.sum(np.abs(pattern(row)) ** 2) / scale for row, scale in zip(difference.lines, scales, strict=True)]
+    n, averages = difference.lines.shape[1], now.averages(side)
+    changed = [
+        np.sum(np.abs(average.residual(lines)) ** 2) / average.mesh_power
+        for lines, average in zip(difference.lines, averages, strict=True)
+    ]
     row = int(np.argmax(changed))
-    measured = pattern(own[row])
+    average = averages[row]
+    measured = average.residual(average.lines[:n])
     lag = load_calibration().lag_pitches / difference.teeth
-    waves = [_wave(lines, lag) for lines in (measured, measured - pattern(difference.lines[row]))]
+    waves = [_wave(lines, lag) for lines in (measured, measured - average.residual(difference.lines[row]))]
     return AverageCurves(
         now.frame.shafts[side],
         unit,

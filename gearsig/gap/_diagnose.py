@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -12,7 +12,15 @@ import numpy as np
 from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap._attribution import attribute, is_calibrated
-from gearsig.gap._conditions import Condition, Stage, conditions_of, doubts_of, observed, simulated
+from gearsig.gap._conditions import (
+    Condition,
+    Stage,
+    conditions_of,
+    numbered,
+    prepare_recordings,
+    simulated,
+    warnings_of,
+)
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import evidence_of
 from gearsig.gap._floors import load_population
@@ -20,7 +28,7 @@ from gearsig.gap._gearless import beside_standing, diagnose_gearless, standing_p
 from gearsig.gap._next_recording import next_recordings
 from gearsig.gap._places import gap_places, ranked_places
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
-from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, n_compared, steps_of
+from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, observed_changes, steps_of
 from gearsig.gap._types import (
     NAMING,
     GapCause,
@@ -102,9 +110,6 @@ OWN_EFFECT = (
     "effects. Its probability is the share of “unknown” that its held-out shrink beyond placebos explains, and is not "
     "calibrated."
 )
-MOMENT_S, MOMENT_HZ = 0.05, 20480.0
-"""Of a run that only shows whether an effect runs."""
-
 NOT_SIMULATED = (
     "The recognition has never seen “{title}”, and it could not be simulated on this rig: nothing is said of it."
 )
@@ -177,54 +182,62 @@ def diagnose_gap(
     """
     tell = on_stage or (lambda _what, _done: None)
     known = simulator.gap_effects()
+
+    # 1. What is given must fit together, and each recording count once.
     _check(recordings, names, effects, known)
-    called = tuple(reference_names) or _numbered("reference", references)
-    _check_distinct([*recordings, *references], [*(names or _numbered("recording", recordings)), *called])
-    own_rigs, other_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
+    own_names = tuple(names) or numbered("recording", recordings)
+    healthy_names = tuple(reference_names) or numbered("reference", references)
+    _check_distinct([*recordings, *references], [*own_names, *healthy_names])
+    own_rigs, healthy_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
+    allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
+
+    # 2. Machines that start and stop are compared by their motion, those without gears by their bearings alone.
     if isinstance(simulator, DriveSimulator):
-        allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
-        shown = tuple(names) or _numbered("recording", recordings)
         return drive_report(
-            diagnose_start_stop(recordings, own_rigs, references, other_rigs, simulator, allowed, shown, called, tell)
+            diagnose_start_stop(
+                recordings, own_rigs, references, healthy_rigs, simulator, allowed, own_names, healthy_names, tell
+            )
         )
-    refuse_start_stop(recordings, own_rigs, names or _numbered("recording", recordings), simulator.name)
+    refuse_start_stop(recordings, own_rigs, own_names, simulator.name)
+    prepared, healthy = prepare_recordings(recordings, own_rigs), prepare_recordings(references, healthy_rigs)
     if is_gearless(own_rigs[0]):
-        allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
-        return diagnose_gearless(recordings, own_rigs, references, other_rigs, names, called, allowed, tell)
-    twin = simulator.twin_of(own_rigs[0])
-    _check_own(twin, effects or tuple(known))
+        return diagnose_gearless(prepared, healthy, own_names, healthy_names, allowed, tell)
+
+    # 3. Each recording is reduced to features, beside the healthy twin at its point and the reference.
+    twin, population = simulator.twin_of(own_rigs[0]), load_population()
+    _check_own(twin, set(allowed) - set(population.causes))
     tell("reading the recordings", 0.02)
-    conditions, notices = conditions_of(recordings, own_rigs, references, other_rigs, twin, names, tell, called)
-    if not is_calibrated():
-        notices.insert(0, UNCALIBRATED)
+    conditions, notices = conditions_of(
+        prepared, healthy, twin, names=own_names, reference_names=healthy_names, tell=tell, population=population
+    )
+    clearest = max(conditions, key=lambda condition: condition.size.structural.value)
+    recording = prepared[conditions.index(clearest)]
+
+    # 4. Which effect: what the forests say, and of the likeliest what trials on the twin say.
     tell("recognising", 0.2)
-    weighed = attribute(
+    attribution = attribute(
         conditions, known, effects, twin, cache, lambda what, done: tell(what, 0.25 + 0.55 * done), fresh=fresh
     )
-    tried, probabilities = weighed.tried, weighed.probabilities()
-    notices += [
-        (OWN_EFFECT if name in tried else NOT_SIMULATED).format(title=known[name].title) for name in weighed.unheard_of
-    ]
-    notices += _without_meaning(twin, known, effects)
+    tried, probabilities = attribution.tried, attribution.probabilities()
+
+    # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
-    clearest = max(conditions, key=lambda condition: condition.size.structural.value)
-    k = conditions.index(clearest)
-    standing, remarks, faults = stood_out(recordings[k], own_rigs[k], references, other_rigs, clearest.facts.name)
-    notices += remarks
-    outcome, unseen = beside_standing(weighed.calibration.outcome(probabilities), standing)
-    doubts = (*unseen, *(text for condition in conditions for text in doubts_of(condition)), *faults)
-    places = ranked_places(_places(clearest), [standing_place(one, own_rigs[k]) for one in standing])
-    causes = tuple(_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items())
-    causes = in_order(causes, outcome)
-    fitted = causes[0].fitted if outcome in NAMING else None
-    if outcome in NAMING and causes[0].severity is not None:
-        notices.append(OF_THE_TWIN)
-    if outcome in NAMING and fitted is None and causes[0].shrinkage is not None:
-        notices.append(NOT_NEARER.format(title=causes[0].title))
+    standing, remarks, faults = stood_out(recording, healthy, clearest.facts.name)
+    outcome, unseen = beside_standing(attribution.calibration.outcome(probabilities), standing)
+    warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
+
+    # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
+    places = ranked_places(_places(clearest), [standing_place(one, recording.rig) for one in standing])
+    causes = in_order([_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items()], outcome)
+    named = causes[0] if outcome in NAMING else None
+    fitted = None if named is None else named.fitted
     after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
+
+    # 7. What would tell more.
     tell("looking for what would tell more", 0.88)
-    pair = likeliest_two(causes)
-    size = clearest.size
+    next_ones = () if named is None else _next(causes, known, tried, twin, conditions)
+
+    uncalibrated = () if is_calibrated() else (UNCALIBRATED,)
     reference = clearest.reference
     return GapReport(
         rig=own_rigs[0].name,
@@ -232,22 +245,22 @@ def diagnose_gap(
         conditions=tuple(c.facts for c in conditions),
         references=tuple(dict.fromkeys(c.facts.reference for c in conditions if c.facts.reference)),
         outcome=outcome,
-        size=size.structural,
-        repeatability=size.repeatability.value,
+        size=clearest.size.structural,
+        repeatability=clearest.size.repeatability.value,
         places=places,
         causes=causes,
         groups=group_probabilities(causes),
         inseparable=rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else None,
-        steps=steps_of(conditions, tried, causes) if tried and outcome in NAMING else (),
-        next_recordings=_next(pair, known, tried, twin, conditions, outcome),
+        steps=steps_of(conditions, tried, causes) if tried and named is not None else (),
+        next_recordings=next_ones,
         spectra=spectrum_curves(
             clearest.now,
             clearest.simulated,
             after,
-            structural=load_population().floor(with_reference=False),
+            structural=population.simulation_floor,
             reference=reference,
-            reference_structural=None if reference is None else load_population().floor(with_reference=True),
-            unit=_unit(recordings[k]),
+            reference_structural=None if reference is None else population.reference_floor,
+            unit=_unit(recording.recording),
         ),
         angles=angle_curves(
             clearest.now,
@@ -256,10 +269,20 @@ def diagnose_gap(
             sound=reference,
             simulated_sound=clearest.simulated if reference is not None else None,
         ),
-        averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recordings[k])),
-        notices=tuple(notices),
+        averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recording.recording)),
+        notices=(
+            *uncalibrated,
+            *notices,
+            *(
+                (OWN_EFFECT if name in tried else NOT_SIMULATED).format(title=known[name].title)
+                for name in attribution.unheard_of
+            ),
+            *_without_place(twin, allowed),
+            *remarks,
+            *_of_the_fit(named),
+        ),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
-        doubts=doubts,
+        doubts=warnings,
     )
 
 
@@ -279,20 +302,16 @@ def _check(
         )
 
 
-def _check_own(twin: Twin, names: Sequence[str]) -> None:
+def _check_own(twin: Twin, names: Iterable[str]) -> None:
     """Run effects that are somebody's own for a moment, before the long work: their files may fail."""
-    for name in sorted(set(names) - set(load_population().causes)):
+    for name in sorted(names):
         for added in twin.candidates(name)[-1:]:
-            twin.run(twin.point, (added,), seed=0, duration_s=MOMENT_S, sampling_rate_hz=MOMENT_HZ)
+            twin.run(twin.point, (added,), seed=0, duration_s=0.05, sampling_rate_hz=20480.0)
 
 
 def _unit(recording: Recording) -> str:
     known = [metres_per_second_squared(channel) for channel in recording.channels if channel.is_vibration]
     return "" if None in known else "m/s^2"
-
-
-def _numbered(what: str, recordings: Sequence[Recording]) -> tuple[str, ...]:
-    return tuple(f"{what} {i + 1}" for i in range(len(recordings)))
 
 
 def _check_distinct(recordings: Sequence[Recording], names: Sequence[str]) -> None:
@@ -323,9 +342,9 @@ def _rigs(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Rig, ..
     return tuple(rig for rig in found if rig is not None)
 
 
-def _without_meaning(twin: Twin, known: Mapping[str, GapEffect], effects: Sequence[str]) -> list[str]:
+def _without_place(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[str]:
     """Name the effects that the rig has no place for, a bearing, say."""
-    titles = [known[name].title for name in effects or known if not twin.candidates(name)]
+    titles = [effect.title for name, effect in allowed.items() if not twin.candidates(name)]
     if not titles:
         return []
     remark = (
@@ -333,6 +352,14 @@ def _without_meaning(twin: Twin, known: Mapping[str, GapEffect], effects: Sequen
         "probability rests on recognition alone."
     )
     return [remark]
+
+
+def _of_the_fit(named: GapCause | None) -> list[str]:
+    """Say what the fitted severity is worth, or that there is none."""
+    if named is None:
+        return []
+    nearer = [OF_THE_TWIN] if named.severity is not None else []
+    return [*nearer, *([NOT_NEARER.format(title=named.title)] if not named.fitted and named.shrinkage else [])]
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:
@@ -352,26 +379,24 @@ def _cause(
     name: str,
     probability: float,
     known: Mapping[str, GapEffect],
-    tried: dict[str, TriedEffect],
+    tried: Mapping[str, TriedEffect],
     conditions: Sequence[Condition],
     places: Sequence[GapPlace],
 ) -> GapCause:
     if name not in known:
         return named_cause(name, probability, known)
-    one = tried.get(name)
-    place = cause_place(name, one if one is not None and one.explains else None, conditions, places)
-    base = named_cause(name, probability, known, place)
-    if one is None:
-        return base
-    n = n_compared(conditions)
-    seen = [observed(c, k, n) for k, c in enumerate(conditions)]
+    trial = tried.get(name)
+    placing = trial if trial is not None and trial.explains else None
+    cause = named_cause(name, probability, known, cause_place(name, placing, conditions, places))
+    if trial is None:
+        return cause
     frame = conditions[0].now.frame
-    if one.explains:
-        base = replace(base, severity=one.fit.severity, fitted=at_its_tooth(one.fit.added, frame, places))
     return replace(
-        base,
-        shrinkage=one.shrinkage,
-        evidence=evidence_of(one.fit, seen, frame),
+        cause,
+        severity=None if placing is None else placing.fit.severity,
+        fitted=None if placing is None else at_its_tooth(placing.fit.added, frame, places),
+        shrinkage=trial.shrinkage,
+        evidence=evidence_of(trial.fit, observed_changes(conditions), frame),
     )
 
 
@@ -381,14 +406,14 @@ def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) ->
 
 
 def _next(
-    pair: tuple[str, str] | None,
+    causes: Sequence[GapCause],
     known: Mapping[str, GapEffect],
-    tried: dict[str, TriedEffect],
+    tried: Mapping[str, TriedEffect],
     twin: Twin,
     conditions: Sequence[Condition],
-    outcome: GapOutcome,
 ) -> tuple[NextRecording, ...]:
-    if pair is None or outcome not in NAMING or any(name not in tried for name in pair):
+    pair = likeliest_two(causes)
+    if pair is None or any(name not in tried for name in pair):
         return ()
     first, second = pair
     return next_recordings(tried[first], tried[second], (known[first].title, known[second].title), twin, conditions)

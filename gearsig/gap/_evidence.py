@@ -15,7 +15,7 @@ from gearsig.gap._reduction import GearFrame
 from gearsig.gap._types import Evidence
 from gearsig.gap._words import feature_words
 
-MOST, MOST_OF_A_FAMILY = 10, 3
+MAX_SHOWN, MAX_OF_A_FAMILY = 10, 3
 CLEAR = 1.0
 """Floors from which a change, predicted or observed, says something."""
 
@@ -47,7 +47,7 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
     best = [
         int(i)
         for rows in family_members(fit.path.names).values()
-        for i in rows[np.argsort(-sizes[rows], kind="stable")][:MOST_OF_A_FAMILY]
+        for i in rows[np.argsort(-sizes[rows], kind="stable")][:MAX_OF_A_FAMILY]
     ]
     telling = sorted((i for i in best if clear[i]), key=lambda i: -sizes[i])
     return tuple(
@@ -57,7 +57,7 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
             float(clearest.distances[i]),
             float(clearest.floors[i]),
         )
-        for i in telling[:MOST]
+        for i in telling[:MAX_SHOWN]
     )
 
 
@@ -117,7 +117,7 @@ FIRST_ORDER = {"misalignment": 2}
 """Cause → the order of its shaft that it makes first, where it is not 1."""
 
 
-WHICH_SHAFT_MOST = 6.0
+MAX_RISE = 6.0
 """Floors that one sign counts for."""
 
 TIMES = 1.5
@@ -214,6 +214,6 @@ def over_floors(change: Features, floor: StructuralFloor, *, is_reference: bool)
 
 
 def _rises(signs: Sequence[str], side: str, change: Mapping[str, float]) -> list[float]:
-    """Return how far each sign that the comparison has rose on one shaft, `MOST` at most."""
+    """Return how far each sign that the comparison has rose on one shaft, `MAX_RISE` at most."""
     names = [sign.format(side) for sign in signs]
-    return [float(np.clip(change[name], 0.0, WHICH_SHAFT_MOST)) for name in names if name in change]
+    return [float(np.clip(change[name], 0.0, MAX_RISE)) for name in names if name in change]

@@ -3,103 +3,104 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from math import gcd
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.gap._reduction import DRIVEN, DRIVER, ChannelSums, GearFrame, ReducedRecording
-from gearsig.severity import orders_from_mesh
+from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ChannelSums, GearFrame, ReducedRecording
 
 # --------------------
 # Features of the two synchronous averages' lines: mesh harmonics, sidebands, shaft orders.
 # --------------------
 
 
-N_MESH_HARMONICS = 6
 N_SIDEBAND_HARMONICS = 5
 SIDEBANDS = {"1": (1, 1), "2": (2, 2), "3to5": (3, 5), "6to12": (6, 12)}
 MOST_SHAFT_ORDERS = 30
-NOMINAL_REVOLUTIONS = 64.0
-BY_CHANCE = 1e-3
-"""Lines of noise that pass for a shaft's own."""
 SIDES = ("driver", "driven")
 
-Feature = tuple[str, float]
+NamedValue = tuple[str, float]
 
 
-def average_lines(sums: ChannelSums, side: int) -> tuple[NDArray[np.complex128], FloatArray]:
-    """Return the complex amplitudes (peak) of a shaft's average and the power that noise leaves on each of them.
+@dataclass(frozen=True)
+class Feature:
+    """What a figure is of: the kind of lines or signal, the shaft, and which of its figures.
 
-    The noise is estimated from how the blocks' averages differ.
+    Parameters
+    ----------
+    family : str
+        "mesh", "sideband", "shaft", "tooth", "change", "surprise", "envelope", "line", "floor", …
+    side : str
+        "driver" or "driven"; empty for what is of no shaft.
+    detail : str
+        E.g. "3to5", "1.to_mesh", "level".
+
+    Examples
+    --------
+    >>> Feature.of("sideband.driven.3to5")
+    Feature(family='sideband', side='driven', detail='3to5')
     """
-    counts, blocks = sums.counts[side], sums.lines[side]
-    weights = counts / counts.sum()
-    lines = weights @ blocks
-    scatter = (np.abs(blocks - lines) ** 2 * counts[:, None]).sum(axis=0) / max(len(counts) - 1, 1)
-    noise = scatter / counts.sum()
-    # A line's own scatter is that of few blocks: its neighbourhood says it better.
-    return lines, np.maximum(smooth_power(noise), 1e-300)
+
+    family: str
+    side: str = ""
+    detail: str = ""
+
+    @classmethod
+    def of(cls, name: str) -> Feature:
+        """Return the feature of a name, as tables keep it."""
+        return _feature_of(name)
+
+    def __str__(self) -> str:
+        return ".".join(part for part in (self.family, self.side, self.detail) if part)
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether it is a level relative to the mesh harmonics."""
+        if self.family == "sideband":
+            return self.detail != "strongest"
+        if self.family in ("tooth", "change"):
+            return self.detail in ("level", "elsewhere", "peak")
+        return self.family == "shaft" and self.detail.endswith(("to_mesh", "low"))
+
+    @property
+    def is_shaft_level(self) -> bool:
+        """Whether it is the level of one of a shaft's first orders, by itself."""
+        return self.family == "shaft" and self.detail.isdigit()
+
+    @property
+    def is_of_the_body(self) -> bool:
+        """Whether it is of a shaft's first orders, at which a machine moves as a whole."""
+        return self.family == "shaft" and self.detail[:1].isdigit()
+
+    @property
+    def mirrored(self) -> Feature:
+        """The same of the other shaft."""
+        if self.family == "envelope" and self.detail.endswith("_shaft"):  # orders of a shaft in what neither repeats
+            return replace(self, detail=f"{_OTHER_SIDE[self.detail.removesuffix('_shaft')]}_shaft")
+        return replace(self, side=_OTHER_SIDE[self.side]) if self.side else self
 
 
-def smooth_power(power: FloatArray) -> FloatArray:
-    """Return the mean of each line and its four neighbours on either side."""
-    smooth: FloatArray = np.convolve(np.pad(power, 4, mode="edge"), np.ones(9) / 9.0, mode="valid")
-    return smooth
+_OTHER_SIDE = {"driver": "driven", "driven": "driver"}
 
 
-def is_synchronous(sums: ChannelSums, side: int) -> NDArray[np.bool_]:
-    """Return which lines keep their phase from block to block: a shaft's own do, what leaks into its average does not.
-
-    |a|² against the power that the same line's scatter over the blocks leaves of it, an F test with 2 and 2(B − 1)
-    degrees of freedom.
-    """
-    counts, blocks = sums.counts[side], sums.lines[side]
-    lines = (counts / counts.sum()) @ blocks
-    degrees = max(len(counts) - 1, 1)
-    scatter = (np.abs(blocks - lines) ** 2 * counts[:, None]).sum(axis=0) / degrees / counts.sum()
-    # The F distribution with 2 and 2m degrees has P(F > f) = (1 + f/m)^(−m).
-    least = degrees * (BY_CHANCE ** (-1.0 / degrees) - 1.0)
-    held: NDArray[np.bool_] = np.abs(lines) ** 2 > least * scatter
-    return held
+@cache
+def _feature_of(name: str) -> Feature:
+    family, _, rest = name.partition(".")
+    side, _, detail = rest.partition(".")
+    return Feature(family, side, detail) if side in SIDES else Feature(family, "", rest)
 
 
-def line_power(sums: ChannelSums, side: int) -> FloatArray:
-    """Return the lines' power over a floor that does not depend on the record's length.
-
-    |a|² holds the noise; what exceeds it counts, and the noise of `NOMINAL_REVOLUTIONS` is put under it. A line that is
-    not there reads alike in records of any length from there on.
-    """
-    lines, noise = average_lines(sums, side)
-    longer = max(1.0, float(sums.counts[side].sum()) / NOMINAL_REVOLUTIONS)
-    power: FloatArray = np.maximum(np.abs(lines) ** 2 - noise, 0.0) + longer * noise
-    return power
-
-
-def visible_orders(gathered: ReducedRecording, side: int, n_lines: int) -> int:
-    """Highest whole order of a shaft whose line is true."""
-    return int(min(gathered.highest_order / gathered.frame.shaft_orders[side], n_lines - 1))
-
-
-def mesh_lines(power: FloatArray, teeth: int, highest: int) -> FloatArray:
-    """Return those of the first mesh harmonics that can be seen, of a shaft's lines."""
-    return power[teeth : N_MESH_HARMONICS * teeth + 1 : teeth][: highest // teeth]
-
-
-def line_features(gathered: ReducedRecording, sums: ChannelSums) -> Iterator[Feature]:
+def line_features(gathered: ReducedRecording, channel: str) -> Iterator[NamedValue]:
     """Yield name and value, in dB, of one channel's mesh, sideband and shaft-order features."""
-    total = 0.0
-    for side in (DRIVER, DRIVEN):
-        power = line_power(sums, side)
-        highest = visible_orders(gathered, side, len(power))
-        teeth = gathered.frame.teeth[side]
-        if side == DRIVER:
-            total = float(mesh_lines(power, teeth, highest).sum())
-            yield from _mesh(power, teeth, highest, total)
-        yield from _sidebands(power, teeth, highest, total, SIDES[side])
-        yield from _shaft_orders(power, teeth, highest, total, SIDES[side])
+    driver, driven = (gathered.average(channel, side) for side in (DRIVER, DRIVEN))
+    total = driver.mesh_power
+    yield from _mesh(driver.power, driver.teeth, driver.highest, total)
+    for average, side in ((driver, SIDES[DRIVER]), (driven, SIDES[DRIVEN])):
+        yield from _sidebands(average.power, average.teeth, average.highest, total, side)
+        yield from _shaft_orders(average.power, average.teeth, average.highest, total, side)
 
 
 def decibel(power: float) -> float:
@@ -107,7 +108,7 @@ def decibel(power: float) -> float:
     return float(10.0 * np.log10(max(power, 1e-300)))
 
 
-def _mesh(power: FloatArray, teeth: int, highest: int, total: float) -> Iterator[Feature]:
+def _mesh(power: FloatArray, teeth: int, highest: int, total: float) -> Iterator[NamedValue]:
     yield "mesh.total", decibel(total)
     for k in range(1, N_MESH_HARMONICS + 1):
         line = k * teeth
@@ -121,7 +122,7 @@ def _mesh(power: FloatArray, teeth: int, highest: int, total: float) -> Iterator
         yield "mesh.half", -60.0
 
 
-def _sidebands(power: FloatArray, teeth: int, highest: int, total: float, side: str) -> Iterator[Feature]:
+def _sidebands(power: FloatArray, teeth: int, highest: int, total: float, side: str) -> Iterator[NamedValue]:
     carriers = [k * teeth for k in range(1, N_SIDEBAND_HARMONICS + 1) if k * teeth + 12 <= highest]
     if not carriers:
         carriers = [teeth]
@@ -142,7 +143,7 @@ def _sidebands(power: FloatArray, teeth: int, highest: int, total: float, side: 
         yield f"sideband.{side}.strongest", 0.0
 
 
-def _shaft_orders(power: FloatArray, teeth: int, highest: int, total: float, side: str) -> Iterator[Feature]:
+def _shaft_orders(power: FloatArray, teeth: int, highest: int, total: float, side: str) -> Iterator[NamedValue]:
     for n in (1, 2, 3):
         level = decibel(power[n])
         yield f"shaft.{side}.{n}", level
@@ -160,29 +161,7 @@ def _shaft_orders(power: FloatArray, teeth: int, highest: int, total: float, sid
 # --------------------
 
 
-SMOOTH_SIDEBANDS = 2
-"""Mesh lines and as many sidebands on either side are left out: eccentricity makes those."""
-SMOOTH_SHAFT_ORDERS = 3
-FEWEST_APART = 3
-"""Orders between two that both shafts share, for those to be left out."""
-
 STEPS_PER_TOOTH = 4
-
-
-def residual_lines(
-    lines: NDArray[np.complex128], teeth: int, highest: int, other_teeth: int = 1
-) -> NDArray[np.complex128]:
-    """Return the lines without mesh harmonics, their first sidebands and the first shaft orders.
-
-    Orders that the other shaft has, too, are left out unless those are most: which teeth meet depends on them.
-    """
-    orders = np.arange(len(lines))
-    near = orders_from_mesh(orders, teeth) <= SMOOTH_SIDEBANDS
-    out = near | (orders <= SMOOTH_SHAFT_ORDERS) | (orders > highest)
-    apart = teeth // gcd(teeth, other_teeth)
-    if apart >= FEWEST_APART:
-        out |= orders % apart == 0
-    return np.where(out, 0.0, lines)
 
 
 def tooth_energy(lines: NDArray[np.complex128], teeth: int) -> FloatArray:
@@ -197,28 +176,18 @@ def tooth_energy(lines: NDArray[np.complex128], teeth: int) -> FloatArray:
     return energy
 
 
-def tooth_features(gathered: ReducedRecording, sums: Sequence[ChannelSums]) -> Iterator[Feature]:
+def tooth_features(gathered: ReducedRecording) -> Iterator[NamedValue]:
     """Yield the tooth features of all channels together, since a tooth shows at one angle on all of them."""
     for side in (DRIVER, DRIVEN):
-        teeth = gathered.frame.teeth[side]
-        residuals, noises = [], []
-        for channel in sums:
-            lines, noise = average_lines(channel, side)
-            scale = mesh_power(gathered, channel, side)
-            highest = visible_orders(gathered, side, len(lines))
-            residual = residual_lines(lines, teeth, highest, gathered.frame.teeth[1 - side])
-            residuals.append(residual / np.sqrt(scale))
-            noises.append(np.where(residuals[-1] != 0, noise, 0.0).sum() / 2.0 / scale)
-        longer = max(1.0, float(sums[0].counts[side].sum()) / NOMINAL_REVOLUTIONS)
-        yield from pattern_features(f"tooth.{SIDES[side]}", residuals, teeth, float(np.mean(noises)), longer)
-
-
-def mesh_power(gathered: ReducedRecording, channel: ChannelSums, side: int) -> float:
-    """Return the power of the mesh harmonics in a shaft's average."""
-    power = line_power(channel, side)
-    teeth = gathered.frame.teeth[side]
-    highest = visible_orders(gathered, side, len(power))
-    return float(mesh_lines(power, teeth, highest).sum())
+        averages = gathered.averages(side)
+        noises = [np.where(a.pattern != 0, a.noise, 0.0).sum() / 2.0 / a.mesh_power for a in averages]
+        yield from pattern_features(
+            f"tooth.{SIDES[side]}",
+            [average.pattern for average in averages],
+            averages[0].teeth,
+            float(np.mean(noises)),
+            averages[0].longer,
+        )
 
 
 def pattern_features(
@@ -228,7 +197,7 @@ def pattern_features(
     noise: float,
     longer: float,
     least: float = 1e-30,
-) -> Iterator[Feature]:
+) -> Iterator[NamedValue]:
     """Yield size, prominence, kurtosis, width, centroid of residuals relative to their mesh.
 
     `noise` is the energy that noise leaves in them; `longer` times it is put under what exceeds it. `least` is the
@@ -300,7 +269,7 @@ def floor_ratio(power: FloatArray) -> FloatArray:
     return ratio
 
 
-def cyclic_features(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[Feature]:
+def cyclic_features(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[NamedValue]:
     """Yield excesses in dB of families of envelope lines and of residual lines: the largest over channels and bands."""
     frame = gathered.frame
     envelopes = np.concatenate([envelope_ratios(gathered, c) for c in channels])
@@ -331,7 +300,7 @@ def envelope_ratios(gathered: ReducedRecording, sums: ChannelSums) -> FloatArray
 
 def _families(
     frame: GearFrame, levels: FloatArray, step: float, known: Sequence[float], name: str
-) -> Iterator[Feature]:
+) -> Iterator[NamedValue]:
     for kind, (attribute, factor) in RACES.items():
         orders = [getattr(b, attribute) * factor for b in frame.bearings]
         scores = [_family(levels, o, N_FAMILY, step, known, SLIP) for o in orders if np.isfinite(o)]
@@ -441,7 +410,7 @@ LEAST_SHARE = 1e-6
 """Below one sample of any record."""
 
 
-def broadband_features(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[Feature]:
+def broadband_features(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[NamedValue]:
     """Yield band levels and kurtosis of the residual, tail figures of the raw signal, in dB; means over channels."""
     moments = np.stack([c.moments.mean(axis=0) for c in channels])  # (channel, band, moment)
     squares = np.log10(np.maximum(moments[:, :, 0], 1e-300)).mean(axis=0) * 10.0
@@ -458,7 +427,7 @@ def broadband_features(gathered: ReducedRecording, channels: Sequence[ChannelSum
     yield "raw.near_the_extreme", decibel(max(float(raw[:, 2].max()), LEAST_SHARE))
 
 
-def speed_features(gathered: ReducedRecording) -> Iterator[Feature]:
+def speed_features(gathered: ReducedRecording) -> Iterator[NamedValue]:
     """Yield the figures of the speed and of the supply's hum."""
     drift, swing, line, _ = gathered.speed
     yield "speed.drift", decibel(abs(drift) + 1e-5) * 2.0
@@ -505,11 +474,12 @@ def features_of(gathered: ReducedRecording) -> Features:
 
 def whole_and_parts(gathered: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values, (1 + n_blocks, n): of the whole, and without each of its blocks; computed once."""
-    if not gathered.known:
+    if "features" not in gathered.kept:
         names, values = once(gathered)
         parts = [once(gathered.without(b))[1] for b in range(gathered.n_blocks)]
-        gathered.known.append((names, np.stack([values, *parts])))
-    return gathered.known[0]
+        gathered.kept["features"] = names, np.stack([values, *parts])
+    found: tuple[tuple[str, ...], FloatArray] = gathered.kept["features"]
+    return found
 
 
 def whole_record_variance(names: Sequence[str]) -> FloatArray:
@@ -520,9 +490,9 @@ def whole_record_variance(names: Sequence[str]) -> FloatArray:
 def once(gathered: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values of the features, without their scatter."""
     channels = list(gathered.channels.values())
-    per_channel = [dict(line_features(gathered, sums)) for sums in channels]
+    per_channel = [dict(line_features(gathered, channel)) for channel in gathered.channels]
     found = {name: float(np.mean([one[name] for one in per_channel])) for name in per_channel[0]}
-    found |= dict(tooth_features(gathered, channels))
+    found |= dict(tooth_features(gathered))
     found |= dict(cyclic_features(gathered, channels))
     found |= dict(broadband_features(gathered, channels))
     found |= dict(speed_features(gathered))

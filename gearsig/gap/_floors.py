@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
-from gearsig.gap._features import SIDES, Features
+from gearsig.gap._features import Feature, Features
 from gearsig.gap._types import NONE, Interval, PlaceKind
 
 # --------------------
@@ -26,32 +26,28 @@ from gearsig.gap._types import NONE, Interval, PlaceKind
 Family = tuple[PlaceKind, str]
 """The kind of place and "driver", "driven" or nothing."""
 
-_PLAIN = {
+_KIND = {
     "mesh": PlaceKind.MESH,
     "alike": PlaceKind.MESH,
-    "envelope": PlaceKind.ENVELOPE,
-    "line": PlaceKind.LINE,
-    "hum": PlaceKind.LINE,
-    "floor": PlaceKind.BAND,
-    "speed": PlaceKind.SPEED,
-    "raw": PlaceKind.TAIL,
-}
-_APART = {"mesh": PlaceKind.MESH, "floor": PlaceKind.BAND}
-
-UNFORETOLD = ("surprise.", "apart.", "alike.")
-"""Features, the last ones, that hang on noise and sensors: no simulation foretells them, no size is made of them."""
-
-_OF_A_SHAFT = {
+    "apart.mesh": PlaceKind.MESH,
+    "line.half_mesh": PlaceKind.MESH,
     "sideband": PlaceKind.SIDEBANDS,
     "shaft": PlaceKind.SHAFT,
     "tooth": PlaceKind.TOOTH,
     "change": PlaceKind.TOOTH,
     "surprise": PlaceKind.TOOTH,
+    "envelope": PlaceKind.ENVELOPE,
+    "line": PlaceKind.LINE,
+    "hum": PlaceKind.LINE,
+    "floor": PlaceKind.BAND,
+    "apart.floor": PlaceKind.BAND,
+    "speed": PlaceKind.SPEED,
+    "raw": PlaceKind.TAIL,
 }
+"""Family of features, or a single feature → the kind of place that it speaks of."""
 
-
-_ALL_ROUND = ("level", "elsewhere")
-"""Features of a shaft's pattern that speak of all its orders and not of one tooth."""
+UNFORETOLD = ("surprise.", "apart.", "alike.")
+"""Features, the last ones, that hang on noise and sensors: no simulation foretells them, no size is made of them."""
 
 _KINDS = {
     "mesh_harmonics": (PlaceKind.MESH,),
@@ -86,11 +82,11 @@ def shown_in(names: Sequence[str], shows_in: Sequence[str]) -> np.ndarray:
 
 
 def _is_shown(name: str, kinds: set[PlaceKind], shows_in: Sequence[str]) -> bool:
-    kind = family_of(name)[0]
     if name == "hum":
         return "mains_lines" in shows_in
-    if kind is PlaceKind.TOOTH and "shaft_orders" in shows_in and name.rpartition(".")[2] in _ALL_ROUND:
-        return True
+    kind = family_of(name)[0]
+    if kind is PlaceKind.TOOTH and "shaft_orders" in shows_in and Feature.of(name).detail in ("level", "elsewhere"):
+        return True  # they speak of all orders of the shaft, and not of one tooth
     return kind in kinds
 
 
@@ -102,15 +98,9 @@ def family_of(name: str) -> Family:
     >>> family_of("sideband.driven.3to5")
     (<PlaceKind.SIDEBANDS: 'sidebands'>, 'driven')
     """
-    first, _, rest = name.partition(".")
-    if name == "line.half_mesh":
-        return PlaceKind.MESH, ""
-    if first == "apart":
-        return _APART[rest], ""
-    if first in _PLAIN:
-        return _PLAIN[first], ""
-    side = rest.partition(".")[0]
-    return _OF_A_SHAFT[first], side if side in SIDES else ""
+    feature = Feature.of(name)
+    key = name if name in _KIND else feature.family
+    return _KIND[key], feature.side
 
 
 def family_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
@@ -292,7 +282,7 @@ def _size(change: Features, structural: StructuralFloor, floors: FloatArray, who
 
     value = size(change.values)
     variance = sum((len(rows) - 1.0) * float(np.var([size(row) for row in rows])) for rows in change.left_out)
-    half = _t_quantile(_degrees(change)) * variance**0.5
+    half = t_quantile(_degrees(change)) * variance**0.5
     return Interval(value, max(0.0, value - half), value + half)
 
 
@@ -301,7 +291,8 @@ def _degrees(change: Features) -> int:
     return min((len(rows) for rows in change.left_out), default=2) - 1
 
 
-def _t_quantile(degrees: int) -> float:
+def t_quantile(degrees: int) -> float:
+    """Return what bounds 90 % on both sides with so few degrees of freedom."""
     from scipy.special import stdtrit
 
     return float(stdtrit(degrees, 0.95))

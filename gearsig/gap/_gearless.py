@@ -39,8 +39,7 @@ from gearsig.gap._types import (
     group_probabilities,
 )
 from gearsig.gap._words import band_words, hertz
-from gearsig.prepared import refined_angle
-from gearsig.recording import Recording
+from gearsig.prepared import PreparedRecording
 from gearsig.rig import Rig
 from gearsig.severity import LARGEST_SPEED_DIFFERENCE
 from gearsig.spectra import noise_floor
@@ -92,6 +91,11 @@ class Standing:
         strength = self.finding.strength
         return float("nan") if strength is None or strength.ratio_db is None else strength.ratio_db
 
+    @property
+    def sureness(self) -> tuple[float, float]:
+        """By which the recording is chosen that shows it surest."""
+        return self.finding.confidence, self.over_floor_db
+
 
 @dataclass(frozen=True)
 class ExaminedRecording:
@@ -123,27 +127,27 @@ class ExaminedRecording:
         return "no-bearing-damage" in codes and self.analysis.outcome is Outcome.NO_FAULT
 
 
-def carrying(recording: Recording, rig: Rig) -> Recording:
-    """Return the recording with this rig; one that it carries already has applied its sensors, which are the same."""
-    applied = recording.rig is not None and recording.rig.sensors
-    return replace(recording, rig=rig) if applied else recording.with_rig(rig)
-
-
-def analysed(recording: Recording, rig: Rig, name: str) -> tuple[Analysis, ShaftAngle]:
+def analysed(recording: PreparedRecording, name: str) -> tuple[Analysis, ShaftAngle]:
     """Analyse a recording whose speed must be known.
 
     Raises
     ------
     RefusalError
-        If there is no speed, no live channel, or too few revolutions.
+        If there is no speed.
     """
-    analysis = analyze(carrying(recording, rig))
+    analysis = analyze(recording)
     if isinstance(analysis.shaft_angle, CannotTell):
         raise RefusalError(f"{name}: {analysis.shaft_angle.reason}", remedy=analysis.shaft_angle.remedy)
-    for finding in analysis.findings:
+    return analysis, analysis.shaft_angle
+
+
+def _with_bearings(recording: PreparedRecording, name: str) -> tuple[Analysis, ShaftAngle]:
+    """Analyse a recording whose bearings must be examined, as there is nothing else."""
+    found = analysed(recording, name)
+    for finding in found[0].findings:
         if finding.code in ("all-channels-dead", "bearings-not-examined"):
             raise RefusalError(f"{name}: {finding.title}", remedy=finding.surer or "check the measurement chain")
-    return analysis, analysis.shaft_angle
+    return found
 
 
 def examined(
@@ -171,11 +175,12 @@ def surest(every: Sequence[ExaminedRecording]) -> list[Standing]:
     found: dict[tuple[str, str], Standing] = {}
     for one in (standing for recording in every for standing in recording.standing):
         key = (one.finding.code, one.finding.where.bearing)
-        if key not in found or _sureness(one) > _sureness(found[key]):
+        if key not in found or one.sureness > found[key].sureness:
             found[key] = one
     kinds = list(Kind)
     return sorted(
-        found.values(), key=lambda one: (one.finding.code == LINE, kinds.index(one.finding.kind), -_sureness(one)[0])
+        found.values(),
+        key=lambda one: (one.finding.code == LINE, kinds.index(one.finding.kind), -one.finding.confidence),
     )
 
 
@@ -193,10 +198,6 @@ def bearings_text(finding: Finding, rig: Rig) -> str:
 def shafts_of_unknown_speed(rig: Rig) -> str:
     """Name the shafts whose speed the rig file does not tell, as those of a gear pair left out; empty: none."""
     return named("shaft", " and ".join(shaft.name for shaft in rig.shafts if rig.ratio(shaft.name) is None))
-
-
-def _sureness(one: Standing) -> tuple[float, float]:
-    return one.finding.confidence, one.over_floor_db
 
 
 def _rise_db(finding: Finding, earlier: Earlier) -> float | None:
@@ -218,15 +219,11 @@ def _reference(
     why = ""
     if abs(its_angle.mean_speed_rpm / speed - 1.0) > LARGEST_SPEED_DIFFERENCE:
         why = f"no reference is within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
-    elif missing := set(_channels(analysis)) - set(_channels(nearest)):
+    elif missing := {c.channel for c in analysis.channels} - {c.channel for c in nearest.channels}:
         why = f"the reference has no channel {', '.join(sorted(missing))}"
     elif nearest.outcome is Outcome.FAULT:
         why = f"the reference at its speed is not healthy ({nearest.findings[0].title.rstrip('.')})"
     return (None, [f"{name} is not compared with a reference: {why}."]) if why else (nearest, [])
-
-
-def _channels(analysis: Analysis) -> list[str]:
-    return [channel.channel for channel in analysis.channels]
 
 
 # --------------------
@@ -333,16 +330,15 @@ def _share_of_unknown(standing: Sequence[Standing], races: Races, every: Sequenc
 
 
 def _race(effect: GapEffect, found: Standing | None, rig: Rig, *, scale: float) -> GapCause:
+    cause = GapCause(effect.name, effect.group, effect.title, effect.unit, 0.0)
     if found is None:
-        return GapCause(effect.name, effect.group, effect.title, effect.unit, 0.0)
-    return GapCause(
-        effect.name,
-        effect.group,
-        effect.title,
-        effect.unit,
-        scale * found.finding.confidence,
-        place=bearings_text(found.finding, rig),
-        remarks=_remarks(found.finding),
+        return cause
+    finding = found.finding
+    return replace(
+        cause,
+        probability=scale * finding.confidence,
+        place=bearings_text(finding, rig),
+        remarks=_remarks(finding),
     )
 
 
@@ -420,10 +416,8 @@ N_SHOWN = 6.5
 
 
 def diagnose_gearless(
-    recordings: Sequence[Recording],
-    rigs: Sequence[Rig],
-    references: Sequence[Recording],
-    reference_rigs: Sequence[Rig],
+    recordings: Sequence[PreparedRecording],
+    references: Sequence[PreparedRecording],
     names: Sequence[str],
     reference_names: Sequence[str],
     effects: Mapping[str, GapEffect],
@@ -433,8 +427,9 @@ def diagnose_gearless(
 
     Parameters
     ----------
-    recordings, rigs, references, reference_rigs, names, reference_names
-        As of `gearsig.gap.diagnose_gap`.
+    recordings, references : sequence of PreparedRecording
+        Each with its rig.
+    names, reference_names : sequence of str
     effects : mapping
         Those that may be named; of them only damaged races can be.
     tell : callable
@@ -451,12 +446,11 @@ def diagnose_gearless(
         If there is no speed, no live channel, or too few revolutions.
     """
     tell("analysing the references", 0.05)
-    healthy = [analysed(*one) for one in zip(references, reference_rigs, reference_names, strict=True)]
-    every = []
-    for i, (recording, rig) in enumerate(zip(recordings, rigs, strict=True)):
-        name = names[i] if names else f"recording {i + 1}"
+    healthy = [_with_bearings(*one) for one in zip(references, reference_names, strict=True)]
+    every, rigs = [], [recording.rig for recording in recordings]
+    for i, (recording, name) in enumerate(zip(recordings, names, strict=True)):
         tell(f"analysing {name}", 0.2 + 0.7 * i / len(recordings))
-        every.append(examined(name, analysed(recording, rig, name), healthy))
+        every.append(examined(name, _with_bearings(recording, name), healthy))
     hint = () if references else (NO_REFERENCE,)
     standing = surest(every)
     causes, outcome = causes_of(standing, every, rigs[0], effects)
@@ -561,7 +555,7 @@ HIGHEST_HARMONIC, SAME_ORDER = 40, 1e-3
 
 
 def stood_out(
-    recording: Recording, rig: Rig, references: Sequence[Recording], reference_rigs: Sequence[Rig], name: str
+    recording: PreparedRecording, references: Sequence[PreparedRecording], name: str
 ) -> tuple[list[Standing], list[str], list[str]]:
     """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; remarks; doubts.
 
@@ -569,13 +563,21 @@ def stood_out(
     there and easily lost. The analysis looks for it by itself. A strange line and a family that may well be chance are
     remarks; a fault of the reference is a doubt about everything else.
     """
-    now = _analysed(recording, rig)
-    if now is None:
+    try:
+        now = analysed(recording, name)
+    except RefusalError:  # without a speed no family of impacts has an order
         return [], [], []
-    nearest = _nearest(now[1].mean_speed_rpm, references, reference_rigs)
-    healthy = None if nearest is None else _analysed(*nearest)
-    found = examined(name, now, [healthy] if healthy is not None else [])
-    doubts = [] if healthy is None else _fault_of_reference(healthy[0], now[0], name)
+    speeds: list[tuple[float, int, PreparedRecording]] = []
+    for reference in references if len(references) > 1 else ():
+        with suppress(RefusalError):  # a reference without a speed is no help
+            speeds.append((abs(reference.shaft_angle.mean_speed_rpm - now[1].mean_speed_rpm), len(speeds), reference))
+    nearest = min(speeds)[2] if speeds else references[0] if len(references) == 1 else None
+    healthy: list[tuple[Analysis, ShaftAngle]] = []
+    if nearest is not None:
+        with suppress(RefusalError):
+            healthy = [analysed(nearest, "its reference")]
+    found = examined(name, now, healthy)
+    doubts = _fault_of_reference(healthy[0][0], now[0], name) if healthy else []
     weak = [one for one in found.standing if one.finding.code == LINE or one.finding.kind is Kind.NOTICE]
     strong = [one for one in found.standing if one not in weak]
     remarks = [
@@ -628,21 +630,3 @@ def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[s
         "reference has and the recording has not."
     )
     return [remark]
-
-
-def _nearest(speed_rpm: float, references: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Recording, Rig] | None:
-    """Return the reference at the speed nearest to the recording's; only that is analysed."""
-    pairs = list(zip(references, rigs, strict=True))
-    if len(pairs) < 2:
-        return pairs[0] if pairs else None
-    known = []
-    for i, (recording, rig) in enumerate(pairs):
-        with suppress(RefusalError):  # a reference without a speed is no help
-            known.append((abs(refined_angle(carrying(recording, rig), rig).mean_speed_rpm - speed_rpm), i))
-    return pairs[min(known)[1]] if known else None
-
-
-def _analysed(recording: Recording, rig: Rig) -> tuple[Analysis, ShaftAngle] | None:
-    """Return a recording's analysis with its angle; None where it has no speed."""
-    analysis = analyze(carrying(recording, rig))
-    return None if isinstance(analysis.shaft_angle, CannotTell) else (analysis, analysis.shaft_angle)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap._change import (
-    APART,
     beyond_the_mesh,
     change_features,
     difference_features,
@@ -22,25 +21,26 @@ from gearsig.gap._features import (
     LOWEST_STRANGE,
     MOST_SHAFT_ORDERS,
     N_FAMILY,
-    N_MESH_HARMONICS,
     N_SHAFT_FAMILY,
     N_SIDEBAND_HARMONICS,
     RACES,
     SIDES,
     SLIP,
+    Feature,
     Features,
-    average_lines,
     envelope_ratios,
-    is_synchronous,
-    line_power,
-    mesh_power,
-    residual_lines,
     residual_ratios,
     tooth_energy,
-    visible_orders,
 )
 from gearsig.gap._floors import REPEATABLE, Family, StructuralFloor, family_members, family_size, pooled_scatter
-from gearsig.gap._reduction import DRIVER, N_HARMONICS, SUPPLIES_HZ, GearFrame, ReducedRecording
+from gearsig.gap._reduction import (
+    DRIVER,
+    N_HARMONICS,
+    N_MESH_HARMONICS,
+    SUPPLIES_HZ,
+    GearFrame,
+    ReducedRecording,
+)
 from gearsig.gap._types import GapPlace, PlaceKind
 from gearsig.gap._words import ComparedPair, LocatedChange, band_words, by_decibels, feature_words, hertz, shaft_words
 from gearsig.severity import ShaftLines, find_event, load_calibration
@@ -388,7 +388,7 @@ def mesh_spot(comparison: ComparedPair) -> LocatedChange | None:
 
 def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
     """Return the order of the one mesh harmonic that a feature is of; none for what is of all."""
-    harmonic = feature.rpartition(".")[2]
+    harmonic = Feature.of(feature).detail.rpartition(".")[2]
     return (float(int(harmonic) * frame.teeth[DRIVER]),) if harmonic.isdigit() else ()
 
 
@@ -420,8 +420,9 @@ def shaft_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
     both = _both(comparison, side, relative=False)
     frame = comparison.now.frame
     last = min(MOST_SHAFT_ORDERS, frame.teeth[side] - 3, both[0].power.shape[1] - 1)
-    name = comparison.strongest(f"shaft.{SIDES[side]}").split(".")[2]
-    groups = [[int(name)]] if name.isdigit() else [[order] for order in range(1, last + 1)]
+    scored = Feature.of(comparison.strongest(f"shaft.{SIDES[side]}"))
+    first = scored.detail.partition(".")[0]  # the order, or "strongest" or "low"
+    groups = [[int(first)]] if first.isdigit() else [[order] for order in range(1, last + 1)]
     strongest = _strongest_group(*both, groups)
     if strongest is None or abs(strongest[2]) < LEAST_CHANGE_DB:
         return None
@@ -460,16 +461,13 @@ def _both(comparison: ComparedPair, side: int, *, relative: bool) -> tuple[_Line
 
 
 def _lines(gathered: ReducedRecording, names: Sequence[str], side: int, *, relative: bool) -> _Lines:
-    rows = []
-    for name in names:
-        sums = gathered.channels[name]
-        power, (lines, noise) = line_power(sums, side), average_lines(sums, side)
-        own = np.where(is_synchronous(sums, side), np.maximum(np.abs(lines) ** 2 - noise, 0.0), 0.0)
-        floor = power - np.maximum(np.abs(lines) ** 2 - noise, 0.0)
-        scale = mesh_power(gathered, sums, side) if relative else 1.0
-        rows.append([values / scale for values in (power, own, floor)])
-    n = visible_orders(gathered, side, min(len(row[0]) for row in rows)) + 1
-    return _Lines(*(np.stack([row[i][:n] for row in rows]) for i in range(3)))
+    averages = [gathered.average(name, side) for name in names]
+    n, rows = averages[0].highest + 1, []
+    for average in averages:
+        own = np.where(average.is_synchronous, average.excess, 0.0)
+        scale = average.mesh_power if relative else 1.0
+        rows.append([values[:n] / scale for values in (average.power, own, average.power - average.excess)])
+    return _Lines(*(np.stack(values) for values in zip(*rows, strict=True)))
 
 
 def _strongest_group(now: _Lines, other: _Lines, groups: Sequence[list[int]]) -> tuple[int, int, float] | None:
@@ -525,7 +523,7 @@ PILED_UP = 1e-3
 def band_spot(comparison: ComparedPair) -> LocatedChange:
     """Return the band of the residual that changed most: its level, or how impulsive it is."""
     name = comparison.strongest("floor.band", "floor.kurtosis")
-    _, kind, number = name.split(".")
+    kind, _, number = Feature.of(name).detail.partition(".")
     band = comparison.now.bands_hz[int(number) - 1]
     change = comparison.change_db[name]
     tone = line_within(comparison, band, change) if kind == "band" else None
@@ -625,14 +623,7 @@ class ToothPattern:
 
 def own_pattern(gathered: ReducedRecording, side: int) -> ToothPattern:
     """Return the pattern of a recording by itself."""
-    teeth = gathered.frame.teeth[side]
-    residuals = []
-    for sums in gathered.channels.values():
-        lines = average_lines(sums, side)[0]
-        residual = residual_lines(
-            lines, teeth, visible_orders(gathered, side, len(lines)), gathered.frame.teeth[1 - side]
-        )
-        residuals.append(residual / np.sqrt(mesh_power(gathered, sums, side)))
+    residuals = [average.pattern for average in gathered.averages(side)]
     return _pattern(gathered, side, residuals, lines_of_shaft(gathered, side))
 
 
@@ -646,7 +637,7 @@ def _pattern(
     gathered: ReducedRecording, side: int, residuals: Sequence[NDArray[np.complex128]], lines: ShaftLines
 ) -> ToothPattern:
     powers = [np.abs(residual) ** 2 for residual in residuals]
-    held = [is_synchronous(sums, side) for sums in gathered.channels.values()]
+    held = [average.is_synchronous for average in gathered.averages(side)]
     own = sum(float(power[own].sum()) for power, own in zip(powers, held, strict=True))
     whole = sum(float(power.sum()) for power in powers)
     energy = np.stack([tooth_energy(residual, lines.teeth) for residual in residuals])
@@ -763,7 +754,7 @@ def _merged(places: list[GapPlace]) -> list[GapPlace]:
 
 
 def _telling(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
-    kept = [row for row in rows if names[row] not in REPEATED and not names[row].startswith(APART)]
+    kept = [row for row in rows if names[row] not in REPEATED and not names[row].startswith("apart.")]
     return np.array(kept, dtype=np.intp)
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.gap._features import SIDEBANDS, SIDES
-from gearsig.gap._floors import family_members
+from gearsig.gap._features import SIDES, Feature
+from gearsig.gap._floors import family_members, t_quantile
 from gearsig.gap._simulator import Added
 from gearsig.gap._types import LEAST_FORETOLD, Interval, Shrinkage
 
@@ -309,25 +309,10 @@ def family_square(names: tuple[str, ...], left: FloatArray, observed: ObservedCh
 # --------------------
 
 
-_RELATIVE = (
-    "mesh.half",
-    *(f"sideband.{side}.{label}" for side in SIDES for label in (*SIDEBANDS, "own")),
-    *(f"shaft.{side}.{n}.to_mesh" for side in SIDES for n in (1, 2, 3, "strongest")),
-    *(f"shaft.{side}.low" for side in SIDES),
-    *(f"tooth.{side}.{what}" for side in SIDES for what in ("level", "elsewhere", "peak")),
-)
-"""Powers over that of the mesh, or of its harmonic."""
-
-_ABSOLUTE = (*(f"shaft.{side}.{n}" for side in SIDES for n in (1, 2, 3)), "floor.total")
-_OF_THE_BODY = tuple(f"shaft.{side}.{n}{what}" for side in SIDES for n in (1, 2, 3) for what in ("", ".to_mesh"))
-"""Low orders, at which a machine moves as a whole."""
-
 _STRONGEST = {"shaft.{}.strongest": "shaft.{}.strongest.to_mesh", "sideband.{}.strongest": "sideband.{}.6to12"}
 """How far the strongest line stands out, and the power by which an effect raises it."""
 
 _BANDS, _KURTOSIS = "floor.band.", "floor.kurtosis."
-_EXCESSES = ("envelope.", "line.")
-_NO_EXCESS = ("envelope.depth",)
 _OF_A_PATTERN = ("prominence", "second", "kurtosis", "width", "below_mesh", "centroid")
 
 
@@ -374,12 +359,13 @@ def transplanted(
     gain_db = real["mesh.total"] - simulated["mesh.total"]
     floor_db = real["floor.total"] - simulated["floor.total"] - gain_db
     for name in names:
-        own_db = level_db + (ground_db - gain_db if name in _OF_THE_BODY else 0.0)
-        if name in _RELATIVE:
+        feature = Feature.of(name)
+        own_db = level_db + (ground_db - gain_db if feature.is_of_the_body else 0.0)
+        if (feature.is_relative and feature.family != "change") or name == "mesh.half":
             found[name] = _added(given[name], simulated[name], real[name], own_db)
-        elif name in _ABSOLUTE or name.startswith(_BANDS):
+        elif feature.is_shaft_level or name == "floor.total" or name.startswith(_BANDS):
             found[name] = _added(given[name], simulated[name], real[name], gain_db + own_db)
-        elif name.startswith(_EXCESSES) and name not in _NO_EXCESS:
+        elif feature.family in ("envelope", "line") and name != "envelope.depth":
             found[name] = _added(given[name], simulated[name], real[name], level_db - floor_db)
     found |= _mesh(given, real, level_db)
     for name in names:
@@ -554,7 +540,8 @@ def shrinkage(
     """
     folds, scores = _telling(folds, [_score(paths, fold, excluded) for fold in folds])
     before, after, shrink = np.mean([score.sizes for score in scores], axis=0)
-    wide = _t_quantile(folds) * np.sqrt(np.mean([score.variances for score in scores], axis=0))
+    n_blocks = min((len(group) for fold in folds for group in fold.again), default=2)
+    wide = t_quantile(max(n_blocks - 1, 1)) * np.sqrt(np.mean([score.variances for score in scores], axis=0))
     return Shrinkage(
         _interval(before, wide[0], 0.0, np.inf),
         _interval(after, wide[1], 0.0, np.inf),
@@ -596,14 +583,6 @@ def _elsewhere(paths: Sequence[EffectPath], fold: Fold) -> float | None:
 
 def _interval(value: float, wide: float, least: float, most: float) -> Interval:
     return Interval(float(value), float(max(value - wide, least)), float(min(value + wide, most)))
-
-
-def _t_quantile(folds: Sequence[Fold]) -> float:
-    """Return what bounds 90 % with as few blocks as there are."""
-    from scipy.special import stdtrit
-
-    n_blocks = min((len(group) for fold in folds for group in fold.again), default=2)
-    return float(stdtrit(max(n_blocks - 1, 1), 0.95))
 
 
 def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPath]) -> _Score:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gearsig.cache import cache_folder, modules_digest, read_arrays, write_whole
 from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
-from gearsig.gap._change import SURPRISE, beyond_the_mesh, counted_from_the_mesh, mirrored, seen_rows
+from gearsig.gap._change import beyond_the_mesh, counted_from_the_mesh, mirrored, seen_rows
 from gearsig.gap._features import SIDES, Features
 from gearsig.gap._floors import (
     LEFT_OUT,
@@ -231,7 +231,7 @@ def textbook_strengths(rules: Iterable[tuple[str, Signs]], deviations: Mapping[s
 
 
 N_TREES = 400
-ROW_SHARE, FEATURE_SHARE, FEWEST_IN_A_LEAF = 0.4, 0.1, 3
+ROW_SHARE, FEATURE_SHARE, MIN_IN_A_LEAF = 0.4, 0.1, 3
 """Of the rows that each tree is fitted to, of the columns that each split may choose from, and the least rows that a
 split leaves on either side. Two forests of 200 trees that differ in their random numbers alone have log losses on blind
 cases that scatter by 0.02, and name three in a hundred differently."""
@@ -248,13 +248,13 @@ machine's lines is its own, and where nothing cancels what is usual, the rules' 
 EVENNESS = 0.5
 """0: every row counts alike; 1: every source of a cause does."""
 
-LEAST_SIZE = 0.6
+MIN_SIZE = 0.6
 """Structural floors, below which a drawn effect changed nothing that could be learned."""
 
-LEAST_PROBABILITY = 2e-3
+MIN_PROBABILITY = 2e-3
 """That a forest gives any cause: no tree having voted for it is no proof."""
 
-LEAST_LOAD_N_PER_MM = 0.01
+MIN_LOAD_N_PER_MM = 0.01
 """Of the teeth: less is none."""
 
 _SEED = 0
@@ -308,7 +308,7 @@ class Recogniser:
             told = self.linear.probabilities(_within_reach(row))
             found = (1.0 - LINEAR_SHARE) * found + LINEAR_SHARE * told
             found = found * self._by_the_rules(change, textbook_rules(effects))
-        found = np.maximum(found, LEAST_PROBABILITY)
+        found = np.maximum(found, MIN_PROBABILITY)
         return dict(zip(self.causes, (found / found.sum()).tolist(), strict=True))
 
     def _by_the_rules(self, change: Features, rules: Iterable[tuple[str, Signs]]) -> FloatArray:
@@ -332,7 +332,7 @@ def input_rows(
     Against a simulation, of the speed only how much it swings counts: how steadily it does, beside the tachometer's
     jitter, says more of the tachometer.
     """
-    patterns = any(name.startswith(SURPRISE) for name in floor.names)
+    patterns = any(name.startswith("surprise.") for name in floor.names)
     left_out = "tooth." if patterns else ("speed.drift", "speed.swing_line")
     kept = [i for i, name in enumerate(floor.names) if not name.startswith(left_out)]
     names = [floor.names[i] for i in kept]
@@ -345,7 +345,7 @@ def input_rows(
         [
             seen_rows(names, distances / both),
             held[:, further],
-            np.log10(np.maximum(loads_n_per_mm, LEAST_LOAD_N_PER_MM)),
+            np.log10(np.maximum(loads_n_per_mm, MIN_LOAD_N_PER_MM)),
         ]
     )
 
@@ -379,7 +379,7 @@ def _fit(population: Population, *, with_reference: bool) -> Fitted:
         bootstrap=True,
         max_samples=ROW_SHARE,
         max_features=FEATURE_SHARE,
-        min_samples_leaf=FEWEST_IN_A_LEAF,
+        min_samples_leaf=MIN_IN_A_LEAF,
         class_weight="balanced",
         n_jobs=2,
         random_state=_SEED,
@@ -420,7 +420,7 @@ def _visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str
     """Return which rows to learn from: an effect that changes nothing would only teach that nothing is that effect."""
     rows = floor.from_centre(floor.names, changes) / floor.of(floor.names)
     sizes = np.array([soft_size(floor.names, row) for row in rows]) / floor.whole_of(floor.names)
-    seen: NDArray[np.bool_] = (sizes > LEAST_SIZE) | np.isin(causes, (NONE, UNKNOWN))
+    seen: NDArray[np.bool_] = (sizes > MIN_SIZE) | np.isin(causes, (NONE, UNKNOWN))
     return seen
 
 

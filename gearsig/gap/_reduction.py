@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
+from math import gcd
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearsig import orders
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.orders import first_whole_sample
-from gearsig.prepared import has_mark
-from gearsig.recording import Recording
+from gearsig.prepared import PreparedRecording, prepare
+from gearsig.recording import Recording, metres_per_second_squared
 from gearsig.rig import GearPair, Rig
+from gearsig.severity import orders_from_mesh
 
 # --------------------
 # The gear pair under study, with every order counted on its driver's shaft.
@@ -87,13 +91,13 @@ def gear_frame(rig: Rig) -> GearFrame:
         raise RefusalError(f"the teeth of pair {pair.name!r} are not known", remedy=remedy)
     teeth = (pair.driver_teeth, pair.driven_teeth)
     shafts = (pair.driver, pair.driven)
-    orders = (1.0, teeth[0] / teeth[1])
+    ratios = (1.0, teeth[0] / teeth[1])
     bearings = []
     for bearing in rig.bearings:
         if bearing.shaft not in shafts:
             continue
         side = shafts.index(bearing.shaft)
-        own = {name: order * orders[side] for name, order in bearing.orders().items()}
+        own = {name: order * ratios[side] for name, order in bearing.orders().items()}
         nan = float("nan")
         bearings.append(
             BearingFrame(bearing.name, side, *(own.get(name, nan) for name in ("BPFO", "BPFI", "BSF", "FTF")))
@@ -107,6 +111,14 @@ def gear_frame(rig: Rig) -> GearFrame:
 
 
 ComplexArray = NDArray[np.complex128]
+
+N_MESH_HARMONICS = 6
+NOMINAL_REVOLUTIONS = 64.0
+BY_CHANCE = 1e-3
+SMOOTH_SIDEBANDS, SMOOTH_SHAFT_ORDERS = 2, 3
+"""Mesh lines with so many sidebands on either side, and the first shaft orders: eccentricity makes those."""
+MIN_APART = 3
+"""Orders between two that both shafts share, for those to be left out."""
 
 
 @dataclass(frozen=True)
@@ -156,6 +168,108 @@ class ChannelSums:
 
 
 @dataclass(frozen=True)
+class ShaftAverage:
+    """What a shaft repeats in one channel.
+
+    Parameters
+    ----------
+    lines : complex array, (n_orders,)
+        Amplitudes (peak) of its orders, from 0 on.
+    scatter : array, (n_orders,)
+        Power that the line's own scatter over the blocks leaves on it.
+    n_blocks : int
+    n_revolutions : float
+    teeth, other_teeth : int
+        Of its gear, and of the one that this meshes with.
+    highest : int
+        Highest order whose line is true.
+    """
+
+    lines: ComplexArray
+    scatter: FloatArray
+    n_blocks: int
+    n_revolutions: float
+    teeth: int
+    other_teeth: int
+    highest: int
+
+    @cached_property
+    def noise(self) -> FloatArray:
+        """Power that noise leaves on each line."""
+        # A line's own scatter is that of few blocks: its neighbourhood says it better.
+        return np.maximum(smooth_power(self.scatter), 1e-300)
+
+    @cached_property
+    def excess(self) -> FloatArray:
+        """The lines' power beyond noise."""
+        return np.maximum(np.abs(self.lines) ** 2 - self.noise, 0.0)
+
+    @property
+    def longer(self) -> float:
+        """By how much longer the record is than `NOMINAL_REVOLUTIONS`; 1 at least."""
+        return max(1.0, self.n_revolutions / NOMINAL_REVOLUTIONS)
+
+    @cached_property
+    def power(self) -> FloatArray:
+        """The lines' power over a floor that does not depend on the record's length.
+
+        |a|² holds the noise; what exceeds it counts, and the noise of `NOMINAL_REVOLUTIONS` is put under it. A line
+        that is not there reads alike in records of any length from there on.
+        """
+        return self.excess + self.longer * self.noise
+
+    @property
+    def mesh_lines(self) -> FloatArray:
+        """Power of those of the first mesh harmonics that can be seen."""
+        return self.power[self.teeth : N_MESH_HARMONICS * self.teeth + 1 : self.teeth][: self.highest // self.teeth]
+
+    @cached_property
+    def mesh_power(self) -> float:
+        """Power of the mesh harmonics together."""
+        return float(self.mesh_lines.sum())
+
+    @cached_property
+    def is_synchronous(self) -> NDArray[np.bool_]:
+        """Which lines keep their phase from block to block: a shaft's own do, what leaks into its average does not.
+
+        |a|² against the power that the same line's scatter over the blocks leaves of it, an F test with 2 and 2(B − 1)
+        degrees of freedom; of lines of noise, `BY_CHANCE` pass for a shaft's own.
+        """
+        degrees = max(self.n_blocks - 1, 1)
+        # The F distribution with 2 and 2m degrees has P(F > f) = (1 + f/m)^(−m).
+        least = degrees * (BY_CHANCE ** (-1.0 / degrees) - 1.0)
+        held: NDArray[np.bool_] = np.abs(self.lines) ** 2 > least * self.scatter
+        return held
+
+    def residual(self, lines: ComplexArray | None = None) -> ComplexArray:
+        """Return its lines, or others over the same orders, without mesh harmonics, first sidebands and shaft orders.
+
+        Orders that the other shaft has, too, are left out unless those are most: which teeth meet depends on them.
+        """
+        given = self.lines if lines is None else lines
+        orders = np.arange(len(given))
+        near = orders_from_mesh(orders, self.teeth) <= SMOOTH_SIDEBANDS
+        out = near | (orders <= SMOOTH_SHAFT_ORDERS) | (orders > self.highest)
+        apart = self.teeth // gcd(self.teeth, self.other_teeth)
+        if apart >= MIN_APART:
+            out |= orders % apart == 0
+        kept: ComplexArray = np.where(out, 0.0, given)
+        return kept
+
+    @cached_property
+    def pattern(self) -> ComplexArray:
+        """What tells the teeth apart: the residual over the mesh harmonics' amplitude."""
+        pattern: ComplexArray = self.residual() / np.sqrt(self.mesh_power)
+        return pattern
+
+
+def smooth_power(power: FloatArray) -> FloatArray:
+    """Return the mean of each line and its four neighbours on either side."""
+    smooth: FloatArray = np.convolve(np.pad(power, 4, mode="edge"), np.ones(9) / 9.0, mode="valid")
+    return smooth
+
+
+@dataclass(frozen=True)
 class ReducedRecording:
     """One recording, reduced.
 
@@ -173,16 +287,15 @@ class ReducedRecording:
         Of the driver, up to which lines are true.
     speed_hz : float
         Mean frequency of the driver.
-    speed : tuple of float
-        What the speed does; see `gearsig.gap`.
+    speed : SpeedFigures
     hum : tuple of float
-        Mains lines; see `gearsig.gap`.
+        Of each supply, see `mains_lines`.
     marks : (bool, bool)
         Whether angle 0 of driver and driven shaft is a mark on that shaft.
     n_revolutions : float
         Of the driver.
-    known : list
-        What `gearsig.gap.whole_and_parts` found; it is asked for again and again.
+    kept : dict
+        What has been made of it; it is asked for again and again.
     """
 
     frame: GearFrame
@@ -192,11 +305,11 @@ class ReducedRecording:
     bands_hz: tuple[tuple[float, float], ...]
     highest_order: float
     speed_hz: float
-    speed: tuple[float, ...]
+    speed: SpeedFigures
     hum: tuple[float, ...]
     marks: tuple[bool, bool]
     n_revolutions: float
-    known: list[tuple[tuple[str, ...], FloatArray]] = field(default_factory=list, compare=False, repr=False)
+    kept: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def n_blocks(self) -> int:
@@ -209,97 +322,29 @@ class ReducedRecording:
 
     def with_channels(self, channels: dict[str, ChannelSums]) -> ReducedRecording:
         """Return the recording with other sums."""
-        return replace(self, channels=channels, known=[])
+        return replace(self, channels=channels, kept={})
 
+    def average(self, channel: str, side: int) -> ShaftAverage:
+        """Return what the driver (0) or the driven shaft (1) repeats in a channel."""
+        if (channel, side) not in self.kept:
+            counts, blocks = self.channels[channel].counts[side], self.channels[channel].lines[side]
+            lines = (counts / counts.sum()) @ blocks
+            scatter = (np.abs(blocks - lines) ** 2 * counts[:, None]).sum(axis=0) / max(len(counts) - 1, 1)
+            self.kept[channel, side] = ShaftAverage(
+                lines,
+                scatter / counts.sum(),
+                len(counts),
+                float(counts.sum()),
+                self.frame.teeth[side],
+                self.frame.teeth[1 - side],
+                int(min(self.highest_order / self.frame.shaft_orders[side], len(lines) - 1)),
+            )
+        average: ShaftAverage = self.kept[channel, side]
+        return average
 
-# --------------------
-# Synchronous averages of both shafts of a gear pair at once: what one repeats does not leak into the other's.
-# --------------------
-
-
-PASSES = 3
-"""Each shaft's average less the other's, in turn. Orders of both lie close, and few revolutions tell them apart
-badly: each pass leaves of the leak its square."""
-
-_FINER = 2  # a periodic waveform's points per given one: cubic splines are good to 10⁻³ at the highest order then
-
-
-@dataclass(frozen=True)
-class JointAverages:
-    """What either shaft repeats in one channel.
-
-    Parameters
-    ----------
-    revolutions : (array, array)
-        (n_revolutions, n_angles) of driver and driven gear, without what the other shaft repeats besides the mesh.
-    residual : array, (n,)
-        Over the driver's angle, what neither repeats.
-    """
-
-    revolutions: tuple[FloatArray, FloatArray]
-    residual: FloatArray
-
-
-def joint_averages(signals: tuple[AngleSignal, ...], channel: int, frame: GearFrame) -> JointAverages:
-    """Separate a channel into what the driver repeats, what the driven gear repeats, and the rest.
-
-    Alternating projections (Gauss–Seidel on the normal equations of x(θ) = a1(θ) + a2(θ z1/z2) + rest). Mesh harmonics
-    stay in both averages; other orders that both shafts have go to the driver.
-
-    Parameters
-    ----------
-    signals : (AngleSignal, AngleSignal)
-        The same record over the angle of driver and driven gear; both count from the same instant.
-    channel : int
-    frame : GearFrame
-    """
-    ratio = frame.shaft_orders[DRIVEN]
-    places = tuple(_places(signal) for signal in signals)
-    own = tuple(signal.samples[channel] for signal in signals)
-    other_mean: FloatArray | None = None
-    for _ in range(PASSES):
-        without_driven = own[DRIVER] if other_mean is None else own[DRIVER] - _at(other_mean, places[DRIVER] * ratio)
-        driver = _whole(signals[DRIVER], without_driven)
-        mean = driver.mean(axis=0)
-        without_driver = own[DRIVEN] - _at(_without_mesh(mean, frame.teeth[DRIVER]), places[DRIVEN] / ratio)
-        driven = _whole(signals[DRIVEN], without_driver)
-        other_mean = _without_mesh(driven.mean(axis=0), frame.teeth[DRIVEN])
-    assert other_mean is not None  # noqa: S101 - there is at least one pass
-    residual = own[DRIVER] - _at(mean, places[DRIVER]) - _at(other_mean, places[DRIVER] * ratio)
-    return JointAverages((driver, driven), residual)
-
-
-def _whole(signal: AngleSignal, values: FloatArray) -> FloatArray:
-    """Return (n_revolutions, n_angles), each from shaft angle 0."""
-    n = signal.samples_per_revolution
-    first, _ = first_whole_sample(signal)
-    count = (len(values) - first) // n
-    revolutions: FloatArray = values[first : first + count * n].reshape(count, n)
-    return revolutions
-
-
-def _without_mesh(revolution: FloatArray, teeth: int) -> FloatArray:
-    lines = np.fft.rfft(revolution)
-    lines[::teeth] = 0.0
-    rest: FloatArray = np.fft.irfft(lines, len(revolution))
-    return rest
-
-
-def _places(signal: AngleSignal) -> FloatArray:
-    """Return the shaft's angle at each sample, in revolutions."""
-    n = signal.samples_per_revolution
-    places: FloatArray = (np.arange(signal.samples.shape[1]) + round(signal.start_revolution * n)) / n
-    return places
-
-
-def _at(revolution: FloatArray, place_rev: FloatArray) -> FloatArray:
-    """Return a periodic waveform at any angles, by cubic splines through finer points."""
-    from scipy.ndimage import map_coordinates
-
-    n = _FINER * len(revolution)
-    fine = np.fft.irfft(np.fft.rfft(revolution), n) * _FINER
-    values: FloatArray = map_coordinates(fine, [place_rev * n % n], order=3, mode="grid-wrap")
-    return values
+    def averages(self, side: int) -> list[ShaftAverage]:
+        """Return what a shaft repeats in each channel."""
+        return [self.average(channel, side) for channel in self.channels]
 
 
 # --------------------
@@ -367,15 +412,21 @@ def _to_a_multiple(frequency_hz: float, of_hz: float) -> float:
 # --------------------
 
 
-SPEED_FIGURES = ("drift", "swing", "swing_line", "swing_frequency_hz")
-"""Relative linear change; relative rms about it; ratio of its strongest line to the others; that line's frequency."""
+class SpeedFigures(NamedTuple):
+    """Relative linear change of a speed; relative rms about it; its strongest line over the others; where."""
+
+    drift: float
+    swing: float
+    swing_line: float
+    swing_frequency_hz: float
+
 
 HIGHEST_SHAFT_ORDER = 2
 """Of each other shaft, that is taken out of the speed: a run-out shakes the speed at its shaft's orders."""
 
 
-def speed_figures(angle: ShaftAngle, other_shafts: Sequence[float] = ()) -> tuple[float, ...]:
-    """Return `SPEED_FIGURES` of a shaft's speed, taken once per revolution.
+def speed_figures(angle: ShaftAngle, other_shafts: Sequence[float] = ()) -> SpeedFigures:
+    """Return figures of a shaft's speed, taken once per revolution.
 
     Faster changes belong to the shaft's orders and are left to the vibration; so do those at other shafts' orders,
     which once a revolution look slower than they are.
@@ -399,7 +450,7 @@ def speed_figures(angle: ShaftAngle, other_shafts: Sequence[float] = ()) -> tupl
     power = np.abs(np.fft.rfft(rest * window, 4 * len(rest)))[1:] ** 2
     strongest = int(np.argmax(power))
     typical = float(np.median(power)) / np.log(2.0)
-    return (
+    return SpeedFigures(
         float(slope * (middle[-1] - middle[0]) / level),
         float(np.std(rest)),
         float(power[strongest] / max(typical, 1e-30)),
@@ -426,11 +477,11 @@ def _without_cycles(rest: FloatArray, cycles: Sequence[float]) -> FloatArray:
     return left
 
 
-LEAST_REVOLUTIONS = 16
+MIN_REVOLUTIONS = 16
 """Of the driver and of the driven gear: fewer leave either shaft's orders in the other's average."""
 
 REVOLUTIONS_PER_BLOCK = 20
-FEWEST_BLOCKS, MOST_BLOCKS = 4, 8
+MIN_BLOCKS, MAX_BLOCKS = 4, 8
 """Blocks long enough to tell bearing orders from shaft orders, and enough of them for a jackknife."""
 
 N_BANDS = 4
@@ -443,57 +494,74 @@ NEAR_THE_EXTREME = 0.005
 
 
 def reduce_recording(
-    recording: Recording, rig: Rig, channels: Sequence[str] = (), angle: ShaftAngle | None = None
+    recording: Recording | PreparedRecording, rig: Rig | None = None, channels: Sequence[str] = ()
 ) -> ReducedRecording:
     """Reduce a recording to what the features need.
 
     Parameters
     ----------
-    recording : Recording
-    rig : Rig
-        With one gear pair.
+    recording : Recording or PreparedRecording
+    rig : Rig or None
+        With one gear pair; None: the one that the recording carries.
     channels : sequence of str
-        Default: all vibration channels.
-    angle : ShaftAngle or None
-        Of the rig's reference shaft; None: found as `analyze` finds it.
+        Default: all vibration channels. Accelerations in a known unit are taken in m/s², as simulations are.
 
     Raises
     ------
     RefusalError
         If the speed cannot be known, there are too few revolutions, or the mesh lies above what is sampled.
     """
-    frame = gear_frame(rig)
-    turned = angle if angle is not None else _angle_of(recording, rig)
-    shaft_angles = tuple(_of_shaft(turned, rig, shaft) for shaft in frame.shafts)
-    for own in shaft_angles:
-        if own.n_revolutions < LEAST_REVOLUTIONS:
+    prepared = prepare(recording) if rig is None else prepare(recording).with_rig(rig)
+    recording, frame = prepared.recording, gear_frame(prepared.rig)
+    angles = [prepared.angle_of(shaft, followed=True) for shaft in frame.shafts]
+    for shaft, angle in zip(frame.shafts, angles, strict=True):
+        if angle.n_revolutions < MIN_REVOLUTIONS:
             raise RefusalError(
-                f"shaft {own.shaft!r} turns {own.n_revolutions:.3g} times in the record, "
-                f"{LEAST_REVOLUTIONS} are needed",
+                f"shaft {shaft!r} turns {angle.n_revolutions:.3g} times in the record, {MIN_REVOLUTIONS} are needed",
                 remedy="record longer",
             )
     names = tuple(channels) or recording.vibration_names()
-    signals = tuple(_over_angle(recording, own, names) for own in shaft_angles)
-    n_blocks = int(np.clip(shaft_angles[0].n_revolutions // REVOLUTIONS_PER_BLOCK, FEWEST_BLOCKS, MOST_BLOCKS))
-    speed_hz = shaft_angles[0].mean_speed_rpm / 60.0
-    _check_mesh(signals[0], frame, recording, speed_hz)
-    bands = _bands(recording.sampling_rate_hz, signals[0].samples_per_revolution * speed_hz)
-    sums, steps = {}, (0.0, 0.0)
-    for i, name in enumerate(names):
-        sums[name], steps = _channel_sums(signals, i, recording.values(name), frame, n_blocks, bands, speed_hz)
+    n_blocks = int(np.clip(angles[DRIVER].n_revolutions // REVOLUTIONS_PER_BLOCK, MIN_BLOCKS, MAX_BLOCKS))
+    speed_hz = angles[DRIVER].mean_speed_rpm / 60.0
+    signals = [prepared.over_angle(shaft, names, followed=True) for shaft in frame.shafts]
+    _check_mesh(signals[DRIVER], frame, recording, speed_hz)
+    bands = _bands(recording.sampling_rate_hz, signals[DRIVER].samples_per_revolution * speed_hz)
+    reduced = {
+        # Channel by channel: signals of all of them in double precision, over both shafts and without what either
+        # repeats, are several times the recording.
+        name: _channel_sums(
+            [_one_channel(signal, i, _si_factor(recording, name)) for signal in signals],
+            recording.values(name) * _si_factor(recording, name),
+            frame,
+            n_blocks,
+            bands,
+            speed_hz,
+        )
+        for i, name in enumerate(names)
+    }
+    _, order_step, cycle_step = reduced[names[-1]]
     return ReducedRecording(
         frame=frame,
-        channels=sums,
-        order_step=steps[0],
-        cycle_step=steps[1],
+        channels={name: sums for name, (sums, _, _) in reduced.items()},
+        order_step=order_step,
+        cycle_step=cycle_step,
         bands_hz=bands,
-        highest_order=signals[0].highest_order,
+        highest_order=signals[DRIVER].highest_order,
         speed_hz=speed_hz,
-        speed=speed_figures(shaft_angles[0], frame.shaft_orders[1:]),
+        speed=speed_figures(angles[DRIVER], frame.shaft_orders[1:]),
         hum=mains_lines(recording, names, speed_hz, frame),
-        marks=tuple(has_mark(recording, rig, shaft) for shaft in frame.shafts),  # type: ignore[arg-type]  # two
-        n_revolutions=shaft_angles[0].n_revolutions,
+        marks=(prepared.has_mark(frame.shafts[DRIVER]), prepared.has_mark(frame.shafts[DRIVEN])),
+        n_revolutions=angles[DRIVER].n_revolutions,
     )
+
+
+def _si_factor(recording: Recording, channel: str) -> float:
+    return metres_per_second_squared(recording.channels[recording.channel_names.index(channel)]) or 1.0
+
+
+def _one_channel(signal: AngleSignal, i: int, factor: float) -> AngleSignal:
+    rows = signal.samples[i : i + 1] * factor
+    return replace(signal, samples=rows, channel_names=signal.channel_names[i : i + 1], units=signal.units[i : i + 1])
 
 
 def _check_mesh(signal: AngleSignal, frame: GearFrame, recording: Recording, speed_hz: float) -> None:
@@ -506,26 +574,6 @@ def _check_mesh(signal: AngleSignal, frame: GearFrame, recording: Recording, spe
         )
 
 
-def _angle_of(recording: Recording, rig: Rig) -> ShaftAngle:
-    from gearsig.prepared import phase_followed_angle, refined_angle
-
-    angle = phase_followed_angle(recording, rig, refined_angle(recording, rig))
-    return angle.between(0.0, recording.duration_s)
-
-
-def _of_shaft(angle: ShaftAngle, rig: Rig, shaft: str) -> ShaftAngle:
-    ratio = rig.ratio(shaft, to=angle.shaft or rig.reference_shaft)
-    if ratio is None:
-        raise RefusalError(f"the speed of shaft {shaft!r} does not follow from the teeth", remedy="complete the rig")
-    return angle if ratio == 1.0 else angle.of_shaft(shaft, ratio)
-
-
-def _over_angle(recording: Recording, angle: ShaftAngle, names: Sequence[str]) -> AngleSignal:
-    from gearsig.angle import resample_to_angle
-
-    return resample_to_angle(recording, angle, channels=names)
-
-
 def _bands(sampling_rate_hz: float, angle_rate_hz: float) -> tuple[tuple[float, float], ...]:
     """Bands of equal relative width, then all of them together."""
     top = 0.42 * min(sampling_rate_hz, angle_rate_hz)
@@ -535,27 +583,31 @@ def _bands(sampling_rate_hz: float, angle_rate_hz: float) -> tuple[tuple[float, 
 
 
 def _channel_sums(
-    signals: tuple[AngleSignal, ...],
-    channel: int,
+    signals: Sequence[AngleSignal],
     raw: FloatArray,
     frame: GearFrame,
     n_blocks: int,
     bands: Sequence[tuple[float, float]],
     speed_hz: float,
-) -> tuple[ChannelSums, tuple[float, float]]:
-    joint = joint_averages(signals, channel, frame)
-    lines, counts = [], []
-    for revolutions in joint.revolutions:
-        edges = np.linspace(0, len(revolutions), n_blocks + 1).round().astype(np.intp)
-        averages = np.stack([revolutions[i:j].mean(axis=0) for i, j in pairwise(edges)])
-        lines.append(2.0 * np.fft.rfft(averages, axis=1) / averages.shape[1])
-        counts.append(np.diff(edges).astype(np.float64))
-    n = signals[0].samples_per_revolution
-    power, order_step = _segment_power(joint.residual, n, n_blocks)
+) -> tuple[ChannelSums, float, float]:
+    """Return one channel's sums, and the steps of its residual's and its envelopes' lines in orders of the driver."""
+    separated = orders.separate_shafts(signals, frame.teeth)
+    lines = []
+    for signal in separated.signals:
+        # All lines that the samples hold, the one at half their number as 0: windows of one tooth count on them.
+        average = orders.average_lines(signal, n_parts=n_blocks, highest_order=np.inf)
+        blocks = np.zeros((n_blocks, signal.samples_per_revolution // 2 + 1), dtype=np.complex128)
+        blocks[:, : average.highest_order + 1] = average.parts[:, 0]
+        blocks[:, 0] *= 2.0  # the mean counts as a peak, too: the floors were learned so, and it is in their noise
+        lines.append((blocks, average.n_revolutions))
+    residual = separated.residual.samples[0]
+    n = signals[DRIVER].samples_per_revolution
+    power, order_step = _segment_power(residual, n, n_blocks)
     highest_cycle = min(max(HIGHEST_CYCLE, frame.teeth[0] + BEYOND_THE_MESH), 0.4 * n)
-    envelopes, moments, cycle_step = _envelopes(joint.residual, n, n_blocks, bands, speed_hz, highest_cycle)
-    sums = ChannelSums((lines[0], lines[1]), (counts[0], counts[1]), power, envelopes, moments, _tail(raw, n_blocks))
-    return sums, (order_step, cycle_step)
+    envelopes, moments, cycle_step = _envelopes(residual, n, n_blocks, bands, speed_hz, highest_cycle)
+    (driver, n_driver), (driven, n_driven) = lines
+    sums = ChannelSums((driver, driven), (n_driver, n_driven), power, envelopes, moments, _tail(raw, n_blocks))
+    return sums, order_step, cycle_step
 
 
 def _segment_power(values: FloatArray, rate: float, n_segments: int) -> tuple[FloatArray, float]:

@@ -17,10 +17,10 @@ import numpy as np
 from gearsig.cache import modules_digest, read_arrays, write_whole
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import GearsigError, InputError, RefusalError
-from gearsig.gap._conditions import SEED, Condition, compare, halves, observed
+from gearsig.gap._conditions import SEED, Condition, halves, observed
 from gearsig.gap._evidence import ONE_TOOTH, SIGNS, told_options
 from gearsig.gap._features import SIDES, whole_and_parts
-from gearsig.gap._floors import UNFORETOLD, gap_size, load_population, shown_in
+from gearsig.gap._floors import UNFORETOLD, gap_size, shown_in
 from gearsig.gap._places import SAME_ORDER
 from gearsig.gap._prediction import (
     INTERVAL_COST,
@@ -237,7 +237,7 @@ def _gathered(run: TwinRun, seed: int, added: Added | None, noise: int) -> Reduc
 
 _MODULES = (
     *(f"gearsig.gap.{name}" for name in ("_reduction", "_features", "_change")),
-    "gearsig.severity._features",
+    *(f"gearsig.{name}" for name in ("severity._features", "orders._average", "prepared._angle")),
     *(f"gearsig.angle.{name}" for name in ("_source", "_resample", "_tachless")),
 )
 """Those whose code changes a feature."""
@@ -486,7 +486,6 @@ def try_effects(
         fresh=fresh,
         on_progress=lambda done, of: on_progress(f"simulating {len(names)} effects at the point of {where}", done / of),
     )
-    everything = [observed(c, k, n_compared(conditions)) for k, c in enumerate(conditions)]
     changes = [condition.over_floors for condition in conditions]
     found = {}
     for effect in effects:
@@ -495,7 +494,7 @@ def try_effects(
         if every:
             paths, excluded = on_shaft(every, told_options(name, changes, conditions[0].now.frame.teeth))
             shrink = shrinkage(paths, folds, HELD_OUT, excluded)
-            found[name] = TriedEffect(name, paths, fit_effect(paths, everything), shrink)
+            found[name] = TriedEffect(name, paths, fit_effect(paths, observed_changes(conditions)), shrink)
     return found
 
 
@@ -511,6 +510,12 @@ def on_shaft(
 def n_compared(conditions: Sequence[Condition]) -> int:
     """Return how many features all conditions have and a simulation can foretell; those of patterns need references."""
     return min(sum(not name.startswith(UNFORETOLD) for name in c.change.names) for c in conditions)
+
+
+def observed_changes(conditions: Sequence[Condition]) -> list[ObservedChange]:
+    """Return each condition's observed distances and floors, of what is compared at all of them."""
+    n = n_compared(conditions)
+    return [observed(condition, k, n) for k, condition in enumerate(conditions)]
 
 
 def _run(twin: Twin, condition: Condition) -> TwinRun:
@@ -549,7 +554,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     if condition.reference is not None:
         compared, baseline = bank.change_names, own[0]
     else:
-        compared, baseline = names, load_population().credibility * own[0] + usual
+        compared, baseline = names, condition.population.credibility * own[0] + usual
     real = dict(zip(own_names, baseline.tolist(), strict=True))
     repeated = dict(zip(floor.names, usual.tolist(), strict=True))
     again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
@@ -562,12 +567,11 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
 
 def folds_of(conditions: Sequence[Condition]) -> list[Fold]:
     """Return what to fit to and what to score on: half of the revolutions at a condition, and all but that half."""
-    n = n_compared(conditions)
-    whole = [observed(c, k, n) for k, c in enumerate(conditions)]
+    n, whole = n_compared(conditions), observed_changes(conditions)
     found = []
     for k, condition in enumerate(conditions):
         others, again = [one for one in whole if one.condition != k], _again(condition, k, n)
-        changes = [compare(part, condition.simulated, condition.reference) for part in halves(condition.now)]
+        changes = [condition.change_of(part) for part in halves(condition.now)]
         first, second = (observed(condition, k, n, change) for change in changes)
         found += [Fold((*others, first), second, again), Fold((*others, second), first, again)]
     return found
@@ -729,8 +733,7 @@ def _with_a_tooth(name: str, told: dict[str, float | str]) -> dict[str, float | 
 
 def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:
     """Whether the fit is worse on the other shaft by more than chance."""
-    n = n_compared(conditions)
-    seen = [observed(condition, k, n) for k, condition in enumerate(conditions)]
+    seen = observed_changes(conditions)
     costs = [fit_effect(paths, seen).cost for paths in _by_shaft(tried.paths)]
     return len(costs) < len(SIDES) or max(costs) - min(costs) > INTERVAL_COST
 

@@ -211,6 +211,7 @@ def average_lines(
     n_parts: int = 1,
     weighting: Literal["equal", "hann"] = "equal",
     scaling: LineScaling = "amplitude peak",
+    highest_order: float | None = None,
 ) -> AverageLines:
     """Return the complex lines of a shaft's synchronous averages, of several channels and parts of the record at once.
 
@@ -229,11 +230,12 @@ def average_lines(
         leaks as 1/(N d)³ of it instead of 1/(N d), and noise grows by 1.8 dB.
     scaling : str
         See `SynchronousAverage.lines`.
+    highest_order : float or None
+        Of the lines; default: the signal's, up to which they are true. `inf`: all that its samples hold.
 
     Returns
     -------
     AverageLines
-        Up to the signal's highest order.
 
     Raises
     ------
@@ -247,7 +249,8 @@ def average_lines(
     one_of(scaling, "scaling", ("amplitude peak", "amplitude rms"))
     names = tuple(channels) if channels is not None else signal.channel_names
     per_rev = signal.samples_per_revolution
-    highest = min(int(signal.highest_order + 1e-9), (per_rev - 1) // 2)
+    limit = signal.highest_order if highest_order is None else highest_order
+    highest = int(min(limit + 1e-9, (per_rev - 1) // 2))
     rows = []
     for name in names:
         revolutions = whole_revolutions(signal, name, at_least=n_parts)

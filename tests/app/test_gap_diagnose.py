@@ -14,17 +14,21 @@ from gearsig.gap import (
     Added,
     GapOutcome,
     GapReport,
-    Healthy,
+    HealthyReference,
     Interval,
     OperatingCondition,
+    SpeedFigures,
     TriedEffect,
+    conditions_of,
     diagnose_gap,
     is_calibrated,
+    once,
+    prepare_recordings,
     reduce_recording,
     with_channels_of,
 )
-from gearsig.gap._conditions import _check_steady, _in_si, _with_channels_of
-from gearsig.gap._diagnose import _without_meaning
+from gearsig.gap._conditions import _check_steady, _with_channels_of
+from gearsig.gap._diagnose import _without_place
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from sims import simulate
@@ -113,7 +117,8 @@ def test_lists_that_do_not_fit_are_errors() -> None:
 
 def test_a_run_up_is_refused_but_beside_the_same_one() -> None:
     steady, rising = (
-        replace(reduce_recording(run(noise=1), rig()), speed=(drift, 0.0, 0.0, 0.0)) for drift in (0.02, 0.9)
+        replace(reduce_recording(run(noise=1), rig()), speed=SpeedFigures(drift, 0.0, 0.0, 0.0))
+        for drift in (0.02, 0.9)
     )
     _check_steady(steady, None, "now")
     _check_steady(rising, rising, "now")
@@ -123,25 +128,23 @@ def test_a_run_up_is_refused_but_beside_the_same_one() -> None:
 
 
 def test_accelerations_in_g_are_compared_in_si_units_and_unknown_units_are_told() -> None:
-    recording, notices = run(noise=1), list[str]()
+    recording = run(noise=1)
     names = recording.vibration_names()
     scale = np.array([9.80665 if c.name in names else 1.0 for c in recording.channels])
     channels = tuple(replace(c, unit="g") if c.name in names else c for c in recording.channels)
     in_g = replace(recording, samples=recording.samples / scale[:, None], channels=channels)
-    again = _in_si(in_g, names, "now", notices)
-    assert again.samples == pytest.approx(recording.samples)
-    assert again.channels == recording.channels
-    assert (_in_si(recording, names, "now", notices), notices) == (recording, [])
+    expected, seen = (once(reduce_recording(given, rig()))[1] for given in (recording, in_g))
+    assert seen == pytest.approx(expected, abs=1e-6)
     bare = replace(recording, channels=tuple(replace(c, unit="") for c in recording.channels))
-    assert _in_si(bare, names, "now", notices) is bare
-    assert "is no acceleration in a known unit" in notices[0]
+    _, notices = conditions_of(prepare_recordings([bare], [rig()]), (), gap_simulator("cracked").twin_of(rig()))
+    assert any("is no acceleration in a known unit" in notice for notice in notices)
 
 
 def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
     now, notices = reduce_recording(run(noise=1), rig()), list[str]()
     first, *others = now.channels
     reference = now.with_channels({first: now.channels[first]})
-    healthy = [Healthy(reference, rig(), "sound.h5")]
+    healthy = [HealthyReference(reference, rig(), "sound.h5")]
     assert list(_with_channels_of(now, reference, healthy, "now", notices).channels) == [first]
     assert notices == [f"now: {', '.join(others)} is left out, for the reference has no such channel."]
 
@@ -166,7 +169,7 @@ def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:
 
 def test_an_effect_that_the_rig_has_no_place_for_is_told() -> None:
     simulator, bare = gap_simulator("cracked"), replace(rig(), bearings=())
-    known = simulator.gap_effects()
-    (text,) = _without_meaning(simulator.twin_of(bare), known, ["bearing_outer_race", "backlash"])
+    known = {name: simulator.gap_effects()[name] for name in ("bearing_outer_race", "backlash")}
+    (text,) = _without_place(simulator.twin_of(bare), known)
     assert text.startswith("The rig file names nothing that spall on an outer race could be in")
-    assert _without_meaning(simulator.twin_of(rig()), known, ()) == []
+    assert _without_place(simulator.twin_of(rig()), known) == []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from gearsig.gap import Healthy, ReducedRecording, matching_reference, reduce_recording
+from gearsig.gap import HealthyReference, ReducedRecording, matching_reference, reduce_recording
 from tests.gap.synthetic import RIG, record
 
 
@@ -13,8 +13,8 @@ def run(seed: int) -> ReducedRecording:
     return reduce_recording(record(seed=seed), RIG)
 
 
-def sound(gathered: ReducedRecording) -> list[Healthy]:
-    return [Healthy(gathered, RIG, "sound.h5")]
+def sound(gathered: ReducedRecording) -> list[HealthyReference]:
+    return [HealthyReference(gathered, RIG, "sound.h5")]
 
 
 def named(seed: int, *names: str) -> ReducedRecording:
@@ -22,22 +22,22 @@ def named(seed: int, *names: str) -> ReducedRecording:
 
 
 def test_equal_names_are_compared_as_they_are() -> None:
-    assert matching_reference(run(0), RIG, sound(run(1))) == (Healthy(run(1), RIG, "sound.h5"), "")
+    assert matching_reference(run(0), RIG, sound(run(1))) == (HealthyReference(run(1), RIG, "sound.h5"), "")
 
 
 def test_the_only_channel_of_each_is_the_same_whatever_its_name() -> None:
     found, why = matching_reference(named(0, "ch1"), RIG, sound(named(1, "a1")))
     assert found is not None
     assert why == ""
-    assert tuple(found.gathered.channels) == ("ch1",)
-    assert found.gathered.channels["ch1"] is run(1).channels["a1"]
+    assert tuple(found.reduced.channels) == ("ch1",)
+    assert found.reduced.channels["ch1"] is run(1).channels["a1"]
 
 
 def test_channels_that_only_one_of_them_has_are_left_out() -> None:
     both, one = run(1), named(0, "a1")
     found, _ = matching_reference(one, RIG, sound(both))
     assert found is not None
-    assert tuple(found.gathered.channels) == ("a1",)
+    assert tuple(found.reduced.channels) == ("a1",)
     assert matching_reference(run(0), RIG, sound(named(1, "a1")))[0] is not None
 
 

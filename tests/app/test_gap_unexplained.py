@@ -9,7 +9,9 @@ import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Finding, Kind
-from gearsig.gap import GapOutcome, Standing, beside_standing, standing_place, stood_out
+from gearsig.gap import GapOutcome, Standing, beside_standing, prepare_recordings, standing_place, stood_out
+from gearsig.recording import Recording
+from gearsig.rig import Rig
 from tests.gap.synthetic import RIG, record, ringing
 
 STRANGE = 5.148
@@ -20,20 +22,25 @@ def knocking(_time: FloatArray, revolutions: FloatArray) -> FloatArray:
     return np.asarray(3.0 * ringing(revolutions * STRANGE))
 
 
+def seen(now: Recording, rig: Rig = RIG, *references: Recording) -> tuple[list[Standing], list[str], list[str]]:
+    (prepared,) = prepare_recordings([now], [rig])
+    return stood_out(prepared, prepare_recordings(references, [RIG] * len(references)), "today")
+
+
 def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_silences_them() -> None:
     struck, sound = record(knocking), record(seed=1)
-    standing, *_ = stood_out(struck, RIG, [sound], [RIG], "today")
+    standing, *_ = seen(struck, RIG, sound)
     place = standing_place(standing[0], RIG)
     assert "order 5.148" in place.title
     assert "no gear, no shaft and no bearing explains (" in place.title
     assert "no shaft explains, the rig file naming no bearing" in standing_place(standing[0], NO_BEARINGS).title
     assert place.orders[0] == pytest.approx(STRANGE, rel=1e-3)
-    again, *_ = stood_out(struck, RIG, [record(knocking, seed=2)], [RIG], "today")
+    again, *_ = seen(struck, RIG, record(knocking, seed=2))
     assert not again
 
 
 def test_sound_gears_have_nothing_strange() -> None:
-    assert stood_out(record(), RIG, [], [], "today") == ([], [], [])
+    assert seen(record()) == ([], [], [])
 
 
 def test_a_line_that_a_family_explains_is_no_remark() -> None:
@@ -41,7 +48,7 @@ def test_a_line_that_a_family_explains_is_no_remark() -> None:
         def vibration(time: FloatArray, revolutions: FloatArray) -> FloatArray:
             return knocking(time, revolutions) + 20.0 * np.sin(2 * np.pi * order * revolutions)
 
-        return stood_out(record(vibration), RIG, [], [], "today")[1]
+        return seen(record(vibration))[1]
 
     assert any("order 41.7" in remark for remark in struck_and_humming(41.7))
     assert not struck_and_humming(9 * STRANGE)
@@ -51,7 +58,7 @@ def test_orders_of_a_place_are_the_drivers_whatever_shaft_the_speed_is_of() -> N
     """Shaft "out" is the reference: the family's order there is 37/23 of that of the driver."""
     turned = replace(RIG, shafts=RIG.shafts[::-1])
     assert turned.reference_shaft == "out"
-    standing, *_ = stood_out(record(knocking), turned, [], [], "today")
+    standing, *_ = seen(record(knocking), turned)
     assert standing[0].finding.where.order == pytest.approx(STRANGE * 37 / 23, rel=1e-3)
     assert standing_place(standing[0], turned).orders[0] == pytest.approx(STRANGE, rel=1e-3)
 

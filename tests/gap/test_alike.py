@@ -9,15 +9,14 @@ import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.gap import (
-    ALIKE,
     alike_features,
     change_features,
     change_once,
     feature_words,
     gear_frame,
     reduce_recording,
+    segment_changes,
     soft_size,
-    stretch_changes,
 )
 from gearsig.recording import Recording
 from tests.gap.synthetic import RATE_HZ, RIG, SPEED_HZ, TEETH, record
@@ -35,7 +34,7 @@ SOUND = record(repeated)
 
 def found(now: Recording) -> dict[str, float]:
     changes = dict(alike_features(reduce_recording(now, RIG), reduce_recording(SOUND, RIG)))
-    return {name.removeprefix(ALIKE): value for name, value in changes.items()}
+    return {name.removeprefix("alike."): value for name, value in changes.items()}
 
 
 def test_a_path_changes_all_three_alike_about_each_harmonic() -> None:
@@ -43,7 +42,7 @@ def test_a_path_changes_all_three_alike_about_each_harmonic() -> None:
     mesh_orders = np.fft.rfftfreq(SOUND.samples.shape[1], 1.0 / RATE_HZ) / MESH_HZ
     gains_db = np.interp(mesh_orders, [1.49, 1.51, 2.49, 2.51], [8.0, 0.0, 0.0, -6.0])
     now = replace(SOUND, samples=np.fft.irfft(lines * 10.0 ** (gains_db / 20.0), SOUND.samples.shape[1]))
-    changes = stretch_changes(reduce_recording(now, RIG), reduce_recording(SOUND, RIG))
+    changes = segment_changes(reduce_recording(now, RIG), reduce_recording(SOUND, RIG))
     for k, gain_db in enumerate((8.0, 0.0, -6.0)):
         assert changes[:, k] == pytest.approx(np.full((2, 3), gain_db), abs=1.5)
     assert np.isnan(changes[:, 3:5, 0]).all()  # there is no fourth and fifth harmonic
@@ -76,7 +75,7 @@ def test_it_is_a_feature_of_a_change_with_a_name_in_words_and_no_part_of_its_siz
     now, sound = reduce_recording(record(repeated, seed=1), RIG), reduce_recording(SOUND, RIG)
     names = change_features(now, sound).names
     assert change_once(now, sound)[0] == names
-    own = [i for i, name in enumerate(names) if name.startswith(ALIKE)]
+    own = [i for i, name in enumerate(names) if name.startswith("alike.")]
     values = np.zeros(len(names))
     values[own] = 99.0
     assert soft_size(names, values) == 0.0

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.gap import gear_frame, joint_averages, reduce_recording
+from gearsig.gap import gear_frame, reduce_recording
+from gearsig.orders import average_lines, separate_shafts
 from tests.gap.synthetic import RIG, TEETH, record
 
 FRAME = gear_frame(RIG)
@@ -33,13 +34,13 @@ def signals(driver_order: int, driven_order: int) -> tuple[AngleSignal, AngleSig
 
 def test_neighbouring_orders_of_two_shafts_are_told_apart() -> None:
     # 8 turns of the driver are nearly 13 of the driven gear: their difference is not resolved in few revolutions.
-    joint = joint_averages(signals(8, 13), 0, FRAME)
-    driver, driven = (np.abs(np.fft.rfft(r.mean(axis=0))) * 2 / N_ANGLES for r in joint.revolutions)
+    separated = separate_shafts(signals(8, 13), TEETH)
+    driver, driven = (np.abs(average_lines(signal).whole[0]) for signal in separated.signals)
     assert driver[8] == pytest.approx(1.0, abs=0.02)
     assert driven[13] == pytest.approx(1.0, abs=0.02)
     assert np.delete(driver, 8).max() < 0.02
     assert np.delete(driven, 13).max() < 0.02
-    assert np.abs(joint.residual).max() < 0.1
+    assert np.abs(separated.residual.samples).max() < 0.1
 
 
 def test_the_mesh_stays_in_both_averages() -> None:

@@ -20,7 +20,6 @@ from gearsig.gap import (
     change_features,
     difference_features,
     gap_places,
-    is_synchronous,
     mesh_spot,
     reduce_recording,
 )
@@ -163,8 +162,7 @@ def test_shares_add_up_to_one_at_most() -> None:
 
 
 def test_what_leaks_into_an_average_is_not_its_own() -> None:
-    leaking = reduce_recording(record(tone(7.43, 3.0), seed=1), RIG).channels["a1"]
-    held = is_synchronous(leaking, DRIVER)
+    held = reduce_recording(record(tone(7.43, 3.0), seed=1), RIG).average("a1", DRIVER).is_synchronous
     assert held[TEETH[0]]
     assert held[TEETH[0] + 1]
     assert not held[6:9].any()
@@ -176,7 +174,8 @@ def test_few_lines_of_noise_pass_for_a_shafts_own() -> None:
     shape = sums.lines[0].shape
     noise = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
     counts = np.ones(len(noise))
-    held = is_synchronous(replace(sums, lines=(noise, noise), counts=(counts, counts)), DRIVER)
+    noisy = sound().with_channels({"a1": replace(sums, lines=(noise, noise), counts=(counts, counts))})
+    held = noisy.average("a1", DRIVER).is_synchronous
     assert held.mean() < 0.005
 
 

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from gearsig.errors import InputError
 from gearsig.gap import (
-    FLOOR_IN_DEVIATIONS,
     Added,
     EffectPath,
     Fold,
@@ -122,7 +121,7 @@ def test_the_severity_lies_in_its_interval_nine_times_out_of_ten() -> None:
     n, true = 300, 2.0
     inside = 0
     for _ in range(n):
-        noise = FLOORS / FLOOR_IN_DEVIATIONS * rng.standard_normal(len(NAMES))
+        noise = FLOORS / 1.96 * rng.standard_normal(len(NAMES))
         severity = fit_path(path(), [seen(foretold(path(), true) + noise)]).severity
         inside += severity.low <= true <= severity.high
     assert inside / n == pytest.approx(0.9, abs=0.045)  # 2.6 standard errors

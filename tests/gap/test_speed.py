@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig.angle import ShaftAngle
-from gearsig.gap import SPEED_FIGURES, speed_figures
+from gearsig.gap import speed_figures
 
 TURNS_HZ, RATIO = 25.0, 29 / 47
 
@@ -20,7 +20,7 @@ def figures(hunting: float, wheel: float, ratio: float = RATIO) -> dict[str, flo
     whole = np.arange(np.floor(turns[-1]))
     at = np.interp(whole, turns, time)
     angle = ShaftAngle("input", at, whole, np.gradient(whole, at), "pulses")
-    return dict(zip(SPEED_FIGURES, speed_figures(angle, (ratio,)), strict=True))
+    return speed_figures(angle, (ratio,))._asdict()
 
 
 def test_hunting_is_seen() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gearsig.gap import MAX_OF_A_SIGN, NONE, load_population, textbook_rules, textbook_strengths
+from gearsig.gap import NONE, load_population, textbook_rules, textbook_strengths
 from sims.effects import as_gap_effect, effects
 
 RULES = textbook_rules(map(as_gap_effect, effects().values()))
@@ -37,4 +37,4 @@ def _others(side: str) -> list[str]:
 def test_one_sign_alone_does_not_carry_a_rule() -> None:
     names = {name.format(side=s) for _, signs in RULES for name, _ in signs for s in ("driver", "driven")}
     said = textbook_strengths(RULES, dict.fromkeys(names, 0.0) | {"mesh.total": 50.0})
-    assert said["tooth_wear"] == pytest.approx(MAX_OF_A_SIGN / 3.0)
+    assert said["tooth_wear"] == pytest.approx(8.0 / 3.0)

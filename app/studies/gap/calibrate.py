@@ -176,7 +176,7 @@ def weigh_case(job: tuple[int, int]) -> list[dict[str, Any]]:
     Each by all that is known, and by what is known without the machines of the rig that made the case. A job is the
     case's number and how many effects are tried at most.
     """
-    from gearsig.gap import attribute, compare, conditions_of
+    from gearsig.gap import attribute, conditions_of, load_population, prepare_recordings
     from sims.blind import CATALOGUE, draw_case, record_case
     from sims.cracked import cracked_gap_simulator
 
@@ -196,12 +196,11 @@ def weigh_case(job: tuple[int, int]) -> list[dict[str, Any]]:
     for references in (recorded.references, ()):
         try:
             twin = simulator.twin_of(rigs[0])
-            conditions, _ = conditions_of(
-                recorded.conditions, rigs, references, [rig_of(r) for r in references], twin, (), lambda *_: None
-            )
+            healthy = prepare_recordings(references, [rig_of(r) for r in references])
+            conditions, _ = conditions_of(prepare_recordings(recorded.conditions, rigs), healthy, twin)
             for left_out in ("", INDEPENDENT):
                 with without_machines_of(left_out):
-                    known = [replace(c, change=compare(c.now, c.simulated, c.reference)) for c in conditions]
+                    known = [replace(c, population=load_population()) for c in conditions]
                     weighed = attribute(
                         known, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=max_tried
                     )
