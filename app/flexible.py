@@ -259,7 +259,7 @@ def sweeps_csv(study: Study) -> str:
     lines = ["torque_nm,direction,speed_rpm,mesh_hz,rms_um,least_force_n,lost_part"]
     for torque, pair in study.sweeps.items():
         for direction, sweep in zip(("up", "down"), pair, strict=True):
-            columns = (sweep.speed_rpm, sweep.mesh_hz, sweep.rms_m * 1e6, sweep.least_force_n, sweep.lost_part)
+            columns = (sweep.speed_rpm, sweep.mesh_hz, sweep.rms_m * 1e6, sweep.minimum_force_n, sweep.lost_part)
             lines += [
                 f"{torque:g},{direction}," + ",".join(f"{v:.6g}" for v in row) for row in zip(*columns, strict=True)
             ]

@@ -216,7 +216,7 @@ def lines(study: GearBodyStudy) -> list[str]:
         a = study.craig_bampton.accuracy
         text.append(
             f"Craig–Bampton: {len(study.craig_bampton.mass)} degrees of freedom, worst of {len(a.full_hz)} frequencies "
-            f"{100.0 * a.worst_error:.4f} %, lowest subspace MAC {a.least_mac:.6f}"
+            f"{100.0 * a.worst_error:.4f} %, lowest subspace MAC {a.minimum_mac:.6f}"
         )
     return text
 

@@ -379,10 +379,12 @@ def integrate(  # noqa: PLR0915  four stages written out
         angle_h = angle + step / 24.0 * (5.0 * w0 + 8.0 * wh - w1)
         angle_1 = angle + step / 6.0 * (w0 + 4.0 * wh + w1)
         m0, mh, m1 = profile_value(torque, t), profile_value(torque, t + 0.5 * step), profile_value(torque, t + step)
+        # Roughness locked to time, at the middle and the end of the step.
         advance(re, im, half_cos, half_sin)
         hh, rh = height_now(re, im, omega)
         advance(re, im, half_cos, half_sin)
         h1, r1 = height_now(re, im, omega)
+        # First stage, at the begin: its accelerations are also those of the kept point.
         accelerations(k, curves, rows, pitch, q, v, m0, angle, w0, d0, h0, r0, a, extra)
         if step_number % stride == 0:
             for i in range(16):
@@ -398,6 +400,7 @@ def integrate(  # noqa: PLR0915  four stages written out
             if not np.isfinite(a[1] + a[5] + a[7] + a[2]):
                 return n_rows
             n_rows += 1
+        # Second and third stage, in the middle; the fourth, at the end.
         half = 0.5 * step
         for i in range(16):
             sum_q[i], sum_v[i] = v[i], a[i]

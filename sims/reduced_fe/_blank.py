@@ -433,7 +433,7 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
     if wanted > MAX_DOF:
         raise InputError(f"n_dof is {wanted}", allowed=f"{MIN_DOF} to {MAX_DOF}", remedy="take fewer")
     sizes = [_size(blank, blank.geometry.module_mm * 2.5 * 0.97**k) for k in range(110)]
-    sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _least_cells(blank)[1]]
+    sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _minimum_cells(blank)[1]]
     best = min(sizes, key=lambda size: abs(n_dof_of(blank, size) - wanted))
     if n_dof_of(blank, best) > 1.2 * wanted:
         best = min(COARSE, key=lambda size: abs(n_dof_of(blank, size) - wanted))
@@ -447,7 +447,7 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
 
 
 @lru_cache(maxsize=16)
-def _least_cells(blank: GearBlank) -> tuple[int, int]:
+def _minimum_cells(blank: GearBlank) -> tuple[int, int]:
     """Fewest cells in the gap, and rows of the tooth, that follow the fillet."""
     g, most = blank.geometry, MAX_OUTLINE_ERROR * blank.geometry.module_mm
     gap = next((n for n in range(1, 4) if outline_error_mm(g, n, 12) <= most), 4)
@@ -458,11 +458,11 @@ def _size(blank: GearBlank, cell_mm: float) -> MeshSize:
     """Cells about `cell_mm` wide in the teeth, lower there (where loads act), longer where the motion varies less."""
     g, split = blank.geometry, fillet_split(blank.geometry)
     across, gap, up = 2.0 * split.y_mm, split.gap_length_mm, split.side_length_mm
-    least_gap, least_up = _least_cells(blank)
+    min_gap, min_up = _minimum_cells(blank)
     return MeshSize(
         n_across=max(2, round(across / cell_mm)),
-        n_gap=max(least_gap, round(gap / cell_mm)),
-        n_up=max(least_up, round(2.7 * up / cell_mm)),
+        n_gap=max(min_gap, round(gap / cell_mm)),
+        n_up=max(min_up, round(2.7 * up / cell_mm)),
         n_rim=max(1, round((g.root_radius_mm - blank.rim_radius_mm) / (2.0 * cell_mm))),
         n_body=max(1, round((blank.rim_radius_mm - g.bore_mm) / (6.0 * cell_mm))),
         n_along=max(1, round(g.face_width_mm / (2.5 * cell_mm))),

@@ -134,7 +134,7 @@ POINTS_PER_PITCH = 64
 """Columns per base pitch; a whole number, so that the columns of the next pair lie on those of this one."""
 MARGIN = 20 / POINTS_PER_PITCH
 """Base pitches before the ideal entry and after the ideal end within which a loaded pair may touch by a corner."""
-LARGEST_LEAD_UM = 500.0
+MAX_LEAD_UM = 500.0
 FLANK = 0
 """Of a `FlankGrid`: the flank that both gears drive with, each seen from its own side."""
 SIGNS = (-1, 1)
@@ -235,7 +235,7 @@ def contact_table(
         If the gears are not those of the mesh, or their slices differ.
     """
     check_gears(gears, mesh)
-    within(lead_um, "lead_error_um", -LARGEST_LEAD_UM, LARGEST_LEAD_UM, "um")
+    within(lead_um, "lead_error_um", -MAX_LEAD_UM, MAX_LEAD_UM, "um")
     n_before = round(MARGIN * POINTS_PER_PITCH)
     n = n_before + ceil((mesh.pair.contact_ratio + MARGIN) * POINTS_PER_PITCH) + 3
     step = 1.0 / POINTS_PER_PITCH
@@ -882,12 +882,14 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
     approach, n_at, w, x, unit = np.empty(most), np.empty(most), np.empty(most), np.empty(most), np.empty(most)
     order = np.empty(most, dtype=np.int64)
     for row in range(cycles.shape[0]):
+        # Pairs near contact at this mesh angle, and the compliance between their slices.
         n = near_pairs(
             cycles[row], start, step, corner, separation, rows, pitch, teeth, 1e9, pairs, columns, parts, apart, slope
         )
         if n <= 0:
             return False
         fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r)
+        # The first load starts from no force, where the nearest flanks touch; each further one from the one before.
         nearest = 1e9
         for p in range(n):
             nearest = min(nearest, apart[p])
@@ -899,6 +901,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
             enough = ENOUGH * max(loads[load] if by_force else loads[load] * 1e8, small)
             at = at if by_force else loads[load]
             found = False
+            # Newton's method for the approach whose forces add up to the load; one solution where it is given.
             for _ in range(100):
                 for p in range(n):
                     for s in range(n_s):
@@ -910,6 +913,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
                 for p in range(m):
                     unit[p] = 1.0
                     total += n_at[order[p]]
+                # dN/dδ of the points that touch: (R + h')⁻¹ 1.
                 back_substituted(a, m, unit)
                 for p in range(m):
                     stiffness += unit[p]
@@ -923,6 +927,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
                 at += missing / stiffness if m > 0 and stiffness > 0.0 else max(r[0, 0] * missing, 1e-9)
             if not found:
                 return False
+            # Results by slot, counted from the newest pair.
             delta[row, load] = at if by_force else total
             for p in range(n):
                 slot = int(newest - pairs[p])

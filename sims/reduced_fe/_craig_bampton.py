@@ -215,7 +215,7 @@ class ReductionAccuracy:
         return float(np.abs(self.errors).max())
 
     @property
-    def least_mac(self) -> float:
+    def minimum_mac(self) -> float:
         """Of all modes compared."""
         return float(self.subspace_mac.min())
 

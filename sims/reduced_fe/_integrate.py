@@ -271,6 +271,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
     w1, rate1 = set_speed(k, speed, time)
     for number in range(n_steps + 1):
         t = time + number * step
+        # The set angle by Simpson's rule over the step; torque and outer forces at its end.
         if number > 0:
             w0 = w1
             wh = set_speed(k, speed, t - 0.5 * step)[0]
@@ -281,6 +282,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
         outer_forces(k, inputs, q, v, angle, w1, rate1, load, base)
         cycles, total, back, along_torque, rubbing, n = 0.0, 0.0, 0.0, 0.0, 0.0, 0
         for one_pass in range(passes):
+            # Where the modes are with the force assumed at the step's end, and which pairs are near contact there.
             _moved(number, coefficients, free_q, free_v, f1, q, v, q1, v1)
             turned_1, turned_2 = on_input(inputs, 0, 1, q1), on_input(inputs, 1, 1, q1)
             cycles = k.cycles_per_rad * (angle + turned_1)
@@ -295,6 +297,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
                 return n_out
             if one_pass == 0:
                 _taken_up(k, n, pairs, held, held_root, held_pair, force, root)
+            # Approach of every slice, elastic law plus damping; then the contact's forces, N ≥ 0.
             deepest = _approaches(
                 k, n, rows, turn, q1, v1, pairs, columns, parts, apart, slope, lead, off, seen, moving, approach,
                 viscous, along,
@@ -304,6 +307,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             if done < 0:
                 return n_out
             _without_damping(k, n * n_s, m, force, viscous, order, a, x, elastic)
+            # The torque by which stiffness and flank shape move past under load, −∂U/∂ζ ∂ζ/∂θ1, and run-out.
             reach = max(deepest - off, 0.0) + margin
             total, along_cycles = 0.0, 0.0
             for i in range(n * n_s):
@@ -316,12 +320,14 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
                 along_torque = -k.cycles_per_rad * along_cycles
             torque_1 = along_torque - total * k.runout[0] * cos(phi_1)
             torque_2 = -total * k.runout[1] * cos(phi_2)
+            # Friction across the line of action, and the flanks behind.
             if k.friction:
                 slip_x = on_input(inputs, 0, 2, v1) - on_input(inputs, 1, 2, v1)
                 rubbing, moment_1, moment_2 = _rubbing(k, n, n_s, pairs, cycles, force, w1, slip_x)
                 torque_1, torque_2 = torque_1 + moment_1, torque_2 + moment_2
             depth = product(back_row, q1) + k.damping_time * product(back_row, v1) - k.backlash
             back = k.back_stiffness * depth if depth > 0.0 else 0.0
+            # All forces as modal ones; the reference repeats the pass until the contact's stay.
             for side in range(2):
                 pull, across = (torque_1, -rubbing) if side == 0 else (torque_2, rubbing)
                 for j in range(n_modes):
@@ -343,6 +349,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
         if k.restitution >= 0.0 and rest[1] == 0.0 and touches > 0.0:
             _bounce(k, rigid, v)
         rest[1] = touches
+        # The wanted signals of this step.
         if number % stride == 0 and n_out < found.shape[0]:
             extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - margin, along_torque
             extras[5] = rubbing

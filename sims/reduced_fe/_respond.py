@@ -313,8 +313,8 @@ class SpeedSweep:
     mesh_hz : array, (n,)
     rms_m : array, (n,)
         Of the dynamic transmission error without its mean in the part.
-    least_force_n : array, (n,)
-        Least mesh force.
+    minimum_force_n : array, (n,)
+        Minimum of the mesh force.
     lost_part : array, (n,)
         Part of the time without contact on the driving flanks.
     n_steps : int
@@ -324,7 +324,7 @@ class SpeedSweep:
     speed_rpm: FloatArray
     mesh_hz: FloatArray
     rms_m: FloatArray
-    least_force_n: FloatArray
+    minimum_force_n: FloatArray
     lost_part: FloatArray
     n_steps: int
     step_s: float

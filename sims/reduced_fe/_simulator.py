@@ -188,7 +188,7 @@ class ReducedPair(PairModel[PreparedPair]):
 
 # From a flexible pair to a recording: run the model, then measure it.
 
-LARGEST_DEPTH = 0.5
+MAX_DEPTH_PART = 0.5
 """Of what corners are apart at the table's ends: the most the static approach may take, to leave room to vibrate."""
 
 
@@ -311,7 +311,7 @@ def check_depth(pair: FlexiblePair, operation: Operation) -> None:
     deepest = float(pair.maps(np.array([torque])).transmission_error_m.max())
     geometry = pair.machine.mesh.pair
     ends = np.array([-MARGIN, geometry.contact_ratio + MARGIN])
-    apart = LARGEST_DEPTH * float(corner_separation_m(geometry, ends).min())
+    apart = MAX_DEPTH_PART * float(corner_separation_m(geometry, ends).min())
     if deepest > apart:
         raise InputError(
             f"the teeth yield by {1e6 * deepest:.0f} µm under {torque:g} N m",

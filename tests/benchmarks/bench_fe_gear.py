@@ -58,7 +58,7 @@ def main() -> None:
         accuracy = craig_bampton(mesh).accuracy
         print(
             f"Craig–Bampton to 229 {process_time() - start:7.2f} s, peak {peak_gb():.2f} GB, "
-            f"worst of 20 frequencies {100 * accuracy.worst_error:.4f} %, least subspace MAC {accuracy.least_mac:.6f}"
+            f"worst of 20 frequencies {100 * accuracy.worst_error:.4f} %, least subspace MAC {accuracy.minimum_mac:.6f}"
         )
         if "--whole" in sys.argv:
             compare_modes(mesh)

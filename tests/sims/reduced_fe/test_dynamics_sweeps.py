@@ -38,7 +38,7 @@ def test_light_damping_loses_contact_and_jumps_with_hysteresis(light_sweeps):
     up, down = light_sweeps
     for sweep in light_sweeps:
         assert sweep.lost_part.max() > 0.02
-        assert sweep.least_force_n.min() == 0.0
+        assert sweep.minimum_force_n.min() == 0.0
     jump_up, jump_down = up.jump_hz(1700.0, 2800.0), down.jump_hz(1700.0, 2800.0)
     assert jump_up is not None
     assert jump_down is not None

@@ -84,7 +84,7 @@ def test_a_reduced_gear_is_free_and_keeps_its_modes() -> None:
     assert accuracy.rigid_hz.max() < 0.1
     assert accuracy.errors.min() > -1e-9  # a reduced model is never softer than the full one
     assert accuracy.worst_error < 2e-3
-    assert accuracy.least_mac > 0.999
+    assert accuracy.minimum_mac > 0.999
     assert small().stiffness.shape == (120, 120)
     assert len(accuracy.table().splitlines()) == 1 + len(accuracy.full_hz)
 
@@ -101,7 +101,7 @@ def test_the_subspace_mac_does_not_depend_on_the_vectors_of_a_pair() -> None:
     found = matched(np.array([1.0, 2.0, 2.0, 5.0]), np.array([1.0, 2.0, 2.0, 5.0]), products, rigid_hz=np.zeros(6))
     np.testing.assert_allclose(found.subspace_mac, 1.0)
     tilted = products * np.array([1.0, 1.0, 1.0, 0.6])
-    assert matched(found.full_hz, found.full_hz, tilted, rigid_hz=np.zeros(6)).least_mac == pytest.approx(0.36)
+    assert matched(found.full_hz, found.full_hz, tilted, rigid_hz=np.zeros(6)).minimum_mac == pytest.approx(0.36)
 
 
 def test_too_few_degrees_of_freedom_are_refused() -> None:
@@ -120,4 +120,4 @@ def test_the_paper_gear_to_229_degrees_of_freedom() -> None:
     accuracy = craig_bampton(sector_mesh(PAPER, mesh_size_for(PAPER, 277_200))).accuracy
     assert len(accuracy.full_hz) == 20
     assert accuracy.worst_error < 5e-4
-    assert accuracy.least_mac > 0.999
+    assert accuracy.minimum_mac > 0.999
