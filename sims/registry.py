@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Protocol, runtime_checkable
-
-import numpy as np
 
 from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError
 from gearsig.gap import DriveSimulator, GapSimulator
-from sims.effects import EffectSetting
-from sims.machine import Operation
-from sims.simulator import ParameterValue, Simulator
+from sims.simulator import Simulator
 
 
 @cache
@@ -60,51 +54,6 @@ def gap_simulator(name: str) -> GapSimulator | DriveSimulator:
             remedy=closest_match_hint(name, found),
         )
     return found[name]
-
-
-class HasText(Protocol):
-    """A result that explains itself."""
-
-    @property
-    def text(self) -> str:
-        """For people."""
-        ...
-
-
-@runtime_checkable
-class HasUsualRate(Protocol):
-    """A simulator whose recordings are usually sampled at a rate of its own."""
-
-    @property
-    def usual_sampling_rate_hz(self) -> float:
-        """Taken where no rate is asked for."""
-        ...
-
-
-USUAL_SAMPLING_RATE_HZ = 20480.0
-"""Of vibration, for all other simulators."""
-
-
-def usual_sampling_rate_hz(model: Simulator) -> float:
-    """Return the rate at which recordings of a model are sampled where none is asked for."""
-    return model.usual_sampling_rate_hz if isinstance(model, HasUsualRate) else USUAL_SAMPLING_RATE_HZ
-
-
-@runtime_checkable
-class ChecksConvergence(Protocol):
-    """A simulator that can tell how far a smaller step changes its result."""
-
-    def check_convergence(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-    ) -> HasText:
-        """Check the very machine that would be simulated."""
-        ...
 
 
 # Which state of the simulators' code made a result.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
@@ -54,39 +55,56 @@ class Parameter:
         return cls(name, "", meaning, default=default, choices=choices)
 
 
-class Simulator(Protocol):
-    """A model that makes recordings."""
+class HasText(Protocol):
+    """A result that explains itself."""
 
     @property
-    def name(self) -> str:
-        """Short name, as on the command line."""
+    def text(self) -> str:
+        """For people."""
         ...
 
-    @property
-    def title(self) -> str:
-        """One line for people."""
-        ...
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters."""
-        ...
+@dataclass(frozen=True)
+class Simulator(ABC):
+    """A model that makes recordings; each simulator gives these fields values of its own.
+
+    Parameters
+    ----------
+    name : str
+        Short, as on the command line.
+    title : str
+        One line for people.
+    parameters : tuple of Parameter
+        All of them.
+    effects : tuple of str
+        Names of the effects that have a meaning here.
+    meaningless : tuple of str
+        What of these effects has none, and why, one sentence each.
+    usual_sampling_rate_hz : float
+        Taken where no rate is asked for.
+    """
+
+    name: str
+    title: str
+    parameters: tuple[Parameter, ...] = field(repr=False)
+    effects: tuple[str, ...] = field(repr=False)
+    meaningless: tuple[str, ...] = field(default=(), repr=False)
+    usual_sampling_rate_hz: float = field(default=20480.0, repr=False)
 
     @property
     def presets(self) -> tuple[str, ...]:
         """Names of the published or demonstration machines."""
-        ...
+        return tuple(presets(self.name))
 
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of the effects that have a meaning here."""
-        ...
+    def rig_name(self, preset_name: str) -> str:
+        """Return the name of a simulated recording's rig."""
+        return f"simulated: {preset_name}"
 
-    @property
-    def meaningless(self) -> tuple[str, ...]:
-        """What of these effects has none, and why, one sentence each."""
-        ...
+    def rig_sources(self, preset_name: str) -> list[str]:
+        """Return what such a rig says of where it comes from."""
+        return [f"simulated with the model {self.name!r}, preset {preset_name!r}; the truth stands in the recording"]
 
+    @abstractmethod
     def simulate(
         self,
         parameters: Mapping[str, ParameterValue],
@@ -112,7 +130,18 @@ class Simulator(Protocol):
             Empty: the simulator's first.
         sampling_rate_hz, duration_s : float
         """
-        ...
+
+    @abstractmethod
+    def check_convergence(
+        self,
+        parameters: Mapping[str, ParameterValue],
+        effects: Sequence[EffectSetting],
+        operation: Operation | None,
+        rng: np.random.Generator,
+        *,
+        preset: str = "",
+    ) -> HasText:
+        """Tell how far a smaller step changes the result of the very machine that would be simulated."""
 
 
 # Values of a simulator's parameters: from defaults, preset and user, checked.
@@ -272,44 +301,3 @@ def truth_of(
         ],
         "operation": {"speed_rpm": operation.speed_rpm.as_dict(), "torque_nm": operation.torque_nm.as_dict()},
     }
-
-
-# What a simulator states of itself: name, parameters, machines, effects, and where its recordings come from.
-
-
-@dataclass(frozen=True)
-class Model:
-    """Base of the simulators, which give these fields values of their own.
-
-    Parameters
-    ----------
-    name : str
-        Short, as on the command line.
-    title : str
-        One line for people.
-    parameters : tuple of Parameter
-        All of them.
-    effects : tuple of str
-        Names of the effects that have a meaning.
-    meaningless : tuple of str
-        What of them has none, and why, one sentence each.
-    """
-
-    name: str
-    title: str
-    parameters: tuple[Parameter, ...] = field(repr=False)
-    effects: tuple[str, ...] = field(repr=False)
-    meaningless: tuple[str, ...] = field(default=(), repr=False)
-
-    @property
-    def presets(self) -> tuple[str, ...]:
-        """Names of the machines."""
-        return tuple(presets(self.name))
-
-    def rig_name(self, preset_name: str) -> str:
-        """Return the name of a simulated recording's rig."""
-        return f"simulated: {preset_name}"
-
-    def rig_sources(self, preset_name: str) -> list[str]:
-        """Return what such a rig says of where it comes from."""
-        return [f"simulated with the model {self.name!r}, preset {preset_name!r}; the truth stands in the recording"]

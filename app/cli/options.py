@@ -197,7 +197,7 @@ def read_request(
     from app.cli.quantities import read_profile
     from sims.presets import is_file
     from sims.presets import preset as preset_named
-    from sims.registry import simulator, simulators, usual_sampling_rate_hz
+    from sims.registry import simulator, simulators
 
     if model is None:
         raise InputError("no model is named", allowed=", ".join(simulators()), remedy="gearsig simulate --list")
@@ -211,7 +211,7 @@ def read_request(
         None if speed is None else read_profile(speed, "speed_rpm", "rpm", duration_s),
         None if torque is None else read_profile(torque, "torque_nm", "N m", duration_s),
         duration_s,
-        quantity(fs, "Hz", "--fs") if fs else usual_sampling_rate_hz(chosen),
+        quantity(fs, "Hz", "--fs") if fs else chosen.usual_sampling_rate_hz,
         seed,
     )
 

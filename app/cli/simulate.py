@@ -95,12 +95,10 @@ def simulate(
 def _convergence(request: options.SimulationChoices) -> str:
     import numpy as np
 
-    from sims.registry import ChecksConvergence, simulator
+    from sims.registry import simulator
     from sims.simulator import operation_of
 
     model = simulator(request.model)
-    if not isinstance(model, ChecksConvergence):
-        raise InputError(f"{request.model} has no convergence check", remedy="leave out --check")
     operation = operation_of(request.model, request.preset, request.speed_rpm, request.torque_nm)
     rng = np.random.default_rng(request.seed)
     return model.check_convergence(request.parameters, request.effects, operation, rng, preset=request.preset).text

@@ -27,10 +27,10 @@ from sims.machine import Operation, Profile, WeakTooth
 from sims.mesh import PairGeometry
 from sims.presets import preset
 from sims.simulator import (
-    Model,
     Parameter,
     ParameterValue,
     ParameterValues,
+    Simulator,
     Values,
     complete_values,
     parameter,
@@ -131,18 +131,14 @@ class PreparedDrive:
 
 
 @dataclass(frozen=True)
-class ForgingManipulator(Model):
+class ForgingManipulator(Simulator):
     """Pinion and wheel of a forging manipulator: start–stop, backlash, impact; see `sims.forging`."""
 
     name: str = NAME
     title: str = "forging manipulator's drive: start–stop, backlash, impact on both flanks, stick–slip"
     parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
     effects: tuple[str, ...] = field(default=WITH_MEANING, repr=False)
-
-    @property
-    def usual_sampling_rate_hz(self) -> float:
-        """A motion controller's, 1 ms."""
-        return 1000.0
+    usual_sampling_rate_hz: float = field(default=1000.0, repr=False)  # a motion controller's, 1 ms
 
     def prepare(
         self,

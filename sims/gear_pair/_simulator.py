@@ -16,8 +16,7 @@ from sims.effects import EffectSetting, completed
 from sims.gear_pair._installed import Installed, installed_of
 from sims.machine import Machine, Operation
 from sims.presets import Preset, preset
-from sims.registry import HasText
-from sims.simulator import Model, Parameter, ParameterValue, Values, complete_values, truth_of
+from sims.simulator import HasText, Parameter, ParameterValue, Simulator, Values, complete_values, truth_of
 
 # What a simulated gear pair can be asked for: speeds, loads, sampling rates, durations.
 
@@ -136,7 +135,7 @@ Ready = TypeVar("Ready", bound=ReadyPair)
 
 
 @dataclass(frozen=True)
-class PairModel(Model, ABC, Generic[Ready]):
+class PairModel(Simulator, Generic[Ready]):
     """Base of the simulators of a gear pair."""
 
     def prepare(

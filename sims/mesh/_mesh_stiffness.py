@@ -343,7 +343,7 @@ def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, 
     shape = (len(mesh_cycles), table.n_slots)
     compliance, separation, weight = np.empty(shape), np.empty(shape), np.empty(shape)
     fill_pairs(
-        np.ascontiguousarray(mesh_cycles, dtype=np.float64),
+        np.array(mesh_cycles, dtype=np.float64),  # a copy: the kernel would be compiled again for a read-only array
         table.start,
         table.step,
         np.array(table.teeth),

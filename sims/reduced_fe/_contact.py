@@ -773,8 +773,8 @@ def _solved(
     force, tangent = (np.zeros((*shape, table.n_slots, table.n_slices)) for _ in range(2))
     greatest = float(loads[-1]) if by_force else max(float(loads[-1]), 1e-6) * 3e8
     found = loaded_contact(
-        np.ascontiguousarray(cycles, dtype=np.float64),
-        np.ascontiguousarray(loads, dtype=np.float64),
+        np.array(cycles, dtype=np.float64),  # copies: the kernel would be compiled again for read-only arrays
+        np.array(loads, dtype=np.float64),
         by_force,
         table.start,
         table.step,
