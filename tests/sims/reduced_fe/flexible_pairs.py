@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from sims.reduced_fe import NAME, FlexiblePair, ReducedPair, ready_gear
 from tests.sims.reduced_fe.synthetic import synthetic_gear
 
 
+@cache
 def pair_of(preset_name="flexible_50_50", **parameters) -> FlexiblePair:
     return ReducedPair().prepare_preset(preset(NAME, preset_name), parameters, (), None, np.random.default_rng(0)).pair
 
 
+@cache
 def synthetic_pair(**parameters) -> FlexiblePair:
     gear = synthetic_gear()
     return replace(pair_of(**parameters), gears=(gear, gear))
