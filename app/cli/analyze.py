@@ -21,7 +21,7 @@ def analyze(
     pulses_per_revolution: options.PulsesOption = 1,
     reference: options.ReferenceOption = None,
     torque: options.TorqueOption = None,
-    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
+    json: options.JsonOption = False,
     indicators: Annotated[bool, typer.Option("--indicators", help="Print the table of indicators as well.")] = False,
 ) -> None:
     """Say what a recording shows of the machine's condition, most important first.

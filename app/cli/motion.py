@@ -25,13 +25,13 @@ DATA, PICTURE = "start_stop.json", "start_stop.png"
 
 
 def start_stop(
-    recording: Annotated[Path, typer.Argument(help="Recording with the motion of both gears, better with torque.")],
+    recording: options.MotionArgument,
     rig: options.RigOption = None,
     use: options.UseOption = None,
     bandwidth: options.BandwidthOption = None,
     unwrap: options.UnwrapOption = False,
     fs: options.SamplingRateOption = None,
-    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
+    json: options.JsonOption = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {DATA} and {PICTURE}.")
     ] = None,
@@ -92,7 +92,7 @@ DatumOption = Annotated[
 
 
 def force(
-    recording: Annotated[Path, typer.Argument(help="Recording with the motion of both gears, better with torque.")],
+    recording: options.MotionArgument,
     rig: options.RigOption = None,
     use: options.UseOption = None,
     bandwidth: options.BandwidthOption = None,
@@ -102,7 +102,7 @@ def force(
         bool, typer.Option("--noise", help="Also: how much noise until the piecewise model is no longer nearer.")
     ] = False,
     fs: options.SamplingRateOption = None,
-    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
+    json: options.JsonOption = False,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {FORCE_DATA}, {TABLE}, {FORCE_PICTURE}."),
@@ -192,7 +192,7 @@ def identify(
     bandwidth: options.BandwidthOption = None,
     unwrap: options.UnwrapOption = False,
     fs: options.SamplingRateOption = None,
-    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")] = False,
+    json: options.JsonOption = False,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="FILE", help="Rig file (.toml) to write, with all that was identified."),

@@ -63,6 +63,8 @@ ChannelsOption = Annotated[
         help="Use this channel only; may be given several times. Default: all accelerations.",
     ),
 ]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")]
+JobsOption = Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")]
 
 
 def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:
@@ -118,6 +120,7 @@ def torque_of(text: str | None) -> float | None:
     return positive(quantity(text, "N m", "--torque"), "--torque", "N m") if text else None
 
 
+ModelArgument = Annotated[str, typer.Argument(help="Model, e.g. cracked; `gearsig simulate --list` shows them.")]
 PresetOption = Annotated[
     str,
     typer.Option(
@@ -288,6 +291,7 @@ def _split(text: str, where: str, example: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
+MotionArgument = Annotated[Path, typer.Argument(help="Recording with the motion of both gears, better with torque.")]
 UseOption = Annotated[
     list[str] | None,
     typer.Option(

@@ -25,7 +25,7 @@ def report(
     pulses_per_revolution: options.PulsesOption = 1,
     reference: options.ReferenceOption = None,
     torque: options.TorqueOption = None,
-    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")] = None,
+    jobs: options.JobsOption = None,
 ) -> None:
     """Write one self-contained HTML page per recording, and an index page that compares them.
 

@@ -24,7 +24,7 @@ MAX_REASONS = 5
 
 
 def sweep(
-    model: Annotated[str, typer.Argument(help="Model, e.g. cracked; `gearsig simulate --list` shows them.")],
+    model: options.ModelArgument,
     vary: Annotated[
         list[str],
         typer.Option(
@@ -51,7 +51,7 @@ def sweep(
         ),
     ] = False,
     extension: Annotated[str, typer.Option("--format", metavar="EXT", help="csv, h5, parquet, wav or mat.")] = "h5",
-    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")] = None,
+    jobs: options.JobsOption = None,
 ) -> None:
     """Simulate a grid of conditions and faults on all processors, into a folder with an index.
 
@@ -82,7 +82,7 @@ def sweep(
 
 
 def bifurcation(
-    model: Annotated[str, typer.Argument(help="Model, e.g. cracked; `gearsig simulate --list` shows them.")],
+    model: options.ModelArgument,
     vary: Annotated[
         str,
         typer.Option(
@@ -131,7 +131,7 @@ def bifurcation(
     ] = False,
     fs: options.RateOption = "20480Hz",
     seed: options.SeedOption = 0,
-    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")] = None,
+    jobs: options.JobsOption = None,
 ) -> None:
     """Draw a bifurcation diagram: Poincaré points of the steady motion over speed, load, backlash, or anything else.
 
