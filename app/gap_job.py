@@ -1,14 +1,13 @@
 """A gap diagnosis from files to a folder of results, here or in a process of its own that can be stopped.
 
-A page starts `python -P -m app.gap_job FOLDER`. The folder holds the request; progress.json, and in the end results or
-an error, come beside it. The process ends when its standard input does: nothing goes on for a parent that is gone.
+A page starts `python -P -m app.gap_job FOLDER`. The folder holds request.json; progress.json, and in the end results or
+error.json, come beside it. The process ends when its standard input does: nothing goes on for a parent that is gone.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import pickle
 import secrets
 import shutil
 import signal
@@ -18,16 +17,16 @@ import sysconfig
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 from threading import Thread
 from time import monotonic
-from typing import Any
 
 from app.stopping import stop
-from gearsig.errors import GearsigError, InputError
+from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.gap import GapReport, GapRequest, read_gap_inputs
-from gearsig.report import check_writable, read_gap_json, write_gap_json, write_gap_page, write_text
+from gearsig.report import check_writable, from_plain, plain, read_gap_json, write_gap_json, write_gap_page, write_text
 
 Stage = Callable[[str, float], None]
 READING = 0.03
@@ -148,7 +147,7 @@ def _is_ours(path: Path) -> bool:
     return isinstance(found, dict) and found.get("schema") == "gearsig.gap"
 
 
-REQUEST, PROGRESS, ERROR, RESULTS, LOG = "request.pickle", "progress.json", "error.pickle", "results", "log.txt"
+REQUEST, PROGRESS, ERROR, RESULTS, LOG = "request.json", "progress.json", "error.json", "results", "log.txt"
 EXIT_REFUSED = 2
 EVERY_S = 0.2
 """Progress is written no oftener."""
@@ -156,6 +155,14 @@ EVERY_S = 0.2
 
 class JobFailedError(GearsigError):
     """The process ended without a result and without a reason of its own."""
+
+
+@dataclass(frozen=True)
+class _JobRequest:
+    asked: GapRequest
+    model: str
+    cache: Path | None
+    command: str
 
 
 class Job:
@@ -171,7 +178,7 @@ class Job:
 
     def __init__(self, folder: Path, asked: GapRequest, model: str, *, cache: Path | None, command: str = "") -> None:
         self.folder, self.was_stopped = folder, False
-        _write(folder / REQUEST, (asked, model, cache, command))
+        write_text(folder / REQUEST, json.dumps(plain(_JobRequest(asked, model, cache, command))))
         log = (folder / LOG).open("w", encoding="utf-8")
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "app.gap_job", str(folder)],  # -P: a user's own app.py there is not ours
@@ -212,7 +219,7 @@ class Job:
             Why there is none.
         """
         if (self.folder / ERROR).exists():
-            raise _read(self.folder / ERROR)
+            raise error_from_json((self.folder / ERROR).read_text(encoding="utf-8"))
         if not (self.folder / RESULTS / JSON).exists():
             raise JobFailedError(f"the diagnosis ended without a result ({self._last_words()})")
         return read_gap_json(self.folder / RESULTS / JSON)
@@ -257,15 +264,19 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
             process.stdin.close()
 
 
-def _write(path: Path, value: object) -> None:
-    """Write what the other process reads; the file appears only when it is complete."""
-    unfinished = path.with_suffix(".part")
-    unfinished.write_bytes(pickle.dumps(value))
-    unfinished.replace(path)
+def error_to_json(error: GearsigError) -> str:
+    """Return an error as a text that `error_from_json` makes it from again, with its parts."""
+    parts = {name: part for name, part in vars(error).items() if isinstance(part, str)} or {"reason": str(error)}
+    return json.dumps({"kind": type(error).__name__, "parts": parts})
 
 
-def _read(path: Path) -> Any:
-    return pickle.loads(path.read_bytes())  # noqa: S301 - of a folder that only this user can write to
+def error_from_json(text: str) -> GearsigError:
+    """Return the error that `error_to_json` made the text of."""
+    written = json.loads(text)
+    parts = written["parts"]
+    if written["kind"] == InputError.__name__:
+        return InputError(**parts)
+    return RefusalError(**parts) if written["kind"] == RefusalError.__name__ else GearsigError(*parts.values())
 
 
 class _Progress:
@@ -283,12 +294,14 @@ class _Progress:
 
 def main(folder: Path) -> int:
     """Diagnose what the folder asks for."""
-    asked, model, cache, command = _read(folder / REQUEST)
+    request: _JobRequest = from_plain(
+        _JobRequest, json.loads((folder / REQUEST).read_text(encoding="utf-8")), where=REQUEST
+    )
     try:
-        report = run_gap(asked, model, cache=cache, on_stage=_Progress(folder / PROGRESS))
-        write_results(report, folder / RESULTS, command=command)
+        report = run_gap(request.asked, request.model, cache=request.cache, on_stage=_Progress(folder / PROGRESS))
+        write_results(report, folder / RESULTS, command=request.command)
     except GearsigError as error:
-        _write(folder / ERROR, error)
+        write_text(folder / ERROR, error_to_json(error))
         return EXIT_REFUSED
     return 0
 

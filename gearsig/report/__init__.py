@@ -38,6 +38,7 @@ from gearsig.report._gap_page import (
     write_gap_page,
 )
 from gearsig.report._index import Entry, Failure, entry_of, write_index
+from gearsig.report._json import from_plain, plain
 from gearsig.report._motion_text import (
     force_csv,
     force_json,
@@ -89,6 +90,7 @@ __all__ = [
     "force_csv",
     "force_json",
     "force_text",
+    "from_plain",
     "gap_figures",
     "gap_from_dict",
     "gap_page_html",
@@ -111,6 +113,7 @@ __all__ = [
     "page_html",
     "page_names",
     "place_rows",
+    "plain",
     "read_gap_json",
     "reference_text",
     "references_text",

@@ -1,13 +1,12 @@
 """A diagnosis in a process of its own: progress, result, refusal, crash, stop; nothing is left behind."""
 
 import os
-import pickle
 import time
 from pathlib import Path
 
 import pytest
 
-from app.gap_job import Job, JobFailedError, private_folder
+from app.gap_job import Job, JobFailedError, error_from_json, error_to_json, private_folder
 from app.samples import sample_folder
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.gap import GapRequest
@@ -109,7 +108,7 @@ def test_a_crash_is_said_with_its_last_words(job):
     [InputError("a", where="b", allowed="c", remedy="d"), RefusalError("a", remedy="b"), GearsigError("something")],
 )
 def test_errors_come_over_from_another_process(error):
-    again = pickle.loads(pickle.dumps(error))  # noqa: S301 - of this very process
+    again = error_from_json(error_to_json(error))
     assert type(again) is type(error)
     assert str(again) == str(error)
     assert vars(again) == vars(error)
