@@ -51,7 +51,7 @@ SEED = 0
 LARGEST_TORQUE_DIFFERENCE = 0.25
 """Stated torques of a recording and its reference, relative."""
 
-LONGEST_RUN_S, MOST_REVOLUTIONS = 5.0, 24.0
+LONGEST_RUN_S, MAX_REVOLUTIONS = 5.0, 24.0
 """Of a simulation: longer ones say no more; but so many revolutions of the slower shaft at least."""
 TRIAL_S, TRIAL_REVOLUTIONS = 2.0, 20.0
 """The same of a run that tries an effect: it differs from the sound run by that effect only, not by noise."""
@@ -114,7 +114,7 @@ class Condition:
 
 def run_length_s(now: ReducedRecording) -> float:
     """Return the length of a simulation that the features can be read from."""
-    return max(LONGEST_RUN_S, MOST_REVOLUTIONS / _slower_hz(now))
+    return max(LONGEST_RUN_S, MAX_REVOLUTIONS / _slower_hz(now))
 
 
 def _slower_hz(now: ReducedRecording) -> float:
@@ -259,14 +259,14 @@ def halves(gathered: ReducedRecording) -> tuple[ReducedRecording, ReducedRecordi
 NEAR_MESH, SLOW = 2, 5
 """Orders of a shaft beside a mesh harmonic that belong to it, and orders from 0 that are the shaft's own."""
 
-LEAST_MESH_SHARE = 0.5
+MIN_MESH_SHARE = 0.5
 """Of what repeats with either shaft. Machines of the simulator have 0.7 and more, the heaviest damage included; a pair
 of 55/75 teeth taken for one of 29/47 has 0.45."""
 
-LEAST_PATTERN = 3.0
+MIN_PATTERN = 3.0
 """Power of the lines that tell teeth apart over that of the noise in them: with less, any two patterns differ."""
 
-LEAST_AGREEMENT = 0.6
+MIN_AGREEMENT = 0.6
 """Of both gears' patterns. One damaged gear lowers its own to 0.2, and leaves the other's at 0.8 and more; another
 specimen of the same drawing has 0.2 and 0.5, and so have two gears that have worn heavily."""
 
@@ -276,7 +276,7 @@ WELL_EXPLAINED, HARDLY_EXPLAINED = 0.5, 0.15
 ones included, the right number of teeth has 0.35 and more (0.08 with the heaviest damage, and then no other number has
 much); most wrong ones have less than 0, a few 0.2 to 0.6."""
 
-FEWEST_TEETH, MOST_TEETH = 12, 200
+MIN_TEETH, MAX_TEETH = 12, 200
 
 LOST_DB, OWN_DB = 10.0, 6.0
 """By how much one tooth's burst has become less since the reference, and by how much it stands above the reference's
@@ -332,7 +332,7 @@ def _explained(now: ReducedRecording, side: int) -> dict[int, float]:
     shares = np.mean(whole, axis=0)
     orders = np.arange(len(shares))
     found = {}
-    for teeth in range(FEWEST_TEETH, min(MOST_TEETH, len(shares) // 2) + 1):
+    for teeth in range(MIN_TEETH, min(MAX_TEETH, len(shares) // 2) + 1):
         near = orders_from_mesh(orders, teeth) <= NEAR_MESH
         by_chance = float(near[SLOW + 1 :].mean())
         found[teeth] = (float(shares[near].sum()) - by_chance) / (1.0 - by_chance)
@@ -386,7 +386,7 @@ def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
     Gears of less than some 15 teeth are not noticed: any order lies near one of their harmonics.
     """
     share = max(_mesh_share(now, side) for side in (DRIVER, DRIVEN))
-    if share >= LEAST_MESH_SHARE or wrong_teeth(now, name):  # that is said by itself
+    if share >= MIN_MESH_SHARE or wrong_teeth(now, name):  # that is said by itself
         return []
     remark = (
         f"{name}: only {100 * share:.0f} % of what repeats with a shaft lies at mesh harmonics of the rig's "
@@ -403,7 +403,7 @@ def strange_pattern(now: ReducedRecording, reference: ReducedRecording, name: st
         agreements = [turned_difference(now, reference, side)[1] for side in (DRIVER, DRIVEN)]
     except RefusalError:
         return []
-    if max(agreements) >= LEAST_AGREEMENT:
+    if max(agreements) >= MIN_AGREEMENT:
         return []
     both = " and ".join(f"{max(a, 0.0):.2f}" for a in agreements)
     remark = (
@@ -419,7 +419,7 @@ def _has_pattern(gathered: ReducedRecording, side: int) -> bool:
     for average in gathered.averages(side):
         used = telling_teeth_apart(np.arange(len(average.lines)), average.teeth)
         clearest = max(clearest, float(np.sum(np.abs(average.lines[used]) ** 2) / np.sum(average.noise[used])))
-    return clearest >= LEAST_PATTERN
+    return clearest >= MIN_PATTERN
 
 
 def _mesh_share(now: ReducedRecording, side: int) -> float:

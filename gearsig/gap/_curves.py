@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.gap._change import turned_difference
 from gearsig.gap._features import (
-    MOST_SHAFT_ORDERS,
+    MAX_SHAFT_ORDERS,
     SIDEBANDS,
     SIDES,
     STEPS_PER_TOOTH,
@@ -104,7 +104,7 @@ def average_features(side: int, teeth: int, n: int) -> list[str]:
     found = []
     for order in range(n):
         harmonic, offset = round(order / teeth), abs((order + teeth // 2) % teeth - teeth // 2)
-        if order <= MOST_SHAFT_ORDERS and 2 * order < teeth:
+        if order <= MAX_SHAFT_ORDERS and 2 * order < teeth:
             found.append(f"shaft.{name}.{max(order, 1)}" if order <= 3 else f"shaft.{name}.low")
         elif offset == 0 and harmonic <= N_MESH_HARMONICS:
             found.append(f"mesh.share.{harmonic}")

@@ -282,7 +282,7 @@ def diagnose_gap(
             *_of_the_fit(named),
         ),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
-        doubts=warnings,
+        warnings=warnings,
     )
 
 

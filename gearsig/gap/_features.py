@@ -19,7 +19,7 @@ from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ChannelSums
 
 N_SIDEBAND_HARMONICS = 5
 SIDEBANDS = {"1": (1, 1), "2": (2, 2), "3to5": (3, 5), "6to12": (6, 12)}
-MOST_SHAFT_ORDERS = 30
+MAX_SHAFT_ORDERS = 30
 SIDES = ("driver", "driven")
 
 NamedValue = tuple[str, float]
@@ -148,7 +148,7 @@ def _shaft_orders(power: FloatArray, teeth: int, highest: int, total: float, sid
         level = decibel(power[n])
         yield f"shaft.{side}.{n}", level
         yield f"shaft.{side}.{n}.to_mesh", level - decibel(total)
-    last = min(MOST_SHAFT_ORDERS, teeth - 3, highest)
+    last = min(MAX_SHAFT_ORDERS, teeth - 3, highest)
     rest = power[4 : last + 1]
     strongest = int(np.argmax(rest))
     yield f"shaft.{side}.strongest", decibel(float(rest[strongest] / np.median(rest)))
@@ -237,7 +237,7 @@ def _kurtosis(lines: NDArray[np.complex128]) -> float:
 
 SLIP = 0.015
 """Rolling elements slip: their orders are sought within this share of the kinematic ones."""
-MOST_SLIPS = 201
+MAX_SLIPS = 201
 
 Known = tuple[float, float]
 """An order, and by how much it may slip."""
@@ -326,7 +326,7 @@ def best_of_family(
     harmonics = harmonics[harmonics * (1.0 + slip) / step < levels.shape[1] - 1]
     if not len(harmonics):
         return 0.0, 0, order
-    n_slips = min(MOST_SLIPS, 2 * int(np.ceil(slip * harmonics.max() / step)) + 1)  # a line apart at the highest
+    n_slips = min(MAX_SLIPS, 2 * int(np.ceil(slip * harmonics.max() / step)) + 1)  # a line apart at the highest
     shifts = np.linspace(-slip, slip, n_slips)
     places = np.rint(np.outer(1.0 + shifts, harmonics) / step).astype(np.intp)
     means = levels[:, places].mean(axis=2)
@@ -406,7 +406,7 @@ def _bearing_orders(frame: GearFrame) -> list[Known]:
 # --------------------
 
 
-LEAST_SHARE = 1e-6
+MIN_SHARE = 1e-6
 """Below one sample of any record."""
 
 
@@ -424,7 +424,7 @@ def broadband_features(gathered: ReducedRecording, channels: Sequence[ChannelSum
     yield "raw.level", float(10.0 * np.log10(raw[:, 0]).mean())
     yield "raw.kurtosis", float((10.0 * np.log10(raw[:, 1] / raw[:, 0] ** 2)).min())
     # Without the block that holds the extreme, the share may be 0.
-    yield "raw.near_the_extreme", decibel(max(float(raw[:, 2].max()), LEAST_SHARE))
+    yield "raw.near_the_extreme", decibel(max(float(raw[:, 2].max()), MIN_SHARE))
 
 
 def speed_features(gathered: ReducedRecording) -> Iterator[NamedValue]:

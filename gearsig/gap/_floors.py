@@ -139,7 +139,7 @@ WITHIN, ACROSS = 8, 4
 PRIOR_WEIGHT = 4.0
 """Degrees of freedom that a family's median scatter counts for beside a feature's own."""
 
-LEAST_SCATTER_DB = 0.05
+MIN_SCATTER_DB = 0.05
 
 _TAIL = 0.05
 
@@ -321,7 +321,7 @@ def pooled_scatter(change: Features) -> FloatArray:
     Source: G. K. Smyth, *Linear models and empirical Bayes methods for assessing differential expression in microarray
     experiments* (Statistical Applications in Genetics and Molecular Biology, 2004).
     """
-    variance = np.maximum(change.scatter, LEAST_SCATTER_DB) ** 2
+    variance = np.maximum(change.scatter, MIN_SCATTER_DB) ** 2
     degrees = _degrees(change)
     pooled = np.empty_like(variance)
     for members in family_members(change.names).values():
@@ -355,7 +355,7 @@ def independent_whole(names: tuple[str, ...]) -> float:
 
 
 POPULATION_FILE = Path(__file__).with_name("population.npz")
-MOST_BYTES = 1_000_000_000
+MAX_BYTES = 1_000_000_000
 """Of its arrays; they have nineteen million."""
 MAKE_POPULATION = "in a checkout of the project: python -m app.studies.gap.population simulate, then pack"
 INDEPENDENT = "independent"
@@ -495,7 +495,7 @@ def _read(path: Path, left_out: str) -> Population:
     if left_out:
         whole = _read(path, "")
         return whole.of_rows(whole.simulators != left_out)
-    arrays = read_arrays(path, MOST_BYTES)
+    arrays = read_arrays(path, MAX_BYTES)
     if arrays is None:
         raise InputError(
             "the population is not there, or damaged",

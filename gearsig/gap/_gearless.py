@@ -64,7 +64,7 @@ SAME_EDGE = 0.1
 """Relative, of a band's edges."""
 GREW = "Whether it has grown cannot be told."
 
-LEAST_RISE_DB = 6.0
+MIN_RISE_DB = 6.0
 """Twice the reference's level: less is between two recordings of the same machine."""
 
 
@@ -162,12 +162,12 @@ def examined(
             continue
         earlier = None if reference is None else in_reference(finding, reference)
         rise_db = None if earlier is None else _rise_db(finding, earlier)
-        if earlier is None or finding.kind is Kind.FAULT or (rise_db is not None and rise_db >= LEAST_RISE_DB):
+        if earlier is None or finding.kind is Kind.FAULT or (rise_db is not None and rise_db >= MIN_RISE_DB):
             standing.append(Standing(finding, name, rise_db))
         elif rise_db is None:
             notices.append(f"{name}: {finding.title.rstrip('.')}; the reference shows it too, in another band. {GREW}")
-    doubts = tuple(f"{name}: {f.title}" for f in analysis.findings if f.kind in (Kind.DATA_PROBLEM, Kind.CANNOT_TELL))
-    return ExaminedRecording(name, analysis, angle, reference, tuple(standing), (*notices, *doubts))
+    warnings = tuple(f"{name}: {f.title}" for f in analysis.findings if f.kind in (Kind.DATA_PROBLEM, Kind.CANNOT_TELL))
+    return ExaminedRecording(name, analysis, angle, reference, tuple(standing), (*notices, *warnings))
 
 
 def surest(every: Sequence[ExaminedRecording]) -> list[Standing]:
@@ -557,7 +557,7 @@ HIGHEST_HARMONIC, SAME_ORDER = 40, 1e-3
 def stood_out(
     recording: PreparedRecording, references: Sequence[PreparedRecording], name: str
 ) -> tuple[list[Standing], list[str], list[str]]:
-    """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; remarks; doubts.
+    """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; remarks; warnings.
 
     The catalogue's effects are compared by features of known places; a strange family is one feature among a hundred
     there and easily lost. The analysis looks for it by itself. A strange line and a family that may well be chance are
@@ -577,7 +577,7 @@ def stood_out(
         with suppress(RefusalError):
             healthy = [analysed(nearest, "its reference")]
     found = examined(name, now, healthy)
-    doubts = _fault_of_reference(healthy[0][0], now[0], name) if healthy else []
+    warnings = _fault_of_reference(healthy[0][0], now[0], name) if healthy else []
     weak = [one for one in found.standing if one.finding.code == LINE or one.finding.kind is Kind.NOTICE]
     strong = [one for one in found.standing if one not in weak]
     remarks = [
@@ -585,7 +585,7 @@ def stood_out(
         for one in weak
         if not (one.finding.code == LINE and any(_is_harmonic(one, family) for family in strong))
     ]
-    return strong, remarks, doubts
+    return strong, remarks, warnings
 
 
 def beside_standing(outcome: GapOutcome, standing: Sequence[Standing]) -> tuple[GapOutcome, list[str]]:

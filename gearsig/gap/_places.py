@@ -19,7 +19,7 @@ from gearsig.gap._change import (
 )
 from gearsig.gap._features import (
     LOWEST_STRANGE,
-    MOST_SHAFT_ORDERS,
+    MAX_SHAFT_ORDERS,
     N_FAMILY,
     N_SHAFT_FAMILY,
     N_SIDEBAND_HARMONICS,
@@ -104,13 +104,13 @@ def _joined(standing: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
 RACE_WORDS = {"outer": "outer race", "inner": "inner race", "ball": "rolling elements", "cage": "cage"}
 A_FAMILY_IS_HEARD = 0.6
 """A family's rise over that of the strongest line, from which on the line is taken for one of the family's."""
-LEAST_OF_A_FAMILY_DB = 3.0
-FEWEST_OF_A_FAMILY = 3
+MIN_OF_A_FAMILY_DB = 3.0
+MIN_OF_A_FAMILY = 3
 """Lines free of the shafts' orders, of the four."""
 UPWARDS, N_SLIPS = 0.005, 41
 """Rolling elements lag behind; only the contact angle brings an outer race's order up a little."""
 HIGHEST_MULTIPLE, MISSED = 12, 0.004
-MOST_OF_A_BAND = 0.5
+MAX_OF_A_BAND = 0.5
 """Of a band's new power in one line: it is a tone, not noise."""
 _SUPPLY_WANDERS = 0.004
 _LINE_WIDTH = 3
@@ -184,7 +184,7 @@ def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_d
     line = powers[0][row, max(peak - _LINE_WIDTH, 0) : peak + _LINE_WIDTH + 1].sum()
     old = np.arange(powers[1].shape[1]) * comparison.other.order_step * now.speed_hz
     before = powers[1][row, (old >= band_hz[0]) & (old <= band_hz[1])].sum()
-    if line < MOST_OF_A_BAND * max(float(powers[0][row, within].sum() - before), 1e-300):
+    if line < MAX_OF_A_BAND * max(float(powers[0][row, within].sum() - before), 1e-300):
         return None
     order = float(orders[peak])
     levels = _residual_levels(comparison)
@@ -237,7 +237,7 @@ def _widened(levels: FloatArray) -> FloatArray:
 def _told_apart(family: _Found, line: _Found) -> _Found:
     """Return the family if it is heard beside the strongest line, or that line is one of its multiples."""
     harmonic = family.orders[0] / line.orders[0] if family.orders else 0.0
-    if family.rise_db < LEAST_OF_A_FAMILY_DB or (harmonic > 1.5 and abs(harmonic / round(harmonic) - 1.0) < MISSED):
+    if family.rise_db < MIN_OF_A_FAMILY_DB or (harmonic > 1.5 and abs(harmonic / round(harmonic) - 1.0) < MISSED):
         return line  # of a lower line's harmonics, the family has but some
     multiple = line.orders[0] / family.orders[0]
     is_one = round(multiple) in range(1, HIGHEST_MULTIPLE + 1) and abs(multiple / round(multiple) - 1.0) < MISSED
@@ -274,7 +274,7 @@ def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[fl
     free = inside & ~levels.taken[lines]
     values = np.where(free, rise[:, lines], np.inf)  # (row, slip, harmonic)
     second = np.sort(values, axis=2)[:, :, 1]
-    second = np.where(free.sum(axis=1) >= FEWEST_OF_A_FAMILY, second, -np.inf)
+    second = np.where(free.sum(axis=1) >= MIN_OF_A_FAMILY, second, -np.inf)
     # Of slips that are as good, the one whose lines are strongest in all.
     mean = np.where(free, rise[:, lines], 0.0).mean(axis=2)
     row, best = np.unravel_index(int(np.argmax(second + 1e-3 * mean)), second.shape)
@@ -351,8 +351,8 @@ def _hum(comparison: ComparedPair) -> LocatedChange:
 FURTHEST_SIDEBAND = 12
 WORTH_NAMING = 0.25
 """Of the largest change of power: what changed by less is not named, be its ratio ever so large."""
-MOST_ORDERS = 6
-LEAST_CHANGE_DB = 1.0
+MAX_ORDERS = 6
+MIN_CHANGE_DB = 1.0
 """Of a sideband or shaft order; features that saw more saw noise."""
 EXPLAINED = 0.5
 """Of the largest change of power, what a shaft's own lines must hold of it."""
@@ -370,7 +370,7 @@ def mesh_spot(comparison: ComparedPair) -> LocatedChange | None:
     if strongest is None:
         return None
     row, best, change = strongest
-    if abs(change) < LEAST_CHANGE_DB:  # the lines hardly moved: what was scored is a ratio, of harmonics or of sensors
+    if abs(change) < MIN_CHANGE_DB:  # the lines hardly moved: what was scored is a ratio, of harmonics or of sensors
         scored = comparison.strongest("mesh.", "alike.")
         change = comparison.change_db[scored]
         title = f"{feature_words(scored, frame)}, {by_decibels(change)}"
@@ -404,7 +404,7 @@ def sideband_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
         if k * teeth + 1 < n
     ]
     strongest = _strongest_group(now, other, groups)
-    if strongest is None or abs(strongest[2]) < LEAST_CHANGE_DB:
+    if strongest is None or abs(strongest[2]) < MIN_CHANGE_DB:
         return None
     row, best, change = strongest
     lines = _largest_lines(now.own[row] - other.own[row], groups[best])
@@ -419,12 +419,12 @@ def shaft_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
     """Return the low order of a shaft that changed most."""
     both = _both(comparison, side, relative=False)
     frame = comparison.now.frame
-    last = min(MOST_SHAFT_ORDERS, frame.teeth[side] - 3, both[0].power.shape[1] - 1)
+    last = min(MAX_SHAFT_ORDERS, frame.teeth[side] - 3, both[0].power.shape[1] - 1)
     scored = Feature.of(comparison.strongest(f"shaft.{SIDES[side]}"))
     first = scored.detail.partition(".")[0]  # the order, or "strongest" or "low"
     groups = [[int(first)]] if first.isdigit() else [[order] for order in range(1, last + 1)]
     strongest = _strongest_group(*both, groups)
-    if strongest is None or abs(strongest[2]) < LEAST_CHANGE_DB:
+    if strongest is None or abs(strongest[2]) < MIN_CHANGE_DB:
         return None
     row, best, change = strongest
     order = groups[best][0]
@@ -491,7 +491,7 @@ def _strongest_group(now: _Lines, other: _Lines, groups: Sequence[list[int]]) ->
 def _largest_lines(moved: FloatArray, lines: list[int]) -> list[int]:
     """Return the lines of one group whose power changed most, the largest first."""
     amounts = np.abs(moved[lines])
-    order = np.argsort(amounts)[::-1][:MOST_ORDERS]
+    order = np.argsort(amounts)[::-1][:MAX_ORDERS]
     return [lines[i] for i in order if amounts[i] >= WORTH_NAMING * amounts.max()]
 
 
@@ -514,7 +514,7 @@ def _channel(comparison: ComparedPair, row: int) -> str:
 # --------------------
 
 
-LEAST_SPEED_CHANGE = 3e-4
+MIN_SPEED_CHANGE = 3e-4
 """Relative; a steadier speed is as good as constant."""
 PILED_UP = 1e-3
 """Share of samples within half a percent of the extreme; of a vibration with random peaks, some 1e-5 lie there."""
@@ -551,7 +551,7 @@ def speed_spot(comparison: ComparedPair) -> LocatedChange | None:
     name = comparison.strongest("speed.")
     change = comparison.change_db[name]
     drift, swing, _, frequency_hz = comparison.now.speed
-    if max(abs(drift), swing, *(abs(figure) for figure in comparison.other.speed[:2])) < LEAST_SPEED_CHANGE:
+    if max(abs(drift), swing, *(abs(figure) for figure in comparison.other.speed[:2])) < MIN_SPEED_CHANGE:
         return None
     if name == "speed.drift":
         return LocatedChange(f"speed drifts by {100 * drift:.2g} % along the record", change)
@@ -680,7 +680,7 @@ def _all_round(comparison: ComparedPair, side: int, shaft: str, channel: str) ->
     return LocatedChange(f"{what} of {shaft} all round, {by}", change, channel=channel)
 
 
-LEAST_SHARE = 0.01
+MIN_SHARE = 0.01
 
 REPEATED = ("floor.to_signal", "floor.total", "raw.level")
 """Features that only repeat what others say of a place."""
@@ -728,7 +728,7 @@ def gap_places(
     comparison = ComparedPair(now, other, is_reference, _named(change.names, distances), _named(change.names, both))
     members = {family: _telling(change.names, rows) for family, rows in family_members(change.names).items()}
     energies = {family: max(family_size(both[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
-    least = LEAST_SHARE * sum(energies.values())
+    least = MIN_SHARE * sum(energies.values())
     spots = {family: _spot(comparison, family) for family, energy in energies.items() if energy > least}
     following = {family for family, spot in spots.items() if spot is not None and spot.follows}
     total = sum(energy for family, energy in energies.items() if family not in following)

@@ -14,12 +14,12 @@ from gearsig.errors import InputError
 from gearsig.gap._features import SIDES, Feature
 from gearsig.gap._floors import family_members, t_quantile
 from gearsig.gap._simulator import Added
-from gearsig.gap._types import LEAST_FORETOLD, Interval, Shrinkage
+from gearsig.gap._types import MIN_PREDICTED, Interval, Shrinkage
 
 STEPS = 41
 """Severities that are tried, over the whole range and again about the best."""
 
-LEAST_TRIED = 0.3
+MIN_TRIED = 0.3
 """Times the least simulated severity."""
 
 LARGEST_DISTANCE = 6.0
@@ -110,7 +110,7 @@ class EffectPath:
 
     def tried(self) -> FloatArray:
         """Return the severities that a fit looks at."""
-        return np.geomspace(LEAST_TRIED * self.severities[0], self.severities[-1], STEPS)
+        return np.geomspace(MIN_TRIED * self.severities[0], self.severities[-1], STEPS)
 
 
 @dataclass(frozen=True)
@@ -557,7 +557,7 @@ def shrinkage(
 
 def _telling(folds: Sequence[Fold], scores: Sequence[_Score]) -> tuple[Sequence[Fold], Sequence[_Score]]:
     """Return the folds in which the effect shows on the simulator, and their scores; all where it does in none."""
-    shown = [i for i, score in enumerate(scores) if score.foretold >= LEAST_FORETOLD] or range(len(scores))
+    shown = [i for i, score in enumerate(scores) if score.foretold >= MIN_PREDICTED] or range(len(scores))
     return [folds[i] for i in shown], [scores[i] for i in shown]
 
 

@@ -122,7 +122,7 @@ class LinearRule:
 # --------------------
 
 
-MOST_BYTES = 200_000_000
+MAX_BYTES = 200_000_000
 """Of a file's arrays; a real one has a tenth."""
 
 _MODULES = ("_change", "_features", "_floors", "_recognition")
@@ -135,7 +135,7 @@ Fitted = tuple[tuple[str, ...], Trees, LinearRule | None]
 
 def read_fitted(name: str) -> Fitted | None:
     """Return what was kept under a name for this very code and population; None where nothing was, or it is damaged."""
-    arrays = read_arrays(_path(name), MOST_BYTES)
+    arrays = read_arrays(_path(name), MAX_BYTES)
     if arrays is None:
         return None
     try:

@@ -46,13 +46,13 @@ from gearsig.processes import can_be_sent, process_pool
 
 
 _ARRAYS = ("sound", "sound_changes", "changes")
-MOST_BYTES = 100_000_000
+MAX_BYTES = 100_000_000
 """Of a bank's arrays; a real one has less than one."""
 
 
 def read_bank(path: Path, key: str) -> Bank | None:
     """Return the bank that a file holds for this key, None where there is no such file, or it is damaged or foreign."""
-    data = read_arrays(path, MOST_BYTES)
+    data = read_arrays(path, MAX_BYTES)
     if data is None:
         return None
     try:
@@ -603,7 +603,7 @@ def refuse_where_none_ran(tried: dict[str, TriedEffect], names: Sequence[str], t
 WORTH_IT = 0.05
 """Share of the gap that a further effect must take away to be shown."""
 
-MOST_ADDED = 2
+MAX_ADDED = 2
 
 
 def steps_of(
@@ -611,7 +611,7 @@ def steps_of(
 ) -> tuple[GapStep, ...]:
     """Return the gap before, and what is left with the likeliest effect, then with the next one as well."""
     folds = folds_of(conditions)
-    names = [c.name for c in causes if c.name in tried][:MOST_ADDED]
+    names = [c.name for c in causes if c.name in tried][:MAX_ADDED]
     steps = [GapStep("before", _left(conditions, folds, []))]
     added: list[TriedEffect] = []
     for name in names:

@@ -212,7 +212,7 @@ class Interval:
         return f"{write(self.low)} or more" if isinf(self.high) else f"{write(self.low)} to {write(self.high)}"
 
 
-LEAST_FORETOLD = 0.5
+MIN_PREDICTED = 0.5
 """Floors: what a simulator changes by less tells nothing, whether the gap shrinks or grows."""
 
 
@@ -255,7 +255,7 @@ class Shrinkage:
     @property
     def is_foretold(self) -> bool:
         """Whether the simulator shows enough of the effect for a shrink to mean anything."""
-        return self.foretold is None or self.foretold >= LEAST_FORETOLD
+        return self.foretold is None or self.foretold >= MIN_PREDICTED
 
 
 @dataclass(frozen=True)
@@ -421,7 +421,7 @@ class GapReport:
         Empty where there is no reference.
     notices : tuple of str
         What the reader should know.
-    doubts : tuple of str
+    warnings : tuple of str
         What must be checked first, where there is strong evidence of it: a wrong rig file, or recording and reference
         exchanged. The rest of the report is as if it were not so.
     twin_toml : str
@@ -446,7 +446,7 @@ class GapReport:
     averages: tuple[AverageCurves, ...] = ()
     notices: tuple[str, ...] = ()
     twin_toml: str = field(default="", repr=False)
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def is_simulated(self) -> bool:

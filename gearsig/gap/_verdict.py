@@ -23,7 +23,7 @@ def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
 NO_SIMULATION = (
     "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
 )
-TOGETHER, MOST_RIVALS = 0.9, 4
+TOGETHER, MAX_RIVALS = 0.9, 4
 """What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
 more of them than anybody would look at."""
 SOUND_MACHINE = "the same machine when it was sound"
@@ -104,7 +104,7 @@ def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
     effects = sorted((c for c in causes if c.name not in (NONE, UNKNOWN)), key=lambda cause: -cause.probability)
     shares = np.cumsum([cause.probability for cause in effects])
     n = int(np.searchsorted(shares, TOGETHER * shares[-1])) + 1 if effects else 0
-    return tuple(cause.name for cause in effects[: int(np.clip(n, 2, MOST_RIVALS))])
+    return tuple(cause.name for cause in effects[: int(np.clip(n, 2, MAX_RIVALS))])
 
 
 def _which_undecided(report: GapReport) -> str:

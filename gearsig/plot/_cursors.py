@@ -23,7 +23,7 @@ N_ROWS = 3
 ROW_IN = 0.15
 OVERHANG_IN = 0.4  # a label may reach this far out of the panel
 LONGEST = 24
-LEAST_DISTANCE_IN = 0.03
+MIN_DISTANCE_IN = 0.03
 CHARACTER_EM = 0.62  # mean width of the font's characters, on the safe side
 LINE_LOOKS = {
     "mesh": ("-", 0.9, 0.55),
@@ -121,7 +121,7 @@ def place(
     result: list[tuple[Cursor, LabelPlace | None]] = []
     for cursor in sorted(cursors, key=_importance):
         at = (cursor.position - limits[0]) * scale
-        if not limits[0] <= cursor.position <= limits[1] or any(abs(at - other) < LEAST_DISTANCE_IN for other in drawn):
+        if not limits[0] <= cursor.position <= limits[1] or any(abs(at - other) < MIN_DISTANCE_IN for other in drawn):
             continue
         drawn.append(at)
         label = _free_place(taken, at, cursor.label, width_in) if cursor.label else None

@@ -36,7 +36,7 @@ from gearsig.report._json import Layout, document, plain
 
 WITHOUT_MESH = 50.0
 """Highest order drawn, in mesh orders, and where there is no mesh."""
-MOST_CURSORS = 10
+MAX_CURSORS = 10
 
 LOOK_AT_ORDERS = (
     "Below: how far each line of the simulation is off. Shaded: twice its repeatability. A triangle marks a line that "
@@ -133,7 +133,7 @@ def mesh_cursors(comparison: Comparison) -> tuple[Cursor, ...]:
     return tuple(
         Cursor(k * mesh, "mesh", f"{k}× mesh" if one else f"{k}× mesh {i}", k)
         for i, mesh in enumerate(comparison.mesh_orders, 1)
-        for k in range(1, MOST_CURSORS + 1)
+        for k in range(1, MAX_CURSORS + 1)
     )
 
 

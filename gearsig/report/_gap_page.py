@@ -557,14 +557,14 @@ def is_finite(value: Any) -> bool:
 
 
 CHECK_FIRST = "Check first"
-"""Before each of the doubts."""
+"""Before each of the warnings."""
 
 
 def gap_text(report: GapReport) -> str:
     """Return the verdict in four lines, what must be checked first, what a second operating condition would give."""
     advice = condition_advice(report)
-    doubts = (f"{CHECK_FIRST}: {doubt}" for doubt in report.doubts)
-    return "\n".join([*report.verdict, *doubts, *([advice] if advice else [])])
+    warnings = (f"{CHECK_FIRST}: {warning}" for warning in report.warnings)
+    return "\n".join([*report.verdict, *warnings, *([advice] if advice else [])])
 
 
 def condition_advice(report: GapReport) -> str:

@@ -170,7 +170,7 @@ class SpeedChannel:
 SpeedSource = ConstantSpeed | PulseTimes | TachometerChannel | EncoderChannel | SpeedChannel
 """Any of the ways to know the speed; None stands for none."""
 
-MOST_TEETH = 5000
+MAX_TEETH = 5000
 """More than any slewing ring has."""
 
 QUANTITIES = (
@@ -240,8 +240,8 @@ class GearPair:
 
     def __post_init__(self) -> None:
         for label, teeth in (("driver", self.driver_teeth), ("driven", self.driven_teeth)):
-            if teeth is not None and teeth > MOST_TEETH:
-                raise InputError(f"{label} teeth of pair {self.name!r} is {teeth}", allowed=f"3 to {MOST_TEETH}")
+            if teeth is not None and teeth > MAX_TEETH:
+                raise InputError(f"{label} teeth of pair {self.name!r} is {teeth}", allowed=f"3 to {MAX_TEETH}")
             if teeth is not None:
                 count(
                     teeth, f"{label} teeth of pair {self.name!r}", minimum=3, remedy="leave it out if it is not known"

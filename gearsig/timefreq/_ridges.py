@@ -503,7 +503,7 @@ def _unit(transform: Coefficients | TimeFrequencyMap) -> str:
 
 
 _MAX_COLUMNS_PER_NODE = 8
-_FEWEST_NODES = 48
+_MIN_NODES = 48
 _MAX_BEND = 4
 
 
@@ -515,7 +515,7 @@ _MIN_ANGLE = 2  # lines per node by which slopes must differ to cross
 
 def nodes_apart(n_columns: int) -> int:
     """Return how many columns lie between nodes: eight, fewer in short tables."""
-    return min(_MAX_COLUMNS_PER_NODE, max(1, n_columns // _FEWEST_NODES))
+    return min(_MAX_COLUMNS_PER_NODE, max(1, n_columns // _MIN_NODES))
 
 
 def best_path(

@@ -20,7 +20,7 @@ from sims.blind._scene import RunCondition, Scene, measure, run, scene_of
 Kind = Literal["none", "single", "unknown", "pair"]
 KINDS: tuple[Kind, ...] = ("none", "single", "unknown", "pair")
 KIND_SHARES = (0.2, 0.5, 0.2, 0.1)
-FEWEST_MESH_HARMONICS = 3
+MIN_MESH_HARMONICS = 3
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def _draw_conditions(
     n_drawn, reference_drawn = int(rng.integers(1, 3)), bool(rng.random() < 0.5)
     n = n_drawn if n_conditions is None else n_conditions
     has_reference = reference_drawn if with_reference is None else with_reference
-    fastest = min(3000.0, 60 * 0.45 * rig.sampling_rate_hz / (FEWEST_MESH_HARMONICS * rig.pair.z1))
+    fastest = min(3000.0, 60 * 0.45 * rig.sampling_rate_hz / (MIN_MESH_HARMONICS * rig.pair.z1))
     slowest = 600.0
     load_error, place = rng.uniform(0.85, 1.15), rng.uniform(0, 1)
     shares, is_light = rng.uniform(0.2, 0.9, 2), rng.random(2) < 0.25

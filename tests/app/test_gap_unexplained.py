@@ -69,9 +69,9 @@ def standing(code: str) -> Standing:
 
 def test_impacts_of_a_known_race_are_not_called_unknown() -> None:
     race, strange = standing("bearing-outer-race"), standing("non-synchronous-impacts")
-    outcome, doubts = beside_standing(GapOutcome.NO_GAP, [race])
+    outcome, warnings = beside_standing(GapOutcome.NO_GAP, [race])
     assert outcome is GapOutcome.UNDECIDED
-    assert "today.h5: Damage of the outer race (at most 90 %)" in doubts[0]
+    assert "today.h5: Damage of the outer race (at most 90 %)" in warnings[0]
     assert beside_standing(GapOutcome.NO_GAP, [race, strange]) == (GapOutcome.UNKNOWN, [])
     assert beside_standing(GapOutcome.NO_GAP, []) == (GapOutcome.NO_GAP, [])
     assert beside_standing(GapOutcome.EFFECT, [race]) == (GapOutcome.EFFECT, [])

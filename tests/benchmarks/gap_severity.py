@@ -21,7 +21,7 @@ from gearsig.errors import GearsigError
 from gearsig.gap import GapEffect, Interval, conditions_of, try_effects
 from sims.registry import gap_simulator
 
-LEAST_LEVEL = 0.4
+MIN_LEVEL = 0.4
 """Weaker effects are hardly ever named, and severities are given of what is named."""
 
 
@@ -67,7 +67,7 @@ def _tried(seen: VisibleCase, effect: GapEffect) -> Interval | None:
 
 def main(n_cases: int, seed: int, role: str) -> None:
     """Print the cases, and what they say together."""
-    plan = Plan(n_cases, seed, role, reference="with", least_level=LEAST_LEVEL)
+    plan = Plan(n_cases, seed, role, reference="with", least_level=MIN_LEVEL)
     rows = []
     for planned in plan.cases():
         if planned.kind == "single" and (row := fitted(plan, planned)) is not None:

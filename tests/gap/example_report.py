@@ -114,7 +114,7 @@ def unknown_report() -> GapReport:
         angles=tuple(replace(a, after=np.zeros(0)) for a in report.angles),
         twin_toml="",
         notices=("The rig file names no bearing: bearing orders could not be tried.",),
-        doubts=("condition_1.h5: the teeth do not fit.",),
+        warnings=("condition_1.h5: the teeth do not fit.",),
     )
 
 

@@ -279,9 +279,9 @@ def test_no_line_is_marked_where_the_whole_gap_is_within_a_floor():
     assert gearless_report().is_beyond
 
 
-def test_doubts_stand_right_under_the_verdict(pages):
+def test_warnings_stand_right_under_the_verdict(pages):
     doubt = "now: the teeth <do not> fit."
-    report = replace(without_curves(effect_report()), doubts=(doubt,))
+    report = replace(without_curves(effect_report()), warnings=(doubt,))
     text = text_of(gap_page_html(report))
     last = report.verdict[-1].partition(": ")[2]
     assert text.index(last[1:]) < text.index(f"Check first {doubt}") < text.index(report.notices[0])

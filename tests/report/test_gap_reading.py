@@ -38,7 +38,7 @@ def test_reports_of_earlier_versions_have_no_reference_curves():
         for one in cause["evidence"]:
             del one["is_further"]
     again = gap_from_dict(found)
-    assert again.averages == again.doubts == ()
+    assert again.averages == again.warnings == ()
     assert not any(len(curves.reference) for curves in again.spectra)
     assert not any(one.is_further for cause in again.causes for one in cause.evidence)
 

@@ -201,8 +201,8 @@ def _show_verdict(report: GapReport) -> None:
     st.badge(report.outcome.value, icon=icon, color=colour)
     lines = (f"**{as_typed(word)}.** {as_typed(text)}" for word, text in verdict_rows(report))
     st.markdown("  \n".join(lines))  # two spaces: a new line, not a new paragraph
-    for doubt in report.doubts:
-        st.warning(f"**{CHECK_FIRST}.** {as_typed(doubt)}", icon=":material/report:")
+    for warning in report.warnings:
+        st.warning(f"**{CHECK_FIRST}.** {as_typed(warning)}", icon=":material/report:")
     advice = condition_advice(report)
     if advice:
         st.caption(as_typed(advice))

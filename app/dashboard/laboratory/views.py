@@ -255,7 +255,7 @@ def _lines(x: FloatArray, curves: list[FloatArray]) -> list[ChartLine]:
 MESH_PERIOD = "mesh period"
 GEARS = {"Driver": "driver y", "Driven gear": "driven y"}
 STROBES = {MESH_PERIOD: None, "revolution of the input shaft": 1.0}
-MOST_POINTS = 10_000
+MAX_POINTS = 10_000
 """A browser without a graphics card draws so many at once."""
 REVOLUTIONS = 1.3
 """Of the line, so that every tooth is on it; the points are of the whole run."""
@@ -299,7 +299,7 @@ def portrait(run: LaboratoryRun, signal: str, n_per_revolution: float) -> Portra
     points = [np.interp(index, response.time_s, values) for values in (y, v)]
     turned = float(np.ptp(response["driver angle"])) / (2.0 * np.pi)
     n = len(y) if turned <= REVOLUTIONS else round(len(y) * REVOLUTIONS / turned)
-    every = -(-n // MOST_POINTS)
+    every = -(-n // MAX_POINTS)
     return y[-n::every], v[-n::every], points[0], points[1]
 
 

@@ -116,8 +116,8 @@ def test_recording_and_reference_exchanged_are_noticed_by_the_sign_of_the_change
 
 def test_a_reference_with_a_fault_is_told() -> None:
     damaged = recording(0, 1, CHIPPED)
-    _, _, doubts = stood_out(*prepared(recording(0, 2)), prepared(recording(0, 3), damaged), "now")
-    assert not doubts  # at the same speed, the first is taken
+    _, _, warnings = stood_out(*prepared(recording(0, 2)), prepared(recording(0, 3), damaged), "now")
+    assert not warnings  # at the same speed, the first is taken
     (doubt,) = stood_out(*prepared(recording(0, 2)), prepared(damaged), "now")[2]
     assert doubt.startswith("The reference of now does not look healthy")
     assert "they may have been exchanged" in doubt
