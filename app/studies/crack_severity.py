@@ -59,7 +59,7 @@ from gearsig.severity import (
 
 
 OTHER_FLANKS_SHARE = 0.15
-"""Sound machines whose flanks are others than in the reference: run in, or ground again."""
+"""Healthy machines whose flanks are others than in the reference: run in, or ground again."""
 
 RELIEF_ERROR = 0.2
 """Largest one of the tip relief that the estimator is told, relative: tips are never ground as they were drawn."""

@@ -35,7 +35,7 @@ from gearsig.severity import ShaftLines, difference_lines
 # A path to a sensor changes all three alike. Flanks that wear alike change the harmonic and leave the rest; friction
 # takes along what is beside it; rough flanks raise what a gear repeats and the noise, and leave the harmonic; teeth
 # that part raise the noise. So each segment of orders from half a tooth below a harmonic to half a tooth above is
-# compared with what it was when the gears were sound.
+# compared with what it was when the gears were healthy.
 #
 # Source of the separation into what is common to all teeth, to one gear, and to nothing: R. B. Randall,
 # *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapter 5.
@@ -54,12 +54,12 @@ MIN_POWER = 1.0
 """dB²: changes as small as a decibel are alike by chance."""
 
 
-def alike_features(now: ReducedRecording, sound: ReducedRecording) -> Iterator[NamedValue]:
+def alike_features(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[NamedValue]:
     """Yield medians, spreads and differences of the three parts' changes, in dB, over segments and channels.
 
     0 where nothing that they compare stands clear of noise.
     """
-    changes = segment_changes(now, sound)
+    changes = segment_changes(now, healthy)
     for part, name in enumerate(_PARTS):
         level = changes[..., part]
         yield f"alike.{name}", _median(level)
@@ -73,11 +73,11 @@ def alike_features(now: ReducedRecording, sound: ReducedRecording) -> Iterator[N
         yield f"{name}.together", _together(a, b)
 
 
-def segment_changes(now: ReducedRecording, sound: ReducedRecording) -> FloatArray:
+def segment_changes(now: ReducedRecording, healthy: ReducedRecording) -> FloatArray:
     """Return the changes in dB, (n_channels, n_harmonics, 3); nan where a part does not stand clear of noise."""
     rows = []
     for name in now.channels:
-        here, before = _segments(now, name), _segments(sound, name)
+        here, before = _segments(now, name), _segments(healthy, name)
         rows.append(np.clip(here - before, -MAX_DB, MAX_DB))
     changes: FloatArray = np.array(rows)
     return changes
@@ -141,16 +141,16 @@ def _together(a: FloatArray, b: FloatArray) -> float:
 # --------------------
 
 
-def apart_features(now: ReducedRecording, sound: ReducedRecording) -> Iterator[NamedValue]:
+def apart_features(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[NamedValue]:
     """Yield by how much the channels' changes differ from each other, rms in dB; 0 where there is one channel.
 
     What drives the gears harder is seen by every sensor, each through its own path; a sensor that was mounted anew, or
     a bearing that holds its shaft less, changes the paths, and each in its own way.
     """
-    here, before = _mesh_levels(now), _mesh_levels(sound)
+    here, before = _mesh_levels(now), _mesh_levels(healthy)
     n = min(here.shape[1], before.shape[1])  # the faster recording shows fewer
     yield "apart.mesh", _scatter(here[:, :n] - before[:, :n])
-    yield "apart.floor", _scatter(_floor_levels(now) - _floor_levels(sound))
+    yield "apart.floor", _scatter(_floor_levels(now) - _floor_levels(healthy))
 
 
 def _scatter(changes: FloatArray) -> float:
@@ -177,36 +177,36 @@ MIN_NOISE = 1e-8
 """Of all lines together over the mesh's power: two gears of equal teeth leave nothing of their own in one average."""
 
 MIN_SURPRISE = 0.1
-"""Energy below any that a sound machine's own noise makes: of two gears of equal teeth one has no average of its own,
+"""Energy below any that a healthy machine's own noise makes: of two gears of equal teeth one has no average of its own,
 and what rounding leaves in it says nothing."""
 
 REPEATS = 0.1
-"""Share by which a sound machine's pattern differs on another day, see `surprises`."""
+"""Share by which a healthy machine's pattern differs on another day, see `surprises`."""
 
 
-def change_features(now: ReducedRecording, sound: ReducedRecording) -> Features:
+def change_features(now: ReducedRecording, healthy: ReducedRecording) -> Features:
     """Return the differences of all features, and features of the difference of the averages.
 
     The reference's scatter counts as well: variances of both add.
     """
-    (names, here), before = whole_and_parts(now), whole_and_parts(sound)[1]
-    joined, values = _joined(names, here[0] - before[0], now, sound)
+    (names, here), before = whole_and_parts(now), whole_and_parts(healthy)[1]
+    joined, values = _joined(names, here[0] - before[0], now, healthy)
     return _with_scatter(
         joined,
         values,
         np.stack(
-            [_joined(names, v - before[0], part, sound)[1] for v, part in zip(here[1:], _parts(now), strict=True)]
+            [_joined(names, v - before[0], part, healthy)[1] for v, part in zip(here[1:], _parts(now), strict=True)]
         ),
         np.stack(
-            [_joined(names, here[0] - v, now, part)[1] for v, part in zip(before[1:], _parts(sound), strict=True)]
+            [_joined(names, here[0] - v, now, part)[1] for v, part in zip(before[1:], _parts(healthy), strict=True)]
         ),
     )
 
 
-def change_once(now: ReducedRecording, sound: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
+def change_once(now: ReducedRecording, healthy: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values of the change features, without their scatter."""
-    (names, here), before = once(now), once(sound)[1]
-    return _joined(names, here - before, now, sound)
+    (names, here), before = once(now), once(healthy)[1]
+    return _joined(names, here - before, now, healthy)
 
 
 def difference_features(
@@ -236,19 +236,19 @@ def _parts(gathered: ReducedRecording) -> Iterator[ReducedRecording]:
 
 
 def _joined(
-    names: tuple[str, ...], differences: FloatArray, now: ReducedRecording, sound: ReducedRecording
+    names: tuple[str, ...], differences: FloatArray, now: ReducedRecording, healthy: ReducedRecording
 ) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values of the differences and of the patterns' features behind them."""
-    patterns = dict(_patterns(now, sound))
+    patterns = dict(_patterns(now, healthy))
     return (*names, *patterns), np.concatenate([differences, list(patterns.values())])
 
 
-def _patterns(now: ReducedRecording, sound: ReducedRecording) -> Iterator[NamedValue]:
+def _patterns(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[NamedValue]:
     """Yield the tooth features of the difference of the averages, turned so that the same teeth meet."""
-    differences = [turned_difference(now, sound, side) for side in (DRIVER, DRIVEN)]
+    differences = [turned_difference(now, healthy, side) for side in (DRIVER, DRIVEN)]
     for side, (turned, agreement) in enumerate(differences):
         residuals, n = difference_residuals(now, turned, side), turned.lines.shape[1]
-        pairs = [(now.average(name, side), sound.average(name, side)) for name in now.channels]
+        pairs = [(now.average(name, side), healthy.average(name, side)) for name in now.channels]
         noises = [
             (here.noise[:n] + before.noise[:n])[lines[:n] != 0].sum() / 2.0 / here.mesh_power
             for lines, (here, before) in zip(residuals, pairs, strict=True)
@@ -259,20 +259,20 @@ def _patterns(now: ReducedRecording, sound: ReducedRecording) -> Iterator[NamedV
     for side, (turned, _) in enumerate(differences):
         yield from pattern_features(
             f"surprise.{SIDES[side]}",
-            surprises(now, sound, turned, side),
+            surprises(now, healthy, turned, side),
             now.frame.teeth[side],
             noise=0.0,
             longer=0.0,
             least=MIN_SURPRISE,
         )
-    yield from apart_features(now, sound)
-    yield from alike_features(now, sound)
+    yield from apart_features(now, healthy)
+    yield from alike_features(now, healthy)
 
 
-def turned_difference(now: ReducedRecording, sound: ReducedRecording, side: int) -> tuple[ShaftLines, float]:
-    """Return a shaft's lines less the sound ones, turned so that the same teeth meet, and how well they agreed."""
+def turned_difference(now: ReducedRecording, healthy: ReducedRecording, side: int) -> tuple[ShaftLines, float]:
+    """Return a shaft's lines less the healthy ones, turned so that the same teeth meet, and how well they agreed."""
     return difference_lines(
-        lines_of_shaft(now, side), lines_of_shaft(sound, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
+        lines_of_shaft(now, side), lines_of_shaft(healthy, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
     )
 
 
@@ -289,19 +289,19 @@ def _filled(row: ComplexArray, average: ShaftAverage) -> ComplexArray:
     return np.pad(row, (0, len(average.lines) - len(row)))
 
 
-def surprises(now: ReducedRecording, sound: ReducedRecording, turned: ShaftLines, side: int) -> list[ComplexArray]:
+def surprises(now: ReducedRecording, healthy: ReducedRecording, turned: ShaftLines, side: int) -> list[ComplexArray]:
     """Return each channel's difference, line by line over what noise and a mounting of its own would make of it.
 
-    w[n] = d[n] / √(σ²[n] + (s |r[n]|)²), with σ² the power that noise leaves in both averages, |r|² the sound
-    pattern's power about that order, s = `REPEATS`; scaled so that a sound machine's energy is about 1 all round,
+    w[n] = d[n] / √(σ²[n] + (s |r[n]|)²), with σ² the power that noise leaves in both averages, |r|² the healthy
+    pattern's power about that order, s = `REPEATS`; scaled so that a healthy machine's energy is about 1 all round,
     whatever the machine. A change counts where it is sure, and not where the vibration is loud.
     """
     found = []
     n = turned.lines.shape[1]
-    own = lines_of_shaft(sound, side).lines
+    own = lines_of_shaft(healthy, side).lines
     for row, born, name in zip(turned.lines, own, now.channels, strict=True):
         here = now.average(name, side)
-        noise = here.noise[:n] + sound.average(name, side).noise[:n] + MIN_NOISE * here.mesh_power / n
+        noise = here.noise[:n] + healthy.average(name, side).noise[:n] + MIN_NOISE * here.mesh_power / n
         expected = np.sqrt(noise + REPEATS**2 * smooth_power(np.abs(born[:n]) ** 2))
         kept = here.residual(_filled(row / expected, here))
         found.append(kept * np.sqrt(2.0 / max(int(np.count_nonzero(kept)), 1)))

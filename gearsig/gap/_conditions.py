@@ -54,7 +54,7 @@ LARGEST_TORQUE_DIFFERENCE = 0.25
 LONGEST_RUN_S, MAX_REVOLUTIONS = 5.0, 24.0
 """Of a simulation: longer ones say no more; but so many revolutions of the slower shaft at least."""
 TRIAL_S, TRIAL_REVOLUTIONS = 2.0, 20.0
-"""The same of a run that tries an effect: it differs from the sound run by that effect only, not by noise."""
+"""The same of a run that tries an effect: it differs from the healthy run by that effect only, not by noise."""
 
 
 @dataclass(frozen=True)
@@ -280,7 +280,7 @@ MIN_TEETH, MAX_TEETH = 12, 200
 
 LOST_DB, OWN_DB = 10.0, 6.0
 """By how much one tooth's burst has become less since the reference, and by how much it stands above the reference's
-middling tooth: sound teeth that differ by chance have up to 7 dB, and lose nothing from one day to the next."""
+middling tooth: healthy teeth that differ by chance have up to 7 dB, and lose nothing from one day to the next."""
 
 CLEAR_CHANGE, ALONE = 10.0, 4.0
 """Energy of the change at one tooth over that at the middling tooth, and over the largest more than a tooth away: worn
@@ -514,7 +514,9 @@ def conditions_of(
             notices += strange_pattern(now, reference, name)
             notices += _strange_reference(condition)
     if not references:
-        notices.append("No healthy reference: a recording of the same rig when it was sound would make it much surer.")
+        notices.append(
+            "No healthy reference: a recording of the same rig when it was healthy would make it much surer."
+        )
     return conditions, notices
 
 
@@ -615,6 +617,6 @@ def _strange_reference(condition: Condition) -> list[str]:
         return []
     remark = (
         f"The reference of {condition.facts.name} is itself {size:.1f} structural floors from the simulation of a "
-        "sound machine: if it was not healthy, only what changed since is seen."
+        "healthy machine: if it was not healthy, only what changed since is seen."
     )
     return [remark]

@@ -229,8 +229,8 @@ def angle_curves(
     before: ReducedRecording,
     after: ReducedRecording | None = None,
     *,
-    sound: ReducedRecording | None = None,
-    simulated_sound: ReducedRecording | None = None,
+    healthy: ReducedRecording | None = None,
+    simulated_healthy: ReducedRecording | None = None,
     unit: str = "",
 ) -> tuple[AngleCurves, ...]:
     """Return, for both shafts, the energy within one pitch over that of the measured middling tooth.
@@ -242,18 +242,18 @@ def angle_curves(
     ----------
     now, before, after : Gathered
         Measured, simulated without and with the likeliest effect.
-    sound, simulated_sound : Gathered or None
-        Where both are given, the curves are those of the differences from them; a simulation that *is* the sound one
+    healthy, simulated_healthy : Gathered or None
+        Where both are given, the curves are those of the differences from them; a simulation that *is* the healthy one
         has none, and its curve is 0.
     """
-    compared = sound is not None and simulated_sound is not None
+    compared = healthy is not None and simulated_healthy is not None
     found = []
     for side in (DRIVER, DRIVEN):
-        measured = _energy(now, sound if compared else None, side)
+        measured = _energy(now, healthy if compared else None, side)
         middling = max(float(np.median(measured)), 1e-300)
         simulated = [
             _turned(
-                _energy(run, simulated_sound if compared else None, side), measured, run.marks[side], now.marks[side]
+                _energy(run, simulated_healthy if compared else None, side), measured, run.marks[side], now.marks[side]
             )
             for run in (before, after)
             if run is not None
@@ -268,11 +268,11 @@ def angle_curves(
     return tuple(found)
 
 
-def _energy(run: ReducedRecording, sound: ReducedRecording | None, side: int) -> FloatArray:
+def _energy(run: ReducedRecording, healthy: ReducedRecording | None, side: int) -> FloatArray:
     """Return the energy at each start of a pitch, mean over channels; 0 for a run compared with itself."""
-    if sound is run:
+    if healthy is run:
         return np.zeros(run.frame.teeth[side] * STEPS_PER_TOOTH)
-    pattern = own_pattern(run, side) if sound is None else changed_pattern(run, sound, side)
+    pattern = own_pattern(run, side) if healthy is None else changed_pattern(run, healthy, side)
     energy: FloatArray = pattern.energy.mean(axis=0)
     return energy
 

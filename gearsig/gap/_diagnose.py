@@ -266,8 +266,8 @@ def diagnose_gap(
             clearest.now,
             clearest.simulated,
             after,
-            sound=reference,
-            simulated_sound=clearest.simulated if reference is not None else None,
+            healthy=reference,
+            simulated_healthy=clearest.simulated if reference is not None else None,
         ),
         averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recording.recording)),
         notices=(

@@ -350,7 +350,7 @@ def independent_whole(names: tuple[str, ...]) -> float:
 
 
 # --------------------
-# What is known from the start: drawn machines, sound and with every effect; changes of features and causes.
+# What is known from the start: drawn machines, healthy and with every effect; changes of features and causes.
 # --------------------
 
 
@@ -361,7 +361,7 @@ MAKE_POPULATION = "in a checkout of the project: python -m app.studies.gap.popul
 INDEPENDENT = "independent"
 """Simulator of the rig that makes blind cases; only its development gears are in the population."""
 BY_HAND = "by hand"
-"""Source of effects that are put into a sound machine's recordings as the literature describes them."""
+"""Source of effects that are put into a healthy machine's recordings as the literature describes them."""
 
 LEFT_OUT: ContextVar[str] = ContextVar("LEFT_OUT", default="")
 """Simulator whose machines nothing may be learned from, see `without_machines_of`."""
@@ -384,7 +384,7 @@ class Population:
     change_names, feature_names : tuple of str
         Of the columns; the first changes are the differences of the features.
     changes, change_scatter : arrays, (n, n_changes)
-        Against a sound recording of the same machine on another day, and standard errors.
+        Against a healthy recording of the same machine on another day, and standard errors.
     features, feature_scatter : arrays, (n, n_features)
         Of the recording itself, and standard errors.
     simulated, simulated_scatter : arrays, (n, n_features)
@@ -419,15 +419,15 @@ class Population:
 
     @cached_property
     def reference_floor(self) -> StructuralFloor:
-        """By how much sound machines differ from themselves on another day."""
-        sound = self.causes == NONE
-        return StructuralFloor.of_healthy(self.change_names, self.changes[sound])
+        """By how much healthy machines differ from themselves on another day."""
+        healthy = self.causes == NONE
+        return StructuralFloor.of_healthy(self.change_names, self.changes[healthy])
 
     @cached_property
     def credibility(self) -> FloatArray:
-        """How much of what the simulation says of each feature holds for sound machines, 0 to 1, (n_features,)."""
-        sound = self.causes == NONE
-        return credibility_of(self.features[sound], self.simulated[sound])
+        """How much of what the simulation says of each feature holds for healthy machines, 0 to 1, (n_features,)."""
+        healthy = self.causes == NONE
+        return credibility_of(self.features[healthy], self.simulated[healthy])
 
     @cached_property
     def gaps(self) -> FloatArray:
@@ -443,9 +443,9 @@ class Population:
 
     @cached_property
     def simulation_floor(self) -> StructuralFloor:
-        """By how much sound machines differ from what a simulation that knows their rig file lets expect."""
-        sound = self.causes == NONE
-        return StructuralFloor.of_healthy(self.feature_names, self.gaps[sound])
+        """By how much healthy machines differ from what a simulation that knows their rig file lets expect."""
+        healthy = self.causes == NONE
+        return StructuralFloor.of_healthy(self.feature_names, self.gaps[healthy])
 
     def floor(self, *, with_reference: bool) -> StructuralFloor:
         """Return the floor of one way of comparing."""
@@ -453,7 +453,7 @@ class Population:
 
 
 def credibility_of(features: FloatArray, simulated: FloatArray) -> FloatArray:
-    """Return the slope of sound machines' features over those of their simulations, cut to 0 … 1.
+    """Return the slope of healthy machines' features over those of their simulations, cut to 0 … 1.
 
     A simulation knows how a figure goes with geometry, speed and load, and little of how impulsive or how uneven a
     machine is: subtracting all of what it says adds its own scatter there. The slope is what leaves least.

@@ -107,7 +107,7 @@ class ExaminedRecording:
     analysis : Analysis
     angle : ShaftAngle
     reference : Analysis or None
-        Of the sound machine at its speed.
+        Of the healthy machine at its speed.
     standing : tuple of Standing
         Most important first.
     notices : tuple of str
@@ -121,7 +121,7 @@ class ExaminedRecording:
     notices: tuple[str, ...]
 
     @property
-    def is_sound(self) -> bool:
+    def is_healthy(self) -> bool:
         """Whether the bearings were examined, and would have shown a damage."""
         codes = {f.code for f in self.analysis.findings}
         return "no-bearing-damage" in codes and self.analysis.outcome is Outcome.NO_FAULT
@@ -301,7 +301,7 @@ def _outcome(
         return GapOutcome.UNKNOWN, _why_unknown(standing[0], races, rig)
     if all(one.reference is not None for one in every):
         return GapOutcome.NO_GAP, "nothing stands out that the healthy reference does not show"
-    if all(one.is_sound for one in every):
+    if all(one.is_healthy for one in every):
         return GapOutcome.NO_GAP, "nothing stands out, and damage of a race would have"
     return GapOutcome.UNKNOWN, "nothing stands out, but damage of a race might not have"
 
@@ -326,7 +326,7 @@ def _share_of_unknown(standing: Sequence[Standing], races: Races, every: Sequenc
         return max([UNDECIDED, *impacts])
     if standing:
         return max(one.finding.confidence for one in standing)
-    return HIDDEN if all(one.is_sound for one in every) else UNDECIDED
+    return HIDDEN if all(one.is_healthy for one in every) else UNDECIDED
 
 
 def _race(effect: GapEffect, found: Standing | None, rig: Rig, *, scale: float) -> GapCause:
@@ -410,7 +410,7 @@ HOW_SURE = (
     "search: an upper limit, from how rarely noise makes such lines and how well other parts or a wrong speed explain "
     "them. What is left over is shared between unknown and none."
 )
-NO_REFERENCE = "No healthy reference: what stands out may have been there when the machine was sound."
+NO_REFERENCE = "No healthy reference: what stands out may have been there when the machine was healthy."
 N_SHOWN = 6.5
 """Multiples of the found order that a spectrum is shown for."""
 

@@ -627,9 +627,9 @@ def own_pattern(gathered: ReducedRecording, side: int) -> ToothPattern:
     return _pattern(gathered, side, residuals, lines_of_shaft(gathered, side))
 
 
-def changed_pattern(now: ReducedRecording, sound: ReducedRecording, side: int) -> ToothPattern:
-    """Return the pattern of the difference from a sound recording, turned so that the same teeth meet."""
-    turned, _ = turned_difference(now, sound, side)
+def changed_pattern(now: ReducedRecording, healthy: ReducedRecording, side: int) -> ToothPattern:
+    """Return the pattern of the difference from a healthy recording, turned so that the same teeth meet."""
+    turned, _ = turned_difference(now, healthy, side)
     return _pattern(now, side, difference_residuals(now, turned, side), turned)
 
 
@@ -675,7 +675,7 @@ def _all_round(comparison: ComparedPair, side: int, shaft: str, channel: str) ->
         title = f"shape of the teeth's pattern of {shaft}, no tooth in particular"
         return LocatedChange(title, change, channel=channel, follows=True)
     of_difference = not scored.startswith("tooth.")
-    by = f"{by_decibels(change)} against what sound machines change by" if of_difference else by_decibels(change)
+    by = f"{by_decibels(change)} against what healthy machines change by" if of_difference else by_decibels(change)
     what = "what has changed of the pattern of the teeth" if of_difference else "pattern of the teeth"
     return LocatedChange(f"{what} of {shaft} all round, {by}", change, channel=channel)
 
@@ -705,7 +705,7 @@ def gap_places(
     ----------
     now : Gathered
     other : Gathered
-        A sound recording of the same machine, or its simulation.
+        A healthy recording of the same machine, or its simulation.
     structural : StructuralFloor
     is_reference : bool
         Whether `other` is a recording of the same machine: the teeth's patterns can then be subtracted.

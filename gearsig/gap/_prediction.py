@@ -54,7 +54,7 @@ class ObservedChange:
     condition : int
         Which operating condition.
     distances : array, (n,)
-        dB, from where sound machines lie.
+        dB, from where healthy machines lie.
     floors : array, (n,)
         dB: structural floor and repeatability together.
     """
@@ -81,7 +81,7 @@ class EffectPath:
     severities : array, (k,)
         Rising, above 0.
     distances : tuple of arrays, (n_ways, k, n)
-        dB from the sound machine; one per condition.
+        dB from the healthy machine; one per condition.
     names : tuple of str
         Of the n features.
     levels_db : tuple of float
@@ -327,9 +327,9 @@ def transplanted(
 ) -> FloatArray:
     """Return the changes that a simulated effect makes on the real machine's own baseline.
 
-    Powers of different causes add: P = P_real + (P_with − P_sound). On a twin whose teeth are rougher than the real
+    Powers of different causes add: P = P_real + (P_with − P_healthy). On a twin whose teeth are rougher than the real
     ones, or whose floor is lower, the same effect changes the decibels less or more. Mesh harmonics pass through the
-    same resonances as those of the sound machine and change by the same decibels each; what they do together hangs on
+    same resonances as those of the healthy machine and change by the same decibels each; what they do together hangs on
     which of them the real machine has. What falls, falls by the same decibels.
 
     Parameters
@@ -337,9 +337,9 @@ def transplanted(
     names : sequence of str
         Of the changes, see `gearsig.gap`; those of patterns last, or none.
     change : array, (n,)
-        dB, with the effect less sound, both simulated. `change.…`: the pattern's own value.
+        dB, with the effect less healthy, both simulated. `change.…`: the pattern's own value.
     simulated, real : mapping
-        Feature → value of the sound twin and of the sound machine.
+        Feature → value of the healthy twin and of the healthy machine.
     usual : mapping
         `change.…` → what mere repetition gives.
     level_db : float

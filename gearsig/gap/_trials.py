@@ -45,7 +45,7 @@ from gearsig.processes import can_be_sent, process_pool
 # --------------------
 
 
-_ARRAYS = ("sound", "sound_changes", "changes")
+_ARRAYS = ("healthy", "healthy_changes", "changes")
 MAX_BYTES = 100_000_000
 """Of a bank's arrays; a real one has less than one."""
 
@@ -83,15 +83,17 @@ def _checked(about: dict[str, Any], arrays: dict[str, FloatArray]) -> Bank | Non
 
     names, changes = tuple(about["feature_names"]), tuple(about["change_names"])
     added = tuple(_added(row) for row in about["added"])
-    sound, again, changed = (arrays[name] for name in _ARRAYS)
+    healthy, again, changed = (arrays[name] for name in _ARRAYS)
     n, m = len(names), len(changes)
-    shapes = sound.ndim == again.ndim == 2 and changed.ndim == 3
-    if not shapes or sound.shape[1] != n or again.shape != (len(sound), m) or changed.shape[::2] != (len(added), m):
+    shapes = healthy.ndim == again.ndim == 2 and changed.ndim == 3
+    if not shapes or healthy.shape[1] != n or again.shape != (len(healthy), m) or changed.shape[::2] != (len(added), m):
         return None
     if any(a.dtype != np.float64 for a in arrays.values()):
         return None
     left_out = tuple((_added(row), str(why)) for row, why in about["left_out"])
-    return Bank(OperatingCondition(*map(float, about["point"])), names, changes, sound, again, added, changed, left_out)
+    return Bank(
+        OperatingCondition(*map(float, about["point"])), names, changes, healthy, again, added, changed, left_out
+    )
 
 
 def _plain(added: Added) -> list[Any]:
@@ -122,14 +124,14 @@ class TwinRun:
     noise: int
 
     @property
-    def sound_key(self) -> SoundKey:
-        """What the twin's sound runs depend on; twins need not hash."""
+    def healthy_key(self) -> SoundKey:
+        """What the twin's healthy runs depend on; twins need not hash."""
         return self.point, self.duration_s, self.sampling_rate_hz
 
 
 @dataclass(frozen=True)
 class Task:
-    """One simulation: a specimen with an effect, or sound; each of the `further` channels is looked at by itself."""
+    """One simulation: a specimen with an effect, or healthy; each of the `further` channels is looked at by itself."""
 
     run: TwinRun
     seed: int
@@ -139,7 +141,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Reduced:
-    """One simulation's features, of a sound specimen only, and its change against the specimen's sound first run.
+    """One simulation's features, of a healthy specimen only, and its change against the specimen's healthy first run.
 
     `alone` has each channel's own change where there are further channels; they have no part in `change`.
     """
@@ -156,7 +158,7 @@ def finished_runs(
 ) -> list[Reduced | str]:
     """Return what each task gave, or why it could not be simulated, in the order of the tasks.
 
-    So many tasks on end go to one process: those that share a sound run then simulate it once. A twin that other
+    So many tasks on end go to one process: those that share a healthy run then simulate it once. A twin that other
     processes could not know, as it is defined in the caller's script, runs in this one.
     """
     found: list[Reduced | str] = [""] * len(tasks)
@@ -180,7 +182,7 @@ def finished_runs(
 
 Known = dict[tuple[SoundKey, int], ReducedRecording]
 _KNOWN: Known = {}
-"""Sound first runs by point, length and seed, of the one twin that a worker works for."""
+"""Healthy first runs by point, length and seed, of the one twin that a worker works for."""
 
 
 def reduced_in_worker(tasks: Sequence[Task]) -> list[Reduced | str]:
@@ -193,20 +195,20 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
     from gearsig.gap._features import once
 
     run = task.run
-    key = run.sound_key, task.seed
+    key = run.healthy_key, task.seed
     try:
         if key not in known:
             known[key] = _gathered(run, task.seed, None, 0)
-        sound = known[key]
-        # A sound specimen is measured again with other noise: against itself everything would be zero.
+        healthy = known[key]
+        # A healthy specimen is measured again with other noise: against itself everything would be zero.
         now = _gathered(run, task.seed, task.added, run.noise if task.added is not None else max(run.noise, 1))
         alone = {}
         if task.further:
-            alone = {name: change_once(_of(now, name), _of(sound, name))[1] for name in sound.channels}
-            own = [name for name in sound.channels if name not in task.further]
-            now, sound = _of(now, *own), _of(sound, *own)
-        names, values = once(sound) if task.added is None else ((), np.empty(0))
-        return Reduced(names, values, *change_once(now, sound), alone)
+            alone = {name: change_once(_of(now, name), _of(healthy, name))[1] for name in healthy.channels}
+            own = [name for name in healthy.channels if name not in task.further]
+            now, healthy = _of(now, *own), _of(healthy, *own)
+        names, values = once(healthy) if task.added is None else ((), np.empty(0))
+        return Reduced(names, values, *change_once(now, healthy), alone)
     except GearsigError as error:
         return str(error)
 
@@ -261,24 +263,24 @@ POINT_DIGITS = 3
 
 @dataclass(frozen=True)
 class Bank:
-    """Simulated features of the sound machine, and what each candidate of one effect changes in them.
+    """Simulated features of the healthy machine, and what each candidate of one effect changes in them.
 
     Parameters
     ----------
     point : Point
         At which it was simulated.
     feature_names : tuple of str
-        Of `sound`; see `gearsig.gap`.
+        Of `healthy`; see `gearsig.gap`.
     change_names : tuple of str
         Of the changes, the features' names first; see `gearsig.gap`.
-    sound : array, (n_seeds, n_features)
+    healthy : array, (n_seeds, n_features)
         One row per specimen.
-    sound_changes : array, (n_seeds, n_changes)
-        Another run of the sound specimen against its first: what a change is when nothing has changed.
+    healthy_changes : array, (n_seeds, n_changes)
+        Another run of the healthy specimen against its first: what a change is when nothing has changed.
     added : tuple of Added
         The candidates that could be simulated.
     changes : array, (n_added, n_change_seeds, n_changes)
-        Each candidate's run against the sound first run of the same specimen.
+        Each candidate's run against the healthy first run of the same specimen.
     left_out : tuple of (Added, str)
         Candidates that could not be simulated, and why.
     """
@@ -286,8 +288,8 @@ class Bank:
     point: OperatingCondition
     feature_names: tuple[str, ...]
     change_names: tuple[str, ...]
-    sound: FloatArray
-    sound_changes: FloatArray
+    healthy: FloatArray
+    healthy_changes: FloatArray
     added: tuple[Added, ...]
     changes: FloatArray
     left_out: tuple[tuple[Added, str], ...] = ()
@@ -310,11 +312,11 @@ def banks_of(
     ----------
     runs : sequence of Run
         Twin, point, length of what is simulated; the point is rounded to `POINT_DIGITS` digits. Noise 0: candidates
-        have the noise and start of the sound run, so that only the effect differs.
+        have the noise and start of the healthy run, so that only the effect differs.
     effects : sequence of str
         Whose candidates are simulated; each has a file of its own.
     seeds : sequence of int
-        Specimens of the sound machine.
+        Specimens of the healthy machine.
     folder : Path or None
         Where they are kept; None: nowhere.
     n_change_seeds : int
@@ -331,20 +333,20 @@ def banks_of(
     InputError
         If the folder cannot be made.
     RefusalError
-        If the sound machine cannot be simulated or its recording is too short for the features.
+        If the healthy machine cannot be simulated or its recording is too short for the features.
     """
     within = seeds[: min(count(n_change_seeds, "n_change_seeds"), len(seeds))]
     wanted = [_BankRequest.of(run, name, seeds, within, folder) for run in runs for name in effects]
     found = {w: read_bank(w.path, w.key) if w.path is not None and not fresh else None for w in wanted}
     missing = [w for w in wanted if found[w] is None]
-    sound = {w.run.sound_key: w.run for w in missing}
-    tasks = [Task(run, seed, None) for run in sound.values() for seed in seeds]
+    healthy = {w.run.healthy_key: w.run for w in missing}
+    tasks = [Task(run, seed, None) for run in healthy.values() for seed in seeds]
     tasks += [Task(w.run, seed, added) for w in missing for added in w.candidates for seed in within]
     rows = iter(finished_runs(tasks, processes, on_progress) if tasks else ())
-    sound_rows = {key: list(islice(rows, len(seeds))) for key in sound}
+    healthy_rows = {key: list(islice(rows, len(seeds))) for key in healthy}
     for w in missing:
         own = list(islice(rows, len(w.candidates) * len(within)))
-        found[w] = bank = _assembled(w.run.point, w.candidates, len(within), sound_rows[w.run.sound_key], own)
+        found[w] = bank = _assembled(w.run.point, w.candidates, len(within), healthy_rows[w.run.healthy_key], own)
         if w.path is not None:
             write_bank(w.path, w.key, bank)
     banks = iter(found[w] for w in wanted)
@@ -400,14 +402,14 @@ def _assembled(
     point: OperatingCondition,
     candidates: Sequence[Added],
     n_seeds: int,
-    sound_rows: Sequence[Reduced | str],
+    healthy_rows: Sequence[Reduced | str],
     rows: Sequence[Reduced | str],
 ) -> Bank:
-    sound = [row for row in sound_rows if isinstance(row, Reduced)]
-    if len(sound) < len(sound_rows):
-        why = next(row for row in sound_rows if isinstance(row, str))
-        raise RefusalError(f"the sound machine cannot be simulated: {why}", remedy="check the rig file")
-    first = sound[0]
+    healthy = [row for row in healthy_rows if isinstance(row, Reduced)]
+    if len(healthy) < len(healthy_rows):
+        why = next(row for row in healthy_rows if isinstance(row, str))
+        raise RefusalError(f"the healthy machine cannot be simulated: {why}", remedy="check the rig file")
+    first = healthy[0]
     kept, changes, left_out = [], [], []
     for i, added in enumerate(candidates):
         own = rows[i * n_seeds : (i + 1) * n_seeds]
@@ -421,8 +423,8 @@ def _assembled(
         point,
         first.names,
         first.change_names,
-        np.stack([row.values for row in sound]),
-        np.stack([row.change for row in sound]),
+        np.stack([row.values for row in healthy]),
+        np.stack([row.change for row in healthy]),
         tuple(kept),
         np.array(changes).reshape(len(kept), n_seeds, len(first.change_names)),
         tuple(left_out),
@@ -540,16 +542,16 @@ def _paths(banks: Sequence[Bank], conditions: Sequence[Condition], shows_in: tup
 
 
 def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in: tuple[str, ...]) -> FloatArray:
-    """Return what candidates would change on the sound machine's own baseline, (n_ways, n_candidates, n).
+    """Return what candidates would change on the healthy machine's own baseline, (n_ways, n_candidates, n).
 
     Nothing where theory does not expect it: a simulation changes more, and that is its own.
 
-    The reference shows the baseline; without one it is what the twin, as far as it is credible, lets expect of sound
-    machines. The bank's own sound machine may be a quiet one, and is not asked.
+    The reference shows the baseline; without one it is what the twin, as far as it is credible, lets expect of healthy
+    machines. The bank's own healthy machine may be a quiet one, and is not asked.
     """
     floor, names = condition.floor, bank.feature_names
     usual = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
-    simulated = dict(zip(names, bank.sound.mean(axis=0).tolist(), strict=True))
+    simulated = dict(zip(names, bank.healthy.mean(axis=0).tolist(), strict=True))
     own_names, own = whole_and_parts(condition.other)
     if condition.reference is not None:
         compared, baseline = bank.change_names, own[0]
@@ -558,7 +560,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     real = dict(zip(own_names, baseline.tolist(), strict=True))
     repeated = dict(zip(floor.names, usual.tolist(), strict=True))
     again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
-    again[: len(names)] = bank.sound_changes.mean(axis=0)[: len(names)]
+    again[: len(names)] = bank.healthy_changes.mean(axis=0)[: len(names)]
     given = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]
     rows = [[transplanted(compared, one, simulated, real, repeated, *way) for one in given] for way in WAYS_DB]
     table = np.array(rows).reshape(len(WAYS_DB), len(kept), len(compared))

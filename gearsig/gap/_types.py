@@ -455,7 +455,7 @@ class GapReport:
 
     @property
     def is_beyond(self) -> bool:
-        """Whether an effect is named, or the whole gap exceeds what sound machines show.
+        """Whether an effect is named, or the whole gap exceeds what healthy machines show.
 
         Single places and lines may exceed their own floors all the same, by chance. True where nothing was simulated:
         there is no whole then.

@@ -26,7 +26,7 @@ NO_SIMULATION = (
 TOGETHER, MAX_RIVALS = 0.9, 4
 """What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
 more of them than anybody would look at."""
-SOUND_MACHINE = "the same machine when it was sound"
+HEALTHY_MACHINE = "the same machine when it was healthy"
 
 
 def _where(report: GapReport) -> str:
@@ -148,7 +148,7 @@ def _how_far(report: GapReport) -> str:
 def _next(report: GapReport) -> str:
     best = report.next_recordings[0].text if report.next_recordings else ""
     if not report.references:
-        first = f"{SOUND_MACHINE}, at the same speed and load; then only what has changed since counts."
+        first = f"{HEALTHY_MACHINE}, at the same speed and load; then only what has changed since counts."
         return f"Next: {first} Or {best}" if best else f"Next: {first}"
     if best:
         return f"Next: {best}"
@@ -191,4 +191,4 @@ def _which_seen(report: GapReport) -> str:
 def _next_seen(report: GapReport) -> str:
     if report.references:
         return "Next: another sensor nearer to the bearings, or a longer recording."
-    return f"Next: {SOUND_MACHINE}, at the same speed; then only what has changed since is named."
+    return f"Next: {HEALTHY_MACHINE}, at the same speed; then only what has changed since is named."

@@ -23,7 +23,7 @@ class ComparedPair:
     ----------
     now, other : Gathered
     is_reference : bool
-        Whether `other` is a sound recording of the same machine; otherwise a simulation.
+        Whether `other` is a healthy recording of the same machine; otherwise a simulation.
     change_db : mapping
         Feature → change from what healthy machines change by.
     size : mapping

@@ -53,7 +53,7 @@ from gearsig.plot._spectrum import (
 )
 from gearsig.plot._start_stop import (
     FAULTY,
-    SOUND,
+    HEALTHY,
     course_figure,
     force_figure,
     impacts_figure,
@@ -66,13 +66,13 @@ from gearsig.plot._style import FAULT, Scale, above_zero, decibels, new_figure, 
 __all__ = [
     "FAULT",
     "FAULTY",
+    "HEALTHY",
     "INNER",
     "LONGEST",
     "METHODS",
     "MIN_SPEED_SPAN",
     "OUTER",
     "PRIORITY",
-    "SOUND",
     "AngleMark",
     "Captioned",
     "Cursor",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-SOUND, FAULTY = style.MEASURED, style.FAULT
+HEALTHY, FAULTY = style.MEASURED, style.FAULT
 FLANKS = {1: (style.FAULT, "drive flank", "o"), -1: (style.BEARING, "back flank", "s")}
 PHASES = {
     motions.RUN_UP: style.SIMULATED,
@@ -69,7 +69,7 @@ def start_stop_figure(examined: motions.StartStop, *, title: str = "") -> Figure
 
 
 def start_stop_pair_figure(
-    sound: motions.StartStop,
+    healthy: motions.StartStop,
     faulty: motions.StartStop,
     *,
     curves_um: tuple[FloatArray, FloatArray] | None = None,
@@ -79,14 +79,14 @@ def start_stop_pair_figure(
 
     Parameters
     ----------
-    sound, faulty : StartStop
+    healthy, faulty : StartStop
     curves_um : (array, array) or None
-        Compression on the drive flank over equal parts of the mesh cycle, in µm, sound and faulty.
+        Compression on the drive flank over equal parts of the mesh cycle, in µm, healthy and faulty.
     title : str
     """
     figure, (over, plane, loop, profile, teeth) = _below_a_wide_one((2.3, 2.3, 2.3))
-    drawn = [(sound, SOUND), (faulty, FAULTY)]
-    _draw_speeds(over, drawn, title or "sound beside faulty")
+    drawn = [(healthy, HEALTHY), (faulty, FAULTY)]
+    _draw_speeds(over, drawn, title or "healthy beside faulty")
     _draw_planes(plane, drawn)
     _draw_loops(loop, drawn)
     style.label_axes(profile, "part of the mesh cycle", "compression (µm)", "drive flank over the mesh cycle")
@@ -107,7 +107,7 @@ def start_stop_pair_figure(
     else:
         teeth.locator_params(axis="x", integer=True)
         teeth.axhline(0.0, color=style.RULE, linewidth=0.8)
-    _legend(figure, [_key(colour, label=name) for name, colour in (("sound", SOUND), ("faulty", FAULTY))])
+    _legend(figure, [_key(colour, label=name) for name, colour in (("healthy", HEALTHY), ("faulty", FAULTY))])
     return figure
 
 

@@ -33,7 +33,9 @@ FLOORS = "structural floors"
 
 
 LAYOUTS = {
-    GapReport: Layout({"repeatability": "size_in_repeatability_floors", "warnings": "doubts"}, null_if_empty=("twin_toml",)),
+    GapReport: Layout(
+        {"repeatability": "size_in_repeatability_floors", "warnings": "doubts"}, null_if_empty=("twin_toml",)
+    ),
     ConditionFacts: Layout(inline=("point",)),
     GapPlace: Layout({"repeatability": "change_in_repeatability_floors", "structural": "change_in_structural_floors"}),
     Added: Layout({"name": "effect"}),

@@ -113,13 +113,13 @@ def floors_text(report: GapReport) -> str:
     structural, beside = "what healthy machines differ by from that", ""
     alone = [one.name for one in report.conditions if not one.reference]
     if report.references:
-        known = f"Compared with the same machine when it was sound ({', '.join(report.references)}). "
+        known = f"Compared with the same machine when it was healthy ({', '.join(report.references)}). "
         if 0 < len(alone) < len(report.conditions):
             known += f"Without a reference at its point, with what the simulation lets expect: {', '.join(alone)}. "
         structural = "what healthy machines change by from one recording to another"
         beside = " The first pictures show the recording beside the reference, the further ones beside the simulation."
     else:
-        known = "Compared with what the simulation of the sound machine lets expect, as far as it is credible. "
+        known = "Compared with what the simulation of the healthy machine lets expect, as far as it is credible. "
     return (
         f"{known}A structural floor is {structural}; they exceed 1 once in twenty. A repeatability floor is what this "
         f"machine differs by from itself, from one stretch to the next. A place counts against its own features alone: "
@@ -474,10 +474,10 @@ def _beyond_text(report: GapReport, curves: SpectrumCurves) -> str:
         )
         return f"The whole gap is within one structural floor, so that no line is marked.{alone if known else ''}"
     if not known:
-        return "Orange: above the repeatability floor; how far sound machines differ is not known line by line."
+        return "Orange: above the repeatability floor; how far healthy machines differ is not known line by line."
     return (
         f"Orange: {many}, which exceed the structural floor (grey band). Single lines scatter more than the features "
-        "that are scored: some exceed it on sound machines, too."
+        "that are scored: some exceed it on healthy machines, too."
     )
 
 
@@ -503,7 +503,7 @@ def _teeth(report: GapReport) -> Iterator[GapFigure]:
         yield GapFigure(
             "where",
             plot.gap_teeth_figure(curves, mark=_mark(report, curves)),
-            f"Shaft {curves.shaft}, tooth by tooth: sound teeth draw an even ring, a damaged one swings out.{numbers}",
+            f"Shaft {curves.shaft}, tooth by tooth: healthy teeth draw a ring, a damaged one stands out.{numbers}",
             f"Energy around one revolution of shaft {curves.shaft}, measured and simulated.",
             is_small=True,
         )

@@ -480,7 +480,7 @@ def _polar(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
         seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
         yield embed(
             plot.polar_figure(average, n_teeth=teeth, marks=marks),
-            f"{shaft}: sound teeth draw an even ring, a damaged one swings out. Grey is ± 2 standard errors."
+            f"{shaft}: healthy teeth draw an even ring, a damaged one swings out. Grey is ± 2 standard errors."
             if teeth
             else f"{shaft}: what leaves the ring comes back at that angle every turn. Grey is ± 2 standard errors.",
             f"Polar picture of the {average.kind} of {channel.channel} over one revolution of {shaft}{seen}.",

@@ -184,12 +184,12 @@ def _setting(value: str | float | int | None) -> str:
 
 
 def reference_text(reference: Analysis | None) -> str:
-    """Return which recording was compared with; empty without one. A reference that is not sound itself is told."""
+    """Return which recording was compared with; empty without one. A reference that is not healthy itself is told."""
     if reference is None:
         return ""
     text = f"Compared with {reference.recording.provenance.source or 'a reference'}"
     if reference.outcome in (Outcome.FAULT, Outcome.SUSPICION):
-        return f"{text}, which is not sound itself: {reference.verdict}"
+        return f"{text}, which is not healthy itself: {reference.verdict}"
     return f"{text}."
 
 

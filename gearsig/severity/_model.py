@@ -104,10 +104,10 @@ class DepthModel:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> DepthModel:
-        """Build it from what a JSON file holds, where the healthy pairs' scores are called sound_scores."""
+        """Build it from what a JSON file holds."""
         fitted: dict[str, Any] = {}
         for f in fields(cls):
-            value = values["sound_scores" if f.name == "healthy_scores" else f.name]
+            value = values[f.name]
             is_array, is_pair = f.type == "FloatArray", f.type == "tuple[float, float]"
             fitted[f.name] = np.asarray(value, dtype=float) if is_array else tuple(value) if is_pair else float(value)
         return cls(**fitted)

@@ -62,7 +62,7 @@ from sims.mesh._mesh_stiffness import (
 from sims.mesh._pair import PairGeometry, arc_length_mm, curvature_radius_mm, flank_length_mm, part_inside
 from sims.mesh._roughness import FlankRoughness, FractalSurface, TimeLockedRoughness, advance, height_now
 from sims.mesh._stiffness import (
-    SOUND,
+    HEALTHY,
     GearMesh,
     ToothFaults,
     cracked_tooth_compliance,
@@ -76,8 +76,8 @@ from sims.mesh._stiffness import (
 
 __all__ = [
     "COEFFICIENTS",
+    "HEALTHY",
     "MAX_FRICTION",
-    "SOUND",
     "STEEL",
     "FlankDeviation",
     "FlankRoughness",

@@ -332,7 +332,7 @@ class ToothFaults(NamedTuple):
     chip: ToothChip | None = None
 
 
-SOUND = ToothFaults()
+HEALTHY = ToothFaults()
 """A tooth without a fault."""
 
 
@@ -434,7 +434,7 @@ class GearMesh:
         rho: FloatArray = self.pair.contact_radii_mm(np.atleast_1d(np.asarray(progress, dtype=np.float64)))[side - 1]
         return np.maximum(rho, 0.0)
 
-    def gear_compliance(self, side: int, progress: FloatArray, faults: ToothFaults = SOUND) -> FloatArray:
+    def gear_compliance(self, side: int, progress: FloatArray, faults: ToothFaults = HEALTHY) -> FloatArray:
         """Tooth and foundation of one gear, and what a spall or chip adds to tooth and contact, in m/N.
 
         c = c_tooth/(1 − λ_chip) + c_foundation + c_h [λ_spall/(1 − λ_spall) + λ_chip/(1 − λ_chip)]

@@ -17,7 +17,7 @@ from gearsig.checks import FloatArray, frozen_array, within
 from gearsig.errors import InputError, RefusalError
 from sims.compiled import UNCOUNTED
 from sims.mesh import (
-    SOUND,
+    HEALTHY,
     GearMesh,
     PairGeometry,
     ToothRows,
@@ -121,7 +121,7 @@ def fault_compliance_rows(
     roll = rolls_rad(mesh.pair, progress)[side - 1]
     for row, tooth in enumerate(own.faulty_teeth, start=1):
         faults = own.faults_of(tooth)
-        lost = mesh.gear_compliance(side, progress, faults._replace(crack=SOUND.crack)) - healthy
+        lost = mesh.gear_compliance(side, progress, faults._replace(crack=HEALTHY.crack)) - healthy
         added = n_slices * lost[:, None, None] * np.eye(n_slices)
         if faults.crack is not None:
             added = added + over_height(gear.grid.roll_rad, crack_added_m_per_n(gear, faults.crack), roll)

@@ -241,7 +241,7 @@ def matched(
         Mass products of full and reduced modes, both mass-normalised.
     rigid_hz : array
 
-    Source: R. J. Allemang, The modal assurance criterion – twenty years of use and abuse, Healthy and Vibration (2003),
+    Source: R. J. Allemang, The modal assurance criterion – twenty years of use and abuse, Sound and Vibration (2003),
     for the criterion; for subspaces, the squared cosines of their principal angles.
     """
     n = len(full_hz)

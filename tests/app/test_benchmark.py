@@ -75,8 +75,8 @@ def everything_but_samples(folder):
 
 
 def test_cases_of_different_kind_differ_in_their_samples_only(folders):
-    sound, *others = (everything_but_samples(folder) for folder, _ in folders.values())
-    assert all(other == sound for other in others)
+    healthy, *others = (everything_but_samples(folder) for folder, _ in folders.values())
+    assert all(other == healthy for other in others)
     values = [read_seen(folder).recordings[0].values("a1") for folder, _ in folders.values()]
     assert all((values[0] != other).any() for other in values[1:])
 

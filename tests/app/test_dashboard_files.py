@@ -99,8 +99,8 @@ def test_the_command_survives_a_shell() -> None:
     words = shlex.split(command_of(request))
     assert words[:5] == ["gearsig", "analyze", "a b; rm -rf.csv", "--rig", "rig's.toml"]
     assert words[5:] == ["--fs", "25600", "--speed-rpm", "1500"]
-    compared = AnalysisRequest("a.h5", "", reference_name="sound; 1.h5", reference_sha256="1", torque_nm=40.0)
-    assert shlex.split(command_of(compared))[3:] == ["--reference", "sound; 1.h5", "--torque", "40Nm"]
+    compared = AnalysisRequest("a.h5", "", reference_name="healthy; 1.h5", reference_sha256="1", torque_nm=40.0)
+    assert shlex.split(command_of(compared))[3:] == ["--reference", "healthy; 1.h5", "--torque", "40Nm"]
 
 
 def test_dark_pictures_turn_paper_and_ink_over_and_keep_the_hue() -> None:

@@ -68,7 +68,7 @@ def bank(
 
 
 def same(one: Bank, other: Bank) -> bool:
-    arrays = ("sound", "sound_changes", "changes")
+    arrays = ("healthy", "healthy_changes", "changes")
     texts = ("point", "feature_names", "change_names", "added", "left_out")
     return all(np.array_equal(getattr(one, a), getattr(other, a)) for a in arrays) and all(
         getattr(one, t) == getattr(other, t) for t in texts
@@ -85,19 +85,19 @@ def test_changes_are_those_of_the_features_against_the_same_specimen() -> None:
         run = Sines().run(rounded(POINT), added, seed=1, duration_s=DURATION_S, sampling_rate_hz=FS, noise=noise)
         return reduce_recording(run, RIG)
 
-    np.testing.assert_array_equal(found.sound[1], once(gathered())[1])
+    np.testing.assert_array_equal(found.healthy[1], once(gathered())[1])
     np.testing.assert_array_equal(found.changes[1, 1], change_once(gathered(STRONG, noise=3), gathered())[1])
 
 
 def test_what_cannot_be_simulated_is_left_out_with_its_reason() -> None:
     assert bank().left_out == ((IMPOSSIBLE, "it cannot be"),)
-    with pytest.raises(RefusalError, match="sound machine cannot be simulated: it cannot be"):
+    with pytest.raises(RefusalError, match="healthy machine cannot be simulated: it cannot be"):
         bank(twin=Sines(broken=True))
 
 
-def test_sound_specimens_change_little_and_candidates_more() -> None:
+def test_healthy_specimens_change_little_and_candidates_more() -> None:
     found = bank()
-    size = np.sqrt(np.mean(found.sound_changes[0][: len(found.feature_names)] ** 2))
+    size = np.sqrt(np.mean(found.healthy_changes[0][: len(found.feature_names)] ** 2))
     strong = np.sqrt(np.mean(found.changes[1, 0][: len(found.feature_names)] ** 2))
     assert strong > size
 
@@ -155,9 +155,9 @@ def test_a_damaged_or_foreign_file_is_made_again(tmp_path: Path, damage: str) ->
     elif damage == "foreign key":
         np.savez(path, **{**arrays, "about": np.array(str(arrays["about"]).replace("sines 1", "sines 9"))})
     elif damage == "other arrays":
-        np.savez(path, **{**arrays, "sound": arrays["sound"][:, 1:]})
+        np.savez(path, **{**arrays, "healthy": arrays["healthy"][:, 1:]})
     else:
-        np.savez(path, **{**arrays, "sound": np.array([{}], dtype=object)})
+        np.savez(path, **{**arrays, "healthy": np.array([{}], dtype=object)})
     made = []
     assert same(bank(tmp_path, on_progress=lambda done, _n: made.append(done)), first)
     assert made
@@ -186,7 +186,7 @@ def test_each_effect_at_each_point_has_a_file_and_what_is_there_is_not_made_agai
         runs, ["louder", "louder 2"], seeds=[0], folder=tmp_path, processes=1, on_progress=lambda *n: made.append(n)
     )
     assert len(list(tmp_path.iterdir())) == 4
-    assert len(made) == 2 + 1 + 4  # the sound machine at both points; one candidate at the first, four at the other
+    assert len(made) == 2 + 1 + 4  # the healthy machine at both points; one candidate at the first, four at the other
     assert [set(at) for at in both] == [{"louder", "louder 2"}] * 2
     assert [at["louder"].point for at in both] == [run.point for run in runs]
     np.testing.assert_array_equal(both[1]["louder"].changes[1], both[1]["louder 2"].changes[0])

@@ -112,9 +112,9 @@ def test_two_rig_files_for_one_recording_are_refused(tmp_path) -> None:
 
 
 def test_the_only_rig_file_is_for_all_though_it_is_named_as_the_reference() -> None:
-    now, sound = upload("now.h5", b"1"), upload("sound.h5", b"2")
-    rig = upload("sound.toml", text=RIG)
-    assert common_rig(Choice((now,), (sound,), (rig,))) is rig
+    now, healthy = upload("now.h5", b"1"), upload("healthy.h5", b"2")
+    rig = upload("healthy.toml", text=RIG)
+    assert common_rig(Choice((now,), (healthy,), (rig,))) is rig
 
 
 def test_another_choice_has_another_key() -> None:

@@ -144,7 +144,7 @@ def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
     now, notices = reduce_recording(run(noise=1), rig()), list[str]()
     first, *others = now.channels
     reference = now.with_channels({first: now.channels[first]})
-    healthy = [HealthyReference(reference, rig(), "sound.h5")]
+    healthy = [HealthyReference(reference, rig(), "healthy.h5")]
     assert list(_with_channels_of(now, reference, healthy, "now", notices).channels) == [first]
     assert notices == [f"now: {', '.join(others)} is left out, for the reference has no such channel."]
 

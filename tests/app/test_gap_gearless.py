@@ -119,7 +119,7 @@ def test_impacts_of_no_known_part_stay_unknown() -> None:
     assert strange.places[0].orders[0] == pytest.approx(5.9, rel=0.01)
     assert "impacts" in strange.verdict[1]
     same = diagnosed(recording(5.9), recording(5.9, seed=1))
-    assert same.outcome is GapOutcome.NO_GAP  # as strong when the machine was sound
+    assert same.outcome is GapOutcome.NO_GAP  # as strong when the machine was healthy
     louder = replace(recording(5.9), samples=3.0 * recording(5.9).samples)
     grown = diagnosed(louder, recording(5.9, seed=1))
     assert grown.outcome is GapOutcome.UNKNOWN

@@ -53,7 +53,7 @@ def written(recording, path: Path) -> str:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     place = tmp_path_factory.mktemp("drives")
-    written(made(1), place / "sound.h5")
+    written(made(1), place / "healthy.h5")
     written(made(2, ("backlash", 120.0)), place / "wide.h5")
     written(made(1, mode="continuous"), place / "continuous.h5")
     written(made(1, drag_nm=200.0), place / "stands.h5")
@@ -67,7 +67,7 @@ def diagnosed(recording, reference=None):
 
 def test_more_play_is_named_measured_and_simulated_again(folder, tmp_path, capsys):
     out = tmp_path / "gap"
-    files = [str(folder / "wide.h5"), "--reference", str(folder / "sound.h5")]
+    files = [str(folder / "wide.h5"), "--reference", str(folder / "healthy.h5")]
     assert run(["gap", *files, "--model", "forging", "-o", str(out)]) == 0
     said = capsys.readouterr().out
     assert "Which: more backlash" in said
@@ -119,7 +119,7 @@ def test_a_heavier_load_is_named_by_its_own_name():
     assert report.references == ("reference 1",)
 
 
-def test_a_sound_drive_has_no_gap_and_it_is_said_what_would_not_show():
+def test_a_healthy_drive_has_no_gap_and_it_is_said_what_would_not_show():
     """A crack that would not stand out of the other teeth is named with its depth."""
     report = diagnosed(made(5), made(6))
     assert report.outcome is GapOutcome.NO_GAP
@@ -144,8 +144,8 @@ def without_torque(recording):
 
 
 def test_without_torque_the_play_can_still_be_told():
-    now, sound = made(7, ("backlash", 150.0)), made(8)
-    report = diagnosed(without_torque(now), without_torque(sound))
+    now, healthy = made(7, ("backlash", 150.0)), made(8)
+    report = diagnosed(without_torque(now), without_torque(healthy))
     ranked = [c.name for c in report.causes if c.severity is not None]
     assert set(ranked) == WITHOUT_TORQUE
     assert any("no torque was recorded in now" in notice for notice in report.notices)
@@ -206,12 +206,12 @@ def test_a_worn_drive_runs_as_its_teeth_at_rest_say(by_its_rig, depth_um):
     """The course of the compression from the balance of forces of two worn pairs, against the drive in motion."""
     drive = by_its_rig
     worn = drive.features(Added("tooth_wear", depth_um, {"gear": "driver"}))
-    sound, expected = drive.healthy, drive.worn_curve_um(depth_um)
-    known = np.isfinite(worn.curve_um) & np.isfinite(sound.curve_um)
-    found = (worn.curve_um - sound.curve_um)[known]
+    healthy, expected = drive.healthy, drive.worn_curve_um(depth_um)
+    known = np.isfinite(worn.curve_um) & np.isfinite(healthy.curve_um)
+    found = (worn.curve_um - healthy.curve_um)[known]
     assert found - found.mean() == pytest.approx(expected[known] - expected[known].mean(), abs=1.5)
     assert np.ptp(found) > 5.0
-    assert worn.play_um - sound.play_um == pytest.approx(expected.mean(), abs=1.5)
+    assert worn.play_um - healthy.play_um == pytest.approx(expected.mean(), abs=1.5)
 
 
 def test_a_sensor_that_misreads_is_not_taken_for_another_load():

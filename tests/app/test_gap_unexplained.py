@@ -28,8 +28,8 @@ def seen(now: Recording, rig: Rig = RIG, *references: Recording) -> tuple[list[S
 
 
 def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_silences_them() -> None:
-    struck, sound = record(knocking), record(seed=1)
-    standing, *_ = seen(struck, RIG, sound)
+    struck, healthy = record(knocking), record(seed=1)
+    standing, *_ = seen(struck, RIG, healthy)
     place = standing_place(standing[0], RIG)
     assert "order 5.148" in place.title
     assert "no gear, no shaft and no bearing explains (" in place.title
@@ -39,7 +39,7 @@ def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_sile
     assert not again
 
 
-def test_sound_gears_have_nothing_strange() -> None:
+def test_healthy_gears_have_nothing_strange() -> None:
     assert seen(record()) == ([], [], [])
 
 

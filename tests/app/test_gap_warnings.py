@@ -55,10 +55,10 @@ def gathered(seed: int, noise: int, *, chipped: bool = False) -> ReducedRecordin
 
 
 def test_another_specimen_is_noticed_and_a_damaged_gear_is_not_another_machine() -> None:
-    sound = gathered(0, 0)
-    assert strange_pattern(gathered(0, 1), sound, "now") == []
-    assert strange_pattern(gathered(0, 1, chipped=True), sound, "now") == []
-    (remark,) = strange_pattern(gathered(3, 1), sound, "now")
+    healthy = gathered(0, 0)
+    assert strange_pattern(gathered(0, 1), healthy, "now") == []
+    assert strange_pattern(gathered(0, 1, chipped=True), healthy, "now") == []
+    (remark,) = strange_pattern(gathered(3, 1), healthy, "now")
     assert "another machine" in remark
 
 
@@ -106,12 +106,12 @@ def test_teeth_that_explain_little_are_a_remark_where_no_other_number_explains_m
 
 
 def test_recording_and_reference_exchanged_are_noticed_by_the_sign_of_the_change() -> None:
-    sound, chipped = gathered(0, 1), gathered(0, 2, chipped=True)
-    (doubt,) = exchanged(sound, chipped, "now")
+    healthy, chipped = gathered(0, 1), gathered(0, 2, chipped=True)
+    (doubt,) = exchanged(healthy, chipped, "now")
     assert "may have been exchanged" in doubt
-    assert exchanged(chipped, sound, "now") == []
-    assert exchanged(sound, gathered(0, 3), "now") == []
-    assert exchanged(gathered(3, 1), sound, "now") == []  # another specimen is no exchange
+    assert exchanged(chipped, healthy, "now") == []
+    assert exchanged(healthy, gathered(0, 3), "now") == []
+    assert exchanged(gathered(3, 1), healthy, "now") == []  # another specimen is no exchange
 
 
 def test_a_reference_with_a_fault_is_told() -> None:

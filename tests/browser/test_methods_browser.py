@@ -74,7 +74,7 @@ def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page) -> 
     np.testing.assert_allclose(found.values("without noise"), whole.values, atol=1e-12)
 
 
-def test_the_depth_of_a_crack_against_the_sound_sample(page: playwright.Page) -> None:
+def test_the_depth_of_a_crack_against_the_healthy_sample(page: playwright.Page) -> None:
     panel = open_methods(page, "Root crack 3mm")
     choose(page, panel, "Crack severity")
     choose(page, panel, "Sample")

@@ -29,20 +29,20 @@ def repeated(time: FloatArray, revolutions: FloatArray) -> FloatArray:
     return sum((0.05 * np.cos(2 * np.pi * n * revolutions + n) for n in range(15, 80, 4)), np.zeros(len(time)))
 
 
-SOUND = record(repeated)
+HEALTHY = record(repeated)
 
 
 def found(now: Recording) -> dict[str, float]:
-    changes = dict(alike_features(reduce_recording(now, RIG), reduce_recording(SOUND, RIG)))
+    changes = dict(alike_features(reduce_recording(now, RIG), reduce_recording(HEALTHY, RIG)))
     return {name.removeprefix("alike."): value for name, value in changes.items()}
 
 
 def test_a_path_changes_all_three_alike_about_each_harmonic() -> None:
     lines = np.fft.rfft(record(repeated, seed=1).samples)
-    mesh_orders = np.fft.rfftfreq(SOUND.samples.shape[1], 1.0 / RATE_HZ) / MESH_HZ
+    mesh_orders = np.fft.rfftfreq(HEALTHY.samples.shape[1], 1.0 / RATE_HZ) / MESH_HZ
     gains_db = np.interp(mesh_orders, [1.49, 1.51, 2.49, 2.51], [8.0, 0.0, 0.0, -6.0])
-    now = replace(SOUND, samples=np.fft.irfft(lines * 10.0 ** (gains_db / 20.0), SOUND.samples.shape[1]))
-    changes = segment_changes(reduce_recording(now, RIG), reduce_recording(SOUND, RIG))
+    now = replace(HEALTHY, samples=np.fft.irfft(lines * 10.0 ** (gains_db / 20.0), HEALTHY.samples.shape[1]))
+    changes = segment_changes(reduce_recording(now, RIG), reduce_recording(HEALTHY, RIG))
     for k, gain_db in enumerate((8.0, 0.0, -6.0)):
         assert changes[:, k] == pytest.approx(np.full((2, 3), gain_db), abs=1.5)
     assert np.isnan(changes[:, 3:5, 0]).all()  # there is no fourth and fifth harmonic
@@ -72,9 +72,9 @@ def test_noise_alone_changes_noise_alone() -> None:
 
 
 def test_it_is_a_feature_of_a_change_with_a_name_in_words_and_no_part_of_its_size() -> None:
-    now, sound = reduce_recording(record(repeated, seed=1), RIG), reduce_recording(SOUND, RIG)
-    names = change_features(now, sound).names
-    assert change_once(now, sound)[0] == names
+    now, healthy = reduce_recording(record(repeated, seed=1), RIG), reduce_recording(HEALTHY, RIG)
+    names = change_features(now, healthy).names
+    assert change_once(now, healthy)[0] == names
     own = [i for i, name in enumerate(names) if name.startswith("alike.")]
     values = np.zeros(len(names))
     values[own] = 99.0

@@ -21,10 +21,10 @@ def test_a_figure_that_no_simulation_changes_is_not_divided_by() -> None:
     assert credibility_of(features, np.ones((50, 2))) == pytest.approx([0.0, 0.0])
 
 
-def test_sound_machines_scatter_less_about_what_is_credible_than_about_all_or_nothing_of_it() -> None:
+def test_healthy_machines_scatter_less_about_what_is_credible_than_about_all_or_nothing_of_it() -> None:
     population = load_population()
-    sound = population.causes == NONE
-    own, simulated = population.features[sound], population.simulated[sound]
-    left = population.gaps[sound].std(axis=0)
+    healthy = population.causes == NONE
+    own, simulated = population.features[healthy], population.simulated[healthy]
+    left = population.gaps[healthy].std(axis=0)
     assert np.all(left <= np.minimum(own.std(axis=0), (own - simulated).std(axis=0)) + 1e-9)
     assert np.median(left / (own - simulated).std(axis=0)) < 0.95

@@ -24,7 +24,7 @@ RATIO = TEETH[0] / TEETH[1]
 
 
 @cache
-def sound() -> ReducedRecording:
+def healthy() -> ReducedRecording:
     return reduce_recording(record(), RIG)
 
 
@@ -34,7 +34,7 @@ def knocking(size: float = 1.5, seed: int = 1) -> ReducedRecording:
 
 
 def test_spectra_are_peak_amplitudes_over_the_drivers_order() -> None:
-    curves = spectrum_curves(sound(), knocking(), knocking(seed=2))
+    curves = spectrum_curves(healthy(), knocking(), knocking(seed=2))
     assert len(curves) == 3
     for average, step in zip(curves[:2], (1.0, RATIO), strict=True):
         assert np.diff(average.orders) == pytest.approx(np.full(len(average.orders) - 1, step))
@@ -43,21 +43,21 @@ def test_spectra_are_peak_amplitudes_over_the_drivers_order() -> None:
             assert average.orders[at] == pytest.approx(k * TEETH[0])
             assert average.measured[at] == pytest.approx(amplitude, rel=0.02)
         assert len(average.after) == len(average.orders)
-    assert not len(spectrum_curves(sound(), knocking())[0].after)
+    assert not len(spectrum_curves(healthy(), knocking())[0].after)
 
 
 def test_noise_stays_below_the_floor() -> None:
     """One line of noise in twenty is above it."""
-    average = spectrum_curves(sound(), reduce_recording(record(seed=5), RIG))[0]
+    average = spectrum_curves(healthy(), reduce_recording(record(seed=5), RIG))[0]
     empty = (average.orders > 80) & (average.orders < 140)
     assert np.mean(average.measured[empty] > average.floor[empty]) < 0.1
 
 
 def test_each_line_has_the_floor_of_its_feature() -> None:
-    change = difference_features(knocking(), sound())
+    change = difference_features(knocking(), healthy())
     table = dict(zip(change.names, range(1, len(change.names) + 1), strict=True))
     floor = StructuralFloor(change.names, np.array(list(table.values()), dtype=float))
-    driver, driven, residual = spectrum_curves(knocking(), sound(), structural=floor)
+    driver, driven, residual = spectrum_curves(knocking(), healthy(), structural=floor)
     assert driver.structural_db[2 * TEETH[0]] == table["mesh.share.2"]
     assert driver.structural_db[2 * TEETH[0] - 4] == table["sideband.driver.3to5"]
     assert driven.structural_db[TEETH[1] + 1] == table["sideband.driven.1"]
@@ -81,7 +81,7 @@ def test_a_line_that_moved_by_one_is_the_same() -> None:
 
 
 def test_energy_peaks_at_the_tooth_and_is_over_the_middling_one() -> None:
-    driver, driven = angle_curves(knocking(), sound())
+    driver, driven = angle_curves(knocking(), healthy())
     place = driver.angle_deg[np.argmax(driver.measured)]
     assert place == pytest.approx(0.4 * 360, abs=360 / TEETH[0])
     assert np.median(driver.measured) == pytest.approx(1.0)
@@ -94,7 +94,7 @@ def test_energy_peaks_at_the_tooth_and_is_over_the_middling_one() -> None:
 def test_the_simulated_change_has_the_size_of_the_measured_one() -> None:
     """Half the knock has a quarter of the energy, in the units of the measured middling tooth."""
     simulated = knocking(0.75, seed=2)
-    driver = angle_curves(knocking(), sound(), simulated, sound=sound(), simulated_sound=sound())[0]
+    driver = angle_curves(knocking(), healthy(), simulated, healthy=healthy(), simulated_healthy=healthy())[0]
     assert driver.after.max() / driver.measured.max() == pytest.approx(0.25, rel=0.1)
     assert not driver.before.any()  # compared with itself
 
@@ -108,19 +108,19 @@ def test_without_a_mark_simulated_curves_are_turned_to_the_measured() -> None:
 
 def test_the_reference_stands_beside_recording_and_simulation() -> None:
     reference = reduce_recording(record(seed=7), RIG)
-    change = difference_features(knocking(), sound())
+    change = difference_features(knocking(), healthy())
     floor = StructuralFloor(change.names, np.full(len(change.names), 2.0))
-    for curves in spectrum_curves(knocking(), sound(), reference=reference, reference_structural=floor):
+    for curves in spectrum_curves(knocking(), healthy(), reference=reference, reference_structural=floor):
         assert len(curves.reference) == len(curves.reference_floor) == len(curves.orders)
         assert len(curves.reference_structural_db) == len(curves.orders)
         assert not len(curves.structural_db)
         view = against_reference(curves)
         np.testing.assert_array_equal(view.before, curves.reference)
         assert not len(view.after)
-    without = spectrum_curves(knocking(), sound())[0]
+    without = spectrum_curves(knocking(), healthy())[0]
     assert not len(without.reference)
     assert not len(without.reference_floor)
-    driver = spectrum_curves(sound(), knocking(), reference=reference)[0]  # the simulation, not the reference, knocks
+    driver = spectrum_curves(healthy(), knocking(), reference=reference)[0]  # the simulation, not the reference, knocks
     assert np.nanmax(np.abs(gap_by_order(against_reference(driver), driver.reference))) < 6.0
     assert np.nanmax(np.abs(gap_by_order(driver, driver.before))) > 10.0
 
@@ -133,7 +133,7 @@ def test_lines_beyond_their_floor_are_counted_of_those_that_are_seen() -> None:
 
 
 def test_averages_differ_where_the_knock_is() -> None:
-    curves = average_curves(knocking(), sound(), unit="m/s^2")[0]
+    curves = average_curves(knocking(), healthy(), unit="m/s^2")[0]
     changed = np.abs(curves.measured - curves.reference)
     away = (curves.angle_deg[np.argmax(changed)] - 0.4 * 360 + 180) % 360 - 180
     assert abs(away) < 360 / TEETH[0]
@@ -147,6 +147,6 @@ def test_averages_are_peak_amplitudes_of_what_was_put_in() -> None:
     """A line between the mesh harmonics, 1.5 m/s² in the recording and none in the reference."""
     order = TEETH[0] + 9
     added = reduce_recording(record(lambda _, r: 1.5 * np.cos(2 * np.pi * order * r), seed=3), RIG)
-    curves = average_curves(added, sound())[0]
+    curves = average_curves(added, healthy())[0]
     change = curves.measured - curves.reference
     assert np.sqrt(2.0 * np.mean(change**2)) == pytest.approx(1.5, rel=0.05)

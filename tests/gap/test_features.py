@@ -32,12 +32,12 @@ def as_dict(features: Features) -> dict[str, float]:
 
 
 @pytest.fixture(scope="module")
-def sound() -> ReducedRecording:
+def healthy() -> ReducedRecording:
     return reduced()
 
 
-def test_mesh_harmonics_and_sidebands_have_their_levels(sound: ReducedRecording) -> None:
-    found = as_dict(features_of(sound))
+def test_mesh_harmonics_and_sidebands_have_their_levels(healthy: ReducedRecording) -> None:
+    found = as_dict(features_of(healthy))
     powers = np.square(MESH_AMPLITUDES)
     for k, power in enumerate(powers, 1):
         assert found[f"mesh.share.{k}"] == pytest.approx(10 * np.log10(power / powers.sum()), abs=0.05)
@@ -61,38 +61,38 @@ def test_scatter_is_that_of_repeated_records() -> None:
     ("family", "order"),
     [("outer", 9 / 2 * (1 - 7.94 / 39.04)), ("inner", 9 / 2 * (1 + 7.94 / 39.04))],
 )
-def test_a_bearings_train_raises_its_own_family(sound: ReducedRecording, family: str, order: float) -> None:
-    changes = as_dict(change_features(reduced(lambda _, r: 0.6 * ringing(0.99 * order * r), seed=1), sound))
+def test_a_bearings_train_raises_its_own_family(healthy: ReducedRecording, family: str, order: float) -> None:
+    changes = as_dict(change_features(reduced(lambda _, r: 0.6 * ringing(0.99 * order * r), seed=1), healthy))
     families = {name: changes[f"envelope.{name}"] for name in ("outer", "inner", "ball", "cage")}
     assert families[family] > 10.0
     assert families[family] > max(v for name, v in families.items() if name != family) + 6.0
     assert abs(changes["mesh.total"]) < 0.1
 
 
-def test_a_train_of_no_known_order_is_strange(sound: ReducedRecording) -> None:
-    changes = as_dict(change_features(reduced(lambda _, r: 0.6 * ringing(2.37 * r), seed=1), sound))
+def test_a_train_of_no_known_order_is_strange(healthy: ReducedRecording) -> None:
+    changes = as_dict(change_features(reduced(lambda _, r: 0.6 * ringing(2.37 * r), seed=1), healthy))
     assert changes["envelope.strange"] > 10.0
 
 
-def test_a_knock_at_one_tooth_stands_out_on_its_own_gear(sound: ReducedRecording) -> None:
-    changes = as_dict(change_features(reduced(lambda _, r: 0.5 * ringing(r - 0.4), seed=1), sound))
+def test_a_knock_at_one_tooth_stands_out_on_its_own_gear(healthy: ReducedRecording) -> None:
+    changes = as_dict(change_features(reduced(lambda _, r: 0.5 * ringing(r - 0.4), seed=1), healthy))
     assert changes["change.driver.prominence"] > 15.0
     assert changes["change.driver.prominence"] > changes["change.driven.prominence"] + 10.0
     assert changes["change.driver.width"] == pytest.approx(0.0, abs=2.0)  # about one pitch
 
 
-def test_hum_and_swing_are_told_from_the_gears(sound: ReducedRecording) -> None:
-    hum = as_dict(change_features(reduced(lambda t, _: 0.02 * np.sin(2 * np.pi * 50.0 * t), seed=1), sound))
+def test_hum_and_swing_are_told_from_the_gears(healthy: ReducedRecording) -> None:
+    hum = as_dict(change_features(reduced(lambda t, _: 0.02 * np.sin(2 * np.pi * 50.0 * t), seed=1), healthy))
     assert hum["hum"] > 6.0
     assert abs(hum["shaft.driver.2"]) < 3.0
-    swing = as_dict(change_features(reduced(seed=1, swing=0.01, swing_hz=1.3), sound))
+    swing = as_dict(change_features(reduced(seed=1, swing=0.01, swing_hz=1.3), healthy))
     assert swing["speed.swing"] > 20.0
     assert abs(swing["mesh.total"]) < 0.1
     assert reduced(seed=1, swing=0.01, swing_hz=1.3).speed[3] == pytest.approx(1.3, abs=0.1)
 
 
-def test_nothing_changes_but_noise(sound: ReducedRecording) -> None:
-    again = change_features(reduced(seed=5), sound)
+def test_nothing_changes_but_noise(healthy: ReducedRecording) -> None:
+    again = change_features(reduced(seed=5), healthy)
     level = [i for i, name in enumerate(again.names) if name.startswith(("mesh.", "sideband.", "floor.band"))]
     assert np.all(np.abs(again.values[level]) < 4.0 * again.scatter[level] + 0.2)
 
@@ -105,18 +105,18 @@ def test_two_gears_of_equal_teeth_leave_nothing_of_their_own_in_one_average() ->
     assert -10.0 < values["surprise.driver.level"] < 3.0
 
 
-def test_a_longer_record_reads_alike(sound: ReducedRecording) -> None:
+def test_a_longer_record_reads_alike(healthy: ReducedRecording) -> None:
     """What is not there has a floor that does not fall with the number of revolutions."""
     whole = record(seed=2)
     half = reduce_recording(replace(whole, samples=whole.samples[:, : whole.n_samples // 2]), RIG)
-    long, short = as_dict(features_of(sound)), as_dict(features_of(half))
+    long, short = as_dict(features_of(healthy)), as_dict(features_of(half))
     for name in ("shaft.driver.1", "shaft.driven.2", "tooth.driver.level", "sideband.driver.6to12"):
         assert short[name] == pytest.approx(long[name], abs=4.0)
     assert abs(short["envelope.strange"]) < 15.0
 
 
-def test_no_cycle_is_read_beyond_its_band(sound: ReducedRecording) -> None:
-    assert as_dict(features_of(sound))["envelope.strange"] < 15.0
+def test_no_cycle_is_read_beyond_its_band(healthy: ReducedRecording) -> None:
+    assert as_dict(features_of(healthy))["envelope.strange"] < 15.0
 
 
 def test_every_feature_has_a_scatter() -> None:

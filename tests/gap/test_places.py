@@ -32,7 +32,7 @@ OUTER = 9 / 2 * (1 - 7.94 / 39.04)
 
 
 @cache
-def sound(seed: int = 0) -> ReducedRecording:
+def healthy(seed: int = 0) -> ReducedRecording:
     return reduce_recording(record(seed=seed), RIG)
 
 
@@ -40,7 +40,7 @@ def sound(seed: int = 0) -> ReducedRecording:
 def floor(is_reference: bool) -> StructuralFloor:
     """Healthy records differ by noise here: three times their scatter, 2 dB at least."""
     compare = change_features if is_reference else difference_features
-    changes = [compare(sound(seed), sound()) for seed in (2, 3, 4)]
+    changes = [compare(healthy(seed), healthy()) for seed in (2, 3, 4)]
     values = np.stack([one.values for one in changes])
     centres = np.median(values, axis=0)
     return StructuralFloor(changes[0].names, np.maximum(3.0 * np.abs(values - centres).max(axis=0), 2.0), centres)
@@ -48,7 +48,7 @@ def floor(is_reference: bool) -> StructuralFloor:
 
 def places_of(added: Added | None = None, *, is_reference: bool = True, **settings: float) -> tuple[GapPlace, ...]:
     now = reduce_recording(record(added, seed=1, **settings), RIG)
-    return gap_places(now, sound(), floor(is_reference), is_reference=is_reference)
+    return gap_places(now, healthy(), floor(is_reference), is_reference=is_reference)
 
 
 def tone(order: float, amplitude: float) -> Added:
@@ -170,11 +170,11 @@ def test_what_leaks_into_an_average_is_not_its_own() -> None:
 
 def test_few_lines_of_noise_pass_for_a_shafts_own() -> None:
     rng = np.random.default_rng(1)
-    sums = sound().channels["a1"]
+    sums = healthy().channels["a1"]
     shape = sums.lines[0].shape
     noise = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
     counts = np.ones(len(noise))
-    noisy = sound().with_channels({"a1": replace(sums, lines=(noise, noise), counts=(counts, counts))})
+    noisy = healthy().with_channels({"a1": replace(sums, lines=(noise, noise), counts=(counts, counts))})
     held = noisy.average("a1", DRIVER).is_synchronous
     assert held.mean() < 0.005
 
@@ -185,13 +185,13 @@ def test_clipping_is_told_from_a_stray_peak() -> None:
     recording = record(seed=1)
     clipped = reduce_recording(replace(recording, samples=np.clip(recording.samples, -4.0, 4.0)), RIG)
     figures = {"raw.near_the_extreme": 20.0, "raw.kurtosis": -1.0}
-    assert "as clipping makes them" in tail_spot(ComparedPair(clipped, sound(), True, figures, figures)).title
-    assert "clipping" not in tail_spot(ComparedPair(sound(), clipped, True, figures, figures)).title
+    assert "as clipping makes them" in tail_spot(ComparedPair(clipped, healthy(), True, figures, figures)).title
+    assert "clipping" not in tail_spot(ComparedPair(healthy(), clipped, True, figures, figures)).title
 
 
 def compared(change_db: dict[str, float]) -> ComparedPair:
     """Return two records that differ by noise, with features that are said to have changed; floors of 1 dB."""
-    return ComparedPair(sound(1), sound(), True, change_db, change_db)
+    return ComparedPair(healthy(1), healthy(), True, change_db, change_db)
 
 
 def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
@@ -199,7 +199,7 @@ def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
     level, apart = "tooth.driven.level", "change.driven.elsewhere"
     round_it = _all_round(compared({level: 0.18, apart: 6.0}), DRIVEN, "shaft out", "a1")
     assert round_it.change_db == 6.0
-    assert "up by 6 dB against what sound machines change by" in round_it.title
+    assert "up by 6 dB against what healthy machines change by" in round_it.title
     assert "0.18" not in round_it.title
     louder = _all_round(compared({level: -4.0, apart: 2.0}), DRIVEN, "shaft out", "a1")
     assert louder.title == "pattern of the teeth of shaft out all round, down by 4 dB"

@@ -55,13 +55,13 @@ def test_what_is_next_says_only_what_was_computed() -> None:
     assert "would put the two likeliest effects further apart" in nothing.verdict[3]
     alone = replace(nothing, causes=(nothing.causes[0], replace(nothing.causes[1], shrinkage=None)))
     assert "likely enough" in replace(alone, causes=alone.causes[:2]).verdict[3]
-    assert "when it was sound" in replace(nothing, references=()).verdict[3]
-    assert "when it was sound" in replace(unknown_report(), references=()).verdict[3]
+    assert "when it was healthy" in replace(nothing, references=()).verdict[3]
+    assert "when it was healthy" in replace(unknown_report(), references=()).verdict[3]
 
 
-def test_a_sound_machine_is_the_first_wish_and_another_point_the_second() -> None:
+def test_a_healthy_machine_is_the_first_wish_and_another_point_the_second() -> None:
     report = cannot_separate_report()
-    assert report.verdict[3].startswith("Next: the same machine when it was sound")
+    assert report.verdict[3].startswith("Next: the same machine when it was healthy")
     assert f" Or {report.next_recordings[0].text}" in report.verdict[3]
     known = replace(report, references=("healthy.h5",))
     assert known.verdict[3] == f"Next: {report.next_recordings[0].text}"

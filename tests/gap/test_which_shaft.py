@@ -95,13 +95,13 @@ def run(*added: Added, noise: int, point: OperatingCondition) -> ReducedRecordin
 
 
 @cache
-def sound(point: OperatingCondition) -> ReducedRecording:
+def healthy(point: OperatingCondition) -> ReducedRecording:
     return run(noise=1, point=point)
 
 
 def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, float]:
     floor = load_population().floor(with_reference=True)
-    return over_floors(change_features(run(*added, noise=2, point=point), sound(point)), floor, is_reference=True)
+    return over_floors(change_features(run(*added, noise=2, point=point), healthy(point)), floor, is_reference=True)
 
 
 @pytest.mark.parametrize("cause", ["root_crack", "tooth_spall", "chipped_tooth", "pitch_error", "eccentricity"])
@@ -123,6 +123,6 @@ def test_what_shows_at_speed_or_load_only_is_put_on_its_shaft_there(
     assert list(told_options(cause, [simulated(strong, point=point)], (29, 47)).values()) == [side]
 
 
-def test_a_sound_machine_has_no_signs_on_either_shaft() -> None:
+def test_a_healthy_machine_has_no_signs_on_either_shaft() -> None:
     again = simulated()
     assert all(told_options(cause, [again], (29, 47)) == {} for cause in SIGNS)

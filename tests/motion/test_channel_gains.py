@@ -35,9 +35,9 @@ def test_nothing_is_said_of_what_stands_or_moves_once() -> None:
 @pytest.mark.parametrize("name", ["pinion speed", "wheel speed", "pinion acceleration", "wheel acceleration"])
 @pytest.mark.parametrize("gain", [0.8, 1.25])
 def test_a_channel_of_another_scale_is_refused_with_its_factor(name: str, gain: float) -> None:
-    sound = start_stop(rate_hz=4000.0)  # the pinion's acceleration rings too fast for 1 kHz to tell its scale
+    healthy = start_stop(rate_hz=4000.0)  # the pinion's acceleration rings too fast for 1 kHz to tell its scale
     with pytest.raises(InputError, match=f"{name}' reads (0.[78]|1.2).*angle' says.*scale"):
-        measure_motion(changed(sound, name, gain * sound.values(name)))
+        measure_motion(changed(healthy, name, gain * healthy.values(name)))
 
 
 def test_simulated_channels_agree_in_every_mode() -> None:
@@ -50,5 +50,5 @@ def test_simulated_channels_agree_in_every_mode() -> None:
 
 def test_an_acceleration_that_is_sampled_too_slowly_is_not_judged() -> None:
     """Ringing folds down, alike in each start: the sum is off though the channel is right."""
-    sound = start_stop()
-    measure_motion(changed(sound, "pinion acceleration", 0.7 * sound.values("pinion acceleration")))
+    healthy = start_stop()
+    measure_motion(changed(healthy, "pinion acceleration", 0.7 * healthy.values("pinion acceleration")))

@@ -1,4 +1,4 @@
-"""A cracked tooth in a drive that starts and stops: by how much it yields, and that a sound one is left alone."""
+"""A cracked tooth in a drive that starts and stops: by how much it yields, and that a healthy one is left alone."""
 
 from dataclasses import replace
 
@@ -34,9 +34,9 @@ def cracked(
 @pytest.mark.parametrize("part", [0.4, 2.0])
 def test_the_min_loss_parts_what_shows_from_what_does_not(part: float) -> None:
     """A tooth that has lost two fifths of it is not named, one that has lost twice as much is."""
-    sound = tooth_compliance(measure_motion(cracked(0.0, "manipulator_formula", "start-stop")))
+    healthy = tooth_compliance(measure_motion(cracked(0.0, "manipulator_formula", "start-stop")))
     prepared = ForgingManipulator().prepare({}, None, preset_name="manipulator_formula")
-    drive = replace(prepared.drive, weak_tooth=WeakTooth(0, 6, part * sound.min_loss(1.5)))
+    drive = replace(prepared.drive, weak_tooth=WeakTooth(0, 6, part * healthy.min_loss(1.5)))
     wanted = ParameterValues(prepared.values)
     recording = record(
         drive,
@@ -64,7 +64,7 @@ def test_the_cracked_tooth_and_the_stiffness_it_has_lost(preset: str, mode: str)
     assert found.extra_um[12] > 5.0 * found.uncertainty_um[12]
 
 
-def test_sound_teeth_are_left_alone() -> None:
+def test_healthy_teeth_are_left_alone() -> None:
     for preset in ("manipulator_formula", "manipulator_table"):
         for mode in ("start-stop", "continuous"):
             for seed in range(2):

@@ -72,19 +72,19 @@ def test_stiffness_refuses_what_does_not_fit(cycles, curves, region, message):
 def test_load_sharing_draws_forces_where_pairs_touch_and_errors_in_um():
     one = np.where(CYCLES < 1.0, 2000.0, 0.0)
     error = 1e-6 * (8 + np.cos(CYCLES))
-    figure = load_sharing_figure(CYCLES, {"pair 0": one, "pair 1": 2000.0 - one}, {"sound": error})
+    figure = load_sharing_figure(CYCLES, {"pair 0": one, "pair 1": 2000.0 - one}, {"healthy": error})
     upper, lower = figure.axes
     drawn = _line(upper, "pair 0").get_ydata()
     np.testing.assert_array_equal(drawn[CYCLES < 1.0], 2000.0)
     assert drawn[200] == 0.0  # the fall to zero is shown
     assert np.isnan(drawn[201:]).all()
-    np.testing.assert_allclose(_line(lower, "sound").get_ydata(), error * 1e6)
+    np.testing.assert_allclose(_line(lower, "healthy").get_ydata(), error * 1e6)
     assert {"force of a pair (N)", "transmission error (µm)", "mesh cycles (tooth passages)"} <= set(_texts(figure))
 
 
 def test_load_sharing_refuses_wrong_lengths():
     with pytest.raises(InputError, match="transmission_error_m"):
-        load_sharing_figure(CYCLES, {"pair 0": np.ones(401)}, {"sound": np.ones(400)})
+        load_sharing_figure(CYCLES, {"pair 0": np.ones(401)}, {"healthy": np.ones(400)})
 
 
 def test_tooth_is_mirrored_to_scale_with_its_crack():

@@ -83,7 +83,7 @@ def test_response_refuses_what_does_not_fit():
 
 def _accelerations():
     impact = np.where(REVOLUTIONS % 1.0 < 0.1, 20.0, 0.0)
-    return {"sound": np.sin(2000 * REVOLUTIONS), "3 mm": np.sin(2000 * REVOLUTIONS) + impact}
+    return {"healthy": np.sin(2000 * REVOLUTIONS), "3 mm": np.sin(2000 * REVOLUTIONS) + impact}
 
 
 def test_crack_comparison_marks_impacts_and_enlarges_the_middle_one():
@@ -93,26 +93,26 @@ def test_crack_comparison_marks_impacts_and_enlarges_the_middle_one():
         cases,
         impacts_rev=(1.0, 2.0, 3.0, 9.0),
         n_teeth=50,
-        change_mps2={"3 mm": cases["3 mm"] - cases["sound"]},
+        change_mps2={"3 mm": cases["3 mm"] - cases["healthy"]},
         reach_cycles={"3 mm": 5.0},
         zoom_cycles=(-2.98, 11.98),
         title="T",
     )
     whole, close, _, close_3 = figure.axes
-    np.testing.assert_array_equal(_longest(whole).get_ydata(), cases["sound"])
+    np.testing.assert_array_equal(_longest(whole).get_ydata(), cases["healthy"])
     marks = {float(line.get_xdata()[0]) for line in whole.lines if len(line.get_xdata()) == 2}
     assert marks == {1.0, 2.0, 3.0}
     at = np.abs((REVOLUTIONS - 2.0) * 50 - 4.5) < 7.48
     # On a logarithmic axis a change of nothing is drawn at a tiny value.
     np.testing.assert_allclose(
-        _longest(close_3).get_ydata(), np.abs(cases["3 mm"] - cases["sound"])[at], rtol=1e-12, atol=2e-12
+        _longest(close_3).get_ydata(), np.abs(cases["3 mm"] - cases["healthy"])[at], rtol=1e-12, atol=2e-12
     )
     np.testing.assert_allclose(_longest(close_3).get_xdata(), (REVOLUTIONS[at] - 2.0) * 50)
-    np.testing.assert_allclose(_longest(close).get_ydata(), np.abs(cases["sound"][at]), atol=2e-12)
+    np.testing.assert_allclose(_longest(close).get_ydata(), np.abs(cases["healthy"][at]), atol=2e-12)
     assert close.get_ylim() == close_3.get_ylim()
     texts = set(_texts(figure))
     assert {
-        "sound",
+        "healthy",
         "3 mm",
         "T",
         "a (m/s²)",

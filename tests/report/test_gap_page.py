@@ -243,7 +243,7 @@ def test_it_says_what_is_compared_with():
     with_reference, without = effect_report(), cannot_separate_report()
     assert "healthy_1.h5" in floors_text(with_reference)
     assert "from one recording to another" in floors_text(with_reference)
-    assert "what the simulation of the sound machine lets expect" in floors_text(without)
+    assert "what the simulation of the healthy machine lets expect" in floors_text(without)
     assert floors_text(gearless_report()) == ""
     first, *others = with_reference.conditions
     partly = replace(with_reference, conditions=(replace(first, reference="healthy_1.h5"), *others))

@@ -83,10 +83,10 @@ def test_cracks_are_sorted_by_depth_and_the_reference_is_marked(write):
         [
             _entry("shallow", Outcome.FAULT, confidence=0.9, crack_mm=1.3),
             _entry("deep", Outcome.FAULT, confidence=0.8, crack_mm=3.3),
-            _entry("sound", Outcome.NO_FAULT, is_reference=True),
+            _entry("healthy", Outcome.NO_FAULT, is_reference=True),
         ]
     )
-    order = [html.index(f"verdict of {name}") for name in ("deep", "shallow", "sound")]
+    order = [html.index(f"verdict of {name}") for name in ("deep", "shallow", "healthy")]
     assert order == sorted(order)
     assert '<td class="number">3.3 mm</td>' in html
     assert '<td class="number">–</td>' in html

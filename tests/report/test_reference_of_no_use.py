@@ -13,7 +13,7 @@ REASON = "The depth of a root crack cannot be told: the rig file does not give m
 
 @pytest.fixture(scope="module")
 def analysis() -> Analysis:
-    """Analyse a sound gearbox, of whose gears too little is known, against a reference."""
+    """Analyse a healthy gearbox, of whose gears too little is known, against a reference."""
     return analyze(record(), reference=record(seed=1))
 
 

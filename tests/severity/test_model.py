@@ -56,7 +56,7 @@ def test_the_least_visible_crack_is_just_visible(name: str) -> None:
 
 
 @MODELS
-def test_p_values_count_sound_pairs(name: str) -> None:
+def test_p_values_count_healthy_pairs(name: str) -> None:
     m = model(name)
     n = len(m.healthy_scores)
     assert m.p_value(np.inf) == pytest.approx(1 / (n + 1))

@@ -143,10 +143,10 @@ def floors_of(rows: Sequence[Row], seed: int, drawn: str = "all") -> dict[str, A
         for name, wanted in (("with_reference", True), ("without_reference", False))
     }
     n_cases = len(parts["with_reference"])
-    n_sound = sum(label["kind"] == "none" for label, _ in parts["with_reference"])
+    n_healthy = sum(label["kind"] == "none" for label, _ in parts["with_reference"])
     provenance = {
         "n_cases": n_cases,
-        "n_sound": n_sound,
+        "n_healthy": n_healthy,
         "role": ROLE,
         "seed": seed,
         "drawn": drawn,

@@ -86,7 +86,7 @@ def test_fast_recordings_are_thinned_to_instants():
     assert np.array_equal(thin(fast).driver_angle_rad, fast.driver_angle_rad[::4])
 
 
-def test_the_sound_drive_tells_its_own_numbers():
+def test_the_healthy_drive_tells_its_own_numbers():
     found = told(examined())
     assert found.play_um == pytest.approx(300.0, rel=0.01)
     assert found.inertia_kg_m2 == pytest.approx(45.2625, rel=0.01)
@@ -114,15 +114,15 @@ def test_the_order_of_a_ripple_is_found():
 
 def test_a_tooth_that_gives_way_is_found_by_its_place():
     """3 µm more compression whenever tooth 8 carries."""
-    sound = examined()
-    m = sound.motion
-    extra = np.where(sound.flanks.tooth == 7, 3e-6, 0.0)
+    healthy = examined()
+    m = healthy.motion
+    extra = np.where(healthy.flanks.tooth == 7, 3e-6, 0.0)
     moved = replace(m, driven_angle_rad=m.driven_angle_rad - extra / m.path.base_radii_m[1])
-    now = replace(sound, motion=moved)
-    assert spot_of(told(now), told(sound)).tooth == 7
+    now = replace(healthy, motion=moved)
+    assert spot_of(told(now), told(healthy)).tooth == 7
     assert told(now).teeth_um[7] == pytest.approx(3.0, abs=0.4)
-    elsewhere = replace(spot_of(told(now), told(sound)), tooth=12)
-    assert change("tooth", now, sound) > change("tooth", now, sound, elsewhere) + 6.0
+    elsewhere = replace(spot_of(told(now), told(healthy)), tooth=12)
+    assert change("tooth", now, healthy) > change("tooth", now, healthy, elsewhere) + 6.0
 
 
 def test_without_torque_the_play_is_told_and_the_load_is_not():

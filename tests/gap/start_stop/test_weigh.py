@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap import FLOOR_IN_DEVIATIONS, NONE, UNKNOWN
+from gearsig.gap import NONE, UNKNOWN
 from gearsig.gap.start_stop import (
     NAMES,
     DriveFloor,
@@ -90,7 +90,7 @@ def test_a_right_prediction_takes_all_away(size):
     own = own_features(change, change, FLOOR_OF_ONE)
     before, after, taken, slope = shrink(change, change, FLOOR_OF_ONE, own)
     assert (after, taken) == (0.0, 1.0)
-    assert before == pytest.approx(size / FLOOR_IN_DEVIATIONS)
+    assert before == pytest.approx(size / 1.96)  # floors are where 95 % of a normal distribution end
     assert slope == pytest.approx(1.0)
 
 
