@@ -10,6 +10,8 @@ import pytest
 import typer.main
 
 from app.cli.main import app
+from gearsig.recording import FORMAT_OF_EXTENSION
+from sims.effects import effects
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -97,3 +99,16 @@ def test_the_glossary_is_short() -> None:
 
 def test_the_readme_is_a_readme() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
+def test_pages_and_help_name_every_file_format() -> None:
+    names = [file_format.name for file_format in dict.fromkeys(FORMAT_OF_EXTENSION.values())]
+    for page in (ROOT / "README.md", ROOT / "docs" / "formats.md", ROOT / "app" / "cli" / "analyze.py"):
+        text = page.read_text(encoding="utf-8")
+        assert [name for name in names if name not in text] == [], page.name
+
+
+def test_pages_name_and_count_the_effects() -> None:
+    simulators = (ROOT / "docs" / "simulators.md").read_text(encoding="utf-8")
+    assert [name for name in effects() if f"`{name}`" not in simulators] == []
+    assert len(effects()) == 19, "README, docs/gap.md and docs/simulators.md say nineteen"

@@ -3,6 +3,7 @@
 from gearsig.recording._limits import check_memory, free_memory_bytes
 from gearsig.recording._quality import ChannelProblem, find_problems
 from gearsig.recording._read import (
+    FORMAT_NAMES,
     FORMAT_OF_EXTENSION,
     WRITERS,
     read_pulse_times,
@@ -15,6 +16,7 @@ from gearsig.recording.formats._mat import variables
 from gearsig.recording.formats._wav import parse_lea
 
 __all__ = [
+    "FORMAT_NAMES",
     "FORMAT_OF_EXTENSION",
     "SI_FACTORS",
     "WRITERS",

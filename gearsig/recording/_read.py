@@ -74,6 +74,9 @@ def sha256_of(path: Path) -> str:
 FORMAT_OF_EXTENSION = {ending: file_format for file_format in FORMATS for ending in file_format.endings}
 """What the extension promises."""
 
+FORMAT_NAMES = f"{', '.join(f.name for f in FORMATS[:-1])} or {FORMATS[-1].name}"
+"""What users are told, in one phrase."""
+
 ALLOWED_EXTENSIONS = " ".join(FORMAT_OF_EXTENSION) + ", text also with .gz"
 
 

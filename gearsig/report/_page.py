@@ -127,9 +127,9 @@ def _position(analysis: Analysis, spectrum: Spectrum, where: Where) -> float | N
 
 
 def _per_order(analysis: Analysis, spectrum: Spectrum | OrderMap) -> float | None:
-    """Return units of the spectrum's axis per order of the shaft that orders are counted on."""
+    """Return units of the spectrum's axis per order of the shaft that orders are counted on; None: no lines there."""
     angle = analysis.shaft_angle
-    if not isinstance(angle, ShaftAngle):
+    if not isinstance(angle, ShaftAngle) or spectrum.axis == "quefrency":
         return None
     return angle.mean_speed_rpm / 60 if spectrum.axis == "frequency" else 1.0
 

@@ -64,6 +64,11 @@ class Spectrum:
             raise InputError(f"{len(self.values)} values for {len(self.positions)} positions")
 
     @property
+    def axis_unit(self) -> str:
+        """Unit of positions and of the resolution."""
+        return {"frequency": "Hz", "order": "orders", "quefrency": "s"}[self.axis]
+
+    @property
     def axis_label(self) -> str:
         """Axis with unit, for figures and tables."""
         if self.axis == "order":

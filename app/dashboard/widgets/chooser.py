@@ -15,13 +15,13 @@ from app.dashboard.state import Chosen, ChosenFile
 from app.dashboard.theme import as_typed
 from app.samples import SampleRecording, samples
 from gearsig.errors import InputError
-from gearsig.recording import FORMAT_OF_EXTENSION, sha256_of
+from gearsig.recording import FORMAT_NAMES, FORMAT_OF_EXTENSION, sha256_of
 
 if TYPE_CHECKING:
     from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 ENDINGS = (*FORMAT_OF_EXTENSION, ".gz")
-KINDS = "CSV (also .gz), MAT, WAV, HDF5, Parquet, TDMS or UFF58."
+KINDS = f"{FORMAT_NAMES}; text also as .gz."
 SIMULATED = "Simulated, not measured: what is in them is known."
 
 # --------------------

@@ -115,10 +115,9 @@ def show_spectrum(
         cursors=[_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen],
         marked=[(p, float(values[first.index_of(p)])) for p in marked if low <= p <= high],
     )
-    resolution = f"{first.resolution:.4g} {'Hz' if first.axis == 'frequency' else 'orders'}"
     averages = f", {first.n_averages} averages" if first.n_averages > 1 else ""
     joined = " Peaks are joined; the pale band reaches down to the lowest line of each pixel." if lines[0].band else ""
-    st.caption(f"Resolution {resolution}, {first.window} window{averages}.{joined}")
+    st.caption(f"Resolution {first.resolution:.4g} {first.axis_unit}, {first.window} window{averages}.{joined}")
     return low, high
 
 

@@ -9,6 +9,7 @@ import streamlit as st
 
 from app.dashboard.theme import as_typed
 from gearsig.diagnosis import Analysis, Finding, Kind, Outcome
+from gearsig.recording import FORMAT_NAMES
 from gearsig.report import FindingCard, finding_card, reference_text
 
 Colour = Literal["red", "orange", "violet", "gray", "blue", "green"]
@@ -147,10 +148,10 @@ def _show_evidence(card: FindingCard, *, folded: bool) -> None:
 # --------------------
 
 
-TEXT = """
+TEXT = f"""
 ### Open a recording of your own
 
-1. Drop the **recording** in the sidebar: CSV, MAT, WAV, HDF5, Parquet, TDMS or UFF58.
+1. Drop the **recording** in the sidebar: {FORMAT_NAMES}.
 2. Drop its **rig file**, or write one under *Rig*, which opens with the recording. Only what is known need be given:
    teeth add mesh orders, sidebands and tooth pictures; bearings add their orders; a speed source makes orders out of
    frequencies.

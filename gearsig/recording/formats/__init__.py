@@ -18,6 +18,6 @@ FORMATS: tuple[FileFormat, ...] = (
     TDMS,
     UFF58,
 )
-"""As they are listed to users; content is tried against them from the last, because all text looks like CSV."""
+"""In the order in which users are told them; content is tried against them from the last: all text looks like CSV."""
 
 __all__ = ["CSV", "FORMATS", "FileFormat"]

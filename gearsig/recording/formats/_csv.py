@@ -450,4 +450,4 @@ def _sniff(head: bytes) -> str:
     return "" if b"\0" in head or n_control > 0.01 * len(head) else "CSV text"
 
 
-CSV = FileFormat("CSV text", (".csv", ".txt", ".tsv", ".dat", ".asc"), _sniff, read_csv, write_csv, (".csv",))
+CSV = FileFormat("CSV", (".csv", ".txt", ".tsv", ".dat", ".asc"), _sniff, read_csv, write_csv, (".csv",))

@@ -202,9 +202,8 @@ def test_candidates_and_draws_lie_in_one_range_and_fit_the_machine(name: str) ->
     assert len(one) <= 4
 
 
-def test_every_effect_has_a_range_with_a_reason() -> None:
+def test_every_effect_is_offered_to_the_gap_diagnosis() -> None:
     assert set(effects()) == set(gap_simulator("cracked").gap_effects())
-    assert all(e.plausible and e.plausible.why and 0 < e.plausible.low < e.plausible.high for e in effects().values())
 
 
 def test_candidates_name_the_rigs_bearings_only() -> None:

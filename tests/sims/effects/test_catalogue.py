@@ -82,6 +82,14 @@ def test_an_effect_says_what_it_is(name: str) -> None:
     assert one.signature.endswith(".")
 
 
+@pytest.mark.parametrize("name", effects())
+def test_an_effect_states_plausible_severities_with_a_reason(name: str) -> None:
+    plausible = effect(name).plausible
+    assert plausible is not None
+    assert plausible.why
+    assert 0 < plausible.low < plausible.high
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_severity_zero_is_the_machine_itself(name: str) -> None:
     assert machine_with(EffectSetting(name, 0.0)) == spur_pair_machine()
