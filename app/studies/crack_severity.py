@@ -157,7 +157,7 @@ def observe(case: CrackCase, other: tuple[str, Recording] | None = None, relief_
 
     Parameters
     ----------
-    case : Case
+    case : CrackCase
     other : (str, Recording) or None
         See `draw_other_fault`.
     relief_error : float

@@ -216,7 +216,7 @@ def difference_features(
 
     Parameters
     ----------
-    now, simulated : Gathered
+    now, simulated : ReducedRecording
     credibility : array, (n_features,), or float
         How much of what the simulation says of each feature is subtracted, see `gearsig.gap`.
     """

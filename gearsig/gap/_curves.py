@@ -51,13 +51,13 @@ def spectrum_curves(
 
     Parameters
     ----------
-    now, before : Gathered
+    now, before : ReducedRecording
         Measured, and what it is compared with.
-    after : Gathered or None
+    after : ReducedRecording or None
         The simulation with the likeliest effect.
     structural : StructuralFloor or None
         Of the same comparison; each line gets the floor of the feature that it belongs to.
-    reference : Gathered or None
+    reference : ReducedRecording or None
         The healthy recording, with the same channels.
     reference_structural : StructuralFloor or None
         Of the comparison with it.
@@ -240,9 +240,9 @@ def angle_curves(
 
     Parameters
     ----------
-    now, before, after : Gathered
+    now, before, after : ReducedRecording
         Measured, simulated without and with the likeliest effect.
-    healthy, simulated_healthy : Gathered or None
+    healthy, simulated_healthy : ReducedRecording or None
         Where both are given, the curves are those of the differences from them; a simulation that *is* the healthy one
         has none, and its curve is 0.
     """
@@ -315,7 +315,7 @@ def average_curves(now: ReducedRecording, reference: ReducedRecording, *, unit: 
 
     Parameters
     ----------
-    now, reference : Gathered
+    now, reference : ReducedRecording
         With the same channels.
     unit : str
         Of the channels.

@@ -36,7 +36,7 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
     Parameters
     ----------
     fit : Fit
-    observed : sequence of Observed
+    observed : sequence of ObservedChange
         One per condition.
     frame : GearFrame
     """

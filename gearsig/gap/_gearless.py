@@ -253,7 +253,7 @@ def causes_of(
     ----------
     standing : sequence of Standing
         Most important first.
-    every : sequence of Examined
+    every : sequence of ExaminedRecording
     rig : Rig
     effects : mapping
         Those that may be named.

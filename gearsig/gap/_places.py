@@ -703,8 +703,8 @@ def gap_places(
 
     Parameters
     ----------
-    now : Gathered
-    other : Gathered
+    now : ReducedRecording
+    other : ReducedRecording
         A healthy recording of the same machine, or its simulation.
     structural : StructuralFloor
     is_reference : bool

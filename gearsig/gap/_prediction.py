@@ -471,9 +471,9 @@ class Fold:
 
     Parameters
     ----------
-    fitted : tuple of Observed
-    scored : Observed
-    again : tuple of tuples of Observed
+    fitted : tuple of ObservedChange
+    scored : ObservedChange
+    again : tuple of tuples of ObservedChange
         `scored` with a block of revolutions left out, each block in turn: of the recording, and of its reference.
     """
 

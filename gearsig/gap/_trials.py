@@ -267,7 +267,7 @@ class Bank:
 
     Parameters
     ----------
-    point : Point
+    point : OperatingCondition
         At which it was simulated.
     feature_names : tuple of str
         Of `healthy`; see `gearsig.gap`.

@@ -344,7 +344,7 @@ class NextRecording:
 
     Parameters
     ----------
-    point : Point
+    point : OperatingCondition
     separates : (str, str)
     standard_deviations : float
         Distance of both predictions there, in structural floors; `now` at the points there are.
@@ -369,7 +369,7 @@ class ConditionFacts:
     Parameters
     ----------
     name : str
-    point : Point
+    point : OperatingCondition
         Nominal torque; measured speed.
     n_revolutions : float
         Of the driver.

@@ -21,7 +21,7 @@ class ComparedPair:
 
     Parameters
     ----------
-    now, other : Gathered
+    now, other : ReducedRecording
     is_reference : bool
         Whether `other` is a healthy recording of the same machine; otherwise a simulation.
     change_db : mapping

@@ -87,7 +87,7 @@ def find_clipping(x: FloatArray, levels: SampleLevels, *, rest: float | None = N
     Parameters
     ----------
     x : array, (n_samples,)
-    levels : Levels
+    levels : SampleLevels
         Those of `x`.
     rest : float or None
         Level at which the quantity itself stays for a time, e.g. 0 of a force between parts that come apart: an end of

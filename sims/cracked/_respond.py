@@ -428,7 +428,7 @@ def respond(
     stride : int
         Every how many steps a point is kept.
     with_energy : bool
-    first : State or None
+    first : PairState or None
         `Response.last` of another run; None: the static balance at `start_s`.
     on_progress : callable or None
         Called now and then with the part that is done, 0 to 1.

@@ -39,7 +39,7 @@ class PreparedCrackedPair(ReadyPair):
 
     Parameters
     ----------
-    asked : Asked
+    asked : SimulationRequest
     made : Machine
         With its effects.
     """
@@ -113,7 +113,7 @@ def simulate_with_motion(
         interval.
     also : sequence of str
         Signals of `sims.cracked.SIGNALS` wanted in the motion besides those that are measured.
-    first : State or None
+    first : PairState or None
         Where the lead-in starts; None: at the static balance.
     noise_rng : numpy.random.Generator or None
         For the chain, instead of the stream made of `rng`: the same machine with other noise.

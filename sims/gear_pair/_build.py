@@ -78,7 +78,7 @@ def build_chain(
 
     Parameters
     ----------
-    wanted : Wanted
+    wanted : ParameterValues
     line_of_action_deg : float
         β: upwards is x sin β + y cos β, to the right x cos β − y sin β.
     first_pulse_rev : (float, float)

@@ -96,7 +96,7 @@ class ReadyPair(ABC):
 
     Parameters
     ----------
-    asked : Asked
+    asked : SimulationRequest
     """
 
     asked: SimulationRequest

@@ -554,7 +554,7 @@ class FlexiblePairConstants:
     record : one `RECORD`
     table : ContactTable
         With the residual compliance.
-    sides : (Side, Side)
+    sides : (FlexibleSide, FlexibleSide)
         Padded to the same numbers of modes.
     mean_stiffness_n_per_m : float
         Tangent stiffness of the mesh at the nominal force, mean over a cycle.
@@ -818,7 +818,7 @@ def eigenfrequencies_hz(
         Its greatest torque loads the contact.
     mesh_cycles : array or None
         None: 50 points of a cycle.
-    ready : Constants or None
+    ready : FlexiblePairConstants or None
         Where they are at hand.
     """
     own = constants(pair, operation) if ready is None else ready
@@ -862,7 +862,7 @@ def torsional_mode(
     pair : FlexiblePair
     operation : Operation
         Its greatest torque loads the contact.
-    ready : Constants or None
+    ready : FlexiblePairConstants or None
         Where they are at hand.
     n_points : int
         Mesh angles in a cycle.

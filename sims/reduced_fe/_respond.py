@@ -61,7 +61,7 @@ def growth(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation,
     Parameters
     ----------
     pair : FlexiblePair
-    own : Constants
+    own : FlexiblePairConstants
     operation : Operation
     coefficients : array, (2, 8, n_modes)
         See `step_coefficients`.
@@ -192,7 +192,7 @@ def respond(
         Meaningful without set speed, damping, governor and weight.
     first : FlexState or None
         `FlexResponse.last` of another run; None: the static balance at `start_s`.
-    ready : Constants or None
+    ready : FlexiblePairConstants or None
         Of this pair and operation, where they are at hand.
     on_progress : callable or None
         Called now and then with the part that is done, 0 to 1.

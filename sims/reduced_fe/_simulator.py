@@ -131,7 +131,7 @@ class PreparedPair(ReadyPair):
 
     Parameters
     ----------
-    asked : Asked
+    asked : SimulationRequest
     pair : FlexiblePair
     """
 

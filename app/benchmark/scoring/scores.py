@@ -476,7 +476,7 @@ class Result:
 
     Parameters
     ----------
-    wanted : Wanted
+    wanted : BenchmarkRequest
     rows : mapping
         Diagnoser → its rows.
     parts : tuple of Part

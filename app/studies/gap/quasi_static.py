@@ -703,8 +703,8 @@ def record(
     Parameters
     ----------
     machine : StaticMachine
-    state : State
-    day : Day
+    state : QuasiStaticState
+    day : QuasiStaticDay
     levels : array, (n_channels,), or None
         Standard deviation of each channel by which noise is measured; None: no noise.
     """
