@@ -47,7 +47,7 @@ _KIND = {
 """Family of features, or a single feature → the kind of place that it speaks of."""
 
 UNFORETOLD = ("surprise.", "apart.", "alike.")
-"""Features, the last ones, that hang on noise and sensors: no simulation foretells them, no size is made of them."""
+"""Features, the last ones, that hang on noise and sensors: no simulation predicts them, no size is made of them."""
 
 _KINDS = {
     "mesh_harmonics": (PlaceKind.MESH,),

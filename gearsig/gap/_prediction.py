@@ -497,8 +497,8 @@ class _Score:
     placebo : float
         The best one's shrink.
     n_placebos : int
-    foretold : float
-        Largest change that the fit foretells, in floors.
+    predicted : float
+        Largest change that the fit predicts, in floors.
     """
 
     sizes: tuple[float, float, float]
@@ -506,7 +506,7 @@ class _Score:
     slope: float
     placebo: float
     n_placebos: int
-    foretold: float
+    predicted: float
 
 
 def own_features(fit: Fit, observed: ObservedChange) -> FloatArray:
@@ -524,7 +524,7 @@ def shrinkage(
     shrink = 1 − (r² − n²)/(o² − n²) on the effect's own features: o the gap before, r what is left, n what the floors
     themselves make, o and r no less than n; the effect's severity and options are fitted to the other part of the data.
 
-    Where the fitted effect foretells nothing, idle gears, say, it has no features of its own and nothing can shrink:
+    Where the fitted effect predicts nothing, idle gears, say, it has no features of its own and nothing can shrink:
     such folds do not count, unless there are no others.
 
     The intervals hold the scatter of what is scored, from its blocks of revolutions; that of the fit is not in them.
@@ -551,13 +551,13 @@ def shrinkage(
         held_out,
         n_placebos=max(score.n_placebos for score in scores),
         elsewhere=_mean([_elsewhere(paths, fold) for fold in folds]),
-        foretold=max(score.foretold for score in scores),
+        predicted=max(score.predicted for score in scores),
     )
 
 
 def _telling(folds: Sequence[Fold], scores: Sequence[_Score]) -> tuple[Sequence[Fold], Sequence[_Score]]:
     """Return the folds in which the effect shows on the simulator, and their scores; all where it does in none."""
-    shown = [i for i, score in enumerate(scores) if score.foretold >= MIN_PREDICTED] or range(len(scores))
+    shown = [i for i, score in enumerate(scores) if score.predicted >= MIN_PREDICTED] or range(len(scores))
     return [folds[i] for i in shown], [scores[i] for i in shown]
 
 
@@ -607,7 +607,7 @@ def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPat
 
 
 def _is_alike(fit: Fit, other: Fit, scored: ObservedChange) -> bool:
-    """Whether two places foretell the same: bearings of one type on one shaft do, and are no placebos of each other."""
+    """Whether two places predict the same: bearings of one type on one shaft do, and are no placebos of each other."""
     a, b = (one.at(scored.condition) / scored.floors for one in (fit, other))
     product = float(np.sqrt((a @ a) * (b @ b)))
     return product > 0.0 and float(a @ b) > ALIKE * product

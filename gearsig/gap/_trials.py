@@ -458,7 +458,7 @@ class TriedEffect:
     @property
     def explains(self) -> bool:
         """Whether the twin shows the effect and comes nearer with it: else severity and place mean nothing."""
-        return self.shrinkage.is_foretold and self.shrinkage.shrink.value > 0.0
+        return self.shrinkage.is_predicted and self.shrinkage.shrink.value > 0.0
 
 
 def try_effects(
@@ -510,7 +510,7 @@ def on_shaft(
 
 
 def n_compared(conditions: Sequence[Condition]) -> int:
-    """Return how many features all conditions have and a simulation can foretell; those of patterns need references."""
+    """Return how many features all conditions have and a simulation can predict; those of patterns need references."""
     return min(sum(not name.startswith(UNFORETOLD) for name in c.change.names) for c in conditions)
 
 

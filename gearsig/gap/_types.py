@@ -238,8 +238,8 @@ class Shrinkage:
     elsewhere : float or None
         The shrink at operating conditions of which nothing but the level was fitted, severity and place being those of
         the others; None with one condition.
-    foretold : float or None
-        The largest change that the simulator foretells of the fitted effect, in floors; None where it is not known.
+    predicted : float or None
+        The largest change that the simulator predicts of the fitted effect, in floors; None where it is not known.
     """
 
     before: Interval
@@ -250,12 +250,12 @@ class Shrinkage:
     held_out: str
     n_placebos: int = 1
     elsewhere: float | None = None
-    foretold: float | None = None
+    predicted: float | None = None
 
     @property
-    def is_foretold(self) -> bool:
+    def is_predicted(self) -> bool:
         """Whether the simulator shows enough of the effect for a shrink to mean anything."""
-        return self.foretold is None or self.foretold >= MIN_PREDICTED
+        return self.predicted is None or self.predicted >= MIN_PREDICTED
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from gearsig.gap._attribution import LIKELIER_THAN_NOT
 from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import NAMING, NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
-from gearsig.gap._words import hardly_foretold, severity_unit
+from gearsig.gap._words import hardly_predicted, severity_unit
 
 
 def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
@@ -133,8 +133,8 @@ def _how_far(report: GapReport) -> str:
     shrinkage = report.causes[0].shrinkage
     if report.outcome not in NAMING or shrinkage is None:
         return "How far: no effect was added."
-    if not shrinkage.is_foretold:
-        return f"How far: not known; {report.causes[0].title} {hardly_foretold(shrinkage)}."
+    if not shrinkage.is_predicted:
+        return f"How far: not known; {report.causes[0].title} {hardly_predicted(shrinkage)}."
     s, both = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
     percent = f"{100 * s.value:.0f} % ({100 * s.low:.0f} to {100 * s.high:.0f} %)"
     shrinks = f"shrinks {both}, by {percent} of what exceeds one,"

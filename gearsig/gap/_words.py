@@ -194,16 +194,16 @@ def feature_words(name: str, frame: GearFrame) -> str:
     return f"{where}: {_CYCLIC[rest]}"
 
 
-def hardly_foretold(shrinkage: Shrinkage) -> str:
+def hardly_predicted(shrinkage: Shrinkage) -> str:
     """Return what is said of an effect that the simulator does not make large enough to judge."""
-    return f"hardly shows on the simulator at these conditions (at most {shrinkage.foretold or 0.0:.2g} floors)"
+    return f"hardly shows on the simulator at these conditions (at most {shrinkage.predicted or 0.0:.2g} floors)"
 
 
 def stance_words(evidence: Evidence) -> str:
-    """Return "speaks for it", "further than foretold" or "speaks against it"."""
+    """Return "speaks for it", "further than predicted" or "speaks against it"."""
     if evidence.speaks_for:
         return "speaks for it"
-    return "further than foretold" if evidence.is_further else "speaks against it"
+    return "further than predicted" if evidence.is_further else "speaks against it"
 
 
 def fitted_words(cause: GapCause, severity: float, recording: str) -> str:

@@ -28,14 +28,12 @@ from gearsig.gap import (
 from gearsig.report._files import write_text
 from gearsig.report._json import Json, Layout, from_plain, plain
 
-SCHEMA, SCHEMA_VERSION = "gearsig.gap", 1
+SCHEMA, SCHEMA_VERSION = "gearsig.gap", 2
 FLOORS = "structural floors"
 
 
 LAYOUTS = {
-    GapReport: Layout(
-        {"repeatability": "size_in_repeatability_floors", "warnings": "doubts"}, null_if_empty=("twin_toml",)
-    ),
+    GapReport: Layout({"repeatability": "size_in_repeatability_floors"}, null_if_empty=("twin_toml",)),
     ConditionFacts: Layout(inline=("point",)),
     GapPlace: Layout({"repeatability": "change_in_repeatability_floors", "structural": "change_in_structural_floors"}),
     Added: Layout({"name": "effect"}),
@@ -112,6 +110,14 @@ def gap_schema() -> Json:
     return schema
 
 
+VERSION_1 = {"doubts": "warnings", "foretold": "predicted"}
+"""Member of version 1 → what it is called now."""
+
+
+def _renamed(members: Json) -> Json:
+    return {VERSION_1.get(name, name): value for name, value in members.items()}
+
+
 def read_gap_json(path: str | Path) -> GapReport:
     """Read a report that `write_gap_json` wrote.
 
@@ -127,18 +133,18 @@ def read_gap_json(path: str | Path) -> GapReport:
     Raises
     ------
     InputError
-        If the file cannot be read, or is no gap report of this version.
+        If the file cannot be read, or is no gap report of this version or the one before.
     """
     where = Path(path).name
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        content = json.loads(Path(path).read_text(encoding="utf-8"), object_hook=_renamed)
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
     except (ValueError, RecursionError):  # some text, or brackets without end
         raise InputError("is not JSON", where=where, remedy="`gearsig gap` writes gap.json") from None
     stated = (content.get("schema"), content.get("schema_version")) if isinstance(content, dict) else (None, None)
-    if stated != (SCHEMA, SCHEMA_VERSION):
-        raise InputError("is no gap report", where=where, allowed=f"schema {SCHEMA}, version {SCHEMA_VERSION}")
+    if stated not in ((SCHEMA, 1), (SCHEMA, SCHEMA_VERSION)):
+        raise InputError("is no gap report", where=where, allowed=f"schema {SCHEMA}, versions 1 and {SCHEMA_VERSION}")
     try:
         return gap_from_dict(content)
     except InputError as error:

@@ -31,7 +31,7 @@ from gearsig.gap import (
     Shrinkage,
     SpectrumCurves,
     against_reference,
-    hardly_foretold,
+    hardly_predicted,
     lines_beyond,
     point_text,
     same_condition,
@@ -212,8 +212,8 @@ def severity_text(cause: GapCause) -> str:
 def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     if shrinkage is None:
         return ("It was not fitted: no held-out check.",)
-    if not shrinkage.is_foretold:
-        return (f"How far the gap shrinks is not known: it {hardly_foretold(shrinkage)}.",)
+    if not shrinkage.is_predicted:
+        return (f"How far the gap shrinks is not known: it {hardly_predicted(shrinkage)}.",)
     before, after = interval_text(shrinkage.before), interval_text(shrinkage.after)
     shrink, wrong = shrinkage.shrink, shrinkage.placebo
     taken, low, high = (percent(x) for x in (shrink.value, shrink.low, shrink.high))
@@ -529,7 +529,7 @@ def _evidence(report: GapReport) -> Iterator[GapFigure]:
             yield GapFigure(
                 "which",
                 plot.gap_evidence_figure(evidence),
-                "Where diamond and bar end together, sign and size are right; further: it moved the foretold way, and "
+                "Where diamond and bar end together, sign and size are right; further: it moved the predicted way, and "
                 "more. Grey: what a healthy machine may change.",
                 f"Predicted and observed changes of the own features of {cause.title}.",
                 of=cause.name,

@@ -155,7 +155,7 @@ def test_what_does_not_bring_the_twin_nearer_says_neither_place_nor_severity(rep
     tried = TriedEffect("eccentricity", (), None, told)  # type: ignore[arg-type]  # its fit is not asked for
     assert tried.explains
     assert not replace(tried, shrinkage=replace(told, shrink=Interval(-0.1, -0.3, 0.1))).explains
-    assert not replace(tried, shrinkage=replace(told, foretold=0.1)).explains
+    assert not replace(tried, shrinkage=replace(told, predicted=0.1)).explains
 
 
 def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:

@@ -44,7 +44,7 @@ def test_what_stays_within_the_floor_on_both_sides_says_nothing() -> None:
     assert told([0.6] * 6, [0.9] * 6) == ()
 
 
-def test_what_moved_further_than_foretold_is_not_against_it() -> None:
+def test_what_moved_further_than_predicted_is_not_against_it() -> None:
     said = {
         (5.0, 12.0): (False, True),  # the right way, more than twice as far
         (-5.0, -12.0): (False, True),

@@ -33,7 +33,7 @@ def path(shape: np.ndarray = SHAPE, n_conditions: int = 1, **options: float | st
     return EffectPath("eccentricity", options, SEVERITIES, (table[None],) * n_conditions, NAMES)
 
 
-def foretold(effect: EffectPath, severity: float, condition: int = 0, level: int = 0) -> np.ndarray:
+def predicted(effect: EffectPath, severity: float, condition: int = 0, level: int = 0) -> np.ndarray:
     return effect.at(np.array([severity]), condition)[level, 0]
 
 
@@ -43,17 +43,17 @@ def seen(distances: np.ndarray, condition: int = 0) -> ObservedChange:
 
 @given(st.floats(1.0, 4.0))
 def test_a_path_is_straight_over_the_logarithm(severity: float) -> None:
-    assert foretold(path(), severity) == pytest.approx((1.0 + np.log2(severity)) * SHAPE)
+    assert predicted(path(), severity) == pytest.approx((1.0 + np.log2(severity)) * SHAPE)
 
 
 @given(st.floats(0.01, 1.0))
 def test_below_the_least_simulated_severity_it_is_proportional(severity: float) -> None:
-    assert foretold(path(), severity) == pytest.approx(severity * SHAPE)
+    assert predicted(path(), severity) == pytest.approx(severity * SHAPE)
 
 
 @given(st.floats(1.0, 4.0))
 def test_the_true_severity_is_found_within_its_interval(severity: float) -> None:
-    fit = fit_path(path(), [seen(foretold(path(), severity))])
+    fit = fit_path(path(), [seen(predicted(path(), severity))])
     assert fit.severity.value == pytest.approx(severity, rel=0.08)
     assert fit.severity.low <= severity * 1.05
     assert severity <= fit.severity.high * 1.05
@@ -62,7 +62,7 @@ def test_the_true_severity_is_found_within_its_interval(severity: float) -> None
 
 def test_the_right_options_are_found() -> None:
     driver, driven = path(gear="driver"), path(SHAPE[[0, 1, 3, 2, 4, 5]], gear="driven")
-    fit = fit_effect([driver, driven], [seen(foretold(driven, 3.0))])
+    fit = fit_effect([driver, driven], [seen(predicted(driven, 3.0))])
     assert fit.added.options == {"gear": "driven"}
 
 
@@ -83,7 +83,7 @@ def test_candidates_become_one_path_for_each_set_of_options() -> None:
 def test_a_true_effect_shrinks_the_gap_and_its_placebo_does_not() -> None:
     driver, driven = path(gear="driver"), path(SHAPE[[0, 1, 3, 2, 5, 4]], gear="driven")
     rng = np.random.default_rng(1)
-    noisy = [seen(foretold(driver, 2.0) + 0.3 * FLOORS * rng.standard_normal(len(NAMES))) for _ in range(3)]
+    noisy = [seen(predicted(driver, 2.0) + 0.3 * FLOORS * rng.standard_normal(len(NAMES))) for _ in range(3)]
     result = shrinkage([driver, driven], [Fold((noisy[0],), noisy[1], ((noisy[1], noisy[2]),))], "other revolutions")
     assert result.shrink.value > 0.9
     assert result.slope == pytest.approx(1.0, abs=0.15)
@@ -95,7 +95,7 @@ def test_a_true_effect_shrinks_the_gap_and_its_placebo_does_not() -> None:
 def test_an_effect_that_was_fitted_to_one_condition_and_fails_at_the_other_does_not_shrink_the_gap() -> None:
     one = path(n_conditions=2)
     nothing = np.zeros(len(NAMES))
-    result = shrinkage([one], [Fold((seen(foretold(one, 4.0)),), seen(nothing, 1))], "another operating condition")
+    result = shrinkage([one], [Fold((seen(predicted(one, 4.0)),), seen(nothing, 1))], "another operating condition")
     assert result.shrink.value <= 0.0
     assert result.slope == pytest.approx(0.0)
 
@@ -103,7 +103,7 @@ def test_an_effect_that_was_fitted_to_one_condition_and_fails_at_the_other_does_
 def test_a_condition_at_which_the_effect_does_nothing_does_not_count() -> None:
     one = path(n_conditions=2)
     idle = replace(one, distances=(one.distances[0], np.zeros_like(one.distances[1])))
-    loud, nothing = seen(foretold(idle, 2.0)), seen(0.5 * FLOORS, 1)
+    loud, nothing = seen(predicted(idle, 2.0)), seen(0.5 * FLOORS, 1)
     folds = [Fold((loud, nothing), loud), Fold((loud, nothing), nothing)]
     assert shrinkage([idle], folds, "").shrink.value == pytest.approx(1.0, abs=0.01)
     assert shrinkage([idle], folds[1:], "").shrink.value <= 0.0  # there is no other
@@ -122,14 +122,14 @@ def test_the_severity_lies_in_its_interval_nine_times_out_of_ten() -> None:
     inside = 0
     for _ in range(n):
         noise = FLOORS / 1.96 * rng.standard_normal(len(NAMES))
-        severity = fit_path(path(), [seen(foretold(path(), true) + noise)]).severity
+        severity = fit_path(path(), [seen(predicted(path(), true) + noise)]).severity
         inside += severity.low <= true <= severity.high
     assert inside / n == pytest.approx(0.9, abs=0.045)  # 2.6 standard errors
 
 
 def test_the_reference_s_scatter_widens_the_interval() -> None:
     rng = np.random.default_rng(4)
-    fitted, truth = foretold(path(), 2.0), foretold(path(), 4.0)
+    fitted, truth = predicted(path(), 2.0), predicted(path(), 4.0)
 
     def blocks() -> tuple[ObservedChange, ...]:
         return tuple(seen(truth + 0.2 * FLOORS * rng.standard_normal(len(NAMES))) for _ in range(6))
@@ -145,7 +145,7 @@ def test_the_reference_s_scatter_widens_the_interval() -> None:
 
 
 def test_an_effect_without_another_place_has_no_placebo() -> None:
-    truth = seen(foretold(path(), 2.0))
+    truth = seen(predicted(path(), 2.0))
     assert shrinkage([path()], [Fold((truth,), truth)], "").n_placebos == 0
     other = path(SHAPE[[0, 1, 3, 2, 5, 4]], gear="driven")
     assert shrinkage([path(gear="driver"), other], [Fold((truth,), truth)], "").n_placebos == 1
@@ -162,7 +162,7 @@ def louder(n_conditions: int = 1, **options: float | str) -> EffectPath:
 
 def test_an_effect_that_is_louder_on_the_machine_is_fitted_at_its_level() -> None:
     effect = louder(n_conditions=2)
-    at_two_levels = [seen(foretold(effect, 2.0, 0, level=2)), seen(foretold(effect, 2.0, 1, level=0), 1)]
+    at_two_levels = [seen(predicted(effect, 2.0, 0, level=2)), seen(predicted(effect, 2.0, 1, level=0), 1)]
     fit = fit_path(effect, at_two_levels)
     assert fit.level_db(0) - fit.level_db(1) == pytest.approx(20.0)
     assert fit.at(0) == pytest.approx(at_two_levels[0].distances, abs=1.5)
@@ -172,23 +172,23 @@ def test_an_effect_that_is_louder_on_the_machine_is_fitted_at_its_level() -> Non
 def test_the_twin_s_own_level_is_the_likeliest() -> None:
     """What fits as well with a larger severity as at a higher level is a larger severity."""
     effect = louder()
-    fit = fit_path(effect, [seen(foretold(effect, 4.0, 0, level=1))])
+    fit = fit_path(effect, [seen(predicted(effect, 4.0, 0, level=1))])
     assert fit.level_db(0) == pytest.approx(0.0)
     assert fit.severity.value == pytest.approx(4.0, rel=0.1)
 
 
-def test_two_places_that_foretell_the_same_are_no_placebos() -> None:
+def test_two_places_that_predict_the_same_are_no_placebos() -> None:
     first, twin = path(bearing="bearing 1"), path(1.1 * SHAPE, bearing="bearing 2")
-    truth = seen(foretold(first, 2.0))
+    truth = seen(predicted(first, 2.0))
     assert shrinkage([first, twin], [Fold((truth,), truth)], "").n_placebos == 0
 
 
 def test_a_severity_from_one_condition_is_tried_at_the_other() -> None:
     """The level may differ; what the effect changes may not."""
     effect = louder(n_conditions=2)
-    first = seen(foretold(effect, 2.0, 0, level=1))
-    second = seen(foretold(effect, 2.0, 1, level=2), 1)
-    other_features = seen(foretold(effect, 2.0, 1, level=2)[::-1], 1)
+    first = seen(predicted(effect, 2.0, 0, level=1))
+    second = seen(predicted(effect, 2.0, 1, level=2), 1)
+    other_features = seen(predicted(effect, 2.0, 1, level=2)[::-1], 1)
     right, wrong = (shrinkage([effect], [Fold((first, one), one)], "") for one in (second, other_features))
     assert right.elsewhere is not None
     assert wrong.elsewhere is not None
@@ -199,19 +199,19 @@ def test_a_severity_from_one_condition_is_tried_at_the_other() -> None:
 
 def test_what_the_simulator_hardly_shows_is_said() -> None:
     """A table that moves nothing by more than a tenth of a floor."""
-    truth = seen(foretold(path(), 4.0))
+    truth = seen(predicted(path(), 4.0))
     shows = shrinkage([path()], [Fold((truth,), truth)], "")
-    assert shows.is_foretold
-    assert shows.foretold == pytest.approx(np.abs(foretold(path(), 4.0) / FLOORS).max(), rel=0.3)
-    loudest = float(np.abs(foretold(path(), path().severities[-1]) / FLOORS).max())
+    assert shows.is_predicted
+    assert shows.predicted == pytest.approx(np.abs(predicted(path(), 4.0) / FLOORS).max(), rel=0.3)
+    loudest = float(np.abs(predicted(path(), path().severities[-1]) / FLOORS).max())
     faint = replace(path(), distances=tuple(0.1 / loudest * table for table in path().distances))
     hardly = shrinkage([faint], [Fold((truth,), truth)], "")
-    assert not hardly.is_foretold
+    assert not hardly.is_predicted
 
 
 def test_a_fit_that_misses_has_a_wider_interval() -> None:
-    """What the simulation does not foretell is as large as what it does."""
-    near, wrong = foretold(path(), 2.0), foretold(path(), 2.0)
+    """What the simulation does not predict is as large as what it does."""
+    near, wrong = predicted(path(), 2.0), predicted(path(), 2.0)
     wrong = wrong + 3.0 * FLOORS * np.where(np.arange(len(NAMES)) % 2, 1.0, -1.0)
     sure, unsure = (fit_path(path(), [seen(values)]).severity for values in (near, wrong))
     assert unsure.high / unsure.low > 1.5 * sure.high / sure.low
@@ -219,19 +219,19 @@ def test_a_fit_that_misses_has_a_wider_interval() -> None:
 
 def test_what_no_simulated_severity_bounds_has_no_end() -> None:
     """The largest that was simulated fits; and a change that any small severity makes as well."""
-    largest = fit_path(path(), [seen(foretold(path(), 4.0))]).severity
+    largest = fit_path(path(), [seen(predicted(path(), 4.0))]).severity
     assert largest.high == np.inf
     assert largest.low > 1.0
-    least = fit_path(path(), [seen(foretold(path(), 0.1))]).severity
+    least = fit_path(path(), [seen(predicted(path(), 0.1))]).severity
     assert least.low == 0.0
     assert least.high < 1.0
-    between = fit_path(path(), [seen(foretold(path(), 1.5))]).severity
+    between = fit_path(path(), [seen(predicted(path(), 1.5))]).severity
     assert 1.0 < between.low < 1.5 < between.high < 4.0
 
 
 def test_an_effect_is_not_fitted_where_the_recordings_tell_that_it_is_not() -> None:
     here, there = path(gear="driver"), path(SHAPE[[0, 1, 3, 2, 4, 5]], gear="driven")
-    truth = seen(foretold(there, 3.0))
+    truth = seen(predicted(there, 3.0))
     free = shrinkage([here, there], [Fold((truth,), truth)], "")
     told = shrinkage([here], [Fold((truth,), truth)], "", [there])
     assert free.shrink.value > 0.9

@@ -142,7 +142,7 @@ def test_a_shrink_that_the_simulator_cannot_show_is_not_claimed() -> None:
     report = effect_report()
     first = report.causes[0]
     assert first.shrinkage is not None
-    faint = replace(first, shrinkage=replace(first.shrinkage, foretold=0.1))
+    faint = replace(first, shrinkage=replace(first.shrinkage, predicted=0.1))
     said = replace(report, causes=(faint, *report.causes[1:])).verdict[2]
     assert said.startswith("How far: not known; ")
     assert "at most 0.1 floors" in said

@@ -87,7 +87,7 @@ def test_nothing_of_the_report_is_lost():
 
 def test_names_that_others_rely_on():
     found = gap_to_dict(effect_report())
-    assert (found["schema"], found["schema_version"]) == ("gearsig.gap", 1)
+    assert (found["schema"], found["schema_version"]) == ("gearsig.gap", 2)
     first = found["causes"][0]
     assert (first["name"], first["probability"], first["severity"]["unit"]) == ("root_crack", 0.88, "mm")
     assert first["fitted"]["options"] == {"gear": "driver", "tooth": 21.0}
@@ -155,6 +155,6 @@ def test_no_text_can_break_it(tmp_path):
 
 def test_the_schema_refuses_what_it_must():
     found = gap_to_dict(effect_report())
-    for change in ({"schema_version": 2}, {"outcome": "perhaps"}, {"causes": None}, {"size": 7.9}):
+    for change in ({"schema_version": 1}, {"outcome": "perhaps"}, {"causes": None}, {"size": 7.9}):
         with pytest.raises(jsonschema.ValidationError):
             VALIDATOR.validate({**found, **change})
