@@ -19,10 +19,11 @@ Making cases
     (two of the catalogue, of different groups). Levels run from 0, barely noticeable, to 1, strong, geometric in the
     effect's unit between. The rig, conditions, lengths and noise do not depend on kind, effect or level; only
     `backlash` takes care that its first condition is a light load, which a quarter of all others have by chance.
-`record_case(case) -> CaseRecordings`
+`record_case(case, *, encoder_counts) -> CaseRecordings`
     Runs it in memory: `conditions`, `references`, `twins`, `places`. A twin is the same run from the same seeds
     without the fault, so that the true place and size of the change can be measured. All recordings of a case are of
-    one assembly, begun wherever it stood: what is fixed to a shaft turns with it, and teeth keep their partners.
+    one assembly, begun wherever it stood: what is fixed to a shaft turns with it, and teeth keep their partners. With
+    `encoder_counts` per revolution each gear carries an encoder (``input encoder``, ``output encoder``; deg).
 `write_seen(made, folder)`
     Writes a folder for the diagnosing side: ``condition_1.h5``, with two conditions ``condition_2.h5``, with
     references ``reference_1.h5`` (same operating point as ``condition_1.h5``) and so on; each beside a rig file of the

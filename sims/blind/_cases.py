@@ -106,11 +106,12 @@ def draw_case(
     return BlindCase(role, chosen, rig, conditions, references, faults)
 
 
-def record_case(case: BlindCase) -> CaseRecordings:
+def record_case(case: BlindCase, *, encoder_counts: int = 0) -> CaseRecordings:
     """Run a case: recordings, references and twins.
 
     A twin is the same run from the same seeds without the fault; a case with no fault is its own twin. Noise is set by
-    the quietest twin and a clipping converter's range by the loudest, so that no recording tells by its noise.
+    the quietest twin and a clipping converter's range by the loudest, so that no recording tells by its noise. With
+    `encoder_counts` per revolution each gear carries an encoder.
     """
     runs = [(scene, run(scene)) for scene in (scene_of(case.rig, c) for c in case.conditions)]
     n, gains = len(case.rig.chains), np.array([c.gain for c in case.rig.chains])
@@ -125,9 +126,9 @@ def record_case(case: BlindCase) -> CaseRecordings:
     def recorded(condition: RunCondition, faults: tuple[Fault, ...] = ()) -> tuple[Recording, list[Place]]:
         scene = levelled(scene_of(case.rig, condition))
         places = [EVERY[f.name].apply(scene, f.severity, np.random.default_rng(f.seed)) for f in faults]
-        return measure(scene, run(scene)), places
+        return measure(scene, run(scene), encoder_counts=encoder_counts), places
 
-    twins = tuple(measure(levelled(scene), motion) for scene, motion in runs)
+    twins = tuple(measure(levelled(scene), motion, encoder_counts=encoder_counts) for scene, motion in runs)
     references = tuple(recorded(c)[0] for c in case.references)
     if not case.faults:
         return CaseRecordings(twins, references, twins, ())

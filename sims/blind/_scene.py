@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import gcd, pi, sin
 from typing import Any
 
@@ -11,10 +11,12 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.recording import Channel, Recording
+from gearsig.rig import Sensor
 from sims.blind import _march as at
 from sims.blind._march import march
 from sims.blind._rig import (
     N_PATH,
+    SHAFTS,
     BlindRig,
     Matrix,
     ModalForm,
@@ -342,6 +344,8 @@ def _padded(arrays: list[FloatArray], fill: float) -> Matrix:
 
 
 TACH_VOLTS = 5.0
+ENCODER_NOISE_REV = 4e-7
+"""Of one reading: half a second of arc."""
 
 
 def path_response(force_n: FloatArray, rate_hz: float, path: list[SensorResonance]) -> FloatArray:
@@ -407,8 +411,17 @@ def tachometer(scene: Scene, motion: BlindMotion, rng: np.random.Generator) -> F
     return np.asarray(np.interp(t, edges, levels) + rng.normal(0, 0.01, n))
 
 
-def measure(scene: Scene, motion: BlindMotion) -> Recording:
-    """Sample the sensors and the tachometer as the rig's front end would."""
+def encoders_deg(scene: Scene, motion: BlindMotion, counts_per_revolution: int) -> FloatArray:
+    """Readings of an encoder at each gear, (2, n) at the sampling rate: the count that was passed last."""
+    n = motion.theta.shape[1] // 2
+    turned = motion.theta[:, : 2 * n : 2] / (2 * pi)
+    noise = np.random.default_rng([scene.condition.seed, 4]).normal(0, ENCODER_NOISE_REV, turned.shape)
+    passed = np.floor((turned + noise) * counts_per_revolution) % counts_per_revolution
+    return np.asarray(passed * (360.0 / counts_per_revolution))
+
+
+def measure(scene: Scene, motion: BlindMotion, *, encoder_counts: int = 0) -> Recording:
+    """Sample sensors, tachometer and, where there are any, an encoder at each gear as the rig's front end would."""
     from scipy.signal import butter, resample_poly, sosfilt
 
     rig = scene.rig
@@ -433,5 +446,9 @@ def measure(scene: Scene, motion: BlindMotion) -> Recording:
         signal = stage(motion, signal, np.random.default_rng([scene.condition.seed, 3]))
     samples = np.vstack([signal, tacho]).astype(np.float32)
     described = rig.description(scene.condition.stated_rpm, scene.condition.stated_nm)
+    if encoder_counts:
+        samples = np.vstack([samples, encoders_deg(scene, motion, encoder_counts).astype(np.float32)])
+        fitted = tuple(Sensor(f"{shaft} encoder", "encoder", "deg", shaft, wraps=True) for shaft in SHAFTS)
+        described = replace(described, sensors=(*described.sensors, *fitted))
     channels = tuple(Channel(s.channel, s.quantity, s.unit, s.position) for s in described.sensors)
     return Recording(samples, rig.sampling_rate_hz, channels, rig=described)

@@ -100,7 +100,7 @@ def build_chain(
         tuple(channels),
         AntiAlias(),
         _tachometer(wanted, pickup, names[pickup.side], first_pulse_rev[pickup.side], installed is None),
-        _encoders(wanted, names[0]),
+        _encoders(wanted, names),
     )
 
 
@@ -169,9 +169,10 @@ def _tachometer(
     return Tachometer(shaft, pulses, pickup.channel, jitter_s=jitter_s, first_pulse_rev=first_pulse_rev, noise_v=0.01)
 
 
-def _encoders(wanted: ParameterValues, shaft: str) -> tuple[Encoder, ...]:
-    counts = wanted.whole("encoder_counts")
-    return (Encoder("encoder", shaft, counts),) if counts else ()
+def _encoders(wanted: ParameterValues, shafts: tuple[str, str]) -> tuple[Encoder, ...]:
+    """One at each gear: what lies between both is the transmission error."""
+    counts, noise_deg = wanted.whole("encoder_counts"), wanted.number("encoder_noise_arcsec") / 3600.0
+    return tuple(Encoder(f"{shaft} encoder", shaft, counts, noise_deg=noise_deg) for shaft in shafts if counts)
 
 
 _SIDES = ("driver", "driven")
@@ -394,7 +395,7 @@ def _sensors(chain: MeasurementChain, shaft: str) -> tuple[Sensor, ...]:
     found = [Sensor(c.name, "acceleration", "m/s^2", c.position) for c in chain.channels]
     if isinstance(chain.tachometer, Tachometer):
         found.append(Sensor(chain.tachometer.channel, "tachometer", "V", f"{chain.tachometer.shaft or shaft} shaft"))
-    found += [Sensor(e.channel, "encoder", "deg", f"{e.shaft or shaft} shaft") for e in chain.encoders]
+    found += [Sensor(e.channel, "encoder", "deg", e.shaft or shaft, wraps=e.wraps) for e in chain.encoders]
     return tuple(found)
 
 

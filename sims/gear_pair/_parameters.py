@@ -145,12 +145,13 @@ _CHAIN = (
     Parameter(
         "encoder_counts",
         "",
-        "counts per revolution of an angle channel of the input shaft; 0: none",
+        "counts per revolution of the encoders, one at each gear; 0: none",
         0,
-        1e6,
+        2**30,
         0,
         whole=True,
     ),
+    Parameter("encoder_noise_arcsec", "arcsec", "standard deviation of an encoder's reading", 0, 3600, 0.5),
     Parameter("hum_mps2", "m/s^2", "mains hum, peak of its first harmonic", 0, 1000, 0.0),
     Parameter("hum_frequency_hz", "Hz", "frequency of the mains", 10, 400, 50.0),
 )

@@ -287,7 +287,8 @@ class MeasurementChain:
         ----------
         motion : Motion
         rng : numpy.random.Generator
-            Gives sensors, background and tachometer a stream each: the background is the same at another motion rate.
+            Gives sensors, background, tachometer and encoders a stream each: the background is the same at another
+            motion rate.
         rig : Rig or None
             Goes with the recording; its reference shaft is that of angle sensors without a shaft of their own.
         duration_s : float or None
@@ -314,10 +315,10 @@ class MeasurementChain:
         first, n_samples = self._span(motion, lead, duration_s)
         start_s = first / self.sampling_rate_hz
         time_s = np.arange(n_samples) / self.sampling_rate_hz
-        sensor_rng, background_rng, tacho_rng = rng.spawn(3)
+        sensor_rng, background_rng, tacho_rng, encoder_rng = rng.spawn(4)
         rows = list(self._vibration(motion, first, time_s, sensor_rng, background_rng))
         channels = [Channel(c.name, "acceleration", "m/s^2", c.position) for c in self.channels]
-        speed = self._speed(motion, rig, start_s, time_s, tacho_rng, rows, channels)
+        speed = self._speed(motion, rig, start_s, time_s, (tacho_rng, encoder_rng), rows, channels)
         return Recording(
             np.vstack(rows),
             self.sampling_rate_hz,
@@ -371,11 +372,12 @@ class MeasurementChain:
         rig: Rig | None,
         start_s: float,
         time_s: FloatArray,
-        rng: np.random.Generator,
+        rngs: tuple[np.random.Generator, np.random.Generator],
         rows: list[FloatArray],
         channels: list[Channel],
     ) -> SpeedSource | None:
         """Append the angle channels to `rows` and `channels`; return the speed source."""
+        rng, encoder_rng = rngs
         fine_s = motion.time_s(start_s)
         speed: SpeedSource | None = None
         tacho = self.tachometer
@@ -395,7 +397,7 @@ class MeasurementChain:
         for encoder in self.encoders:
             shaft = encoder.shaft or _default_shaft(motion, rig)
             angle = np.interp(time_s, fine_s, motion.angle_rad(shaft, "encoder"))
-            rows.append(encoder.read_deg(angle))
+            rows.append(encoder.read_deg(angle, encoder_rng))
             channels.append(Channel(encoder.channel, "encoder", "deg", shaft))
             speed = speed or EncoderChannel(encoder.channel, 360.0, wraps=encoder.wraps, shaft=shaft)
         return speed

@@ -127,6 +127,8 @@ class Encoder:
         Whether it starts again after each revolution.
     runout_deg : float
         Peak of a once-per-revolution error, from a disc that sits off centre.
+    noise_deg : float
+        Standard deviation of each reading's error ahead of the counting.
     """
 
     channel: str = "encoder"
@@ -134,14 +136,18 @@ class Encoder:
     counts_per_revolution: int = 4096
     wraps: bool = True
     runout_deg: float = 0.0
+    noise_deg: float = 0.0
 
     def __post_init__(self) -> None:
         count(self.counts_per_revolution, "counts_per_revolution of the encoder", minimum=4)
         within(self.runout_deg, "runout_deg of the encoder", -10.0, 10.0, "deg")
+        not_negative(self.noise_deg, "noise_deg of the encoder", "deg")
 
-    def read_deg(self, angle_rad: FloatArray) -> FloatArray:
-        """Reading at the given shaft angles."""
+    def read_deg(self, angle_rad: FloatArray, rng: np.random.Generator | None = None) -> FloatArray:
+        """Reading at the given shaft angles; without `rng` free of noise."""
         seen_rev = angle_rad / (2 * np.pi) + self.runout_deg / 360.0 * np.sin(angle_rad)
+        if rng is not None and self.noise_deg:
+            seen_rev = seen_rev + self.noise_deg / 360.0 * rng.standard_normal(np.shape(angle_rad))
         counts = np.floor(seen_rev * self.counts_per_revolution)
         if self.wraps:
             counts = np.mod(counts, self.counts_per_revolution)

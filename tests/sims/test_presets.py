@@ -24,7 +24,7 @@ SUFFIXES = {
     "mm": "_mm", "um": "_um", "us": "_us", "deg": "_deg", "kg": "_kg", "kg m^2": "_kg_m2", "GPa": "_gpa",
     "kg/m^3": "_kg_m3", "cP": "_cp", "%": "_percent", "g mm": "_g_mm", "N/m": "_n_per_m", "N s/m": "_n_s_per_m",
     "N m/rad": "_nm_per_rad", "N m s/rad": "_nm_s_per_rad", "m/s^2": "_mps2",
-    "m/s^2/s": "_mps2_per_s", "m/s^2/√Hz": "_mps2_per_sqrt_hz",
+    "m/s^2/s": "_mps2_per_s", "arcsec": "_arcsec", "m/s^2/√Hz": "_mps2_per_sqrt_hz",
     "Hz": "_hz",
 }  # fmt: skip
 
@@ -183,7 +183,7 @@ def test_parameters_reach_the_machine() -> None:
     assert not built.lubrication.friction
     without = machine(tachometer_pulses=0, encoder_counts=1024).chain
     assert without.tachometer is None
-    assert without.encoders[0].counts_per_revolution == 1024
+    assert [(e.shaft, e.counts_per_revolution) for e in without.encoders] == [("input", 1024), ("output", 1024)]
 
 
 def test_tolerances_are_those_of_one_specimen() -> None:

@@ -90,3 +90,11 @@ def test_encoder_runout_is_once_per_revolution():
     encoder = Encoder(counts_per_revolution=10_000_000, wraps=False, runout_deg=0.5)
     error = encoder.read_deg(angle) - np.degrees(angle)
     np.testing.assert_allclose(error, 0.5 * np.sin(angle), atol=1e-4)
+
+
+def test_encoder_noise_has_its_deviation_and_is_only_drawn_where_it_may_be():
+    angle = np.linspace(0.0, 100.0, 20_001)
+    encoder = Encoder(counts_per_revolution=2**30, wraps=False, noise_deg=0.01)
+    error = encoder.read_deg(angle, np.random.default_rng(0)) - np.degrees(angle)
+    assert error.std() == pytest.approx(0.01, rel=0.03)
+    np.testing.assert_allclose(encoder.read_deg(angle), np.degrees(angle), atol=4e-7)

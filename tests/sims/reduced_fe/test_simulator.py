@@ -120,7 +120,7 @@ def test_speed_courses_and_encoders_are_measured():
     found = sims.simulate(
         MODEL, speed_rpm=[(0.0, 1500.0), (0.4, 2500.0)], parameters={"encoder_counts": 3600}, duration_s=0.4
     )
-    angle = np.unwrap(np.radians(found.values("encoder")))
+    angle = np.unwrap(np.radians(found.values("input encoder")))
     rpm = np.gradient(angle, 1.0 / found.sampling_rate_hz) * 30.0 / np.pi
     assert rpm[200:600].mean() == pytest.approx(1500.0, rel=0.05)
     assert rpm[-600:-200].mean() == pytest.approx(2500.0, rel=0.05)
