@@ -13,7 +13,7 @@ from gearsig.errors import InputError
 
 
 def analyze(
-    recording: Annotated[Path, typer.Argument(help="CSV, MAT, WAV, HDF5, Parquet, TDMS or UFF58 file.")],
+    recording: Annotated[Path, typer.Argument(help="CSV, MAT, WAV, HDF5, Parquet, TDMS, UFF58 or MF4 file.")],
     rig: options.RigOption = None,
     fs: options.SamplingRateOption = None,
     speed_rpm: options.SpeedOption = None,

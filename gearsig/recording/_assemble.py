@@ -12,7 +12,7 @@ from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory
 from gearsig.recording._table import RawTable, rate_of_time, seconds_per_unit
 from gearsig.recording._types import RPM_UNITS, Channel, Provenance, Recording, quantity_of
-from gearsig.rig import Rig, SpeedChannel, SpeedSource
+from gearsig.rig import ConstantSpeed, Rig, SpeedChannel, SpeedSource
 
 
 def assemble(
@@ -179,13 +179,23 @@ def _stack(table: RawTable, source: str) -> FloatArray:
 def _speed(
     table: RawTable, channels: tuple[Channel, ...], rig: Rig | None, speed: SpeedSource | None
 ) -> tuple[SpeedSource | None, tuple[str, ...]]:
-    """Return the speed source: the argument's, the file's, or one channel in rpm if the rig has none."""
-    if speed is not None:
-        return speed, ()
-    if table.speed is not None or table.is_own_layout or (rig is not None and rig.speed is not None):
+    """Return the speed source: the argument's, what measures it, what the file states, what the rig states."""
+    if speed is not None or table.is_own_layout:
+        return speed or table.speed, ()
+    known = None if rig is None else rig.speed
+    measured = known is not None and not isinstance(known, ConstantSpeed)
+    if table.speed is not None and not isinstance(table.speed, ConstantSpeed):
         return table.speed, ()
     in_rpm = [c for c in channels if c.quantity == "rotational_speed" and c.unit.casefold() in RPM_UNITS]
-    if len(in_rpm) == 1:
+    if known is None and len(in_rpm) == 1:
         name = in_rpm[0].name
         return SpeedChannel(name), (f"channel {name!r} is in {in_rpm[0].unit} and was taken as the shaft speed",)
-    return None, ()
+    if table.speed is None or measured:
+        return None, ()
+    of_file = table.speed.speed_rpm
+    text = f"the file states {of_file:g} rpm, which was taken as the speed of the reference shaft"
+    if isinstance(known, ConstantSpeed):
+        if abs(of_file - known.speed_rpm) <= 1e-3 * of_file:
+            return None, ()
+        text = f"the rig states a speed of {known.speed_rpm:g} rpm, the file {of_file:g} rpm: the file's was taken"
+    return ConstantSpeed(of_file, known.shaft if known is not None else ""), (text,)

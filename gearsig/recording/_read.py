@@ -15,7 +15,7 @@ from gearsig.checks import closest_match_hint, count
 from gearsig.errors import InputError
 from gearsig.recording._assemble import assemble
 from gearsig.recording._limits import CHUNK_BYTES, read_text_bytes
-from gearsig.recording._table import SECONDS_PER_UNIT
+from gearsig.recording._table import SECONDS_PER_UNIT, one_condition
 from gearsig.recording._types import Recording, split_unit
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
@@ -29,7 +29,7 @@ def read_recording(
     sampling_rate_hz: float | None = None,
     speed: SpeedSource | None = None,
 ) -> Recording:
-    """Read a recording from CSV, MAT v5 or v7.3, WAV, HDF5, Parquet, TDMS or UFF58.
+    """Read a recording from CSV, MAT v5 or v7.3, WAV, HDF5, Parquet, TDMS, UFF58 or MF4.
 
     The extension and the content must agree. Nothing in a file is ever executed: pickles are refused, external links
     in HDF5 are not followed.
@@ -37,6 +37,8 @@ def read_recording(
     Parameters
     ----------
     path : str or Path
+        "runs.mat#2" is the second of several runs that stand side by side in one file: column 2 beside the time, as a
+        recording of one channel, "vibration". So one run can be the reference of another.
     rig : Rig, optional
         Its sensors give the channels quantity, unit, scale and position; its speed and sampling rate are used where
         the file has none.
@@ -57,9 +59,19 @@ def read_recording(
         If the file is missing, empty, damaged, too large for the memory, of another kind than its extension says, or
         holds columns that make no recording; if no sampling rate is known.
     """
-    file = Path(path)
-    table = identify(file).read(file)
-    return assemble(table, file.name, sha256_of(file), rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    file, condition = _without_condition(Path(path))
+    table, name = identify(file).read(file), file.name
+    if condition is not None:
+        table, name = one_condition(table, condition, file.name), f"{file.name}#{condition}"
+    return assemble(table, name, sha256_of(file), rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+
+
+def _without_condition(path: Path) -> tuple[Path, int | None]:
+    """Split "runs.mat#2"; a file that is really called so is that file."""
+    name, sign, number = path.name.rpartition("#")
+    if not (sign and name and number.isascii() and number.isdigit()) or path.exists():
+        return path, None
+    return path.with_name(name), int(number)
 
 
 def sha256_of(path: Path) -> str:
@@ -99,6 +111,12 @@ _FOREIGN = (
 # Pickle protocols 2 to 5 begin with a number; 0 and 1 are text: an opening mark, or a global "cmodule\nname\n".
 _TEXT_PICKLE = re.compile(rb"\A(?:\((?:dp|lp|[dl]|i)\d*\n|c[\w.]+\n[\w.]+\n|[\])}]q|\(c[\w.]+\n[\w.]+\n)")
 _MARKUP = re.compile(rb"\A\s*<(?:!doctype|html|\?xml|svg|script)", re.IGNORECASE)
+
+
+_EXPORTS = dict.fromkeys(
+    (".dxd", ".dxz", ".d7d", ".d7z"), "only Dewesoft reads its own files: export as MAT, MF4, HDF5, UFF58 or text"
+)
+"""Endings of programs' own files → what to do."""
 
 
 def identify(path: Path) -> FileFormat:
@@ -143,7 +161,7 @@ def identify(path: Path) -> FileFormat:
             f"extension {path.suffix or '(none)'!r} is not known; the content looks like {kind}",
             where=path.name,
             allowed=ALLOWED_EXTENSIONS,
-            remedy="rename or convert the file",
+            remedy=_EXPORTS.get(endings[-1], "rename or convert the file"),
         )
     if promised.sniff(head) == kind:
         return promised

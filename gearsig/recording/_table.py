@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, SPEED_NAMES, plain_name
-from gearsig.rig import SpeedSource
+from gearsig.rig import ConstantSpeed, SpeedSource
 
 NumberArray = NDArray[Any]
 
@@ -116,6 +116,89 @@ def seconds_per_unit(name: str, unit: str) -> float | None:
         return None
     suffix = plain.rpartition("_")[2] if "_" in plain else ""
     return SECONDS_PER_UNIT.get(unit.strip().casefold() or (suffix if suffix in SECONDS_PER_UNIT else ""))
+
+
+def without_clock(columns: list[RawColumn]) -> tuple[list[RawColumn], RawColumn | None, list[str]]:
+    """Take a first column that has no name of its own, and is a clock, away from the channels.
+
+    Returns
+    -------
+    tuple
+        The other columns, the time if there is one, and what to tell the user. A column that counts the rows from 0
+        or 1 is neither signal nor time; one that rises in equal steps (within 1 %) is the time in seconds.
+    """
+    if len(columns) < 2 or len(columns[0].values) < 3:
+        return columns, None, []
+    first = columns[0]
+    if first.values.dtype.kind not in "fiu":
+        return columns, None, []
+    steps = np.diff(first.values.astype(np.float64))
+    if first.values[0] in (0, 1) and bool(np.all(steps == 1)):
+        return columns[1:], None, [f"column 1 ({first.name!r}) only counts the rows and was left out"]
+    if steps.min() > 0 and np.ptp(steps) <= 0.02 * steps.mean():
+        note = f"column 1 ({first.name!r}) has no name, increases uniformly and was taken for the time in seconds"
+        return columns[1:], RawColumn("time", first.values, "s"), [note]
+    return columns, None, []
+
+
+N_COHERENCE_SEGMENTS = 64
+
+
+def ask_whether_runs(columns: list[RawColumn], where: str) -> list[str]:
+    r"""Ask whether columns without names are runs that were made one after the other, where they look like it.
+
+    Sensors on one machine hear the same noise in much of the spectrum; runs at different times share steady tones at
+    most. Of n segments of independent noise the coherence exceeds c with the probability
+
+    .. math:: P(\hat\gamma^2 > c) = (1 - c)^{n - 1}.
+
+    Columns share no noise if in every pair less than half of the spectrum is coherent at 5 %.
+
+    Source: J. S. Bendat, A. G. Piersol, *Random Data*, 4th ed., ch. 9.
+    """
+    from scipy.signal import coherence
+
+    n_samples = min(len(c.values) for c in columns)
+    if len(columns) < 2 or n_samples < 64 * N_COHERENCE_SEGMENTS:
+        return []
+    chance = 1.0 - 0.05 ** (1.0 / (N_COHERENCE_SEGMENTS - 1))
+    length = n_samples // N_COHERENCE_SEGMENTS
+    for i, a in enumerate(columns):
+        for b in columns[:i]:
+            _, gamma2 = coherence(a.values[:n_samples], b.values[:n_samples], nperseg=length, noverlap=0)
+            if not float(np.median(gamma2[2:-1])) < chance:
+                return []
+    question = f"{SEPARATE_RUNS} The {len(columns)} columns share no noise, as channels of one machine do."
+    return [f"{question} If they are conditions, read one at a time: {where}#1 to {where}#{len(columns)}"]
+
+
+def one_condition(table: RawTable, number: int, where: str) -> RawTable:
+    """Return the table of one of several runs that stand side by side as columns; its channel is called "vibration".
+
+    The same name in all of them lets one be the reference of another.
+
+    Raises
+    ------
+    InputError
+        If there is no such column.
+    """
+    columns = [c for c in table.columns if seconds_per_unit(c.name, c.unit) is None]
+    times = [c for c in table.columns if c not in columns]
+    if not 1 <= number <= len(columns):
+        raise InputError(
+            f"condition {number} is asked for; beside the time there are {len(columns)} column(s)",
+            where=where,
+            allowed=f"#1 to #{len(columns)}",
+            remedy="count the columns from 1, without the time",
+        )
+    chosen = replace(columns[number - 1], name=CONDITION_CHANNEL)
+    kept = tuple(text for text in table.warnings if not text.startswith(SEPARATE_RUNS))
+    return replace(table, columns=(*times, chosen), warnings=kept)
+
+
+CONDITION_CHANNEL = "vibration"
+SEPARATE_RUNS = "Are these separate runs?"
+"""How the question begins whether columns are conditions."""
 
 
 def rate_of_time(values: NumberArray, scale_s: float, where: str, row_place: Callable[[int], str]) -> float:
@@ -257,14 +340,46 @@ def table_from_arrays(found: NamedArrays, reader: str, where: str) -> RawTable:
     rate_hz = _one_rate(scalars, found.rates_hz, where)
     longest = max(max(a.shape) for a in signals.values())
     short = [path for path, a in signals.items() if max(a.shape) < 0.1 * longest]  # a setting or a result
-    columns = [c for path, a in signals.items() if path not in short for c in _columns(path, a, found, where)]
+    clocks = [path for path, a in signals.items() if path not in short and _is_clock(path, a)]
+    time: RawColumn | None = None
+    columns: list[RawColumn] = []
+    warnings = list(found.warnings)
+    for path, array in signals.items():
+        if path in short or path in clocks:
+            continue
+        of_array = _columns(path, array, found, where)
+        if array.ndim == 2 and 1 not in array.shape and time is None and not clocks:
+            of_array, time, notes = without_clock(of_array)
+            warnings += notes
+            if notes:
+                of_array = [replace(c, name=f"{path}_{i}") for i, c in enumerate(of_array, 1)]
+            if time is not None:
+                warnings += ask_whether_runs(of_array, where)
+        columns += of_array
+    if clocks and rate_hz is None:
+        time = RawColumn("time", signals[clocks[0]].reshape(-1), "s")
+    if clocks:
+        warnings.append(f"taken for times and not for channels: {', '.join(clocks[:8])}")
     # A channel is called by the last part of its path where that is unique.
     leaves = [c.name.rpartition(".")[2] for c in columns]
     columns = [replace(c, name=leaf) if leaves.count(leaf) == 1 else c for c, leaf in zip(columns, leaves, strict=True)]
-    warnings = [*found.warnings, *_speed_hints(scalars)]
+    speed, hints = _stated_speed(scalars)
+    warnings += hints
     if short:
         warnings.append(f"shorter than a tenth of the longest signal and left out: {', '.join(short[:8])}")
-    return RawTable(tuple(columns), reader, sampling_rate_hz=rate_hz, warnings=tuple(warnings))
+    return RawTable(tuple(columns), reader, sampling_rate_hz=rate_hz, time=time, warnings=tuple(warnings), speed=speed)
+
+
+def _is_clock(path: str, array: NumberArray) -> bool:
+    """Whether a vector is the time of other channels, as Dewesoft's Data1_time_AI_1; one called "time" is a column's.
+
+    "X097_DE_time" is a signal over time: only what increases is a clock.
+    """
+    leaf = path.rpartition(".")[2]
+    if (1 not in array.shape and array.ndim > 1) or seconds_per_unit(leaf, "") is not None or array.dtype.kind == "c":
+        return False
+    named = re.search(r"(?:^|[_\W])time(?:[_\W]|$)", leaf, re.IGNORECASE) is not None
+    return named and bool(np.all(np.diff(array.reshape(-1)) > 0))
 
 
 def _columns(path: str, array: NumberArray, found: NamedArrays, where: str) -> list[RawColumn]:
@@ -313,14 +428,15 @@ def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: Mapping[str, float]
     return values[0] if values else None
 
 
-def _speed_hints(scalars: Mapping[str, NumberArray]) -> list[str]:
-    """Mention scalars that may be a shaft speed: which shaft, and how true, the file does not say."""
-    hints = []
-    for path, array in scalars.items():
-        name = plain_name(path)
-        if (name in SPEED_NAMES or name.endswith("rpm")) and array.dtype.kind in "fiu":
-            unit = "rpm" if "rpm" in name else "Hz or rpm"
-            hints.append(
-                f"{path} = {float(array.reshape(-1)[0]):g} may be a nominal shaft speed ({unit}); it was not used"
-            )
-    return hints
+def _stated_speed(scalars: Mapping[str, NumberArray]) -> tuple[ConstantSpeed | None, list[str]]:
+    """Return the speed that the one scalar in rpm states; mention others that may be speeds, which were not used."""
+    values = {path: float(a.reshape(-1)[0]) for path, a in scalars.items() if a.dtype.kind in "fiu"}
+    in_rpm = {path: value for path, value in values.items() if plain_name(path).endswith("rpm")}
+    possible = {path: value for path, value in values.items() if plain_name(path) in SPEED_NAMES or path in in_rpm}
+    stated = set(in_rpm.values())
+    if len(stated) == 1 and 0 < min(stated) < np.inf:
+        return ConstantSpeed(min(stated)), []
+    return None, [
+        f"{path} = {value:g} may be a nominal shaft speed ({'rpm' if path in in_rpm else 'Hz or rpm'}); it was not used"
+        for path, value in possible.items()
+    ]

@@ -57,6 +57,7 @@ _RATE_LINE = re.compile(
     r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(?P<unit>k?hz)?[\s;,]*$",
     re.IGNORECASE,
 )
+_AXIS = re.compile(r"^[XYZ]:\s*(?=\S)", re.IGNORECASE)
 _UNIT_AT_END = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]\[]*)\]|\((?P<round>[^()]*)\))\s*$", re.DOTALL)
 
 
@@ -74,19 +75,24 @@ def plain_name(name: str) -> str:
 def split_unit(header: str) -> tuple[str, str]:
     """Split "acc [m/s^2]" or "acc (g)" into name and unit; round brackets only where they hold a known unit.
 
+    The letter of an axis before it, which data collectors write ("X:Time (Seconds)"), is no part of the name.
+
     Examples
     --------
     >>> split_unit("acc [m/s^2]"), split_unit("Time (s)"), split_unit("bearing (left)")
     (('acc', 'm/s^2'), ('Time', 's'), ('bearing (left)', ''))
+    >>> split_unit("X:Time (Seconds)"), split_unit("Y:(g)")
+    (('Time', 'Seconds'), ('', 'g'))
     """
-    match = _UNIT_AT_END.match(header.strip())
-    if match is None or not match["name"]:
-        return header.strip(), ""
+    header = _AXIS.sub("", header.strip())
+    match = _UNIT_AT_END.match(header)
+    if match is None:
+        return header, ""
     if match["square"] is not None:
         return match["name"], match["square"].strip()
     if is_unit(match["round"]):
         return match["name"], match["round"].strip()
-    return header.strip(), ""
+    return header, ""
 
 
 def rate_in_line(line: str) -> float | None:

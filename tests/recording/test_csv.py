@@ -197,3 +197,23 @@ def test_markup_in_names_stays_text(tmp_path):
     name = "<img src=x onerror=alert(1)>"
     r = read_recording(write(tmp_path / "x.csv", [f"a,{name}", "1,2", "3,4"]), sampling_rate_hz=1)
     assert r.channel_names[1] == name
+
+
+def test_axes_before_names_and_units(tmp_path):
+    lines = ["Serial Number:\t12345", "X:Time (Seconds)\tY:(g)", *("\t".join(map(repr, row[:2])) for row in rows())]
+    r = read_recording(write(tmp_path / "x.csv", lines))
+    assert (r.channel_names, r.channels[0].unit) == (("column 2",), "g")
+    assert r.sampling_rate_hz == pytest.approx(FS_HZ)
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_export_with_events_above_the_table(tmp_path, decimal):
+    head = [
+        *("Data info", "File name: run_0001.dxd", "Start time: 2/16/2024 11:20:33.000", "Number of channels: 2"),
+        *("Sample rate: 25600", "Store type: always fast", "", "Events", "Event Type\tEvent\tTime\tComment"),
+        *("1\tstoring started at\t11:20:33.500\t", "2\tstoring stopped at\t11:20:43.500\t", "", "Data1"),
+    ]
+    numbers = ["\t".join(map(repr, row)).replace(".", decimal) for row in rows()]
+    r = read_recording(write(tmp_path / "x.txt", [*head, "Time (s)\tAI 1 (m/s2)\tAI 2 (V)", *numbers]))
+    assert [(c.name, c.unit) for c in r.channels] == [("AI 1", "m/s2"), ("AI 2", "V")]
+    assert r.sampling_rate_hz == 25600

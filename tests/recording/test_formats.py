@@ -1,5 +1,6 @@
 """Every binary format, on files made by its own library."""
 
+import gc
 import struct
 import wave
 
@@ -15,7 +16,7 @@ from scipy.sparse import csc_array
 
 from gearsig.errors import InputError
 from gearsig.recording import parse_lea, read_recording, variables
-from gearsig.rig import Rig, Sensor, SpeedChannel
+from gearsig.rig import ConstantSpeed, Rig, Sensor, Shaft, SpeedChannel, TachometerChannel
 
 RNG = np.random.default_rng(7)
 X = RNG.standard_normal(1000)
@@ -47,15 +48,55 @@ class TestMat5:
         assert r.channel_names == ("m_1", "m_2")
         np.testing.assert_array_equal(r.samples, np.stack([X, Y]))
 
-    def test_time_vector_and_speed_hint(self, tmp_path):
-        savemat(
-            tmp_path / "x.mat", {"t": np.arange(1000) / 50, "a": X, "X097RPM": 1796, "BPFO": 81.1, "win": [1, 2, 3]}
-        )
+    def test_time_vector_and_speed(self, tmp_path):
+        contents = {"t": np.arange(1000) / 50, "a": X, "X097RPM": 1796, "BPFO": 81.1, "win": [1, 2, 3]}
+        savemat(tmp_path / "x.mat", contents)
         r = read_recording(tmp_path / "x.mat")
         assert r.sampling_rate_hz == pytest.approx(50)
-        assert r.speed is None
-        assert any("X097RPM = 1796 may be" in w for w in r.warnings)
+        assert r.speed == ConstantSpeed(1796.0)
         assert any("win" in w for w in r.warnings)
+        savemat(tmp_path / "y.mat", contents | {"X098RPM": 1772})  # which of them?
+        assert read_recording(tmp_path / "y.mat").speed is None
+        savemat(tmp_path / "z.mat", {"a": X, "fs": 50.0, "rate": 25.0})  # Hz or rpm?
+        assert read_recording(tmp_path / "z.mat").speed is None
+
+    def test_stated_speed_goes_before_a_rigs_but_not_before_what_measures_it(self, tmp_path):
+        savemat(tmp_path / "x.mat", {"DE_time": X, "tacho": Y, "RPM": 1772, "fs": 50.0})
+        constant = Rig(shafts=(Shaft("motor"),), speed=ConstantSpeed(1797.0, "motor"))
+        assert read_recording(tmp_path / "x.mat", rig=constant).speed == ConstantSpeed(1772.0, "motor")
+        measured = Rig(speed=TachometerChannel("tacho"))
+        assert read_recording(tmp_path / "x.mat", rig=measured).speed_source == TachometerChannel("tacho")
+
+    def test_times_beside_their_channels(self, tmp_path):
+        t = np.arange(1000) / 50
+        names = {"Data1_AI_1": X, "Data1_time_AI_1": t, "Data1_AI_2": Y, "Data1_time_AI_2": t}
+        savemat(tmp_path / "x.mat", names)
+        r = read_recording(tmp_path / "x.mat")
+        assert (r.channel_names, r.sampling_rate_hz) == (("Data1_AI_1", "Data1_AI_2"), pytest.approx(50))
+        savemat(tmp_path / "y.mat", names | {"Data1_time_AI_1": 736000 + t / 86400, "Sample_rate": 50.0})  # days
+        assert read_recording(tmp_path / "y.mat").sampling_rate_hz == 50.0
+
+    @pytest.mark.parametrize("together", [True, False])
+    def test_columns_beside_a_time_are_channels_or_conditions(self, tmp_path, together):
+        rng, n = np.random.default_rng(1), 20_000
+        tone, noise = np.sin(0.2 * np.arange(n)), rng.standard_normal(n)
+        runs = [tone + (0.5 * noise if together else 0) + rng.standard_normal(n) for _ in range(3)]
+        matrix = np.stack([np.arange(n) / 5120, *runs], axis=1)
+        savemat(tmp_path / "x.mat", {"m": matrix})
+        r = read_recording(tmp_path / "x.mat")
+        assert r.channel_names == ("m_1", "m_2", "m_3")
+        assert r.sampling_rate_hz == pytest.approx(5120)
+        assert any("#3" in w for w in r.warnings) is not together
+        np.savetxt(tmp_path / "x.csv", matrix, fmt="%.9g")
+        for name in ("x.mat#2", "x.csv#2"):
+            second = read_recording(tmp_path / name)
+            assert second.channel_names == ("vibration",)
+            assert second.name == name
+            np.testing.assert_allclose(second.samples[0], runs[1], rtol=1e-7)
+        with pytest.raises(InputError, match="condition 4"):
+            read_recording(tmp_path / "x.mat#4")
+        (tmp_path / "x.mat").rename(tmp_path / "x#2.mat")
+        assert len(read_recording(tmp_path / "x#2.mat").channels) == 3
 
     @pytest.mark.parametrize("zero_first", [True, False])
     def test_doubled_variables(self, tmp_path, zero_first):
@@ -223,6 +264,12 @@ class TestWav:
         data = (tmp_path / "x.wav").read_bytes()
         (tmp_path / "y.wav").write_bytes(data + b"abcd" + struct.pack("<I", 4) + b"1234")
         assert read_recording(tmp_path / "y.wav").n_samples == 100
+        for tail in (b"VENDOR 4711: not a chunk", b"\xff" * 3, b"LIST" + struct.pack("<I", 10**6) + b"short"):
+            for n_riff in (len(data) - 8, len(data) + len(tail) - 8):  # counted in by some, by others not
+                (tmp_path / "y.wav").write_bytes(data[:4] + struct.pack("<I", n_riff) + data[8:] + tail)
+                r = read_recording(tmp_path / "y.wav")
+                np.testing.assert_array_equal(r.samples[0] * 2**15, np.arange(100))
+                assert f"{len(tail)} bytes after the audio" in r.warnings[0]
         (tmp_path / "z.wav").write_bytes(data[:-50])
         with pytest.raises(InputError, match=r"z\.wav: chunk 'data'.*50 are missing"):
             read_recording(tmp_path / "z.wav")
@@ -333,3 +380,25 @@ class TestUff58:
         ]
         assert r.sampling_rate_hz == pytest.approx(256)
         np.testing.assert_allclose(r.samples, [X, X + 1], rtol=1e-5, atol=1e-5)
+
+
+class TestMf4:
+    @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # asammdf's, of a damaged file
+    @pytest.mark.parametrize("version", ["3.30", "4.10"])
+    def test_channels_at_the_fastest_times(self, tmp_path, version):
+        asammdf = pytest.importorskip("asammdf", reason="the extra gearsig[mf4] is not installed")
+        t = np.arange(1000) / 500
+        with asammdf.MDF(version=version) as file:
+            file.append([asammdf.Signal(v, t, unit, name) for name, v, unit in (("a1", X, "g"), ("a2", Y, "m/s^2"))])
+            file.append([asammdf.Signal(X[:20], t[:20] * 50, "degC", "oil")])
+            saved = file.save(tmp_path / ("x.mf4" if version[0] == "4" else "x.mdf"))
+        r = read_recording(saved)
+        assert [(c.name, c.unit) for c in r.channels] == [("a1", "g"), ("a2", "m/s^2")]
+        assert r.sampling_rate_hz == pytest.approx(500)
+        np.testing.assert_allclose(r.samples, [X, Y])
+        assert any("oil" in w for w in r.warnings)
+        data = saved.read_bytes()
+        saved.write_bytes(data[: len(data) // 3])
+        with pytest.raises(InputError, match="MF4"):
+            read_recording(saved)
+        gc.collect()

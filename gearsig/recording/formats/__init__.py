@@ -4,6 +4,7 @@ from gearsig.recording.formats._csv import CSV
 from gearsig.recording.formats._format import FileFormat
 from gearsig.recording.formats._hdf5 import HDF5
 from gearsig.recording.formats._mat import MAT
+from gearsig.recording.formats._mf4 import MF4
 from gearsig.recording.formats._parquet import PARQUET
 from gearsig.recording.formats._tdms import TDMS
 from gearsig.recording.formats._uff58 import UFF58
@@ -17,6 +18,7 @@ FORMATS: tuple[FileFormat, ...] = (
     PARQUET,
     TDMS,
     UFF58,
+    MF4,
 )
 """In the order in which users are told them; content is tried against them from the last: all text looks like CSV."""
 

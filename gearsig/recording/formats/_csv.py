@@ -16,7 +16,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory, read_text_bytes
 from gearsig.recording._metadata import OWN_TEXT_MARK, metadata_json, table_from_metadata
-from gearsig.recording._table import RawColumn, RawTable
+from gearsig.recording._table import RawColumn, RawTable, ask_whether_runs, without_clock
 from gearsig.recording._types import Recording, is_unit, plain_name, rate_in_line, split_unit
 from gearsig.recording.formats._format import FileFormat
 
@@ -341,6 +341,8 @@ def _raise_no_number(field: str, number: int, name: str, layout: CsvLayout, wher
 
 
 READER = "gearsig CSV reader"
+INDEX_NAMES = ("", "index", "sample", "samples", "no", "nr", "#")
+"""Headers of columns that may count the rows, lower case."""
 
 
 def read_csv(path: Path) -> RawTable:
@@ -371,12 +373,10 @@ def read_csv(path: Path) -> RawTable:
         return table_from_metadata(layout.preamble[0].removeprefix(OWN_TEXT_MARK), values, READER, where, place)
     warnings = list(_doubtful_comma(layout, values))
     columns = [RawColumn(name, v, unit) for name, unit, v in zip(names, units, values, strict=True)]
-    columns, warning = _without_counter(columns, layout)
-    warnings += warning
     time = None
-    if not layout.header and len(columns) > 1 and not warning and _is_uniform(columns[0].values):
-        time = columns.pop(0)
-        warnings.append("no header: the first column increases uniformly and was taken for the time in seconds")
+    if not layout.header or plain_name(layout.header[0]) in INDEX_NAMES:
+        columns, time, notes = without_clock(columns)
+        warnings += notes if time is None else [*notes, *ask_whether_runs(columns, where)]
     return RawTable(
         tuple(columns),
         READER,
@@ -397,23 +397,6 @@ def _names_and_units(layout: CsvLayout) -> tuple[tuple[str, ...], tuple[str, ...
     prefix = "column " if layout.header else "ch"
     names = [name or f"{prefix}{i + 1}" for i, (name, _) in enumerate(pairs)]
     return tuple(names), tuple(units)
-
-
-def _without_counter(columns: list[RawColumn], layout: CsvLayout) -> tuple[list[RawColumn], list[str]]:
-    """Drop a first column that only counts the rows: it is neither a signal nor a time."""
-    first = columns[0]
-    unnamed = not layout.header or plain_name(layout.header[0]) in ("", "index", "sample", "samples", "no", "nr", "#")
-    if len(columns) == 1 or not unnamed or len(first.values) < 2 or first.values[0] not in (0, 1):
-        return columns, []
-    if not np.all(np.diff(first.values) == 1):
-        return columns, []
-    return columns[1:], [f"column 1 ({first.name!r}) only counts the rows and was left out"]
-
-
-def _is_uniform(values: FloatArray) -> bool:
-    """Whether a column without a name rises in steps that are equal within 1 %."""
-    steps = np.diff(values)
-    return len(steps) > 1 and bool(steps.min() > 0) and bool(np.ptp(steps) <= 0.02 * steps.mean())
 
 
 def _doubtful_comma(layout: CsvLayout, values: list[FloatArray]) -> list[str]:

@@ -24,6 +24,7 @@ from gearsig.recording.formats._format import FileFormat
 
 
 MAX_CHUNK_BYTES = 1 << 26
+OWN_CHUNK = b"gsig"
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,10 @@ class LeaChannel:
     unit: str
 
 
-def find_chunks(path: Path) -> dict[bytes, bytes]:
-    """Return the chunks other than "data" by name; refuse a file whose chunks are longer than the file.
+def find_chunks(path: Path) -> tuple[dict[bytes, bytes], int]:
+    """Return the chunks other than "data" by name, and the place after the last; refuse one whose audio is cut off.
+
+    What follows the audio and is no chunk, as some vendors append, is left out.
 
     Raises
     ------
@@ -50,11 +53,14 @@ def find_chunks(path: Path) -> dict[bytes, bytes]:
         head = file.read(12)
         order = ">" if head[:4] == b"RIFX" else "<"
         if head[:4] == b"RF64":  # 64-bit lengths stand in a chunk of their own; scipy checks them
-            return chunks
+            return chunks, n_bytes
+        last = file.tell()
         while len(tag := file.read(8)) == 8:
             name, size = tag[:4], struct.unpack(order + "I", tag[4:])[0]
             end = file.tell() + size
             if end > n_bytes:
+                if has_data and name not in (OWN_CHUNK, b"LEA "):  # those carry units and scales
+                    break
                 raise InputError(
                     f"chunk {name.decode('latin-1')!r} is stated with {size} bytes, {end - n_bytes} are missing",
                     where=path.name,
@@ -65,13 +71,14 @@ def find_chunks(path: Path) -> dict[bytes, bytes]:
                 has_data = size > 0
             elif size <= MAX_CHUNK_BYTES:
                 chunks[name] = file.read(size)
-            file.seek(end + (size & 1))  # chunks begin at even bytes
+            last = min(end + (size & 1), n_bytes)  # chunks begin at even bytes
+            file.seek(last)
     if not has_data or b"fmt " not in chunks:
         missing = "samples" if b"fmt " in chunks else "format description"
         raise InputError(
             f"holds no {missing}", where=path.name, allowed="a complete WAV file", remedy="export it again"
         )
-    return chunks
+    return chunks, last
 
 
 def parse_lea(chunk: bytes) -> list[LeaChannel]:
@@ -106,7 +113,6 @@ def _counted_text(body: bytes, at: int) -> tuple[str, int]:
 
 
 READER = "gearsig WAV reader"
-OWN_CHUNK = b"gsig"
 
 # Zero and full scale of the integer types as scipy returns them; it left-justifies 24 bit in 32.
 _SCALES = {"uint8": (128.0, 128.0), "int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "int64": (0.0, 2.0**63)}
@@ -126,19 +132,29 @@ def read_wav(path: Path) -> RawTable:
     from scipy.io import wavfile
 
     where = path.name
-    chunks = find_chunks(path)
-    check_memory(6 * path.stat().st_size, where)
+    chunks, end = find_chunks(path)
+    n_bytes = path.stat().st_size
+    check_memory(6 * n_bytes, where)
     with foreign_errors(where, "WAV"), warnings.catch_warnings():
         warnings.simplefilter("error")  # a warning means a damaged file, and becomes an error
         # Chunks that scipy does not know are none of its business; find_chunks has checked the lengths.
         warnings.filterwarnings("ignore", message="Chunk .*not understood")
-        rate_hz, frames = wavfile.read(path)
+        rate_hz, frames = wavfile.read(path if end == n_bytes else _up_to(path, end))
     rows = [frames] if frames.ndim == 1 else list(frames.T)
     if OWN_CHUNK in chunks:
         return table_from_metadata(chunks[OWN_CHUNK].decode("utf-8", errors="replace"), rows, READER, where)
     described = parse_lea(chunks.get(b"LEA ", b""))
     columns = [_column(i, row, described if len(described) == len(rows) else []) for i, row in enumerate(rows)]
-    return RawTable(tuple(columns), READER, sampling_rate_hz=float(rate_hz))
+    notes = (f"{n_bytes - end} bytes after the audio are no WAV chunk and were left out",) if end < n_bytes else ()
+    return RawTable(tuple(columns), READER, sampling_rate_hz=float(rate_hz), warnings=notes)
+
+
+def _up_to(path: Path, end: int) -> io.BytesIO:
+    """Return the file without what follows its last chunk; its header then states that length."""
+    with path.open("rb") as file:
+        whole = bytearray(file.read(end))
+    whole[4:8] = struct.pack(">I" if whole[:4] == b"RIFX" else "<I", end - 8)
+    return io.BytesIO(whole)
 
 
 def _column(i: int, values: NumberArray, described: list[LeaChannel]) -> RawColumn:

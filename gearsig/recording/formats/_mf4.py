@@ -1,0 +1,65 @@
+"""ASAM MDF files, version 3 and 4, of vehicle and test-bench loggers; needs the extra `gearsig[mf4]`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearsig.errors import InputError
+from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._table import NumberArray, RawColumn, RawTable
+from gearsig.recording.formats._format import FileFormat
+
+READER = "gearsig MF4 reader"
+
+
+def read_mf4(path: Path) -> RawTable:
+    """Return the fastest channels of an MDF file, scaled as it says, with their time.
+
+    Each group of channels has a time of its own. The group with most samples counts, and others with the same times;
+    slower ones are left out with a note.
+
+    Raises
+    ------
+    InputError
+        If `asammdf` is not installed, or the file is damaged, holds no numbers or would not fit into memory.
+    """
+    try:
+        from asammdf import MDF
+    except ImportError:
+        raise InputError(
+            "MF4 files are read by the package asammdf, which is not installed",
+            where=path.name,
+            remedy="pip install 'gearsig[mf4]', or export as HDF5 or MAT",
+        ) from None
+    where = path.name
+    check_memory(4 * path.stat().st_size, where)
+    with foreign_errors(where, "MF4"), MDF(str(path)) as file:
+        signals = [s for s in file.iter_channels(skip_master=True) if s.samples.dtype.kind in "fiub"]
+    signals = [s for s in signals if s.samples.ndim == 1 and len(s.samples) > 1]
+    if not signals:
+        raise InputError("holds no signal of numbers", where=where, remedy="check the channels of the measurement")
+    time: NumberArray = max(signals, key=lambda s: len(s.samples)).timestamps
+    kept = [s for s in signals if np.array_equal(s.timestamps, time)]
+    slower = [str(s.name) for s in signals if not np.array_equal(s.timestamps, time)]
+    notes = (f"channel(s) at other times were left out: {', '.join(slower[:8])}",) if slower else ()
+    return RawTable(_columns(kept), READER, time=RawColumn("time", time, "s"), warnings=notes)
+
+
+def _columns(signals: list[Any]) -> tuple[RawColumn, ...]:
+    """Name channels as the file does, numbered where a name is used twice."""
+    n_used = Counter(str(s.name) for s in signals)
+    return tuple(
+        RawColumn(f"{s.name} ({i})" if n_used[str(s.name)] > 1 else str(s.name), s.samples, str(s.unit or ""))
+        for i, s in enumerate(signals, 1)
+    )
+
+
+def _sniff(head: bytes) -> str:
+    return "MF4" if head.startswith((b"MDF     ", b"UnFinMF ")) else ""
+
+
+MF4 = FileFormat("MF4", (".mf4", ".mdf"), _sniff, read_mf4)
