@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gearsig.diagnosis import Analysis, CannotTell, Finding, Kind, analyze
-from gearsig.recording import read_recording
+from gearsig.prepared import refined_angle
+from gearsig.recording import Recording, read_recording
 from gearsig.rig import Bearing, ConstantSpeed, GearPair, OperatingPoint, Rig, Shaft
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -26,6 +27,11 @@ BEARING = Rig(
     bearings=(Bearing("test bearing", "shaft", 8, 5.969, 31.623),),
     speed=ConstantSpeed(1500.0, "shaft"),
 )
+MOTOR = Rig(
+    name="motor test bench",
+    shafts=(Shaft("motor"),),
+    bearings=(Bearing("drive end", "motor", 9, 7.94, 39.04), Bearing("fan end", "motor", 8, 6.746, 28.5)),
+)
 TWO_STAGES = Rig(
     name="fault simulator",
     shafts=(Shaft("input"), Shaft("middle"), Shaft("output")),
@@ -34,6 +40,9 @@ TWO_STAGES = Rig(
     sampling_rate_hz=4266.7,
     assumed=("sampling rate", "teeth"),
 )
+
+
+RATES_HZ = {"OR007@6_0.mat": 12e3, "IR021_0.mat": 12e3, "B007_0.mat": 12e3, "normal_0.mat": 48e3}
 
 
 def found(analysis: Analysis, code: str) -> Finding:
@@ -76,6 +85,21 @@ def test_bearing_files(file: str, code: str, hertz: float) -> None:
     # The kurtogram's own band is searched like the fixed ones, and shows the race by itself.
     assert any("own band" in text and "dB over its floor" in text for text in found(analysis, code).evidence)
     assert analysis.channels[0].kurtogram_band is not None
+
+
+def motor_bench(file: str, *, part: slice = slice(None), stated_rpm: float = 1797.0) -> Recording:
+    """Return a recording of the motor test bench, or a part of it, with the speed that is stated for it."""
+    recording = read_recording(DATA / "bearing_cwru" / file, rig=replace(MOTOR, sampling_rate_hz=RATES_HZ[file]))
+    recording = recording.select(recording.vibration_names())
+    return replace(recording, samples=recording.samples[:, part], speed=ConstantSpeed(stated_rpm, "motor"))
+
+
+@pytest.mark.parametrize("file", ["OR007@6_0.mat", "IR021_0.mat", "B007_0.mat", "normal_0.mat"])
+def test_a_stated_speed_is_set_right_alike_from_either_half(file: str) -> None:
+    half = motor_bench(file).n_samples // 2
+    for part, rpm in ((slice(half), 1797.0), (slice(half, None), 1770.0)):
+        angle = refined_angle(motor_bench(file, part=part, stated_rpm=rpm), MOTOR)
+        assert angle.mean_speed_rpm == pytest.approx(1796.0, rel=6e-4)
 
 
 @pytest.mark.parametrize("file", ["InnerRaceFault_vload_3.mat", "OuterRaceFault_vload_4.mat"])

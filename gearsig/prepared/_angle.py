@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError, RefusalError
-from gearsig.prepared._lines import best_comb, floor_of
+from gearsig.prepared._lines import CLEAR_LINE_DB, LOG_RATIO_LIMIT, LineExcess, best_comb, floor_of, over_floor_db
 from gearsig.recording import Recording
 from gearsig.rig import ConstantSpeed, Rig, SpeedChannel
 
@@ -141,41 +143,66 @@ def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAng
 
 
 def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngle | None:
-    """Find the shaft's harmonics in the envelopes, where a bearing's modulation shows them better than the spectrum.
+    """Find the shaft's harmonics in all channels and the envelopes of all bands together.
 
-    Multiples of the mains are left out: a hum's would be taken for the shaft of any motor of little slip.
+    Each shows lines of its own, a bearing's above all; those of the shaft are common to them. A speed other than the
+    stated one must show its first harmonic, and clearer than the stated one does. A family on multiples of the mains
+    says nothing, and is left out: a hum's would be taken for the shaft of any motor of little slip.
     """
-    from gearsig.spectra import amplitude_spectrum, envelope_recording
-
-    hertz = stated.mean_speed_rpm / 60
+    lines = _common_lines(recording)
+    hertz, resolution = stated.mean_speed_rpm / 60, lines.spectrum.resolution
     low, high = hertz * (1 - STATED_SPEED_TOLERANCE), hertz * (1 + STATED_SPEED_TOLERANCE)
-    combs = []
-    for band in envelope_bands(recording.sampling_rate_hz):
-        try:
-            envelopes = envelope_recording(recording, band, kind="magnitude")
-        except InputError:
-            continue
-        for name in envelopes.channel_names:
-            spectrum = amplitude_spectrum(envelopes, name)
-            excess = floor_of(spectrum)
-            for mains_hz in MAINS_HZ:
-                excess = excess.without_multiples(mains_hz, skirt=MAINS_TOLERANCE)
-            comb = best_comb(excess, low, high, offsets=np.arange(1, N_SHAFT_HARMONICS + 1))
-            if comb is not None:
-                combs.append((comb.p_value, comb.fundamental, spectrum.resolution))
-    if not combs:
+    harmonics = np.arange(1, N_SHAFT_HARMONICS + 1)
+    comb = best_comb(lines, low, high, harmonics)
+    mains = [hz for hz in MAINS_HZ if comb and abs(comb.fundamental / hz - 1) <= MAINS_TOLERANCE]
+    for mains_hz in mains:
+        comb = best_comb(lines.without_multiples(mains_hz, skirt=MAINS_TOLERANCE), low, high, harmonics)
+    if comb is None or comb.p_value > 1e-3:
         return None
-    p_value, found, resolution = min(combs)
-    p_value = min(1.0, p_value * len(combs))
-    if p_value > 1e-3:
+    found = comb.fundamental
+    first_db, stated_db = (_line_db(lines, place) for place in (found, hertz))
+    if abs(found - hertz) > resolution and first_db <= max(stated_db, CLEAR_LINE_DB):
         return None
     return replace(
         stated,
         revolutions=stated.revolutions * (found / hertz),
         speed_rev_per_s=stated.speed_rev_per_s * (found / hertz),
         relative_speed_uncertainty=resolution / (3 * N_SHAFT_HARMONICS) / found,
-        quality=min(0.95, 1 - p_value),
+        quality=min(0.95, 1 - comb.p_value),
     )
+
+
+def _common_lines(recording: Recording) -> LineExcess:
+    """Return the lines over frequency that all channels and the envelopes of their bands have in common.
+
+    The mean over the spectra of the logarithm of power over floor, each cut so that no single one decides.
+    """
+    spectra = list(_spectra_of_shaft(recording))
+    n = min(len(excess.floor) for excess in spectra)
+    log_ratios = [
+        np.log(np.maximum(excess.spectrum.values[:n], 1e-300) / np.maximum(excess.floor[:n], 1e-300))
+        for excess in spectra
+    ]
+    mean = np.mean(np.clip(log_ratios, -1.0, 1.5 * LOG_RATIO_LIMIT / 2), axis=0)
+    first = spectra[0].spectrum
+    return floor_of(replace(first, values=np.exp(mean), positions=first.positions[:n], unit=""))
+
+
+def _line_db(excess: LineExcess, place: float) -> float:
+    i = excess.spectrum.index_of(place)
+    return over_floor_db(float(excess.spectrum.values[i]), float(excess.floor[i]))
+
+
+def _spectra_of_shaft(recording: Recording) -> Iterator[LineExcess]:
+    """Yield the spectra of all vibration channels, then those of their envelopes, all of the same resolution."""
+    from gearsig.spectra import amplitude_spectrum, envelope_recording
+
+    sources = [recording]
+    for band in envelope_bands(recording.sampling_rate_hz):
+        with suppress(InputError):  # the record is too short for so narrow a band
+            sources.append(envelope_recording(recording, band, kind="magnitude"))
+    for source in sources:
+        yield from (floor_of(amplitude_spectrum(source, name)) for name in source.vibration_names())
 
 
 # --------------------

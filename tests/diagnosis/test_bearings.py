@@ -133,6 +133,15 @@ def test_a_stated_speed_is_not_taken_from_the_mains() -> None:
     assert any("no line of a shaft or mesh confirms" in text for text in found.evidence)
 
 
+def test_a_stated_speed_is_not_replaced_by_a_third_of_a_bearings_tone() -> None:
+    rng, t = np.random.default_rng(4), np.arange(51_200) / 5120.0
+    tone = (1 + 0.5 * np.cos(2 * np.pi * 184.2 * t)) * np.cos(2 * np.pi * 1400 * t)
+    shaft = sum(a * np.cos(2 * np.pi * 59.7 * k * t) for k, a in enumerate((1.0, 0.1), 1))
+    samples = (0.3 * tone + shaft + 0.3 * rng.normal(size=len(t)))[None, :]
+    recording = Recording(samples, 5120.0, (Channel("a1", "acceleration"),), speed=ConstantSpeed(3600.0, "in"))
+    assert refined_angle(recording, ONE_SHAFT).mean_speed_rpm == pytest.approx(3600.0, rel=0.006)
+
+
 def test_a_family_beyond_slip_of_a_stated_speed_may_be_the_part() -> None:
     found = finding(analyze(stated(2950.0, 2850.0, np.random.default_rng(1))), "bearing-outer-race")
     assert found.kind is Kind.SUSPICION
