@@ -10,6 +10,7 @@ import numpy as np
 from gearsig import indicators
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._bearing import detect_bearings
+from gearsig.diagnosis._change import change_findings, family_change, level_changes
 from gearsig.diagnosis._crack import crack_depth, with_crack
 from gearsig.diagnosis._lines import detect_lines, detect_mesh, speed_finding
 from gearsig.diagnosis._modulation import detect_sidebands
@@ -25,7 +26,7 @@ from gearsig.diagnosis._signals import (
 )
 from gearsig.diagnosis._start_stop import start_stop_analysis
 from gearsig.diagnosis._tooth import detect_tooth_damage
-from gearsig.diagnosis._types import Analysis, AnalysisSettings, CannotTell, cannot_tell
+from gearsig.diagnosis._types import Analysis, AnalysisSettings, CannotTell, LevelChange, cannot_tell
 from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import SeparatedAverage, band_passed_mesh
@@ -79,28 +80,40 @@ def analyze(
         If there is no vibration channel, the record is shorter than 256 samples, or the reference has other channels or
         is the recording itself.
     """
-    settings = settings or AnalysisSettings()
-    announce = on_stage or (lambda _: None)
     prepared = prepare(recording, rig)
-    recording, known = prepared.recording, prepared.rig
-    _check_size(recording)
-    healthy = None if reference is None else prepare(reference, recording.rig)
+    _check_size(prepared.recording)
+    healthy = None if reference is None else prepare(reference, prepared.recording.rig)
     if healthy is not None:
-        _check_reference(recording, healthy.recording)
+        _check_reference(prepared.recording, healthy.recording)
+    return _examined(prepared, settings or AnalysisSettings(), healthy, torque_nm, on_stage or (lambda _: None))[0]
 
+
+Shown = tuple[AnalysisSignals, Sequence[BandEnvelope]]
+"""What an analysis looked at."""
+
+
+def _examined(
+    prepared: PreparedRecording,
+    settings: AnalysisSettings,
+    healthy: PreparedRecording | None,
+    torque_nm: float | None,
+    announce: Callable[[str], object],
+) -> tuple[Analysis, Shown | None]:
+    """Return the analysis, and what it looked at where channels live and the machine turns."""
+    recording, known = prepared.recording, prepared.rig
     announce("finding the speed")
     findings, dead = detect_data_problems(recording)
     healthy_recording = healthy.recording if healthy is not None else None
     unsteady = start_stop_analysis(recording, known, findings, asdict(settings), healthy_recording)
     if unsteady is not None:
-        return unsteady
+        return unsteady, None
     _check_vibration(recording)
     angle = _angle_of(prepared)
     findings.append(speed_finding(angle))
     names = [name for name in recording.vibration_names() if name not in dead]
     if not names:
         order = ranked([*findings, cannot_tell("all-channels-dead", "Every vibration channel is dead.")])
-        return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
+        return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
 
     announce("averages and spectra")
     usable = angle if isinstance(angle, ShaftAngle) else None
@@ -122,14 +135,22 @@ def analyze(
     findings += detect_lines(signals)
     findings += detect_resonances(levels)
 
-    reference_analysis = None
+    reference_analysis: Analysis | None = None
+    compared: tuple[LevelChange, ...] = ()
     if healthy is not None:
         announce("the reference")
-        reference_analysis = analyze(healthy, settings=settings)
-        findings = beside_reference(findings, reference_analysis)
+        _check_size(healthy.recording)
+        reference_analysis, then = _examined(healthy, settings, None, None, lambda _: None)
+        if then is None:
+            findings = beside_reference(findings, reference_analysis)
+        else:
+            beside = (signals, envelopes, *then)
+            findings = beside_reference(findings, reference_analysis, lambda f: family_change(f, *beside))
+            compared = level_changes(*beside)
+            findings += change_findings(compared, signals, then[0], findings)
     crack = crack_depth(prepared, known, healthy, torque_nm, dead)
     order = ranked(with_crack(findings, crack, known))
-    return Analysis(
+    analysis = Analysis(
         recording=recording,
         rig=recording.rig,
         shaft_angle=angle,
@@ -140,7 +161,9 @@ def analyze(
         settings=asdict(settings),
         crack=crack,
         reference=reference_analysis,
+        level_changes=compared,
     )
+    return analysis, (signals, envelopes)
 
 
 def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from math import isfinite, log10
 from pathlib import Path
 
-from gearsig.diagnosis._types import Analysis, Finding, Kind, Where
+from gearsig.diagnosis._types import MIN_CHANGE_DB, Analysis, Finding, Kind, LevelChange, Where
 from gearsig.errors import InputError
+from gearsig.formatting import signed
 from gearsig.indicators import Indicator
 from gearsig.rig import Rig
 
@@ -80,10 +81,41 @@ def changes(analysis: Analysis) -> tuple[IndicatorChange | None, ...]:
     return tuple(_change(now, then.get(_key(now))) for now in analysis.indicators)
 
 
-def beside_reference(findings: Iterable[Finding], reference: Analysis) -> list[Finding]:
-    """Return the findings, each fault or suspicion with a sentence on what the reference shows of it."""
-    claims = (Kind.FAULT, Kind.SUSPICION)
-    return [replace(f, evidence=(*f.evidence, _then(f, reference))) if f.kind in claims else f for f in findings]
+def beside_reference(
+    findings: Iterable[Finding],
+    reference: Analysis,
+    measured: Callable[[Finding], LevelChange | None] = lambda _: None,
+) -> list[Finding]:
+    """Return the findings, each fault or suspicion with a sentence on what the reference shows of it.
+
+    A suspicion that the healthy machine gives as much reason for is a notice.
+
+    Parameters
+    ----------
+    findings : iterable of Finding
+    reference : Analysis
+    measured : callable
+        Finding → the level of its family of lines here and in the reference, in the same band; None: not measured.
+    """
+    return [_beside(f, reference, measured(f)) if f.kind in (Kind.FAULT, Kind.SUSPICION) else f for f in findings]
+
+
+def _beside(finding: Finding, reference: Analysis, measured: LevelChange | None) -> Finding:
+    earlier = in_reference(finding, reference)
+    text = _then(finding, reference)
+    if measured is not None:
+        is_new = measured.is_change and measured.change_db > 0
+        if earlier is None and not is_new:
+            text = (
+                f"The reference has as much there, within its own scatter ({signed(measured.change_db)} dB since then)."
+            )
+        elif earlier is not None and not earlier.is_comparable:
+            text = f"The reference shows it as well; since then it has changed by {signed(measured.change_db)} dB."
+    else:
+        change_db = earlier.change_db if earlier is not None and earlier.is_comparable else None
+        is_new = earlier is None or change_db is None or change_db >= MIN_CHANGE_DB
+    kind = Kind.NOTICE if finding.kind is Kind.SUSPICION and not is_new else finding.kind
+    return replace(finding, kind=kind, evidence=(*finding.evidence, text))
 
 
 def in_reference(finding: Finding, reference: Analysis) -> Earlier | None:

@@ -71,6 +71,8 @@ class AnalysisSignals:
         Channel → map along speed, where the speed varies.
     has_reference : bool
         Whether a recording of the healthy machine was given: then none is asked for.
+    over_angle : AngleSignal or None
+        The channels over the reference shaft's angle; None where `order_excess` is empty.
     """
 
     recording: Recording
@@ -82,6 +84,7 @@ class AnalysisSignals:
     shafts: tuple[ShaftSignals, ...]
     order_maps: Mapping[str, OrderMap]
     has_reference: bool = False
+    over_angle: AngleSignal | None = None
 
     @property
     def known_shaft_orders(self) -> dict[str, float]:
@@ -188,9 +191,10 @@ def compute_signals(
     spectra = {name: prepared.spectrum(name) for name in names}
     excess: dict[str, LineExcess] = {}
     shafts: tuple[ShaftSignals, ...] = ()
+    over_angle: AngleSignal | None = None
     if angle is not None and angle.n_revolutions >= settings.minimum_revolutions:
         try:
-            prepared.over_angle(channels=names)  # all channels at once
+            over_angle = prepared.over_angle(channels=names)  # all channels at once
             excess = {name: prepared.order_lines(name) for name in names}
             ratios = {shaft: prepared.rig.ratio(shaft) for shaft in prepared.rig.shaft_names} or {angle.shaft: 1.0}
             shafts = tuple(
@@ -199,9 +203,11 @@ def compute_signals(
                 if ratio is not None and angle.n_revolutions * ratio >= settings.minimum_revolutions
             )
         except RefusalError:  # too few samples per revolution or too short: the detectors say that nothing is known
-            excess, shafts = {}, ()
+            excess, shafts, over_angle = {}, (), None
     recording = prepared.recording.select(names)
-    signals = AnalysisSignals(recording, prepared.rig, angle, settings, spectra, excess, shafts, {}, has_reference)
+    signals = AnalysisSignals(
+        recording, prepared.rig, angle, settings, spectra, excess, shafts, {}, has_reference, over_angle
+    )
     if not (excess and signals.speed_varies):
         return signals
     return replace(signals, order_maps={name: prepared.order_map(name) for name in names})
@@ -246,12 +252,15 @@ class BandEnvelope:
         Over order where the speed is known, else over frequency.
     mean : float
         Mean of the envelope: lines over it are modulation depths.
+    over_angle : AngleSignal or None
+        The envelopes of this band, all channels; None where the speed is not known.
     """
 
     channel: str
     band_hz: tuple[float, float]
     excess: LineExcess
     mean: float
+    over_angle: AngleSignal | None = None
 
 
 def band_envelopes(signals: AnalysisSignals) -> Iterator[BandEnvelope]:
@@ -286,7 +295,7 @@ def envelopes_in(signals: AnalysisSignals, recording: Recording, band: tuple[flo
             return  # the band is narrower than the modulations sought
     for name in envelopes.channel_names:
         spectrum = amplitude_spectrum(envelopes, name) if over_angle is None else order_spectrum(over_angle, name)
-        yield BandEnvelope(name, band, floor_of(spectrum), float(envelopes.values(name).mean()))
+        yield BandEnvelope(name, band, floor_of(spectrum), float(envelopes.values(name).mean()), over_angle)
 
 
 @dataclass(frozen=True)

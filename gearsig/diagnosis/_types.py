@@ -41,6 +41,13 @@ class Outcome(Enum):
 EXAMINED = ("no-tooth-local-damage", "no-crack-seen", "no-bearing-damage")
 """Codes of findings that say that something was examined that would have shown a fault."""
 
+MIN_CHANGE_DB = 6.0
+"""Twice the reference's level: two recordings of one machine in one state differ by less (R. B. Randall,
+*Vibration-based Condition Monitoring*, 2nd ed., 2021, ch. 5: 6 to 8 dB are significant, 20 dB serious)."""
+
+CHANGED, UNCHANGED = "changed-since-reference", "unchanged-since-reference"
+"""Codes of the findings that levels have changed since the reference, or not."""
+
 HINDERING = ("channel-clipped", "channel-stuck", "channel-dead")
 """Codes of data problems behind which a fault may hide."""
 
@@ -213,6 +220,52 @@ class ChannelAnalysis:
 
 
 @dataclass(frozen=True)
+class LevelChange:
+    """One level, in this recording and in the reference.
+
+    Parameters
+    ----------
+    label : str
+        E.g. "1× rotor", "2× mesh stage 1", "outer race of front", "noise 300 to 700 Hz".
+    kind : str
+        "overall", "shaft", "subharmonic", "mesh", "sidebands", "bearing" or "noise".
+    where : Where
+    harmonic : float
+        Of the shaft or of the mesh; 0 for the rest.
+    unit : str
+    level_db, reference_db : float
+        Mean over segments of each record, in dB re one unit (rms).
+    repeatability_db : float
+        By how much the halves of the less steady record differ.
+    p_value : float
+        Of so large a change between two records of the same state, by what their segments scatter, after all levels
+        that were compared.
+    is_change : bool
+        Whether it has changed by 6 dB or more, with so small a p-value as the settings ask for, and the louder record
+        shows it above what lies beside it.
+    stands_out : bool
+        The last of these.
+    """
+
+    label: str
+    kind: str
+    where: Where
+    harmonic: float
+    unit: str
+    level_db: float
+    reference_db: float
+    repeatability_db: float
+    p_value: float
+    is_change: bool
+    stands_out: bool
+
+    @property
+    def change_db(self) -> float:
+        """Level now less that of the reference."""
+        return self.level_db - self.reference_db
+
+
+@dataclass(frozen=True)
 class Analysis:
     """Everything `analyze` found out about one recording.
 
@@ -237,6 +290,8 @@ class Analysis:
         Of the recording of the healthy machine that was given to compare with.
     motion : StartStop or None
         Of a machine that starts and stops, where its teeth could be examined.
+    level_changes : tuple of LevelChange
+        Against the reference; empty without one, or where speeds are not known.
     """
 
     recording: Recording
@@ -250,6 +305,7 @@ class Analysis:
     crack: CrackEstimate | NoCrackSeen | CannotTell | None = None
     reference: Analysis | None = None
     motion: StartStop | None = None
+    level_changes: tuple[LevelChange, ...] = ()
 
     @property
     def outcome(self) -> Outcome:

@@ -4,30 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from gearsig.diagnosis._types import EXAMINED, HINDERING, Finding, Kind, Outcome, Where, outcome_of
+from gearsig.diagnosis._types import CHANGED, EXAMINED, HINDERING, UNCHANGED, Finding, Kind, Outcome, Where, outcome_of
 from gearsig.recording import Recording
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
 """Code of the finding that a given reference did not tell the depth of a crack."""
 
 WITHOUT_REFERENCE = "Damage of many teeth would only show against an earlier recording."
-WITH_REFERENCE = "Damage of many teeth would only show in how the indicators have changed since the reference."
 
 _RANK = {kind: i for i, kind in enumerate(Kind)}
 
 
 def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings, most important first: by kind, then by confidence, then by strength."""
+    """Return the findings, most important first: what has changed, then by kind, by confidence, by strength."""
 
-    def key(finding: Finding) -> tuple[int, float, float]:
+    def key(finding: Finding) -> tuple[bool, int, float, float]:
         ratio = finding.strength.ratio_db if finding.strength is not None else None
-        return (_RANK[finding.kind], -finding.confidence, -(ratio or 0.0))
+        return (finding.code != CHANGED, _RANK[finding.kind], -finding.confidence, -(ratio or 0.0))
 
     return tuple(sorted(findings, key=key))
 
 
 def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) -> str:
-    """Return the sentence a hurried reader takes away; why a given reference did not help is always part of it."""
+    """Return the sentences a hurried reader takes away: what has changed, then what it comes to.
+
+    Why a given reference did not help is always part of it.
+    """
+    changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
+    others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED))
+    claims = [f for f in others if f.kind in (Kind.FAULT, Kind.SUSPICION)]
+    # A change that no pattern explains is a suspicion by itself, and said already.
+    if not claims and outcome_of(findings) is Outcome.SUSPICION:
+        return changed
+    return " ".join(filter(None, (changed, _said(others, has_reference=has_reference), unchanged)))
+
+
+def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     outcome = outcome_of(findings)
     unused = [f for f in findings if f.code == DEPTH_UNKNOWN]
     if outcome in (Outcome.FAULT, Outcome.SUSPICION):
@@ -40,7 +52,7 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
         return " ".join([f"{kind.value.capitalize()}: {claim}", *(f.title for f in unused)])
     said = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.NO_FAULT:
-        return " ".join(["No fault shows.", *said, WITH_REFERENCE if has_reference else WITHOUT_REFERENCE])
+        return " ".join(["No fault shows.", *said, *([] if has_reference else [WITHOUT_REFERENCE])])
     others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
     gaps = [*unused, *others]
     why = " ".join(f.title for f in gaps[:2]) or "Nothing was examined that would show a fault."

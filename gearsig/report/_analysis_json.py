@@ -24,6 +24,9 @@ not defined is null. Members may be added within a version, never renamed or rem
   ``text``, ``shaft``, ``gear``, ``tooth``, ``angle_deg``, ``depth_mm``, ``interval_mm`` and the like; with
   ``below_mm``; or with ``reason`` and ``remedy``
 - ``reference``: null, or ``source``, ``sha256``, ``outcome``, ``verdict`` of the recording that was compared with
+- ``level_changes``: against it, levels of lines, sidebands, bearing parts and noise by channel: ``label``, ``kind``,
+  ``where``, ``harmonic``, ``unit``, ``level_db`` and ``reference_db`` (rms, dB re one unit), ``change_db``,
+  ``repeatability_db`` (half against half), ``p_value``, ``is_change``, ``stands_out``; empty without a reference
 """
 
 from __future__ import annotations
@@ -73,6 +76,7 @@ def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
         "settings": plain(analysis.settings, arrays=False),
         "crack": _crack(analysis.crack),
         "reference": _reference(analysis.reference),
+        "level_changes": [plain(c, arrays=False) | {"change_db": rounded(c.change_db)} for c in analysis.level_changes],
     }
 
 

@@ -1,0 +1,635 @@
+"""What changed since the reference, in dB against what either record's own segments differ by, and what it may mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import hypot, inf, sqrt
+
+import numpy as np
+
+from gearsig.angle import AngleSignal
+from gearsig.checks import FloatArray
+from gearsig.diagnosis._bearing import CLEAR_MODULATION
+from gearsig.diagnosis._bearing_families import expected_parts, part_text, slip_of, speed_is_only_stated
+from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
+from gearsig.diagnosis._types import (
+    CHANGED,
+    MIN_CHANGE_DB,
+    UNCHANGED,
+    WITH_ASSUMED_DATA,
+    Finding,
+    Kind,
+    LevelChange,
+    Strength,
+    Where,
+    cannot_tell,
+)
+from gearsig.errors import RefusalError
+from gearsig.formatting import signed
+from gearsig.orders import order_map
+from gearsig.prepared import envelope_bands
+from gearsig.rig import order_lines
+
+N_SEGMENTS = 12
+"""Of the shorter record: enough to know the scatter of a level to a fifth, and long enough to tell sidebands apart."""
+
+MIN_SEGMENT_REV = 8
+STATED_SPEED = 0.01
+"""Relative error of a speed that is stated and that nothing confirms."""
+
+STANDS_OUT = 4.0
+"""Power of a line, averaged over the segments, over the lines' lower quartile around: noise does not reach it."""
+
+NOISE_QUANTILE = 0.25
+"""Of lines: three in four of them may be tones, as between the harmonics of a loose shaft."""
+
+N_HARMONICS, N_MESH_HARMONICS, N_SIDEBANDS = 10, 8, 3
+SUBHARMONICS = (1 / 2, 3 / 2, 5 / 2, 7 / 2, 1 / 3, 2 / 3)
+OTHER_SPEED = 0.03
+"""Relative difference of speed from which levels differ for that alone: forces grow with its square, and resonances
+meet other orders."""
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Mean squares of one quantity in each segment of one record, and whether it stands out of what is beside it."""
+
+    power: FloatArray
+    stands_out: bool = True
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    label: str
+    kind: str
+    where: Where
+    harmonic: float
+    unit: str
+    now: _Levels
+    then: _Levels
+
+
+def level_changes(
+    signals: AnalysisSignals,
+    envelopes: Sequence[BandEnvelope],
+    reference: AnalysisSignals,
+    reference_envelopes: Sequence[BandEnvelope],
+) -> tuple[LevelChange, ...]:
+    """Compare the levels of lines, sidebands, bearing parts and noise with those of the reference.
+
+    Either record is cut into segments of equally many revolutions. A level is the mean over them, in dB; its standard
+    error comes from their scatter, and from that of means of 2, 4, … neighbours where it is larger, as what wanders
+    slowly does not average out. The change is tested by Welch's t.
+
+    Parameters
+    ----------
+    signals, envelopes
+        Of the recording.
+    reference, reference_envelopes
+        Of the healthy machine, same channels.
+
+    Returns
+    -------
+    tuple of LevelChange
+        Empty where a speed is not known or a record is shorter than 16 revolutions.
+
+    References
+    ----------
+    B. L. Welch, "The generalization of 'Student's' problem when several different population variances are involved",
+    1947. C. Alexopoulos, A. F. Seila, "Output data analysis", in *Handbook of Simulation*, 1998 (batch means).
+    """
+    try:
+        block_rev = _segment_rev(signals, reference)
+        quantities = [
+            *_lines_and_noise(signals, reference, block_rev),
+            *_bearing_parts(signals, envelopes, reference_envelopes, block_rev),
+        ]
+    except RefusalError:
+        return ()
+    probability = signals.settings.false_alarm_probability
+    return tuple(_compared(q, len(quantities), probability) for q in quantities)
+
+
+def family_change(
+    finding: Finding,
+    signals: AnalysisSignals,
+    envelopes: Sequence[BandEnvelope],
+    reference: AnalysisSignals,
+    reference_envelopes: Sequence[BandEnvelope],
+) -> LevelChange | None:
+    """Return the level of a finding's family of lines beside that in the reference, same channel, band and order.
+
+    Of the bands whose envelopes both have, the one that has most in common with the finding's; None where there is
+    none, or the finding is no family of an envelope.
+    """
+    order, band = finding.where.order, finding.where.band_hz
+    if order is None or band is None:
+        return None
+    pairs = [(a, b) for a in envelopes for b in reference_envelopes if (a.channel, a.band_hz) == (b.channel, b.band_hz)]
+    pairs = [(a, b) for a, b in pairs if a.channel in finding.where.channels and _in_common(a.band_hz, band) > 0]
+    if not pairs:
+        return None
+    try:
+        block_rev = _segment_rev(signals, reference)
+    except RefusalError:
+        return None
+    best = max(pairs, key=lambda pair: _in_common(pair[0].band_hz, band))
+    now, then = (_family(envelope, order, SAME_FAMILY, block_rev) for envelope in best)
+    if now is None or then is None:
+        return None
+    quantity = _Quantity(finding.code, "bearing", finding.where, 0.0, "", now, then)
+    return _compared(quantity, 1, signals.settings.false_alarm_probability)
+
+
+SAME_FAMILY = 5e-3
+"""Relative range in which a family is sought that another record shows: a bearing's slip differs from day to day."""
+
+
+def _in_common(a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Return the part that two bands share of what they cover together."""
+    return float(max(min(a[1], b[1]) - max(a[0], b[0]), 0.0) / (max(a[1], b[1]) - min(a[0], b[0])))
+
+
+def _segment_rev(signals: AnalysisSignals, reference: AnalysisSignals) -> int:
+    """Return the revolutions of a segment, alike in both records.
+
+    Raises
+    ------
+    RefusalError
+        If a record has no speed, or not two segments.
+    """
+    lengths = [s.over_angle.n_revolutions if s.over_angle is not None else 0.0 for s in (signals, reference)]
+    revolutions = int(min(lengths)) - 1  # the first may be incomplete
+    if revolutions < 2 * MIN_SEGMENT_REV:
+        raise RefusalError(f"{revolutions} whole revolutions are too few to compare", remedy="record longer")
+    return max(revolutions // N_SEGMENTS, MIN_SEGMENT_REV)
+
+
+# --------------------
+# Levels by segment.
+# --------------------
+
+
+@dataclass(frozen=True)
+class _Segments:
+    """Power spectra over order of consecutive segments, (n_segments, n_lines)."""
+
+    power: FloatArray
+    resolution: float
+
+    @classmethod
+    def of(cls, signal: AngleSignal, channel: str, block_rev: int) -> _Segments:
+        """Return those of a channel, without overlap: then the segments' noise is independent."""
+        found = order_map(signal, channel, revolutions_per_block=block_rev, overlap=0.0, scaling="power")
+        return cls(found.values, found.resolution)
+
+    @property
+    def highest_order(self) -> float:
+        """Of the lines."""
+        return float((self.power.shape[1] - 4) * self.resolution)
+
+    def line(self, order: float, slip: float = 0.0) -> _Levels:
+        """Return the largest line at an order, within `slip` (relative) or a line to either side."""
+        reach = max(1, round(slip * order / self.resolution))
+        low, high = max(round(order / self.resolution) - reach, 1), round(order / self.resolution) + reach + 1
+        mean = self.power.mean(axis=0)
+        top = low + int(np.argmax(mean[low:high]))
+        floor = np.quantile(mean[max(low - 32, 1) : high + 32], NOISE_QUANTILE)
+        is_peak = mean[top] >= mean[max(top - 2, 1) : top + 3].max()  # and no foot of a line beyond
+        return _Levels(self.power[:, low:high].max(axis=1), bool(is_peak and mean[top] >= STANDS_OUT * floor))
+
+    def band(self, low: float, high: float) -> _Levels:
+        """Return the lower quartile of a band's lines, which tones do not reach."""
+        a, b = (int(edge / self.resolution) for edge in (low, high))
+        return _Levels(np.quantile(self.power[:, max(a, 1) : b + 1], NOISE_QUANTILE, axis=1))
+
+
+def _sum(levels: Sequence[_Levels]) -> _Levels:
+    """Add mean squares; they stand out if half of them do."""
+    power = np.sum([one.power for one in levels], axis=0)
+    return _Levels(power, 2 * sum(one.stands_out for one in levels) >= len(levels))
+
+
+def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block_rev: int) -> Iterator[_Quantity]:
+    for channel in signals.recording.channels:
+        name, unit = channel.name, channel.unit
+        assert signals.over_angle is not None  # noqa: S101 - `_segment_rev` has refused; narrows the type
+        assert reference.over_angle is not None  # noqa: S101
+        if name not in reference.over_angle.channel_names:
+            continue  # dead in the reference
+        now = _Segments.of(signals.over_angle, name, block_rev)
+        then = _Segments.of(reference.over_angle, name, block_rev)
+        highest = min(now.highest_order, then.highest_order)
+        slip = STATED_SPEED if speed_is_only_stated(signals) or speed_is_only_stated(reference) else 0.0
+        taken: list[float] = []
+        for label, kind, harmonic, where, orders in _families(signals, name, now.resolution):
+            free = [o for o in orders if o <= highest and all(abs(o - t) > 3 * now.resolution for t in taken)]
+            if free:
+                taken += free
+                levels = (_sum([side.line(o, slip) for o in free]) for side in (now, then))
+                yield _Quantity(label, kind, where, harmonic, unit, *levels)
+        n_fine = 6  # the narrowest of the bands that envelopes are taken of
+        for low, high in envelope_bands(signals.recording.sampling_rate_hz)[-n_fine:]:
+            hertz = signals.frequency_per_order_hz, reference.frequency_per_order_hz
+            if high / min(hertz) > highest:
+                continue
+            label, where = f"noise {low:.3g} to {high:.3g} Hz", Where((name,), band_hz=(low, high))
+            levels = (s.band(low / f, high / f) for s, f in zip((now, then), hertz, strict=True))
+            yield _Quantity(label, "noise", where, 0.0, unit, *levels)
+
+
+Family = tuple[str, str, float, Where, list[float]]
+
+
+def _families(signals: AnalysisSignals, channel: str, resolution: float) -> Iterator[Family]:
+    """Yield label, kind, harmonic, place and orders of the lines that teeth and shafts give; the most certain first."""
+    rig, closest = signals.rig, 4 * resolution  # nearer lines run into each other: the Hann window's main lobe
+    reference = rig.reference_shaft
+    lines = order_lines(rig, reference, n_mesh_harmonics=N_MESH_HARMONICS, n_shaft_harmonics=0, n_sidebands=N_SIDEBANDS)
+    for line in lines:
+        if line.kind == "mesh":
+            where = signals.where(line.order, channel, gear=line.element)
+            yield line.label, "mesh", line.harmonic, where, [line.order]
+    for shaft, order in signals.known_shaft_orders.items():
+        for k in range(1, N_HARMONICS + 1 if not rig.pairs else 5):
+            if order >= closest:
+                where = signals.where(k * order, channel, shaft=shaft)
+                yield f"{k}× {shaft}".strip(), "shaft", k, where, [k * order]
+    for pair in rig.pairs:
+        for shaft in (pair.driver, pair.driven):
+            own = [x.order for x in lines if (x.kind, x.element, x.modulating_shaft) == ("sideband", pair.name, shaft)]
+            ratio = rig.ratio(shaft)
+            if own and ratio is not None and ratio >= closest:
+                where = replace(signals.where(ratio, channel, gear=f"{pair.name}/{shaft}"), frequency_hz=None)
+                yield f"sidebands of {pair.name} by {shaft}", "sidebands", 0.0, where, [o for o in own if o > 0]
+    fastest = max(signals.known_shaft_orders.items(), key=lambda item: item[1])
+    for part in SUBHARMONICS if not rig.pairs else ():  # between the shafts of a gear train all ratios are taken
+        where = signals.where(part * fastest[1], channel, shaft=fastest[0])
+        yield f"{part:.3g}× {fastest[0]}".strip(), "subharmonic", part, where, [part * fastest[1]]
+
+
+def _bearing_parts(
+    signals: AnalysisSignals,
+    envelopes: Sequence[BandEnvelope],
+    reference_envelopes: Sequence[BandEnvelope],
+    block_rev: int,
+) -> Iterator[_Quantity]:
+    """Yield each known part's family of lines in the band of each channel's envelopes where either record has most."""
+    bands = {(e.channel, e.band_hz): e for e in reference_envelopes}
+    pairs = [(e, bands[e.channel, e.band_hz]) for e in envelopes if (e.channel, e.band_hz) in bands]
+    for bearing, name, order in expected_parts(signals):
+        for channel in dict.fromkeys(e.channel for e, _ in pairs):
+            place = signals.where(order, channel, shaft=bearing.shaft, bearing=bearing.name)
+            found = []
+            for envelope, other in pairs:
+                levels = [_family(e, order, slip_of(signals), block_rev) for e in (envelope, other)]
+                if envelope.channel == channel and levels[0] is not None and levels[1] is not None:
+                    where = replace(place, band_hz=envelope.band_hz)
+                    found.append(_Quantity(part_text(name, bearing.name), "bearing", where, 0.0, "", *levels))  # type: ignore[arg-type]
+            if found:
+                yield max(found, key=lambda q: max(float(q.now.power.mean()), float(q.then.power.mean())))
+
+
+def _family(envelope: BandEnvelope, order: float, slip: float, block_rev: int) -> _Levels | None:
+    """Return the sum of the first three multiples of an order in the envelope, as depths of modulation.
+
+    It stands out where its depth is one that a damage has: a louder carrier changes none of it.
+    """
+    if envelope.over_angle is None or envelope.mean <= 0:
+        return None
+    segments = _Segments.of(envelope.over_angle, envelope.channel, block_rev)
+    orders = [k * order for k in (1, 2, 3) if k * order * (1 + slip) <= segments.highest_order]
+    if not orders:
+        return None
+    lines = [segments.line(o, slip) for o in orders]
+    family, depth = _sum(lines), max(float(np.sqrt(2 * one.power.mean())) for one in lines) / envelope.mean
+    return _Levels(family.power / envelope.mean**2, family.stands_out and depth >= CLEAR_MODULATION)
+
+
+# --------------------
+# Whether they differ.
+# --------------------
+
+
+def _compared(quantity: _Quantity, n_compared: int, probability: float) -> LevelChange:
+    from scipy.stats import t as student
+
+    tiny = 1e-300
+    now, then = (10 * np.log10(np.maximum(x.power, tiny)) for x in (quantity.now, quantity.then))
+    change = float(now.mean() - then.mean())
+    errors = [_standard_error(x) for x in (now, then)]
+    error = hypot(*errors)
+    freedom = error**4 / sum(e**4 / (len(x) - 1) for e, x in zip(errors, (now, then), strict=True)) if error else inf
+    p_value = 2 * float(student.sf(abs(change) / error, freedom)) if error else float(change == 0.0)
+    p_value = min(1.0, p_value * n_compared)
+    louder = quantity.now if change > 0 else quantity.then
+    is_change = abs(change) >= MIN_CHANGE_DB and p_value <= probability and louder.stands_out
+    return LevelChange(
+        quantity.label,
+        quantity.kind,
+        quantity.where,
+        quantity.harmonic,
+        quantity.unit,
+        float(now.mean()),
+        float(then.mean()),
+        max(_between_halves(x) for x in (now, then)),
+        p_value,
+        is_change,
+        louder.stands_out,
+    )
+
+
+def _standard_error(levels: FloatArray) -> float:
+    """Return the standard error of the mean of a series whose neighbours may go together: largest of batch means'."""
+    errors, batch = [], 1
+    while len(levels) // batch >= 2:
+        n = len(levels) // batch
+        means = levels[: n * batch].reshape(n, batch).mean(axis=1)
+        errors.append(float(means.std(ddof=1)) / sqrt(n))
+        batch *= 2
+    return max(errors)
+
+
+def _between_halves(levels: FloatArray) -> float:
+    half = len(levels) // 2
+    return abs(float(levels[:half].mean() - levels[half:].mean()))
+
+
+# --------------------
+# What is said of it.
+# --------------------
+
+
+def change_findings(
+    changes: Sequence[LevelChange], signals: AnalysisSignals, reference: AnalysisSignals, named: Sequence[Finding]
+) -> list[Finding]:
+    """Return what changed since the reference as the first finding, and what it may mean.
+
+    Parameters
+    ----------
+    changes : sequence of LevelChange
+    signals, reference : AnalysisSignals
+    named : sequence of Finding
+        What the recording shows by itself: a bearing's part that is named there is not named again.
+    """
+    if not changes:
+        title = "What has changed since the reference cannot be told by order: "
+        title += "the speed of one is not known, or it is too short."
+        surer = "Two recordings with known speed, of 16 revolutions or more."
+        return [cannot_tell("change-not-examined", title, surer=surer)]
+    findings, rest = _gains(changes)
+    changed = [c for c in rest if c.is_change and (c.change_db > 0 or c.kind != "bearing")]  # none heals
+    if not changed:
+        return [*findings, _unchanged(rest)] if rest else findings
+    off = signals.frequency_per_order_hz / reference.frequency_per_order_hz - 1.0
+    risen = _largest([c for c in changed if c.change_db > 0 and _matters(c, rest)])
+    headline = _changed(_largest(changed), off)
+    if abs(off) > OTHER_SPEED or signals.speed_varies or reference.speed_varies:
+        return [*findings, replace(headline, kind=Kind.NOTICE)]
+    meanings = _meanings(risen, rest, signals, named)
+    if not meanings and risen:
+        more = "It has no pattern of a known fault: load, temperature or a sensor moved would do it as well."
+        headline = replace(headline, evidence=(*headline.evidence, more))
+    return [*findings, headline if risen else replace(headline, kind=Kind.NOTICE), *meanings]
+
+
+DEEPEST_DB = 40.0
+"""Below a channel's strongest line in the reference, a line that has risen is no reason to worry yet."""
+
+
+def _matters(change: LevelChange, changes: Sequence[LevelChange]) -> bool:
+    if change.kind in ("bearing", "noise"):
+        return True
+    strongest_db = max(c.reference_db for c in changes if c.where.channels == change.where.channels)
+    return change.level_db >= strongest_db - DEEPEST_DB
+
+
+def _largest(changes: Sequence[LevelChange]) -> list[LevelChange]:
+    """Return each label once, from the channel and band where it has changed most, in the order compared."""
+    best: dict[str, LevelChange] = {}
+    for change in changes:
+        if change.label not in best or abs(change.change_db) > abs(best[change.label].change_db):
+            best[change.label] = change
+    return list(best.values())
+
+
+SAME_GAIN_DB = 2.0
+"""Levels of a channel that change alike within so much, noise and all, are read with another gain."""
+
+
+def _gains(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelChange]]:
+    """Tell channels whose levels have all changed alike, noise included, and return the changes of the others."""
+    findings, rest = [], []
+    for channel in dict.fromkeys(c.where.channels[0] for c in changes):
+        own = [c for c in changes if c.where.channels[0] == channel]
+        told = [c for c in own if c.stands_out and c.kind != "bearing"]
+        shifts = np.array([c.change_db for c in told])
+        gain = float(np.median(shifts))
+        spread = float(np.percentile(np.abs(shifts - gain), 90))
+        if len(told) < 4 or abs(gain) < MIN_CHANGE_DB / 2 or spread > SAME_GAIN_DB:
+            rest += own
+            continue
+        findings.append(
+            Finding(
+                "levels-scaled",
+                Kind.DATA_PROBLEM,
+                f"Every level of channel {channel} is {signed(gain)} dB against the reference alike, noise included: "
+                "another gain, unit or sensor rather than another machine.",
+                Where((channel,)),
+                confidence=0.9,
+                confidence_basis=f"{len(told)} levels within {spread:.2g} dB of each other",
+                surer="Check sensor, range and unit of both recordings.",
+            )
+        )
+    return findings, rest
+
+
+def _unchanged(changes: Sequence[LevelChange]) -> Finding:
+    shown = [c for c in changes if c.stands_out]
+    largest = max(shown, key=lambda c: abs(c.change_db), default=None)
+    evidence = (f"The largest change is {signed(largest.change_db)} dB: {largest.label}.",) if largest else ()
+    return Finding(
+        UNCHANGED,
+        Kind.INFORMATION,
+        f"Nothing has changed since the reference: no level by {MIN_CHANGE_DB:.0f} dB and beyond its scatter.",
+        confidence=0.9,
+        confidence_basis=f"{len(changes)} levels: shafts, meshes, sidebands, bearings, noise; segment against segment",
+        evidence=evidence,
+    )
+
+
+def _changed(changes: Sequence[LevelChange], off: float) -> Finding:
+    risen, fallen = ([c for c in changes if sign * c.change_db > 0] for sign in (1, -1))
+    texts = [", ".join(f"{c.label} {signed(c.change_db)} dB" for c in (risen or fallen)[:4])]
+    rest = len(risen or fallen) - 4
+    texts += [f"{rest} more up" if risen else f"{rest} more down"] if rest > 0 else []
+    texts += [f"{len(fallen)} level{'s' if len(fallen) > 1 else ''} down"] if risen and fallen else []
+    repeats = max(c.repeatability_db for c in (risen or fallen)[:4])
+    first = max(changes, key=lambda c: abs(c.change_db))
+    value, floor = (10 ** (level / 20) for level in (first.level_db, first.reference_db))
+    evidence = [
+        f"{c.label} in {c.where.channels[0]}: {signed(c.change_db)} dB; the halves of a recording differ by "
+        f"{c.repeatability_db:.1f} dB."
+        for c in changes[:12]
+    ]
+    if abs(off) > OTHER_SPEED:
+        evidence.insert(
+            0,
+            f"The speed differs by {100 * off:+.0f} %: an unbalance alone would change 1× by "
+            f"{signed(40 * np.log10(1 + off))} dB, and resonances meet other orders.",
+        )
+    return Finding(
+        CHANGED,
+        Kind.SUSPICION,
+        f"Changed since the reference: {', '.join(texts)}; halves of either recording agree within {repeats:.1f} dB.",
+        first.where,
+        Strength(value, first.unit, floor, f"{first.label}, rms", first.change_db, against="the reference's"),
+        confidence=0.99,
+        confidence_basis="that it has changed: by Welch's t over segments, after all levels compared",
+        evidence=tuple(evidence),
+        surer="The same comparison at the same speed and load on another day.",
+    )
+
+
+# What textbooks say of it: ISO 13373-3:2015, "Condition monitoring and diagnostics of machines – Vibration condition
+# monitoring – Part 3: Guidelines for vibration diagnosis"; R. B. Randall, 2021, ch. 2.
+
+_FIT = "how well the textbook's signs fit, one sensor's levels alone; not calibrated"
+OTHER_CAUSES = 0.3
+"""Weight of all that no textbook's pattern covers, beside those it does."""
+
+
+def _meanings(
+    risen: Sequence[LevelChange], changes: Sequence[LevelChange], signals: AnalysisSignals, named: Sequence[Finding]
+) -> list[Finding]:
+    """Return what the changes may mean, likeliest first."""
+    findings: list[Finding] = []
+    for shaft in signals.known_shaft_orders:
+        findings += _of_shaft(shaft, risen, changes, signals)
+    for pair in signals.rig.pairs:
+        findings += _of_pair(pair.name, risen)
+    claimed = {f.where.bearing for f in named if f.kind in (Kind.FAULT, Kind.SUSPICION)}
+    parts = [c for c in risen if c.kind == "bearing" and c.where.bearing not in claimed]
+    if parts:
+        findings.append(_of_bearing(max(parts, key=lambda c: c.change_db)))
+    if risen and all(c.kind == "noise" for c in risen):
+        findings.append(_of_noise(risen))
+    if signals.rig.assumed:
+        findings = [replace(f, confidence=f.confidence * WITH_ASSUMED_DATA) for f in findings]
+    return findings
+
+
+SHAFT_CAUSES: Mapping[str, tuple[str, str]] = {
+    "unbalance": (
+        "Perhaps unbalance",
+        "1× largest in radial direction, 90° apart between horizontal and vertical, growing with the speed's square.",
+    ),
+    "bent-shaft": (
+        "Perhaps a bent shaft",
+        "1× large in axial direction, 180° apart between the shaft's ends; run-out when it is turned by hand.",
+    ),
+    "misalignment": (
+        "Perhaps misalignment",
+        "2× large in axial direction, 180° apart across the coupling; a change with temperature or after aligning.",
+    ),
+    "looseness": (
+        "Perhaps looseness",
+        "A wandering phase; levels that differ between foot and foundation, or change when bolts are tightened.",
+    ),
+    "rub": (
+        "Perhaps a rub",
+        "Halves and thirds of the shaft's order come and go with speed and temperature; marks at seals.",
+    ),
+}
+
+
+def _of_shaft(
+    shaft: str, risen: Sequence[LevelChange], changes: Sequence[LevelChange], signals: AnalysisSignals
+) -> Iterator[Finding]:
+    """Yield what a shaft's own orders mean by their share of what has been added.
+
+    Unbalance adds 1× alone; misalignment 2×, of half of 1× or more; a bent shaft both; looseness many harmonics and
+    halves; a rub halves, thirds and noise.
+    """
+    own = [c for c in risen if c.where.shaft == shaft and c.kind in ("shaft", "subharmonic")]
+    added = {c.harmonic: _velocity(c, signals, since=True) for c in own}
+    total = sum(added.values())
+    if total <= 0:
+        return
+    first, second = added.get(1.0, 0.0) / total, added.get(2.0, 0.0) / total
+    now = {
+        c.harmonic: _velocity(c, signals)
+        for c in changes
+        if c.where.shaft == shaft and c.kind == "shaft" and c.where.channels == own[0].where.channels
+    }
+    doubled = sqrt(now.get(2.0, 0.0) / max(now.get(1.0, 0.0), 1e-300))
+    many = sum(k >= 3 for k in added) / N_HARMONICS
+    fractions = sum(c.kind == "subharmonic" for c in own)
+    noise = any(c.kind == "noise" for c in risen)
+    loose = min(1.0, many + 0.25 * fractions)  # with many harmonics, the first two say nothing by themselves
+    weights = {
+        "unbalance": first**2 * (1.0 - loose),
+        "bent-shaft": 0.3 * first * (1.0 + (second > 0)) * (1.0 - loose),
+        "misalignment": min(1.0, second / 0.2) * min(1.0, doubled / 0.5) * (1.0 - loose),
+        "looseness": loose,
+        "rub": min(1.0, 0.2 * fractions * (1 + noise)),
+    }
+    whole = sum(weights.values()) + OTHER_CAUSES
+    for cause, weight in sorted(weights.items(), key=lambda item: -item[1]):
+        share = weight / whole
+        if share >= 0.1:
+            title, confirm = SHAFT_CAUSES[cause]
+            place = max(own, key=lambda c: added[c.harmonic]).where
+            likely = Kind.SUSPICION if share >= 0.3 else Kind.NOTICE
+            name = f" of {place.shaft}" if place.shaft else ""
+            text = "Of what has been added in velocity, " + ", ".join(
+                f"{100 * power / total:.0f} % is at {c.label}"
+                for c in own
+                if (power := added[c.harmonic]) >= 0.01 * total
+            )
+            yield Finding(cause, likely, f"{title}{name}.", place, None, share, _FIT, (f"{text}.",), confirm)
+
+
+def _velocity(change: LevelChange, signals: AnalysisSignals, *, since: bool = False) -> float:
+    """Return a line's mean square as of velocity, up to a factor; `since`: what was added to the reference's.
+
+    Acceleration weighs by 1/order², displacement by order².
+    """
+    power = 10 ** (change.level_db / 10) - since * 10 ** (change.reference_db / 10)
+    quantity = signals.recording.channels[signals.recording.index(change.where.channels[0])].quantity
+    derivatives = {"velocity": 0, "displacement": -1, "transmission_error": -1}.get(quantity, 1)
+    return float(power * change.harmonic ** (-2 * derivatives))
+
+
+def _of_pair(name: str, risen: Sequence[LevelChange]) -> Iterator[Finding]:
+    mesh = [c for c in risen if c.kind == "mesh" and c.where.gear == name]
+    sides = [c for c in risen if c.kind == "sidebands" and c.where.gear.startswith(f"{name}/")]
+    if mesh:
+        confirm = (
+            "The same load as in the reference; second and third harmonic rise more than the first with wear; wear "
+            "particles in the oil; contact pattern and backlash."
+        )
+        title = f"Perhaps wear, another load, or misaligned teeth at {name}."
+        yield Finding("mesh-risen", Kind.SUSPICION, title, mesh[0].where, None, 0.5, _FIT, _told(mesh), confirm)
+    for one in sides:
+        confirm = "The average of that shaft: one tooth or all around; run-out, keys and couplings; another load."
+        shaft = one.where.gear.partition("/")[2]
+        title = f"Perhaps an eccentric, loose or damaged gear on shaft {shaft}."
+        yield Finding("sidebands-risen", Kind.SUSPICION, title, one.where, None, 0.5, _FIT, _told([one]), confirm)
+
+
+def _of_bearing(change: LevelChange) -> Finding:
+    confirm = "The same part in another band or sensor; its level over days; grease, temperature, noise when turned."
+    title = f"Perhaps damage at the {change.label}."
+    return Finding("bearing-risen", Kind.SUSPICION, title, change.where, None, 0.5, _FIT, _told([change]), confirm)
+
+
+def _of_noise(risen: Sequence[LevelChange]) -> Finding:
+    confirm = "Lubricant and temperature; flow, suction and leaks; the sensor's mounting; a look for rubbing parts."
+    title = "Perhaps poor lubrication, a rub, turbulence or cavitation: noise has risen, and no line."
+    return Finding("noise-risen", Kind.SUSPICION, title, risen[0].where, None, 0.4, _FIT, _told(risen), confirm)
+
+
+def _told(changes: Sequence[LevelChange]) -> tuple[str, ...]:
+    return tuple(f"{c.label}: {signed(c.change_db)} dB." for c in changes)

@@ -1,0 +1,106 @@
+"""What changed since the reference comes first, against the scatter of either recording, and what it may mean."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.diagnosis import Analysis, Kind, LevelChange, Outcome, analyze
+from gearsig.recording import Channel, Recording
+from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft
+from tests.diagnosis.machines import codes, finding
+
+ROTOR = Rig(shafts=(Shaft("rotor"),), bearings=(Bearing("front", "rotor", 9, 7.94, 39.04),))
+HEALTHY = {1.0: 0.1, 2.0: 0.02, 3.0: 0.01}
+SAMPLING_RATE_HZ, SECONDS = 2048.0, 6.0
+
+
+def rotor(lines: Mapping[float, float], *, seed: int, speed_rpm: float = 1500.0, noise: float = 0.02) -> Recording:
+    """Return an acceleration with lines (order → amplitude) in white noise."""
+    rng = np.random.default_rng(seed)
+    turns = np.arange(int(SECONDS * SAMPLING_RATE_HZ)) / SAMPLING_RATE_HZ * speed_rpm / 60.0
+    x = noise * rng.standard_normal(len(turns))
+    for order, amplitude in lines.items():
+        x += amplitude * np.cos(2 * np.pi * (order * turns + rng.uniform()))
+    rig = replace(ROTOR, speed=ConstantSpeed(speed_rpm, "rotor"))
+    return Recording(x[None, :], SAMPLING_RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),), rig=rig)
+
+
+def beside_healthy(lines: Mapping[float, float], **options: float) -> Analysis:
+    return analyze(rotor(lines, seed=1, **options), reference=rotor(HEALTHY, seed=2))  # type: ignore[arg-type]
+
+
+def level(analysis: Analysis, label: str) -> LevelChange:
+    return next(c for c in analysis.level_changes if c.label == label)
+
+
+@pytest.mark.parametrize(
+    ("lines", "cause"),
+    [
+        (HEALTHY | {1.0: 0.5}, "unbalance"),
+        (HEALTHY | {2.0: 0.3}, "misalignment"),
+        (HEALTHY | {k / 2: 0.2 for k in range(1, 17)}, "looseness"),
+    ],
+)
+def test_what_changed_is_the_first_finding_and_its_likeliest_cause_the_second(
+    lines: Mapping[float, float], cause: str
+) -> None:
+    analysis = beside_healthy(lines)
+    assert codes(analysis, Kind.FAULT, Kind.SUSPICION)[:2] == ["changed-since-reference", cause]
+    assert analysis.verdict.startswith(analysis.findings[0].title)
+    assert finding(analysis, cause).surer
+    assert analysis.outcome is Outcome.SUSPICION
+
+
+def test_levels_change_by_the_ratio_of_amplitudes() -> None:
+    analysis = beside_healthy(HEALTHY | {1.0: 0.5})
+    once = level(analysis, "1× rotor")
+    assert once.change_db == pytest.approx(20 * np.log10(5), abs=0.2)
+    assert once.level_db == pytest.approx(20 * np.log10(0.5 / np.sqrt(2)), abs=0.2)
+    assert once.is_change
+    assert [c.label for c in analysis.level_changes if c.is_change] == ["1× rotor"]
+
+
+@pytest.mark.parametrize("seed", range(3, 8))
+def test_another_recording_of_the_same_state_changes_nothing(seed: int) -> None:
+    analysis = analyze(rotor(HEALTHY, seed=seed), reference=rotor(HEALTHY, seed=2))
+    assert not any(c.is_change for c in analysis.level_changes)
+    assert "unchanged-since-reference" in codes(analysis)
+    assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
+
+
+def test_a_level_that_wanders_within_either_recording_has_not_changed() -> None:
+    """1× is four times as large in the second third of one recording as in the rest: that is its scatter."""
+    record = rotor(HEALTHY, seed=1)
+    envelope = np.ones(record.n_samples)
+    envelope[record.n_samples // 3 : 2 * record.n_samples // 3] = 4.0
+    wandering = replace(record, samples=record.samples * envelope)
+    analysis = analyze(wandering, reference=rotor(HEALTHY, seed=2))
+    assert not level(analysis, "1× rotor").is_change
+    assert level(analysis, "1× rotor").repeatability_db > 0.0
+
+
+def test_another_gain_is_no_other_machine() -> None:
+    record = rotor(HEALTHY, seed=1)
+    analysis = analyze(replace(record, samples=5.0 * record.samples), reference=rotor(HEALTHY, seed=2))
+    assert finding(analysis, "levels-scaled").kind is Kind.DATA_PROBLEM
+    assert "changed-since-reference" not in codes(analysis)
+
+
+def test_at_another_speed_a_change_is_told_but_means_nothing_yet() -> None:
+    analysis = beside_healthy(HEALTHY | {1.0: 0.5}, speed_rpm=1800.0)
+    assert finding(analysis, "changed-since-reference").kind is Kind.NOTICE
+    assert "unbalance" not in codes(analysis)
+
+
+def test_a_smaller_level_is_told_and_no_suspicion() -> None:
+    analysis = beside_healthy(HEALTHY | {1.0: 0.01})
+    assert analysis.findings[0].code == "changed-since-reference"
+    assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
+
+
+def test_a_record_too_short_to_compare_says_so() -> None:
+    short = rotor(HEALTHY, seed=1)
+    short = replace(short, samples=short.samples[:, : int(0.5 * SAMPLING_RATE_HZ)])
+    assert "change-not-examined" in codes(analyze(short, reference=rotor(HEALTHY, seed=2)))
