@@ -145,19 +145,24 @@ def _print_effects(model: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from gearsig.gap import severity_unit
+    from gearsig.gap import DriveSimulator, load_population, severity_unit
     from sims.effects import is_own
     from sims.registry import gap_simulator
 
     table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
-    found = gap_simulator(model).gap_effects()
+    simulator = gap_simulator(model)
+    found = simulator.gap_effects()
+    # Starts and stops are compared by their equation of motion: nothing is learned, and nothing is unknown to it.
+    learned = found if isinstance(simulator, DriveSimulator) else load_population().causes
     last = ""
     for effect in found.values():
         where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)
         group = "" if effect.group == last else effect.group
         last = effect.group
-        own = "\n  (your own: tried by simulation, not known to the recognition)" if is_own(effect.name) else ""
-        table.add_row(group, f"{effect.name}\n  {effect.title}{own}", severity_unit(effect.unit) or "–", where)
+        notes = ["your own"] if is_own(effect.name) else []
+        notes += ["tried, not recognised"] if effect.name not in learned else []
+        note = f"\n  ({': '.join(notes)})" if notes else ""
+        table.add_row(group, f"{effect.name}\n  {effect.title}{note}", severity_unit(effect.unit) or "–", where)
     width = None if sys.stdout.isatty() else TABLE_WIDTH
     Console(markup=False, highlight=False, width=width).print(table)
     typer.echo(f"{len(found)} effects that have a meaning for the model {model}; also: none, unknown.")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.cli.main import main
@@ -299,6 +300,18 @@ def test_the_catalogue_is_listed(capsys) -> None:
     assert "envelope orders" in out
     assert "µm" in out
     assert max(map(len, out.splitlines())) <= 110
+    assert "not recognised" not in out
+
+
+def test_an_effect_that_was_not_learned_is_listed_as_such(capsys, monkeypatch) -> None:
+    from gearsig.gap import load_population
+
+    learned = load_population()
+    monkeypatch.setattr("gearsig.gap.load_population", lambda: replace(learned, causes=np.array(["none", "tooth_wear"])))
+    _, out, _ = run(capsys, "--list-effects")
+    assert out.count("not recognised") == 18
+    _, out, _ = run(capsys, "--list-effects", "--model", "forging")
+    assert "not recognised" not in out
 
 
 def test_a_file_that_is_not_there_is_told_before_its_rig(capsys, tmp_path) -> None:
