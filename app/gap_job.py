@@ -67,11 +67,7 @@ def run_gap(
     return diagnose_gap(
         inputs.recordings,
         simulator,
-        rigs=inputs.rigs,
         references=inputs.references,
-        reference_rigs=inputs.reference_rigs,
-        names=inputs.names,
-        reference_names=inputs.reference_names,
         cache=cache,
         fresh=fresh,
         on_stage=lambda stage, done: on_stage(stage, READING + (1 - READING) * done),

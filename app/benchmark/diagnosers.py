@@ -24,13 +24,13 @@ from gearsig.gap import (
     Interval,
     ReducedRecording,
     once,
-    prepare_recordings,
     reduce_recording,
     rivals,
     rule_strengths,
     textbook_rules,
     without_machines_of,
 )
+from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording, read_recording
 from gearsig.rig import Rig, read_rig
 from sims.effects import as_gap_effect, effects
@@ -42,47 +42,40 @@ from sims.effects import as_gap_effect, effects
 
 @dataclass(frozen=True)
 class VisibleCase:
-    """The recordings of a case.
+    """The recordings of a case, each with its rig.
 
     Parameters
     ----------
     recordings, references : tuple of Recording
         Reference i was recorded where recording i was; none: no reference at all.
-    rigs, reference_rigs : tuple of Rig
-    names : tuple of str
-        Of the recordings.
     """
 
     recordings: tuple[Recording, ...]
-    rigs: tuple[Rig, ...]
-    names: tuple[str, ...]
     references: tuple[Recording, ...]
-    reference_rigs: tuple[Rig, ...]
+
+    @property
+    def rig(self) -> Rig:
+        """Of the first recording."""
+        return self.recordings[0].rig or Rig()
 
     @cached_property
     def reduced(self) -> tuple[ReducedRecording, ...]:
         """The recordings, reduced."""
-        return tuple(reduce_recording(r, rig) for r, rig in zip(self.recordings, self.rigs, strict=True))
+        return tuple(reduce_recording(recording) for recording in self.recordings)
 
     @cached_property
     def reduced_references(self) -> tuple[ReducedRecording, ...]:
         """The references, reduced."""
-        return tuple(reduce_recording(r, rig) for r, rig in zip(self.references, self.reference_rigs, strict=True))
+        return tuple(reduce_recording(recording) for recording in self.references)
 
 
 def read_seen(folder: Path) -> VisibleCase:
     """Read condition_1.h5, reference_1.h5 … with the rig files beside them."""
-    conditions, references = (sorted(folder.glob(f"{stem}_*.h5")) for stem in ("condition", "reference"))
-    rigs, reference_rigs = (
-        tuple(read_rig(p.with_suffix(".toml")) for p in paths) for paths in (conditions, references)
+    conditions, references = (
+        tuple(read_recording(p, rig=read_rig(p.with_suffix(".toml"))) for p in sorted(folder.glob(f"{stem}_*.h5")))
+        for stem in ("condition", "reference")
     )
-    return VisibleCase(
-        tuple(read_recording(p, rig=rig) for p, rig in zip(conditions, rigs, strict=True)),
-        rigs,
-        tuple(p.name for p in conditions),
-        tuple(read_recording(p, rig=rig) for p, rig in zip(references, reference_rigs, strict=True)),
-        reference_rigs,
-    )
+    return VisibleCase(conditions, references)
 
 
 Diagnoser = Callable[[VisibleCase], GapReport]
@@ -136,10 +129,7 @@ def diagnose(seen: VisibleCase, model: str = "cracked") -> GapReport:
     return diagnose_gap(
         seen.recordings,
         gap_simulator(model),
-        rigs=seen.rigs,
         references=seen.references,
-        reference_rigs=seen.reference_rigs,
-        names=seen.names,
         cache=Path.cwd() / "kept",
     )
 
@@ -222,10 +212,9 @@ def diagnose_forest(seen: VisibleCase) -> GapReport:
     from sims.cracked import cracked_gap_simulator
 
     simulator = cracked_gap_simulator()
-    twin = simulator.twin_of(seen.rigs[0])
-    recordings = prepare_recordings(seen.recordings, seen.rigs)
-    references = prepare_recordings(seen.references, seen.reference_rigs)
-    conditions, _ = conditions_of(recordings, references, twin, names=seen.names)
+    twin = simulator.twin_of(seen.rig)
+    recordings, references = ([PreparedRecording(r) for r in given] for given in (seen.recordings, seen.references))
+    conditions, _ = conditions_of(recordings, references, twin)
     weighed = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=0)
     probabilities = weighed.probabilities()
     changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth

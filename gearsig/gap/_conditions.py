@@ -30,7 +30,7 @@ from gearsig.gap._simulator import Added, OperatingCondition, Twin
 from gearsig.gap._types import ConditionFacts
 from gearsig.gap._words import shaft_words
 from gearsig.prepared import PreparedRecording
-from gearsig.recording import Recording, find_problems, metres_per_second_squared
+from gearsig.recording import find_problems, metres_per_second_squared
 from gearsig.rig import Rig
 from gearsig.severity import (
     LARGEST_SPEED_DIFFERENCE,
@@ -155,7 +155,7 @@ def compare(
     return difference_features(now, simulation, population.credibility)
 
 
-def facts_of(prepared: PreparedRecording, now: ReducedRecording, name: str, twin: Twin) -> ConditionFacts:
+def facts_of(prepared: PreparedRecording, now: ReducedRecording, twin: Twin) -> ConditionFacts:
     """Return what is known of a recording's operating point: measured speed, stated torque of the driver.
 
     Raises
@@ -166,12 +166,13 @@ def facts_of(prepared: PreparedRecording, now: ReducedRecording, name: str, twin
     recording, stated_nm = prepared.recording, _torque_nm(prepared.rig)
     if stated_nm == 0.0:
         raise RefusalError(
-            f"{name}: the rig file states a torque of 0, at which nothing presses the simulated teeth together",
+            f"{recording.name}: the rig file states a torque of 0, at which nothing presses the simulated teeth "
+            "together",
             remedy="give the drag of the driven side, some percent of the rated torque; without torque_nm a usual one "
             "is assumed",
         )
     return ConditionFacts(
-        name,
+        recording.name,
         OperatingCondition(60.0 * now.speed_hz, twin.point.torque_nm if stated_nm is None else stated_nm),
         now.n_revolutions,
         recording.duration_s,
@@ -450,25 +451,11 @@ LARGEST_DRIFT = 0.4
 Stage = Callable[[str, float], object]
 
 
-def prepare_recordings(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[PreparedRecording, ...]:
-    """Return recordings prepared, each with its rig; one that it carries already has applied its sensors."""
-    return tuple(
-        PreparedRecording(
-            replace(recording, rig=rig)
-            if recording.rig is not None and recording.rig.sensors
-            else recording.with_rig(rig)
-        )
-        for recording, rig in zip(recordings, rigs, strict=True)
-    )
-
-
 def conditions_of(
     recordings: Sequence[PreparedRecording],
     references: Sequence[PreparedRecording],
     twin: Twin,
     *,
-    names: Sequence[str] = (),
-    reference_names: Sequence[str] = (),
     tell: Stage = lambda _what, _done: None,
     population: Population | None = None,
 ) -> tuple[list[Condition], list[str]]:
@@ -477,9 +464,8 @@ def conditions_of(
     Parameters
     ----------
     recordings, references : sequence of PreparedRecording
-        Each with its own rig, see `prepare_recordings`.
+        Each carries its rig, and the name that it is called by.
     twin : Twin
-    names, reference_names : sequence of str
     tell : callable
         Is told what is being done, and which share of the whole is complete.
     population : Population or None
@@ -493,12 +479,13 @@ def conditions_of(
     population = load_population() if population is None else population
     conditions: list[Condition] = []
     notices: list[str] = []
-    healthy = _references(references, reference_names or numbered("reference", references), notices)
-    for i, (recording, name) in enumerate(zip(recordings, names or numbered("recording", recordings), strict=True)):
+    healthy = _references(references, notices)
+    for i, recording in enumerate(recordings):
+        name = recording.recording.name
         tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
-        now = _reduced(recording, name, notices)
+        now = _reduced(recording, notices)
         notices += strange_teeth(now, name)
-        facts = facts_of(recording, now, name, twin)
+        facts = facts_of(recording, now, twin)
         notices += _assumed(recording, facts)
         match, why = matching_reference(now, recording.rig, healthy)
         if why:
@@ -518,11 +505,6 @@ def conditions_of(
             "No healthy reference: a recording of the same rig when it was healthy would make it much surer."
         )
     return conditions, notices
-
-
-def numbered(what: str, recordings: Sequence[object]) -> tuple[str, ...]:
-    """Return names for recordings that have none, for people."""
-    return tuple(f"{what} {i + 1}" for i in range(len(recordings)))
 
 
 def _with_channels_of(
@@ -554,14 +536,13 @@ def _check_steady(now: ReducedRecording, reference: ReducedRecording | None, nam
         )
 
 
-def _references(
-    references: Sequence[PreparedRecording], names: Sequence[str], notices: list[str]
-) -> list[HealthyReference]:
+def _references(references: Sequence[PreparedRecording], notices: list[str]) -> list[HealthyReference]:
     """Reduce the references; one of several that cannot be read is left out, and said."""
     healthy: list[HealthyReference] = []
-    for recording, name in zip(references, names, strict=True):
+    for recording in references:
+        name = recording.recording.name
         try:
-            healthy.append(HealthyReference(_reduced(recording, name, notices), recording.rig, name))
+            healthy.append(HealthyReference(_reduced(recording, notices), recording.rig, name))
         except RefusalError as refusal:
             if not healthy and recording is references[-1]:
                 raise
@@ -571,9 +552,9 @@ def _references(
     return healthy
 
 
-def _reduced(prepared: PreparedRecording, name: str, notices: list[str]) -> ReducedRecording:
+def _reduced(prepared: PreparedRecording, notices: list[str]) -> ReducedRecording:
     """Reduce a recording without its dead channels; a refusal names the recording."""
-    recording = prepared.recording
+    recording, name = prepared.recording, prepared.recording.name
     dead = {p.channel: p for p in find_problems(recording) if p.kind == "dead"}
     live = [channel for channel in recording.vibration_names() if channel not in dead]
     if not live:

@@ -16,8 +16,6 @@ from gearsig.gap._conditions import (
     Condition,
     Stage,
     conditions_of,
-    numbered,
-    prepare_recordings,
     simulated,
     warnings_of,
 )
@@ -41,6 +39,7 @@ from gearsig.gap._types import (
 from gearsig.gap._verdict import in_order, likeliest_two, named_cause, rivals
 from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
+from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording, metres_per_second_squared
 from gearsig.rig import Bearing, GearPair, Rig
 
@@ -131,12 +130,8 @@ def diagnose_gap(
     recordings: Sequence[Recording],
     simulator: GapSimulator | DriveSimulator,
     *,
-    rigs: Sequence[Rig] = (),
     references: Sequence[Recording] = (),
-    reference_rigs: Sequence[Rig] = (),
     effects: Sequence[str] = (),
-    names: Sequence[str] = (),
-    reference_names: Sequence[str] = (),
     cache: Path | None = None,
     fresh: bool = False,
     on_stage: Stage | None = None,
@@ -149,19 +144,14 @@ def diagnose_gap(
     Parameters
     ----------
     recordings : sequence of Recording
-        Of one rig; several operating conditions tell more.
+        Of one rig, which each carries with its operating point; several operating conditions tell more.
     simulator : GapSimulator or DriveSimulator
         Of running that goes on, or of starts and stops: what is compared is told in `gearsig.gap.start_stop`.
-    rigs : sequence of Rig
-        One per recording, with its operating point; empty: those that the recordings carry.
     references : sequence of Recording
         Of the same rig when it was healthy; each recording is compared with the one at its speed and torque.
-    reference_rigs : sequence of Rig
     effects : sequence of str
         Which effects may be named; empty: all that the simulator has, those of the user's own files included, see
         `sims.effects.add_effect`.
-    names, reference_names : sequence of str
-        Of the recordings and references, for people.
     cache : Path or None
         Folder that keeps simulations; None: nothing is kept.
     fresh : bool
@@ -176,7 +166,7 @@ def diagnose_gap(
     Raises
     ------
     InputError
-        If the lists do not fit each other or an effect does not exist.
+        If a recording carries no rig or is given twice, or an effect does not exist.
     RefusalError
         If the rig's data do not suffice, there is no speed, or too few revolutions.
     """
@@ -184,32 +174,25 @@ def diagnose_gap(
     known = simulator.gap_effects()
 
     # 1. What is given must fit together, and each recording count once.
-    _check(recordings, names, effects, known)
-    own_names = tuple(names) or numbered("recording", recordings)
-    healthy_names = tuple(reference_names) or numbered("reference", references)
-    _check_distinct([*recordings, *references], [*own_names, *healthy_names])
-    own_rigs, healthy_rigs = _rigs(recordings, rigs), _rigs(references, reference_rigs)
+    _check(recordings, effects, known)
+    recordings, references = _named_apart(recordings), _named_apart(references)
+    _check_distinct([*recordings, *references])
+    rig = _check_rigs([*recordings, *references])
     allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
 
     # 2. Machines that start and stop are compared by their motion, those without gears by their bearings alone.
     if isinstance(simulator, DriveSimulator):
-        return drive_report(
-            diagnose_start_stop(
-                recordings, own_rigs, references, healthy_rigs, simulator, allowed, own_names, healthy_names, tell
-            )
-        )
-    refuse_start_stop(recordings, own_rigs, own_names, simulator.name)
-    prepared, healthy = prepare_recordings(recordings, own_rigs), prepare_recordings(references, healthy_rigs)
-    if is_gearless(own_rigs[0]):
-        return diagnose_gearless(prepared, healthy, own_names, healthy_names, allowed, tell)
+        return drive_report(diagnose_start_stop(recordings, references, simulator, allowed, tell))
+    refuse_start_stop(recordings, simulator.name)
+    prepared, healthy = [PreparedRecording(r) for r in recordings], [PreparedRecording(r) for r in references]
+    if is_gearless(rig):
+        return diagnose_gearless(prepared, healthy, allowed, tell)
 
     # 3. Each recording is reduced to features, beside the healthy twin at its point and the reference.
-    twin, population = simulator.twin_of(own_rigs[0]), load_population()
+    twin, population = simulator.twin_of(rig), load_population()
     _check_own(twin, set(allowed) - set(population.causes))
     tell("reading the recordings", 0.02)
-    conditions, notices = conditions_of(
-        prepared, healthy, twin, names=own_names, reference_names=healthy_names, tell=tell, population=population
-    )
+    conditions, notices = conditions_of(prepared, healthy, twin, tell=tell, population=population)
     clearest = max(conditions, key=lambda condition: condition.size.structural.value)
     recording = prepared[conditions.index(clearest)]
 
@@ -222,7 +205,7 @@ def diagnose_gap(
 
     # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
-    standing, remarks, faults = stood_out(recording, healthy, clearest.facts.name)
+    standing, remarks, faults = stood_out(recording, healthy)
     outcome, unseen = beside_standing(attribution.calibration.outcome(probabilities), standing)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
@@ -240,7 +223,7 @@ def diagnose_gap(
     uncalibrated = () if is_calibrated() else (UNCALIBRATED,)
     reference = clearest.reference
     return GapReport(
-        rig=own_rigs[0].name,
+        rig=rig.name,
         simulator=simulator.name,
         conditions=tuple(c.facts for c in conditions),
         references=tuple(dict.fromkeys(c.facts.reference for c in conditions if c.facts.reference)),
@@ -286,13 +269,9 @@ def diagnose_gap(
     )
 
 
-def _check(
-    recordings: Sequence[Recording], names: Sequence[str], effects: Sequence[str], known: Mapping[str, GapEffect]
-) -> None:
+def _check(recordings: Sequence[Recording], effects: Sequence[str], known: Mapping[str, GapEffect]) -> None:
     if not recordings:
         raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
-    if names and len(names) != len(recordings):
-        raise InputError(f"{len(names)} names for {len(recordings)} recordings", allowed="one each")
     strange = [name for name in effects if name not in known]
     if strange:
         raise InputError(
@@ -314,32 +293,33 @@ def _unit(recording: Recording) -> str:
     return "" if None in known else "m/s^2"
 
 
-def _check_distinct(recordings: Sequence[Recording], names: Sequence[str]) -> None:
+def _named_apart(recordings: Sequence[Recording]) -> list[Recording]:
+    """Number the recordings of one name."""
+    names = [recording.name for recording in recordings]
+    if len(set(names)) == len(names):
+        return list(recordings)
+    return [recording.with_name(f"{recording.name} ({i})") for i, recording in enumerate(recordings, 1)]
+
+
+def _check_distinct(recordings: Sequence[Recording]) -> None:
     """Refuse copies: they tell nothing more, and a recording does not differ from itself."""
-    for (one, name), (other, other_name) in combinations(zip(recordings, names, strict=True), 2):
+    for one, other in combinations(recordings, 2):
         if np.array_equal(one.samples, other.samples):
             raise InputError(
-                f"holds the same samples as {name}", where=other_name, remedy="give each recording once, in one role"
+                f"holds the same samples as {one.name}",
+                where=other.name,
+                remedy="give each recording once, in one role",
             )
 
 
-def _rigs(recordings: Sequence[Recording], rigs: Sequence[Rig]) -> tuple[Rig, ...]:
-    if rigs:
-        if len(rigs) != len(recordings):
-            raise InputError(f"{len(rigs)} rigs for {len(recordings)} recordings", allowed="one each")
-        if any(
-            r.rig is not None and r.rig.sensors not in ((), rig.sensors)
-            for r, rig in zip(recordings, rigs, strict=True)
-        ):
+def _check_rigs(recordings: Sequence[Recording]) -> Rig:
+    """Return the rig of the first recording; refuse one that has none."""
+    for recording in recordings:
+        if recording.rig is None:
             raise InputError(
-                "a recording carries a rig with other sensors than the one given for it",
-                remedy="read its file again with that rig",
+                "carries no rig", where=recording.name, remedy="read it with one, or give it one: with_rig"
             )
-        return tuple(rigs)
-    found = tuple(r.rig for r in recordings)
-    if any(rig is None for rig in found):
-        raise InputError("a recording carries no rig", remedy="give rigs, one for each recording")
-    return tuple(rig for rig in found if rig is not None)
+    return recordings[0].rig or Rig()
 
 
 def _without_place(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[str]:

@@ -127,7 +127,7 @@ class ExaminedRecording:
         return "no-bearing-damage" in codes and self.analysis.outcome is Outcome.NO_FAULT
 
 
-def analysed(recording: PreparedRecording, name: str) -> tuple[Analysis, ShaftAngle]:
+def analysed(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
     """Analyse a recording whose speed must be known.
 
     Raises
@@ -137,16 +137,19 @@ def analysed(recording: PreparedRecording, name: str) -> tuple[Analysis, ShaftAn
     """
     analysis = analyze(recording)
     if isinstance(analysis.shaft_angle, CannotTell):
+        name = recording.recording.name
         raise RefusalError(f"{name}: {analysis.shaft_angle.reason}", remedy=analysis.shaft_angle.remedy)
     return analysis, analysis.shaft_angle
 
 
-def _with_bearings(recording: PreparedRecording, name: str) -> tuple[Analysis, ShaftAngle]:
+def _with_bearings(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
     """Analyse a recording whose bearings must be examined, as there is nothing else."""
-    found = analysed(recording, name)
+    found = analysed(recording)
     for finding in found[0].findings:
         if finding.code in ("all-channels-dead", "bearings-not-examined"):
-            raise RefusalError(f"{name}: {finding.title}", remedy=finding.surer or "check the measurement chain")
+            raise RefusalError(
+                f"{recording.recording.name}: {finding.title}", remedy=finding.surer or "check the measurement chain"
+            )
     return found
 
 
@@ -418,8 +421,6 @@ N_SHOWN = 6.5
 def diagnose_gearless(
     recordings: Sequence[PreparedRecording],
     references: Sequence[PreparedRecording],
-    names: Sequence[str],
-    reference_names: Sequence[str],
     effects: Mapping[str, GapEffect],
     tell: Stage,
 ) -> GapReport:
@@ -429,7 +430,6 @@ def diagnose_gearless(
     ----------
     recordings, references : sequence of PreparedRecording
         Each with its rig.
-    names, reference_names : sequence of str
     effects : mapping
         Those that may be named; of them only damaged races can be.
     tell : callable
@@ -446,11 +446,12 @@ def diagnose_gearless(
         If there is no speed, no live channel, or too few revolutions.
     """
     tell("analysing the references", 0.05)
-    healthy = [_with_bearings(*one) for one in zip(references, reference_names, strict=True)]
+    healthy = [_with_bearings(one) for one in references]
     every, rigs = [], [recording.rig for recording in recordings]
-    for i, (recording, name) in enumerate(zip(recordings, names, strict=True)):
+    for i, recording in enumerate(recordings):
+        name = recording.recording.name
         tell(f"analysing {name}", 0.2 + 0.7 * i / len(recordings))
-        every.append(examined(name, _with_bearings(recording, name), healthy))
+        every.append(examined(name, _with_bearings(recording), healthy))
     hint = () if references else (NO_REFERENCE,)
     standing = surest(every)
     causes, outcome = causes_of(standing, every, rigs[0], effects)
@@ -458,7 +459,7 @@ def diagnose_gearless(
         rig=rigs[0].name,
         simulator="",
         conditions=tuple(_facts(one, rig) for one, rig in zip(every, rigs, strict=True)),
-        references=tuple(reference_names) if any(e.reference for e in every) else (),
+        references=tuple(one.recording.name for one in references) if any(e.reference for e in every) else (),
         outcome=outcome,
         size=Interval(NAN, NAN, NAN),
         repeatability=NAN,
@@ -555,7 +556,7 @@ HIGHEST_HARMONIC, SAME_ORDER = 40, 1e-3
 
 
 def stood_out(
-    recording: PreparedRecording, references: Sequence[PreparedRecording], name: str
+    recording: PreparedRecording, references: Sequence[PreparedRecording]
 ) -> tuple[list[Standing], list[str], list[str]]:
     """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; remarks; warnings.
 
@@ -563,8 +564,9 @@ def stood_out(
     there and easily lost. The analysis looks for it by itself. A strange line and a family that may well be chance are
     remarks; a fault of the reference is a doubt about everything else.
     """
+    name = recording.recording.name
     try:
-        now = analysed(recording, name)
+        now = analysed(recording)
     except RefusalError:  # without a speed no family of impacts has an order
         return [], [], []
     speeds: list[tuple[float, int, PreparedRecording]] = []
@@ -575,7 +577,7 @@ def stood_out(
     healthy: list[tuple[Analysis, ShaftAngle]] = []
     if nearest is not None:
         with suppress(RefusalError):
-            healthy = [analysed(nearest, "its reference")]
+            healthy = [analysed(nearest)]
     found = examined(name, now, healthy)
     warnings = _fault_of_reference(healthy[0][0], now[0], name) if healthy else []
     weak = [one for one in found.standing if one.finding.code == LINE or one.finding.kind is Kind.NOTICE]

@@ -42,11 +42,7 @@ class GapInputs:
     """Recordings and references, each with its rig and its name for people."""
 
     recordings: tuple[Recording, ...]
-    rigs: tuple[Rig, ...]
-    names: tuple[str, ...]
     references: tuple[Recording, ...] = ()
-    reference_rigs: tuple[Rig, ...] = ()
-    reference_names: tuple[str, ...] = ()
 
 
 def read_gap_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda _: None) -> GapInputs:
@@ -66,18 +62,16 @@ def read_gap_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda
     """
     _check_files(asked)
     files = (*asked.recordings, *asked.references)
-    rigs = _rigs(asked, files)
+    names = (
+        *(asked.names or _names(asked.recordings)),
+        *(asked.reference_names or _names(asked.references)),
+    )
     recordings = []
-    for path, rig in zip(files, rigs, strict=True):
+    for path, name, rig in zip(files, names, _rigs(asked, files), strict=True):
         on_file(path.name)
-        recordings.append(_read(path, rig, asked.sampling_rate_hz))
+        recordings.append(read_recording(path, rig=rig, sampling_rate_hz=asked.sampling_rate_hz).with_name(name))
     n = len(asked.recordings)
-    names, references = asked.names or _names(asked.recordings), asked.reference_names or _names(asked.references)
-    return GapInputs(tuple(recordings[:n]), rigs[:n], names, tuple(recordings[n:]), rigs[n:], references)
-
-
-def _read(path: Path, rig: Rig, sampling_rate_hz: float | None) -> Recording:
-    return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz)
+    return GapInputs(tuple(recordings[:n]), tuple(recordings[n:]))
 
 
 def _check_files(asked: GapRequest) -> None:

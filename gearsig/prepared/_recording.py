@@ -258,10 +258,10 @@ class PreparedRecording:
         return self.keep(("order map", channel), lambda: order_map(self.over_angle("", [channel]), channel))
 
     def with_rig(self, rig: Rig) -> PreparedRecording:
-        """Return the same with another rig, whose sensors are not applied; this very object where it is its own rig."""
+        """Return the same with another rig, see `Recording.with_rig`; this very object where it is its own rig."""
         if rig is self.recording.rig or (not isinstance(rig.speed, PulseTimes) and rig == self.recording.rig):
             return self
-        return PreparedRecording(replace(self.recording, rig=rig), memory_limit_mb=self.memory_limit_mb)
+        return PreparedRecording(self.recording.with_rig(rig), memory_limit_mb=self.memory_limit_mb)
 
 
 def prepare(recording: Recording | PreparedRecording, rig: Rig | None = None) -> PreparedRecording:
@@ -275,9 +275,7 @@ def prepare(recording: Recording | PreparedRecording, rig: Rig | None = None) ->
     """
     if not isinstance(recording, PreparedRecording):
         return PreparedRecording(recording, rig)
-    if recording.recording.rig is None and rig is not None:
-        return PreparedRecording(recording.recording, rig, memory_limit_mb=recording.memory_limit_mb)
-    return recording
+    return recording.with_rig(rig) if recording.recording.rig is None and rig is not None else recording
 
 
 def has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:

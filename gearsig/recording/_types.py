@@ -351,20 +351,28 @@ class Recording:
         )
 
     def with_rig(self, rig: Rig | None) -> Recording:
-        """Return the recording with another rig; its sensors' quantity, unit, scale and position are applied.
+        """Return the recording with another rig, whose sensors' quantity, unit, scale and position are applied.
 
-        Sensors apply once, to the values as they were read: give the rig to a recording that has none. Where the file
-        states another unit and the rig no scale between the two, the rig's unit is taken, with a warning.
+        Sensors apply once, to the values as they were read. Where those of the rig that it carries were applied
+        already, they stay with it: the other rig must have the same ones, or none. Where the file states another unit
+        and the rig no scale between the two, the rig's unit is taken, with a warning.
+
+        Raises
+        ------
+        InputError
+            If sensors were applied, and the other rig has different ones.
         """
-        if rig is None:
-            return replace(self, rig=None)
-        if self.rig is not None and self.rig.sensors and self.rig != rig:
+        if rig is None or self.rig is rig:
+            return replace(self, rig=rig)
+        applied = () if self.rig is None else self.rig.sensors
+        if applied and rig.sensors not in ((), applied):
             raise InputError(
-                "the recording already carries a rig whose sensor scales were applied",
+                "the recording carries a rig with other sensors, and their scales were applied",
+                where=self.name,
                 remedy="read the file again with the other rig",
             )
-        if self.rig is rig or not rig.sensors:
-            return replace(self, rig=rig)
+        if applied or not rig.sensors:
+            return replace(self, rig=replace(rig, sensors=applied))
         samples = np.array(self.samples)
         channels, warnings = list(self.channels), list(self.warnings)
         for sensor in rig.sensors:
@@ -386,6 +394,10 @@ class Recording:
                 sensor.position or old.position,
             )
         return replace(self, samples=samples, channels=tuple(channels), rig=rig, warnings=tuple(warnings))
+
+    def with_name(self, name: str) -> Recording:
+        """Return the recording under another name."""
+        return replace(self, provenance=replace(self.provenance, source=name))
 
     def _changed(self, step: str, **changes: Any) -> Recording:
         provenance = replace(self.provenance, history=(*self.provenance.history, step))

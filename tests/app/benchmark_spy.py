@@ -22,7 +22,7 @@ def diagnose(seen: VisibleCase) -> GapReport:
                 "folder": str(Path.cwd()),
                 "files": sorted(p.name for p in Path.cwd().rglob("*")),
                 "modules": [m for m in sys.modules if m.startswith(("sims.blind", "app.benchmark"))],
-                "recordings": list(seen.names),
+                "recordings": [recording.name for recording in seen.recordings],
                 "truths": [r.truth for r in (*seen.recordings, *seen.references)],
             }
         )

@@ -78,9 +78,7 @@ def test_it_prints_the_verdict_and_leaves_three_files(capsys, stub, tmp_path) ->
     assert [r.provenance.source for r in stub.given["recordings"]] == [CRACKED.name]
     assert [r.provenance.source for r in stub.given["references"]] == [HEALTHY.name]
     assert stub.given["simulator"].name == "cracked"
-    assert stub.given["names"] == (CRACKED.name,)
-    assert stub.given["reference_names"] == (HEALTHY.name,)
-    assert stub.given["rigs"][0].operating_point.torque_nm == 110.0
+    assert stub.given["recordings"][0].rig.operating_point.torque_nm == 110.0
 
 
 def test_one_condition_is_told_of_what_a_second_would_give(capsys, stub, tmp_path) -> None:
@@ -165,16 +163,16 @@ def test_a_rig_file_beside_a_recording_overrides_speed_and_torque(tmp_path) -> N
     half = copied(tmp_path, "half", operating_point=OperatingPoint("input", 250.0))
     bare = copied(tmp_path, "bare")
     inputs = read_gap_inputs(GapRequest((slow, half, bare), rig=RIG))
-    points = [(rig.operating_point.speed_rpm, rig.operating_point.torque_nm) for rig in inputs.rigs]
+    rigs = [recording.rig for recording in inputs.recordings]
+    points = [(rig.operating_point.speed_rpm, rig.operating_point.torque_nm) for rig in rigs]
     assert points == [(300.0, 40.0), (250.0, 110.0), (500.0, 110.0)]
-    assert all(rig.pairs == inputs.rigs[0].pairs for rig in inputs.rigs)
-    assert [r.rig for r in inputs.recordings] == list(inputs.rigs)
+    assert all(rig.pairs == rigs[0].pairs for rig in rigs)
 
 
 def test_without_a_rig_those_beside_are_taken(tmp_path) -> None:
     inputs = read_gap_inputs(GapRequest((CRACKED,), (HEALTHY,)))
-    assert inputs.rigs[0].name == read_rig(RIG).name
-    assert len(inputs.reference_rigs) == 1
+    assert inputs.recordings[0].rig.name == read_rig(RIG).name
+    assert [reference.rig.name for reference in inputs.references] == [read_rig(HEALTHY.with_suffix(".toml")).name]
     with pytest.raises(InputError, match="--rig"):
         read_gap_inputs(GapRequest((copied(tmp_path, "bare"),)))
 
@@ -184,7 +182,7 @@ def test_torques_are_one_for_all_or_one_for_each(tmp_path) -> None:
 
     def torques(*stated: float) -> list[float | None]:
         inputs = read_gap_inputs(GapRequest((one, two), (HEALTHY,), RIG, stated))
-        return [rig.operating_point.torque_nm for rig in (*inputs.rigs, *inputs.reference_rigs)]
+        return [r.rig.operating_point.torque_nm for r in (*inputs.recordings, *inputs.references)]
 
     assert torques() == [110.0, 110.0, 110.0]
     assert torques(60.0) == [60.0, 60.0, 60.0]
@@ -221,7 +219,7 @@ def test_recordings_of_different_rigs_are_refused(tmp_path, changes, what) -> No
 
 def test_what_a_rig_file_does_not_say_is_no_difference(tmp_path) -> None:
     own = copied(tmp_path, "own", bearings=(), **rig_with(module_mm=None, face_width_mm=None))
-    assert read_gap_inputs(GapRequest((own,), rig=RIG)).rigs[0].bearings
+    assert read_gap_inputs(GapRequest((own,), rig=RIG)).recordings[0].rig.bearings
 
 
 def test_files_given_twice_are_refused() -> None:
@@ -235,7 +233,8 @@ def test_names_of_equal_files_in_different_folders_stay_apart(tmp_path) -> None:
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
     paths = tuple(copied(tmp_path / name, "run") for name in ("a", "b"))
-    assert read_gap_inputs(GapRequest(paths, rig=RIG)).names == ("a/run.h5", "b/run.h5")
+    inputs = read_gap_inputs(GapRequest(paths, rig=RIG))
+    assert [recording.name for recording in inputs.recordings] == ["a/run.h5", "b/run.h5"]
 
 
 @pytest.mark.parametrize(
@@ -307,7 +306,8 @@ def test_an_effect_that_was_not_learned_is_listed_as_such(capsys, monkeypatch) -
     from gearsig.gap import load_population
 
     learned = load_population()
-    monkeypatch.setattr("gearsig.gap.load_population", lambda: replace(learned, causes=np.array(["none", "tooth_wear"])))
+    fewer = replace(learned, causes=np.array(["none", "tooth_wear"]))
+    monkeypatch.setattr("gearsig.gap.load_population", lambda: fewer)
     _, out, _ = run(capsys, "--list-effects")
     assert out.count("not recognised") == 18
     _, out, _ = run(capsys, "--list-effects", "--model", "forging")
@@ -325,5 +325,5 @@ def test_a_rig_that_does_not_know_all_teeth_is_no_other_machine(tmp_path) -> Non
     rig = read_rig(RIG)
     partly = replace(rig, pairs=(replace(rig.pairs[0], driven_teeth=None),))
     write_rig(partly, tmp_path / "common.toml")
-    (read,) = read_gap_inputs(GapRequest((path,), rig=tmp_path / "common.toml")).rigs
-    assert read.pairs[0].driven_teeth is None
+    (read,) = read_gap_inputs(GapRequest((path,), rig=tmp_path / "common.toml")).recordings
+    assert read.rig.pairs[0].driven_teeth is None

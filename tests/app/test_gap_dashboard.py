@@ -81,7 +81,7 @@ def test_uploads_become_files_with_their_own_rigs(tmp_path) -> None:
     assert all(tmp_path in path.parents for path in (*asked.recordings, *asked.references))
     assert asked.names == ("../a run.h5", "b.h5")
     inputs = read_gap_inputs(asked)
-    torques = [rig.operating_point.torque_nm for rig in (*inputs.rigs, *inputs.reference_rigs)]
+    torques = [r.rig.operating_point.torque_nm for r in (*inputs.recordings, *inputs.references)]
     assert torques == [110.0, 55.0, 55.0]
     assert "--rig gearbox.toml" in choice.command
     assert "'../a run.h5'" in choice.command
@@ -101,7 +101,8 @@ def test_names_that_differ_after_a_dot_have_their_own_rigs(tmp_path) -> None:
         rigs=(upload("run.10Nm.toml", text=RIG), upload("run.5Nm.toml", text=own)),
     )
     assert common_rig(choice) is None
-    assert [rig.operating_point.torque_nm for rig in read_gap_inputs(files_of(choice, tmp_path)).rigs] == [55.0, 110.0]
+    recordings = read_gap_inputs(files_of(choice, tmp_path)).recordings
+    assert [recording.rig.operating_point.torque_nm for recording in recordings] == [55.0, 110.0]
     assert own_rig(upload("run.5Nm.csv.gz"), choice.rigs) is choice.rigs[1]
 
 

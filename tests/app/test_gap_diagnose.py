@@ -23,12 +23,12 @@ from gearsig.gap import (
     diagnose_gap,
     is_calibrated,
     once,
-    prepare_recordings,
     reduce_recording,
     with_channels_of,
 )
 from gearsig.gap._conditions import _check_steady, _with_channels_of
 from gearsig.gap._diagnose import _without_place
+from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from sims import simulate
@@ -62,11 +62,10 @@ class Eccentric(Added):
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> GapReport:
     return diagnose_gap(
-        [run(Eccentric("eccentricity", SEVERITY_UM, {"gear": "driven"}), noise=2)],
+        [run(Eccentric("eccentricity", SEVERITY_UM, {"gear": "driven"}), noise=2).with_name("now")],
         gap_simulator("cracked"),
         references=[run(noise=1)],
         effects=["eccentricity"],
-        names=["now"],
         cache=tmp_path_factory.mktemp("cache"),
     )
 
@@ -101,18 +100,12 @@ def test_lists_that_do_not_fit_are_errors() -> None:
     simulator, recording = gap_simulator("cracked"), run(noise=1)
     with pytest.raises(InputError, match="no recording"):
         diagnose_gap([], simulator)
-    with pytest.raises(InputError, match="2 names for 1 recordings"):
-        diagnose_gap([recording], simulator, names=["a", "b"])
     with pytest.raises(InputError, match=r"no effect 'backlsh'.*did you mean backlash"):
         diagnose_gap([recording], simulator, effects=["backlsh"])
     with pytest.raises(InputError, match="carries no rig"):
         diagnose_gap([replace(recording, rig=None)], simulator)
-    with pytest.raises(InputError, match="other sensors"):
-        diagnose_gap([recording], simulator, rigs=[replace(rig(), sensors=rig().sensors[:1])])
     with pytest.raises(InputError, match=r"old\.h5: holds the same samples as new\.h5"):
-        diagnose_gap(
-            [recording], simulator, references=[replace(recording)], names=["new.h5"], reference_names=["old.h5"]
-        )
+        diagnose_gap([recording.with_name("new.h5")], simulator, references=[recording.with_name("old.h5")])
 
 
 def test_a_run_up_is_refused_but_beside_the_same_one() -> None:
@@ -136,7 +129,7 @@ def test_accelerations_in_g_are_compared_in_si_units_and_unknown_units_are_told(
     expected, seen = (once(reduce_recording(given, rig()))[1] for given in (recording, in_g))
     assert seen == pytest.approx(expected, abs=1e-6)
     bare = replace(recording, channels=tuple(replace(c, unit="") for c in recording.channels))
-    _, notices = conditions_of(prepare_recordings([bare], [rig()]), (), gap_simulator("cracked").twin_of(rig()))
+    _, notices = conditions_of([PreparedRecording(bare)], (), gap_simulator("cracked").twin_of(rig()))
     assert any("is no acceleration in a known unit" in notice for notice in notices)
 
 

@@ -47,13 +47,10 @@ def recording(order: float = 0.0, seed: int = 0) -> Recording:
 
 def diagnosed(now: Recording, *references: Recording, rig: Rig = RIG, effects: Sequence[str] = ()) -> GapReport:
     report = diagnose_gap(
-        [now],
+        [now.with_rig(rig).with_name("now")],
         gap_simulator("cracked"),
-        rigs=[rig],
-        references=references,
-        reference_rigs=[rig] * len(references),
+        references=[reference.with_rig(rig) for reference in references],
         effects=effects,
-        names=["now"],
     )
     assert {cause.name for cause in report.causes} <= ANSWERS
     assert sum(cause.probability for cause in report.causes) == pytest.approx(1.0)
@@ -147,10 +144,11 @@ def test_bearings_of_equal_orders_are_named_together() -> None:
 
 def test_several_recordings_say_which_shows_it() -> None:
     report = diagnose_gap(
-        [recording(), recording(ORDERS["BPFO"])],
+        [
+            recording().with_rig(RIG).with_name("quiet"),
+            recording(ORDERS["BPFO"]).with_rig(RIG).with_name("loud"),
+        ],
         gap_simulator("cracked"),
-        rigs=[RIG, RIG],
-        names=["quiet", "loud"],
     )
     assert report.causes[0].name == "bearing_outer_race"
     assert report.places[0].title.endswith(", in loud")
@@ -171,7 +169,7 @@ def test_several_recordings_say_which_shows_it() -> None:
 )
 def test_what_is_missing_is_said(rig: Rig, said: str) -> None:
     with pytest.raises(RefusalError, match=said):
-        diagnose_gap([recording()], gap_simulator("cracked"), rigs=[rig])
+        diagnose_gap([recording().with_rig(rig)], gap_simulator("cracked"))
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")

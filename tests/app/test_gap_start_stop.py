@@ -62,7 +62,7 @@ def folder(tmp_path_factory) -> Path:
 
 def diagnosed(recording, reference=None):
     references = [] if reference is None else [reference]
-    return diagnose_gap([recording], SIMULATOR, references=references, names=["now"])
+    return diagnose_gap([recording.with_name("now")], SIMULATOR, references=references)
 
 
 def test_more_play_is_named_measured_and_simulated_again(folder, tmp_path, capsys):
@@ -90,7 +90,7 @@ def wider():
     """All that the report of a drive with more play is made of."""
     now, healthy = made(2, ("backlash", 120.0)), made(1)
     effects = SIMULATOR.gap_effects()
-    return diagnose_start_stop([now], [now.rig], [healthy], [healthy.rig], SIMULATOR, effects, ["now"], ["reference 1"])
+    return diagnose_start_stop([now], [healthy], SIMULATOR, effects)
 
 
 def test_what_is_left_is_told_on_cycles_that_the_severity_was_not_fitted_to(wider):
@@ -116,7 +116,7 @@ def test_a_heavier_load_is_named_by_its_own_name():
     report = diagnosed(made(3, wheel_inertia_kg_m2=80.0), made(4))
     assert report.causes[0].name == "load_inertia"
     assert report.causes[0].severity.value == pytest.approx(100 * 38 / 45.2625, rel=0.15)
-    assert report.references == ("reference 1",)
+    assert report.references == (made(4).name,)
 
 
 def test_a_healthy_drive_has_no_gap_and_it_is_said_what_would_not_show():
@@ -154,8 +154,8 @@ def test_without_torque_the_play_can_still_be_told():
 
 def test_a_second_recording_without_torque_is_told_about():
     """Causes are weighed on all recordings, so that what one of them cannot tell is weighed on none."""
-    recordings = [made(7, ("backlash", 150.0)), without_torque(made(8, ("backlash", 150.0)))]
-    report = diagnose_gap(recordings, SIMULATOR, references=[made(9)], names=["first", "second"])
+    first, second = made(7, ("backlash", 150.0)), without_torque(made(8, ("backlash", 150.0)))
+    report = diagnose_gap([first.with_name("first"), second.with_name("second")], SIMULATOR, references=[made(9)])
     assert {c.name for c in report.causes if c.severity is not None} == WITHOUT_TORQUE
     told = next(text for text in report.notices if text.startswith("Not weighed, as no torque was recorded in second:"))
     assert "crack in a tooth root" in told

@@ -9,7 +9,8 @@ import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Finding, Kind
-from gearsig.gap import GapOutcome, Standing, beside_standing, prepare_recordings, standing_place, stood_out
+from gearsig.gap import GapOutcome, Standing, beside_standing, standing_place, stood_out
+from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from tests.gap.synthetic import RIG, record, ringing
@@ -23,8 +24,8 @@ def knocking(_time: FloatArray, revolutions: FloatArray) -> FloatArray:
 
 
 def seen(now: Recording, rig: Rig = RIG, *references: Recording) -> tuple[list[Standing], list[str], list[str]]:
-    (prepared,) = prepare_recordings([now], [rig])
-    return stood_out(prepared, prepare_recordings(references, [RIG] * len(references)), "today")
+    prepared = [PreparedRecording(recording.with_rig(RIG)) for recording in references]
+    return stood_out(PreparedRecording(now.with_rig(rig).with_name("today")), prepared)
 
 
 def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_silences_them() -> None:

@@ -16,7 +16,6 @@ from gearsig.gap import (
     ReducedRecording,
     conditions_of,
     exchanged,
-    prepare_recordings,
     reduce_recording,
     stood_out,
     strange_pattern,
@@ -46,7 +45,7 @@ def recording(seed: int, noise: int, *added: Added, duration_s: float = 3.0) -> 
 
 
 def prepared(*recordings: Recording) -> tuple[PreparedRecording, ...]:
-    return prepare_recordings(recordings, [rig()] * len(recordings))
+    return tuple(PreparedRecording(recording) for recording in recordings)
 
 
 @cache
@@ -116,60 +115,56 @@ def test_recording_and_reference_exchanged_are_noticed_by_the_sign_of_the_change
 
 def test_a_reference_with_a_fault_is_told() -> None:
     damaged = recording(0, 1, CHIPPED)
-    _, _, warnings = stood_out(*prepared(recording(0, 2)), prepared(recording(0, 3), damaged), "now")
+    _, _, warnings = stood_out(*prepared(recording(0, 2)), prepared(recording(0, 3), damaged))
     assert not warnings  # at the same speed, the first is taken
-    (doubt,) = stood_out(*prepared(recording(0, 2)), prepared(damaged), "now")[2]
+    (doubt,) = stood_out(*prepared(recording(0, 2).with_name("now")), prepared(damaged))[2]
     assert doubt.startswith("The reference of now does not look healthy")
     assert "they may have been exchanged" in doubt
-    (doubt,) = stood_out(*prepared(recording(0, 2, CHIPPED)), prepared(damaged), "now")[2]
+    (doubt,) = stood_out(*prepared(recording(0, 2, CHIPPED)), prepared(damaged))[2]
     assert "exchanged" not in doubt
 
 
 def test_a_refusal_names_the_recording_that_is_too_short() -> None:
     twin, short = gap_simulator("cracked").twin_of(rig()), recording(0, 1, duration_s=0.1)
     with pytest.raises(RefusalError, match=r"^the old one: shaft .* turns"):
-        conditions_of(prepared(short), prepared(short), twin, reference_names=["the old one"])
+        conditions_of(prepared(short), prepared(short.with_name("the old one")), twin)
     with pytest.raises(RefusalError, match=r"^today: "):
-        conditions_of(prepared(short), (), twin, names=["today"])
+        conditions_of(prepared(short.with_name("today")), (), twin)
 
 
 def test_one_of_several_references_that_cannot_be_read_is_left_out() -> None:
     whole = recording(0, 1)
-    short = replace(whole, samples=whole.samples[:, :4000])
+    short = replace(whole, samples=whole.samples[:, :4000]).with_name("the short one")
     twin = gap_simulator("cracked").twin_of(rig())
     (condition,), notices = conditions_of(
         prepared(whole),
         prepared(short, whole),
         twin,
-        names=["now"],
-        reference_names=["the short one", "the long one"],
     )
     assert condition.reference is not None
     assert any(n.startswith("the short one") and n.endswith("this reference is left out.") for n in notices)
 
 
 def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> None:
-    twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1)
+    twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1).with_name("now")
     first, *_ = whole.vibration_names()
     samples = whole.samples.copy()
     samples[whole.channel_names.index(first)] = 0.0
-    (condition,), notices = conditions_of(prepared(replace(whole, samples=samples)), (), twin, names=["now"])
+    (condition,), notices = conditions_of(prepared(replace(whole, samples=samples)), (), twin)
     assert first not in condition.now.channels
     assert any(f"channel {first} is dead" in notice for notice in notices)
     samples[: len(whole.vibration_names())] = 0.0
     with pytest.raises(RefusalError, match="now: no vibration channel is live"):
-        conditions_of(prepared(replace(whole, samples=samples)), (), twin, names=["now"])
+        conditions_of(prepared(replace(whole, samples=samples)), (), twin)
 
 
 def test_what_was_not_given_of_the_operating_point_is_told() -> None:
-    twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1)
-    _, notices = conditions_of(prepared(whole), (), twin, names=["now"])
+    twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1).with_name("now")
+    _, notices = conditions_of(prepared(whole), (), twin)
     assert not any("not given" in notice or "tachometer" in notice for notice in notices)
     point = replace(rig().operating_point, torque_nm=None)
-    _, notices = conditions_of(
-        prepare_recordings([whole], [replace(rig(), operating_point=point)]), (), twin, names=["now"]
-    )
+    _, notices = conditions_of(prepared(whole.with_rig(replace(rig(), operating_point=point))), (), twin)
     assert any(notice.startswith("now: the torque is not given; ") for notice in notices)
     idle = replace(rig(), operating_point=replace(rig().operating_point, torque_nm=0.0))
     with pytest.raises(RefusalError, match="now: the rig file states a torque of 0"):
-        conditions_of(prepare_recordings([whole], [idle]), (), twin, names=["now"])
+        conditions_of(prepared(whole.with_rig(idle)), (), twin)

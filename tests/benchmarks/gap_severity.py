@@ -19,6 +19,7 @@ from app.benchmark.cases import Plan, PlannedCase
 from app.benchmark.diagnosers import VisibleCase, read_seen
 from gearsig.errors import GearsigError
 from gearsig.gap import GapEffect, Interval, conditions_of, try_effects
+from gearsig.prepared import PreparedRecording
 from sims.registry import gap_simulator
 
 MIN_LEVEL = 0.4
@@ -48,16 +49,12 @@ def fitted(plan: Plan, planned: PlannedCase) -> Fitted | None:
 
 
 def _tried(seen: VisibleCase, effect: GapEffect) -> Interval | None:
-    twin = gap_simulator("cracked").twin_of(seen.rigs[0])
+    twin = gap_simulator("cracked").twin_of(seen.rig)
     try:
         conditions, _notices = conditions_of(
-            seen.recordings,
-            seen.rigs,
-            seen.references,
-            seen.reference_rigs,
+            [PreparedRecording(recording) for recording in seen.recordings],
+            [PreparedRecording(reference) for reference in seen.references],
             twin,
-            seen.names,
-            lambda _what, _done: None,
         )
         found = try_effects([effect], twin, conditions, None, lambda _what, _done: None).get(effect.name)
     except GearsigError:

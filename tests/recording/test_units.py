@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
 from gearsig.rig import Rig, Sensor
 
@@ -38,3 +41,13 @@ def test_a_recording_is_a_table_with_times():
     frame = Recording(np.arange(8.0).reshape(2, 4), 4.0, (Channel("a"), Channel("b"))).to_frame()
     assert list(frame.columns) == ["a", "b"]
     assert frame["b"].loc[0.5] == 6.0
+
+
+def test_sensors_are_applied_once_whatever_else_of_the_rig_changes() -> None:
+    scaled = recording("g").with_rig(rig(scale=9.81))
+    for other in (replace(rig(scale=9.81), name="other"), Rig(name="other")):
+        found = scaled.with_rig(other)
+        assert found.values("a1") == pytest.approx(9.81 * np.ones(8))
+        assert (found.rig.name, found.rig.sensors) == ("other", rig(scale=9.81).sensors)
+    with pytest.raises(InputError, match="other sensors"):
+        scaled.with_rig(rig(scale=2.0))

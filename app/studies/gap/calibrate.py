@@ -176,7 +176,8 @@ def weigh_case(job: tuple[int, int]) -> list[dict[str, Any]]:
     Each by all that is known, and by what is known without the machines of the rig that made the case. A job is the
     case's number and how many effects are tried at most.
     """
-    from gearsig.gap import attribute, conditions_of, load_population, prepare_recordings
+    from gearsig.gap import attribute, conditions_of, load_population
+    from gearsig.prepared import PreparedRecording
     from sims.blind import CATALOGUE, draw_case, record_case
     from sims.cracked import cracked_gap_simulator
 
@@ -190,14 +191,13 @@ def weigh_case(job: tuple[int, int]) -> list[dict[str, Any]]:
     case = draw_case(rng, "calibration", kind=kind, with_reference=True, **wanted)  # type: ignore[arg-type]  # as drawn
     truths = [wanted["effect"]] if wanted else [NONE if kind == "none" else UNKNOWN]
     recorded = record_case(case)
-    rigs = [rig_of(r) for r in recorded.conditions]
     simulator = cracked_gap_simulator()
     rows = []
     for references in (recorded.references, ()):
         try:
-            twin = simulator.twin_of(rigs[0])
-            healthy = prepare_recordings(references, [rig_of(r) for r in references])
-            conditions, _ = conditions_of(prepare_recordings(recorded.conditions, rigs), healthy, twin)
+            twin = simulator.twin_of(rig_of(recorded.conditions[0]))
+            prepared = [[PreparedRecording(r) for r in given] for given in (recorded.conditions, references)]
+            conditions, _ = conditions_of(*prepared, twin)
             for left_out in ("", INDEPENDENT):
                 with without_machines_of(left_out):
                     known = [replace(c, population=load_population()) for c in conditions]

@@ -36,7 +36,7 @@ from gearsig.gap.start_stop._cycles import (
 )
 from gearsig.motion import PairMotion, check_turns, find_roles, measure_motion
 from gearsig.recording import Recording
-from gearsig.rig import Rig, contact_pair
+from gearsig.rig import contact_pair
 
 TORQUE_GAIN, WEAR = "torque_gain", "tooth_wear"
 
@@ -291,20 +291,20 @@ def _jackknife(rows: FloatArray) -> FloatArray:
     return error
 
 
-def read_cycles(recording: Recording, rig: Rig | None = None) -> PreparedCycles:
-    """Measure a recording's motion and cut it into cycles.
+def read_cycles(recording: Recording) -> PreparedCycles:
+    """Measure a recording's motion, by the rig that it carries, and cut it into cycles.
 
     Raises
     ------
     RefusalError
         If neither gear's motion was recorded: vibration alone.
     """
-    rig = rig or recording.rig
+    rig = recording.rig
     if rig is not None and rig.pairs:
         roles = find_roles(recording, contact_pair(rig)) if rig.contact or len(rig.pairs) == 1 else {}
         if not any(role.endswith((" angle", " speed")) for role in roles):
             raise RefusalError(
-                f"{recording.provenance.source or 'the recording'} holds no angle or speed of pinion and wheel, and "
+                f"{recording.name} holds no angle or speed of pinion and wheel, and "
                 "the model forging compares their starts and stops",
                 remedy="compare vibration of stationary running with --model cracked; else name the channels' shafts "
                 "in the rig file's [[sensor]] tables",

@@ -54,7 +54,6 @@ from gearsig.gap.start_stop._comparison import (
 from gearsig.gap.start_stop._cycles import COMPRESSION, FEATURES, NAMES, UNITS, change_of, prediction_errors
 from gearsig.motion import is_start_stop, measure_motion, motion_segments
 from gearsig.recording import Recording
-from gearsig.rig import Rig
 
 Stage = Callable[[str, float], object]
 SMALLEST = 0.3
@@ -90,13 +89,9 @@ class DriveDiagnosis:
 
 def diagnose_start_stop(
     recordings: Sequence[Recording],
-    rigs: Sequence[Rig],
     references: Sequence[Recording],
-    reference_rigs: Sequence[Rig],
     simulator: DriveSimulator,
     effects: Mapping[str, GapEffect],
-    names: Sequence[str],
-    reference_names: Sequence[str],
     tell: Stage = lambda *_: None,
 ) -> DriveDiagnosis:
     """Diagnose the gap between start–stop recordings of one machine and its simulated drive; see `diagnose_gap`.
@@ -105,13 +100,10 @@ def diagnose_start_stop(
     ----------
     recordings, references : sequence of Recording
         With the angles (or speeds) of pinion and wheel, better with the torque between motor and pinion. Each is
-        compared with the reference at the nearest torque.
-    rigs, reference_rigs : sequence of Rig
-        With a [contact] table.
+        compared with the reference at the nearest torque. Each carries its rig, with a [contact] table.
     simulator : DriveSimulator
     effects : mapping
         Those that may be named.
-    names, reference_names : sequence of str
     tell : callable
 
     Returns
@@ -125,11 +117,8 @@ def diagnose_start_stop(
         If a recording holds no start and stop, or no motion of both gears, or the rig no contact.
     """
     tell("reading the motion", 0.02)
-    healthy = [read_cycles(*each) for each in zip(references, reference_rigs, strict=True)]
-    compared = tuple(
-        compare_drive(read_cycles(recording, rig), healthy, simulator, name)
-        for name, recording, rig in zip(names, recordings, rigs, strict=True)
-    )
+    healthy = [read_cycles(reference) for reference in references]
+    compared = tuple(compare_drive(read_cycles(now), healthy, simulator, now.name) for now in recordings)
     seen = []
     for i, each in enumerate(compared):
 
@@ -140,9 +129,9 @@ def diagnose_start_stop(
     tell("weighing", 0.85)
     attribution = attribute_drive(seen, with_reference=bool(references))
     outcome = attribution.calibration.outcome(attribution.probabilities())
-    return DriveDiagnosis(
-        rigs[0].name, simulator.name, effects, compared, tuple(seen), attribution, outcome, tuple(reference_names)
-    )
+    rig = "" if recordings[0].rig is None else recordings[0].rig.name
+    names = tuple(reference.name for reference in references)
+    return DriveDiagnosis(rig, simulator.name, effects, compared, tuple(seen), attribution, outcome, names)
 
 
 def drive_report(diagnosis: DriveDiagnosis) -> GapReport:
@@ -467,7 +456,7 @@ def _next_recordings(
     return tuple(sorted(recordings, key=lambda one: -one.standard_deviations))
 
 
-def refuse_start_stop(recordings: Sequence[Recording], rigs: Sequence[Rig], names: Sequence[str], model: str) -> None:
+def refuse_start_stop(recordings: Sequence[Recording], model: str) -> None:
     """Refuse recordings of starts and stops for a model of running that goes on.
 
     Raises
@@ -475,17 +464,17 @@ def refuse_start_stop(recordings: Sequence[Recording], rigs: Sequence[Rig], name
     RefusalError
         With the model that they are for.
     """
-    for recording, rig, name in zip(recordings, rigs, names, strict=True):
-        if rig.contact is None:
+    for recording in recordings:
+        if recording.rig is None or recording.rig.contact is None:
             continue
         try:
-            motion = measure_motion(recording, rig)
+            motion = measure_motion(recording, recording.rig)
             starts = is_start_stop(motion_segments(motion.driver_angle_rad, motion.sampling_rate_hz))
         except GearsigError:
             continue
         if starts:
             raise RefusalError(
-                f"{name} starts and stops: orders, which the model {model} is compared by, need a shaft that goes on "
-                "turning",
+                f"{recording.name} starts and stops: orders, which the model {model} is compared by, need a shaft that "
+                "goes on turning",
                 remedy="--model forging",
             )
