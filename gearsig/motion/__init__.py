@@ -54,6 +54,7 @@ from gearsig.motion._segments import (
     shaft_speed_rad_s,
 )
 from gearsig.motion._start_stop import StartStop, examine_start_stop
+from gearsig.motion._transmission_error import AngleSource, TransmissionError, transmission_error
 from gearsig.motion._types import ForceEstimate, PairMotion, check_turns, refuse_standing
 
 __all__ = [
@@ -69,6 +70,7 @@ __all__ = [
     "TEETH",
     "TOOTH_FORCE",
     "AngleProfile",
+    "AngleSource",
     "Burst",
     "FittedParameter",
     "ForceEstimate",
@@ -79,6 +81,7 @@ __all__ = [
     "NoiseStudy",
     "PairMotion",
     "StartStop",
+    "TransmissionError",
     "YieldingTeeth",
     "acceleration_limit_rad_s2",
     "angle_profile",
@@ -113,4 +116,5 @@ __all__ = [
     "shaft_speed_rad_s",
     "tooth_compliance",
     "torque_twist",
+    "transmission_error",
 ]

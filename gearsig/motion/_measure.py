@@ -106,10 +106,10 @@ def _fits(channel: Channel, role: str, pair: GearPair) -> bool:
         return channel.quantity == what
     if channel.quantity not in QUANTITY_OF[what]:
         return False
-    return side == _side_of(channel, pair)
+    return side == side_of(channel, pair)
 
 
-def _side_of(channel: Channel, pair: GearPair) -> str:
+def side_of(channel: Channel, pair: GearPair) -> str:
     """Return "driver", "driven" or nothing; the longer name decides where one shaft's name holds the other's."""
     names = sorted(((pair.driver, "driver"), (pair.driven, "driven")), key=lambda entry: -len(entry[0]))
     for shaft, side in names:

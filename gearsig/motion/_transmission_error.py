@@ -1,0 +1,499 @@
+"""Transmission error of a gear pair from encoders or fine tachometers on both shafts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, gcd, lcm, pi, radians, sqrt
+
+import numpy as np
+
+from gearsig.angle import AngleSignal, ShaftAngle, find_pulse_edges, pulse_train_angle
+from gearsig.checks import FloatArray, freeze
+from gearsig.errors import InputError, RefusalError
+from gearsig.motion._measure import SIDES, find_roles, role_values, side_of
+from gearsig.orders import SynchronousAverage, order_spectrum
+from gearsig.recording import Channel, Recording
+from gearsig.rig import GearPair, PulseTimes, Rig, TachometerChannel
+from gearsig.spectra import Spectrum
+
+NAME, UNIT = "transmission error", "um"
+
+USUAL_PRESSURE_ANGLE_DEG = 20.0
+LARGEST_STEPS, SMALLEST_STEPS = 32, 4
+"""Of a tooth pitch: more show nothing that a mesh makes, fewer do not show the mesh."""
+MIN_TURNS = 2.0
+"""Revolutions of the slower gear, from which what either gear repeats can be told from what the other does."""
+
+
+@dataclass(frozen=True)
+class AngleSource:
+    """Where the angle of one gear comes from, and how finely it is known.
+
+    Parameters
+    ----------
+    channel : str
+        Empty: pulse times that belong to no channel.
+    kind : str
+        "encoder" or "pulses".
+    per_revolution : float
+        Counts or pulses; nan for an angle without steps.
+    noise_rad : float
+        Standard deviation of one angle that was read: of its step or of the clock that times it, or as it scatters.
+    """
+
+    channel: str
+    kind: str
+    per_revolution: float
+    noise_rad: float
+
+
+@dataclass(frozen=True)
+class TransmissionError:
+    """δ = r_b1 θ1 − r_b2 θ2 over the driver's tooth pitches, and what either gear repeats of it.
+
+    δ is how far the driven gear lags behind perfect transmission, along the line of action; its mean is taken off.
+    Textbooks that count the driven gear's lead have the other sign. δ/r_b2 is the angle by which the driven gear lags.
+
+    Parameters
+    ----------
+    cycles_um : array, (n_cycles, n_steps)
+        δ; row n is the driver's pitch `first_pitch` + n from its angle 0.
+    first_pitch, first_driven_pitch : int
+        Pitches of either gear from its angle 0 on which the first row lies: modulo its teeth, which tooth it is.
+    pitch_offset : float
+        By how many pitches the driven gear's angle is ahead of the driver's; its whole part is in the pitches above.
+    mesh_um : array, (n_steps,)
+        What each tooth pair repeats, mean 0.
+    driver_um, driven_um : arrays, (z, n_steps)
+        What each tooth of that gear adds, mean 0 at each step.
+    driver_error_um, driven_error_um : arrays, (z, n_steps)
+        Standard errors of these, from what nothing repeats.
+    base_radii_m : (float, float)
+    shafts : (str, str)
+    time_s : array, (n_cycles,)
+        Middle of each row.
+    sources : (AngleSource, AngleSource)
+    floor_um : float
+        Standard deviation of one value of `cycles_um` by the resolution of both sources.
+    notes : tuple of str
+    """
+
+    cycles_um: FloatArray
+    first_pitch: int
+    first_driven_pitch: int
+    pitch_offset: float
+    mesh_um: FloatArray
+    driver_um: FloatArray
+    driven_um: FloatArray
+    driver_error_um: FloatArray
+    driven_error_um: FloatArray
+    base_radii_m: tuple[float, float]
+    shafts: tuple[str, str]
+    time_s: FloatArray
+    sources: tuple[AngleSource, AngleSource]
+    floor_um: float
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        freeze(self, "cycles_um", "driver_um", "driven_um", "driver_error_um", "driven_error_um", ndim=2)
+        freeze(self, "mesh_um", "time_s")
+
+    def __repr__(self) -> str:
+        swings = f"mesh {np.ptp(self.mesh_um):.3g}, driver {np.ptp(self.driver_um):.3g}"
+        return (
+            f"TransmissionError({swings}, driven gear {np.ptp(self.driven_um):.3g} um peak to peak, "
+            f"{len(self.cycles_um)} mesh cycles at {self.speed_rpm:.4g} rpm)"
+        )
+
+    @property
+    def teeth(self) -> tuple[int, int]:
+        """Of driver and driven gear."""
+        return len(self.driver_um), len(self.driven_um)
+
+    @property
+    def n_steps(self) -> int:
+        """Steps of a tooth pitch."""
+        return int(self.cycles_um.shape[1])
+
+    @property
+    def speed_rpm(self) -> float:
+        """Mean speed of the driver."""
+        n = len(self.time_s) - 1
+        return 60.0 * n / self.teeth[0] / float(self.time_s[-1] - self.time_s[0])
+
+    @property
+    def mesh_hz(self) -> float:
+        """Tooth pairs per second."""
+        return self.speed_rpm / 60.0 * self.teeth[0]
+
+    @cached_property
+    def residual_um(self) -> FloatArray:
+        """What neither the mesh nor a gear repeats, (n_cycles, n_steps)."""
+        return np.asarray(self.cycles_um - self.mesh_um - self.driver_um[self.tooth(0)] - self.driven_um[self.tooth(1)])
+
+    def tooth(self, side: int) -> np.ndarray:
+        """Tooth of the driver (0) or the driven gear (1) that is in each row's pitch, from 0, (n_cycles,)."""
+        first = (self.first_pitch, self.first_driven_pitch)[side]
+        return np.asarray((first + np.arange(len(self.cycles_um))) % self.teeth[side])
+
+    def in_urad(self, values_um: FloatArray) -> FloatArray:
+        """Return a transmission error as angle of the driven gear, δ/r_b2."""
+        return np.asarray(values_um / self.base_radii_m[1])
+
+    def average(self, side: int) -> SynchronousAverage:
+        """Return one revolution of the driver (0) or the driven gear (1): what that gear adds, without the mesh."""
+        values, error = ((self.driver_um, self.driver_error_um), (self.driven_um, self.driven_error_um))[side]
+        n_revolutions = int(len(self.cycles_um) / self.teeth[side])
+        highest = self.teeth[side] * self.n_steps / 2.0
+        return SynchronousAverage(
+            values.reshape(-1), error.reshape(-1), n_revolutions, self.shafts[side], NAME, UNIT, "residual", highest
+        )
+
+    def hunting_um(self) -> FloatArray:
+        """Return the mean over whole hunting periods, lcm(z1, z2) mesh cycles, (n_cycles of one period, n_steps).
+
+        Raises
+        ------
+        RefusalError
+            If there is less than one.
+        """
+        period = lcm(*self.teeth)
+        n = len(self.cycles_um) // period
+        if n == 0:
+            raise RefusalError(
+                f"the recording holds {len(self.cycles_um)} mesh cycles, the hunting period has {period}",
+                remedy=f"record {60.0 * period / self.teeth[0] / self.speed_rpm:.3g} s at this speed",
+            )
+        return np.asarray(self.cycles_um[: n * period].reshape(n, period, self.n_steps).mean(axis=0))
+
+    def signal(self) -> AngleSignal:
+        """Return δ over the driver's angle, for order spectra, maps and averages."""
+        z1 = self.teeth[0]
+        pitches = self.first_pitch + np.arange(len(self.cycles_um)) + 0.5
+        speed = np.gradient(pitches / z1, self.time_s)
+        angle = ShaftAngle(self.shafts[0], self.time_s, pitches / z1, speed, "encoder")
+        per_revolution = z1 * self.n_steps
+        start = self.first_pitch / z1 + 0.5 / per_revolution
+        values = self.cycles_um.reshape(1, -1)
+        return AngleSignal(values, per_revolution, angle, start, (NAME,), (UNIT,), per_revolution / 2.0)
+
+    def spectrum(self) -> Spectrum:
+        """Return the peak amplitudes over orders of the driver."""
+        return order_spectrum(self.signal(), NAME)
+
+
+def transmission_error(
+    recording: Recording, rig: Rig | None = None, *, pair: str = "", use: Mapping[str, str] | None = None
+) -> TransmissionError:
+    """Return the transmission error of a gear pair, and what the mesh, the driver and the driven gear repeat of it.
+
+    δ = r_b1 θ1 − r_b2 θ2, r_b = m z cos α/2. Sampled over the driver's angle it is split as
+
+    δ(n, s) = mesh(s) + driver(n mod z1, s) + driven(n mod z2, s) + residual,
+
+    n the mesh cycle and s the place in it, by least squares at each s. Patterns that both gears repeat together, as
+    where teeth have a common divisor, are shared out evenly.
+
+    Parameters
+    ----------
+    recording : Recording
+        With an encoder, an angle or a tachometer of many pulses on each of both shafts.
+    rig : Rig or None
+        With teeth and module; default: the recording's own.
+    pair : str
+        Name of the gear pair; default: the rig's only one.
+    use : mapping or None
+        "driver angle", "driven angle" → channel; the others are found by position or name.
+
+    Raises
+    ------
+    InputError
+        If several channels fit, a unit is not known, or both angles do not belong to one pair.
+    RefusalError
+        If an angle, the teeth or the module are missing, a shaft turns back, the recording is too short, or a tooth
+        pitch holds fewer than four readings.
+
+    Notes
+    -----
+    Quasi-static where the mesh harmonics in question lie well below the first resonance in which the teeth yield; else
+    the dynamic transmission error.
+
+    An encoder's own errors repeat with its shaft and are in that gear's part: an eccentric disc looks like an eccentric
+    gear (order 1), errors of its lines like pitch errors. Neither changes with load, and both cancel in the difference
+    of two recordings between which the encoder was not moved. Errors within a line come back many times per tooth and
+    average out. Encoders that sit away from their gears add the twist of the shaft between.
+
+    Sources: J. D. Smith, *Gear Noise and Vibration*, 2nd ed., ch. 7 and 8; D. R. Houser, "Gear noise sources and their
+    prediction using mathematical models", 1990.
+    """
+    known = rig or recording.rig
+    if known is None:
+        raise RefusalError("no rig is known", remedy="give a rig file with teeth and module of the pair")
+    gears = _pair_of(known, pair)
+    teeth, radii_m = _geometry(gears)
+    (t1, angle_1, first), (t2, angle_2, second), notes = _both_angles(recording, known, gears, use or {})
+
+    # Both angles at the recording's own samples, wherever both are known.
+    rate = recording.sampling_rate_hz
+    low, high = max(t1[0], t2[0]), min(t1[-1], t2[-1])
+    time_s = np.arange(np.ceil(low * rate), np.floor(high * rate) + 1) / rate
+    if len(time_s) < 2:
+        raise RefusalError("both angles are not known at the same time", remedy="record both shafts together")
+    theta = np.interp(time_s, t1, angle_1), np.interp(time_s, t2, angle_2)
+    pitches, driven_pitches = (theta[side] * teeth[side] / (2.0 * pi) for side in (0, 1))
+    _check_pair(pitches, driven_pitches, teeth)
+    error_um = 1e6 * (radii_m[0] * theta[0] - radii_m[1] * theta[1])
+
+    # Means over equal steps of the driver's angle: each is a low-pass at the step, and averages the readings in it.
+    turned = float(pitches[-1] - pitches[0])
+    readings = [turned / len(time_s), *(float(np.ptp(a)) * z / (2.0 * pi) / len(t) for t, a, z in
+                ((t1, angle_1, teeth[0]), (t2, angle_2, teeth[1])))]  # fmt: skip
+    n_steps = _n_steps(max(readings), gears)
+    rows, first_row, row_time_s = _over_pitches(error_um, pitches, time_s, n_steps)
+    offset = float(np.mean(driven_pitches - pitches))
+    _check_length(len(rows), teeth)
+    rows = rows - rows.mean()
+    driven_row = first_row + round(offset)
+    parts = _parts(rows, first_row, driven_row, teeth)
+    noise_m = [
+        r * s.noise_rad * sqrt(n_steps * per) for r, s, per in zip(radii_m, (first, second), readings[1:], strict=True)
+    ]
+    return TransmissionError(
+        rows,
+        first_row,
+        driven_row,
+        offset,
+        *parts,
+        radii_m,
+        (gears.driver, gears.driven),
+        row_time_s,
+        (first, second),
+        1e6 * sqrt(sum(v * v for v in noise_m)),
+        tuple(notes),
+    )
+
+
+def _pair_of(rig: Rig, name: str) -> GearPair:
+    if name:
+        return rig.pair(name)
+    if len(rig.pairs) != 1:
+        names = ", ".join(repr(p.name) for p in rig.pairs) or "none"
+        raise InputError(f"the rig has {len(rig.pairs)} gear pairs", where="pair", allowed=f"the name of one: {names}")
+    return rig.pairs[0]
+
+
+def _geometry(pair: GearPair) -> tuple[tuple[int, int], tuple[float, float]]:
+    if pair.driver_teeth is None or pair.driven_teeth is None or pair.module_mm is None:
+        raise RefusalError(
+            f"pair {pair.name!r} lacks teeth or module, from which the base radii follow",
+            remedy="add driver_teeth, driven_teeth and module_mm to its [[pair]] table",
+        )
+    teeth = pair.driver_teeth, pair.driven_teeth
+    half_mm = 0.5 * pair.module_mm * cos(radians(pair.pressure_angle_deg or USUAL_PRESSURE_ANGLE_DEG))
+    return teeth, (1e-3 * half_mm * teeth[0], 1e-3 * half_mm * teeth[1])
+
+
+# --------------------
+# From channels to the angle of either gear: times, angles running on, and how finely they are known.
+# --------------------
+
+Angle = tuple[FloatArray, FloatArray, AngleSource]
+
+
+def _both_angles(
+    recording: Recording, rig: Rig, pair: GearPair, use: Mapping[str, str]
+) -> tuple[Angle, Angle, list[str]]:
+    roles, notes = find_roles(recording, pair, use), []
+    found: dict[str, Angle] = {}
+    for side, shaft in zip(SIDES, (pair.driver, pair.driven), strict=True):
+        if f"{side} angle" in roles:
+            name = roles[f"{side} angle"]
+            found[side] = _from_encoder(role_values(recording, rig, f"{side} angle", name), recording, name)
+        elif (stated := _stated_pulses(recording, rig, shaft)) is not None:
+            found[side] = stated
+    for side, other in (SIDES, SIDES[::-1]):
+        channels = [] if side in found else _tachometers(recording, pair, side)
+        if len(channels) == 1 and other in found:
+            ratio = (pair.driven_teeth or 1) / (pair.driver_teeth or 1)
+            found[side] = _counted(recording, channels[0], found[other], ratio if side == "driver" else 1.0 / ratio)
+    missing = [side for side in SIDES if side not in found]
+    if missing:
+        raise RefusalError(
+            f"the angle of the {missing[0]} gear was not measured: a transmission error takes both",
+            remedy=f'fit an encoder to each shaft; name the channel with --use "{missing[0]} angle=CHANNEL", or give '
+            "its shaft's name as position in its [[sensor]] table",
+        )
+    if not pair.pressure_angle_deg:
+        notes.append(f"the pressure angle is not stated: {USUAL_PRESSURE_ANGLE_DEG:g}° is assumed")
+    for side, (time_s, angle, source) in list(found.items()):
+        if angle[-1] < angle[0]:
+            found[side] = time_s, -angle, source
+            notes.append(f"the {side} angle counts down; it is counted up")
+    return found["driver"], found["driven"], notes
+
+
+def _from_encoder(angle_rad: FloatArray, recording: Recording, name: str) -> Angle:
+    """Read an angle at its samples; where it stands still between counts, at the instants when it counts."""
+    angle, step_s = np.unwrap(angle_rad), 1.0 / recording.sampling_rate_hz
+    steps = np.diff(angle)
+    sizes = np.unique(np.abs(steps))
+    largest = float(sizes[-1])
+    apart = np.diff(sizes, prepend=0.0)
+    count_rad = float(np.min(apart[apart > 1e-3 * largest], initial=largest))
+    moved = np.abs(steps) > 0.5 * count_rad
+    if largest == 0.0:
+        raise RefusalError(f"the angle in channel {name!r} stands still", remedy="record while it turns")
+    if np.mean(moved) < 0.5:  # what is known is when a count was passed, to within a sample
+        at = np.flatnonzero(moved)
+        turned = float(np.mean(steps))
+        source = AngleSource(name, "encoder", 2.0 * pi / count_rad, abs(turned) / sqrt(12.0))
+        return (at + 0.5) * step_s, 0.5 * (angle[at] + angle[at + 1]), source
+    whole = np.abs(steps / count_rad - np.round(steps / count_rad)).max() < 0.02
+    # A third difference of independent errors has 20 times their variance; the motion has almost none.
+    scatter = float(np.sqrt(np.mean(np.square(np.diff(angle, 3))) / 20.0)) if len(angle) > 8 else 0.0
+    per_revolution = 2.0 * pi / count_rad if whole else float("nan")
+    source = AngleSource(name, "encoder", per_revolution, max(scatter, count_rad / sqrt(12.0) if whole else 0.0))
+    return np.arange(len(angle)) * step_s, angle, source
+
+
+def _tachometers(recording: Recording, pair: GearPair, side: str) -> list[Channel]:
+    return [c for c in recording.channels if c.quantity == "tachometer" and side_of(c, pair) == side]
+
+
+def _stated_pulses(recording: Recording, rig: Rig, shaft: str) -> Angle | None:
+    """Return the angle by the speed source, where that is pulses on this shaft."""
+    source = recording.speed_source if recording.speed_source is not None else rig.speed
+    if isinstance(source, PulseTimes | TachometerChannel) and (source.shaft or rig.reference_shaft) == shaft:
+        if isinstance(source, PulseTimes):
+            return _from_pulses(source.times_s, source.pulses_per_revolution, "", 0.0)
+        edges = find_pulse_edges(
+            recording.values(source.channel),
+            recording.sampling_rate_hz,
+            threshold=source.threshold,
+            hysteresis=source.hysteresis,
+            edge=source.edge,
+        )
+        if len(edges.times_s) > 1:
+            return _from_pulses(edges.times_s, source.pulses_per_revolution, source.channel, edges.tick_s)
+    return None
+
+
+def _counted(recording: Recording, channel: Channel, other: Angle, ratio: float) -> Angle:
+    """Return the angle by a tachometer whose pulses per revolution follow from the other gear's turns and the teeth."""
+    edges = find_pulse_edges(recording.values(channel.name), recording.sampling_rate_hz)
+    ends = edges.times_s[[0, -1]] if len(edges.times_s) > 1 else np.zeros(2)
+    turned = abs(float(np.diff(np.interp(ends, other[0], other[1]))[0])) / (2.0 * pi) * ratio
+    pulses = (len(edges.times_s) - 1) / turned if turned > 0.0 else 0.0
+    if pulses < 1.0 or abs(pulses - round(pulses)) > 0.1:
+        raise RefusalError(
+            f"tachometer {channel.name!r} makes {pulses:.4g} pulses per revolution as the teeth have it: that is no "
+            "whole number",
+            remedy="check teeth and pulses, and record longer",
+        )
+    return _from_pulses(edges.times_s, round(pulses), channel.name, edges.tick_s)
+
+
+def _from_pulses(times_s: FloatArray, per_revolution: int, name: str, tick_s: float) -> Angle:
+    angle = pulse_train_angle(times_s, per_revolution, tick_s=tick_s)
+    speed = 2.0 * pi * angle.mean_speed_rpm / 60.0
+    jitter_s = float(np.sqrt(np.mean(np.square(np.diff(times_s, 3))) / 20.0)) if len(times_s) > 8 else 0.0
+    noise = speed * max(jitter_s, tick_s / sqrt(12.0))
+    return angle.time_s, 2.0 * pi * angle.revolutions, AngleSource(name, "pulses", float(per_revolution), noise)
+
+
+# --------------------
+# Over the driver's pitches, and what each gear repeats.
+# --------------------
+
+
+def _check_pair(pitches: FloatArray, driven: FloatArray, teeth: tuple[int, int]) -> None:
+    """Refuse a shaft that turns back, and angles that are not those of one pair of gears in mesh."""
+    back = float(np.max(np.maximum.accumulate(pitches) - pitches))
+    if back > 0.5:
+        raise RefusalError(
+            f"the driver turns back by {back:.3g} tooth pitches",
+            remedy="cut the recording where it does; `gearsig start-stop` is for machines that turn back",
+        )
+    between = driven - pitches
+    if float(np.ptp(between)) > 0.5:
+        turned, follows = float(pitches[-1] - pitches[0]), float(driven[-1] - driven[0])
+        raise InputError(
+            f"the driver turns by {turned:.6g} tooth pitches and the driven gear by {follows:.6g}",
+            where="angles",
+            allowed=f"the same, with {teeth[0]} and {teeth[1]} teeth",
+            remedy="check teeth, units and scales, and whether both channels belong to this pair",
+        )
+
+
+def _n_steps(pitches_per_reading: float, pair: GearPair) -> int:
+    n = min(int(1.0 / pitches_per_reading), LARGEST_STEPS)
+    if n < SMALLEST_STEPS:
+        raise RefusalError(
+            f"a tooth pitch of pair {pair.name!r} holds {1.0 / pitches_per_reading:.2g} readings of an angle, "
+            f"{SMALLEST_STEPS} at least are needed",
+            remedy="encoders or tachometers with more lines, a lower speed, or a higher sampling rate",
+        )
+    return n
+
+
+def _check_length(n_cycles: int, teeth: tuple[int, int]) -> None:
+    if n_cycles < MIN_TURNS * max(teeth):
+        raise RefusalError(
+            f"the recording holds {n_cycles} tooth pitches, {MIN_TURNS:g} revolutions of the slower gear are "
+            f"{MIN_TURNS * max(teeth):.0f}",
+            remedy="record longer",
+        )
+
+
+def _over_pitches(
+    error_um: FloatArray, pitches: FloatArray, time_s: FloatArray, n_steps: int
+) -> tuple[FloatArray, int, FloatArray]:
+    """Return means over steps of the pitch, (n_cycles, n_steps), the first pitch, and each pitch's mean time."""
+    place = np.floor(pitches * n_steps).astype(np.int64)
+    start = int(place.min() // n_steps)
+    place -= start * n_steps
+    n_rows = int(place.max() // n_steps) + 1
+    size = n_rows * n_steps
+    n = np.bincount(place, minlength=size).reshape(n_rows, n_steps)
+    sums = np.bincount(place, error_um, minlength=size).reshape(n_rows, n_steps)
+    times = np.bincount(place, time_s, minlength=size).reshape(n_rows, n_steps)
+    full = np.flatnonzero((n > 0).all(axis=1))
+    full = full[(full > 0) & (full < n_rows - 1)]  # of the first and the last pitch a part may be missing
+    if len(full) and np.any(np.diff(full) > 1):  # the longest run without a hole
+        runs = np.split(full, np.flatnonzero(np.diff(full) > 1) + 1)
+        full = max(runs, key=len)
+    if not len(full):
+        return np.empty((0, n_steps)), start, np.empty(0)
+    rows = sums[full] / n[full]
+    return rows, start + int(full[0]), times[full].sum(axis=1) / n[full].sum(axis=1)
+
+
+def _parts(
+    rows: FloatArray, first: int, first_driven: int, teeth: tuple[int, int]
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Split rows into mesh, driver's and driven gear's teeth, with standard errors of both.
+
+    The normal equations hold how often each tooth and each pair of teeth came; their pseudo-inverse gives the solution
+    of least norm, which shares out evenly what both gears repeat.
+    """
+    z1, z2 = teeth
+    n = np.arange(len(rows))
+    i, k = (first + n) % z1, (first_driven + n) % z2
+    met = np.bincount(i * z2 + k, minlength=z1 * z2).reshape(z1, z2).astype(np.float64)
+    normal = np.block([[np.diag(met.sum(axis=1)), met], [met.T, np.diag(met.sum(axis=0))]])
+    mesh = rows.mean(axis=0)
+    sums = np.zeros((z1 + z2, rows.shape[1]))
+    np.add.at(sums, i, rows - mesh)
+    np.add.at(sums, z1 + k, rows - mesh)
+    inverse = np.linalg.pinv(normal, rcond=1e-9, hermitian=True)
+    found = inverse @ sums
+    driver, driven = found[:z1], found[z1:]
+    shift = driver.mean(axis=0) + driven.mean(axis=0)
+    driver, driven, mesh = driver - driver.mean(axis=0), driven - driven.mean(axis=0), mesh + shift
+    residual = rows - mesh - driver[i] - driven[k]
+    spare = max(len(rows) - (z1 + z2 - gcd(z1, z2)), 1)
+    scatter = np.sqrt(np.square(residual).sum(axis=0) / spare)
+    error = np.sqrt(np.maximum(np.diag(inverse), 0.0))[:, None] * scatter
+    return mesh - mesh.mean(), driver, driven, error[:z1], error[z1:]
