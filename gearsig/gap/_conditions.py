@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,8 +167,7 @@ def facts_of(prepared: PreparedRecording, now: ReducedRecording, twin: Twin) -> 
     recording, stated_nm = prepared.recording, _torque_nm(prepared.rig)
     if stated_nm == 0.0:
         raise RefusalError(
-            f"{recording.name}: the rig file states a torque of 0, at which nothing presses the simulated teeth "
-            "together",
+            "the rig file states a torque of 0, at which nothing presses the simulated teeth together",
             remedy="give the drag of the driven side, some percent of the rated torque; without torque_nm a usual one "
             "is assumed",
         )
@@ -474,37 +474,93 @@ def conditions_of(
     Raises
     ------
     RefusalError
-        If a speed cannot be known or there are too few revolutions: in a recording, or in every reference.
+        If in no recording, or in no reference, the speed can be known and there are enough revolutions.
     """
     population = load_population() if population is None else population
-    conditions: list[Condition] = []
     notices: list[str] = []
-    healthy = _references(references, notices)
-    for i, recording in enumerate(recordings):
+    healthy = readable(references, _healthy, "reference", notices)
+    done = iter(range(len(recordings)))
+
+    def condition_of(recording: PreparedRecording) -> tuple[Condition, list[str]]:
         name = recording.recording.name
-        tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * i / len(recordings))
-        now = _reduced(recording, notices)
-        notices += strange_teeth(now, name)
-        facts = facts_of(recording, now, twin)
-        notices += _assumed(recording, facts)
-        match, why = matching_reference(now, recording.rig, healthy)
-        if why:
-            notices.append(f"{name} is compared with the simulation: {why}.")
-        if match is not None:
-            facts = replace(facts, reference=match.name)
-            now = _with_channels_of(now, match.reduced, healthy, name, notices)
-        reference = None if match is None else match.reduced
-        _check_steady(now, reference, name)
-        condition = Condition(facts, now, simulated(twin, facts, now), reference, population)
-        conditions.append(condition)
-        if reference is not None:
-            notices += strange_pattern(now, reference, name)
-            notices += _strange_reference(condition)
+        tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * next(done) / len(recordings))
+        return _condition(recording, healthy, twin, population)
+
+    conditions = readable(recordings, condition_of, "recording", notices)
     if not references:
         notices.append(
             "No healthy reference: a recording of the same rig when it was healthy would make it much surer."
         )
     return conditions, notices
+
+
+Found = TypeVar("Found")
+
+
+def readable(
+    recordings: Sequence[PreparedRecording],
+    read: Callable[[PreparedRecording], tuple[Found, list[str]]],
+    what: str,
+    notices: list[str],
+) -> list[Found]:
+    """Return what can be read of each recording; one of several that is refused, as too short, is left out and said.
+
+    Parameters
+    ----------
+    recordings : sequence of PreparedRecording
+    read : callable
+        Returns what is wanted of a recording, and remarks.
+    what : str
+        What the recordings are called.
+    notices : list of str
+        Remarks and refusals are added to it.
+
+    Raises
+    ------
+    RefusalError
+        If none can be read: why not the first.
+    """
+    found, refused = [], list[RefusalError]()
+    for recording in recordings:
+        try:
+            one, remarks = read(recording)
+        except RefusalError as refusal:
+            refused.append(RefusalError(f"{recording.recording.name}: {refusal.reason}", remedy=refusal.remedy))
+        else:
+            found.append(one)
+            notices += remarks
+    if refused and not found:
+        raise refused[0]
+    notices += [f"{refusal.reason}; this {what} is left out." for refusal in refused]
+    return found
+
+
+def _healthy(recording: PreparedRecording) -> tuple[HealthyReference, list[str]]:
+    name, (reduced, notices) = recording.recording.name, _reduced(recording)
+    return HealthyReference(reduced, recording.rig, name), [*notices, *strange_teeth(reduced, name)]
+
+
+def _condition(
+    recording: PreparedRecording, healthy: Sequence[HealthyReference], twin: Twin, population: Population
+) -> tuple[Condition, list[str]]:
+    """Return a recording beside its reference and the healthy twin at its point, and what is worth a remark."""
+    name, (now, notices) = recording.recording.name, _reduced(recording)
+    notices += strange_teeth(now, name)
+    facts = facts_of(recording, now, twin)
+    notices += _assumed(recording, facts)
+    match, why = matching_reference(now, recording.rig, healthy)
+    if why:
+        notices.append(f"{name} is compared with the simulation: {why}.")
+    if match is not None:
+        facts = replace(facts, reference=match.name)
+        now = _with_channels_of(now, match.reduced, healthy, name, notices)
+    reference = None if match is None else match.reduced
+    _check_steady(now, reference)
+    condition = Condition(facts, now, simulated(twin, facts, now), reference, population)
+    if reference is not None:
+        notices += strange_pattern(now, reference, name)
+        notices += _strange_reference(condition)
+    return condition, notices
 
 
 def _with_channels_of(
@@ -523,55 +579,36 @@ def _with_channels_of(
     return now.with_channels({channel: now.channels[channel] for channel in reference.channels})
 
 
-def _check_steady(now: ReducedRecording, reference: ReducedRecording | None, name: str) -> None:
+def _check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> None:
     """Refuse a run-up, but beside one of the reference's: the simulation is at one speed."""
     drift, usual = now.speed.drift, 0.0 if reference is None else reference.speed.drift
     if abs(drift - usual) > LARGEST_DRIFT:
         start, end = (60.0 * now.speed_hz * (1.0 + half * drift) for half in (-0.5, 0.5))
         raise RefusalError(
-            f"{name}: the speed goes from about {start:.0f} to {end:.0f} rpm; the simulation it is compared with is at "
+            f"the speed goes from about {start:.0f} to {end:.0f} rpm; the simulation it is compared with is at "
             "one speed",
             remedy="cut out parts at steady speed and give them as operating conditions, or give a reference of the "
             "same run",
         )
 
 
-def _references(references: Sequence[PreparedRecording], notices: list[str]) -> list[HealthyReference]:
-    """Reduce the references; one of several that cannot be read is left out, and said."""
-    healthy: list[HealthyReference] = []
-    for recording in references:
-        name = recording.recording.name
-        try:
-            healthy.append(HealthyReference(_reduced(recording, notices), recording.rig, name))
-        except RefusalError as refusal:
-            if not healthy and recording is references[-1]:
-                raise
-            notices.append(f"{refusal.reason}; this reference is left out.")
-            continue
-        notices += strange_teeth(healthy[-1].reduced, name)
-    return healthy
-
-
-def _reduced(prepared: PreparedRecording, notices: list[str]) -> ReducedRecording:
-    """Reduce a recording without its dead channels; a refusal names the recording."""
-    recording, name = prepared.recording, prepared.recording.name
+def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
+    """Return a recording reduced without its dead channels, and remarks."""
+    recording, name, notices = prepared.recording, prepared.recording.name, list[str]()
     dead = {p.channel: p for p in find_problems(recording) if p.kind == "dead"}
     live = [channel for channel in recording.vibration_names() if channel not in dead]
     if not live:
         seen = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
-        raise RefusalError(f"{name}: no vibration channel is live ({seen})", remedy="check sensors, cables and inputs")
+        raise RefusalError(f"no vibration channel is live ({seen})", remedy="check sensors, cables and inputs")
     unknown = [c.name for c in recording.channels if c.name in live and metres_per_second_squared(c) is None]
     if unknown:
         notices.append(
             f"{name}: {', '.join(unknown)} is no acceleration in a known unit; it is compared as if it were m/s², so "
             "that without a reference its level says nothing."
         )
-    try:
-        reduced = reduce_recording(prepared, channels=live)
-    except RefusalError as refusal:
-        raise RefusalError(f"{name}: {refusal.reason}", remedy=refusal.remedy) from None
+    reduced = reduce_recording(prepared, channels=live)
     notices += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
-    return reduced
+    return reduced, notices
 
 
 def _assumed(prepared: PreparedRecording, facts: ConditionFacts) -> list[str]:

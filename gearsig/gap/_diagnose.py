@@ -194,7 +194,7 @@ def diagnose_gap(
     tell("reading the recordings", 0.02)
     conditions, notices = conditions_of(prepared, healthy, twin, tell=tell, population=population)
     clearest = max(conditions, key=lambda condition: condition.size.structural.value)
-    recording = prepared[conditions.index(clearest)]
+    recording = next(one for one in prepared if one.recording.name == clearest.facts.name)
 
     # 4. Which effect: what the forests say, and of the likeliest what trials on the twin say.
     tell("recognising", 0.2)

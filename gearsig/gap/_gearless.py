@@ -23,7 +23,7 @@ from gearsig.diagnosis import (
 )
 from gearsig.errors import RefusalError
 from gearsig.formatting import named, signed
-from gearsig.gap._conditions import Stage
+from gearsig.gap._conditions import Stage, readable
 from gearsig.gap._simulator import GapEffect, OperatingCondition
 from gearsig.gap._types import (
     NONE,
@@ -137,8 +137,7 @@ def analysed(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
     """
     analysis = analyze(recording)
     if isinstance(analysis.shaft_angle, CannotTell):
-        name = recording.recording.name
-        raise RefusalError(f"{name}: {analysis.shaft_angle.reason}", remedy=analysis.shaft_angle.remedy)
+        raise RefusalError(analysis.shaft_angle.reason, remedy=analysis.shaft_angle.remedy)
     return analysis, analysis.shaft_angle
 
 
@@ -147,9 +146,7 @@ def _with_bearings(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
     found = analysed(recording)
     for finding in found[0].findings:
         if finding.code in ("all-channels-dead", "bearings-not-examined"):
-            raise RefusalError(
-                f"{recording.recording.name}: {finding.title}", remedy=finding.surer or "check the measurement chain"
-            )
+            raise RefusalError(finding.title, remedy=finding.surer or "check the measurement chain")
     return found
 
 
@@ -446,24 +443,28 @@ def diagnose_gearless(
         If there is no speed, no live channel, or too few revolutions.
     """
     tell("analysing the references", 0.05)
-    healthy = [_with_bearings(one) for one in references]
-    every, rigs = [], [recording.rig for recording in recordings]
-    for i, recording in enumerate(recordings):
+    left_out: list[str] = []
+    healthy = readable(references, lambda one: (_with_bearings(one), []), "reference", left_out)
+    done, rig = iter(range(len(recordings))), recordings[0].rig
+
+    def examine(recording: PreparedRecording) -> tuple[ExaminedRecording, list[str]]:
         name = recording.recording.name
-        tell(f"analysing {name}", 0.2 + 0.7 * i / len(recordings))
-        every.append(examined(name, _with_bearings(recording), healthy))
+        tell(f"analysing {name}", 0.2 + 0.7 * next(done) / len(recordings))
+        return examined(name, _with_bearings(recording), healthy), []
+
+    every = readable(recordings, examine, "recording", left_out)
     hint = () if references else (NO_REFERENCE,)
     standing = surest(every)
-    causes, outcome = causes_of(standing, every, rigs[0], effects)
+    causes, outcome = causes_of(standing, every, rig, effects)
     return GapReport(
-        rig=rigs[0].name,
+        rig=rig.name,
         simulator="",
-        conditions=tuple(_facts(one, rig) for one, rig in zip(every, rigs, strict=True)),
+        conditions=tuple(_facts(one) for one in every),
         references=tuple(one.recording.name for one in references) if any(e.reference for e in every) else (),
         outcome=outcome,
         size=Interval(NAN, NAN, NAN),
         repeatability=NAN,
-        places=tuple(standing_place(one, rigs[0], name=one.recording if len(every) > 1 else "") for one in standing),
+        places=tuple(standing_place(one, rig, name=one.recording if len(every) > 1 else "") for one in standing),
         causes=causes,
         groups=group_probabilities(causes),
         spectra=_spectra(standing, every),
@@ -471,7 +472,8 @@ def diagnose_gearless(
             NOT_SIMULATED,
             HOW_SURE,
             *hint,
-            *_loose_shafts(rigs[0]),
+            *left_out,
+            *_loose_shafts(rig),
             *_limits(standing, every),
             *(text for one in every for text in one.notices),
         ),
@@ -508,8 +510,9 @@ def _limits(standing: Sequence[Standing], every: Sequence[ExaminedRecording]) ->
     return texts
 
 
-def _facts(one: ExaminedRecording, rig: Rig) -> ConditionFacts:
-    torque, recording = rig.nominal_torque_nm(), one.analysis.recording
+def _facts(one: ExaminedRecording) -> ConditionFacts:
+    recording = one.analysis.recording
+    torque = None if recording.rig is None else recording.rig.nominal_torque_nm()
     return ConditionFacts(
         one.name,
         OperatingCondition(one.angle.mean_speed_rpm, NAN if torque is None else torque),

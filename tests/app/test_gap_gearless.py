@@ -155,6 +155,15 @@ def test_several_recordings_say_which_shows_it() -> None:
     assert any(notice.startswith("quiet: no lines of the outer race") for notice in report.notices)
 
 
+def test_one_of_several_that_is_too_short_is_left_out() -> None:
+    whole = recording(ORDERS["BPFO"]).with_rig(RIG).with_name("whole")
+    short = replace(whole, samples=whole.samples[:, :500]).with_name("short")
+    report = diagnose_gap([short, whole], gap_simulator("cracked"))
+    assert report.causes[0].name == "bearing_outer_race"
+    assert [one.name for one in report.conditions] == ["whole"]
+    assert any(n.startswith("short: ") and n.endswith("this recording is left out.") for n in report.notices)
+
+
 @pytest.mark.parametrize(
     ("rig", "said"),
     [

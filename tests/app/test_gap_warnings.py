@@ -145,6 +145,16 @@ def test_one_of_several_references_that_cannot_be_read_is_left_out() -> None:
     assert any(n.startswith("the short one") and n.endswith("this reference is left out.") for n in notices)
 
 
+def test_one_of_several_recordings_that_is_too_short_is_left_out_and_told() -> None:
+    whole = recording(0, 1).with_name("now")
+    short = replace(whole, samples=whole.samples[:, :2000]).with_name("the short one")
+    twin = gap_simulator("cracked").twin_of(rig())
+    for given in ((short, whole), (whole, short)):
+        (condition,), notices = conditions_of(prepared(*given), (), twin)
+        assert condition.facts.name == "now"
+        assert any(n.startswith("the short one: ") and n.endswith("this recording is left out.") for n in notices)
+
+
 def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> None:
     twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1).with_name("now")
     first, *_ = whole.vibration_names()
