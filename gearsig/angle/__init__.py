@@ -12,16 +12,17 @@ from gearsig.angle._resample import (
     times_at,
 )
 from gearsig.angle._source import constant_speed_angle, find_shaft_angle
-from gearsig.angle._tachless import comb_evidence, estimate_shaft_angle, refine_by_phase
+from gearsig.angle._tachless import CombElsewhere, comb_elsewhere, estimate_shaft_angle, refine_by_phase
 from gearsig.angle._types import AngleSignal, ShaftAngle
 
 __all__ = [
     "PASSBAND",
     "REACH",
     "AngleSignal",
+    "CombElsewhere",
     "ShaftAngle",
     "clock_tick",
-    "comb_evidence",
+    "comb_elsewhere",
     "constant_speed_angle",
     "count_pulses",
     "delay_table",

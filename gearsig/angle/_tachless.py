@@ -441,28 +441,50 @@ def _better(
     return steady if sure or varying is None else varying
 
 
-def comb_evidence(recording: Recording, rig: Rig, stated_speed_rpm: float) -> str:
-    """Say at which multiple of a stated speed the comb of the gears does lie; empty if nowhere.
+@dataclass(frozen=True)
+class CombElsewhere:
+    """A comb of mesh lines that lies beside the place where speed and teeth put it.
+
+    Parameters
+    ----------
+    factor : float
+        Its speed over the stated one.
+    text : str
+        What was found, in one sentence.
+    """
+
+    factor: float
+    text: str
+
+
+FARTHEST_COMB = 12.5
+"""Factor on the stated speed up to which the comb is sought: sampling rates are mistaken by 10, and by 2.56."""
+
+
+def comb_elsewhere(recording: Recording, rig: Rig, stated_speed_rpm: float) -> CombElsewhere | None:
+    """Return at which multiple of a stated speed the comb of the gears does lie, if anywhere else.
 
     For "sampling rate, speed and teeth disagree": a factor of 2, or of two common sampling rates, names the culprit.
     """
     positive(stated_speed_rpm, "stated_speed_rpm", "rpm")
     stated = stated_speed_rpm / 60.0
     try:
-        search = search_of(recording, rig, None, (stated_speed_rpm / 8.0, stated_speed_rpm * 8.0))
+        limits = (stated_speed_rpm / FARTHEST_COMB, stated_speed_rpm * FARTHEST_COMB)
+        search = search_of(recording, rig, None, limits)
     except (RefusalError, InputError):
-        return ""
+        return None
     candidate = _constant_speed(search)
     if candidate is None or candidate.decision.quality < MIN_QUALITY:
-        return ""
+        return None
     factor = candidate.decision.speed / stated
     if abs(factor - 1.0) < 0.002:
-        return ""
+        return None
     mesh = search.comb.meshes[0]
-    return (
+    return CombElsewhere(
+        factor,
         f"Mesh lines with sidebands lie at {mesh * candidate.decision.speed:.5g} Hz and its multiples, "
         f"{factor:.4g} times where speed and teeth put them ({candidate.decision.evidence()}): "
-        "sampling rate, speed or teeth are wrong."
+        "sampling rate, speed or teeth are wrong.",
     )
 
 
@@ -508,9 +530,9 @@ def _refusal(search: SpeedSearch, best: SpeedCandidate | None, rig: Rig) -> Refu
         reason += f" ({best.decision.evidence()}; quality {best.decision.quality:.2f}, needed {MIN_QUALITY})"
     middle = 30.0 * (search.low + search.high)
     if search.high / search.low < 4.0:
-        elsewhere = comb_evidence(search.recording, rig, middle)
-        if elsewhere:
-            reason += ". " + elsewhere
+        elsewhere = comb_elsewhere(search.recording, rig, middle)
+        if elsewhere is not None:
+            reason += ". " + elsewhere.text
     return RefusalError(
         reason, remedy="give a tachometer or the speed, check teeth and sampling rate, or record longer under load"
     )

@@ -16,6 +16,7 @@ from gearsig.diagnosis._lines import detect_lines, detect_mesh, speed_finding
 from gearsig.diagnosis._modulation import detect_sidebands
 from gearsig.diagnosis._reference import beside_reference
 from gearsig.diagnosis._resonance import detect_resonances, order_levels
+from gearsig.diagnosis._sampling_rate import detect_sampling_rate
 from gearsig.diagnosis._signals import (
     AnalysisSignals,
     BandEnvelope,
@@ -32,7 +33,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.orders import SeparatedAverage, band_passed_mesh
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
-from gearsig.rig import Rig
+from gearsig.rig import EncoderChannel, Rig, TachometerChannel
 
 MINIMUM_SAMPLES = 256
 """Below it no spectrum has a noise floor to compare with."""
@@ -124,6 +125,12 @@ def _examined(
     levels = order_levels(signals)
 
     announce("gears, bearings and shafts")
+    doubt = detect_sampling_rate(signals, angle, envelopes)
+    if doubt is not None:
+        findings.append(doubt)
+    if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
+        order = ranked(findings)  # all orders are wrong, and what they would say
+        return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
     if not (known.pairs or known.bearings):
         title = "No gears and no bearings are described, so that none can be examined."
         surer = "A rig file with teeth and bearings; `gearsig rig example` prints one to start from."

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from math import isfinite
 
 import numpy as np
 
-from gearsig.angle import ShaftAngle
+from gearsig.angle import ShaftAngle, comb_elsewhere
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
 from gearsig.prepared import MAINS_HZ, RUN_UP_FOOT_ORDERS, LineExcess, floor_of, levels_beside
@@ -138,6 +137,8 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
         title = f"The mesh of {pair.name} shows at order {line.position:.6g} ({where.frequency_hz:.6g} Hz, "
         title += f"harmonic {harmonic})."
         return Finding("mesh-found", Kind.INFORMATION, title, where, strength, 0.99, _OVER_FLOOR)
+    # At which multiple of the stated speed the mesh lines do lie, if anywhere.
+    elsewhere = comb_elsewhere(signals.recording, signals.rig, signals.frequency_per_order_hz * 60)
     near = f"The best of {N_HARMONICS} harmonics is {line.ratio_db:.1f} dB over the floor."
     if not line.is_highest:
         near = f"Near harmonic {harmonic} a line stands beside its place: the speed may be off by little, and small "
@@ -148,18 +149,9 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
         f"No mesh line of {pair.name} where speed and teeth put it (order {mesh:.6g}, {hertz:.6g} Hz).",
         where,
         strength,
-        evidence=(*_where_instead(signals), near),
+        evidence=(near,) if elsewhere is None else (elsewhere.text, near),
         surer="Check sampling rate, speed source (pulses per revolution, shaft) and teeth; or the gears carry no load.",
     )
-
-
-def _where_instead(signals: AnalysisSignals) -> Iterator[str]:
-    """Say at which multiple of the stated speed the mesh lines do lie, if anywhere."""
-    from gearsig.angle import comb_evidence
-
-    evidence = comb_evidence(signals.recording, signals.rig, signals.frequency_per_order_hz * 60)
-    if evidence:
-        yield evidence
 
 
 def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | None:

@@ -6,7 +6,13 @@
 >>> analyze(now, reference=healthy), estimate_crack(now, reference=healthy)  # doctest: +SKIP
 """
 
-from gearsig.prepared._angle import MAINS_HZ, envelope_bands, phase_followed_angle, refined_angle
+from gearsig.prepared._angle import (
+    MAINS_HZ,
+    STATED_SPEED_TOLERANCE,
+    envelope_bands,
+    phase_followed_angle,
+    refined_angle,
+)
 from gearsig.prepared._lines import (
     INNER_LINES,
     LOG_RATIO_LIMIT,
@@ -31,6 +37,7 @@ __all__ = [
     "LOG_RATIO_LIMIT",
     "MAINS_HZ",
     "RUN_UP_FOOT_ORDERS",
+    "STATED_SPEED_TOLERANCE",
     "Comb",
     "LineExcess",
     "PreparedRecording",

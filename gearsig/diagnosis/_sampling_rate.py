@@ -1,0 +1,252 @@
+"""A sampling rate that is wrong: everything then lies a factor beside the place where speed and geometry put it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import log10
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.angle import ShaftAngle, comb_elsewhere
+from gearsig.checks import FloatArray
+from gearsig.diagnosis._lines import speed_is_confirmed
+from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
+from gearsig.diagnosis._types import CannotTell, Finding, Kind
+from gearsig.prepared import STATED_SPEED_TOLERANCE, LineExcess
+from gearsig.recording import Recording
+from gearsig.rig import ConstantSpeed, EncoderChannel, Rig, TachometerChannel
+
+SAMPLING_RATE = "sampling-rate-doubtful"
+"""Code of the finding; it opens the verdict."""
+
+USUAL_FACTORS = (2.0, 2.56, 4.0, 5.0, 8.0, 10.0)
+"""By which rates are mistaken, up or down: decimation, a prefix or a digit, bandwidth for rate (2.56)."""
+
+N_LINES = 12
+HIGHEST_ORDER = 12.0
+CLEAR_DB = 12.0
+"""The strongest lines of a spectrum, up to that order of the shaft: those that a machine's own parts make."""
+
+ENOUGH_EVIDENCE = -20.0
+"""Sum over all spectra of lg p from which a rate explains what is seen."""
+
+SHARE_OF_STATED = 0.25
+"""The stated rate explains nothing where its own sum is below that share of another rate's."""
+
+AS_GOOD = 0.6
+"""Share of the best factor's sum that makes a milder one preferred."""
+
+
+def detect_sampling_rate(
+    signals: AnalysisSignals, angle: ShaftAngle | CannotTell, envelopes: Sequence[BandEnvelope]
+) -> Finding | None:
+    """Say that the sampling rate is probably wrong, and by which factor, None where nothing speaks for it.
+
+    With gears, their comb of mesh lines and sidebands is sought at other multiples of the stated speed. Without, the
+    strongest lines are explained by shafts and races at each of the usual factors; a tachometer or encoder is compared
+    with the nominal speed.
+    """
+    recording, rig = signals.recording, signals.rig
+    source = recording.speed_source
+    if isinstance(source, TachometerChannel | EncoderChannel) and isinstance(angle, ShaftAngle):
+        return _beside_nominal(recording, rig, angle)
+    if rig.pairs:
+        return _by_gears(signals, angle)
+    if isinstance(source, ConstantSpeed) and signals.angle is not None:
+        return _by_lines(signals, envelopes)
+    return None
+
+
+def _finding(recording: Recording, factor: float, evidence: str, surer: str) -> Finding:
+    """Return the finding that the true rate is `factor` times the stated one."""
+    stated_hz = recording.sampling_rate_hz
+    times = f"{factor:.4g} times" if factor > 1 else f"1/{1 / factor:.4g} of"
+    return Finding(
+        SAMPLING_RATE,
+        Kind.DATA_PROBLEM,
+        f"The sampling rate is probably wrong: {factor * stated_hz:.6g} Hz, {times} the stated {stated_hz:.6g} Hz, "
+        "would fit best.",
+        confidence=0.9,
+        confidence_basis="what the factor explains that the stated rate does not",
+        evidence=(evidence,),
+        surer=surer,
+    )
+
+
+def _usual(factor: float, tolerance: float) -> float | None:
+    """Return the usual factor, or one over it, that a measured one is within a relative tolerance of."""
+    near = [f for usual in USUAL_FACTORS for f in (usual, 1 / usual) if abs(factor / f - 1) <= tolerance]
+    return min(near, key=lambda f: abs(factor / f - 1), default=None)
+
+
+def _beside_nominal(recording: Recording, rig: Rig, angle: ShaftAngle) -> Finding | None:
+    """Compare a speed measured by the recording's own clock with the nominal one."""
+    nominal_rpm = rig.nominal_speed_rpm(angle.shaft if angle.shaft in rig.shaft_names else "")
+    if not nominal_rpm:
+        return None
+    ratio = angle.mean_speed_rpm / nominal_rpm
+    factor = _usual(1 / ratio, rig.operating_point.speed_tolerance_percent / 100)
+    if factor is None:
+        return None
+    evidence = f"The shaft turns at {angle.mean_speed_rpm:.5g} rpm by this clock, {ratio:.3g} times the nominal speed."
+    other = "or the pulses per revolution" if isinstance(recording.speed_source, TachometerChannel) else "or the speed"
+    return _finding(recording, factor, evidence, f"Check the sampling rate, {other}: orders are right with either.")
+
+
+def _by_gears(signals: AnalysisSignals, angle: ShaftAngle | CannotTell) -> Finding | None:
+    recording, rig = signals.recording, signals.rig
+    if isinstance(angle, ShaftAngle):
+        if not isinstance(recording.speed_source, ConstantSpeed) or speed_is_confirmed(signals):
+            return None
+        stated_rpm: float | None = angle.mean_speed_rpm
+    else:
+        stated_rpm = rig.nominal_speed_rpm()
+    elsewhere = comb_elsewhere(recording, rig, stated_rpm) if stated_rpm else None
+    factor = None if elsewhere is None else _usual(1 / elsewhere.factor, STATED_SPEED_TOLERANCE)
+    if elsewhere is None or factor is None:
+        return None
+    return _finding(recording, factor, elsewhere.text, "Check the sampling rate first, then speed and teeth.")
+
+
+# --------------------
+# Without gears: which rate lets shafts and races explain the strongest lines.
+# --------------------
+
+
+@dataclass(frozen=True)
+class StrongLines:
+    """The strongest lines of one spectrum over order, as it looks at the stated rate.
+
+    Parameters
+    ----------
+    orders : array, (n_lines,)
+    half_width : float
+        How far a line may be beside its place, in orders.
+    lowest, highest : float
+        Orders between which they were sought.
+    """
+
+    orders: FloatArray
+    half_width: float
+    lowest: float
+    highest: float
+
+
+def _strong_lines(excess: LineExcess, highest: float) -> StrongLines | None:
+    from scipy.ndimage import maximum_filter1d
+
+    spectrum = excess.spectrum
+    lowest = max(4 * spectrum.resolution, 0.02)
+    highest = min(highest, float(spectrum.positions[-1]))
+    clear = spectrum.values > excess.floor * 10 ** (CLEAR_DB / 20)
+    clear &= (spectrum.values >= maximum_filter1d(spectrum.values, 7)) & (spectrum.positions > lowest)
+    places = np.flatnonzero(clear & (spectrum.positions < highest))
+    places = places[np.argsort(-spectrum.values[places])][:N_LINES]
+    if len(places) < 5:
+        return None  # chance then explains them as well
+    return StrongLines(spectrum.positions[places], 1.5 * spectrum.resolution, lowest, highest)
+
+
+def _near(lines: StrongLines, places: FloatArray) -> NDArray[np.bool_]:
+    """Which of the lines lie at one of the places."""
+    if not len(places):
+        return np.zeros(len(lines.orders), dtype=bool)
+    places = np.sort(places)
+    right = np.clip(np.searchsorted(places, lines.orders), 1, len(places) - 1) if len(places) > 1 else 0
+    nearest: FloatArray = np.minimum(np.abs(lines.orders - places[right]), np.abs(lines.orders - places[right - 1]))
+    beside: NDArray[np.bool_] = nearest < lines.half_width
+    return beside
+
+
+def _log_p(lines: StrongLines, factor: float, shafts: Sequence[float], races: Sequence[tuple[float, float]]) -> float:
+    r"""Return lg of the probability that chance puts so many of n lines on the places of shafts and races.
+
+    .. math:: p = T \sum_{k \ge m} \binom{n}{k} c^k (1 - c)^{n - k}
+
+    c is the share of the range that the places cover, T the number of speeds and slips tried: the stated speed may be
+    3 % beside the true one, a race 1.5 % beside its kinematic order. Each multiple of a race has two
+    sidebands of its shaft to either side.
+    """
+    highest = max(lines.highest, 1.0)
+    n_speeds = min(4001, int(2 * STATED_SPEED_TOLERANCE * highest / (lines.half_width / 1.5)) + 2)
+    speeds = np.linspace(1 - STATED_SPEED_TOLERANCE, 1 + STATED_SPEED_TOLERANCE, n_speeds) / factor
+    ratio = lines.orders[:, None] / speeds
+    beside = np.abs(ratio - np.maximum(np.rint(ratio), 1)) * speeds
+    # The speed that puts most lines on the shaft's multiples, or the stated one where those are weak.
+    best = float(speeds[int(np.argmax((beside < lines.half_width).sum(axis=0)))])
+    return min(_log_p_at(lines, speed, n_speeds, shafts, races) for speed in (best, 1 / factor))
+
+
+def _log_p_at(
+    lines: StrongLines, speed: float, n_speeds: int, shafts: Sequence[float], races: Sequence[tuple[float, float]]
+) -> float:
+    from scipy.stats import binom
+
+    places = [np.arange(1, int(lines.highest / (shaft * speed)) + 2) * shaft * speed for shaft in shafts]
+    seen, tries = _near(lines, np.concatenate(places)), float(n_speeds)
+    for race, shaft in races:
+        slips = [_family(race * slip, shaft, lines.highest / speed) * speed for slip in np.linspace(0.985, 1.015, 61)]
+        new = [int((_near(lines, family) & ~seen).sum()) for family in slips]
+        best = int(np.argmax(new))
+        tries *= 3.0
+        if new[best] >= 2:
+            places.append(slips[best])
+            seen |= _near(lines, slips[best])
+            tries *= len(slips) / 3
+    inside = np.sort(np.concatenate(places))
+    inside = inside[(inside > lines.lowest) & (inside < lines.highest)]
+    if not len(inside):
+        return 0.0
+    width = np.minimum(np.diff(inside), 2 * lines.half_width).sum() + 2 * lines.half_width
+    covered = min(1.0, width / (lines.highest - lines.lowest))
+    p_value = tries * float(binom.sf(int(seen.sum()) - 1, len(lines.orders), covered))
+    return min(0.0, log10(max(p_value, 1e-30)))
+
+
+def _family(race: float, shaft: float, highest: float) -> FloatArray:
+    """Orders of a race's multiples with their sidebands."""
+    multiples = race * np.arange(1, int(highest / race) + 2)
+    return (multiples[:, None] + shaft * np.arange(-2, 3)).ravel()
+
+
+def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Finding | None:
+    spectra = [*signals.order_excess.values(), *(e.excess for e in envelopes)]
+    shafts = sorted(signals.known_shaft_orders.values())
+    races = list(_races(signals))
+
+    def evidence(factor: float, highest: float) -> float:
+        """Sum over the spectra, of lg of the chance that lines up to an order lie as well."""
+        found = (_strong_lines(excess, highest) for excess in spectra)
+        return sum(_log_p(lines, factor, shafts, races) for lines in found if lines is not None)
+
+    if evidence(1.0, HIGHEST_ORDER) <= ENOUGH_EVIDENCE:
+        return None
+    # Halves of the shaft's order are looseness, and multiples blades or poles: races must tell these rates apart.
+    factors = [f for usual in USUAL_FACTORS for f in (usual, 1 / usual) if (f > 2 or races)]
+    # A rate that is too high moves everything up, and more of the spectrum counts.
+    ranges = {factor: HIGHEST_ORDER * max(1.0, 1 / factor) for factor in factors}
+    sums = {factor: evidence(factor, ranges[factor]) for factor in factors}
+    # The mildest factor that explains nearly as much as the best: its multiples do so, too, with more places.
+    as_good = [f for f in factors if sums[f] <= AS_GOOD * min(sums.values())]
+    factor = min(as_good, key=lambda f: (round(abs(log10(f)), 6), sums[f]))
+    stated = evidence(1.0, ranges[factor])
+    if min(sums.values()) > ENOUGH_EVIDENCE or stated < SHARE_OF_STATED * sums[factor]:
+        return None
+    return _finding(
+        signals.recording,
+        factor,
+        f"The strongest lines of {len(spectra)} spectra then lie at orders of shafts and races (lg p "
+        f"{sums[factor]:.0f} in sum); at the stated rate they do not ({stated:.0f}).",
+        "Check the sampling rate, and whether another shaft turns that much slower or faster.",
+    )
+
+
+def _races(signals: AnalysisSignals) -> Iterator[tuple[float, float]]:
+    """Yield the order of each race and that of its shaft."""
+    for bearing in signals.rig.bearings:
+        ratio = signals.rig.ratio(bearing.shaft)
+        orders = bearing.orders()
+        if ratio is not None:
+            yield from ((ratio * orders[part], ratio) for part in ("BPFO", "BPFI") if part in orders)
