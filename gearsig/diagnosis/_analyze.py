@@ -130,15 +130,13 @@ def _examined(
         findings.append(doubt)
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
         order = ranked(findings)  # all orders are wrong, and what they would say
-        return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings))
+        return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
     if not (known.pairs or known.bearings):
         title = "No gears and no bearings are described, so that none can be examined."
         surer = "A rig file with teeth and bearings; `gearsig rig example` prints one to start from."
         findings.append(cannot_tell("machine-not-described", title, surer=surer))
-    findings += detect_mesh(signals)
-    findings += detect_tooth_damage(signals)
-    findings += detect_bearings(signals, envelopes, own_bands)
-    findings += detect_sidebands(signals)
+    findings += [*detect_mesh(signals), *detect_tooth_damage(signals)]
+    findings += [*detect_bearings(signals, envelopes, own_bands), *detect_sidebands(signals)]
     findings += detect_lines(signals)
     findings += detect_resonances(levels)
 
