@@ -67,7 +67,7 @@ def shaft_lines(prepared: PreparedRecording, pair: GearPair, shaft: str, channel
             f"the record holds {angle.n_revolutions:.3g} revolutions of shaft {shaft!r}, {MIN_REVOLUTIONS} are needed",
             remedy="record longer",
         )
-    average = prepared.average_lines(shaft, channels)
+    average = prepared.average_lines(shaft, channels, followed=True)  # two records' averages are compared
     return ShaftLines(
         shaft,
         teeth,
