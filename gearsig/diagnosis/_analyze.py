@@ -20,6 +20,7 @@ from gearsig.diagnosis._sampling_rate import detect_sampling_rate
 from gearsig.diagnosis._signals import (
     AnalysisSignals,
     BandEnvelope,
+    KurtogramBand,
     band_envelopes,
     channel_analysis,
     compute_signals,
@@ -27,7 +28,7 @@ from gearsig.diagnosis._signals import (
 )
 from gearsig.diagnosis._start_stop import start_stop_analysis
 from gearsig.diagnosis._tooth import detect_tooth_damage
-from gearsig.diagnosis._types import Analysis, AnalysisSettings, CannotTell, LevelChange, cannot_tell
+from gearsig.diagnosis._types import Analysis, AnalysisSettings, CannotTell, Finding, LevelChange, cannot_tell
 from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import SeparatedAverage, band_passed_mesh
@@ -131,14 +132,7 @@ def _examined(
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
         order = ranked(findings)  # all orders are wrong, and what they would say
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
-    if not (known.pairs or known.bearings):
-        title = "No gears and no bearings are described, so that none can be examined."
-        surer = "A rig file with teeth and bearings; `gearsig rig example` prints one to start from."
-        findings.append(cannot_tell("machine-not-described", title, surer=surer))
-    findings += [*detect_mesh(signals), *detect_tooth_damage(signals)]
-    findings += [*detect_bearings(signals, envelopes, own_bands), *detect_sidebands(signals)]
-    findings += detect_lines(signals)
-    findings += detect_resonances(levels)
+    findings += [*_of_machine(signals, envelopes, own_bands), *detect_resonances(levels)]
 
     reference_analysis: Analysis | None = None
     compared: tuple[LevelChange, ...] = ()
@@ -169,6 +163,23 @@ def _examined(
         level_changes=compared,
     )
     return analysis, (signals, envelopes)
+
+
+def _of_machine(
+    signals: AnalysisSignals, envelopes: list[BandEnvelope], own_bands: Sequence[KurtogramBand]
+) -> Iterator[Finding]:
+    """Yield what gears, bearings, shafts and single lines show."""
+    if not (signals.rig.pairs or signals.rig.bearings):
+        title = "No gears and no bearings are described, so that none can be examined."
+        surer = "A rig file with teeth and bearings; `gearsig rig example` prints one to start from."
+        yield cannot_tell("machine-not-described", title, surer=surer)
+    yield from detect_mesh(signals)
+    yield from detect_tooth_damage(signals)
+    impacts = detect_bearings(signals, envelopes, own_bands)
+    yield from impacts
+    trains = tuple(f.where.order for f in impacts if f.where.order is not None and f.where.band_hz is not None)
+    yield from detect_sidebands(signals, trains)
+    yield from detect_lines(signals, trains)
 
 
 def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:

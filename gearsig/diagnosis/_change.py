@@ -31,8 +31,8 @@ from gearsig.orders import order_map
 from gearsig.prepared import envelope_bands
 from gearsig.rig import order_lines
 
-N_SEGMENTS = 12
-"""Of the shorter record: enough to know the scatter of a level to a fifth, and long enough to tell sidebands apart."""
+N_SEGMENTS = 8
+"""Of the shorter record: enough to know a level's scatter to a quarter, and long enough to tell sidebands apart."""
 
 MIN_SEGMENT_REV = 8
 STATED_SPEED = 0.01
@@ -189,6 +189,14 @@ class _Segments:
         """Of the lines."""
         return float((self.power.shape[1] - 4) * self.resolution)
 
+    def without_multiples(self, orders: Sequence[float]) -> _Segments:
+        """Return the same with the lines at multiples of some orders, two to either side, set to 0."""
+        positions = np.arange(self.power.shape[1]) * self.resolution
+        hidden = np.zeros(len(positions), dtype=bool)
+        for order in orders:
+            hidden |= np.abs(positions - np.rint(positions / order) * order) < 2.5 * self.resolution
+        return _Segments(np.where(hidden, 0.0, self.power), self.resolution)
+
     def line(self, order: float, slip: float = 0.0) -> _Levels:
         """Return the largest line at an order, within `slip` (relative) or a line to either side."""
         reach = max(1, round(slip * order / self.resolution))
@@ -206,9 +214,10 @@ class _Segments:
 
 
 def _sum(levels: Sequence[_Levels]) -> _Levels:
-    """Add mean squares; they stand out if half of them do."""
+    """Add mean squares; they stand out if the lines that do hold half of all."""
     power = np.sum([one.power for one in levels], axis=0)
-    return _Levels(power, 2 * sum(one.stands_out for one in levels) >= len(levels))
+    standing = sum(float(one.power.sum()) for one in levels if one.stands_out)
+    return _Levels(power, 2 * standing >= float(power.sum()))
 
 
 def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block_rev: int) -> Iterator[_Quantity]:
@@ -278,12 +287,13 @@ def _bearing_parts(
     """Yield each known part's family of lines in the band of each channel's envelopes where either record has most."""
     bands = {(e.channel, e.band_hz): e for e in reference_envelopes}
     pairs = [(e, bands[e.channel, e.band_hz]) for e in envelopes if (e.channel, e.band_hz) in bands]
+    shafts = tuple(signals.known_shaft_orders.values())
     for bearing, name, order in expected_parts(signals):
         for channel in dict.fromkeys(e.channel for e, _ in pairs):
             place = signals.where(order, channel, shaft=bearing.shaft, bearing=bearing.name)
             found = []
             for envelope, other in pairs:
-                levels = [_family(e, order, slip_of(signals), block_rev) for e in (envelope, other)]
+                levels = [_family(e, order, slip_of(signals), block_rev, shafts) for e in (envelope, other)]
                 if envelope.channel == channel and levels[0] is not None and levels[1] is not None:
                     where = replace(place, band_hz=envelope.band_hz)
                     found.append(_Quantity(part_text(name, bearing.name), "bearing", where, 0.0, "", *levels))  # type: ignore[arg-type]
@@ -291,20 +301,23 @@ def _bearing_parts(
                 yield max(found, key=lambda q: max(float(q.now.power.mean()), float(q.then.power.mean())))
 
 
-def _family(envelope: BandEnvelope, order: float, slip: float, block_rev: int) -> _Levels | None:
+def _family(
+    envelope: BandEnvelope, order: float, slip: float, block_rev: int, shafts: Sequence[float] = ()
+) -> _Levels | None:
     """Return the sum of the first three multiples of an order in the envelope, as depths of modulation.
 
-    It stands out where its depth is one that a damage has: a louder carrier changes none of it.
+    It stands out where each does, beside multiples of the shafts, and the depth is one that a damage has: a louder
+    carrier changes none of it.
     """
     if envelope.over_angle is None or envelope.mean <= 0:
         return None
-    segments = _Segments.of(envelope.over_angle, envelope.channel, block_rev)
-    orders = [k * order for k in (1, 2, 3) if k * order * (1 + slip) <= segments.highest_order]
-    if not orders:
+    segments = _Segments.of(envelope.over_angle, envelope.channel, block_rev).without_multiples(shafts)
+    lines = [segments.line(k * order, slip) for k in (1, 2, 3) if k * order * (1 + slip) <= segments.highest_order]
+    if not lines or not all(line.power.any() for line in lines):
         return None
-    lines = [segments.line(o, slip) for o in orders]
-    family, depth = _sum(lines), max(float(np.sqrt(2 * one.power.mean())) for one in lines) / envelope.mean
-    return _Levels(family.power / envelope.mean**2, family.stands_out and depth >= CLEAR_MODULATION)
+    depth = max(float(np.sqrt(2 * line.power.mean())) for line in lines) / envelope.mean
+    stands_out = len(lines) > 1 and all(line.stands_out for line in lines) and depth >= CLEAR_MODULATION
+    return _Levels(_sum(lines).power / envelope.mean**2, stands_out)
 
 
 # --------------------

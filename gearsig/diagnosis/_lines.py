@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
 
@@ -11,7 +12,8 @@ from gearsig.angle import ShaftAngle, comb_elsewhere
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
 from gearsig.prepared import MAINS_HZ, RUN_UP_FOOT_ORDERS, LineExcess, floor_of, levels_beside
-from gearsig.rig import GearPair
+from gearsig.rig import GearPair, hunting_tooth_order
+from gearsig.spectra import Spectrum
 
 N_HARMONICS = 3
 """Multiples of a mesh or shaft order that are looked at."""
@@ -217,9 +219,16 @@ def _margin_db(excess: LineExcess, mesh: float, order: float) -> float | None:
 # Single lines: the mains', and the strongest that belongs to nothing known.
 
 
-def detect_lines(signals: AnalysisSignals) -> list[Finding]:
-    """Report mains hum and the strongest unexplained line; without speed the strongest line, as a start."""
-    strongest = _unexplained(signals) if signals.order_excess else _strongest(signals)
+def detect_lines(signals: AnalysisSignals, trains: Sequence[float] = ()) -> list[Finding]:
+    """Report mains hum and the strongest unexplained line; without speed the strongest line, as a start.
+
+    Parameters
+    ----------
+    signals : AnalysisSignals
+    trains : sequence of float
+        Orders of impacts that the envelopes show: they stand beside the meshes as well.
+    """
+    strongest = _unexplained(signals, trains) if signals.order_excess else _strongest(signals)
     return [finding for finding in (_mains(signals), strongest) if finding is not None]
 
 
@@ -257,7 +266,7 @@ def _is_synchronous(signals: AnalysisSignals, hertz: float) -> bool:
     return any(abs(order / o - round(order / o)) * o < 0.01 for o in candidates)
 
 
-def _unexplained(signals: AnalysisSignals) -> Finding | None:
+def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding | None:
     """Return the strongest order line that is no multiple of a known shaft's order, and no bearing's."""
     best: tuple[float, str, int] | None = None
     foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
@@ -283,17 +292,75 @@ def _unexplained(signals: AnalysisSignals) -> Finding | None:
     if best is None:
         return None
     line = PlacedLine.at(signals.order_excess[best[1]], best[2])
-    where = signals.where(line.position, best[1])
+    where, excess = signals.where(line.position, best[1]), signals.order_excess[best[1]]
+    origin = combination(signals, line.position, excess.spectrum, trains)
+    title = (
+        "The strongest line of no single shaft or mesh" if origin else "The strongest line of no known shaft or mesh"
+    )
+    title += f" is at order {line.position:.4f} ({where.frequency_hz:.5g} Hz)"
     return Finding(
         "unexplained-line",
         Kind.NOTICE,
-        f"The strongest line of no known shaft or mesh is at order {line.position:.4f} ({where.frequency_hz:.5g} Hz).",
+        f"{title}: {origin}." if origin else f"{title}.",
         replace(where, order_shaft=signals.order_excess[best[1]].spectrum.shaft),
         line.strength("noise floor"),
         0.95,
         _UNKNOWN_CAUSE,
         surer="A run-up: a line of fixed frequency is a resonance or electrical, one of fixed order a shaft's.",
     )
+
+
+BY_CHANCE = 0.1
+"""Part of all places that combinations may cover, for one that fits to say anything."""
+
+
+def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trains: Sequence[float]) -> str:
+    """Say which combination of known orders a line is; empty where it is none, or so many would be that one fits.
+
+    Impacts of order q that a mesh modulates, or is modulated by, stand at h·mesh ± k·q, and a shaft's order beside.
+    Multiples of the hunting-tooth order belong to both gears together: each pair of teeth has its own meeting.
+
+    Parameters
+    ----------
+    signals : AnalysisSignals
+    order : float
+        Of the reference shaft.
+    spectrum : Spectrum
+        That shows the line.
+    trains : sequence of float
+        Orders of impacts.
+    """
+    near, highest = 1.5 * spectrum.resolution, float(spectrum.positions[-1])
+    places: dict[str, float] = {}
+    for train in trains:
+        for h in range(N_COMBINED + 1):
+            for name, mesh in signals.known_mesh_orders.items() if h else (("", 0.0),):
+                start = f"{h}× mesh {name} {{}} " if h else ""
+                for k in range(1, N_COMBINED + 1):
+                    text = f"{start}{k if k > 1 else ''}{'×' if k > 1 else ''}{train:.4f}, the order of impacts"
+                    places |= {text.format(sign): h * mesh + (k if sign == "+" else -k) * train for sign in "+−"}
+    for train_text, place in list(places.items()):
+        for shaft, turns in signals.known_shaft_orders.items():
+            for j in (1, 2):
+                places |= {
+                    f"{train_text}, {sign} {j}× {shaft}": place + (j if sign == "+" else -j) * turns for sign in "+−"
+                }
+    inside = {text: place for text, place in places.items() if 0 < place < highest}
+    if len(inside) * 2 * near <= BY_CHANCE * highest:
+        text = min(inside, key=lambda one: abs(inside[one] - order), default="")
+        if text and abs(inside[text] - order) <= near:
+            return text
+    for pair in signals.rig.pairs:
+        hunting = hunting_tooth_order(signals.rig, pair)
+        if hunting is not None and 2 * near <= BY_CHANCE * hunting:
+            n = round(order / hunting)
+            if abs(order - n * hunting) <= near:
+                return f"{n}× the hunting-tooth order of {pair.name}, of both its gears together"
+    return ""
+
+
+N_COMBINED = 3
+"""Harmonics of a mesh and of a train of impacts that are combined."""
 
 
 def _strongest(signals: AnalysisSignals) -> Finding | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import log10
 
@@ -13,7 +13,7 @@ from gearsig.diagnosis._signals import AnalysisSignals, line_at
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, from_p_value, p_text
 from gearsig.indicators import lobe_lines
 from gearsig.prepared import INNER_LINES, RUN_UP_FOOT_ORDERS, Comb, LineExcess, best_comb, level_beside
-from gearsig.rig import GearPair
+from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
 
 STRONG_DB = -10.0
@@ -30,6 +30,9 @@ MIRROR_RATIO = 10.0
 """Power over its mirror image from which a line may be another machine's."""
 
 APART_LINES = 3.0
+
+TRAIN_SKIRT = 5e-4
+"""Relative: a bearing's slip wanders."""
 
 Cells = dict[tuple[int, int], tuple[float, float]]
 """(mesh harmonic, k) → power of the lower and of the upper sideband."""
@@ -203,8 +206,15 @@ def _floor_power(excess: LineExcess, place: float) -> float:
     return float(excess.floor[excess.spectrum.index_of(place)]) ** 2
 
 
-def detect_sidebands(signals: AnalysisSignals) -> list[Finding]:
-    """Report strong modulation by known shafts, and sideband families of shafts that the rig does not know."""
+def detect_sidebands(signals: AnalysisSignals, trains: Sequence[float] = ()) -> list[Finding]:
+    """Report strong modulation by known shafts, and sideband families of shafts that the rig does not know.
+
+    Parameters
+    ----------
+    signals : AnalysisSignals
+    trains : sequence of float
+        Orders of impacts that the envelopes show: their sidebands are no shaft's.
+    """
     findings: list[Finding] = []
     for pair in signals.rig.pairs:
         if not mesh_is_confirmed(signals, pair) or teeth_are_contradicted(signals, pair) is not None:
@@ -214,7 +224,7 @@ def detect_sidebands(signals: AnalysisSignals) -> list[Finding]:
             median = float(np.median([m.level_db for m in by_channel.values()])) if by_channel else -np.inf
             if median >= NOTABLE_DB:
                 findings.append(_modulated(signals, pair, shaft, by_channel, median))
-        findings += _unknown_family(signals, pair)
+        findings += _unknown_family(signals, pair, trains)
     return findings
 
 
@@ -226,7 +236,6 @@ def _modulated(
     strongest = by_channel[channel]
     n = strongest.times
     times = {1: "once", 2: "twice"}.get(n, f"{n} times")
-    suspect = median >= STRONG_DB and not rig.assumed
     how = "strongly modulated" if median >= STRONG_DB else "modulated"
     basis = "how much modulation is usual depends on the machine and the sensor's place"
     evidence = [
@@ -244,24 +253,24 @@ def _modulated(
     surer = "Compare with a recording of the same gearbox known to be good, or look for it at another load."
     return Finding(
         "mesh-modulated",
-        Kind.SUSPICION if suspect else Kind.NOTICE,
+        Kind.NOTICE,  # what is usual differs by machine: only one whose reference lacks it is suspected, see `_change`
         f"The mesh of {pair.name} is {how} {times} per revolution of shaft {shaft}.",
         # Of a ratio between lines, a frequency says nothing.
         replace(signals.where(strongest.spacing, channel, shaft=shaft, gear=f"{pair.name}/{shaft}"), frequency_hz=None),
         Strength(value, "sideband/carrier", limit, "common on healthy machines", median - NOTABLE_DB),
-        confidence=0.5 if suspect else 0.95 * (WITH_ASSUMED_DATA if rig.assumed else 1.0),
-        confidence_basis=f"that it is a fault: {basis}" if suspect else f"that it is there; {basis}",
+        confidence=0.95 * (WITH_ASSUMED_DATA if rig.assumed else 1.0),
+        confidence_basis=f"that it is there; {basis}",
         evidence=tuple(evidence),
         surer="Look for it at another load." if signals.has_reference else surer,
     )
 
 
-def _unknown_family(signals: AnalysisSignals, pair: GearPair) -> Iterator[Finding]:
+def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[float]) -> Iterator[Finding]:
     """Find sidebands whose spacing is no known shaft's: that is how a wheel shows whose teeth are not given."""
     mesh = signals.rig.mesh_order(pair)
     if mesh is None:
         return
-    combs = {name: _family(signals, excess, mesh) for name, excess in signals.order_excess.items()}
+    combs = {name: _family(signals, excess, pair, trains) for name, excess in signals.order_excess.items()}
     found = {name: comb for name, comb in combs.items() if comb is not None}
     channel = min(found, key=lambda name: found[name].p_value, default=None)
     if channel is None:
@@ -271,6 +280,9 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair) -> Iterator[Findin
     shafts = signals.known_shaft_orders.values()
     # The spacing may be a known shaft's after all: skirts of its lines, where the speed is not exactly known.
     is_known = any(abs(k * order / comb.fundamental - 1) < 0.01 for order in shafts for k in (1, 2))
+    hunting = hunting_tooth_order(signals.rig, pair)
+    known = (*trains, hunting) if hunting is not None else trains
+    is_known |= _is_part_of(comb.fundamental, known, excess.spectrum.resolution)
     if p_value > signals.settings.false_alarm_probability or is_known or not _is_family(excess, comb, mesh):
         return
     evidence = [f"{len(comb.positions)} of the sidebands stand 6 dB or more over the floor."]
@@ -302,7 +314,23 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair) -> Iterator[Findin
     )
 
 
-def _family(signals: AnalysisSignals, excess: LineExcess, mesh: float) -> Comb | None:
+MOST_PARTS = 16
+
+
+def _is_part_of(spacing: float, orders: Sequence[float], resolution: float) -> bool:
+    """Whether a spacing is a part m/n of an order: two combs of lines have common ones then.
+
+    A cage turns n times slower than the elements of its bearing pass. The multiple is as exact as the spacing, which
+    its third multiples give to a sixth of a line.
+    """
+    whole = [(m * order, round(m * order / spacing)) for order in orders for m in (1, 2, 3)]
+    return any(1 <= n <= MOST_PARTS and abs(order - n * spacing) <= n * resolution / 6 for order, n in whole)
+
+
+def _family(signals: AnalysisSignals, excess: LineExcess, pair: GearPair, trains: Sequence[float]) -> Comb | None:
+    mesh, hunting = signals.rig.mesh_order(pair), hunting_tooth_order(signals.rig, pair)
+    if mesh is None:
+        return None
     foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
     for other in {mesh, *signals.known_mesh_orders.values()}:
         excess = excess.without_multiples(other, half_width=foot)
@@ -310,6 +338,11 @@ def _family(signals: AnalysisSignals, excess: LineExcess, mesh: float) -> Comb |
         wide = foot if order >= 4 * foot else 0.0
         excess = excess.without_multiples(order, half_width=wide)
         excess = excess.without_multiples(order, start=mesh, half_width=wide)
+    if hunting is not None:
+        excess = excess.without_multiples(hunting)  # of both gears together, and the mesh is one of them
+    for train in trains:  # with each shaft's sidebands
+        for start in (0.0, mesh, *(mesh + k * o for o in signals.known_shaft_orders.values() for k in (-2, -1, 1, 2))):
+            excess = excess.without_multiples(train, start=start, skirt=TRAIN_SKIRT)
     centres = mesh * np.arange(1, N_CARRIERS + 1)
     centres = centres[centres + 2 < excess.spectrum.positions[-1]]
     if len(centres) == 0:

@@ -251,8 +251,8 @@ LARGEST_TORQUE_CHANGE = 0.10
 """Relative, as in the calibration."""
 
 LARGEST_LEVEL_CHANGE_DB = 2.5
-"""Of the median mesh harmonic, each weighted by the decibels it stands over the lines around. Unweighted, on 100 simulated machines it is 1.4 dB at most, with the deepest cracks; another
-torque within its limit adds 0.8 dB."""
+"""Of the median mesh harmonic, each weighted by the decibels it stands over the lines around. Unweighted, on 100
+simulated machines it is 1.4 dB at most, with the deepest cracks; another torque within its limit adds 0.8 dB."""
 
 _REMEDY = "take a reference of the same gears, with the same sensors and gains, at the same speed and load"
 

@@ -167,7 +167,7 @@ def test_lines_of_another_pair_or_of_the_carrier_are_no_sidebands(pairs: tuple[G
 def test_three_modulations_per_revolution_are_told() -> None:
     model = replace(MODEL, modulations=(MeshModulation("stage", "in", 0.9, order=3),))
     (finding,) = found(analyze(record(model)), "mesh-modulated")
-    assert finding.kind is Kind.SUSPICION
+    assert finding.kind is Kind.NOTICE
     assert "3 times per revolution of shaft in" in finding.title
     assert finding.where.order == pytest.approx(3.0)
 
