@@ -1,5 +1,6 @@
 """The machine: shafts, gear pairs, bearings, sensors, operating point, and the orders they imply."""
 
+from gearsig.rig._catalogue import CatalogueBearing, bearing_catalogue, catalogue_bearing
 from gearsig.rig._contact import (
     DAMPING_LAWS,
     PathOfContact,
@@ -42,6 +43,7 @@ __all__ = [
     "DAMPING_LAWS",
     "QUANTITIES",
     "Bearing",
+    "CatalogueBearing",
     "ConstantSpeed",
     "EncoderChannel",
     "GearPair",
@@ -56,6 +58,8 @@ __all__ = [
     "SpeedSource",
     "TachometerChannel",
     "ToothContact",
+    "bearing_catalogue",
+    "catalogue_bearing",
     "contact_pair",
     "damping_ratio_s_per_m",
     "describe_rig",

@@ -169,7 +169,8 @@ def _bearing_text(rig: Rig) -> list[str]:
     lines = ["", "Bearings (orders of their own shaft)"] if rig.bearings else []
     for bearing in rig.bearings:
         orders = ", ".join(f"{name} {order:.5g}" for name, order in bearing.orders().items())
-        lines.append(f"  {bearing.name} on {bearing.shaft}: {orders or 'no geometry and no orders given'}")
+        by_name = f" ({bearing.bearing})" if bearing.bearing else ""
+        lines.append(f"  {bearing.name}{by_name} on {bearing.shaft}: {orders or 'no geometry and no orders given'}")
     return lines
 
 

@@ -8,6 +8,7 @@ from math import cos, isclose, isfinite, radians
 
 from gearsig.checks import FloatArray, closest_match_hint, count, frozen_array, not_negative, one_of, positive, within
 from gearsig.errors import InputError
+from gearsig.rig._catalogue import catalogue_bearing
 from gearsig.rig._contact import ToothContact
 
 # --------------------
@@ -267,8 +268,9 @@ class GearPair:
 class Bearing:
     """A rolling-element bearing with a turning inner ring and a standing outer ring.
 
-    Give the geometry (`n_rolling_elements`, both diameters, contact angle) or the orders from a catalogue; orders win
-    where both are given. Orders are cycles per revolution of the bearing's own shaft.
+    Give the name of one that the catalogue knows (`bearing = "6205"`), the geometry (`n_rolling_elements`, both
+    diameters, contact angle) or the orders from its maker; orders win over a geometry, and a geometry over that of the
+    name. Orders are cycles per revolution of the bearing's own shaft.
     """
 
     name: str
@@ -281,9 +283,14 @@ class Bearing:
     bpfi_order: float | None = None
     bsf_order: float | None = None
     ftf_order: float | None = None
+    bearing: str = ""
 
     def __post_init__(self) -> None:
         where = f"of bearing {self.name!r}"
+        if self.bearing and self.n_rolling_elements is None and not any((self.bpfo_order, self.bpfi_order)):
+            known = catalogue_bearing(self.bearing)
+            for key in ("n_rolling_elements", "rolling_element_diameter_mm", "pitch_diameter_mm", "contact_angle_deg"):
+                object.__setattr__(self, key, getattr(known, key))
         geometry = (self.n_rolling_elements, self.rolling_element_diameter_mm, self.pitch_diameter_mm)
         if any(v is not None for v in geometry) and not all(v is not None for v in geometry):
             raise InputError(

@@ -1,0 +1,115 @@
+"""Rolling bearings by name."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from types import MappingProxyType
+
+from gearsig.errors import InputError
+
+_MAKERS = re.compile(r"^(?:SKF|FAG|INA|NSK|NTN|SNR|NACHI|KOYO|JTEKT|NKE|TIMKEN|FAFNIR|ZVL|ZKL|C&U|HRB|RHP|FBJ)")
+# Seals, shields, cages, clearance, tolerance and grease: none of them touches the rolling elements.
+_SUFFIX = re.compile(
+    r"(?:[-/]*(?:2?RS(?:R|H|1|2|L|H2)?|2?ZR?|ZZ[12]?|DDU|DD|LL[UBHM]|VV|2?NS[EL]|N|NR|TN9?|TNH?|TVH|MA?|J|"
+    r"C[1-5N]|CM|P[2456]3?|W\d+|HT|GJN|JEM))*"
+)
+_OTHER_NAMES = (
+    (re.compile(r"^619(\d\d)$"), r"69\1"),  # ISO 15 and the numbering of NSK and NTN
+    # Inserts of pillow blocks share balls and outer raceway with the deep groove bearing of their size.
+    (re.compile(r"^UC[PFTC]?[LC]?([23](?:0[4-9]|1\d|20))$"), r"6\1"),
+)
+
+
+@dataclass(frozen=True)
+class CatalogueBearing:
+    """Geometry of a bearing as it is published.
+
+    Parameters
+    ----------
+    name : str
+    n_rolling_elements : int
+    rolling_element_diameter_mm, pitch_diameter_mm : float
+    contact_angle_deg : float
+    source : str
+        Key of a source in the head of `bearings.csv`.
+    """
+
+    name: str
+    n_rolling_elements: int
+    rolling_element_diameter_mm: float
+    pitch_diameter_mm: float
+    contact_angle_deg: float
+    source: str
+
+
+@cache
+def bearing_catalogue() -> Mapping[str, CatalogueBearing]:
+    """Return the bearings whose geometry is known, by name.
+
+    Deep groove ball bearings of the series 60, 62, 63, 64 and 69 (619), some miniatures, inserts and bearings of public
+    test rigs. Makers change numbers and sizes of balls: ball-pass orders of one designation usually agree within
+    2 %, and where the number of balls differs the name is listed by maker only. Orders that matter come from the maker
+    of the bearing that is in the machine.
+    """
+    text = files("gearsig.rig").joinpath("bearings.csv").read_text(encoding="utf-8")
+    rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
+    bearings = (
+        CatalogueBearing(
+            row["name"],
+            int(row["n_rolling_elements"]),
+            float(row["rolling_element_diameter_mm"]),
+            float(row["pitch_diameter_mm"]),
+            float(row["contact_angle_deg"] or 0.0),
+            row["source"],
+        )
+        for row in rows
+    )
+    return MappingProxyType({bearing.name: bearing for bearing in bearings})
+
+
+def catalogue_bearing(name: str) -> CatalogueBearing:
+    """Return a bearing of the catalogue.
+
+    Seals, shields, cage, clearance and, where makers agree, the maker do not matter.
+
+    Examples
+    --------
+    >>> catalogue_bearing("SKF 6205-2RS/C3").n_rolling_elements, catalogue_bearing("61904 ZZ").name
+    (9, '6904')
+
+    Raises
+    ------
+    InputError
+        If the name is not in the catalogue, or names bearings that makers build with different numbers of balls.
+    """
+    known = {bearing.name.replace(" ", ""): bearing for bearing in bearing_catalogue().values()}
+    full = re.sub(r"\s+", "", name.upper())
+    basic = _MAKERS.sub("", full)
+    for text in (full, basic):
+        start = max((n for n in known if text.startswith(n) and _SUFFIX.fullmatch(text[len(n) :])), key=len, default="")
+        if start:
+            return known[start]
+    size = re.match(r"[A-Z]*\d+", basic)
+    if size is not None and _SUFFIX.fullmatch(basic[size.end() :]):
+        basic = size[0]
+        for pattern, replacement in _OTHER_NAMES:
+            basic = pattern.sub(replacement, basic)
+        if basic in known:
+            return known[basic]
+    makers = [bearing.name for key, bearing in known.items() if _MAKERS.sub("", key) == basic]
+    if makers:
+        raise InputError(
+            f"bearing {name!r} is known by maker only: their balls differ",
+            allowed=", ".join(makers),
+            remedy="name the maker, or give the geometry or the orders from its catalogue",
+        )
+    raise InputError(
+        f"bearing {name!r} is not in the catalogue",
+        allowed="deep groove 60.., 62.., 63.., 64.., 69.. and some others: `gearsig rig bearings` lists them",
+        remedy="give n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm, or the orders",
+    )
