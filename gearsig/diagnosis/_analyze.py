@@ -14,6 +14,7 @@ from gearsig.diagnosis._change import change_findings, family_change, level_chan
 from gearsig.diagnosis._crack import crack_depth, with_crack
 from gearsig.diagnosis._lines import detect_lines, detect_mesh, speed_finding
 from gearsig.diagnosis._modulation import detect_sidebands
+from gearsig.diagnosis._overall import detect_vibration_zone
 from gearsig.diagnosis._reference import beside_reference
 from gearsig.diagnosis._resonance import detect_resonances, order_levels
 from gearsig.diagnosis._sampling_rate import detect_sampling_rate
@@ -132,7 +133,9 @@ def _examined(
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
         order = ranked(findings)  # all orders are wrong, and what they would say
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
+    found = tuple(_indicators(signals, envelopes))
     findings += [*_of_machine(signals, envelopes, own_bands), *detect_resonances(levels)]
+    findings += detect_vibration_zone(signals, found)
 
     reference_analysis: Analysis | None = None
     compared: tuple[LevelChange, ...] = ()
@@ -154,7 +157,7 @@ def _examined(
         rig=recording.rig,
         shaft_angle=angle,
         channels=tuple(channel_analysis(signals, n, envelopes, own_bands, levels.get(n, ()), order) for n in names),
-        indicators=tuple(_indicators(signals, envelopes)),
+        indicators=found,
         findings=order,
         verdict=verdict_of(order, has_reference=healthy is not None),
         settings=asdict(settings),
@@ -200,7 +203,10 @@ def _indicators(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> 
     rig = signals.rig
     for channel in signals.recording.channels:
         name, unit = channel.name, channel.unit
-        yield from indicators.time_indicators(signals.recording.values(name), name, unit)
+        values, rate_hz = signals.recording.values(name), signals.recording.sampling_rate_hz
+        yield from indicators.time_indicators(values, name, unit)
+        speed_rpm = None if signals.angle is None else signals.angle.mean_speed_rpm
+        yield from indicators.overall_indicators(values, rate_hz, channel, speed_rpm)
         if name in signals.order_excess:
             spectrum = signals.order_excess[name].spectrum
             for pair in rig.pairs:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from gearsig.diagnosis._overall import VIBRATION_ZONE
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import CHANGED, EXAMINED, HINDERING, UNCHANGED, Finding, Kind, Outcome, Where, outcome_of
 from gearsig.recording import Recording
@@ -27,18 +28,19 @@ def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) -> str:
-    """Return the sentences a hurried reader takes away: a doubtful sampling rate, what has changed, what it comes to.
+    """Return the sentences a hurried reader takes away: a doubtful rate, what has changed, what it comes to.
 
     Why a given reference did not help is always part of it.
     """
     doubt = next((f.title for f in findings if f.code == SAMPLING_RATE), "")
+    zone = next((f.title for f in findings if f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE), "")
     changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
     others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED))
     claims = [f for f in others if f.kind in (Kind.FAULT, Kind.SUSPICION)]
     # A change that no pattern explains is a suspicion by itself, and said already.
     if not claims and outcome_of(findings) is Outcome.SUSPICION:
-        return " ".join(filter(None, (doubt, changed)))
-    return " ".join(filter(None, (doubt, changed, _said(others, has_reference=has_reference), unchanged)))
+        return " ".join(filter(None, (doubt, changed, zone)))
+    return " ".join(filter(None, (doubt, changed, _said(others, has_reference=has_reference), zone, unchanged)))
 
 
 def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:

@@ -40,8 +40,15 @@ from gearsig.indicators._lines import (
     over_orders,
     shaft_indicators,
 )
+from gearsig.indicators._overall import (
+    ZONE_LIMITS_MM_PER_S,
+    overall_indicators,
+    overall_velocity_mm_per_s,
+    vibration_zone,
+)
 
 __all__ = [
+    "ZONE_LIMITS_MM_PER_S",
     "Indicator",
     "bearing_indicators",
     "clearance_factor",
@@ -67,6 +74,8 @@ __all__ = [
     "nb4",
     "noise_reaches",
     "over_orders",
+    "overall_indicators",
+    "overall_velocity_mm_per_s",
     "peak",
     "peak_to_peak",
     "rms",
@@ -76,4 +85,5 @@ __all__ = [
     "sideband_level_factor",
     "skewness",
     "time_indicators",
+    "vibration_zone",
 ]

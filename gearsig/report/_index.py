@@ -88,7 +88,17 @@ def by_severity(entry: Entry) -> tuple[int, float, float, float, str]:
     return place, -(entry.crack_mm or 0.0), -(entry.confidence or 0.0), -(entry.ratio_db or 0.0), entry.name
 
 
-KEY_INDICATORS = ("FM4", "kurtosis", "sideband index", "NA4", "sideband level", "FM0", "rms", "crest factor")
+KEY_INDICATORS = (
+    "FM4",
+    "kurtosis",
+    "sideband index",
+    "NA4",
+    "sideband level",
+    "FM0",
+    "overall velocity",
+    "rms",
+    "crest factor",
+)
 """Indicators the index compares, where they were computed: tooth-local first, then impulsive, modulation, level."""
 
 

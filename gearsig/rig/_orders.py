@@ -128,6 +128,10 @@ def describe_rig(rig: Rig) -> str:
     if reference:
         at = f", nominal {speed:g} rpm" if speed else ""
         lines.append(f"Orders are cycles per revolution of shaft '{reference}'{at}.")
+    if rig.machine is not None:
+        lines.append(
+            f"Group of ISO 20816-3: {rig.machine.group or 'none'}, mounting {rig.machine.mounting or 'not stated'}."
+        )
     lines += _shaft_text(rig) + _pair_text(rig) + _bearing_text(rig) + _contact_text(rig)
     marked = order_lines(rig, n_mesh_harmonics=2, n_shaft_harmonics=2, n_sidebands=1)
     if marked:

@@ -16,6 +16,7 @@ from gearsig.rig._types import (
     ConstantSpeed,
     EncoderChannel,
     GearPair,
+    MachineSize,
     OperatingPoint,
     PulseTimes,
     Rig,
@@ -93,7 +94,7 @@ def recording_stem(name: str) -> str:
 
 def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
     """Build a rig from the tables of a rig file (or of any mapping of the same shape)."""
-    allowed = (*_LISTS, *_PLAIN, "operating_point", "speed", "contact")
+    allowed = (*_LISTS, *_PLAIN, "operating_point", "speed", "contact", "machine")
     for key in data:
         if key not in allowed:
             raise InputError(
@@ -110,6 +111,8 @@ def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
         parts["operating_point"] = from_table(OperatingPoint, data["operating_point"], f"{where}: [operating_point]")
     if "contact" in data:
         parts["contact"] = from_table(ToothContact, data["contact"], f"{where}: [contact]")
+    if "machine" in data:
+        parts["machine"] = from_table(MachineSize, data["machine"], f"{where}: [machine]")
     if "speed" in data:
         parts["speed"] = _speed(data["speed"], f"{where}: [speed]")
     plain = {key: data[key] for key in _PLAIN if key in data}
@@ -127,6 +130,8 @@ def rig_to_dict(rig: Rig) -> dict[str, Any]:
         data["operating_point"] = to_table(rig.operating_point)
     if rig.contact is not None:
         data["contact"] = to_table(rig.contact)
+    if rig.machine is not None:
+        data["machine"] = to_table(rig.machine)
     if rig.speed is not None and not isinstance(rig.speed, PulseTimes):
         source = next(name for name, kind in _SPEED_SOURCES.items() if kind is type(rig.speed))
         data["speed"] = {"source": source} | to_table(rig.speed)

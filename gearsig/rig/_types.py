@@ -360,6 +360,47 @@ class Sensor:
                 )
 
 
+MOUNTINGS = ("rigid", "flexible")
+"""Of a machine on its foundation, as ISO 20816-3 tells them: rigid where the lowest natural frequency of both together,
+in the direction measured, is a quarter above the main frequency (mostly the speed) or more."""
+
+
+@dataclass(frozen=True)
+class MachineSize:
+    """What ISO 20816-3 judges overall vibration by: the machine's size, and how it stands.
+
+    Parameters
+    ----------
+    power_kw : float or None
+        Rated power.
+    shaft_height_mm : float or None
+        Of an electrical machine: from its feet to the middle of its shaft (the 225 of an IEC 225 frame).
+    mounting : str
+        "rigid" or "flexible"; empty: not known.
+    """
+
+    power_kw: float | None = None
+    shaft_height_mm: float | None = None
+    mounting: str = ""
+
+    def __post_init__(self) -> None:
+        for label, value in (("power_kw", self.power_kw), ("shaft_height_mm", self.shaft_height_mm)):
+            if value is not None:
+                positive(value, f"{label} of the machine")
+        if self.mounting:
+            one_of(self.mounting, "mounting of the machine", MOUNTINGS)
+
+    @property
+    def group(self) -> int | None:
+        """Group of ISO 20816-3: 1 above 300 kW or from 315 mm, 2 above 15 kW or from 160 mm, else None."""
+        for group, power_kw, height_mm in ((1, 300.0, 315.0), (2, 15.0, 160.0)):
+            if self.shaft_height_mm is not None and self.shaft_height_mm >= height_mm:
+                return group
+            if self.shaft_height_mm is None and self.power_kw is not None and self.power_kw > power_kw:
+                return group
+        return None
+
+
 @dataclass(frozen=True)
 class OperatingPoint:
     """The nominal running condition; its speed guides the search for the true one and is not taken as measured."""
@@ -402,6 +443,8 @@ class Rig:
         them is worth less, and says so.
     contact : ToothContact or None
         How the teeth of one pair touch, and what turns with them: for forces from measured motion.
+    machine : MachineSize or None
+        For the zones of ISO 20816-3.
     """
 
     name: str = ""
@@ -415,6 +458,7 @@ class Rig:
     sources: tuple[str, ...] = ()
     assumed: tuple[str, ...] = ()
     contact: ToothContact | None = None
+    machine: MachineSize | None = None
 
     def __post_init__(self) -> None:
         for kind, items in (("shaft", self.shafts), ("pair", self.pairs), ("bearing", self.bearings)):

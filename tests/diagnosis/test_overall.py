@@ -1,0 +1,63 @@
+"""Zones of ISO 20816-3: given where the rig file says what the machine is, with the reason where they do not apply."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.diagnosis import analyze
+from gearsig.recording import Channel, Recording
+from gearsig.rig import ConstantSpeed, MachineSize, Rig, Shaft
+from tests.diagnosis.machines import codes, finding
+
+FS_HZ = 5120.0
+MOTOR = Rig(
+    shafts=(Shaft("motor"),), speed=ConstantSpeed(1480.0), machine=MachineSize(shaft_height_mm=225.0, mounting="rigid")
+)
+
+
+def motor(velocity_mm_per_s: float, rig: Rig = MOTOR, unit: str = "m/s^2") -> Recording:
+    t = np.arange(round(4 * FS_HZ)) / FS_HZ
+    hertz = 1480.0 / 60
+    x = 2 * np.pi * hertz * 1e-3 * velocity_mm_per_s * np.sqrt(2) * np.cos(2 * np.pi * hertz * t)
+    x += 0.01 * np.random.default_rng(0).standard_normal(len(t))
+    return Recording(x[None, :], FS_HZ, (Channel("a1", "acceleration", unit),), rig=rig)
+
+
+@pytest.mark.parametrize(("velocity", "zone"), [(1.0, "A"), (2.0, "B"), (4.0, "C"), (6.0, "D")])
+def test_zone(velocity: float, zone: str) -> None:
+    analysis = analyze(motor(velocity))
+    stated = finding(analysis, "vibration-zone")
+    assert (stated.title in analysis.verdict) is (zone in "CD")
+    assert f"zone {zone} of ISO 20816-3" in stated.title
+    assert stated.strength is not None
+    assert stated.strength.value == pytest.approx(velocity, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("machine", "speed_rpm", "unit"),
+    [
+        (MachineSize(), 1480.0, "m/s^2"),
+        (MachineSize(power_kw=1.5, mounting="rigid"), 1480.0, "m/s^2"),
+        (MachineSize(power_kw=55.0), 1480.0, "m/s^2"),
+        (MachineSize(power_kw=55.0, mounting="rigid"), 60.0, "m/s^2"),
+        (MachineSize(power_kw=55.0, mounting="rigid"), 1480.0, ""),
+    ],
+)
+def test_not_applicable(machine: MachineSize, speed_rpm: float, unit: str) -> None:
+    rig = replace(MOTOR, machine=machine, speed=ConstantSpeed(speed_rpm))
+    said = codes(analyze(motor(3.0, rig, unit)))
+    assert "vibration-zone-not-applicable" in said
+    assert "vibration-zone" not in said
+
+
+def test_nothing_is_said_of_machines_that_are_not_described() -> None:
+    assert not any("vibration-zone" in code for code in codes(analyze(motor(9.0, replace(MOTOR, machine=None)))))
+
+
+@pytest.mark.parametrize(
+    ("size", "group"),
+    [({"power_kw": 500}, 1), ({"power_kw": 300}, 2), ({"power_kw": 15}, None), ({"shaft_height_mm": 315}, 1)],
+)
+def test_groups(size: dict[str, float], group: int | None) -> None:
+    assert MachineSize(**size).group == group
