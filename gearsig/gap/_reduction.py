@@ -316,6 +316,11 @@ class ReducedRecording:
         """Number of blocks."""
         return next(iter(self.channels.values())).n_blocks
 
+    @property
+    def fewest_revolutions(self) -> float:
+        """Of the slower shaft."""
+        return self.n_revolutions * min(self.frame.shaft_orders)
+
     def without(self, block: int) -> ReducedRecording:
         """Return the recording with one block of revolutions left out."""
         return self.with_channels({name: sums.without(block) for name, sums in self.channels.items()})
@@ -477,8 +482,8 @@ def _without_cycles(rest: FloatArray, cycles: Sequence[float]) -> FloatArray:
     return left
 
 
-MIN_REVOLUTIONS = 16
-"""Of the driver and of the driven gear: fewer leave either shaft's orders in the other's average."""
+MIN_REVOLUTIONS = 8
+"""Of the driver and of the driven gear: two in each block, the fewest that tell one shaft's orders from the other's."""
 
 REVOLUTIONS_PER_BLOCK = 20
 MIN_BLOCKS, MAX_BLOCKS = 4, 8

@@ -12,7 +12,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive, within
 from gearsig.errors import InputError
-from gearsig.rig import QUANTITIES, Rig, SpeedSource
+from gearsig.rig import QUANTITIES, PulseTimes, Rig, SpeedSource
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -394,6 +394,28 @@ class Recording:
                 sensor.position or old.position,
             )
         return replace(self, samples=samples, channels=tuple(channels), rig=rig, warnings=tuple(warnings))
+
+    def between(self, start_s: float, end_s: float) -> Recording:
+        """Return the part from `start_s` to `end_s`, whose time begins at 0 again; tachometer pulses go with it.
+
+        Raises
+        ------
+        InputError
+            If no sample lies there.
+        """
+        first, last = (int(np.clip(round(t * self.sampling_rate_hz), 0, self.n_samples)) for t in (start_s, end_s))
+        if first >= last:
+            raise InputError(
+                f"no sample lies from {start_s:.6g} to {end_s:.6g} s",
+                where=self.name,
+                allowed=f"a part of 0 to {self.duration_s:.6g} s",
+            )
+        speed, start = self.speed_source, first / self.sampling_rate_hz
+        if isinstance(speed, PulseTimes):
+            kept = (speed.times_s >= start) & (speed.times_s <= last / self.sampling_rate_hz)
+            speed = replace(speed, times_s=speed.times_s[kept] - start)
+        step = f"from {start:.6g} to {last / self.sampling_rate_hz:.6g} s"
+        return self._changed(step, samples=self.samples[:, first:last], speed=speed)
 
     def with_name(self, name: str) -> Recording:
         """Return the recording under another name."""

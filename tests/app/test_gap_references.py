@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from functools import cache
 
-from gearsig.gap import HealthyReference, ReducedRecording, matching_reference, reduce_recording
+import pytest
+
+from gearsig.gap import (
+    HealthyReference,
+    ReducedRecording,
+    change_features,
+    gap_size,
+    load_population,
+    matching_reference,
+    reduce_recording,
+)
+from gearsig.prepared import PreparedRecording
 from tests.gap.synthetic import RIG, record
 
 
@@ -23,6 +34,19 @@ def named(seed: int, *names: str) -> ReducedRecording:
 
 def test_equal_names_are_compared_as_they_are() -> None:
     assert matching_reference(run(0), RIG, healthy(run(1))) == (HealthyReference(run(1), RIG, "healthy.h5"), "")
+
+
+def test_few_revolutions_are_compared_with_as_many_of_a_longer_reference() -> None:
+    whole = PreparedRecording(record(seed=1))
+    short = reduce_recording(record(seed=0).between(1.0, 1.65), RIG)
+    found, _ = matching_reference(short, RIG, [HealthyReference(run(1), RIG, "healthy.h5", whole)])
+    assert found is not None
+    assert found.reduced.n_revolutions == pytest.approx(short.n_revolutions, abs=2.0)
+    floor = load_population().floor(with_reference=True)
+    same, longer = (
+        gap_size(change_features(short, reference), floor).structural.value for reference in (found.reduced, run(1))
+    )
+    assert same < 0.75 * longer
 
 
 def test_the_only_channel_of_each_is_the_same_whatever_its_name() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
-from gearsig.rig import Rig, Sensor
+from gearsig.rig import PulseTimes, Rig, Sensor
 
 
 def recording(unit: str) -> Recording:
@@ -35,6 +35,16 @@ def test_a_scale_converts_and_says_nothing() -> None:
     found = recording("g").with_rig(rig(scale=9.81))
     assert found.warnings == ()
     assert found.values("a1") == pytest.approx(9.81 * np.ones(8))
+
+
+def test_a_part_keeps_its_pulses_in_its_own_time() -> None:
+    whole = Recording(np.arange(10.0)[None], 10.0, (Channel("a"),), PulseTimes(np.array([0.1, 0.35, 0.6, 0.85])))
+    part = whole.between(0.3, 0.7)
+    assert part.values("a") == pytest.approx([3.0, 4.0, 5.0, 6.0])
+    assert isinstance(part.speed, PulseTimes)
+    assert part.speed.times_s == pytest.approx([0.05, 0.3])
+    with pytest.raises(InputError, match="no sample lies from 2 to 3 s"):
+        whole.between(2.0, 3.0)
 
 
 def test_a_recording_is_a_table_with_times():
