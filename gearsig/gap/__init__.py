@@ -47,7 +47,7 @@ from gearsig.gap._curves import (
     lines_beyond,
     spectrum_curves,
 )
-from gearsig.gap._diagnose import diagnose_gap
+from gearsig.gap._diagnose import diagnose_gap, unbounded_fits, within_the_floor
 from gearsig.gap._evidence import (
     SIGNS,
     ShaftSigns,
@@ -77,7 +77,7 @@ from gearsig.gap._floors import (
 )
 from gearsig.gap._gearless import Standing, beside_standing, standing_place, stood_out
 from gearsig.gap._inputs import GapRequest, read_gap_inputs
-from gearsig.gap._places import gap_places, mesh_spot, ranked_places, tail_spot
+from gearsig.gap._places import counted_against, gap_places, mesh_spot, ranked_places, tail_spot
 from gearsig.gap._prediction import (
     EffectPath,
     Fit,
@@ -251,6 +251,7 @@ __all__ = [
     "change_once",
     "compare",
     "conditions_of",
+    "counted_against",
     "credibility_of",
     "diagnose_gap",
     "difference_features",
@@ -323,8 +324,10 @@ __all__ = [
     "tooth_load_n_per_mm",
     "transplanted",
     "try_effects",
+    "unbounded_fits",
     "weighed_evidence",
     "with_channels_of",
+    "within_the_floor",
     "without_machines_of",
     "wrong_teeth",
 ]

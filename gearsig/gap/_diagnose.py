@@ -24,15 +24,18 @@ from gearsig.gap._evidence import evidence_of
 from gearsig.gap._floors import load_population
 from gearsig.gap._gearless import beside_standing, diagnose_gearless, standing_place, stood_out
 from gearsig.gap._next_recording import next_recordings
-from gearsig.gap._places import gap_places, ranked_places
+from gearsig.gap._places import counted_against, gap_places, ranked_places
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
 from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, observed_changes, steps_of
 from gearsig.gap._types import (
     NAMING,
+    NONE,
+    UNKNOWN,
     GapCause,
     GapOutcome,
     GapPlace,
     GapReport,
+    Interval,
     NextRecording,
     group_probabilities,
 )
@@ -201,7 +204,9 @@ def diagnose_gap(
     attribution = attribute(
         conditions, known, effects, twin, cache, lambda what, done: tell(what, 0.25 + 0.55 * done), fresh=fresh
     )
-    tried, probabilities = attribution.tried, attribution.probabilities()
+    tried, gap = attribution.tried, _places(clearest)
+    probabilities = within_the_floor(attribution.probabilities(), clearest.size.structural)
+    probabilities = counted_against(probabilities, known, gap, clearest.now.frame)
 
     # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
@@ -210,9 +215,10 @@ def diagnose_gap(
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
-    places = ranked_places(_places(clearest), [standing_place(one, recording.rig) for one in standing])
+    places = ranked_places(gap, [standing_place(one, recording.rig) for one in standing])
     causes = in_order([_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items()], outcome)
     named = causes[0] if outcome in NAMING else None
+    warnings = (*warnings, *unbounded_fits(causes, outcome))
     fitted = None if named is None else named.fitted
     after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
 
@@ -338,8 +344,35 @@ def _of_the_fit(named: GapCause | None) -> list[str]:
     """Say what the fitted severity is worth, or that there is none."""
     if named is None:
         return []
-    nearer = [OF_THE_TWIN] if named.severity is not None else []
+    nearer = [OF_THE_TWIN] if named.severity is not None and not named.severity.is_unbounded else []
     return [*nearer, *([NOT_NEARER.format(title=named.title)] if not named.fitted and named.shrinkage else [])]
+
+
+def within_the_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
+    """Return the probabilities with that of an unknown cause given to none, where the whole gap is within its floor.
+
+    Parameters
+    ----------
+    probabilities : mapping
+        Cause → probability.
+    size : Interval
+        Of the whole gap, in structural floors.
+    """
+    if size.high > 1.0:
+        return dict(probabilities)
+    moved = {NONE: probabilities[NONE] + probabilities[UNKNOWN], UNKNOWN: 0.0}
+    return dict(sorted({**probabilities, **moved}.items(), key=lambda item: -item[1]))
+
+
+def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
+    """Say of what is named which effects the fit can give no size, not even tell from nothing at all."""
+    named = rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else [causes[0].name] if outcome in NAMING else ()
+    return [
+        f"{cause.title[0].upper()}{cause.title[1:]}: on the twin any severity fits the recordings about as well, none "
+        "at all included. How the recordings changed speaks for it, the simulation does not."
+        for cause in causes
+        if cause.name in named and cause.severity is not None and cause.severity.is_unbounded
+    ]
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:

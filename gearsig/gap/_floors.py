@@ -46,7 +46,7 @@ _KIND = {
 }
 """Family of features, or a single feature → the kind of place that it speaks of."""
 
-UNFORETOLD = ("surprise.", "apart.", "alike.")
+UNPREDICTED = ("surprise.", "apart.", "alike.")
 """Features, the last ones, that hang on noise and sensors: no simulation predicts them, no size is made of them."""
 
 _KINDS = {
@@ -63,6 +63,11 @@ _KINDS = {
 """What an effect says it shows in (`gearsig.gap.GapEffect.shows_in`), as kinds of places."""
 
 
+def kinds_of(shows_in: Sequence[str]) -> set[PlaceKind]:
+    """Return the kinds of places that an effect says it shows in."""
+    return {kind for shown in shows_in for kind in _KINDS.get(shown, ())}
+
+
 def shown_in(names: Sequence[str], shows_in: Sequence[str]) -> np.ndarray:
     """Return which features are of the kinds that an effect says it shows in; all, if it says none that is known.
 
@@ -76,7 +81,7 @@ def shown_in(names: Sequence[str], shows_in: Sequence[str]) -> np.ndarray:
     -------
     array of bool, (n,)
     """
-    kinds = {kind for shown in shows_in for kind in _KINDS.get(shown, ())}
+    kinds = kinds_of(shows_in)
     found = np.array([_is_shown(name, kinds, shows_in) for name in names], dtype=np.bool_)
     return found if found.any() else np.ones(len(names), dtype=np.bool_)
 
@@ -116,7 +121,7 @@ def sized_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
 @cache
 def _sized(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
     kept = {
-        family: np.array([i for i in rows if not names[i].startswith(UNFORETOLD)], dtype=np.intp)
+        family: np.array([i for i in rows if not names[i].startswith(UNPREDICTED)], dtype=np.intp)
         for family, rows in _members(names).items()
     }
     return {family: rows for family, rows in kept.items() if len(rows)}

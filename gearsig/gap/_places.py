@@ -32,7 +32,15 @@ from gearsig.gap._features import (
     residual_ratios,
     tooth_energy,
 )
-from gearsig.gap._floors import REPEATABLE, Family, StructuralFloor, family_members, family_size, pooled_scatter
+from gearsig.gap._floors import (
+    REPEATABLE,
+    Family,
+    StructuralFloor,
+    family_members,
+    family_size,
+    kinds_of,
+    pooled_scatter,
+)
 from gearsig.gap._reduction import (
     DRIVER,
     N_HARMONICS,
@@ -41,7 +49,8 @@ from gearsig.gap._reduction import (
     GearFrame,
     ReducedRecording,
 )
-from gearsig.gap._types import GapPlace, PlaceKind
+from gearsig.gap._simulator import GapEffect
+from gearsig.gap._types import UNKNOWN, GapPlace, PlaceKind
 from gearsig.gap._words import ComparedPair, LocatedChange, band_words, by_decibels, feature_words, hertz, shaft_words
 from gearsig.severity import ShaftLines, find_event, load_calibration
 
@@ -94,6 +103,59 @@ def _joined(standing: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
     largest = max(same, key=lambda place: place.share)
     share = sum(place.share for place in same)
     return replace(standing, repeatability=largest.repeatability, structural=largest.structural, share=share)
+
+
+# --------------------
+# What an order that is most of the gap says against effects that cannot make it.
+# --------------------
+
+
+MOST = 0.5
+"""Share of the gap from which one order is more of it than all else."""
+
+
+def counted_against(
+    probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], places: Sequence[GapPlace], frame: GearFrame
+) -> dict[str, float]:
+    """Return the probabilities with those of effects lowered that cannot make the order that is most of the gap.
+
+    A cause of 2 % of a gap is hardly its cause: p → 2 (1 − s) p for a share s of more than a half; unknown gets the
+    rest. Only orders count against an effect, lines at their place in the spectrum: noise, tails and envelopes at a
+    shaft's multiples follow from much that theory does not list.
+
+    Parameters
+    ----------
+    probabilities : mapping
+        Cause → probability.
+    effects : mapping
+        Effect → where it shows.
+    places : sequence of GapPlace
+        Of the gap, with their shares.
+    frame : GearFrame
+    """
+    found = dict(probabilities)
+    for place in (one for one in places if one.share > MOST and _is_an_order(one, frame)):
+        for name in probabilities.keys() & effects.keys():
+            if not _can_make(effects[name].shows_in, place):
+                found[name] *= 2.0 * (1.0 - place.share)
+    found[UNKNOWN] += 1.0 - sum(found.values())
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def _is_an_order(place: GapPlace, frame: GearFrame) -> bool:
+    """Whether a place is one of lines: a shaft's, those of the residual, or an envelope's at no shaft's order."""
+    if place.kind is PlaceKind.ENVELOPE and place.orders:
+        return all(
+            abs(turns - round(turns)) > SAME_ORDER * turns for turns in np.divide(place.orders[0], frame.shaft_orders)
+        )
+    return place.kind in (PlaceKind.LINE, PlaceKind.SHAFT, PlaceKind.SIDEBANDS)
+
+
+def _can_make(shows_in: Sequence[str], place: GapPlace) -> bool:
+    kinds = kinds_of(shows_in)
+    if place.kind is PlaceKind.LINE:  # of the supply, or of a bearing, whose lines stand in envelope and spectrum
+        return not kinds or "mains_lines" in shows_in or PlaceKind.ENVELOPE in kinds
+    return not kinds or place.kind in kinds
 
 
 # --------------------

@@ -20,7 +20,7 @@ from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.gap._conditions import SEED, Condition, halves, observed
 from gearsig.gap._evidence import ONE_TOOTH, SIGNS, told_options
 from gearsig.gap._features import SIDES, whole_and_parts
-from gearsig.gap._floors import UNFORETOLD, gap_size, shown_in
+from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
 from gearsig.gap._places import SAME_ORDER
 from gearsig.gap._prediction import (
     INTERVAL_COST,
@@ -511,7 +511,7 @@ def on_shaft(
 
 def n_compared(conditions: Sequence[Condition]) -> int:
     """Return how many features all conditions have and a simulation can predict; those of patterns need references."""
-    return min(sum(not name.startswith(UNFORETOLD) for name in c.change.names) for c in conditions)
+    return min(sum(not name.startswith(UNPREDICTED) for name in c.change.names) for c in conditions)
 
 
 def observed_changes(conditions: Sequence[Condition]) -> list[ObservedChange]:

@@ -10,7 +10,7 @@ import numpy as np
 from gearsig.gap._attribution import LIKELIER_THAN_NOT
 from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import NAMING, NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
-from gearsig.gap._words import hardly_predicted, severity_unit
+from gearsig.gap._words import hardly_predicted, same_load, same_speed, severity_unit
 
 
 def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
@@ -153,16 +153,24 @@ def _next(report: GapReport) -> str:
     if best:
         return f"Next: {best}"
     if report.outcome in (GapOutcome.UNKNOWN, GapOutcome.UNDECIDED):
-        return (
-            "Next: another sensor nearer to where it is loudest, or another speed, which tells orders from resonances."
-        )
+        other = {"speed": ", which tells orders from resonances"}
+        ways = "".join(f", or another {what}{other.get(what, '')}" for what in _not_varied(report)[:1])
+        return f"Next: another sensor nearer to where it is loudest{ways}."
     if report.outcome is GapOutcome.NO_GAP:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
     if sum(cause.shrinkage is not None for cause in report.causes) < 2:
-        return "Next: another speed or load; no two effects are likely enough to compute which would tell most."
+        ways = " or ".join(_not_varied(report)) or "sensor"
+        return f"Next: another {ways}; no two effects are likely enough to compute which would tell most."
     seen = _place_of_both(report)
     look = f"look at {seen}; " if seen else ""
     return f"Next: {look}no other speed or load that was simulated would put the two likeliest effects further apart."
+
+
+def _not_varied(report: GapReport) -> list[str]:
+    """Return what of speed and load is the same in all recordings."""
+    points = [condition.point for condition in report.conditions]
+    same = {"speed": same_speed, "load": same_load}
+    return [what for what, is_same in same.items() if all(is_same(points[0], point) for point in points)]
 
 
 def _place_of_both(report: GapReport) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isclose
 
 from gearsig.gap._features import SIDES
 from gearsig.gap._reduction import GearFrame, ReducedRecording
@@ -224,6 +225,14 @@ def point_text(point: OperatingCondition) -> str:
 
 def same_condition(one: OperatingCondition, other: OperatingCondition) -> bool:
     """Whether two points are one operating condition."""
-    speed = abs(one.speed_rpm - other.speed_rpm) <= SAME_SPEED * max(abs(one.speed_rpm), abs(other.speed_rpm))
-    torque = abs(one.torque_nm - other.torque_nm) <= SAME_TORQUE * max(abs(one.torque_nm), abs(other.torque_nm))
-    return speed and torque
+    return same_speed(one, other) and same_load(one, other)
+
+
+def same_speed(one: OperatingCondition, other: OperatingCondition) -> bool:
+    """Whether two points are at one speed."""
+    return isclose(one.speed_rpm, other.speed_rpm, rel_tol=SAME_SPEED)
+
+
+def same_load(one: OperatingCondition, other: OperatingCondition) -> bool:
+    """Whether two points are at one torque."""
+    return isclose(one.torque_nm, other.torque_nm, rel_tol=SAME_TORQUE)

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from gearsig.gap import GapPlace, PlaceKind, ranked_places
+from dataclasses import replace
+
+import pytest
+
+from gearsig.gap import UNKNOWN, GapEffect, GapPlace, PlaceKind, counted_against, gear_frame, ranked_places
+from tests.gap.synthetic import RIG, TEETH
 
 NAN = float("nan")
 
@@ -33,3 +38,35 @@ def test_impacts_that_stand_out_come_first_and_take_the_sizes_of_their_family() 
 
 def test_impacts_without_such_a_place_have_no_share() -> None:
     assert ranked_places([MESH], [IMPACTS]) == (IMPACTS, MESH)
+
+
+EFFECTS = {
+    "misalignment": GapEffect("misalignment", "", "", "", "", shows_in=("shaft_orders", "mesh_sidebands")),
+    "bearing": GapEffect("bearing", "", "", "", "", shows_in=("envelope_orders",)),
+    "of my own": GapEffect("of my own", "", "", "", ""),
+}
+FOUND = {"misalignment": 0.8, "bearing": 0.05, "of my own": 0.05, "none": 0.05, UNKNOWN: 0.05}
+
+
+def against(place: GapPlace) -> dict[str, float]:
+    return counted_against(FOUND, EFFECTS, [place], gear_frame(RIG))
+
+
+def test_an_order_that_is_most_of_the_gap_counts_against_what_cannot_make_it() -> None:
+    strange = against(place(PlaceKind.LINE, 0.98, 3.35))
+    assert strange["misalignment"] == pytest.approx(0.04 * 0.8)
+    assert strange[UNKNOWN] == pytest.approx(0.05 + 0.96 * 0.8)
+    assert [strange[name] for name in ("bearing", "of my own", "none")] == [0.05, 0.05, 0.05]
+    assert against(place(PlaceKind.SHAFT, 0.98, 2.0))["misalignment"] == 0.8
+    assert against(place(PlaceKind.SHAFT, 0.98, 2.0))["bearing"] < 0.01
+
+
+def test_what_is_less_than_half_or_follows_from_much_counts_against_nothing() -> None:
+    nothing = [
+        place(PlaceKind.LINE, 0.4, 3.35),
+        place(PlaceKind.BAND, 0.98),
+        place(PlaceKind.ENVELOPE, 0.98, 3.0 * TEETH[0] / TEETH[1]),
+        replace(place(PlaceKind.LINE, 0.98, 3.35), share=float("nan")),
+    ]
+    assert all(against(one) == pytest.approx(FOUND) for one in nothing)
+    assert against(place(PlaceKind.ENVELOPE, 0.98, 3.35))["misalignment"] < 0.05

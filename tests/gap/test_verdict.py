@@ -4,7 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gearsig.gap import UNKNOWN, GapCause, GapOutcome, GapPlace, Interval, PlaceKind, rivals
+import pytest
+
+from gearsig.gap import (
+    NONE,
+    UNKNOWN,
+    ConditionFacts,
+    GapCause,
+    GapOutcome,
+    GapPlace,
+    Interval,
+    OperatingCondition,
+    PlaceKind,
+    rivals,
+    unbounded_fits,
+    within_the_floor,
+)
 from tests.gap.example_report import (
     cannot_separate_report,
     effect_report,
@@ -136,6 +151,45 @@ def test_impacts_without_a_size_are_named_with_the_place_beside_them() -> None:
 
 def test_next_to_an_unknown_cause_is_another_look_at_it() -> None:
     assert "sensor nearer" in replace(unknown_report(), next_recordings=(), references=("healthy.h5",)).verdict[3]
+
+
+def test_a_fit_that_any_severity_serves_is_a_warning() -> None:
+    report = effect_report()
+    assert unbounded_fits(report.causes, report.outcome) == []
+    anything = replace(report.causes[0], severity=Interval(2.0, 0.0, float("inf")))
+    causes = (anything, *report.causes[1:])
+    assert (
+        len(unbounded_fits(causes, GapOutcome.EFFECT)) == len(unbounded_fits(causes, GapOutcome.CANNOT_SEPARATE)) == 1
+    )
+    assert unbounded_fits(causes, GapOutcome.UNKNOWN) == []
+    at_most = replace(anything, severity=Interval(2.0, 0.0, 4.0))
+    assert unbounded_fits((at_most, *report.causes[1:]), GapOutcome.EFFECT) == []
+
+
+def test_a_gap_within_the_floor_has_no_unknown_cause() -> None:
+    found = {UNKNOWN: 0.6, NONE: 0.3, "unbalance": 0.1}
+    assert within_the_floor(found, Interval(0.5, 0.4, 0.6)) == pytest.approx(
+        {NONE: 0.9, "unbalance": 0.1, UNKNOWN: 0.0}
+    )
+    assert within_the_floor(found, Interval(0.9, 0.7, 1.1)) == found
+
+
+def at(*points: tuple[float, float]) -> tuple[ConditionFacts, ...]:
+    first = effect_report().conditions[0]
+    return tuple(replace(first, point=OperatingCondition(*point)) for point in points)
+
+
+def test_what_was_varied_already_is_not_advised() -> None:
+    unknown = replace(unknown_report(), next_recordings=(), references=("healthy.h5",))
+    alone = replace(effect_report(), causes=effect_report().causes[:1], next_recordings=())
+    for report in (unknown, alone):
+        once = replace(report, conditions=at((1500.0, 60.0))).verdict[3]
+        two_speeds = replace(report, conditions=at((1500.0, 60.0), (900.0, 60.0))).verdict[3]
+        two_loads = replace(report, conditions=at((1500.0, 60.0), (1500.0, 20.0))).verdict[3]
+        both = replace(report, conditions=at((1500.0, 60.0), (900.0, 20.0))).verdict[3]
+        said = [("speed" in text, "load" in text) for text in (two_speeds, two_loads, both)]
+        assert "speed" in once
+        assert said == [(False, True), (True, False), (False, False)]
 
 
 def test_a_shrink_that_the_simulator_cannot_show_is_not_claimed() -> None:
