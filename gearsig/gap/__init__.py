@@ -47,7 +47,7 @@ from gearsig.gap._curves import (
     lines_beyond,
     spectrum_curves,
 )
-from gearsig.gap._diagnose import diagnose_gap, unbounded_fits, within_the_floor
+from gearsig.gap._diagnose import diagnose_gap
 from gearsig.gap._evidence import (
     SIGNS,
     ShaftSigns,
@@ -159,7 +159,7 @@ from gearsig.gap._types import (
     SpectrumCurves,
     group_probabilities,
 )
-from gearsig.gap._verdict import rivals
+from gearsig.gap._verdict import rivals, unbounded_fits, within_the_floor
 from gearsig.gap._words import (
     ComparedPair,
     feature_words,

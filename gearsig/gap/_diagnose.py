@@ -29,17 +29,14 @@ from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulato
 from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, observed_changes, steps_of
 from gearsig.gap._types import (
     NAMING,
-    NONE,
-    UNKNOWN,
     GapCause,
     GapOutcome,
     GapPlace,
     GapReport,
-    Interval,
     NextRecording,
     group_probabilities,
 )
-from gearsig.gap._verdict import in_order, likeliest_two, named_cause, rivals
+from gearsig.gap._verdict import in_order, likeliest_two, named_cause, rivals, unbounded_fits, within_the_floor
 from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
 from gearsig.prepared import PreparedRecording
@@ -346,33 +343,6 @@ def _of_the_fit(named: GapCause | None) -> list[str]:
         return []
     nearer = [OF_THE_TWIN] if named.severity is not None and not named.severity.is_unbounded else []
     return [*nearer, *([NOT_NEARER.format(title=named.title)] if not named.fitted and named.shrinkage else [])]
-
-
-def within_the_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
-    """Return the probabilities with that of an unknown cause given to none, where the whole gap is within its floor.
-
-    Parameters
-    ----------
-    probabilities : mapping
-        Cause → probability.
-    size : Interval
-        Of the whole gap, in structural floors.
-    """
-    if size.high > 1.0:
-        return dict(probabilities)
-    moved = {NONE: probabilities[NONE] + probabilities[UNKNOWN], UNKNOWN: 0.0}
-    return dict(sorted({**probabilities, **moved}.items(), key=lambda item: -item[1]))
-
-
-def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
-    """Say of what is named which effects the fit can give no size, not even tell from nothing at all."""
-    named = rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else [causes[0].name] if outcome in NAMING else ()
-    return [
-        f"{cause.title[0].upper()}{cause.title[1:]}: on the twin any severity fits the recordings about as well, none "
-        "at all included. How the recordings changed speaks for it, the simulation does not."
-        for cause in causes
-        if cause.name in named and cause.severity is not None and cause.severity.is_unbounded
-    ]
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:

@@ -107,6 +107,33 @@ def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
     return tuple(cause.name for cause in effects[: int(np.clip(n, 2, MAX_RIVALS))])
 
 
+def within_the_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
+    """Return the probabilities with that of an unknown cause given to none, where the whole gap is within its floor.
+
+    Parameters
+    ----------
+    probabilities : mapping
+        Cause → probability.
+    size : Interval
+        Of the whole gap, in structural floors.
+    """
+    if size.high > 1.0:
+        return dict(probabilities)
+    moved = {NONE: probabilities[NONE] + probabilities[UNKNOWN], UNKNOWN: 0.0}
+    return dict(sorted({**probabilities, **moved}.items(), key=lambda item: -item[1]))
+
+
+def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
+    """Say of what is named which effects the fit can give no size, not even tell from nothing at all."""
+    named = rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else [causes[0].name] if outcome in NAMING else ()
+    return [
+        f"{cause.title[0].upper()}{cause.title[1:]}: on the twin any severity fits the recordings about as well, none "
+        "at all included. How the recordings changed speaks for it, the simulation does not."
+        for cause in causes
+        if cause.name in named and cause.severity is not None and cause.severity.is_unbounded
+    ]
+
+
 def _which_undecided(report: GapReport) -> str:
     """Name the likeliest two, and the group that is likelier than not."""
     named = {NONE: "no gap", UNKNOWN: "a gap of unknown cause"}
