@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from math import cos, radians
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -33,12 +34,12 @@ SIZES = (0.3, 6.0)
 """Structural floors that a gap's size counts from and to."""
 
 _NUMBERS = ("sharpness", "shrink_weight", "neutral_shrink", "none_bias", "unknown_bias", "named_from", "apart")
-_FURTHER = ("sharper", "none_slope")
+_FURTHER = {"sharper": 0.0, "none_slope": 0.0, "several": 1.0}
 
 
 @dataclass(frozen=True)
 class GapCalibration:
-    """p ∝ exp(a s^κ ln p_forest + b (score − s0) + c[kind] + d[kind] ln s), s the gap's size, fitted to blind cases.
+    """p ∝ exp(a m s^κ ln p_forest + b (score − s0) + c[kind] + d[kind] ln s), s the gap's size, fitted to known cases.
 
     Parameters
     ----------
@@ -59,6 +60,8 @@ class GapCalibration:
         shows than that says. 0 where it is missing.
     sharper, none_slope : float
         κ, and d of no gap: of a large gap more can be said, and hardly that it is none.
+    several : float
+        m where there is more than one operating condition, else 1: by how much more they say than one of them does.
     """
 
     sharpness: float
@@ -71,12 +74,13 @@ class GapCalibration:
     effect_biases: Mapping[str, float] = field(default_factory=dict)
     sharper: float = 0.0
     none_slope: float = 0.0
+    several: float = 1.0
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
         """Build it from what a JSON file holds."""
         biases = {name: float(value) for name, value in values.get("effect_biases", {}).items()}
-        further = {name: float(values.get(name, 0.0)) for name in _FURTHER}
+        further = {name: float(values.get(name, usual)) for name, usual in _FURTHER.items()}
         return cls(**{name: float(values[name]) for name in _NUMBERS}, effect_biases=biases, **further)
 
     def to_mapping(self) -> dict[str, Any]:
@@ -85,7 +89,7 @@ class GapCalibration:
         return numbers | ({"effect_biases": dict(self.effect_biases)} if self.effect_biases else {})
 
     def probabilities(
-        self, forest: Mapping[str, float], scores: Mapping[str, float], size: float = 1.0
+        self, forest: Mapping[str, float], scores: Mapping[str, float], size: float = 1.0, n_conditions: int = 1
     ) -> dict[str, float]:
         """Return cause → probability, likeliest first.
 
@@ -97,9 +101,11 @@ class GapCalibration:
             Effect → score of those that were tried.
         size : float
             Of the gap, in structural floors.
+        n_conditions : int
+            That were joined in `forest`.
         """
         counted = float(np.clip(size, *SIZES))
-        sharpness = self.sharpness * counted**self.sharper
+        sharpness = self.sharpness * counted**self.sharper * (self.several if n_conditions > 1 else 1.0)
         levels = {
             name: sharpness * float(np.log(max(p, 1e-9)))
             + self.shrink_weight * (scores.get(name, self.neutral_shrink) - self.neutral_shrink)
@@ -113,16 +119,31 @@ class GapCalibration:
         total = sum(weights.values())
         return {name: w / total for name, w in sorted(weights.items(), key=lambda item: -item[1])}
 
-    def outcome(self, probabilities: Mapping[str, float]) -> GapOutcome:
-        """Return what may be said; nothing that is less likely than all else together."""
+    def outcome(
+        self, probabilities: Mapping[str, float], groups: Mapping[str, str] = MappingProxyType({})
+    ) -> GapOutcome:
+        """Return what may be said; nothing that is less likely than all else together.
+
+        Parameters
+        ----------
+        probabilities : mapping
+            Cause → probability.
+        groups : mapping
+            Effect → group. Where effects of one group are likelier than all else, the kind of fault is told, whichever
+            of them it is.
+        """
         none, unknown = probabilities[NONE], probabilities[UNKNOWN]
         if max(none, unknown) >= LIKELIER_THAN_NOT:
             return GapOutcome.NO_GAP if none >= unknown else GapOutcome.UNKNOWN
         if 1.0 - none - unknown < self.named_from:
             return GapOutcome.UNDECIDED
-        first, *others = sorted((p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)), reverse=True)
+        effects = {name: p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)}
+        first, *others = sorted(effects.values(), reverse=True)
         second = others[0] if others else 0.0
-        if first + second < LIKELIER_THAN_NOT:
+        together: dict[str, float] = {}
+        for name, p in effects.items():
+            together[groups.get(name, name)] = together.get(groups.get(name, name), 0.0) + p
+        if max(first + second, *together.values()) < LIKELIER_THAN_NOT:
             return GapOutcome.UNDECIDED
         alone = first >= LIKELIER_THAN_NOT and first / (first + second) >= self.apart
         return GapOutcome.EFFECT if alone else GapOutcome.CANNOT_SEPARATE
@@ -182,9 +203,13 @@ NOT_SEEN_LOADED = {"backlash": 0.9}
 def joint_probabilities(
     found: Sequence[Mapping[str, float]], loads_n_per_mm: Sequence[float], allowed: Collection[str]
 ) -> dict[str, float]:
-    """Return the joint probabilities of several conditions, which are independent of each other.
+    """Return the joint probabilities of n conditions, p ∝ Π p_i^(1/n): the logarithmic opinion pool.
 
-    At one of several conditions an effect may not show, q: p(x|e) = (1 − q) p_forest(x|e) + q p_forest(x|none).
+    One machine's conditions say nearly the same: three of them carry the log evidence of little more than one, and
+    their product is far too sure. How much more than one they say is in the calibration. At one of several conditions
+    an effect may not show, q: p_i(x|e) = (1 − q) p_forest(x|e) + q p_forest(x|none).
+
+    Source: C. Genest, J. V. Zidek, "Combining probability distributions", Statistical Science 1 (1986).
 
     Parameters
     ----------
@@ -201,7 +226,7 @@ def joint_probabilities(
         loaded = parts_somewhere and load > LIGHT_LOAD_N_PER_MM
         for name in joint:
             unseen = 0.0 if len(found) == 1 else NOT_SEEN_LOADED.get(name, NOT_SEEN) if loaded else NOT_SEEN
-            joint[name] *= (1.0 - unseen) * at[name] + unseen * at[NONE]
+            joint[name] *= ((1.0 - unseen) * at[name] + unseen * at[NONE]) ** (1.0 / len(found))
     total = sum(joint.values())
     return {name: p / total for name, p in joint.items()}
 
@@ -232,6 +257,7 @@ class Attribution(Generic[TriedT]):
         The one that belongs to this way of comparing.
     size : float
         Of the gap in structural floors; of several conditions the largest.
+    n_conditions : int
     unheard_of : tuple of str
         Effects that the forests do not know, the user's own: each was to be tried.
     """
@@ -240,6 +266,7 @@ class Attribution(Generic[TriedT]):
     tried: dict[str, TriedT]
     calibration: GapCalibration
     size: float = 1.0
+    n_conditions: int = 1
     unheard_of: tuple[str, ...] = ()
 
     @property
@@ -250,7 +277,9 @@ class Attribution(Generic[TriedT]):
 
     def probabilities(self, calibration: GapCalibration | None = None) -> dict[str, float]:
         """Return cause → probability, likeliest first; calibrated, but for effects that the forests do not know."""
-        found = (calibration or self.calibration).probabilities(self.evidence, self.scores, self.size)
+        found = (calibration or self.calibration).probabilities(
+            self.evidence, self.scores, self.size, self.n_conditions
+        )
         return shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
 
 
@@ -296,14 +325,14 @@ def attribute(
     with_reference = all(c.reference is not None for c in conditions)
     size = max(condition.size.structural.value for condition in conditions)
     calibration = load_gap_calibration(with_reference=with_reference)
-    first = calibration.probabilities(forest, {}, size)
+    first = calibration.probabilities(forest, {}, size, len(conditions))
     likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
     heard_of = _known_to_forests(conditions)
     own = [name for name in effects or known if name not in heard_of] if max_tried else []
     likely += own
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_where_none_ran(tried, likely, twin)
-    return Attribution(forest, tried, calibration, size, tuple(own))
+    return Attribution(forest, tried, calibration, size, len(conditions), tuple(own))
 
 
 def _known_to_forests(conditions: Sequence[Condition]) -> set[str]:

@@ -50,6 +50,23 @@ def test_outcomes() -> None:
     assert outcome(unknown=0.7) is GapOutcome.UNKNOWN
 
 
+def test_a_certain_kind_is_told_where_no_effect_of_it_is() -> None:
+    teeth = dict.fromkeys(("root_crack", "tooth_spall", "chipped_tooth", "pitch_error"), 0.19)
+    found = {**teeth, "unbalance": 0.2, NONE: 0.02, UNKNOWN: 0.02}
+    groups = dict.fromkeys(("root_crack", "tooth_spall", "chipped_tooth"), "tooth-local")
+    assert PLAIN.outcome(found) is GapOutcome.UNDECIDED
+    assert PLAIN.outcome(found, groups) is GapOutcome.CANNOT_SEPARATE
+
+
+def test_several_conditions_say_more_than_one_by_the_calibrated_factor() -> None:
+    sharper = GapCalibration(1.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.65, several=2.0)
+    assert sharper.probabilities(FOREST, {}) == pytest.approx(FOREST)
+    squared = {name: p**2 for name, p in FOREST.items()}
+    expected = {name: p / sum(squared.values()) for name, p in squared.items()}
+    assert sharper.probabilities(FOREST, {}, n_conditions=2) == pytest.approx(expected)
+    assert GapCalibration.from_mapping(sharper.to_mapping()) == sharper
+
+
 def probabilities(**given: float) -> dict[str, float]:
     """Many further effects share the rest."""
     rest = 1.0 - sum(given.values())

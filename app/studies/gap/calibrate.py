@@ -1,18 +1,16 @@
-"""Calibrate the gap's probabilities on blind cases: `python -m app.studies.gap.calibrate --cases N --work FILE`.
+"""Calibrate the gap's probabilities on simulators left out of learning: `python -m app.studies.gap.calibrate`.
 
-Cases of the role "calibration" differ in gear geometry from those that the benchmark judges by. Each is weighed twice:
-as the shipped population has it, which knows the independent rig's development gears, and without any machine of that
-rig, since a user's machine may be as strange to all simulators as it is to the others then. What a case says is
-kept in the work file, a line each, so that a stopped run goes on. The forests are asked about every case, which takes
-some seconds; effects are tried on the twin for the first `--tried` cases only, a minute each. From what probability on
-an effect is named hangs on the few cases from outside the catalogue: `--strange` further ones tell that alone.
+A user's machine is as strange to all simulators as each of them is to the others. So the machines of the population's
+simulators are diagnosed in turn, each simulator's by what the others alone have taught; nothing is simulated anew. What
+is printed, by simulator, is how good recognition is on machines of a kind that it has not learned from. The biases and
+the sharpness are fitted to the same cases: a dozen numbers for some thousand cases.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,23 +18,26 @@ from typing import Any
 import numpy as np
 import typer
 
-from app.studies.gap.by_hand import rig_of
-from app.studies.pool import answers_of
 from gearsig.checks import FloatArray
-from gearsig.errors import GearsigError
 from gearsig.gap import (
     CALIBRATION_FILE,
     INDEPENDENT,
-    MAX_TRIED,
     NAMING,
     NONE,
     UNKNOWN,
+    Features,
     GapCalibration,
+    Population,
+    gap_size,
+    joint_probabilities,
+    load_population,
+    load_recogniser,
     without_machines_of,
 )
+from sims.cracked import cracked_gap_simulator
 
 # --------------------
-# From blind cases with known causes to the numbers that make the gap's probabilities right on the average.
+# From cases with known causes to the numbers that make the gap's probabilities right on the average.
 # --------------------
 
 
@@ -51,6 +52,7 @@ development and calibration cases."""
 _START = np.array([1.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0])
 _BOUNDS = ((0.1, 5.0), (0.0, 10.0), (-1.0, 1.0), (-4.0, 4.0), (-4.0, 4.0), (0.0, 1.0), (-4.0, 0.0))
 _BIAS_BOUNDS = (-2.0, 2.0)
+_SEVERAL_BOUNDS = (0.5, 4.0)
 _PRIOR = 0.5
 """Weight of the start, at which trials say nothing, beside that of one case."""
 BIAS_SCATTER = 0.3
@@ -59,7 +61,7 @@ BIAS_SCATTER = 0.3
 
 @dataclass(frozen=True)
 class WeighedCase:
-    """One blind case: what the forests and the trials said, and the truth.
+    """One case: what the forests and the trials said, and the truth.
 
     Parameters
     ----------
@@ -68,41 +70,59 @@ class WeighedCase:
     forest, scores : mapping
     size : float
         See `gearsig.gap.Attribution`.
+    n_conditions : int
+    simulator : str
+        That made it.
     """
 
     truths: tuple[str, ...]
     forest: Mapping[str, float]
     scores: Mapping[str, float]
     size: float = 1.0
+    n_conditions: int = 1
+    simulator: str = ""
+
+    def by(self, calibration: GapCalibration) -> dict[str, float]:
+        """Return cause → probability, likeliest first."""
+        return calibration.probabilities(self.forest, self.scores, self.size, self.n_conditions)
 
 
-def fit_calibration(cases: Sequence[WeighedCase], strange: Sequence[WeighedCase] = ()) -> GapCalibration:
+def fit_calibration(cases: Sequence[WeighedCase], several: Sequence[WeighedCase] = ()) -> GapCalibration:
     """Fit sharpness, what trials say and all biases by likelihood; then the threshold for naming an effect.
 
     Parameters
     ----------
     cases : sequence of WeighedCase
-    strange : sequence of WeighedCase
-        Further ones from outside the catalogue, for the threshold only: as many in the likelihood would make whatever
-        is diagnosed look strange.
+        Of one operating condition each.
+    several : sequence of WeighedCase
+        Of several: by how much more than one they say is fitted to these, all else kept.
 
     J. C. Platt, "Probabilistic outputs for support vector machines", 1999; C. Guo, G. Pleiss, Y. Sun, K. Q. Weinberger,
     "On calibration of modern neural networks", 2017 (one temperature for all classes, a bias for each).
     """
-    from scipy.optimize import minimize
+    from scipy.optimize import minimize, minimize_scalar
 
     effects = sorted({t for c in cases for t in c.truths} - {NONE, UNKNOWN})
     start = np.append(_START, np.zeros(len(effects)))
     weights = np.append(np.full(len(_START), _PRIOR), np.full(len(effects), 0.5 / BIAS_SCATTER**2))
 
     def loss(x: FloatArray) -> float:
-        fitted = _calibration(x, effects)
-        right = [sum(fitted.probabilities(c.forest, c.scores, c.size)[t] for t in c.truths) for c in cases]
-        return float(-np.mean(np.log(np.maximum(right, 1e-9))) + weights @ (x - start) ** 2 / len(cases))
+        return log_loss(_calibration(x, effects), cases) + float(weights @ (x - start) ** 2) / len(cases)
 
     best = minimize(loss, start, method="L-BFGS-B", bounds=[*_BOUNDS, *[_BIAS_BOUNDS] * len(effects)]).x
     fitted = _calibration(np.round(best, 3), effects)
-    return replace(fitted, named_from=_named_from(fitted, [*cases, *strange]))
+    if several:
+        sharper = minimize_scalar(
+            lambda factor: log_loss(replace(fitted, several=factor), several), bounds=_SEVERAL_BOUNDS, method="bounded"
+        )
+        fitted = replace(fitted, several=round(float(sharper.x), 3))
+    return replace(fitted, named_from=_named_from(fitted, cases))
+
+
+def log_loss(calibration: GapCalibration, cases: Sequence[WeighedCase]) -> float:
+    """Return −mean ln p of what is true."""
+    right = [sum(p.get(t, 0.0) for t in c.truths) for c in cases for p in (c.by(calibration),)]
+    return float(-np.mean(np.log(np.maximum(right, 1e-9))))
 
 
 def _calibration(x: FloatArray, effects: Sequence[str]) -> GapCalibration:
@@ -116,7 +136,7 @@ def _calibration(x: FloatArray, effects: Sequence[str]) -> GapCalibration:
 def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:
     """Return the least probability of effects together from which naming keeps both false rates."""
     without = [
-        (rate, [fitted.probabilities(c.forest, c.scores, c.size) for c in cases if c.truths == (cause,)])
+        (rate, [c.by(fitted) for c in cases if c.truths == (cause,)])
         for cause, rate in ((NONE, FALSE_ON_NONE), (UNKNOWN, FALSE_ON_UNKNOWN))
     ]
     for threshold in THRESHOLDS:
@@ -126,114 +146,138 @@ def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:
     return THRESHOLDS[-1]
 
 
-SEED = 9202
-MIN_LEVEL = 0.4
-"""Of effects' severities, 0 to 1: nothing can be learned from those that nobody could see."""
-ROUND = 27
-"""Cases of a round: each effect once, four healthy ones, four from outside the catalogue."""
-FIRST_STRANGE = 10_000
-"""Number of the first of the cases from outside the catalogue that only tell from what probability on to name."""
+# --------------------
+# The population's own machines as cases, each simulator's known to the others' forests only.
+# --------------------
+
+
+SEED = 9203
+PER_EFFECT, PER_NO_EFFECT = 24, 96
+"""Rows of each simulator: of each effect, and of healthy machines and of unknown changes; a case in five is either."""
+
+
+def cases_of(population: Population, simulator: str, *, with_reference: bool) -> tuple[list[WeighedCase], ...]:
+    """Return the cases of one simulator's machines, by forests without it: of one condition, and of two.
+
+    Only the independent rig's machines were recorded at two operating points with the same effect.
+    """
+    rng = np.random.default_rng(SEED)
+    own = np.flatnonzero((population.simulators == simulator) & ~population.by_hand)
+    drawn = []
+    for cause in np.unique(population.causes[own]):
+        rows = own[population.causes[own] == cause]
+        n = PER_NO_EFFECT if cause in (NONE, UNKNOWN) else PER_EFFECT
+        drawn += rng.permutation(rows)[:n].tolist()
+    pairs = two_conditions(population, own) if simulator == INDEPENDENT else []
+    with without_machines_of(simulator):
+        single = [_weighed(population, (row,), simulator, with_reference=with_reference) for row in drawn]
+        both = [_weighed(population, rows, simulator, with_reference=with_reference) for rows in pairs]
+    return single, both
+
+
+def two_conditions(population: Population, rows: Iterable[int]) -> list[tuple[int, int]]:
+    """Return the rows that are of one machine with one cause at both of its points: machine 2k and 2k + 1."""
+    at = {(int(population.rigs[row]), str(population.causes[row])): row for row in rows}
+    return [(row, at[rig + 1, cause]) for (rig, cause), row in at.items() if rig % 2 == 0 and (rig + 1, cause) in at]
+
+
+def _weighed(population: Population, rows: tuple[int, ...], simulator: str, *, with_reference: bool) -> WeighedCase:
+    recogniser = load_recogniser(with_reference=with_reference)
+    effects = cracked_gap_simulator().gap_effects().values()
+    known = load_population()
+    found, sizes = [], []
+    for row in rows:
+        change = _change(population, known, row, with_reference=with_reference)
+        found.append(recogniser.probabilities(change, float(population.loads_n_per_mm[row]), effects))
+        sizes.append(gap_size(change, recogniser.floor).structural.value)
+    loads = [float(population.loads_n_per_mm[row]) for row in rows]
+    forest = joint_probabilities(found, loads, recogniser.causes)
+    return WeighedCase((str(population.causes[rows[0]]),), forest, {}, max(sizes), len(rows), simulator)
+
+
+def _change(population: Population, known: Population, row: int, *, with_reference: bool) -> Features:
+    """Return what a row's machine changed, the twin as credible as the others' machines show it to be."""
+    if with_reference:
+        return Features(population.change_names, population.changes[row], population.change_scatter[row])
+    values = population.features[row] - known.credibility * population.simulated[row]
+    scatter = np.hypot(population.feature_scatter[row], known.credibility * population.simulated_scatter[row])
+    return Features(population.feature_names, values, scatter)
+
+
+# --------------------
+# How good that is, by simulator.
+# --------------------
+
+
+STRONG = 3.0
+"""Structural floors from which an effect counts as strong."""
+
+
+def table(calibration: GapCalibration, cases: Sequence[WeighedCase]) -> list[str]:
+    """Return a line for each simulator and one for all: of strong effects, and of all."""
+    named = [*dict.fromkeys(case.simulator for case in cases)]
+    rows = [(name, [case for case in cases if case.simulator == name]) for name in named]
+    return [_line(name, calibration, some) for name, some in [*rows, ("all", list(cases))]]
+
+
+def _line(name: str, calibration: GapCalibration, cases: Sequence[WeighedCase]) -> str:
+    effects = cracked_gap_simulator().gap_effects()
+    groups = {name: effect.group for name, effect in effects.items()} | {NONE: NONE, UNKNOWN: UNKNOWN}
+    said = [(case, case.by(calibration)) for case in cases]
+    strong = [(c, p) for c, p in said if c.size >= STRONG and c.truths[0] not in (NONE, UNKNOWN)]
+    first = [next(iter(p)) == c.truths[0] for c, p in strong]
+    two = [c.truths[0] in list(p)[:2] for c, p in strong]
+    group = [_likeliest_group(p, groups) == groups[c.truths[0]] for c, p in strong]
+    sure = [next(iter(p)) in c.truths for c, p in said if max(p.values()) >= 0.9]
+    healthy, unknown = (
+        [calibration.outcome(p, groups) in NAMING for c, p in said if c.truths == (cause,)] for cause in (NONE, UNKNOWN)
+    )
+    return (
+        f"{name}: strong {len(strong)}: likeliest {_share(first)}, two {_share(two)}, group {_share(group)}; "
+        f"said with 0.9 {len(sure)}, right {_share(sure)}; calibration error {calibration_error(said):.3f}; "
+        f"named on healthy {_share(healthy)}, on unknown {_share(unknown)}; log loss {log_loss(calibration, cases):.3f}"
+    )
+
+
+def _share(values: Sequence[bool]) -> str:
+    return f"{np.mean(values):.2f}" if values else "-"
+
+
+def _likeliest_group(probabilities: Mapping[str, float], groups: Mapping[str, str]) -> str:
+    together: dict[str, float] = {}
+    for name, p in probabilities.items():
+        together[groups[name]] = together.get(groups[name], 0.0) + p
+    return max(together, key=together.__getitem__)
+
+
+def calibration_error(said: Sequence[tuple[WeighedCase, Mapping[str, float]]], n_bins: int = 10) -> float:
+    """Return Σ_b n_b/n |share right − mean probability| of the likeliest, over equal bins of its probability."""
+    likeliest = np.array([max(p.values()) for _, p in said])
+    right = np.array([next(iter(p)) in case.truths for case, p in said], dtype=float)
+    bins = np.minimum((likeliest * n_bins).astype(int), n_bins - 1)
+    parts = [abs(float(np.sum(right[bins == b] - likeliest[bins == b]))) for b in range(n_bins)]
+    return sum(parts) / len(likeliest) if len(likeliest) else 0.0
 
 
 def main() -> None:
-    """Make cases, weigh them, fit, write."""
-    from app.studies.gap.calibrate import weigh_case
-
+    """Weigh the population's machines, fit, write, and print how good that is."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=216)
-    parser.add_argument("--strange", type=int, default=64)
-    parser.add_argument("--tried", type=int, default=27)
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--work", type=Path, required=True, help="keeps what the cases say")
     parser.add_argument("--to", type=Path, default=CALIBRATION_FILE)
     given = parser.parse_args()
-    done = _read(given.work)
-    wanted = [*range(given.cases), *range(FIRST_STRANGE, FIRST_STRANGE + given.strange)]
-    missing = [i for i in wanted if i not in done]
-    jobs = [(i, MAX_TRIED if i < given.tried else 0) for i in missing]
-    with given.work.open("a", encoding="utf-8") as file:
-        for (i, _), rows in answers_of(weigh_case, jobs, given.processes):
-            file.write(json.dumps({"case": i, "rows": rows}) + "\n")
-            file.flush()
-            typer.echo(f"case {i}: {', '.join(rows[0]['truths']) if rows else 'refused'}")
-    kept = {i: found for i, found in _read(given.work).items() if i in wanted}
-    values: dict[str, Any] = {
-        name: fit_calibration(*(_cases(kept, flag, strange=strange) for strange in (False, True))).to_mapping()
-        for name, flag in (("with_reference", True), ("without_reference", False))
-    }
-    values["provenance"] = {
-        "made_by": "python -m app.studies.gap.calibrate",
-        "seed": SEED,
-        "n_cases": len(kept),
-    }
+    population = load_population()
+    values: dict[str, Any] = {}
+    n_cases = 0
+    for name, with_reference in (("with_reference", True), ("without_reference", False)):
+        found = [cases_of(population, s, with_reference=with_reference) for s in np.unique(population.simulators)]
+        single, several = ([case for one in found for case in one[i]] for i in (0, 1))
+        fitted = fit_calibration(single, several)
+        values[name] = fitted.to_mapping()
+        n_cases += len(single) + len(several)
+        typer.echo(f"{name.replace('_', ' ')}, one condition, the simulator left out:")
+        typer.echo("\n".join(table(fitted, single)))
+        typer.echo(f"two conditions of it:\n{_line(INDEPENDENT, fitted, several)}")
+    values["provenance"] = {"made_by": "python -m app.studies.gap.calibrate", "seed": SEED, "n_cases": n_cases}
     given.to.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
-    typer.echo(json.dumps(values, indent=1))
-
-
-def weigh_case(job: tuple[int, int]) -> list[dict[str, Any]]:
-    """Return what is said of a blind case with its reference and without, and the truth; less where it is refused.
-
-    Each by all that is known, and by what is known without the machines of the rig that made the case. A job is the
-    case's number and how many effects are tried at most.
-    """
-    from gearsig.gap import attribute, conditions_of, load_population
-    from gearsig.prepared import PreparedRecording
-    from sims.blind import CATALOGUE, draw_case, record_case
-    from sims.cracked import cracked_gap_simulator
-
-    index, max_tried = job
-    rng = np.random.default_rng([SEED, index])
-    place, names = index % ROUND, list(CATALOGUE)
-    kind = "single" if place < len(names) else "none" if place < len(names) + 4 else "unknown"
-    if index >= FIRST_STRANGE:
-        kind = "unknown"
-    wanted = {"effect": names[place], "level": float(rng.uniform(MIN_LEVEL, 1.0))} if kind == "single" else {}
-    case = draw_case(rng, "calibration", kind=kind, with_reference=True, **wanted)  # type: ignore[arg-type]  # as drawn
-    truths = [wanted["effect"]] if wanted else [NONE if kind == "none" else UNKNOWN]
-    recorded = record_case(case)
-    simulator = cracked_gap_simulator()
-    rows = []
-    for references in (recorded.references, ()):
-        try:
-            twin = simulator.twin_of(rig_of(recorded.conditions[0]))
-            prepared = [[PreparedRecording(r) for r in given] for given in (recorded.conditions, references)]
-            conditions, _ = conditions_of(*prepared, twin)
-            for left_out in ("", INDEPENDENT):
-                with without_machines_of(left_out):
-                    known = [replace(c, population=load_population()) for c in conditions]
-                    weighed = attribute(
-                        known, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=max_tried
-                    )
-                rows.append(
-                    {
-                        "truths": truths,
-                        "level": wanted.get("level"),
-                        "left_out": left_out,
-                        "with_reference": all(condition.reference is not None for condition in known),
-                        "size": weighed.size,
-                        "forest": dict(weighed.evidence),
-                        "scores": weighed.scores,
-                    }
-                )
-        except GearsigError as error:
-            typer.echo(f"case {index}: {error}")
-    return rows
-
-
-def _read(path: Path) -> dict[int, list[dict[str, Any]]]:
-    if not path.exists():
-        return {}
-    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    return {line["case"]: line["rows"] for line in lines}
-
-
-def _cases(kept: dict[int, list[dict[str, Any]]], with_reference: bool, *, strange: bool) -> list[WeighedCase]:
-    rows = [row for i, found in kept.items() if (i >= FIRST_STRANGE) == strange for row in found]
-    return [
-        WeighedCase(tuple(row["truths"]), row["forest"], row["scores"], row["size"])
-        for row in rows
-        if row["with_reference"] == with_reference
-    ]
 
 
 if __name__ == "__main__":
