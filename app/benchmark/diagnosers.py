@@ -217,9 +217,10 @@ def diagnose_forest(seen: VisibleCase) -> GapReport:
     conditions, _ = conditions_of(recordings, references, twin)
     weighed = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=0)
     probabilities = weighed.probabilities()
+    groups = {name: effect.group for name, effect in simulator.gap_effects().items()}
     changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
     shafts = {name: told_options(name, changes, teeth) for name in probabilities}
-    return bare_report("forest", probabilities, shafts, weighed.calibration.outcome(probabilities))
+    return bare_report("forest", probabilities, shafts, weighed.calibration.outcome(probabilities, groups))
 
 
 # --------------------

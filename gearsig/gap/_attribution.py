@@ -21,14 +21,10 @@ from gearsig.gap._conditions import Condition
 from gearsig.gap._recognition import load_recogniser
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
-from gearsig.gap._types import NONE, UNKNOWN, GapOutcome, Shrinkage
+from gearsig.gap._types import LIKELIER_THAN_NOT, NONE, UNKNOWN, GapOutcome, Shrinkage
 from gearsig.rig import GearPair
 
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
-
-LIKELIER_THAN_NOT = 0.5
-"""Probability from which a cause is likelier than all others together. No effect is named below it, nor are two that
-have less together: then what is wrong is unknown, however sure it is that something is."""
 
 SIZES = (0.3, 6.0)
 """Structural floors that a gap's size counts from and to."""

@@ -208,7 +208,8 @@ def diagnose_gap(
     # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
     standing, remarks, faults = stood_out(recording, healthy)
-    outcome, unseen = beside_standing(attribution.calibration.outcome(probabilities), standing)
+    groups = {name: effect.group for name, effect in known.items()}
+    outcome, unseen = beside_standing(attribution.calibration.outcome(probabilities, groups), standing)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.

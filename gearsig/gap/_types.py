@@ -102,6 +102,10 @@ class AverageCurves:
     reference: FloatArray
 
 
+LIKELIER_THAN_NOT = 0.5
+"""Probability from which a cause, or a kind of fault, is likelier than all others together. No effect is named below
+it, nor are two that have less together: then what is wrong is unknown, however sure it is that something is."""
+
 NONE, UNKNOWN = "none", "unknown"
 """Names of the two causes that are no effect: no gap beyond the floor; a gap that nothing in the catalogue explains."""
 
@@ -330,6 +334,46 @@ def group_probabilities(causes: Sequence[GapCause]) -> dict[str, float]:
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
+KIND_TITLES = {
+    "tooth-local": "a damaged tooth",
+    "flank": "the flanks of the teeth",
+    "shaft": "unbalance, run-out or misalignment of a shaft",
+    "drive and load": "the drive or the load",
+    "bearing": "a bearing",
+    "measurement chain": "the measurement chain",
+}
+"""Group of effects → the kind of fault, in words; of another group, its name."""
+
+
+@dataclass(frozen=True)
+class GapKind:
+    """The kind of fault, which is surer than which effect of that kind it is.
+
+    Parameters
+    ----------
+    group, title : str
+    probability : float
+        Of its effects together.
+    place : str
+        As of its likeliest effect; empty where that has none.
+    """
+
+    group: str
+    title: str
+    probability: float
+    place: str = ""
+
+
+def kind_of(causes: Sequence[GapCause], groups: Mapping[str, float]) -> GapKind | None:
+    """Return the likeliest kind of fault, None where that is no likelier than all else together."""
+    effects = {name: p for name, p in groups.items() if name not in (NONE, UNKNOWN, "")}
+    group = max(effects, key=effects.__getitem__, default="")
+    if not effects.get(group, 0.0) >= LIKELIER_THAN_NOT:
+        return None
+    place = next((cause.place for cause in causes if cause.group == group), "")
+    return GapKind(group, KIND_TITLES.get(group, group), effects[group], place)
+
+
 @dataclass(frozen=True)
 class GapStep:
     """One bar of the waterfall: what is left of the whole gap once `label` is added, on held-out data."""
@@ -447,6 +491,11 @@ class GapReport:
     notices: tuple[str, ...] = ()
     twin_toml: str = field(default="", repr=False)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> GapKind | None:
+        """The kind of fault that is named; None where nothing is, or no kind is likelier than all else together."""
+        return kind_of(self.causes, self.groups) if self.outcome in NAMING else None
 
     @property
     def is_simulated(self) -> bool:

@@ -7,10 +7,20 @@ from math import isfinite
 
 import numpy as np
 
-from gearsig.gap._attribution import LIKELIER_THAN_NOT
 from gearsig.gap._simulator import GapEffect
-from gearsig.gap._types import NAMING, NONE, UNKNOWN, GapCause, GapOutcome, GapPlace, GapReport, Interval
-from gearsig.gap._words import hardly_predicted, same_load, same_speed, severity_unit
+from gearsig.gap._types import (
+    LIKELIER_THAN_NOT,
+    NAMING,
+    NONE,
+    UNKNOWN,
+    GapCause,
+    GapKind,
+    GapOutcome,
+    GapPlace,
+    GapReport,
+    Interval,
+)
+from gearsig.gap._words import hardly_predicted, odds_text, same_load, same_speed, severity_unit
 
 
 def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
@@ -49,7 +59,7 @@ def _with_size(place: GapPlace) -> str:
 
 def _which(report: GapReport) -> str:
     first = report.causes[0]
-    odds = f"{100 * first.probability:.0f} %"
+    odds = odds_text(first.probability)
     if report.outcome is GapOutcome.NO_GAP:
         return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
     if report.outcome is GapOutcome.UNDECIDED:
@@ -57,12 +67,39 @@ def _which(report: GapReport) -> str:
     if report.outcome is GapOutcome.UNKNOWN:
         return _which_unknown(report)
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
-        *others, last = (_titled(report, name) for name in report.inseparable)
-        named = f"{', '.join(others)} or {last}"
-        return f"Which: {named}; these recordings cannot tell them apart."
+        return f"Which: {_kind_and_rivals(report, report.inseparable)}; these recordings cannot tell them apart."
     size = f", {_severity(first, first.severity)}" if first.severity and not first.severity.is_unbounded else ""
+    if report.kind is not None and report.kind.probability - first.probability >= SURER:
+        return f"Which: {_kind(report.kind)}: {first.title}{size} (probability {odds})."
     place = f" at {first.place}" if first.place else ""
     return f"Which: {first.title}{place}{size} (probability {odds})."
+
+
+SURER = 0.01
+"""By how much the kind of fault is surer than the effect, from which it is told first."""
+
+
+def _kind(kind: GapKind) -> str:
+    """Return "a damaged tooth, tooth 21 of the gear on the input shaft (97 %)"."""
+    place = f", {kind.place}" if kind.place else ""
+    return f"{kind.title}{place} ({odds_text(kind.probability)})"
+
+
+def _kind_and_rivals(report: GapReport, rivals: Sequence[str]) -> str:
+    """Return the kind of fault with what of it is likeliest, then what else may be; without a kind, all of them."""
+    if report.kind is None:
+        return _either(report, rivals)
+    groups = {cause.name: cause.group for cause in report.causes}
+    within = [name for name in rivals if groups.get(name) == report.kind.group]
+    others = [name for name in rivals if name not in within]
+    if not within:
+        return _either(report, rivals)
+    return f"{_kind(report.kind)}: {_either(report, within)}{f'; else {_either(report, others)}' if others else ''}"
+
+
+def _either(report: GapReport, names: Sequence[str]) -> str:
+    *others, last = (_titled(report, name) for name in names)
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def _which_unknown(report: GapReport) -> str:
@@ -71,7 +108,7 @@ def _which_unknown(report: GapReport) -> str:
     unknown = next((cause.probability for cause in report.causes if cause.name == UNKNOWN), 1.0)
     if best is None or best.probability <= unknown:
         return "Which: unknown; nothing in the catalogue explains it well enough."
-    return f"Which: unknown; {best.title} comes nearest ({100 * best.probability:.0f} %), too little to be named."
+    return f"Which: unknown; {best.title} comes nearest ({odds_text(best.probability)}), too little to be named."
 
 
 def named_cause(name: str, probability: float, effects: Mapping[str, GapEffect], place: str = "") -> GapCause:
@@ -138,11 +175,11 @@ def _which_undecided(report: GapReport) -> str:
     """Name the likeliest two, and the group that is likelier than not."""
     named = {NONE: "no gap", UNKNOWN: "a gap of unknown cause"}
     likeliest = sorted(report.causes, key=lambda cause: -cause.probability)[:2]
-    parts = [f"{named.get(cause.name, cause.title)} {100 * cause.probability:.0f} %" for cause in likeliest]
+    parts = [f"{named.get(cause.name, cause.title)} {odds_text(cause.probability)}" for cause in likeliest]
     groups = {name: p for name, p in report.groups.items() if name not in (NONE, UNKNOWN, "")}
     group = max(groups, key=groups.__getitem__, default="")
     if group and groups[group] >= LIKELIER_THAN_NOT:
-        parts.append(f"effects of the group “{group}” together {100 * groups[group]:.0f} %")
+        parts.append(f"effects of the group “{group}” together {odds_text(groups[group])}")
     return f"Which: undecided; nothing is likely enough to be named: {', '.join(parts)}."
 
 
@@ -153,7 +190,7 @@ def _severity(cause: GapCause, severity: Interval) -> str:
 
 def _titled(report: GapReport, name: str) -> str:
     cause = {c.name: c for c in report.causes}.get(name)
-    return f"{cause.title} ({100 * cause.probability:.0f} %)" if cause is not None else name.replace("_", " ")
+    return f"{cause.title} ({odds_text(cause.probability)})" if cause is not None else name.replace("_", " ")
 
 
 def _how_far(report: GapReport) -> str:

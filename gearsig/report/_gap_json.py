@@ -73,6 +73,7 @@ def gap_to_dict(report: GapReport) -> Json:
         "gearsig_version": __version__,
         "outcome": report.outcome.value,
         "verdict": dict(zip(("where", "which", "how_far", "next"), report.verdict, strict=True)),
+        "kind": None if report.kind is None else plain(report.kind, layouts=LAYOUTS),
         **plain(report, layouts=LAYOUTS),
     }
     _state_units(result)

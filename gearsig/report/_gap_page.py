@@ -32,6 +32,7 @@ from gearsig.gap import (
     SpectrumCurves,
     against_reference,
     hardly_predicted,
+    odds_text,
     lines_beyond,
     point_text,
     same_condition,
@@ -195,7 +196,7 @@ def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
         cause.name,
         cause.title,
         cause.group,
-        percent(cause.probability),
+        odds_text(cause.probability),
         _bar(cause.probability),
         severity_text(cause),
         cause.place,
@@ -245,14 +246,14 @@ def _evidence_row(one: Evidence) -> EvidenceRow:
 def group_texts(report: GapReport) -> tuple[str, ...]:
     """Return the groups that have a chance, likeliest first."""
     ranked = sorted(report.groups.items(), key=lambda item: -item[1] if isfinite(item[1]) else 0.0)
-    return tuple(f"{group} {percent(p)}" for group, p in ranked if p >= MIN_SHOWN)
+    return tuple(f"{group} {odds_text(p)}" for group, p in ranked if p >= MIN_SHOWN)
 
 
 def inseparable_text(report: GapReport) -> str:
     """Say which causes cannot be told apart; empty where there are none."""
     if report.inseparable is None:
         return ""
-    titles = {cause.name: f"{cause.title} ({percent(cause.probability)})" for cause in report.causes}
+    titles = {cause.name: f"{cause.title} ({odds_text(cause.probability)})" for cause in report.causes}
     *others, last = (titles.get(name, name) for name in report.inseparable)
     return f"These recordings cannot tell {', '.join(others)} and {last} apart."
 

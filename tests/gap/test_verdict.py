@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from gearsig.gap import (
+    KIND_TITLES,
     NONE,
     UNKNOWN,
     ConditionFacts,
@@ -42,8 +43,22 @@ def test_a_severity_has_a_unit_for_people_and_no_exponent() -> None:
 def test_causes_that_cannot_be_told_apart_are_named_even_if_one_is_not_among_them() -> None:
     report = replace(cannot_separate_report(), inseparable=("root_crack", "torque_ripple"))
     assert report.verdict[1] == (
-        "Which: crack in a tooth root (48 %) or torque ripple; these recordings cannot tell them apart."
+        "Which: a damaged tooth, tooth 21 of the gear on the input shaft (93 %): crack in a tooth root (48 %); else "
+        "torque ripple; these recordings cannot tell them apart."
     )
+
+
+def test_the_kind_of_fault_comes_first_where_it_is_surer_than_the_effect() -> None:
+    report = effect_report()
+    assert report.kind is not None
+    assert (report.kind.group, report.kind.probability) == ("tooth-local", 0.93)
+    assert report.kind.place == report.causes[0].place
+    line = report.verdict[1]
+    assert line.index(report.kind.title) < line.index("93 %") < line.index(report.causes[0].title)
+    as_sure = replace(report, groups={"tooth-local": report.causes[0].probability})
+    assert KIND_TITLES["tooth-local"] not in as_sure.verdict[1]
+    assert no_gap_report().kind is None
+    assert replace(report, groups={"tooth-local": 0.4, "shaft": 0.3}).kind is None
 
 
 def test_what_cannot_be_told_apart_is_named_until_it_is_nearly_all_that_effects_have() -> None:

@@ -92,7 +92,7 @@ def test_names_that_others_rely_on():
     assert (first["name"], first["probability"], first["severity"]["unit"]) == ("root_crack", 0.88, "mm")
     assert first["fitted"]["options"] == {"gear": "driver", "tooth": 21.0}
     assert found["places"][0]["tooth"] == 21
-    assert found["verdict"]["which"].startswith("Which: crack in a tooth root")
+    assert found["verdict"]["which"].startswith("Which: a damaged tooth")
     assert found["conditions"][1]["speed_rpm"] == 1998.7
     assert found["next_recordings"][0]["distance_in_structural_floors"] == 5.4
     assert found["twin_toml"].startswith("[about]")
