@@ -138,7 +138,7 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
     page = wait_for_the_end(page)
     assert not page.exception
     text = text_of(page)
-    assert "Crack in a tooth root at tooth 21 of the driver" in text
+    assert "tooth 21 of the driver (93 %): crack in a tooth root" in text
     assert "10 mm" not in text
     labels = [button.label for button in page.get("download_button")]
     assert labels == ["Report (HTML)", "JSON", "Twin (preset)"]

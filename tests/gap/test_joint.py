@@ -25,7 +25,7 @@ def test_an_effect_may_be_unseen_at_one_of_two() -> None:
     found = joint_probabilities([SURE, NOTHING], [LOADED, LOADED], SURE)
     pooled = {name: (SURE[name] * NOTHING[name]) ** 0.5 for name in SURE}
     assert found["backlash"] > pooled["backlash"] / sum(pooled.values())
-    by_hand = {n: ((0.6 * SURE[n] + 0.4 * 0.1) * (0.6 * NOTHING[n] + 0.4 * 0.9)) ** 0.5 for n in SURE}
+    by_hand = {n: ((0.8 * SURE[n] + 0.2 * 0.1) * (0.8 * NOTHING[n] + 0.2 * 0.9)) ** 0.5 for n in SURE}
     assert found == pytest.approx({n: p / sum(by_hand.values()) for n, p in by_hand.items()})
 
 
@@ -42,5 +42,5 @@ def test_loads_that_never_let_them_part_or_are_not_known_change_nothing() -> Non
 
 def test_the_same_said_twice_is_no_surer() -> None:
     joint = joint_probabilities([SURE, SURE, SURE], [LOADED] * 3, SURE)
-    once = {name: 0.6 * SURE[name] + 0.4 * SURE[NONE] for name in SURE}
+    once = {name: 0.8 * SURE[name] + 0.2 * SURE[NONE] for name in SURE}
     assert joint == pytest.approx({name: p / sum(once.values()) for name, p in once.items()})

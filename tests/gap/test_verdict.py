@@ -43,7 +43,7 @@ def test_a_severity_has_a_unit_for_people_and_no_exponent() -> None:
 def test_causes_that_cannot_be_told_apart_are_named_even_if_one_is_not_among_them() -> None:
     report = replace(cannot_separate_report(), inseparable=("root_crack", "torque_ripple"))
     assert report.verdict[1] == (
-        "Which: a damaged tooth, tooth 21 of the gear on the input shaft (93 %): crack in a tooth root (48 %); else "
+        "Which: a damaged tooth, tooth 21 of the driver (93 %): crack in a tooth root (48 %); else "
         "torque ripple; these recordings cannot tell them apart."
     )
 

@@ -168,7 +168,7 @@ def cases_of(population: Population, simulator: str, *, with_reference: bool) ->
         rows = own[population.causes[own] == cause]
         n = PER_NO_EFFECT if cause in (NONE, UNKNOWN) else PER_EFFECT
         drawn += rng.permutation(rows)[:n].tolist()
-    pairs = two_conditions(population, own) if simulator == INDEPENDENT else []
+    pairs = two_conditions(population, rng.permutation(own)) if simulator == INDEPENDENT else []
     with without_machines_of(simulator):
         single = [_weighed(population, (row,), simulator, with_reference=with_reference) for row in drawn]
         both = [_weighed(population, rows, simulator, with_reference=with_reference) for rows in pairs]
@@ -176,9 +176,19 @@ def cases_of(population: Population, simulator: str, *, with_reference: bool) ->
 
 
 def two_conditions(population: Population, rows: Iterable[int]) -> list[tuple[int, int]]:
-    """Return the rows that are of one machine with one cause at both of its points: machine 2k and 2k + 1."""
+    """Return the rows that are of one machine with one cause at both of its points: machine 2k and 2k + 1.
+
+    Of healthy machines and of unknown changes as many as of four effects each, as among the cases of one condition.
+    """
     at = {(int(population.rigs[row]), str(population.causes[row])): row for row in rows}
-    return [(row, at[rig + 1, cause]) for (rig, cause), row in at.items() if rig % 2 == 0 and (rig + 1, cause) in at]
+    pairs = {
+        key: (row, at[key[0] + 1, key[1]]) for key, row in at.items() if key[0] % 2 == 0 and (key[0] + 1, key[1]) in at
+    }
+    effects = [pair for (_, cause), pair in pairs.items() if cause not in (NONE, UNKNOWN)]
+    n = round(len(effects) * PER_NO_EFFECT / PER_EFFECT / len({cause for _, cause in pairs} - {NONE, UNKNOWN}))
+    return effects + [
+        pair for cause in (NONE, UNKNOWN) for pair in [p for (_, c), p in pairs.items() if c == cause][:n]
+    ]
 
 
 def _weighed(population: Population, rows: tuple[int, ...], simulator: str, *, with_reference: bool) -> WeighedCase:
