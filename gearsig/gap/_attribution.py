@@ -190,8 +190,8 @@ def tooth_load_n_per_mm(pair: GearPair, torque_nm: float) -> float:
 
 
 NOT_SEEN = 0.2
-"""Probability that an effect is too weak to be seen at one of several conditions: of 0, 0.1, 0.2, 0.4 the likeliest, by the
-independent rig's machines at two points each, learned from the other simulators."""
+"""Probability that an effect is too weak to be seen at one of several conditions: of 0, 0.1, 0.2, 0.4 the likeliest, by
+the independent rig's machines at two points each, learned from the other simulators."""
 
 NOT_SEEN_LOADED = {"backlash": 0.9}
 """The same at a condition whose load keeps the flanks together, where another one lets them part."""

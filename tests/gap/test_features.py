@@ -130,7 +130,7 @@ def test_every_feature_has_a_scatter() -> None:
 def test_too_few_revolutions_are_refused() -> None:
     whole = record()
     short = replace(whole, samples=whole.samples[:, : int(RATE_HZ / SPEED_HZ * 12)])
-    with pytest.raises(RefusalError, match="turns 12 times"):
+    with pytest.raises(RefusalError, match=r"turns 7\.\d+ times"):
         reduce_recording(short, RIG)
 
 

@@ -11,7 +11,7 @@ from gearsig.report import analysis_to_dict, analysis_to_json, write_json
 
 MEMBERS = [
     "schema", "schema_version", "gearsig_version", "outcome", "verdict", "findings", "speed", "indicators", "recording",
-    "rig", "channels", "settings", "crack", "reference",
+    "rig", "channels", "settings", "crack", "reference", "level_changes",
 ]  # fmt: skip
 FINDING = ["code", "kind", "title", "where", "strength", "confidence", "confidence_basis", "evidence", "surer"]
 RECORDING = [
