@@ -12,6 +12,7 @@ from gearsig.gap._attribution import (
     load_gap_calibration,
     score_of,
     shared,
+    told_apart,
     tooth_load_n_per_mm,
 )
 from gearsig.gap._change import (
@@ -162,6 +163,8 @@ from gearsig.gap._types import (
     group_probabilities,
 )
 from gearsig.gap._verdict import rivals, unbounded_fits, within_the_floor
+from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
+from gearsig.gap._waveform import WaveformMatch, best_match
 from gearsig.gap._words import (
     ComparedPair,
     feature_words,
@@ -186,6 +189,7 @@ __all__ = [
     "NAMING",
     "NONE",
     "POPULATION_FILE",
+    "SIDEBAND_OFFSETS",
     "SIDES",
     "SIGNS",
     "UNKNOWN",
@@ -242,6 +246,7 @@ __all__ = [
     "TriedEffect",
     "Twin",
     "TwinRun",
+    "WaveformMatch",
     "against_reference",
     "alike_features",
     "angle_curves",
@@ -251,6 +256,7 @@ __all__ = [
     "average_curves",
     "banks_of",
     "beside_standing",
+    "best_match",
     "beyond_the_mesh",
     "change_features",
     "change_once",
@@ -326,6 +332,7 @@ __all__ = [
     "tail_spot",
     "textbook_rules",
     "textbook_strengths",
+    "told_apart",
     "told_options",
     "tooth_load_n_per_mm",
     "transplanted",

@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from math import cos, radians
+from math import cos, exp, radians
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, Protocol, TypeVar
@@ -18,6 +18,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from gearsig.gap._conditions import Condition
+from gearsig.gap._evidence import ONE_TOOTH
 from gearsig.gap._recognition import load_recogniser
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
@@ -272,16 +273,46 @@ class Attribution(Generic[TriedT]):
         known = ((name, tried.shrinkage) for name, tried in self.tried.items())
         return {name: score_of(s.shrink.value, s.placebo) for name, s in known if s is not None}
 
+    @property
+    def matches(self) -> dict[str, float]:
+        """Effect → log-likelihood of its waveform, of the faults of one tooth that were tried."""
+        known = ((name, getattr(tried, "match", None)) for name, tried in self.tried.items())
+        return {name: match.log_likelihood for name, match in known if match is not None}
+
     def probabilities(self, calibration: GapCalibration | None = None) -> dict[str, float]:
         """Return cause → probability, likeliest first; calibrated, but for effects that the forests do not know."""
         found = (calibration or self.calibration).probabilities(
             self.evidence, self.scores, self.size, self.n_conditions
         )
+        found = told_apart(found, self.matches)
         return shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
 
 
 MAX_TRIED, MIN_TRIED_PROBABILITY = 3, 0.06
 """Effects that are simulated: so many of the likeliest, none less likely than this."""
+
+
+def told_apart(probabilities: Mapping[str, float], matches: Mapping[str, float]) -> dict[str, float]:
+    """Return the probabilities with those of faults of one tooth parted anew by their waveforms, likeliest first.
+
+    p_i ∝ p_i L_i among those that were tried; what they have together stays: the waveform tells how a tooth is damaged,
+    and that one is, the features tell.
+
+    Parameters
+    ----------
+    probabilities : mapping
+        Cause → probability.
+    matches : mapping
+        Effect → ln L.
+    """
+    if len(matches) < 2:
+        return dict(probabilities)
+    together = sum(probabilities[name] for name in matches)
+    top = max(matches.values())
+    weights = {name: probabilities[name] * exp(value - top) for name, value in matches.items()}
+    total = sum(weights.values())
+    parted = {name: together * weight / total for name, weight in weights.items()} if total > 0.0 else {}
+    return dict(sorted({**probabilities, **parted}.items(), key=lambda item: -item[1]))
 
 
 def shared(probabilities: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
@@ -326,6 +357,8 @@ def attribute(
     likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
     heard_of = _known_to_forests(conditions)
     own = [name for name in effects or known if name not in heard_of] if max_tried else []
+    if max_tried and any(name in ONE_TOOTH for name in likely):  # waveforms part them: all are tried, or none
+        likely += [name for name in ONE_TOOTH if name in first and name in known and name not in likely]
     likely += own
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_where_none_ran(tried, likely, twin)

@@ -267,6 +267,7 @@ def diagnose_gap(
             *_without_place(twin, allowed),
             *remarks,
             *_of_the_fit(named),
+            *_of_the_waveforms(tried, known),
         ),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
         warnings=warnings,
@@ -338,6 +339,20 @@ def _without_place(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[str]:
     return [remark]
 
 
+def _of_the_waveforms(tried: Mapping[str, TriedEffect], known: Mapping[str, GapEffect]) -> list[str]:
+    """Say how well the twin shows the faults of one tooth, and what follows from it."""
+    matches = {known[name].title: trial.match.correlation for name, trial in tried.items() if trial.match is not None}
+    if not matches:
+        return []
+    ranked = sorted(matches.items(), key=lambda item: -item[1])
+    seen = ", ".join(f"{title} {correlation:.2f}" for title, correlation in ranked)
+    told = any(trial.match is not None and trial.match.is_good for trial in tried.values())
+    meant = "which tells them apart" if told else "too little to tell them apart by: the twin is not like this machine"
+    return [
+        f"As a waveform beside the mesh harmonics, the recorded change correlates with the twin's: {seen}; {meant}."
+    ]
+
+
 def _of_the_fit(named: GapCause | None) -> list[str]:
     """Say what the fitted severity is worth, or that there is none."""
     if named is None:
@@ -378,7 +393,7 @@ def _cause(
     return replace(
         cause,
         severity=None if placing is None else placing.fit.severity,
-        fitted=None if placing is None else at_its_tooth(placing.fit.added, frame, places),
+        fitted=None if placing is None else at_its_tooth(placing.added, frame, places),
         shrinkage=trial.shrinkage,
         evidence=evidence_of(trial.fit, observed_changes(conditions), frame),
     )

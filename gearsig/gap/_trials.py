@@ -34,9 +34,10 @@ from gearsig.gap._prediction import (
     shrinkage,
     transplanted,
 )
-from gearsig.gap._reduction import GearFrame, ReducedRecording
+from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording
 from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, OperatingCondition, Twin
 from gearsig.gap._types import GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
+from gearsig.gap._waveform import N_HARMONICS, OFFSETS, WaveformMatch, best_match, mesh_sidebands, sideband_weights
 from gearsig.gap._words import shaft_words
 from gearsig.processes import can_be_sent, process_pool
 
@@ -45,7 +46,8 @@ from gearsig.processes import can_be_sent, process_pool
 # --------------------
 
 
-_ARRAYS = ("healthy", "healthy_changes", "changes")
+_ARRAYS = ("healthy", "healthy_changes", "changes", "sidebands")
+SIDEBAND_AXES = 5
 MAX_BYTES = 100_000_000
 """Of a bank's arrays; a real one has less than one."""
 
@@ -79,20 +81,32 @@ def write_bank(path: Path, key: str, bank: Bank) -> None:
         raise InputError(error.what, where=str(path.parent), remedy="choose another folder with --cache") from None
 
 
-def _checked(about: dict[str, Any], arrays: dict[str, FloatArray]) -> Bank | None:
+def _checked(about: dict[str, Any], arrays: dict[str, Any]) -> Bank | None:
 
     names, changes = tuple(about["feature_names"]), tuple(about["change_names"])
     added = tuple(_added(row) for row in about["added"])
-    healthy, again, changed = (arrays[name] for name in _ARRAYS)
+    healthy, again, changed, sidebands = (arrays[name] for name in _ARRAYS)
     n, m = len(names), len(changes)
-    shapes = healthy.ndim == again.ndim == 2 and changed.ndim == 3
+    shapes = healthy.ndim == again.ndim == 2 and changed.ndim == 3 and sidebands.ndim == SIDEBAND_AXES
+    if not shapes or len(sidebands) != len(added):
+        return None
+    if sidebands.shape[2:] != (len(SIDES), N_HARMONICS, len(OFFSETS)) or sidebands.dtype != np.complex128:
+        return None
     if not shapes or healthy.shape[1] != n or again.shape != (len(healthy), m) or changed.shape[::2] != (len(added), m):
         return None
-    if any(a.dtype != np.float64 for a in arrays.values()):
+    if any(a.dtype != np.float64 for a in (healthy, again, changed)):
         return None
     left_out = tuple((_added(row), str(why)) for row, why in about["left_out"])
     return Bank(
-        OperatingCondition(*map(float, about["point"])), names, changes, healthy, again, added, changed, left_out
+        OperatingCondition(*map(float, about["point"])),
+        names,
+        changes,
+        healthy,
+        again,
+        added,
+        changed,
+        sidebands,
+        left_out,
     )
 
 
@@ -143,13 +157,15 @@ class Task:
 class Reduced:
     """One simulation's features, of a healthy specimen only, and its change against the specimen's healthy first run.
 
-    `alone` has each channel's own change where there are further channels; they have no part in `change`.
+    `sidebands` are the change's, see `mesh_sidebands`. `alone` has each channel's own change where there are further
+    channels; they have no part in `change`.
     """
 
     names: tuple[str, ...]
     values: FloatArray
     change_names: tuple[str, ...]
     change: FloatArray
+    sidebands: ComplexArray
     alone: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
@@ -208,7 +224,8 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
             own = [name for name in healthy.channels if name not in task.further]
             now, healthy = _of(now, *own), _of(healthy, *own)
         names, values = once(healthy) if task.added is None else ((), np.empty(0))
-        return Reduced(names, values, *change_once(now, healthy), alone)
+        sidebands = mesh_sidebands(now, healthy, is_turned=False)
+        return Reduced(names, values, *change_once(now, healthy), sidebands, alone)
     except GearsigError as error:
         return str(error)
 
@@ -238,7 +255,7 @@ def _gathered(run: TwinRun, seed: int, added: Added | None, noise: int) -> Reduc
 
 
 _MODULES = (
-    *(f"gearsig.gap.{name}" for name in ("_reduction", "_features", "_change")),
+    *(f"gearsig.gap.{name}" for name in ("_reduction", "_features", "_change", "_waveform")),
     *(f"gearsig.{name}" for name in ("severity._features", "orders._average", "prepared._angle")),
     *(f"gearsig.angle.{name}" for name in ("_source", "_resample", "_tachless")),
 )
@@ -281,6 +298,8 @@ class Bank:
         The candidates that could be simulated.
     changes : array, (n_added, n_change_seeds, n_changes)
         Each candidate's run against the healthy first run of the same specimen.
+    sidebands : complex array, (n_added, n_channels, 2, n_harmonics, n_offsets)
+        The same beside the mesh harmonics, mean over specimens, see `mesh_sidebands`.
     left_out : tuple of (Added, str)
         Candidates that could not be simulated, and why.
     """
@@ -292,6 +311,7 @@ class Bank:
     healthy_changes: FloatArray
     added: tuple[Added, ...]
     changes: FloatArray
+    sidebands: ComplexArray
     left_out: tuple[tuple[Added, str], ...] = ()
 
 
@@ -410,13 +430,14 @@ def _assembled(
         why = next(row for row in healthy_rows if isinstance(row, str))
         raise RefusalError(f"the healthy machine cannot be simulated: {why}", remedy="check the rig file")
     first = healthy[0]
-    kept, changes, left_out = [], [], []
+    kept, changes, sidebands, left_out = [], [], [], []
     for i, added in enumerate(candidates):
         own = rows[i * n_seeds : (i + 1) * n_seeds]
         whole = [row for row in own if isinstance(row, Reduced) and row.change_names == first.change_names]
         if len(whole) == n_seeds:
             kept.append(added)
             changes.append([row.change for row in whole])
+            sidebands.append(np.mean([row.sidebands for row in whole], axis=0))
         else:
             left_out.append((added, next((r for r in own if isinstance(r, str)), "it has other features")))
     return Bank(
@@ -427,6 +448,7 @@ def _assembled(
         np.stack([row.change for row in healthy]),
         tuple(kept),
         np.array(changes).reshape(len(kept), n_seeds, len(first.change_names)),
+        np.array(sidebands, dtype=np.complex128).reshape(len(kept), *first.sidebands.shape),
         tuple(left_out),
     )
 
@@ -448,17 +470,32 @@ class TriedEffect:
         To all conditions.
     shrinkage : Shrinkage
         On held-out data.
+    match : WaveformMatch or None
+        Of a fault of one tooth, with a reference: how well the twin shows its course.
     """
 
     name: str
     paths: tuple[EffectPath, ...]
     fit: Fit
     shrinkage: Shrinkage
+    match: WaveformMatch | None = None
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether the twin shows the course of a tooth's fault well."""
+        return self.match is not None and self.match.is_good
+
+    @property
+    def added(self) -> Added:
+        """The setting that comes nearest, on the gear whose waveform is the recorded one."""
+        if self.match is None or not self.match.is_good:
+            return self.fit.added
+        return replace(self.fit.added, options={**self.fit.added.options, "gear": self.match.gear})
 
     @property
     def explains(self) -> bool:
         """Whether the twin shows the effect and comes nearer with it: else severity and place mean nothing."""
-        return self.shrinkage.is_predicted and self.shrinkage.shrink.value > 0.0
+        return self.is_shown or (self.shrinkage.is_predicted and self.shrinkage.shrink.value > 0.0)
 
 
 def try_effects(
@@ -494,10 +531,33 @@ def try_effects(
         name = effect.name
         every = _paths([at[name] for at in banks], conditions, effect.shows_in)
         if every:
-            paths, excluded = on_shaft(every, told_options(name, changes, conditions[0].now.frame.teeth))
+            told = told_options(name, changes, conditions[0].now.frame.teeth)
+            paths, excluded = on_shaft(every, told)
             shrink = shrinkage(paths, folds, HELD_OUT, excluded)
-            found[name] = TriedEffect(name, paths, fit_effect(paths, observed_changes(conditions)), shrink)
+            match = _match([at[name] for at in banks], conditions) if name in ONE_TOOTH else None
+            found[name] = TriedEffect(name, paths, fit_effect(paths, observed_changes(conditions)), shrink, match)
     return found
+
+
+def _match(banks: Sequence[Bank], conditions: Sequence[Condition]) -> WaveformMatch | None:
+    """Return the likeliest match over both gears and the conditions that have a reference."""
+    found = []
+    for bank, condition in zip(banks, conditions, strict=True):
+        if condition.reference is None:
+            continue
+        observed = mesh_sidebands(condition.now, condition.reference, is_turned=True)
+        weights = sideband_weights(condition.now, condition.reference, observed)
+        names, simulated = list(condition.now.channels), list(condition.simulated.channels)
+        if not set(names) <= set(simulated) or len(simulated) != bank.sidebands.shape[1]:
+            continue
+        channels = [simulated.index(name) for name in names]
+        for side, gear in enumerate(SIDES):
+            own = [i for i, added in enumerate(bank.added) if added.options.get("gear") == gear]
+            trials = [bank.sidebands[i][channels, side] for i in own]
+            match = best_match(observed[:, side], weights[:, side], trials, [bank.added[i].severity for i in own])
+            found.append(None if match is None else replace(match, gear=gear))
+    matches = [match for match in found if match is not None]
+    return max(matches, key=lambda match: match.log_likelihood, default=None)
 
 
 def on_shaft(
@@ -720,8 +780,10 @@ def cause_place(
     frame = conditions[0].now.frame
     changes = [condition.over_floors for condition in conditions]
     told: dict[str, float | str] = {**told_options(name, changes, frame.teeth)}
+    if tried is not None and tried.match is not None and tried.is_shown:
+        told["gear"] = tried.match.gear
     if told or name not in SIGNS:
-        added = tried.fit.added if tried is not None else Added(name, 0.0, _with_a_tooth(name, told))
+        added = tried.added if tried is not None else Added(name, 0.0, _with_a_tooth(name, told))
         return place_of(added, frame, places)
     if tried is not None and _is_clear(tried, conditions):
         return place_of(tried.fit.added, frame, places)

@@ -66,7 +66,7 @@ def simulated(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Task]]:
             is_crack = task.added == CRACK.fit.added
             own = np.array([own_db[key] * is_crack, 0.0])
             alone = {"a": own, "b": np.array([further_db * is_crack, 0.0])} if task.further else {}
-            return Reduced((), np.empty(0), NAMES, own, alone)
+            return Reduced((), np.empty(0), NAMES, own, np.empty(0, dtype=complex), alone)
 
         monkeypatch.setattr(room, "finished_runs", rows)
         return asked
