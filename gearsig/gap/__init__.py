@@ -164,7 +164,7 @@ from gearsig.gap._types import (
 )
 from gearsig.gap._verdict import rivals, unbounded_fits, within_the_floor
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
-from gearsig.gap._waveform import WaveformMatch, best_match
+from gearsig.gap._waveform import WaveformMatch, best_match, waveform_log_likelihood
 from gearsig.gap._words import (
     ComparedPair,
     feature_words,
@@ -338,6 +338,7 @@ __all__ = [
     "transplanted",
     "try_effects",
     "unbounded_fits",
+    "waveform_log_likelihood",
     "weighed_evidence",
     "with_channels_of",
     "within_the_floor",

@@ -27,6 +27,8 @@ class GapEffect:
         Of the measurement chain: in every real recording, never a cause in the machine.
     signs : tuple of (str, int)
         The textbook's: features that rise (1), fall (−1) or change either way (0); ``{side}`` is driver or driven.
+    moves_pitches : float
+        By how much, either way, its place within a tooth's engagement moves between the severities of its candidates.
     """
 
     name: str
@@ -38,6 +40,7 @@ class GapEffect:
     shows_in: tuple[str, ...] = ()
     is_nuisance: bool = False
     signs: tuple[tuple[str, int], ...] = ()
+    moves_pitches: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -534,12 +534,12 @@ def try_effects(
             told = told_options(name, changes, conditions[0].now.frame.teeth)
             paths, excluded = on_shaft(every, told)
             shrink = shrinkage(paths, folds, HELD_OUT, excluded)
-            match = _match([at[name] for at in banks], conditions) if name in ONE_TOOTH else None
+            match = _match([at[name] for at in banks], conditions, effect.moves_pitches) if name in ONE_TOOTH else None
             found[name] = TriedEffect(name, paths, fit_effect(paths, observed_changes(conditions)), shrink, match)
     return found
 
 
-def _match(banks: Sequence[Bank], conditions: Sequence[Condition]) -> WaveformMatch | None:
+def _match(banks: Sequence[Bank], conditions: Sequence[Condition], moves_pitches: float) -> WaveformMatch | None:
     """Return the likeliest match over both gears and the conditions that have a reference."""
     found = []
     for bank, condition in zip(banks, conditions, strict=True):
@@ -554,7 +554,7 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition]) -> WaveformMa
         for side, gear in enumerate(SIDES):
             own = [i for i, added in enumerate(bank.added) if added.options.get("gear") == gear]
             trials = [bank.sidebands[i][channels, side] for i in own]
-            match = best_match(observed[:, side], weights[:, side], trials, [bank.added[i].severity for i in own])
+            match = best_match(observed[:, side], weights[:, side], trials, moves_pitches=moves_pitches)
             found.append(None if match is None else replace(match, gear=gear))
     matches = [match for match in found if match is not None]
     return max(matches, key=lambda match: match.log_likelihood, default=None)

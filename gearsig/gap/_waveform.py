@@ -33,6 +33,7 @@ GOOD = 0.6
 """Correlation from which a twin is believed to show the course of a fault; others reach 0.1 to 0.35."""
 
 _N_TURNS = 1024
+_SHIFT_PITCHES = 0.01
 
 
 def mesh_sidebands(now: ReducedRecording, healthy: ReducedRecording, *, is_turned: bool) -> ComplexArray:
@@ -101,12 +102,15 @@ class WaveformMatch:
     scale : float
         g, by which the simulation is to be multiplied there. Flanks that deviate from the drawing make the mesh lines
         larger or smaller, which the twin does not know: it says little of the severity.
+    log_likelihood : float
+        See `waveform_log_likelihood`; near 0 of a twin that resembles nothing.
     gear : str
         "driver" or "driven"; empty: not told.
     """
 
     correlation: float
     scale: float
+    log_likelihood: float
     gear: str = ""
 
     @property
@@ -114,13 +118,15 @@ class WaveformMatch:
         """Whether the twin shows the course of the fault well enough to tell which it is, and on which gear."""
         return self.correlation >= GOOD
 
-    @property
-    def log_likelihood(self) -> float:
-        """Ln L = −(N/2) ln(1 − ρ²) − ρ² (ln g)²/(2 s²); 0 of a twin that resembles nothing."""
-        return _log_likelihood(self.correlation, self.scale)
 
+def waveform_log_likelihood(correlation: float, scale: float) -> float:
+    """Return ln L = −(N/2) ln(1 − ρ²) − ρ² (ln g)²/(2 s²).
 
-def _log_likelihood(correlation: float, scale: float) -> float:
+    Parameters
+    ----------
+    correlation, scale : float
+        ρ and g, see `WaveformMatch`.
+    """
     squared = min(correlation**2, 0.999)
     if squared == 0.0 or scale <= 0.0:
         return 0.0
@@ -128,11 +134,12 @@ def _log_likelihood(correlation: float, scale: float) -> float:
 
 
 def best_match(
-    observed: ComplexArray, weights: FloatArray, simulated: Sequence[ComplexArray], severities: Sequence[float]
+    observed: ComplexArray, weights: FloatArray, simulated: Sequence[ComplexArray], *, moves_pitches: float = 0.0
 ) -> WaveformMatch | None:
-    """Return the match of the severity whose simulation is likeliest; None where nothing was observed or simulated.
+    """Return the match of the likeliest simulation; None where nothing was observed or simulated.
 
-    ρ = max_φ Re Σ w o* t exp(−jiφ)/√(Σ w |o|² Σ w |t|²).
+    ρ = max_φ Re Σ w o* t_δ exp(−jiφ)/√(Σ w |o|² Σ w |t|²), t_δ[k, i] = t[k, i] exp(−2πjkδ) a fault that comes δ pitches
+    later in the engagement. The likelihood is the mean over δ: a fault that may lie anywhere must not win by that.
 
     Parameters
     ----------
@@ -141,22 +148,25 @@ def best_match(
         See `sideband_weights`.
     simulated : sequence of arrays, as `observed`
         One per severity.
-    severities : sequence of float
+    moves_pitches : float
+        The largest |δ|.
     """
     weights = weights[..., None]
     whole = float(np.sum(weights * np.abs(observed) ** 2))
     if whole == 0.0:
         return None
     turns = np.exp(-1j * np.outer(OFFSETS, 2.0 * np.pi * np.arange(_N_TURNS) / _N_TURNS))
+    n = round(moves_pitches / _SHIFT_PITCHES)
+    later = np.exp(-2j * np.pi * np.outer(np.arange(-n, n + 1) * _SHIFT_PITCHES, np.arange(1, observed.shape[1] + 1)))
     found = []
-    for severity, trial in sorted(zip(severities, simulated, strict=True), key=lambda pair: pair[0]):
+    for trial in simulated:
         own = float(np.sum(weights * np.abs(trial) ** 2))
         if own == 0.0:
             continue
-        product = np.sum(weights * np.conj(observed) * trial, axis=(0, 1))
-        in_phase = max(float(np.max(np.real(product @ turns))), 0.0)
-        found.append((severity, in_phase / (whole * own) ** 0.5, in_phase / own))
-    if not found:
-        return None
-    _, correlation, scale = max(found, key=lambda row: _log_likelihood(*row[1:]))
-    return WaveformMatch(correlation, scale)
+        products = later @ np.sum(weights * np.conj(observed) * trial, axis=0)
+        in_phase = np.maximum(np.max(np.real(products @ turns), axis=1), 0.0)
+        levels = [waveform_log_likelihood(level / (whole * own) ** 0.5, level / own) for level in in_phase.tolist()]
+        best = int(np.argmax(levels))
+        mean = levels[best] + log(float(np.mean(np.exp(np.array(levels) - levels[best]))))
+        found.append(WaveformMatch(float(in_phase[best] / (whole * own) ** 0.5), float(in_phase[best] / own), mean))
+    return max(found, key=lambda match: match.log_likelihood, default=None)

@@ -182,6 +182,7 @@ def as_gap_effect(shown: Effect) -> GapEffect:
         shown.shows_in,
         shown.group == "measurement chain",
         shown.textbook.signs if shown.textbook else (),
+        shown.moves_pitches,
     )
 
 

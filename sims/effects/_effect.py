@@ -235,6 +235,9 @@ class Effect:
         (parameters, severity, options) → change of a start–stop drive; None: it has no meaning there.
     textbook : Textbook or None
         How the literature says that it shows.
+    moves_pitches : float
+        By how much, either way, its place within a tooth's engagement moves between severities that are tried; 0: it
+        stays where it is.
     """
 
     name: str
@@ -249,6 +252,7 @@ class Effect:
     plausible: PlausibleRange | None = None
     on_drive: Callable[[DriveParameters, float, Options], DriveEffect] | None = None
     textbook: Textbook | None = None
+    moves_pitches: float = 0.0
 
     def __post_init__(self) -> None:
         one_of(self.group, f"group of {self.name}", GROUPS)

@@ -42,6 +42,7 @@ EFFECT = Effect(
     "sidebands of that shaft, ringing resonances, envelope lines at multiples of its order. Small chips lie in double "
     "contact and show little.",
     shows_in=("tooth_window", "envelope_orders", "mesh_sidebands", "resonances"),
+    moves_pitches=0.2,  # the pair lets go a quarter of a pitch earlier for each millimetre at a module of 4 mm
     change=change,
     options=(
         GEAR_OPTION,
