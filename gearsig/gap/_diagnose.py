@@ -358,7 +358,7 @@ def _of_the_waveforms(tried: Mapping[str, TriedEffect], known: Mapping[str, GapE
     ranked = sorted(matches.items(), key=lambda item: -item[1])
     seen = ", ".join(f"{title} {correlation:.2f}" for title, correlation in ranked)
     told = any(trial.match is not None and trial.match.is_good for trial in tried.values())
-    meant = "which tells them apart" if told else "too little to tell them apart by: the twin is not like this machine"
+    meant = "the highest is likeliest" if told else "too little to part them: the twin is not like this machine"
     return [
         f"As a waveform beside the mesh harmonics, the recorded change correlates with the twin's: {seen}; {meant}."
     ]
