@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, one_of
 from gearsig.timefreq._squeezing import (
@@ -193,14 +194,19 @@ def squeezed_cwt(
     plan = analysis(x, wavelet, lowest, highest, n_per_octave)
     transform = _transform(x, plan.lines, "logarithmic", wavelet, edges, engine)
     T = transform.room(step)
+    levels = np.empty(T.shape, dtype=np.float32)
     if is_ssqueezepy(engine):
         T[:] = _by_ssqueezepy(x, plan, wavelet, edges)[:, ::step]
+        for piece, column, W, _ in sampled_pieces(x, plan.lines, wavelet, step, edges):
+            levels[piece.lines, column : column + W.shape[1]] = np.abs(W)
     else:
         table = squeeze_lines(plan.lines, x.rate, "logarithmic")
         weights = np.full(len(plan.analysed), plan.weight, dtype=np.float32)
-        for _, column, W, dW in sampled_pieces(x, plan.analysed, wavelet, step, edges, derivatives=True):
+        for piece, column, W, dW in sampled_pieces(x, plan.analysed, wavelet, step, edges, derivatives=True):
             squeeze(W, dW, weights, plan.smallest, table.borders, table.lookup, T, column)
-    return transform.coefficients(T, step, np.ones(len(T)))
+            lines, of_piece = plan.lines_among(piece.lines)
+            levels[lines, column : column + W.shape[1]] = np.abs(W[of_piece])
+    return transform.coefficients(T, step, np.ones(len(T)), levels)
 
 
 def squeezed_cwt_map(
@@ -241,8 +247,12 @@ def squeezed_cwt_map(
     transform = _transform(x, plan.lines, "logarithmic", wavelet, edges, engine)
     columns = plan_columns(x, n_columns)
     if is_ssqueezepy(engine):
-        whole = ((np.arange(len(plan.lines)), 0, 1, _by_ssqueezepy(x, plan, wavelet, edges)) for _ in range(1))
-        return transform.level_map(columns, reduction, scaling, whole)
+        squeezed = _by_ssqueezepy(x, plan, wavelet, edges)
+        plain = np.empty_like(squeezed)
+        for piece, column, W, _ in sampled_pieces(x, plan.lines, wavelet, 1, edges):
+            plain[piece.lines, column : column + W.shape[1]] = W
+        whole = (np.arange(len(plan.lines)), 0, 1, np.stack([squeezed, plain]))
+        return transform.level_map(columns, reduction, scaling, [whole])
     octave = np.floor(np.log2(plan.lines[-1] / plan.lines) + 1e-9)
     blocks = (
         block
@@ -292,6 +302,13 @@ class SqueezingWavelets:
     weight: float
     smallest: float
 
+    def lines_among(self, analysed: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return which lines are among these wavelets, and which of the wavelets they are."""
+        first = int(np.argmin(np.abs(np.log(self.analysed / self.lines[0]))))
+        numbers = analysed - first
+        inside = (numbers >= 0) & (numbers < len(self.lines))
+        return numbers[inside], inside
+
 
 def analysis(
     x: UniformSignal, wavelet: Wavelet, lowest: float | None, highest: float | None, n_per_octave: int
@@ -325,9 +342,12 @@ def _blocks(
     space = workspace(group)
     for start in group.starts(x.n_samples):
         length = -(-min(group.n_core, x.n_samples - start) // step)
-        T = np.zeros((len(part), length), dtype=np.complex64)
+        T = np.zeros((2, len(part), length), dtype=np.complex64)
         for piece in block_pieces(x.values, group, start, edges, space, derivatives=True):
-            squeeze(piece.values, piece.derivatives, weights, plan.smallest, table.borders, table.lookup, T, 0)
+            squeeze(piece.values, piece.derivatives, weights, plan.smallest, table.borders, table.lookup, T[0], 0)
+            numbers, of_piece = plan.lines_among(piece.lines)
+            here = (numbers >= part[0]) & (numbers <= part[-1])
+            T[1, numbers[here] - part[0]] = piece.values[of_piece][here]
         yield part, start, step, T
 
 

@@ -264,9 +264,10 @@ _MIN_SCORE = 0.25  # mean score of a path: below, it hops between maxima of nois
 
 @dataclass(frozen=True)
 class _Grid:
-    """Power and complex values (where there are any) over line and column, at most `MAX_COLUMNS` of them."""
+    """Power over line and column, at most `MAX_COLUMNS` of them, and the power before squeezing."""
 
     power: FloatArray
+    unsqueezed: FloatArray
     at: FloatArray
     n_reach: int
     squeezed: bool
@@ -287,8 +288,9 @@ def ridges(
     what a path covers is taken out before the next one. Eight more than asked are looked for, and those of most power
     kept. Where two of them meet, they are then looked at together: if
     the power shows a valley all through the meeting, they part again; otherwise tails are exchanged if place, slope and
-    level go on more evenly so. Places between lines come from a parabola through the logarithm of the power (or its
-    centre of gravity where the transform is squeezed).
+    level go on more evenly so. Place and level come from a parabola through the logarithm of the power, where the
+    transform is squeezed of the power before squeezing: squeezing shows which way a component goes, and scatters its
+    level over lines where there is noise.
 
     Parameters
     ----------
@@ -333,14 +335,14 @@ def ridges(
     part = _lines_between(transform.positions, lowest, highest)
     _check_room(n_ridges, part, transform.n_reach)
     grid = _grid(transform, part)
-    paths, power = _paths(grid, n_ridges, steepest, stiffness)
+    paths = _paths(grid, n_ridges, steepest, stiffness)
     if not paths:
         raise RefusalError(
             "no ridge stands out from the rest of the transform",
             remedy="look between other lines (lowest, highest), take a longer wavelet or window, or average more",
         )
     shared = shared_columns(paths, 2.0 * grid.n_reach)
-    found = [_ridge(transform, grid, power, part, p, s) for p, s in zip(paths, shared, strict=True)]
+    found = [_ridge(transform, grid, part, p, s) for p, s in zip(paths, shared, strict=True)]
     return tuple(sorted(found, key=lambda r: -float(np.mean(r.amplitude**2))))
 
 
@@ -370,21 +372,23 @@ def _grid(transform: Coefficients | TimeFrequencyMap, part: slice) -> _Grid:
     n = len(transform.at)
     starts = np.arange(0, n, -(-n // MAX_COLUMNS))
     n_pooled = np.diff(starts, append=n)
-    power = np.empty((part.stop - part.start, len(starts)))
-    scaling = transform.scaling if isinstance(transform, TimeFrequencyMap) else ""
-    values = transform.values[:, part].T if scaling else transform.values[part]
-    for row, line in enumerate(values):  # one line at a time: the whole may be large
-        if not scaling:
-            square = line.real**2 + line.imag**2
-        else:
-            square = (line**2 if scaling == "amplitude peak" else 2.0 * line).astype(np.float64)
-        power[row] = np.add.reduceat(square, starts) / n_pooled
+    is_map = isinstance(transform, TimeFrequencyMap)
+    is_power = isinstance(transform, TimeFrequencyMap) and transform.scaling == "power"
+
+    def pooled(values: NDArray[Any]) -> FloatArray:
+        power = np.empty((part.stop - part.start, len(starts)))
+        for row, line in enumerate(values[:, part].T if is_map else values[part]):  # the whole may be large
+            square = 2.0 * line if is_power else np.square(np.abs(line), dtype=np.float64)
+            power[row] = np.add.reduceat(square, starts) / n_pooled
+        return power
+
     at = (transform.at[starts] + transform.at[starts + n_pooled - 1]) / 2
-    return _Grid(power, at, transform.n_reach, transform.squeezed)
+    power = pooled(transform.values)
+    unsqueezed = power if transform.unsqueezed is None else pooled(transform.unsqueezed)
+    return _Grid(power, unsqueezed, at, transform.n_reach, transform.squeezed)
 
 
-def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tuple[list[FloatArray], FloatArray]:
-    """Return paths, and the power of a component at each cell."""
+def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> list[FloatArray]:
     power = ridge_power(grid.power, squeezed=grid.squeezed)
     scores = ridge_scores(power, grid.n_reach)
     found: list[FloatArray] = []
@@ -406,7 +410,7 @@ def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> tup
             hidden = _hidden(scores.shape, others + paths[:i] + paths[i + 1 :], grid.n_reach)
             paths[i] = _seen_path(scores, hidden, steepest, stiffness)
         paths = _settled(paths, grid, power)
-    return paths, power
+    return paths
 
 
 def _seen_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float) -> FloatArray:
@@ -419,7 +423,7 @@ def _seen_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, s
 
 def _settled(paths: list[FloatArray], grid: _Grid, power: FloatArray) -> list[FloatArray]:
     """Return the paths, read between the lines, each going on as what it was before it met another one."""
-    paths = [_read(grid, power, p)[0] for p in paths]
+    paths = [_read(grid, p)[0] for p in paths]
     levels: list[FloatArray] = [np.log(np.maximum(_along(power, p), np.finfo(np.float64).tiny)) / 2 for p in paths]
     return untangled(paths, levels, 2.0 * grid.n_reach, float(grid.n_reach), power)
 
@@ -440,12 +444,11 @@ def _hidden(shape: tuple[int, ...], paths: list[FloatArray], n_cover: int) -> ND
 def _ridge(
     transform: Coefficients | TimeFrequencyMap,
     grid: _Grid,
-    power: FloatArray,
     part: slice,
     path: FloatArray,
     shared: np.ndarray[tuple[int], np.dtype[np.bool_]],
 ) -> Ridge:
-    places, peak = _read(grid, power, path)
+    places, peak = _read(grid, path)
     alone = ~shared
     if alone.any() and shared.any():
         columns, known = np.arange(len(path)), np.flatnonzero(alone)
@@ -462,14 +465,14 @@ def _ridge(
     )
 
 
-def _read(grid: _Grid, power: FloatArray, path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return place, between the lines, and peak power next to a path."""
-    return _centres(grid, path) if grid.squeezed else _parabolas(power, path)
+def _read(grid: _Grid, path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return place, between the lines, and height of the parabola through the log power around the maximum at a path.
 
-
-def _parabolas(power: FloatArray, path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return place and height of the parabola through the log power around the local maximum next to the path."""
-    n, columns = len(power), np.arange(len(path))
+    Of squeezed transforms, of the power before squeezing: noise scatters a component's squeezed share over lines, so
+    that their sum reads low, and a sweep's share moves towards where the frequency is going.
+    """
+    power, columns = grid.unsqueezed, np.arange(len(path))
+    n = len(power)
     near = np.clip(np.round(path).astype(np.int64)[None, :] + np.arange(-2, 3)[:, None], 1, n - 2)
     best = near[np.argmax(power[near, columns[None, :]], axis=0), columns]
     lowest = float(np.finfo(np.float64).tiny)
@@ -477,17 +480,6 @@ def _parabolas(power: FloatArray, path: FloatArray) -> tuple[FloatArray, FloatAr
     bend = a - 2 * b + c
     shift = np.where(bend < 0, np.clip((a - c) / 2 / np.where(bend < 0, bend, -1.0), -0.5, 0.5), 0.0)
     return best + shift, np.exp(b - (a - c) * shift / 4)
-
-
-def _centres(grid: _Grid, path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return centre of gravity and sum of the power within reach of the path."""
-    n, columns = len(grid.power), np.arange(len(path))
-    near = np.round(path).astype(np.int64)[None, :] + np.arange(-SQUEEZED_REACH, SQUEEZED_REACH + 1)[:, None]
-    inside = (near >= 0) & (near < n)
-    power = np.where(inside, grid.power[np.clip(near, 0, n - 1), columns[None, :]], 0.0)
-    total = power.sum(axis=0)
-    centre = (power * near).sum(axis=0) / np.where(total > 0, total, 1.0)
-    return np.where(total > 0, centre, path), total
 
 
 def _along(table: NDArray[Any], path: FloatArray) -> FloatArray:

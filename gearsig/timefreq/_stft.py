@@ -258,9 +258,13 @@ class FramePlan:
         """Return the spectra of frames at every `step`-th sample."""
         transform = self.transform
         V = transform.room(step)
+        levels = np.empty(V.shape, dtype=np.float32) if transform.squeezed else None
         for frame, part in self.batches(step):
-            V[:, frame : frame + part.shape[1]] = part
-        return transform.coefficients(V, step, np.full(len(V), 1.0 if transform.squeezed else self.weight))
+            columns = slice(frame, frame + part.shape[-1])
+            V[:, columns] = part if levels is None else part[0]
+            if levels is not None:
+                levels[:, columns] = np.abs(part[1])
+        return transform.coefficients(V, step, np.full(len(V), 1.0 if transform.squeezed else self.weight), levels)
 
     def level_map(self, n_columns: int, reduction: Reduction, scaling: str) -> TimeFrequencyMap:
         """Return the levels of frames that overlap by at least 7/8, 15/16 where they are squeezed."""
@@ -270,10 +274,8 @@ class FramePlan:
         return self.transform.level_map(columns, reduction, scaling, pieces)
 
     def batches(self, step: int) -> Iterator[tuple[int, ComplexArray]]:
-        """Yield (first frame, spectra), (n_lines, n_frames); ssqueezepy knows one batch only."""
-        if self.engine == "ssqueezepy":
-            yield 0, _by_ssqueezepy(self, step)
-            return
+        """Yield (first frame, spectra), (n_lines, n_frames), where squeezed with the plain ones behind them."""
+        by_ssqueezepy = _by_ssqueezepy(self, step) if self.engine == "ssqueezepy" else None  # it knows one batch only
         x, gains = self.signal, self.gains
         lines = self.transform.lines
         table = squeeze_lines(lines, x.rate, "linear")
@@ -286,10 +288,13 @@ class FramePlan:
                 continue
             # With the frame's middle as origin of the phase, ∂V/∂t = -V_g' + iω V: the same rule as for wavelets.
             scaled = (V * gains).T.astype(np.complex64)
+            if by_ssqueezepy is not None:
+                yield frame, np.stack([by_ssqueezepy[:, frame : frame + scaled.shape[1]], scaled])
+                continue
             rates = ((1j * omega * V - slopes) * gains).T.astype(np.complex64)
             T = np.zeros(scaled.shape, dtype=np.complex64)
             squeeze(scaled, rates, weights, smallest, table.borders, table.lookup, T, 0)
-            yield frame, T
+            yield frame, np.stack([T, scaled])
 
     def _spectra(self, step: int) -> Iterator[tuple[int, ComplexArray, ComplexArray]]:
         """Yield (first frame, spectra with the window, with its slope where squeezed), (n_frames, n_lines)."""

@@ -50,6 +50,9 @@ class TimeFrequencyMap:
         Whether a component's share is moved to its momentary frequency: it is then the sum over a few lines.
     source, shaft : str
         Channel; the shaft that orders and revolutions are counted on, empty over time.
+    unsqueezed : array, (n_columns, n_lines), or None
+        Of squeezed maps: the levels before squeezing. Noise scatters a component's squeezed share over lines, so that
+        only these hold its level.
     """
 
     values: FloatArray
@@ -66,10 +69,12 @@ class TimeFrequencyMap:
     squeezed: bool = False
     source: str = ""
     shaft: str = ""
+    unsqueezed: FloatArray | None = None
 
     def __post_init__(self) -> None:
         freeze(self, "values", ndim=2)
         freeze(self, "positions", "at", "edge")
+        _freeze_unsqueezed(self)
         if self.values.shape != (len(self.at), len(self.positions)) or len(self.edge) != len(self.positions):
             raise InputError(
                 f"values of shape {self.values.shape} and {len(self.edge)} edges for {len(self.at)} columns × "
@@ -105,6 +110,8 @@ class Coefficients:
         Real part of Σ weights · values over the lines: the signal at the columns.
     n_reach, squeezed
         As in `TimeFrequencyMap`.
+    unsqueezed : array, (n_lines, n_columns), or None
+        Of squeezed transforms: peak amplitudes before squeezing; see `TimeFrequencyMap`.
     """
 
     values: ComplexArray
@@ -119,14 +126,32 @@ class Coefficients:
     squeezed: bool = False
     source: str = ""
     shaft: str = ""
+    unsqueezed: FloatArray | None = None
 
     def __post_init__(self) -> None:
         freeze(self, "values", ndim=None)
         freeze(self, "positions", "at", "weights")
+        _freeze_unsqueezed(self)
         if self.values.shape != (len(self.positions), len(self.at)):
             raise InputError(
                 f"values of shape {self.values.shape} for {len(self.positions)} lines × {len(self.at)} columns"
             )
+
+
+def _freeze_unsqueezed(result: TimeFrequencyMap | Coefficients) -> None:
+    """Raise InputError unless a squeezed transform carries its levels before squeezing, and no other one does."""
+    if result.squeezed != (result.unsqueezed is not None):
+        raise InputError(
+            f"squeezed is {result.squeezed}, and levels before squeezing are "
+            f"{'given' if result.unsqueezed is not None else 'missing'}",
+            where="unsqueezed",
+            allowed="an array where squeezed, None where not",
+        )
+    if result.unsqueezed is None:
+        return
+    freeze(result, "unsqueezed", ndim=None)
+    if result.unsqueezed.shape != result.values.shape:
+        raise InputError(f"unsqueezed has shape {result.unsqueezed.shape}", allowed=str(result.values.shape))
 
 
 @dataclass(frozen=True)
@@ -140,8 +165,7 @@ class Ridge:
     positions : array, (n,)
         Momentary frequency in Hz, or order.
     amplitude : array, (n,)
-        Peak amplitude in `unit`, from the largest coefficient near the path, or from the sum over it where the
-        transform was squeezed.
+        Peak amplitude in `unit`, from the largest coefficient near the path, before squeezing.
     shared : boolean array, (n,)
         Where another ridge lies within reach: the amplitude there is of both together.
     axis, unit, source, shaft

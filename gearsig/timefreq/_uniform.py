@@ -163,7 +163,9 @@ def stretch(values: FloatArray, start: int, n: int, edges: Edges) -> FloatArray:
 
 
 Piece = tuple[NDArray[np.int64], int, int, ComplexArray]
-"""Lines, first sample, samples between columns, and the coefficients, (n_lines, n_columns)."""
+"""Lines, first sample, samples between columns, and the coefficients, (n_lines, n_columns).
+
+Of a squeezed transform (2, n_lines, n_columns): squeezed, and as they were."""
 
 
 @dataclass(frozen=True)
@@ -213,7 +215,9 @@ class LinePlan:
             )
         return np.zeros((n_lines, n_columns), dtype=np.complex64)
 
-    def coefficients(self, values: ComplexArray, step: int, weights: FloatArray) -> Coefficients:
+    def coefficients(
+        self, values: ComplexArray, step: int, weights: FloatArray, unsqueezed: FloatArray | None = None
+    ) -> Coefficients:
         """Return the complex values of every `step`-th sample; the weights give the signal back."""
         x = self.signal
         return Coefficients(
@@ -229,6 +233,7 @@ class LinePlan:
             self.squeezed,
             x.source,
             x.shaft,
+            unsqueezed,
         )
 
     def level_map(
@@ -241,24 +246,26 @@ class LinePlan:
         one_of(reduction, "reduction", ("mean", "max"))
         kind = cast("Scaling", one_of(scaling, "scaling", ("amplitude peak", "power")))
         x, n_per_column = self.signal, columns.n_per_column
-        gathered = np.zeros((len(self.lines), columns.n_columns))
-        n_read = np.zeros(gathered.shape, dtype=np.int64)
+        gathered = np.zeros((2 if self.squeezed else 1, len(self.lines), columns.n_columns))
+        n_read = np.zeros(gathered.shape[1:], dtype=np.int64)
         for lines, start, step, W in pieces:
-            power = W.real**2 + W.imag**2
-            column = (start + step * np.arange(W.shape[1])) // n_per_column
+            power = (W.real**2 + W.imag**2).reshape(len(gathered), len(lines), -1)
+            column = (start + step * np.arange(power.shape[2])) // n_per_column
             first = np.flatnonzero(np.diff(column, prepend=-1))
             at = slice(int(column[0]), int(column[-1]) + 1)
             if reduction == "max":
-                gathered[lines, at] = np.maximum(gathered[lines, at], np.maximum.reduceat(power, first, axis=1))
+                largest = np.maximum.reduceat(power, first, axis=2)
+                gathered[:, lines, at] = np.maximum(gathered[:, lines, at], largest)
                 n_read[lines, at] = 1
             else:
-                gathered[lines, at] += np.add.reduceat(power, first, axis=1, dtype=np.float64)
+                gathered[:, lines, at] += np.add.reduceat(power, first, axis=2, dtype=np.float64)
                 n_read[lines, at] += np.diff(first, append=len(column))
-        level = (gathered / np.maximum(n_read, 1)).T
+        power = gathered / np.maximum(n_read, 1)
+        levels = [(np.sqrt(p) if kind == "amplitude peak" else p / 2).T for p in power]
         begin = np.arange(columns.n_columns) * n_per_column
         last = np.minimum(begin + n_per_column, columns.n_samples) - 1
         return TimeFrequencyMap(
-            np.sqrt(level) if kind == "amplitude peak" else level / 2,
+            levels[0],
             self.lines,
             x.start + (begin + last) / 2 / x.rate,
             x.axis,
@@ -272,4 +279,5 @@ class LinePlan:
             self.squeezed,
             x.source,
             x.shaft,
+            levels[1] if self.squeezed else None,
         )
