@@ -21,18 +21,38 @@ def depth(compression_m: FloatArray, half_backlash_m: float) -> FloatArray:
     return g
 
 
-def latched_damping(g: FloatArray, rate_mps: FloatArray, contact: ToothContact) -> FloatArray:
-    """β in s/m at each sample, from the speed at the last sample before the flanks touched; 0 in the gap.
+def latched_damping(motion: PairMotion, compression_m: FloatArray) -> FloatArray:
+    """β in s/m at each sample, from the speed at which the flanks met; 0 in the gap.
 
-    The speed is latched for the whole contact, with the floor: b = f/v of the speed at each instant would grow without
-    bound where the flanks come to rest.
+    √(v² + 2 a d) with speed v, acceleration a and distance d of the last sample in the gap: between two samples flanks
+    that start from rest gain most of their speed. The speed is latched for the whole contact, with the floor: b = f/v
+    of the speed at each instant would grow without bound where the flanks come to rest.
+
+    Parameters
+    ----------
+    motion : PairMotion
+    compression_m : array, (n,)
+        From the middle of the backlash.
     """
-    side = np.sign(g)
+    contact, rate = motion.contact, motion.compression_rate_mps
+    play = contact.half_backlash_um * 1e-6
+    side = np.sign(depth(compression_m, play))
     begins = np.flatnonzero((side != 0.0) & (np.concatenate([[0.0], side[:-1]]) != side))
     if not len(begins):
-        return np.zeros_like(g)
-    speed = np.maximum(np.abs(rate_mps[np.maximum(begins - 1, 0)]), contact.impact_speed_floor_mps)
-    latest = np.searchsorted(begins, np.arange(len(g)), side="right") - 1
+        return np.zeros_like(side)
+    last = np.maximum(begins - 1, 0)
+    earlier = np.maximum(begins - 2, 0)
+    # A derived acceleration would hold a part of the blow that follows: two samples in the gap tell it without.
+    flown = (side[earlier] == 0.0) & (earlier < last)
+    gained = np.where(
+        flown,
+        (rate[last] - rate[earlier]) / np.where(flown, motion.time_s[last] - motion.time_s[earlier], 1.0),
+        motion.compression_acceleration_mps2[last],
+    )
+    left = np.where(side[last] == 0.0, play - side[begins] * compression_m[last], 0.0)
+    square = rate[last] ** 2 + 2.0 * side[begins] * gained * left
+    speed = np.maximum(np.sqrt(np.maximum(square, 0.0)), contact.impact_speed_floor_mps)
+    latest = np.searchsorted(begins, np.arange(len(side)), side="right") - 1
     beta = contact.damping_ratio_at(1.0) * max(1.0, contact.impact_speed_floor_mps) / speed
     return np.where(side != 0.0, beta[np.maximum(latest, 0)], 0.0)
 
@@ -46,25 +66,36 @@ def pair_force(g: FloatArray, rate_mps: FloatArray, damping_s_per_m: FloatArray,
 
 
 def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArray:
-    """Mean of 1 − μ sgn(v_s) tan α_k over the pairs that touch: what a gear's torque feels of the normal force.
+    """Mean of 1 − μ sgn(v_s) tan α_k over the pairs that carry: what a gear's torque feels of the normal force.
 
     tan α_k = ρ/r_b at the point of contact, of the driver (gear 0) or the driven gear (1); the sign changes at the
     pitch point, so that the share is 1 ∓ 0.018 there for μ = 0.05 and 20°.
     """
     path = motion.path
     flank = np.where(g < 0.0, -1.0, 1.0)
-    first = path.position(motion.driver_angle_rad, flank)
-    n = path.n_pairs(motion.driver_angle_rad, flank)
-    total = np.zeros_like(g)
-    for younger in (0.0, 1.0):
-        rho_1 = path.driver_lever_m(first + younger)
-        sliding = flank * (motion.driven_speed_rad_s * (path.length_m - rho_1) - motion.driver_speed_rad_s * rho_1)
-        # Below 2 mm/s the sign of friction is brought over smoothly: bristles that bend are not followed.
-        sign = np.clip(sliding / 2e-3, -1.0, 1.0)
-        lever = (rho_1, path.length_m - rho_1)[gear]
-        share = 1.0 - motion.contact.friction_coefficient * sign * lever / path.base_radii_m[gear]
-        total += np.where((younger == 0.0) | (n > 1.5), share, 0.0)
-    result: FloatArray = total / n
+    positions, weights, _ = path.pairs(motion.driver_angle_rad, flank)
+    rho_1 = path.driver_lever_m(positions)
+    rho_2 = path.length_m - rho_1
+    sliding = flank * (motion.driven_speed_rad_s * rho_2 - motion.driver_speed_rad_s * rho_1)
+    # Below 2 mm/s the sign of friction is brought over smoothly: bristles that bend are not followed.
+    sign = np.clip(sliding / 2e-3, -1.0, 1.0)
+    share = 1.0 - motion.contact.friction_coefficient * sign * (rho_1, rho_2)[gear] / path.base_radii_m[gear]
+    result: FloatArray = np.sum(weights * share, axis=0) / np.sum(weights, axis=0)
+    return result
+
+
+def hand_over_force(motion: PairMotion, g: FloatArray) -> FloatArray:
+    """Return ∂V/∂θ1 / r_b1: what storing energy in a growing number of pairs asks of the driver, beside the force.
+
+    V = Σ w(p_i) k |g|^(λ+1)/(λ+1) changes with the driver's angle by the weights of the pairs that come and go; over a
+    whole pitch at constant depth it is nothing.
+    """
+    flank = np.where(g < 0.0, -1.0, 1.0)
+    slopes = np.sum(motion.path.pairs(motion.driver_angle_rad, flank)[2], axis=0)
+    exponent = motion.contact.exponent + 1.0
+    energy = motion.contact.stiffness_n_per_m_lambda * np.abs(g) ** exponent / exponent
+    per_rad = motion.path.teeth[0] / (2.0 * np.pi)
+    result: FloatArray = flank * slopes * per_rad * energy / motion.path.base_radii_m[0]
     return result
 
 
@@ -116,7 +147,8 @@ def _from_torque(motion: PairMotion) -> Datum:
             remedy="record while the machine drives, or tell the zero to gearsig force by --datum",
         )
     a = motion.contact.half_backlash_um * 1e-6
-    zero = (motion.compression_m - np.sign(force) * a - elastic_depth(motion, force))[loaded]
+    normal = force / friction_share(motion, force)
+    zero = (motion.compression_m - np.sign(force) * a - elastic_depth(motion, normal))[loaded]
     middle = float(np.median(zero))
     spread = 1.4826 * float(np.median(np.abs(zero - middle)))
     return Datum(middle, 1.25 * spread / np.sqrt(len(zero)), f"from the torque, {len(zero)} loaded samples")
@@ -150,11 +182,13 @@ FROM_TORQUE, TOOTH_FORCE = "torque / rb1", "tooth force"
 def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> ForceEstimate:
     """Estimate the force between the teeth at every sample.
 
-    - piecewise: Σ over the pairs in contact of k sgn(g)|g|^λ (1 + β ġ)(1 ∓ μ tan α_k), plus J1 α1/r_b1 of what turns
-      between torque sensor and teeth: comparable with τ/r_b1. Pairs by the driver's angle, forwards and backwards.
+    - piecewise: Σ over the pairs in contact of w k sgn(g)|g|^λ (1 + β ġ)(1 ∓ μ tan α_k), plus ∂V/∂θ1/r_b1 where their
+      weights w change, plus J1 α1/r_b1 of what turns between torque sensor and teeth: comparable with τ/r_b1. Pairs by
+      the driver's angle, forwards and backwards.
     - piecewise, teeth alone: without the inertia and the friction's share, the normal force itself.
     - piecewise, as printed: with J2/r_b2² · q̈ instead of J1 α1/r_b1. For two free bodies that is the force with the
-      opposite sign; in a driven gear it counts the load's inertia in the pinion's torque.
+      opposite sign; in a driven gear it counts the load's inertia in the pinion's torque, and is several times the
+      force off.
     - Hunt–Crossley: k δ^λ (1 + β δ̇) of one pair on the drive flank, δ from where the flanks touch.
     - Kelvin–Voigt: k' δ + b' δ̇, likewise, k' and b' such that both agree with Hunt–Crossley at the median load.
 
@@ -183,10 +217,10 @@ def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> Force
     q = motion.compression_m - found.compression_m
     g = depth(q, contact.half_backlash_um * 1e-6)
     rate = motion.compression_rate_mps
-    beta = latched_damping(g, rate, contact)
+    beta = latched_damping(motion, q)
     n = np.where(g != 0.0, motion.path.n_pairs(motion.driver_angle_rad, np.sign(g)), 0.0)
     normal = n * pair_force(g, rate, beta, contact)
-    at_shaft = normal * friction_share(motion, g)
+    at_shaft = normal * friction_share(motion, g) + hand_over_force(motion, g)
     r1, r2 = motion.path.base_radii_m
     forces = {PIECEWISE: at_shaft + contact.driver_inertia_kg_m2 * motion.driver_acceleration_rad_s2 / r1}
     if motion.force_n is not None:

@@ -55,6 +55,9 @@ class ToothContact:
         Driver's angle in tooth pitches at which a pair enters on the drive flank, 0 to 1.
     contact_ratio : float or None
         1 to 2; None: that of standard teeth (addendum of one module).
+    mesh_ramp : float
+        Base pitches over which a pair takes up its stiffness and gives it back, centred on the ideal entry and exit, 0
+        to 0.2: corner contact and tip relief spread the change between one and two pairs. 0: at once.
 
     Raises
     ------
@@ -75,6 +78,7 @@ class ToothContact:
     mesh_phase: float = 0.0
     contact_ratio: float | None = None
     motor_inertia_kg_m2: float = 0.0
+    mesh_ramp: float = 0.05
 
     def __post_init__(self) -> None:
         positive(self.stiffness_n_per_m_lambda, "stiffness_n_per_m_lambda", "N/m^λ")
@@ -91,6 +95,7 @@ class ToothContact:
         within(self.mesh_phase, "mesh_phase", 0.0, 1.0)
         if self.contact_ratio is not None:
             within(self.contact_ratio, "contact_ratio", 1.0, 2.0)
+        within(self.mesh_ramp, "mesh_ramp", 0.0, 0.2, "base pitches")
 
     def damping_ratio_at(self, impact_speed_mps: float) -> float:
         """β = b/k in s/m of a contact whose flanks met at that speed, the floor at least."""
@@ -204,6 +209,8 @@ class PathOfContact:
         a sin α = ρ1 + ρ2.
     phase : float
         Driver's angle in pitches at which a pair enters on the drive flank.
+    ramp : float
+        Base pitches over which a pair takes up its stiffness, and gives it back.
     """
 
     teeth: tuple[int, int]
@@ -213,6 +220,7 @@ class PathOfContact:
     start_m: float
     length_m: float
     phase: float = 0.0
+    ramp: float = 0.0
 
     @property
     def pitch_point(self) -> float:
@@ -233,9 +241,25 @@ class PathOfContact:
         x = np.where(np.asarray(flank) < 0.0, 2.0 * self.pitch_point + 0.5 - x, x)
         return np.asarray(x - np.floor(x))
 
+    def pairs(
+        self, driver_angle_rad: FloatArray, flank: FloatArray | float = 1.0
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the pairs that may touch: positions behind entry, weights, and dweight/dposition, each (4, ...).
+
+        A pair's weight is the part of its stiffness that it has: s((p + r/2)/r) · s((ε − p + r/2)/r) with the ramp r
+        and s(x) = x³(10 − 15x + 6x²), which is 0 below 0 and 1 above 1.
+        """
+        u = self.position(driver_angle_rad, flank)
+        p = u + np.arange(-1.0, 3.0).reshape(-1, *([1] * u.ndim))
+        if self.ramp == 0.0:
+            inside = ((p >= 0.0) & (p < self.contact_ratio)).astype(np.float64)
+            return p, inside, np.zeros_like(p)
+        (rise, up), (stay, down) = (_smooth_step(0.5 + x / self.ramp) for x in (p, self.contact_ratio - p))
+        return p, rise * stay, (up * stay - rise * down) / self.ramp
+
     def n_pairs(self, driver_angle_rad: FloatArray, flank: FloatArray | float = 1.0) -> FloatArray:
-        """Pairs in contact: 2 where u < ε − 1, else 1, with u = frac(z1 θ1/2π − phase)."""
-        return np.asarray(np.where(self.position(driver_angle_rad, flank) < self.contact_ratio - 1.0, 2.0, 1.0))
+        """Pairs in contact: 2 where u < ε − 1, else 1, u = frac(z1 θ1/2π − phase); in between over the ramps."""
+        return np.asarray(self.pairs(driver_angle_rad, flank)[1].sum(axis=0))
 
     def tooth(self, driver_angle_rad: FloatArray) -> FloatArray:
         """Tooth of the driver that entered last, from 1, as diagnoses count them."""
@@ -245,6 +269,12 @@ class PathOfContact:
     def driver_lever_m(self, position: FloatArray) -> FloatArray:
         """ρ1 of a pair at `position` base pitches behind its entry."""
         return np.asarray(self.start_m + np.asarray(position, dtype=np.float64) * self.base_pitch_m)
+
+
+def _smooth_step(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rise from 0 to 1 with two continuous derivatives, and its slope."""
+    t = np.clip(x, 0.0, 1.0)
+    return t**3 * (10.0 + t * (6.0 * t - 15.0)), 30.0 * (t * (1.0 - t)) ** 2
 
 
 def path_of_contact(rig: Rig) -> PathOfContact:
@@ -268,7 +298,12 @@ def path_of_contact(rig: Rig) -> PathOfContact:
     z1, z2, module_mm, angle_deg = known
     assert z1 is not None and z2 is not None and module_mm is not None and angle_deg is not None  # noqa: S101, PT018
     return standard_path(
-        (z1, z2), module_mm * 1e-3, radians(angle_deg), phase=contact.mesh_phase, contact_ratio=contact.contact_ratio
+        (z1, z2),
+        module_mm * 1e-3,
+        radians(angle_deg),
+        phase=contact.mesh_phase,
+        contact_ratio=contact.contact_ratio,
+        ramp=contact.mesh_ramp,
     )
 
 
@@ -279,6 +314,7 @@ def standard_path(
     *,
     phase: float = 0.0,
     contact_ratio: float | None = None,
+    ramp: float = 0.0,
 ) -> PathOfContact:
     """Return the path of contact of standard teeth: addendum of one module, no shift, reference centre distance.
 
@@ -310,7 +346,7 @@ def standard_path(
     ratio = own if contact_ratio is None else contact_ratio
     within(ratio, "contact_ratio", 1.0, 2.0, remedy="the model holds for one to two pairs in contact")
     start = length - out_2 - 0.5 * (ratio - own) * base_pitch
-    return PathOfContact(teeth, (rb1, rb2), ratio, base_pitch, max(start, 0.0), length, phase)
+    return PathOfContact(teeth, (rb1, rb2), ratio, base_pitch, max(start, 0.0), length, phase, ramp)
 
 
 def contact_pair(rig: Rig) -> GearPair:

@@ -144,8 +144,6 @@ class ForgingDrive:
         Of the tooth flanks, level 1: their friction is μN.
     speed_limit_rad_s : float
         ω_lim of the pinion that the flow allows; 0: no limit.
-    mesh_ramp : float
-        Base pitches over which a pair takes up its load, 0.005 to 0.1.
     weak_tooth : WeakTooth or None
     wear_um : tuple of float
         Worn off both drive flanks together, at equal steps of the path of contact from where a pair enters to where it
@@ -165,16 +163,15 @@ class ForgingDrive:
     load: GrippedLoad
     flanks: Bristle
     speed_limit_rad_s: float = 0.0
-    mesh_ramp: float = 0.05
     weak_tooth: WeakTooth | None = None
     wear_um: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         not_negative(self.speed_limit_rad_s, "speed_limit_rad_s", "rad/s")
-        within(self.mesh_ramp, "mesh_ramp", *MESH_RAMP_RANGE)
         for depth in self.wear_um:
             not_negative(depth, "wear_um", "um")
-        highest = 1.9 - self.mesh_ramp
+        within(self.path.ramp, "mesh_ramp", *MESH_RAMP_RANGE)
+        highest = 1.9 - self.path.ramp
         within(self.path.contact_ratio, "contact_ratio", MIN_CONTACT_RATIO, highest, remedy="one to two pairs touch")
         if self.contact.driven_inertia_kg_m2 is None or self.pinion_side_inertia_kg_m2 <= 0.0:
             raise InputError("an inertia is missing", where="forging drive", allowed="above 0 kg m^2 on either side")
@@ -498,6 +495,7 @@ def build_drive(wanted: ParameterValues, speed_limit_rpm: float, weak_tooth: Wea
         radians(wanted.number("pressure_angle_deg")),
         phase=wanted.number("mesh_phase"),
         contact_ratio=wanted.optional("contact_ratio"),
+        ramp=wanted.number("mesh_ramp"),
     )
     contact = build_contact(wanted, path)
     brake = wanted.number("brake_nm")
@@ -522,8 +520,7 @@ def build_drive(wanted: ParameterValues, speed_limit_rpm: float, weak_tooth: Wea
         wanted.number("flank_presliding_um") * 1e-6,
     )
     limit = speed_limit_rpm * pi / 30.0
-    ramp, worn = wanted.number("mesh_ramp"), worn_um(wanted, path)
-    return ForgingDrive(path, contact, motor, load, flanks, limit, ramp, weak_tooth, worn)
+    return ForgingDrive(path, contact, motor, load, flanks, limit, weak_tooth, worn_um(wanted, path))
 
 
 def build_contact(wanted: ParameterValues, path: PathOfContact) -> ToothContact:
@@ -544,6 +541,7 @@ def build_contact(wanted: ParameterValues, path: PathOfContact) -> ToothContact:
         path.phase,
         path.contact_ratio,
         wanted.number("motor_inertia_kg_m2"),
+        path.ramp,
     )
 
 

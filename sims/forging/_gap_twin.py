@@ -13,7 +13,7 @@ from gearsig.gap import Added, DriveFacts, GapEffect, OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import standard_path
 from sims.effects import EffectSetting, effect
-from sims.forging._drive import PARAMETERS
+from sims.forging._drive import MESH_RAMP_RANGE, PARAMETERS
 from sims.forging._simulator import NAME, ForgingManipulator, with_effects
 from sims.machine import Operation
 from sims.mesh import GearGeometry, PairGeometry, wear_profile
@@ -198,6 +198,7 @@ class ForgingGapSimulator:
             "module_mm": facts.module_mm,
             "contact_ratio": min(path.contact_ratio, 1.84),
             "mesh_phase": contact.mesh_phase,
+            "mesh_ramp": min(max(contact.mesh_ramp, MESH_RAMP_RANGE[0]), MESH_RAMP_RANGE[1]),
             "stiffness_n_per_m_lambda": contact.stiffness_n_per_m_lambda,
             "exponent": contact.exponent,
             "restitution": max(contact.restitution, 0.05),

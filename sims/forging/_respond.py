@@ -68,7 +68,7 @@ def drive_numbers(drive: ForgingDrive) -> Any:
     k["damping_at_1_mps"] = damping_ratio_s_per_m(contact.damping_law, contact.restitution, 1.0)
     k["speed_floor"] = contact.impact_speed_floor_mps
     k["cycles_per_rad"], k["phase"] = path.teeth[0] / (2.0 * pi), path.phase
-    k["contact_ratio"], k["ramp"] = path.contact_ratio, drive.mesh_ramp
+    k["contact_ratio"], k["ramp"] = path.contact_ratio, path.ramp
     k["start"], k["base_pitch"], k["length"] = path.start_m, path.base_pitch_m, path.length_m
     k["mirror"] = 2.0 * path.pitch_point + 0.5
     k["tooth_friction"] = contact.friction_coefficient

@@ -378,7 +378,7 @@ class Material:
     Parameters
     ----------
     youngs_modulus_gpa : float
-        E.
+        E, 0.001 to 1500 GPa: from soft plastics to diamond.
     poisson_ratio : float
         ν, 0 to 0.49.
     density_kg_m3 : float
@@ -389,9 +389,13 @@ class Material:
     density_kg_m3: float = 7850.0
 
     def __post_init__(self) -> None:
-        positive(self.youngs_modulus_gpa, "youngs_modulus_gpa", "GPa")
+        if self.youngs_modulus_gpa > 1e6:
+            remedy = f"it is in GPa: for {self.youngs_modulus_gpa:g} Pa give {self.youngs_modulus_gpa * 1e-9:g}"
+        else:
+            remedy = "it is in GPa, 206 of steel"
+        within(self.youngs_modulus_gpa, "youngs_modulus_gpa", 1e-3, 1500.0, "GPa", remedy=remedy)
         within(self.poisson_ratio, "poisson_ratio", 0.0, 0.49)
-        positive(self.density_kg_m3, "density_kg_m3", "kg/m^3")
+        within(self.density_kg_m3, "density_kg_m3", 10.0, 30e3, "kg/m^3", remedy="7850 of steel")
 
     @property
     def youngs_modulus_pa(self) -> float:

@@ -16,6 +16,7 @@ from gearsig.motion import (
     TOOTH_FORCE,
     ForceEstimate,
     NoiseStudy,
+    PairMotion,
     acceleration_limit_rad_s2,
     depth,
     estimate_forces,
@@ -26,7 +27,7 @@ from gearsig.motion import (
     pair_force,
 )
 from gearsig.recording import Recording
-from gearsig.rig import ToothContact
+from gearsig.rig import ToothContact, standard_path
 from tests.motion.recordings import changed, continuous, start_stop, without
 from tests.sims.forging.drives import free_bodies, impact
 
@@ -53,13 +54,25 @@ def test_force_is_the_law_on_both_flanks_and_never_tension() -> None:
     assert pair_force(g, rate, beta, CONTACT) == pytest.approx([expected, -expected, 0.0])
 
 
-def test_damping_is_latched_where_flanks_meet() -> None:
-    """8(1 − e)/(5 e v), v of the sample before; it stays until they part; the floor holds for slow ones."""
-    g = np.array([0.0, 0.0, 1e-6, 2e-6, 1e-6, 0.0, -1e-6, 0.0])
-    rate = np.array([0.2, 0.2, 0.15, 0.0, -0.1, -0.001, -0.001, 0.0])
-    beta = latched_damping(g, rate, CONTACT)
-    one, floor = 8.0 * 0.2 / (5.0 * 0.8 * 0.2), 8.0 * 0.2 / (5.0 * 0.8 * 0.01)
-    assert beta == pytest.approx([0.0, 0.0, one, one, one, 0.0, floor, 0.0])
+def test_damping_is_latched_at_the_speed_with_which_flanks_meet() -> None:
+    """A driver that turns from rest at constant acceleration meets the other flank at √(2 a d), between two samples."""
+    path = standard_path((20, 100), 5e-3, np.radians(20.0))
+    t = np.arange(6) * 1e-3
+    turn, still = 12.0 / path.base_radii_m[0], np.zeros(6)  # 12 m/s² along the line of action: 100 µm after 4.08 ms
+    motion = PairMotion(1000.0, 0.5 * turn * t**2, still, turn * t, still, still, still, path, CONTACT)
+    beta = latched_damping(motion, motion.compression_m)
+    expected = 8.0 * 0.2 / (5.0 * 0.8 * np.sqrt(2.0 * 12.0 * 1e-4))
+    assert beta == pytest.approx([0.0] * 5 + [expected], rel=1e-9)
+
+
+def test_a_slow_meeting_is_damped_by_the_floor() -> None:
+    path = standard_path((20, 100), 5e-3, np.radians(20.0))
+    q = np.array([0.0, 9e-5, 9.9e-5, 1.1e-4, 1.2e-4, 9e-5])
+    still = np.zeros(6)
+    speed = np.full(6, 1e-4 / path.base_radii_m[0])
+    motion = PairMotion(1000.0, q / path.base_radii_m[0], still, speed, still, still, still, path, CONTACT)
+    floor = 8.0 * 0.2 / (5.0 * 0.8 * 0.01)
+    assert latched_damping(motion, q) == pytest.approx([0.0, 0.0, 0.0, floor, floor, 0.0])
 
 
 def test_the_inverse_formula_recovers_minus_the_force_of_a_free_impact() -> None:
@@ -76,13 +89,21 @@ def test_the_inverse_formula_recovers_minus_the_force_of_a_free_impact() -> None
 @pytest.mark.parametrize("preset", ["manipulator_formula", "manipulator_table"])
 @pytest.mark.parametrize("record", [start_stop, continuous])
 def test_noiseless_motion_gives_the_simulated_force(preset: str, record: object) -> None:
-    """The force that made the motion; what is left is the twentieth of a pitch in which pairs come and go."""
-    found = estimate(record(preset, quiet=True), "zero")  # type: ignore[operator]  # a function of the preset
-    assert relative(found, TEETH, TOOTH_FORCE) < 0.06
-    assert relative(found, PIECEWISE, FROM_TORQUE) < 0.08
-    whole = (np.abs(np.diff(found.n_pairs, prepend=0.0)) == 0.0) & (found.n_pairs > 0.0)
-    share = found.forces_n[TEETH][whole] / np.where(whole, found.references_n[TOOTH_FORCE], 1.0)[whole]
-    assert np.median(share) == pytest.approx(1.0, abs=1e-3)
+    """The force that made the motion; what is left are blows between two samples, and bristles of the flanks."""
+    found = estimate(record(preset, quiet=True))  # type: ignore[operator]  # a function of the preset
+    assert relative(found, TEETH, TOOTH_FORCE) < (0.01 if record is start_stop else 0.0005)
+    assert relative(found, PIECEWISE, FROM_TORQUE) < 0.015
+    assert relative(found, AS_PRINTED, FROM_TORQUE) > 3.0  # the load's inertia, which the torque does not carry
+
+
+def test_pairs_that_come_and_go_at_once_miss_the_force_of_a_ramp() -> None:
+    recording = continuous(quiet=True)
+    rig = recording.rig
+    assert rig is not None
+    assert rig.contact is not None
+    sudden = replace(rig, contact=replace(rig.contact, mesh_ramp=0.0))
+    hard = estimate_forces(measure_motion(recording, sudden))
+    assert relative(hard, TEETH, TOOTH_FORCE) > 50.0 * relative(estimate(recording), TEETH, TOOTH_FORCE)
 
 
 @pytest.mark.parametrize("preset", ["manipulator_formula", "manipulator_table"])
@@ -199,14 +220,14 @@ def test_noise_on_the_acceleration_costs_the_drivers_inertia_times_it(preset: st
 
 
 def test_noise_on_the_speed_spoils_the_damping_of_single_contacts() -> None:
-    """Nearer up to 0.3 rad/s in every draw; at 1 rad/s a contact whose first speed was read wrong decides."""
+    """Nearer up to 1 rad/s in every draw; at 3 rad/s a contact whose first speed was read wrong decides."""
 
     def is_nearer(deviation: float, seed: int) -> bool:
         found = estimate(noisy(start_stop(), "rotational_speed", deviation, seed))
         return found.error(PIECEWISE, FROM_TORQUE).rms_n < found.error(HUNT_CROSSLEY, FROM_TORQUE).rms_n
 
-    assert all(is_nearer(deviation, seed) for deviation in (0.1, 0.3) for seed in range(4))
-    assert {is_nearer(1.0, seed) for seed in range(4)} == {True, False}
+    assert all(is_nearer(deviation, seed) for deviation in (0.3, 1.0) for seed in range(4))
+    assert {is_nearer(3.0, seed) for seed in range(4)} == {True, False}
 
 
 def test_two_pairs_count_one_mass() -> None:
@@ -218,5 +239,5 @@ def test_two_pairs_count_one_mass() -> None:
     own = motion.contact.driver_inertia_kg_m2 * motion.driver_acceleration_rad_s2 / motion.path.base_radii_m[0]
     added = found.forces_n[AS_PRINTED] - (found.forces_n[PIECEWISE] - own)
     expected = j2 / r2**2 * motion.compression_acceleration_mps2
-    assert set(found.n_pairs) == {0.0, 1.0, 2.0}
+    assert np.all((found.n_pairs == 0.0) | ((found.n_pairs >= 1.0) & (found.n_pairs <= 2.0)))
     assert added == pytest.approx(expected, abs=1e-6 * np.max(np.abs(expected)))

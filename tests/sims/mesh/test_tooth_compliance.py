@@ -208,3 +208,8 @@ def test_a_crack_must_fit_its_gear() -> None:
     for crack, words in ((RootCrack(1.0, tooth=55), "tooth"), (RootCrack(1.0, width_mm=21.0), "width_mm")):
         with pytest.raises(InputError, match=words):
             cracked_tooth_compliance(PINION, STEEL_200, rolls(PINION), crack, 0.02)
+
+
+def test_a_modulus_in_pascals_is_refused_with_the_value_in_gpa() -> None:
+    with pytest.raises(InputError, match=r"in GPa: for 2.06e\+11 Pa give 206"):
+        Material(206e9)
