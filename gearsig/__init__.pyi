@@ -59,6 +59,7 @@ from .recording import (
     write_recording as write_recording,
 )
 from .report import analysis_text as analysis_text
+from .results import to_frame as to_frame
 from .rig import (
     Bearing as Bearing,
     ConstantSpeed as ConstantSpeed,

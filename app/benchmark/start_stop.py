@@ -17,9 +17,9 @@ from app.benchmark.diagnosers import START_STOP
 from app.benchmark.run import BenchmarkRequest, Done
 from app.benchmark.scoring.judged import Located, Row, row_of
 from app.benchmark.scoring.scores import (
+    BenchmarkResult,
     Figure,
     Measure,
-    Result,
     Rows,
     Score,
     brier_of,
@@ -132,10 +132,10 @@ PARTS: dict[str, Callable[[Row], bool]] = {
 }
 
 
-def judge_drives(request: BenchmarkRequest, cases: Sequence[Done]) -> Result:
+def judge_drives(request: BenchmarkRequest, cases: Sequence[Done]) -> BenchmarkResult:
     """Score all answers."""
     rows = {START_STOP: [drive_row(done) for done in cases]}
-    return Result(
+    return BenchmarkResult(
         request, rows, score_parts(request, rows, PARTS, FIGURES, (False,)), nan, strengths_known=False, figures=FIGURES
     )
 
@@ -267,7 +267,7 @@ FIGURES = (
 )
 
 
-def write_drive_results(result: Result, cases: Sequence[Done], folder: Path, command: str) -> Path:
+def write_drive_results(result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str) -> Path:
     """Write table, scores, cases and labels beside the answers, each whole or not at all; return the table's path."""
     from app.benchmark.scoring.results import TABLE, Table, figures_table, markdown_table, write_files
 
@@ -278,7 +278,7 @@ def write_drive_results(result: Result, cases: Sequence[Done], folder: Path, com
     return folder / TABLE
 
 
-def _by_effect(result: Result) -> tuple[str, str, tuple[str, ...], tuple[tuple[str, ...], ...]]:
+def _by_effect(result: BenchmarkResult) -> tuple[str, str, tuple[str, ...], tuple[tuple[str, ...], ...]]:
     """Return how often the likeliest effect was right for each effect, and what it was taken for."""
     table = []
     for name in CATALOGUE:

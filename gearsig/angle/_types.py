@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, frozen_array, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.results import Result
 
 AngleMethod = Literal["constant", "pulses", "encoder", "speed channel", "tachless"]
 
 
 @dataclass(frozen=True)
-class ShaftAngle:
+class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
     """Angle of a shaft against time, as a piecewise cubic through knots.
 
     Parameters
@@ -136,7 +137,7 @@ class ShaftAngle:
 
 
 @dataclass(frozen=True)
-class AngleSignal:
+class AngleSignal(Result, matrix=("samples.T", "revolutions", "channel_names")):
     """Channels sampled at equal steps of a shaft's angle.
 
     Parameters
@@ -161,6 +162,11 @@ class AngleSignal:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "samples", frozen_array(self.samples, "samples (channel, angle)", ndim=2))
+
+    @property
+    def revolutions(self) -> FloatArray:
+        """Angle of each sample, (n_samples,)."""
+        return self.start_revolution + np.arange(self.samples.shape[1]) / self.samples_per_revolution
 
     @property
     def n_revolutions(self) -> float:

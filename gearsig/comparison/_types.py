@@ -9,6 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.orders import SynchronousAverage
+from gearsig.results import Result
 from gearsig.spectra import Spectrum
 
 BEYOND = 2.0
@@ -218,7 +219,7 @@ class Locked:
 
 
 @dataclass(frozen=True)
-class ChannelComparison:
+class ChannelComparison(Result, rows="lines"):
     """One channel of the simulation beside one of the recording.
 
     Parameters
@@ -294,7 +295,7 @@ class RecordFacts:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Result, rows="channels"):
     """A simulation beside a recording.
 
     Parameters

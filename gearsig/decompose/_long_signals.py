@@ -59,7 +59,7 @@ def vmd(
     --------
     >>> t = np.arange(2000) / 1000.0
     >>> x = np.cos(2 * np.pi * 50 * t) + 0.5 * np.cos(2 * np.pi * 200 * t)
-    >>> vmd(x, 1000.0, 2, engine="vmdpy").centre_frequencies_hz.round(1)
+    >>> vmd(x, 1000.0, 2, engine="vmdpy").centres.round(1)
     array([ 50., 200.])
     """
     x = uniform(signal, channel)

@@ -11,6 +11,7 @@ from gearsig.checks import FloatArray, count, positive
 from gearsig.decompose._types import SAMPLES_PER_MODE, ModeAxis, Modes, VmdSettings, check_supported, half_gain_distance
 from gearsig.decompose._vmd import variational_modes
 from gearsig.errors import InputError, RefusalError
+from gearsig.results import Result
 from gearsig.spectra import checked_signal
 
 
@@ -62,7 +63,7 @@ class ModeTrial:
 
 
 @dataclass(frozen=True)
-class ModeSuggestion:
+class ModeSuggestion(Result, rows="trials"):
     """Settings for a signal, with their reasons and everything that was tried.
 
     Parameters
@@ -87,19 +88,6 @@ class ModeSuggestion:
     def settings(self) -> VmdSettings:
         """The suggested number of modes, penalty and start."""
         return self.chosen.settings
-
-    def describe(self) -> str:
-        """Return reasons and table as text; the suggested row is marked."""
-        head = "".join(f"{name:>11}" for name in ("penalty", "modes", "start", "residual %", "separation", "widest"))
-        head += f"{'weakest %':>11}  objection"
-        lines = [f"Suggested for {self.source or 'signal'}:", *self.reasons, "", "  " + head]
-        for t in self.trials:
-            mark = ">" if t is self.chosen else " "
-            lines.append(
-                f"{mark} {t.penalty:>11g}{t.n_modes:>11}{t.settings.start!s:>11}{100 * t.reconstruction_error:>11.2f}"
-                f"{t.separation:>11.2f}{t.widest:>11.2f}{100 * t.smallest_share:>11.2g}  {t.objection or '-'}"
-            )
-        return "\n".join(lines)
 
 
 PENALTIES = (500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, freeze, not_negative, one_of, positive
 from gearsig.errors import InputError
+from gearsig.results import Result
 
 StartName = Literal["uniform", "zero", "random", "peaks"]
 STARTS = get_args(StartName)
@@ -96,7 +97,7 @@ class VmdSettings:
 
 
 @dataclass(frozen=True)
-class Modes:
+class Modes(Result, columns=("centres", "bandwidths", "rms")):
     """A signal as a sum of modes and a residual.
 
     Parameters
@@ -158,13 +159,6 @@ class Modes:
         return len(self.centres)
 
     @property
-    def centre_frequencies_hz(self) -> FloatArray:
-        """Centres in Hz, (n_modes,)."""
-        if self.axis != "frequency":
-            raise InputError("the modes were taken over angle", remedy="read centres, which are orders")
-        return self.centres
-
-    @property
     def positions(self) -> FloatArray:
         """Time in s or angle in revolutions of each sample from the first, (n_samples,)."""
         return np.arange(len(self.residual)) / self.sampling_rate
@@ -183,21 +177,6 @@ class Modes:
     def by_centre(self) -> tuple[int, ...]:
         """Return the modes' indices by rising centre."""
         return tuple(int(i) for i in np.argsort(self.centres, kind="stable"))
-
-    def describe(self) -> str:
-        """Return a table of the modes as text, by rising centre."""
-        axis = "Hz" if self.axis == "frequency" else "order"
-        rms, s = self.rms, self.settings
-        end = "converged" if self.converged else "not converged"
-        lines = [
-            f"{self.n_modes} modes of {self.source or 'signal'}, penalty {s.penalty:g}",
-            f"{self.n_iterations} iterations, {end}; residual {100 * self.reconstruction_error:.2g} % of the rms",
-            f"{'mode':>4} {f'centre ({axis})':>16} {f'bandwidth ({axis})':>18} {f'rms ({self.unit or 1})':>16}",
-        ]
-        lines += [
-            f"{i + 1:>4} {self.centres[i]:>16.6g} {self.bandwidths[i]:>18.4g} {rms[i]:>16.4g}" for i in self.by_centre()
-        ]
-        return "\n".join([*lines, *self.notes])
 
 
 def _root_mean_square(x: FloatArray) -> float:

@@ -152,7 +152,7 @@ def variational_modes(
     --------
     >>> t = np.arange(2000) / 1000.0
     >>> x = np.cos(2 * np.pi * 50 * t) + 0.5 * np.cos(2 * np.pi * 200 * t)
-    >>> variational_modes(x, 1000.0, VmdSettings(2)).centre_frequencies_hz.round(1)
+    >>> variational_modes(x, 1000.0, VmdSettings(2)).centres.round(1)
     array([ 50., 200.])
     """
     x = checked_signal(values, minimum=8)

@@ -10,6 +10,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, freeze, one_of, positive
 from gearsig.errors import InputError
 from gearsig.recording import Recording
+from gearsig.results import Result
 from gearsig.spectra import named_signal
 
 MEDIAN_OF_NORMAL = 0.674489750196081743
@@ -163,7 +164,7 @@ class DenoisedLevel:
 
 
 @dataclass(frozen=True)
-class Denoised:
+class Denoised(Result, columns=("time_s", "values", "removed")):
     """A signal without its noise.
 
     Parameters
@@ -194,26 +195,16 @@ class Denoised:
         freeze(self, "values", "removed")
 
     @property
+    def time_s(self) -> FloatArray:
+        """Times of the samples from 0, (n_samples,)."""
+        return np.arange(len(self.values)) / self.sampling_rate_hz
+
+    @property
     def removed_share(self) -> float:
         """Energy of the removed part over that of the signal without its mean."""
         signal = self.values + self.removed
         energy = float(np.sum(np.square(signal - signal.mean())))
         return float(np.sum(np.square(self.removed))) / energy if energy > 0.0 else 0.0
-
-    def describe(self) -> str:
-        """Return the levels as a table in text."""
-        s, unit = self.settings, self.unit or "1"
-        lines = [
-            f"{self.source or 'signal'}: {s.threshold} thresholds, {s.rule}, {s.wavelet}, {s.n_shifts} shift(s)",
-            f"noise {self.noise_rms:.3g} {unit}; removed {100 * self.removed_share:.3g} % of the energy",
-            f"{'level':>5} {'band (Hz)':>20} {f'noise ({unit})':>16} {f'threshold ({unit})':>18} {'kept %':>8}",
-        ]
-        lines += [
-            f"{v.level:>5} {f'{v.band_hz[0]:.4g} to {v.band_hz[1]:.4g}':>20} {v.noise:>16.3g} {v.threshold:>18.3g} "
-            f"{100 * v.kept_share:>8.2f}"
-            for v in self.levels
-        ]
-        return "\n".join(lines)
 
 
 def denoise(

@@ -13,6 +13,7 @@ from gearsig.indicators import Indicator
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.recording import Recording
+from gearsig.results import Result
 from gearsig.rig import Rig
 from gearsig.severity import CrackEstimate, NoCrackSeen
 from gearsig.spectra import BandCandidate, Kurtogram, Spectrum
@@ -86,7 +87,7 @@ class Strength:
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding(Result):
     """One statement about the machine or the recording.
 
     Parameters
@@ -179,7 +180,7 @@ class OrderLevel:
 
 
 @dataclass(frozen=True)
-class ChannelAnalysis:
+class ChannelAnalysis(Result):
     """The signals and spectra of one vibration channel.
 
     `order_spectrum`, `order_map` and `averages` are None or empty where the speed is not known.
@@ -266,7 +267,7 @@ class LevelChange:
 
 
 @dataclass(frozen=True)
-class Analysis:
+class Analysis(Result, rows="findings"):
     """Everything `analyze` found out about one recording.
 
     Parameters

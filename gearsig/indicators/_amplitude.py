@@ -14,6 +14,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
+from gearsig.results import Result
 
 
 def checked_values(values: FloatArray, name: str = "values") -> FloatArray:
@@ -44,7 +45,7 @@ def standardised_moment(x: FloatArray, order: int, size: float | None = None) ->
 
 
 @dataclass(frozen=True)
-class Indicator:
+class Indicator(Result):
     """A number that says something about the condition, with everything needed to read it.
 
     Parameters

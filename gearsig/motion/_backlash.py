@@ -11,13 +11,14 @@ from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.motion._segments import MotionSegments
 from gearsig.motion._types import PairMotion
+from gearsig.results import Result
 
 MIN_SAMPLES = 12
 """On either flank."""
 
 
 @dataclass(frozen=True)
-class BacklashEstimate:
+class BacklashEstimate(Result):
     """Play between the flanks.
 
     Parameters
@@ -173,7 +174,7 @@ LIGHT = (0.1, 0.5)
 
 
 @dataclass(frozen=True)
-class TorqueTwist:
+class TorqueTwist(Result, columns=("twist_rad", "torque_nm")):
     """The loop of torque over twist of the pair.
 
     Parameters

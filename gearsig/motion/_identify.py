@@ -14,6 +14,7 @@ from gearsig.motion._backlash import MIN_SAMPLES, dependence, estimate_backlash
 from gearsig.motion._force import find_datum, friction_share
 from gearsig.motion._impacts import meeting_speeds
 from gearsig.motion._types import PairMotion
+from gearsig.results import Result
 from gearsig.rig import damping_ratio_s_per_m
 
 N_BLOCKS = 8
@@ -361,7 +362,7 @@ class FittedParameter:
 
 
 @dataclass(frozen=True)
-class Identification:
+class Identification(Result, rows="parameters"):
     """Parameters of contact and load.
 
     Parameters
@@ -589,7 +590,7 @@ MIN_SAMPLES_PER_TOOTH = 4
 
 
 @dataclass(frozen=True)
-class YieldingTeeth:
+class YieldingTeeth(Result, columns=("extra_um", "uncertainty_um", "n_samples")):
     """How much more than the fitted contact each tooth of the driver yields, while it carries alone.
 
     Parameters

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.motion._measure import local_polynomial
+from gearsig.results import Result
 from gearsig.spectra import Spectrum, amplitude_spectrum
 
 AT_ONCE, FIRST_S = 0.15, 0.01
@@ -49,7 +50,7 @@ class MotionSegment:
 
 
 @dataclass(frozen=True)
-class MotionSegments:
+class MotionSegments(Result, rows="segments"):
     """The segments of a recording, and what they add up to.
 
     Parameters

@@ -15,10 +15,11 @@ from gearsig.motion._impacts import Impact, find_impacts
 from gearsig.motion._segments import MotionSegments, motion_segments
 from gearsig.motion._types import PairMotion, check_turns
 from gearsig.phase import PhasePortrait
+from gearsig.results import Result
 
 
 @dataclass(frozen=True)
-class StartStop:
+class StartStop(Result, rows="impacts"):
     """What a start–stop motion shows.
 
     Parameters

@@ -15,6 +15,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.motion._measure import SIDES, find_roles, role_values, side_of
 from gearsig.orders import SynchronousAverage, order_spectrum
 from gearsig.recording import Channel, Recording
+from gearsig.results import Result
 from gearsig.rig import GearPair, PulseTimes, Rig, TachometerChannel
 from gearsig.spectra import Spectrum
 
@@ -50,7 +51,7 @@ class AngleSource:
 
 
 @dataclass(frozen=True)
-class TransmissionError:
+class TransmissionError(Result):
     """δ = r_b1 θ1 − r_b2 θ2 over the driver's tooth pitches, and what either gear repeats of it.
 
     δ is how far the driven gear lags behind perfect transmission, along the line of action; its mean is taken off.

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import RefusalError
+from gearsig.results import Result
 from gearsig.rig import PathOfContact, ToothContact
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class PairMotion:
+class PairMotion(Result, columns=("time_s", "driver_angle_rad", "driven_angle_rad")):
     """Measured motion of both gears.
 
     Parameters
@@ -144,7 +145,7 @@ class ForceError:
 
 
 @dataclass(frozen=True)
-class ForceEstimate:
+class ForceEstimate(Result):
     """Force between the teeth from their motion, by several models.
 
     Parameters

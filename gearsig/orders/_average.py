@@ -14,6 +14,7 @@ from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._types import AverageLines, LineScaling, SynchronousAverage, lines_of_revolution
 from gearsig.recording import Channel, Recording
+from gearsig.results import Result
 from gearsig.rig import Rig
 from gearsig.spectra import checked_signal
 
@@ -279,7 +280,7 @@ def _weighted_mean(revolutions: FloatArray, weighting: str) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class SeparatedShafts:
+class SeparatedShafts(Result):
     """What each of several meshing shafts repeats.
 
     Parameters

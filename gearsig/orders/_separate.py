@@ -11,12 +11,13 @@ import numpy as np
 from gearsig.checks import FloatArray, count, freeze
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._types import SynchronousAverage
+from gearsig.results import Result
 
 PartKind = Literal["residual", "difference", "regular", "band-passed mesh"]
 
 
 @dataclass(frozen=True)
-class SeparatedAverage:
+class SeparatedAverage(Result):
     """A synchronous average and its parts: average = regular + difference, exactly."""
 
     average: SynchronousAverage
@@ -186,7 +187,7 @@ def _part(average: SynchronousAverage, values: FloatArray, kind: PartKind, share
 
 
 @dataclass(frozen=True)
-class MeshModulation:
+class MeshModulation(Result):
     """Modulation of one mesh harmonic over a revolution of the gear's shaft.
 
     Parameters

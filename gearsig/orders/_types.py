@@ -9,13 +9,14 @@ import numpy as np
 
 from gearsig.checks import FloatArray, freeze
 from gearsig.errors import InputError
+from gearsig.results import Result
 from gearsig.spectra import ComplexArray, Scaling
 
 LineScaling = Literal["amplitude peak", "amplitude rms"]
 
 
 @dataclass(frozen=True)
-class OrderMap:
+class OrderMap(Result, matrix=("values", "time_s", "positions")):
     """Spectra along speed or time.
 
     Parameters
@@ -52,7 +53,7 @@ class OrderMap:
 
 
 @dataclass(frozen=True)
-class TrackedOrder:
+class TrackedOrder(Result, columns=("time_s", "speed_rpm", "amplitude", "phase_rad")):
     """Level and phase of one order along speed.
 
     Parameters
@@ -83,7 +84,7 @@ class TrackedOrder:
 
 
 @dataclass(frozen=True)
-class SynchronousAverage:
+class SynchronousAverage(Result, columns=("revolutions", "values", "standard_error")):
     """One mean revolution of a shaft, and how well the revolutions agree on it.
 
     Parameters
@@ -117,6 +118,11 @@ class SynchronousAverage:
             raise InputError(f"{len(self.values)} values, {len(self.standard_error)} standard errors")
 
     @property
+    def revolutions(self) -> FloatArray:
+        """Angle of each value, (n_angles,), from 0 to just under 1."""
+        return np.arange(len(self.values)) / len(self.values)
+
+    @property
     def highest_line(self) -> int:
         """Highest whole order that is truly in the average."""
         return min(int(self.highest_order + 1e-9), (len(self.values) - 1) // 2)
@@ -131,7 +137,7 @@ class SynchronousAverage:
 
 
 @dataclass(frozen=True)
-class AverageLines:
+class AverageLines(Result):
     """Complex lines of a shaft's synchronous averages: of several channels at once, in consecutive parts of a record.
 
     Parameters

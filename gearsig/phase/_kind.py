@@ -23,6 +23,7 @@ from gearsig.phase._types import (
     checked_series,
     mean_period_samples,
 )
+from gearsig.results import Result
 
 MIN_VALUES, MAX_VALUES = 200, 20_000
 LOWEST_C, HIGHEST_C = np.pi / 5.0, 4.0 * np.pi / 5.0
@@ -193,7 +194,7 @@ Kind = Literal["periodic", "subharmonic", "quasi-periodic", "chaotic", "stochast
 
 
 @dataclass(frozen=True)
-class MotionKind:
+class MotionKind(Result):
     """The kind of a motion with its evidence.
 
     Parameters

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, freeze, frozen_array, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.results import Result
 
 BoolArray = NDArray[np.bool_]
 ChaosVerdict = Literal["regular", "irregular", "undecided"]
@@ -18,7 +19,7 @@ PortraitKind = Literal["phase plane", "delay embedding", "states"]
 
 
 @dataclass(frozen=True)
-class PhasePortrait:
+class PhasePortrait(Result, matrix=("points", "times_s", "axis_names")):
     """A path through phase space, sampled at a constant rate.
 
     Parameters
@@ -68,6 +69,11 @@ class PhasePortrait:
         return int(self.points.shape[1])
 
     @property
+    def times_s(self) -> FloatArray:
+        """Time of each sample, (n_points,)."""
+        return self.start_s + np.arange(self.n_points) / self.sampling_rate_hz
+
+    @property
     def end_s(self) -> float:
         """Time of the last sample."""
         return self.start_s + (self.n_points - 1) / self.sampling_rate_hz
@@ -97,7 +103,7 @@ class PhasePortrait:
 
 
 @dataclass(frozen=True)
-class PoincareSection:
+class PoincareSection(Result, matrix=("points", "times_s", "axis_names")):
     """Points at which a path meets its section.
 
     Parameters
@@ -137,7 +143,7 @@ class PoincareSection:
 
 
 @dataclass(frozen=True)
-class BifurcationDiagram:
+class BifurcationDiagram(Result, columns=("parameter", "points")):
     """One coordinate of the Poincaré points over a parameter.
 
     Parameters
@@ -175,7 +181,7 @@ class BifurcationDiagram:
 
 
 @dataclass(frozen=True)
-class MutualInformation:
+class MutualInformation(Result, columns=("delays_s", "information_nats")):
     """Average mutual information of a signal and its delayed self, and the delay chosen from it.
 
     Parameters
@@ -216,7 +222,7 @@ class MutualInformation:
 
 
 @dataclass(frozen=True)
-class EmbeddingDimension:
+class EmbeddingDimension(Result):
     """How many delayed values unfold a signal's path.
 
     Parameters
@@ -254,7 +260,7 @@ class EmbeddingDimension:
 
 
 @dataclass(frozen=True)
-class LyapunovExponent:
+class LyapunovExponent(Result, columns=("times_s", "log_distance")):
     """Largest Lyapunov exponent, with the divergence curve it was read from.
 
     Parameters
@@ -300,7 +306,7 @@ class LyapunovExponent:
 
 
 @dataclass(frozen=True)
-class ChaosTest:
+class ChaosTest(Result, columns=("c_rad", "k_of_c")):
     """Result of the 0–1 test.
 
     Parameters
@@ -338,7 +344,7 @@ class ChaosTest:
 
 
 @dataclass(frozen=True)
-class RecurrencePlot:
+class RecurrencePlot(Result, matrix=("recurrent", "times_s", "times_s")):
     """Which points of a path lie close to which.
 
     Parameters
@@ -365,7 +371,7 @@ class RecurrencePlot:
 
 
 @dataclass(frozen=True)
-class RecurrenceMeasures:
+class RecurrenceMeasures(Result):
     """Recurrence quantification; lengths in seconds, shares from 0 to 1.
 
     Parameters

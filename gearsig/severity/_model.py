@@ -13,6 +13,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError, RefusalError
+from gearsig.results import Result
 from gearsig.severity._features import FEATURES, RELIEF, RISING, SHAPE, SHAPED
 
 MIN_SPREAD = 0.1
@@ -298,7 +299,7 @@ def load_calibration() -> Calibration:
 
 
 @dataclass(frozen=True)
-class CrackEstimate:
+class CrackEstimate(Result):
     """A damaged tooth was seen; whether it is cracked, and how deep the crack is, if it is one.
 
     Parameters
@@ -396,7 +397,7 @@ class CrackEstimate:
 
 
 @dataclass(frozen=True)
-class NoCrackSeen:
+class NoCrackSeen(Result):
     """No crack was seen, and how deep one may be that would not have shown.
 
     Parameters

@@ -12,6 +12,7 @@ from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray, count, freeze, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
+from gearsig.results import Result
 from gearsig.spectra._envelope import Preparation, prepared_signal
 from gearsig.spectra._types import (
     ComplexArray,
@@ -88,7 +89,7 @@ def lay_bands(n_lines: int, n_bands: int, n_highest: float, inflation: float, n_
 
 
 @dataclass(frozen=True)
-class SpectralCoherence:
+class SpectralCoherence(Result, matrix=("coherence_squared", "alpha", "frequency_hz")):
     """How strongly each carrier band is modulated at each cyclic frequency.
 
     γ²(α, f) = |S(α, f)|² / (S(0, f) S(0, f - α)): 0 for stationary noise, 1 where the band's content at f is a copy
@@ -150,7 +151,7 @@ class SpectralCoherence:
 
 
 @dataclass(frozen=True)
-class EnhancedEnvelope:
+class EnhancedEnvelope(Result):
     """Squared coherence averaged over a range of carriers: an envelope spectrum in which all bands count alike.
 
     Parameters

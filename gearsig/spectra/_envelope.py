@@ -11,6 +11,7 @@ import numpy as np
 from gearsig.checks import FloatArray, freeze, one_of, positive, within
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
+from gearsig.results import Result
 from gearsig.spectra._amplitude import amplitude_spectrum, floor_of_powers
 from gearsig.spectra._types import ComplexArray, Scaling, Spectrum, checked_signal, named_signal, squared_unit
 
@@ -18,7 +19,7 @@ EnvelopeKind = Literal["magnitude", "squared"]
 
 
 @dataclass(frozen=True)
-class Envelope:
+class Envelope(Result, columns=("time_s", "values")):
     """Envelope of a band as a time series of its own, lower sampling rate; sample 0 is at time 0.
 
     Parameters
@@ -40,6 +41,11 @@ class Envelope:
 
     def __post_init__(self) -> None:
         freeze(self, "values")
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Times of the samples from 0, (n_samples,)."""
+        return np.arange(len(self.values)) / self.sampling_rate_hz
 
 
 def band_envelope(

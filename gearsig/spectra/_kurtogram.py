@@ -11,6 +11,7 @@ from numba import njit
 from gearsig.checks import FloatArray, count, freeze, not_negative, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
+from gearsig.results import Result
 from gearsig.spectra._envelope import (
     BandCandidate,
     Envelope,
@@ -36,7 +37,7 @@ def kurtosis_error(n_bands: int, n_samples: int) -> float:
 
 
 @dataclass(frozen=True)
-class Kurtogram:
+class Kurtogram(Result):
     """Spectral kurtosis over the bands of a tree of halves and thirds.
 
     K = ⟨|z|⁴⟩/⟨|z|²⟩² - 2 of a band's complex envelope z; 0 for stationary Gaussian noise, -1 for a steady sine. For

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, closest_match_hint, count, freeze, frozen_array, not_negative, positive, within
 from gearsig.errors import InputError
 from gearsig.recording import Recording
+from gearsig.results import Result
 
 Scaling = Literal["amplitude peak", "amplitude rms", "power", "power density", "dimensionless"]
 Axis = Literal["frequency", "order", "quefrency"]
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class Spectrum(Result, columns=("positions", "values")):
     """Values over frequency (Hz), order (cycles per revolution) or quefrency (s).
 
     Parameters

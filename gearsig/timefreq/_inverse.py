@@ -8,6 +8,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, freeze, not_negative, one_of, within
 from gearsig.errors import InputError
+from gearsig.results import Result
 from gearsig.timefreq._cwt import analysis
 from gearsig.timefreq._squeezing import gather_lines, gather_near
 from gearsig.timefreq._types import Coefficients, ComplexArray, Ridge
@@ -66,7 +67,7 @@ def _limit(value: FloatArray | float | None, default: float, n: int, name: str) 
 
 
 @dataclass(frozen=True)
-class Component:
+class Component(Result, columns=("at", "analytic")):
     """Waveform of one component.
 
     Parameters

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, freeze, one_of
 from gearsig.errors import InputError, RefusalError
+from gearsig.results import Result
 from gearsig.timefreq._types import Axis, Reduction, TimeFrequencyMap
 from gearsig.timefreq._uniform import Columns, LinePlan, Source, plan_columns, uniform
 
@@ -16,7 +17,7 @@ _MODE = "periodization"  # as many coefficients as samples: the only one that ke
 
 
 @dataclass(frozen=True)
-class WaveletPackets:
+class WaveletPackets(Result):
     """Coefficients of an orthogonal wavelet packet transform, in bands of equal width.
 
     Parameters

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, freeze
 from gearsig.errors import InputError
+from gearsig.results import Result
 from gearsig.spectra import Scaling
 
 Axis = Literal["frequency", "order"]
@@ -19,7 +20,7 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 
 @dataclass(frozen=True)
-class TimeFrequencyMap:
+class TimeFrequencyMap(Result, matrix=("values", "at", "positions")):
     """Levels over time and frequency, or shaft angle and order, small enough to draw.
 
     Parameters
@@ -93,7 +94,7 @@ class TimeFrequencyMap:
 
 
 @dataclass(frozen=True)
-class Coefficients:
+class Coefficients(Result, matrix=("values.T", "at", "positions")):
     """Complex coefficients of a transform at equal steps of time or angle.
 
     Parameters
@@ -155,7 +156,7 @@ def _freeze_unsqueezed(result: TimeFrequencyMap | Coefficients) -> None:
 
 
 @dataclass(frozen=True)
-class Ridge:
+class Ridge(Result, columns=("at", "positions", "amplitude", "shared")):
     """Frequency and amplitude of one component along time, or order along shaft angle.
 
     Parameters

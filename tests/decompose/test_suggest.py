@@ -45,15 +45,15 @@ def test_close_tones_ask_for_a_larger_penalty_and_the_text_says_why():
     assert "At the usual penalty of 2000 two modes share the same lines." in suggestion.reasons
 
 
-def test_the_table_holds_every_trial_and_marks_one():
+def test_the_table_holds_every_trial():
     x = _tones(0.05, 0.2) + 0.1 * np.random.default_rng(0).normal(size=N)
     suggestion = suggest_modes(x, 1.0, max_modes=4, penalties=(2000.0, 500.0), source="a1")
     assert [(t.penalty, t.n_modes) for t in suggestion.trials] == [
         (p, k) for p in (500.0, 2000.0) for k in (1, 2, 3, 4)
     ]
-    lines = suggestion.describe().splitlines()
-    assert sum(line.startswith("> ") for line in lines) == 1
-    assert "Suggested for a1" in lines[0]
+    table = suggestion.to_frame()
+    assert list(table["settings.n_modes"]) == [t.n_modes for t in suggestion.trials]
+    assert suggestion.chosen in suggestion.trials
     assert any(t.objection == "a mode is as wide as noise" for t in suggestion.trials)
 
 

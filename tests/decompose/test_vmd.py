@@ -178,7 +178,7 @@ def test_given_starts_are_in_hertz():
     x = _signal(2000)
     modes = variational_modes(x, 5000.0, VmdSettings(3, start=(0.0, 150.0, 600.0)))
     assert modes.centre_history[0] == pytest.approx([0.0, 150.0, 600.0])
-    assert modes.centre_frequencies_hz[1:] == pytest.approx([150.0, 600.0], abs=5.0)
+    assert modes.centres[1:] == pytest.approx([150.0, 600.0], abs=5.0)
 
 
 def test_what_is_not_converged_says_so():
@@ -186,7 +186,6 @@ def test_what_is_not_converged_says_so():
     assert not modes.converged
     assert modes.n_iterations == 5
     assert "Not converged" in modes.notes[0]
-    assert "not converged" in modes.describe()
 
 
 def test_modes_on_the_same_lines_are_noted():
@@ -195,13 +194,11 @@ def test_modes_on_the_same_lines_are_noted():
     assert not variational_modes(_signal(1000), 1.0, VmdSettings(2, max_iterations=5000)).notes
 
 
-def test_the_table_lists_modes_by_rising_centre():
+def test_modes_are_sorted_by_rising_centre():
     modes = variational_modes(_signal(2000), 1000.0, VmdSettings(2, start=(120.0, 30.0)), unit="g", source="a1")
     assert modes.centres[0] > modes.centres[1]
     assert modes.by_centre() == (1, 0)
-    rows = modes.describe().splitlines()
-    assert rows[0].startswith("2 modes of a1")
-    assert [row.split()[0] for row in rows[3:5]] == ["2", "1"]
+    assert list(modes.to_frame()["centres"]) == list(modes.centres)
 
 
 @pytest.mark.parametrize(

@@ -23,9 +23,9 @@ from app.benchmark.scoring.scores import (
     FIGURES,
     WITH,
     WITHOUT,
+    BenchmarkResult,
     Figure,
     Part,
-    Result,
     Score,
     bins_of,
     is_one_answer,
@@ -66,7 +66,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-def main_table(result: Result) -> Table:
+def main_table(result: BenchmarkResult) -> Table:
     """Return the figures that have targets or matter beside them, with and without reference."""
     parts = {name: result.part(name).scores for name in (WITHOUT, WITH)}
     rows = []
@@ -81,7 +81,7 @@ def main_table(result: Result) -> Table:
     return Table("Against the targets", _basis(result), header, tuple(rows))
 
 
-def same_table(result: Result) -> Table | None:
+def same_table(result: BenchmarkResult) -> Table | None:
     """Return the figures of the diagnosing simulator's own cases and the drop from them; None if there are none."""
     if not result.wanted.plan.same_simulator:
         return None
@@ -97,7 +97,9 @@ def same_table(result: Result) -> Table | None:
     return Table("Same simulator", note, ("", WITHOUT, "drop", WITH, "drop"), tuple(rows))
 
 
-def figures_table(result: Result, title: str, note: str, columns: Mapping[str, Part], *, with_n: bool = True) -> Table:
+def figures_table(
+    result: BenchmarkResult, title: str, note: str, columns: Mapping[str, Part], *, with_n: bool = True
+) -> Table:
     """Return the figures of some parts of the cases side by side, without those that no case has."""
     rows = []
     for figure in result.figures:
@@ -107,7 +109,7 @@ def figures_table(result: Result, title: str, note: str, columns: Mapping[str, P
     return Table(title, note, ("", *columns), tuple(rows))
 
 
-def beside_table(result: Result) -> Table:
+def beside_table(result: BenchmarkResult) -> Table:
     """Return the same figures of the diagnosers beside, on the very same cases."""
     names = result.wanted.diagnosers
     parts = (("without", WITHOUT), ("with", WITH))
@@ -118,7 +120,7 @@ def beside_table(result: Result) -> Table:
     return figures_table(result, "Beside other diagnosers", text, columns, with_n=False)
 
 
-def parts_table(result: Result) -> Table:
+def parts_table(result: BenchmarkResult) -> Table:
     """Return the figures of one and two conditions, and of faults of every strength."""
     columns = {name: result.part(name) for name in ("one condition", "two conditions")} | {
         "every strength, without": result.part(WITHOUT, strong=False),
@@ -157,7 +159,7 @@ def _drop(figure: Figure, same: Score, blind: Score) -> str:
     return text.replace("-", "−")
 
 
-def _basis(result: Result) -> str:
+def _basis(result: BenchmarkResult) -> str:
     if result.strengths_known:
         return (
             f"Faults of at least {STRONG:g} structural floors, and all healthy cases; value (90 % interval) of "
@@ -169,7 +171,7 @@ def _basis(result: Result) -> str:
     )
 
 
-def markdown(result: Result, command: str, date: datetime) -> str:
+def markdown(result: BenchmarkResult, command: str, date: datetime) -> str:
     """Return the tables for a README, with date, version and command."""
     plan = result.wanted.plan
     text = [
@@ -196,7 +198,7 @@ def markdown_table(table: Table) -> Iterator[str]:
         yield "| " + " | ".join(row) + " |"
 
 
-def cost_lines(result: Result) -> list[str]:
+def cost_lines(result: BenchmarkResult) -> list[str]:
     """Return what a diagnosis took, and the calibration error that chance alone would give."""
     answers = [row.answer for row in result.rows[result.judged]]
     wall = np.array([a.seconds for a in answers])
@@ -221,7 +223,7 @@ LEVELS = (("weak", 0.0, 1 / 3), ("middle", 1 / 3, 2 / 3), ("strong", 2 / 3, 1.01
 MAX_CONFUSIONS = 12
 
 
-def effects_table(result: Result) -> Table:
+def effects_table(result: BenchmarkResult) -> Table:
     """Return, for each effect, how often the likeliest cause was right, by level, strength and reference."""
     rows = [r for r in result.rows[result.judged] if r.source == BLIND]
     table = [_effect_row(name, [r for r in rows if r.kind == "single" and r.effects == (name,)]) for name in CATALOGUE]
@@ -265,7 +267,7 @@ def _right(rows: Sequence[Row]) -> str:
     return f"{sum(r.first in r.truths for r in rows)} of {len(rows)}" if rows else "–"
 
 
-def confusions_table(result: Result) -> Table:
+def confusions_table(result: BenchmarkResult) -> Table:
     """Return the commonest wrong answers, and in which kinds of features both effects show."""
     rows = [r for r in result.rows[result.judged] if r.source == BLIND and r.kind != "pair"]
     if result.strengths_known:
@@ -295,7 +297,7 @@ def _common(true: str, said: str) -> str:
     return "not explained well enough" if said == UNKNOWN else ""
 
 
-def confusion_counts(result: Result) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray]:
+def confusion_counts(result: BenchmarkResult) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray]:
     """Return what it was, what was said, and the counts, (n_true, n_said), of blind cases with one right answer."""
     rows = [r for r in result.rows[result.judged] if r.source == BLIND and r.kind != "pair"]
     if result.strengths_known:
@@ -319,7 +321,7 @@ REPORT, TABLE, SCORES, CASES, LABELS = "report.html", "table.md", "scores.json",
 
 
 def write_results(
-    result: Result, cases: Sequence[Done], folder: Path, command: str, date: datetime | None = None
+    result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str, date: datetime | None = None
 ) -> Path:
     """Write everything; return the page's path. Nothing may be left to diagnose when this is called."""
     now = date or datetime.now().astimezone()
@@ -328,7 +330,7 @@ def write_results(
 
 
 def write_files(
-    result: Result, cases: Sequence[Done], folder: Path, command: str, table: str, date: datetime | None = None
+    result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str, table: str, date: datetime | None = None
 ) -> None:
     """Write labels, cases, scores and the tables' text, each whole or not at all."""
     (folder / LABELS).mkdir(exist_ok=True)
@@ -340,7 +342,7 @@ def write_files(
     written(folder / TABLE, table)
 
 
-def scores_json(result: Result, command: str, date: datetime) -> str:
+def scores_json(result: BenchmarkResult, command: str, date: datetime) -> str:
     """Return every figure of every part, for programs."""
     parts = [
         {
@@ -370,7 +372,7 @@ def _plain(score: Score) -> dict[str, float | int | None]:
     return {**{key: rounded(found[key]) for key in ("value", "low", "high")}, "n": score.n}
 
 
-def cases_csv(result: Result, cases: Sequence[Done]) -> str:
+def cases_csv(result: BenchmarkResult, cases: Sequence[Done]) -> str:
     """Return one line per case and diagnoser."""
     text = StringIO()
     table = csv.writer(text, lineterminator="\n")
@@ -408,7 +410,7 @@ def _number(value: float) -> str:
     return f"{value:.4g}" if np.isfinite(value) else ""
 
 
-def page(result: Result, command: str, date: datetime) -> str:
+def page(result: BenchmarkResult, command: str, date: datetime) -> str:
     """Return report.html."""
     sections = [
         _section(main_table(result)),
@@ -434,7 +436,7 @@ def _section(table: Table, title: str = "") -> Section:
     return Section(title or table.title, table.note, table.header, table.rows)
 
 
-def _summary(result: Result) -> str:
+def _summary(result: BenchmarkResult) -> str:
     said = []
     for name in (WITHOUT, WITH):
         part = result.part(name)
@@ -445,7 +447,7 @@ def _summary(result: Result) -> str:
     return f"{'. '.join(text[0].upper() + text[1:] for text in said)}." if said else "No mechanical effects."
 
 
-def _provenance(result: Result, command: str) -> list[tuple[str, str]]:
+def _provenance(result: BenchmarkResult, command: str) -> list[tuple[str, str]]:
     plan = result.wanted.plan
     shares = ", ".join(f"{100 * part:.0f} % {kind}" for kind, part in SHARES.items())
     return [
@@ -458,7 +460,7 @@ def _provenance(result: Result, command: str) -> list[tuple[str, str]]:
     ]
 
 
-def _confusion_picture(result: Result) -> Picture:
+def _confusion_picture(result: BenchmarkResult) -> Picture:
     from gearsig.plot import confusion_figure
 
     strong = f", faults of at least {STRONG:g} structural floors" if result.strengths_known else ""
@@ -471,7 +473,7 @@ def _confusion_picture(result: Result) -> Picture:
     )
 
 
-def _calibration(result: Result) -> tuple[Picture, ...]:
+def _calibration(result: BenchmarkResult) -> tuple[Picture, ...]:
     from gearsig.plot import calibration_figure
 
     curves = {}
@@ -493,7 +495,7 @@ def _calibration(result: Result) -> tuple[Picture, ...]:
     return (embed(figure, caption, "Share of right answers over stated probability.", vector=True),)
 
 
-def _failures(result: Result) -> Section:
+def _failures(result: BenchmarkResult) -> Section:
     rows = [r for r in result.rows[result.judged] if r.answer.error]
     cells = tuple((str(r.number), "same simulator" if r.source == SAME else "blind", r.answer.error) for r in rows)
     return Section("Cases without an answer", "", ("case", "made by", "reason"), cells)

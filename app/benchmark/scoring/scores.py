@@ -471,7 +471,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Result:
+class BenchmarkResult:
     """A benchmark's outcome.
 
     Parameters
@@ -506,14 +506,14 @@ class Result:
         return next(p for p in self.parts if (p.diagnoser, p.source, p.name, p.strong) == (own, source, name, wanted))
 
 
-def judge(wanted: BenchmarkRequest, cases: Sequence[Done]) -> Result:
+def judge(wanted: BenchmarkRequest, cases: Sequence[Done]) -> BenchmarkResult:
     """Score all answers."""
     floors = known_floors([done.truth for done in cases if done.planned.source == BLIND])
     rows = {name: rows_of(cases, name, floors) for name in wanted.diagnosers}
     first = rows[wanted.diagnosers[0]]
     parts = score_parts(wanted, rows, PARTS, FIGURES, (True, False))
     confidence = [r.confidence for r in first if r.source == BLIND and is_one_answer(r)]
-    return Result(
+    return BenchmarkResult(
         wanted,
         rows,
         parts,

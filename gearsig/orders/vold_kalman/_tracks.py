@@ -15,6 +15,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.orders._average import times_of_revolutions
 from gearsig.orders._types import TrackedOrder
 from gearsig.orders.vold_kalman._kernels import lowest_frequency
+from gearsig.results import Result
 from gearsig.rig import Rig
 
 Generation = Literal["first", "second"]
@@ -51,7 +52,9 @@ class FrequencyTrack:
 
 
 @dataclass(frozen=True)
-class SeparatedOrder:
+class SeparatedOrder(
+    Result, columns=("time_s", "waveform", "amplitude", "phase_rad", "frequency_hz", "valid", "settled")
+):
     """One order taken out of a signal: waveform, and complex envelope over time.
 
     Parameters
@@ -136,7 +139,7 @@ class SeparatedOrder:
 
 
 @dataclass(frozen=True)
-class OrderSeparation:
+class OrderSeparation(Result, rows="orders"):
     """A signal as the sum of orders and a residual.
 
     Parameters
