@@ -74,7 +74,7 @@ def test_the_library_knows_no_simulator_and_no_app() -> None:
 
 
 def test_simulators_use_only_rig_recording_and_the_protocol_of_the_gap_diagnosis() -> None:
-    basic = ("gearsig.checks", "gearsig.errors", "gearsig.cache", "gearsig.processes", "gearsig.formatting")
+    basic = ("gearsig.checks", "gearsig.results", "gearsig.errors", "gearsig.cache", "gearsig.processes", "gearsig.formatting")
     drive = {"DriveFacts", "DriveSimulator", "DriveTwin"}
     protocol = {"Added", "GapEffect", "GapSimulator", "OperatingCondition", "Twin"} | drive
     allowed = ("gearsig.rig", "gearsig.recording", *basic, *(f"gearsig.gap.{name}" for name in protocol))

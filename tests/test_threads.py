@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearsig.angle import ShaftAngle, resample_to_angle
-from gearsig.decompose import VmdSettings, denoise, suggest_modes, variational_modes
+from gearsig.decompose import VmdSettings, denoise, suggest_modes, vmd
 from gearsig.orders import order_map, track_vold_kalman
 from gearsig.phase import phase_plane
 from gearsig.plot import kurtogram_figure, time_frequency_figure
@@ -66,7 +66,7 @@ METHODS = {
     "kurtogram": lambda r, _: kurtogram_envelope(r, "a", preparation="tones removed").spectrum.values,
     "coherence": lambda r, _: spectral_coherence(r, "a", highest_alpha_hz=100, n_bands=16).coherence_squared,
     "order coherence": lambda r, a: order_coherence(r, "a", a, highest_order=4, n_bands=16).coherence_squared,
-    "modes": lambda r, _: variational_modes(r.values("a"), FS, VmdSettings(3)).waveforms,
+    "modes": lambda r, _: vmd(r.values("a"), FS, VmdSettings(3)).waveforms,
     "suggested modes": lambda r, _: np.array(
         suggest_modes(r.values("a"), FS, max_modes=2, penalties=(2000.0,), longest=2048).chosen.centres
     ),

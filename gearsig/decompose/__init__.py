@@ -1,12 +1,11 @@
 """Signals taken apart: variational modes, wavelet denoising."""
 
-from gearsig.decompose._long_signals import long_modes, modes_by_block, vmd
+from gearsig.decompose._long_signals import modes_by_block, vmd
 from gearsig.decompose._suggestion import ModeSuggestion, ModeTrial, noise_width, suggest_modes
 from gearsig.decompose._types import ModeAxis, Modes, StartName, VmdEngine, VmdSettings
 from gearsig.decompose._vmd import (
     mode_spectra,
     peak_centres,
-    variational_modes,
 )
 from gearsig.decompose._wavelet_denoising import (
     Denoised,
@@ -34,7 +33,6 @@ __all__ = [
     "bayes",
     "deepest_level",
     "denoise",
-    "long_modes",
     "mode_spectra",
     "modes_by_block",
     "noise_level",
@@ -43,6 +41,5 @@ __all__ = [
     "suggest_modes",
     "sure",
     "universal",
-    "variational_modes",
     "vmd",
 ]

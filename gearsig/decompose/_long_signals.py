@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, count, positive, within
+from gearsig.checks import FloatArray, count, within
 from gearsig.decompose._types import ModeAxis, Modes, VmdEngine, VmdSettings, mode_notes
-from gearsig.decompose._vmd import variational_modes
-from gearsig.spectra import checked_signal
-from gearsig.timefreq import Source, uniform
+from gearsig.decompose._vmd import modes_of_whole
+from gearsig.timefreq import Source, UniformSignal, uniform
 
 IndexArray = NDArray[np.intp]
 
@@ -27,33 +26,61 @@ def vmd(
     settings: VmdSettings | int,
     *,
     engine: VmdEngine | None = None,
+    n_per_block: int = N_PER_BLOCK,
     rng: np.random.Generator | None = None,
 ) -> Modes:
-    """Return the variational modes of a recording's channel, of a signal over angle, or of plain samples.
+    """Return the variational modes of a signal: each most compact around a centre frequency, together they fit it.
+
+    min Σ_k α ‖∂_t [(δ + j/πt) * u_k] e^(-jω_k t)‖² + ‖f - Σ_k u_k‖², solved by alternating Wiener filters
+    û_k = (f̂ - Σ_{i≠k} û_i - λ̂/2) / (1 + α (ω - ω_k)²) and centroids ω_k of |û_k|².
 
     Parameters
     ----------
     signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
-        Over angle, centres and bandwidths are orders: at variable speed an order stays one narrow mode, where over time
-        it would be smeared.
+        Not constant; at least 4 samples per mode. Over angle, centres and bandwidths are orders: at variable speed an
+        order stays one narrow mode, where over time it would be smeared.
     channel : str, float or None
         None: the only channel there is. Of an array its sampling rate in Hz.
     settings : VmdSettings or int
         An int is the number of modes, with everything else as usual; `suggest_modes` finds it.
     engine : str or None
         "gearsig" or "vmdpy", in place of that of the settings.
+    n_per_block : int
+        A longer signal is taken block by block, see `modes_by_block`.
     rng : numpy.random.Generator or None
         Needed for `start="random"` only.
 
     Returns
     -------
     Modes
-        See `variational_modes`; of more than 2¹⁸ samples see `long_modes`.
+        In the signal's unit; computed in double precision whatever the input's. Of several blocks: centres are
+        c = Σ E_i c_i / Σ E_i, E_i a mode's energy in block i, and bandwidths √(Σ E_i (b_i² + (c_i - c)²) / Σ E_i), so
+        that how far a mode wanders counts as width; `n_iterations` is the sum, `last_change` is nan, and
+        `centre_history` has one row per block, then the centres. The notes say where a mode does not go on over a seam.
 
     Raises
     ------
-    InputError, RefusalError
-        As in `variational_modes`.
+    InputError
+        On NaN, a constant, too few samples for the number of modes, start frequencies outside the spectrum.
+    RefusalError
+        If a mode stays empty: the signal does not hold that many.
+
+    Notes
+    -----
+    The signal is mirrored at both ends, by half its length in the reference programs; that length does not matter, as
+    mirroring makes the signal periodic. For even lengths the result is that of vmdpy 0.2 within rounding, with two of
+    its habits: it returns the modes before the last iteration, and it fills the line at half the sampling rate, where a
+    mirrored signal has nothing, with its neighbour's value (an alternating ±|û|/2n, mostly invisible). vmdpy drops
+    the last sample of an odd length; here all samples are kept, and the line at half the sampling rate is empty.
+
+    Memory is 8 bytes per sample and mode, and about four times that of one block.
+
+    When not to use it: for broad-band impulses, whose spectrum is no narrow band (take their envelope, or a band);
+    for speeds that vary by more than a mode's width (resample over angle first).
+
+    References
+    ----------
+    K. Dragomiretskiy and D. Zosso, "Variational mode decomposition", 2014.
 
     Examples
     --------
@@ -66,79 +93,34 @@ def vmd(
     chosen = settings if isinstance(settings, VmdSettings) else VmdSettings(settings)
     if engine is not None:
         chosen = replace(chosen, engine=engine)
-    source = f"{x.source} over angle" if x.axis == "order" else x.source
-    return long_modes(x.values, x.rate, chosen, rng=rng, axis=x.axis, unit=x.unit, source=source, shaft=x.shaft)
-
-
-def long_modes(
-    values: FloatArray,
-    sampling_rate: float,
-    settings: VmdSettings,
-    *,
-    n_per_block: int = N_PER_BLOCK,
-    rng: np.random.Generator | None = None,
-    axis: ModeAxis = "frequency",
-    unit: str = "",
-    source: str = "",
-    shaft: str = "",
-) -> Modes:
-    """Return the modes of a signal of any length: of the whole, or block by block where it is longer than a block.
-
-    Centres are c = Σ E_i c_i / Σ E_i over the blocks, E_i a mode's energy there, bandwidths
-    √(Σ E_i (b_i² + (c_i - c)²) / Σ E_i): of a mode that wanders, how far it does counts as width.
-
-    Parameters
-    ----------
-    values, sampling_rate, settings, rng, axis, unit, source, shaft
-        As in `variational_modes`.
-    n_per_block : int
-
-    Returns
-    -------
-    Modes
-        Of several blocks: `n_iterations` is their sum, `last_change` is nan, and `centre_history` has one row per
-        block, then the centres. The notes say where a mode does not go on over a seam.
-
-    Raises
-    ------
-    InputError, RefusalError
-        As in `variational_modes` and `modes_by_block`.
-
-    Notes
-    -----
-    Memory is that of the modes, 8 bytes per sample and mode, and of one block's solution.
-    """
-    if len(values) <= n_per_block:
-        return variational_modes(
-            values, sampling_rate, settings, rng=rng, axis=axis, unit=unit, source=source, shaft=shaft
-        )
-    waveforms: FloatArray = np.empty((settings.n_modes, len(values)))
+    if x.n_samples <= n_per_block:
+        return modes_of_whole(x, chosen, rng)
+    waveforms: FloatArray = np.empty((chosen.n_modes, x.n_samples))
     segments: list[ModeSegment] = []
     energies = []
-    for segment in modes_by_block(values, sampling_rate, settings, n_per_block=n_per_block, rng=rng, axis=axis):
+    for segment in modes_by_block(x, None, chosen, n_per_block=n_per_block, rng=rng):
         waveforms[:, segment.start : segment.start + segment.waveforms.shape[1]] = segment.waveforms
         energies.append(np.square(segment.waveforms).sum(axis=1))
         segments.append(replace(segment, waveforms=segment.waveforms[:, :0].copy()))
     centres, bandwidths = _together(segments, np.array(energies))
-    history = np.array([segment.centres for segment in segments] + [centres])
     converged = all(segment.converged for segment in segments)
-    notes = mode_notes(centres, sampling_rate, settings, converged=converged, axis=axis)
+    notes = mode_notes(centres, x.rate, chosen, converged=converged, axis=x.axis)
     return Modes(
         waveforms=waveforms,
-        residual=np.asarray(values - waveforms.sum(axis=0)),
+        residual=np.asarray(x.values - waveforms.sum(axis=0)),
         centres=centres,
         bandwidths=bandwidths,
-        axis=axis,
-        sampling_rate=float(sampling_rate),
+        axis=x.axis,
+        sampling_rate=float(x.rate),
         n_iterations=sum(segment.n_iterations for segment in segments),
         converged=converged,
         last_change=float("nan"),
-        centre_history=history,
-        settings=settings,
-        unit=unit,
-        source=source,
-        shaft=shaft,
-        notes=(*notes, *_seam_notes(segments, sampling_rate, axis)),
+        centre_history=np.array([segment.centres for segment in segments] + [centres]),
+        settings=chosen,
+        unit=x.unit,
+        source=f"{x.source} over angle" if x.axis == "order" else x.source,
+        shaft=x.shaft,
+        notes=(*notes, *_seam_notes(segments, x.rate, x.axis)),
     )
 
 
@@ -174,14 +156,13 @@ class ModeSegment:
 
 
 def modes_by_block(
-    values: FloatArray,
-    sampling_rate: float,
+    signal: Source,
+    channel: str | float | None,
     settings: VmdSettings,
     *,
     n_per_block: int = N_PER_BLOCK,
     overlap: float = 0.125,
     rng: np.random.Generator | None = None,
-    axis: ModeAxis = "frequency",
 ) -> Iterator[ModeSegment]:
     """Yield the modes of a long signal segment by segment; memory is bounded by the block.
 
@@ -191,10 +172,8 @@ def modes_by_block(
 
     Parameters
     ----------
-    values : array, (n_samples,)
-        May be a memory map.
-    sampling_rate, settings, rng, axis
-        As in `variational_modes`.
+    signal, channel, settings, rng
+        As in `vmd`; an array may be a memory map.
     n_per_block : int
         A shorter signal is one block. A block's modes may follow slow changes of frequency.
     overlap : float
@@ -203,18 +182,17 @@ def modes_by_block(
     Raises
     ------
     InputError
-        As in `variational_modes`, of each block: a constant segment as long as a block has no modes.
+        As in `vmd`, of each block: a constant segment as long as a block has no modes.
 
     Notes
     -----
     The blocks' modes differ from the whole signal's: each block has centres of its own.
     """
-    x = checked_signal(values, minimum=8)
-    fs = positive(sampling_rate, "sampling_rate")
-    n_block = min(count(n_per_block, "n_per_block", minimum=64), len(x))
+    x = uniform(signal, channel)
+    n_block = min(count(n_per_block, "n_per_block", minimum=64), x.n_samples)
     n_fade = max(1, int(within(overlap, "overlap", 1e-3, 1 / 3) * n_block))
-    starts = _starts(len(x), n_block, n_fade)
-    return _segments(x, fs, settings, starts, n_block, n_fade, rng, axis)
+    starts = _starts(x.n_samples, n_block, n_fade)
+    return _segments(x, settings, starts, n_block, n_fade, rng)
 
 
 def _starts(n: int, n_block: int, n_fade: int) -> list[int]:
@@ -224,21 +202,19 @@ def _starts(n: int, n_block: int, n_fade: int) -> list[int]:
 
 
 def _segments(
-    x: FloatArray,
-    fs: float,
+    x: UniformSignal,
     settings: VmdSettings,
     starts: list[int],
     n_block: int,
     n_fade: int,
     rng: np.random.Generator | None,
-    axis: ModeAxis,
 ) -> Iterator[ModeSegment]:
     rising = 0.5 - 0.5 * np.cos(np.pi * (np.arange(n_fade) + 0.5) / n_fade)
     previous: FloatArray = np.zeros((settings.n_modes, 0))
     mismatch: FloatArray = np.zeros(settings.n_modes)
     done = 0
     for start, following in zip(starts, [*starts[1:], None], strict=True):
-        modes = variational_modes(x[start : start + n_block], fs, settings, rng=rng, axis=axis)
+        modes = modes_of_whole(replace(x, values=x.values[start : start + n_block]), settings, rng)
         order = _continuation(previous, modes.waveforms, fixed_first=settings.zero_mode)
         waveforms, centres = modes.waveforms[order], modes.centres[order]
         if start:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gearsig.checks import FloatArray, count, positive
 from gearsig.decompose._types import SAMPLES_PER_MODE, ModeAxis, Modes, VmdSettings, check_supported, half_gain_distance
-from gearsig.decompose._vmd import variational_modes
+from gearsig.decompose._vmd import modes_of_whole
 from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
-from gearsig.spectra import checked_signal
+from gearsig.timefreq import Source, UniformSignal, uniform
 
 
 @dataclass(frozen=True)
@@ -103,14 +103,12 @@ MIN_SHARE = 1e-4
 
 
 def suggest_modes(
-    values: FloatArray,
-    sampling_rate: float,
+    signal: Source,
+    channel: str | float | None = None,
     *,
     max_modes: int = 8,
     penalties: Sequence[float] = PENALTIES,
     longest: int = 2**14,
-    axis: ModeAxis = "frequency",
-    source: str = "",
 ) -> ModeSuggestion:
     """Return the number of modes and the penalty that separate a signal's components.
 
@@ -122,14 +120,12 @@ def suggest_modes(
 
     Parameters
     ----------
-    values : array, (n_samples,)
-    sampling_rate : float
-        Samples per second, or per revolution where `axis` is "order".
+    signal, channel
+        As in `vmd`.
     max_modes : int
     penalties : sequence of float
     longest : int
         A longer signal is tried on this many samples from its middle.
-    axis, source : str
 
     Returns
     -------
@@ -148,16 +144,15 @@ def suggest_modes(
     root mean square width √[(atan R - R/(1+R²)) / (atan R + R/(1+R²))] half-gain distances; R is half the mean distance
     of the modes. A suggestion is a start, not a proof: look at the modes.
     """
-    x = checked_signal(values, minimum=8)
-    fs = positive(sampling_rate, "sampling_rate")
+    x = uniform(signal, channel)
     count(max_modes, "max_modes")
     alphas = sorted({positive(p, "penalties") for p in penalties})
     if not alphas:
         raise InputError("penalties is empty", allowed="one or more values above zero")
-    part = _middle(x, count(longest, "longest", minimum=64))
-    check_supported(part, 1)
-    most = min(max_modes, len(part) // SAMPLES_PER_MODE)
-    trials = tuple(trial for penalty in alphas for trial in _trials(part, fs, most, penalty))
+    part = replace(x, values=_middle(x.values, count(longest, "longest", minimum=64)))
+    check_supported(part.values, 1)
+    most = min(max_modes, part.n_samples // SAMPLES_PER_MODE)
+    trials = tuple(trial for penalty in alphas for trial in _trials(part, most, penalty))
     good = [t for t in trials if not t.objection]
     if not good:
         raise RefusalError(
@@ -165,10 +160,10 @@ def suggest_modes(
             remedy="choose a frequency band first (its envelope for impulses), or set n_modes and penalty by hand",
         )
     chosen = max(good, key=lambda t: (t.n_modes, -abs(np.log(t.penalty / USUAL_PENALTY))))
-    reasons = _reasons(chosen, trials, fs, axis)
-    if len(part) < len(x):
-        reasons = (*reasons, f"Tried on {len(part)} of {len(x)} samples, from the middle.")
-    return ModeSuggestion(chosen, trials, reasons, axis, source)
+    reasons = _reasons(chosen, trials, x.rate, x.axis)
+    if part.n_samples < x.n_samples:
+        reasons = (*reasons, f"Tried on {part.n_samples} of {x.n_samples} samples, from the middle.")
+    return ModeSuggestion(chosen, trials, reasons, x.axis, x.source)
 
 
 def noise_width(penalty: float, n_modes: int) -> float:
@@ -193,32 +188,32 @@ def _middle(x: FloatArray, longest: int) -> FloatArray:
     return x[start : start + longest]
 
 
-def _trials(x: FloatArray, fs: float, max_modes: int, penalty: float) -> list[ModeTrial]:
+def _trials(x: UniformSignal, max_modes: int, penalty: float) -> list[ModeTrial]:
     trials: list[ModeTrial] = []
     for n_modes in range(1, max_modes + 1):
-        trials.append(_better_trial(x, fs, n_modes, penalty))
+        trials.append(_better_trial(x, n_modes, penalty))
         if len(trials) >= GIVE_UP_AFTER and all(t.objection for t in trials[-GIVE_UP_AFTER:]):
             break
     return trials
 
 
-def _better_trial(x: FloatArray, fs: float, n_modes: int, penalty: float) -> ModeTrial:
+def _better_trial(x: UniformSignal, n_modes: int, penalty: float) -> ModeTrial:
     """Return the trial from uniform starts, or from the spectrum's peaks if only that one meets no objection."""
-    uniform = _trial(x, fs, VmdSettings(n_modes, penalty))
+    uniform = _trial(x, VmdSettings(n_modes, penalty))
     if not uniform.objection:
         return uniform
-    peaks = _trial(x, fs, VmdSettings(n_modes, penalty, start="peaks"))
+    peaks = _trial(x, VmdSettings(n_modes, penalty, start="peaks"))
     return uniform if peaks.objection else peaks
 
 
-def _trial(x: FloatArray, fs: float, settings: VmdSettings) -> ModeTrial:
-    modes = variational_modes(x, fs, settings)
+def _trial(x: UniformSignal, settings: VmdSettings) -> ModeTrial:
+    modes = modes_of_whole(x, settings, None)
     order = np.array(modes.by_centre())
     centres, widths = modes.centres[order], modes.bandwidths[order]
-    half_gain = half_gain_distance(settings.penalty, fs)
+    half_gain = half_gain_distance(settings.penalty, x.rate)
     gaps = np.diff(centres) / half_gain
     relative = widths / (half_gain * noise_width(settings.penalty, settings.n_modes))
-    shares = modes.rms**2 / np.mean(np.square(x, dtype=np.float64))
+    shares = modes.rms**2 / np.mean(np.square(x.values, dtype=np.float64))
     return ModeTrial(
         settings=settings,
         centres=tuple(centres.tolist()),

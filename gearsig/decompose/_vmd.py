@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from gearsig.checks import FloatArray, positive
-from gearsig.decompose._types import ModeAxis, Modes, VmdSettings, check_supported, mode_notes
+from gearsig.checks import FloatArray
+from gearsig.decompose._types import Modes, VmdSettings, check_supported, mode_notes
 from gearsig.engines import engine_module
 from gearsig.errors import InputError, RefusalError
-from gearsig.spectra import Spectrum, amplitude_spectrum, checked_signal
+from gearsig.spectra import Spectrum, amplitude_spectrum
+from gearsig.timefreq import UniformSignal
 
 
 def first_centres(
@@ -92,79 +93,16 @@ RELATIVE_TOLERANCE = 1e-9
 _MUCH_MEMORY = 2**23
 
 
-def variational_modes(
-    values: FloatArray,
-    sampling_rate: float,
-    settings: VmdSettings,
-    *,
-    rng: np.random.Generator | None = None,
-    axis: ModeAxis = "frequency",
-    unit: str = "",
-    source: str = "",
-    shaft: str = "",
-) -> Modes:
-    """Return the modes that are each most compact around a centre frequency and together fit the signal.
-
-    min Σ_k α ‖∂_t [(δ + j/πt) * u_k] e^(-jω_k t)‖² + ‖f - Σ_k u_k‖², solved by alternating Wiener filters
-    û_k = (f̂ - Σ_{i≠k} û_i - λ̂/2) / (1 + α (ω - ω_k)²) and centroids ω_k of |û_k|².
-
-    Parameters
-    ----------
-    values : array, (n_samples,)
-        Finite, not constant; at least 8 samples, and 4 per mode.
-    sampling_rate : float
-        Samples per second, or per revolution where `axis` is "order".
-    settings : VmdSettings
-    rng : Generator or None
-        Needed for `start="random"` only.
-    axis, unit, source, shaft : str
-
-    Returns
-    -------
-    Modes
-        In the signal's unit; computed in double precision whatever the input's.
-
-    Raises
-    ------
-    InputError
-        On NaN, a constant, too few samples for the number of modes, start frequencies outside the spectrum.
-    RefusalError
-        If a mode stays empty: the signal does not hold that many.
-
-    Notes
-    -----
-    The signal is mirrored at both ends, by half its length in the reference programs; that length does not matter, as
-    mirroring makes the signal periodic. For even lengths the result is that of vmdpy 0.2 within rounding, with two of
-    its habits: it returns the modes before the last iteration, and it fills the line at half the sampling rate, where a
-    mirrored signal has nothing, with its neighbour's value (an alternating ±|û|/2n, mostly invisible). vmdpy drops
-    the last sample of an odd length; here all samples are kept, and the line at half the sampling rate is empty.
-
-    Memory is about 4 × 8 bytes per sample and mode. For signals beyond that see `modes_by_block`.
-
-    When not to use it: for broad-band impulses, whose spectrum is no narrow band (take their envelope, or a band);
-    for speeds that vary by more than a mode's width (resample over angle first).
-
-    References
-    ----------
-    K. Dragomiretskiy and D. Zosso, "Variational mode decomposition", 2014.
-
-    Examples
-    --------
-    >>> t = np.arange(2000) / 1000.0
-    >>> x = np.cos(2 * np.pi * 50 * t) + 0.5 * np.cos(2 * np.pi * 200 * t)
-    >>> variational_modes(x, 1000.0, VmdSettings(2)).centres.round(1)
-    array([ 50., 200.])
-    """
-    x = checked_signal(values, minimum=8)
-    fs = positive(sampling_rate, "sampling_rate", "Hz" if axis == "frequency" else "per revolution")
+def modes_of_whole(signal: UniformSignal, settings: VmdSettings, rng: np.random.Generator | None) -> Modes:
+    """Return the modes of a signal, all of it at once; see `vmd`."""
+    x, fs, axis = signal.values, signal.rate, signal.axis
     check_supported(x, settings.n_modes)
     solution = _solve(x.astype(np.float64), fs, settings, rng)
     centres, bandwidths = fs * solution.history[-1], fs * _bandwidths(solution)
     waveforms = solution.waveforms()
-    residual = np.asarray(x - waveforms.sum(axis=0))
     return Modes(
         waveforms=waveforms,
-        residual=residual,
+        residual=np.asarray(x - waveforms.sum(axis=0)),
         centres=centres,
         bandwidths=bandwidths,
         axis=axis,
@@ -174,9 +112,9 @@ def variational_modes(
         last_change=solution.relative_change,
         centre_history=fs * solution.history,
         settings=settings,
-        unit=unit,
-        source=source,
-        shaft=shaft,
+        unit=signal.unit,
+        source=f"{signal.source} over angle" if axis == "order" else signal.source,
+        shaft=signal.shaft,
         notes=mode_notes(centres, fs, settings, converged=solution.converged, axis=axis),
     )
 
@@ -321,7 +259,7 @@ def working_space(n_modes: int, n_lines: int) -> FloatArray:
 def iterate(C, grid, space, omega, alpha, tau, fixed_zero, tolerance, max_iterations, history):  # type: ignore[no-untyped-def]
     """Iterate until the modes' energy changes by no more than `tolerance`.
 
-    Returns the modes' real spectra before the last iteration (see `variational_modes`), the number of iterations and
+    Returns the modes' real spectra before the last iteration (see `vmd`), the number of iterations and
     the last change of energy. Row m of `history` (max_iterations + 1, K) receives the centres after m iterations.
     The spectra lie in `space`, which comes from `working_space`.
     """

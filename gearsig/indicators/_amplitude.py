@@ -14,6 +14,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
+from gearsig.recording import Recording
 from gearsig.results import Result
 
 
@@ -132,14 +133,15 @@ def clearance_factor(values: FloatArray) -> float:
 
 
 def time_indicators(
-    values: FloatArray, channel: str = "", unit: str = "", *, computed_on: str = "raw", shaft: str = ""
+    signal: FloatArray | Recording, channel: str = "", unit: str = "", *, computed_on: str = "raw", shaft: str = ""
 ) -> tuple[Indicator, ...]:
-    """Return all indicators of this file.
+    """Return rms, peaks, moments and factors of a signal's amplitudes.
 
     Parameters
     ----------
-    values : array, (n_samples,)
+    signal : Recording or array, (n_samples,)
     channel, unit : str
+        Of a recording: which to read, and in what unit. Of an array: what the indicators are labelled with.
     computed_on : str
         "raw", "synchronous average", …
     shaft : str
@@ -159,7 +161,10 @@ def time_indicators(
     ----------
     M. Lebold et al., "Review of vibration analysis methods for gearbox diagnostics and prognostics", 2000.
     """
-    x = checked_values(values)
+    if isinstance(signal, Recording):
+        unit = unit or signal.channels[signal.index(channel)].unit
+        signal = signal.values(channel)
+    x = checked_values(signal)
     mean = float(x.mean())
     offset = ""
     if abs(mean) > 0.1 * rms(x):  # then amplitudes say more about the offset than about the vibration

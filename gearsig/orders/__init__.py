@@ -14,7 +14,7 @@ from gearsig.orders._separate import SeparatedAverage, band_passed_mesh, mesh_mo
 from gearsig.orders._spectrum import frequency_map, order_map, order_spectrum
 from gearsig.orders._track import amplitude_at_speeds, track_order_bands, track_orders
 from gearsig.orders._types import AverageLines, OrderMap, SynchronousAverage, TrackedOrder
-from gearsig.orders.vold_kalman._filter import separate_frequencies, track_vold_kalman
+from gearsig.orders.vold_kalman._filter import track_vold_kalman
 from gearsig.orders.vold_kalman._joint import (
     accuracy_of,
     closeness,
@@ -64,7 +64,6 @@ __all__ = [
     "rotate",
     "samples_per_cell",
     "separate",
-    "separate_frequencies",
     "separate_shafts",
     "settling_time",
     "solve_band",

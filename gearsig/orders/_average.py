@@ -9,7 +9,15 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.angle import AngleSignal, ShaftAngle, find_shaft_angle, resample_to_angle, times_at
+from gearsig.angle import (
+    AngleSignal,
+    ShaftAngle,
+    constant_speed_angle,
+    find_shaft_angle,
+    resample_to_angle,
+    speed_channel_angle,
+    times_at,
+)
 from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._types import AverageLines, LineScaling, SynchronousAverage, lines_of_revolution
@@ -88,29 +96,58 @@ def block_times(
 
 
 def over_angle(
-    signal: AngleSignal | Recording | FloatArray, channel: str | float, shaft: str, shaft_angle: ShaftAngle | None
+    signal: AngleSignal | Recording | FloatArray,
+    channel: str | float,
+    shaft: str,
+    shaft_angle: ShaftAngle | None,
+    speed_rpm: float | FloatArray | None,
 ) -> tuple[AngleSignal, str]:
-    """Return (a channel over a shaft's angle, its name) of what `synchronous_average` and `order_spectrum` accept."""
+    """Return (a channel over a shaft's angle, its name) of what `synchronous_average` and its neighbours accept."""
     if isinstance(signal, AngleSignal):
-        if shaft not in ("", signal.shaft_angle.shaft) or shaft_angle is not None:
+        if shaft not in ("", signal.shaft_angle.shaft) or shaft_angle is not None or speed_rpm is not None:
             raise InputError(
                 f"the signal lies over the angle of shaft {signal.shaft_angle.shaft!r}",
                 where="shaft",
                 allowed="no other",
             )
         return signal, str(channel)
-    if not isinstance(signal, Recording):
-        if shaft_angle is None:
-            raise InputError("an array has no shaft angle", where="shaft_angle", remedy="give one, or a recording")
-        if isinstance(channel, str):
-            raise InputError(f"an array has no channel {channel!r}", allowed="its sampling rate in Hz")
-        rate = positive(channel, "sampling_rate_hz", "Hz")
-        signal = Recording(checked_signal(signal)[None], rate, (Channel("signal"),))
-        channel = "signal"
-    angle = find_shaft_angle(signal) if shaft_angle is None else shaft_angle
+    recording, name = as_recording(signal, channel)
+    angle = angle_of(recording, shaft_angle, speed_rpm)
     if shaft not in ("", angle.shaft):
-        angle = angle.of_shaft(shaft, _ratio(signal.rig, shaft, angle.shaft))
-    return resample_to_angle(signal, angle, channels=[str(channel)]), str(channel)
+        angle = angle.of_shaft(shaft, _ratio(recording.rig, shaft, angle.shaft))
+    return resample_to_angle(recording, angle, channels=[name]), name
+
+
+def as_recording(signal: Recording | FloatArray, channel: str | float) -> tuple[Recording, str]:
+    """Return (a recording, the channel's name) of a recording and its channel, or of an array and its rate in Hz."""
+    if isinstance(signal, Recording):
+        return signal, str(channel)
+    if isinstance(channel, str):
+        raise InputError(f"an array has no channel {channel!r}", allowed="its sampling rate in Hz")
+    rate = positive(channel, "sampling_rate_hz", "Hz")
+    return Recording(checked_signal(signal)[None], rate, (Channel("signal"),)), "signal"
+
+
+def angle_of(recording: Recording, shaft_angle: ShaftAngle | None, speed_rpm: float | FloatArray | None) -> ShaftAngle:
+    """Return the shaft angle that is given, or that follows from the speed that is given, or from the recording."""
+    if shaft_angle is not None and speed_rpm is not None:
+        raise InputError("both shaft_angle and speed_rpm are given", remedy="leave one of them out")
+    if shaft_angle is not None:
+        return shaft_angle
+    if speed_rpm is None:
+        if recording.speed_source is None and recording.rig is None:
+            raise InputError(
+                "the shaft's speed is not known", where="shaft_angle, speed_rpm", remedy="give one of both"
+            )
+        return find_shaft_angle(recording)
+    if np.ndim(speed_rpm) == 0:
+        return constant_speed_angle(float(speed_rpm), recording.duration_s)
+    if np.shape(speed_rpm) != (recording.n_samples,):
+        raise InputError(
+            f"speed_rpm has shape {np.shape(speed_rpm)}",
+            allowed=f"one number, or one for each of {recording.n_samples} samples",
+        )
+    return speed_channel_angle(np.asarray(speed_rpm), recording.sampling_rate_hz)
 
 
 def _ratio(rig: Rig | None, shaft: str, reference: str) -> float:
@@ -126,6 +163,7 @@ def synchronous_average(
     *,
     shaft: str = "",
     shaft_angle: ShaftAngle | None = None,
+    speed_rpm: float | FloatArray | None = None,
     n_jackknife_blocks: int = 32,
 ) -> SynchronousAverage:
     """Return the mean over whole revolutions of a shaft, with its standard error.
@@ -143,6 +181,8 @@ def synchronous_average(
         Of a recording: the shaft to average over; default: that of the angle.
     shaft_angle : ShaftAngle or None
         Of a recording or an array; default: what `gearsig.angle.find_shaft_angle` finds in the recording.
+    speed_rpm : float, array, (n_samples,), or None
+        Instead of the angle: the speed, constant or at each sample.
     n_jackknife_blocks : int
         At least 2. Revolutions are grouped in so many blocks (or as many as there are revolutions) before their
         scatter is taken, so that a correlation between neighbouring revolutions does not make the error too small.
@@ -167,7 +207,7 @@ def synchronous_average(
     M. H. Quenouille, "Notes on bias in estimation", 1956 (jackknife).
     """
     count(n_jackknife_blocks, "n_jackknife_blocks", minimum=2)
-    signal, channel = over_angle(signal, channel, shaft, shaft_angle)
+    signal, channel = over_angle(signal, channel, shaft, shaft_angle, speed_rpm)
     revolutions = whole_revolutions(signal, channel, at_least=2)
     mean, standard_error = mean_and_error(revolutions, n_jackknife_blocks)
     return SynchronousAverage(

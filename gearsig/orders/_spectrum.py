@@ -33,6 +33,7 @@ def order_spectrum(
     *,
     shaft: str = "",
     shaft_angle: ShaftAngle | None = None,
+    speed_rpm: float | FloatArray | None = None,
     window: str = "hann",
     scaling: Scaling = "amplitude peak",
     revolutions_per_block: int | None = None,
@@ -49,7 +50,7 @@ def order_spectrum(
         Partial revolutions at either end are left out.
     channel : str or float
         The channel's name; of an array its sampling rate in Hz.
-    shaft, shaft_angle
+    shaft, shaft_angle, speed_rpm
         Of a recording or an array, as in `synchronous_average`.
     window : str
         See `make_window`. "hann" for spectra that hold other shafts' orders as well; "rectangular" has the finest
@@ -87,7 +88,7 @@ def order_spectrum(
     2.0
     """
     one_of(scaling, "scaling", ORDER_SCALINGS)
-    signal, channel = over_angle(signal, channel, shaft, shaft_angle)
+    signal, channel = over_angle(signal, channel, shaft, shaft_angle, speed_rpm)
     revolutions = whole_revolutions(signal, channel)
     n_rev, per_rev = revolutions.shape
     if revolutions_per_block is not None:
@@ -110,9 +111,12 @@ def order_spectrum(
 
 
 def order_map(
-    signal: AngleSignal,
-    channel: str,
+    signal: AngleSignal | Recording | FloatArray,
+    channel: str | float,
     *,
+    shaft: str = "",
+    shaft_angle: ShaftAngle | None = None,
+    speed_rpm: float | FloatArray | None = None,
     revolutions_per_block: int = 10,
     overlap: float = 0.5,
     window: str = "hann",
@@ -124,8 +128,8 @@ def order_map(
 
     Parameters
     ----------
-    signal : AngleSignal
-    channel : str
+    signal, channel, shaft, shaft_angle, speed_rpm
+        As in `order_spectrum`.
     revolutions_per_block : int
         Lines are 1/revolutions_per_block orders apart.
     overlap : float
@@ -155,6 +159,7 @@ def order_map(
     """
     one_of(scaling, "scaling", ORDER_SCALINGS)
     count(revolutions_per_block, "revolutions_per_block")
+    signal, channel = over_angle(signal, channel, shaft, shaft_angle, speed_rpm)
     start, _ = first_whole_sample(signal)
     x = signal.values(channel)[start:]
     n_per_block = revolutions_per_block * signal.samples_per_revolution

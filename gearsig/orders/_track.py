@@ -7,19 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsig.angle import AngleSignal
+from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray, frozen_array, not_negative, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders._average import block_times, unit_of
+from gearsig.orders._average import block_times, over_angle, unit_of
 from gearsig.orders._types import TrackedOrder
+from gearsig.recording import Recording
 from gearsig.spectra import BATCH_SAMPLES, BlockPlan, ComplexArray, plan_blocks
 
 
 def track_orders(
-    signal: AngleSignal,
-    channel: str,
+    signal: AngleSignal | Recording | FloatArray,
+    channel: str | float,
     orders: Sequence[float],
     *,
+    shaft: str = "",
+    shaft_angle: ShaftAngle | None = None,
+    speed_rpm: float | FloatArray | None = None,
     revolutions_per_block: float = 10.0,
     overlap: float = 0.75,
     window: str = "hann",
@@ -31,8 +35,8 @@ def track_orders(
 
     Parameters
     ----------
-    signal : AngleSignal
-    channel : str
+    signal, channel, shaft, shaft_angle, speed_rpm
+        As in `order_spectrum`.
     orders : floats
         Cycles per revolution; need not be whole.
     revolutions_per_block : float
@@ -64,6 +68,7 @@ def track_orders(
     ----------
     K. R. Fyfe and E. D. S. Munck, "Analysis of computed order tracking", 1997.
     """
+    signal, channel = over_angle(signal, channel, shaft, shaft_angle, speed_rpm)
     numbers, plan = plan_track(signal, channel, orders, revolutions_per_block, overlap, window)
     cycles = numbers / signal.samples_per_revolution
     c = order_amplitudes(signal.values(channel), plan, cycles, numbers * signal.start_revolution)
@@ -180,10 +185,13 @@ def _checked_orders(signal: AngleSignal, orders: Sequence[float], margin: float)
 
 
 def track_order_bands(
-    signal: AngleSignal,
-    channel: str,
+    signal: AngleSignal | Recording | FloatArray,
+    channel: str | float,
     orders: Sequence[float],
     *,
+    shaft: str = "",
+    shaft_angle: ShaftAngle | None = None,
+    speed_rpm: float | FloatArray | None = None,
     bandwidth_orders: float = 0.25,
     revolutions_per_block: float = 24.0,
     overlap: float = 0.75,
@@ -198,9 +206,8 @@ def track_order_bands(
 
     Parameters
     ----------
-    signal : AngleSignal
-    channel : str
-    orders : floats
+    signal, channel, orders, shaft, shaft_angle, speed_rpm
+        As in `track_orders`.
     bandwidth_orders : float
         Full width; at least 4/revolutions_per_block, so that the main lobe of the Hann window fits.
     revolutions_per_block : float
@@ -225,6 +232,7 @@ def track_order_bands(
             allowed=f"at least {4.0 / positive(revolutions_per_block, 'revolutions_per_block'):g}",
             remedy="widen the band or lengthen the block",
         )
+    signal, channel = over_angle(signal, channel, shaft, shaft_angle, speed_rpm)
     numbers, plan = plan_track(signal, channel, orders, revolutions_per_block, overlap, window, margin=width / 2)
     per_rev = signal.samples_per_revolution
     half = int(width / 2 * plan.n_per_block / per_rev * (1 + 1e-12))

@@ -8,15 +8,16 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal
+from gearsig.recording import Recording
+from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal, named_signal
 
 LOWEST_RELATIVE_MAGNITUDE = 1e-12
 """Lines of zero have no logarithm: magnitudes are kept above this part of the largest."""
 
 
 def cepstrum(
-    values: FloatArray,
-    sampling_rate_hz: float,
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
     *,
     kind: Literal["real", "power"] = "real",
     source: str = "",
@@ -28,8 +29,9 @@ def cepstrum(
 
     Parameters
     ----------
-    values : array, (n_samples,)
-    sampling_rate_hz : float
+    signal : Recording or array, (n_samples,)
+    channel_or_rate_hz : str or float
+        The channel of a recording; of an array its sampling rate in Hz.
     kind : str
         "real" (signed) or "power".
     source : str
@@ -64,8 +66,7 @@ def cepstrum(
     >>> round(c.largest_near(0.05, 0.02)[0], 3)
     0.05
     """
-    x = checked_signal(values, minimum=4)
-    fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    x, fs, _, source = named_signal(signal, channel_or_rate_hz, "", source, minimum=4)
     one_of(kind, "kind", ("real", "power"))
     c = real_cepstrum(_transform(x), len(x))[: len(x) // 2 + 1]
     return Spectrum(

@@ -17,7 +17,7 @@ import time
 import numpy as np
 from vmdpy import VMD
 
-from gearsig.decompose import VmdSettings, variational_modes
+from gearsig.decompose import VmdSettings, vmd
 
 N_ROUNDS = 3
 N_MODES = 5
@@ -33,12 +33,12 @@ def _signal(n: int) -> np.ndarray:
 
 def _compare(n: int, tolerance: float) -> None:
     x, settings = _signal(n), VmdSettings(N_MODES, tolerance=tolerance)
-    variational_modes(x[:64], 1.0, VmdSettings(N_MODES))  # compiles, or loads what is compiled
+    vmd(x[:64], 1.0, VmdSettings(N_MODES))  # compiles, or loads what is compiled
     ours, theirs = [], []
     for _ in range(N_ROUNDS):
         gc.collect()
         start = time.process_time()
-        modes = variational_modes(x, 1.0, settings)
+        modes = vmd(x, 1.0, settings)
         ours.append(time.process_time() - start)
         start = time.process_time()
         u, _, omega = VMD(x, settings.penalty, settings.dual_step, N_MODES, DC=False, init=1, tol=tolerance)
@@ -54,9 +54,9 @@ def _compare(n: int, tolerance: float) -> None:
 def _memory(n: int) -> None:
     """Print how far the process' peak memory rises; memory does not depend on the number of iterations."""
     x, settings = _signal(n), VmdSettings(N_MODES, max_iterations=3)
-    variational_modes(x[:64], 1.0, settings)
+    vmd(x[:64], 1.0, settings)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    modes = variational_modes(x, 1.0, settings)
+    modes = vmd(x, 1.0, settings)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     print(
         f"{n:>8} samples, {modes.n_modes} modes: peak memory of the process {peak / 1024:.0f} MiB, "

@@ -3,7 +3,7 @@
 Run: python tests/benchmarks/bench_vold_kalman.py. One core; ratios of processor time, the best of interleaved rounds.
 Errors against the exact solution: in closed form for one order, by orthogonal rotations sample by sample for two and
 for the first generation. For information, LAPACK's banded solver (`scipy.linalg.solveh_banded`), given the finished
-band, and `separate_frequencies` as a whole: checks, phases, envelope, waveform, residual.
+band, and `track_vold_kalman` as a whole: checks, phases, envelope, waveform, residual.
 """
 
 import os
@@ -20,7 +20,7 @@ from scipy.sparse.linalg import spsolve
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from gearsig.orders import separate_frequencies, solve_envelopes, solve_waveforms, waveform_weight
+from gearsig.orders import solve_envelopes, solve_waveforms, track_vold_kalman, waveform_weight
 from tests.orders.test_vold_kalman_exact import (
     RATE_HZ,
     differences,
@@ -141,12 +141,12 @@ def _whole_call(y: Any, cycles: Any) -> None:
     r = weight_of(2.0, 2)
     (second_s, _), (first_s, _), (scipy_s, _) = best_of(
         ROUNDS,
-        lambda: separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=2.0),
-        lambda: separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=2.0, generation="first"),
+        lambda: track_vold_kalman(y, RATE_HZ, tracks, bandwidth_hz=2.0),
+        lambda: track_vold_kalman(y, RATE_HZ, tracks, bandwidth_hz=2.0, generation="first"),
         lambda: spsolve(textbook_matrix(len(y), r, 2), z),
     )
     print(
-        f"separate_frequencies as a whole, mirror image included: {scipy_s / second_s:4.0f} times faster than spsolve "
+        f"track_vold_kalman as a whole, mirror image included: {scipy_s / second_s:4.0f} times faster than spsolve "
         f"alone, first generation {scipy_s / first_s:4.0f} times; {1e3 * second_s:.0f} and {1e3 * first_s:.0f} ms"
     )
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.decompose import VmdSettings, modes_by_block, variational_modes
+from gearsig.decompose import VmdSettings, modes_by_block, vmd
 from gearsig.errors import InputError
 
 SAMPLES = np.arange(20_000)
@@ -30,7 +30,7 @@ def test_stretches_cover_the_signal_once_and_sum_to_it(n, n_per_block, overlap):
 
 def test_a_short_signal_is_one_block():
     (segment,) = modes_by_block(TONES.sum(axis=0), 1.0, VmdSettings(2))
-    whole = variational_modes(TONES.sum(axis=0), 1.0, VmdSettings(2))
+    whole = vmd(TONES.sum(axis=0), 1.0, VmdSettings(2))
     assert np.array_equal(segment.waveforms, whole.waveforms)
     assert (segment.n_fade, segment.start) == (0, 0)
 

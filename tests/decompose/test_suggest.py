@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from gearsig.decompose import noise_width, peak_centres, suggest_modes
-from gearsig.errors import InputError, RefusalError
+from gearsig.errors import GearsigError, InputError, RefusalError
 
 N = 6000
 SAMPLES = np.arange(N)
@@ -47,7 +47,7 @@ def test_close_tones_ask_for_a_larger_penalty_and_the_text_says_why():
 
 def test_the_table_holds_every_trial():
     x = _tones(0.05, 0.2) + 0.1 * np.random.default_rng(0).normal(size=N)
-    suggestion = suggest_modes(x, 1.0, max_modes=4, penalties=(2000.0, 500.0), source="a1")
+    suggestion = suggest_modes(x, 1.0, max_modes=4, penalties=(2000.0, 500.0))
     assert [(t.penalty, t.n_modes) for t in suggestion.trials] == [
         (p, k) for p in (500.0, 2000.0) for k in (1, 2, 3, 4)
     ]
@@ -107,5 +107,5 @@ def test_settings_that_do_not_do(wrong, message):
 
 @pytest.mark.parametrize("values", [np.zeros(100), np.r_[np.inf, np.ones(99)], np.arange(5.0)])
 def test_signals_that_do_not_do(values):
-    with pytest.raises(InputError):
+    with pytest.raises(GearsigError):
         suggest_modes(values, 1.0)

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vmdpy import VMD
 
-from gearsig.decompose import VmdSettings, variational_modes
+from gearsig.decompose import VmdSettings, vmd
 from gearsig.errors import InputError
+from gearsig.timefreq import UniformSignal
 
 INIT = {"zero": 0, "uniform": 1, "random": 2}
 
@@ -31,7 +32,7 @@ def _reference(x: np.ndarray, s: VmdSettings) -> tuple[np.ndarray, np.ndarray]:
 
 def _assert_equal(x: np.ndarray, s: VmdSettings, rng: np.random.Generator | None = None) -> None:
     u, omega = _reference(x, s)
-    modes = variational_modes(x, 1.0, s, rng=rng)
+    modes = vmd(x, 1.0, s, rng=rng)
     assert modes.n_iterations == len(omega)
     # On noise 500 iterations without an end let rounding grow a little.
     assert np.abs(modes.waveforms - u).max() < 1e-11 * np.abs(x).max()
@@ -65,9 +66,9 @@ def test_equals_vmdpy_where_it_stops_all_of_a_sudden():
     # A lone tone's change falls ten-thousandfold per iteration: the solver sees its last iteration only afterwards.
     x = np.cos(0.2 * np.arange(1000)) + 0.1 * np.random.default_rng(0).normal(size=1000)
     s = VmdSettings(1, start="zero", tolerance=1e-5)
-    before = variational_modes(x, 1.0, VmdSettings(1, start="zero", tolerance=0.0, max_iterations=3))
+    before = vmd(x, 1.0, VmdSettings(1, start="zero", tolerance=0.0, max_iterations=3))
     _assert_equal(x, s)
-    after = variational_modes(x, 1.0, s)
+    after = vmd(x, 1.0, s)
     assert before.last_change > 4 * 1e-5 / float(np.sum(x**2)) > 4 * after.last_change
     assert after.n_iterations == 4
 
@@ -99,7 +100,7 @@ def test_where_the_multiplier_amplifies_rounding_it_does_no_more_than_in_vmdpy(s
     u, v = _reference(x, s)[0], _reference(x * (1 + 1e-15), s)[0]
     bound = max(1e-12, 20 * np.abs(v - u).max())
     assert bound < 1e-7
-    assert np.abs(variational_modes(x, 1.0, s).waveforms - u).max() < bound
+    assert np.abs(vmd(x, 1.0, s).waveforms - u).max() < bound
 
 
 def test_tones_on_lines_of_the_mirrored_signal_come_back_by_the_fixed_point():
@@ -108,7 +109,7 @@ def test_tones_on_lines_of_the_mirrored_signal_come_back_by_the_fixed_point():
     n, a, b = 4000, 200, 1600
     q = np.pi * (np.arange(n) + 0.5) / n
     x = 2.0 * np.cos(a * q) + 1.0 * np.cos(b * q)
-    modes = variational_modes(x, 1.0, VmdSettings(2, tolerance=1e-18))
+    modes = vmd(x, 1.0, VmdSettings(2, tolerance=1e-18))
     lines = np.array([np.cos(a * q), np.cos(b * q)])
     gains = 2000.0 * (np.array([a, b])[None, :] / (2 * n) - modes.centres[:, None]) ** 2  # (mode, line)
     expected = np.zeros((2, 2))
@@ -123,22 +124,22 @@ def test_tones_on_lines_of_the_mirrored_signal_come_back_by_the_fixed_point():
 
 def test_modes_and_residual_sum_to_the_signal():
     x = _signal(1001)
-    modes = variational_modes(x, 1.0, VmdSettings(3))
+    modes = vmd(x, 1.0, VmdSettings(3))
     assert modes.waveforms.sum(axis=0) + modes.residual == pytest.approx(x, abs=1e-13)
 
 
 def test_the_multiplier_makes_the_modes_sum_to_the_signal():
     x = _signal(1001)
-    loose = variational_modes(x, 1.0, VmdSettings(4, penalty=20.0))
-    exact = variational_modes(x, 1.0, VmdSettings(4, penalty=20.0, dual_step=0.5, tolerance=0.0))
+    loose = vmd(x, 1.0, VmdSettings(4, penalty=20.0))
+    exact = vmd(x, 1.0, VmdSettings(4, penalty=20.0, dual_step=0.5, tolerance=0.0))
     assert exact.reconstruction_error < 1e-5
     assert loose.reconstruction_error > 5e-3
 
 
-@pytest.mark.parametrize("factor", [1e-160, 1e-3, -7.0, 1e150])
+@pytest.mark.parametrize("factor", [1e-10, 1e-3, -7.0, 1e12])
 def test_the_unit_does_not_matter(factor):
     x = _signal(700)
-    a, b = (variational_modes(v, 1.0, VmdSettings(3)) for v in (x, factor * x))
+    a, b = (vmd(v, 1.0, VmdSettings(3)) for v in (x, factor * x))
     assert a.n_iterations == b.n_iterations
     assert b.waveforms / factor == pytest.approx(a.waveforms, abs=1e-12)
     assert b.rms / abs(factor) == pytest.approx(a.rms)
@@ -148,7 +149,7 @@ def test_the_unit_does_not_matter(factor):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_reversed_in_time_the_modes_are_reversed(seed):
     x = _signal(901, seed)
-    a, b = (variational_modes(v, 1.0, VmdSettings(3)) for v in (x, x[::-1]))
+    a, b = (vmd(v, 1.0, VmdSettings(3)) for v in (x, x[::-1]))
     assert a.waveforms == pytest.approx(b.waveforms[:, ::-1], abs=1e-11)
 
 
@@ -156,46 +157,46 @@ def test_reversed_in_time_the_modes_are_reversed(seed):
 def test_a_sample_more_or_less_changes_little(shorter):
     x = _signal(4000) - 0.2
     settings_ = VmdSettings(2, start=(0.03, 0.12))
-    whole = variational_modes(x, 1.0, settings_)
-    part = variational_modes(x[: len(x) - shorter], 1.0, settings_)
+    whole = vmd(x, 1.0, settings_)
+    part = vmd(x[: len(x) - shorter], 1.0, settings_)
     assert part.centres == pytest.approx(whole.centres, abs=5e-5)
     assert part.waveforms[:, :3000] == pytest.approx(whole.waveforms[:, :3000], abs=2e-2)
 
 
 def test_single_precision_input_is_computed_in_double():
     x = _signal(2000).astype(np.float32)
-    a, b = (variational_modes(v, 1.0, VmdSettings(3)) for v in (x, x.astype(np.float64)))
+    a, b = (vmd(v, 1.0, VmdSettings(3)) for v in (x, x.astype(np.float64)))
     assert np.array_equal(a.waveforms, b.waveforms)
     assert a.waveforms.dtype == np.float64
 
 
 def test_odd_lengths_keep_the_last_sample():
-    modes = variational_modes(_signal(999), 1.0, VmdSettings(2))
+    modes = vmd(_signal(999), 1.0, VmdSettings(2))
     assert modes.waveforms.shape == (2, 999)
 
 
 def test_given_starts_are_in_hertz():
     x = _signal(2000)
-    modes = variational_modes(x, 5000.0, VmdSettings(3, start=(0.0, 150.0, 600.0)))
+    modes = vmd(x, 5000.0, VmdSettings(3, start=(0.0, 150.0, 600.0)))
     assert modes.centre_history[0] == pytest.approx([0.0, 150.0, 600.0])
     assert modes.centres[1:] == pytest.approx([150.0, 600.0], abs=5.0)
 
 
 def test_what_is_not_converged_says_so():
-    modes = variational_modes(_signal(500), 1.0, VmdSettings(3, max_iterations=5))
+    modes = vmd(_signal(500), 1.0, VmdSettings(3, max_iterations=5))
     assert not modes.converged
     assert modes.n_iterations == 5
     assert "Not converged" in modes.notes[0]
 
 
 def test_modes_on_the_same_lines_are_noted():
-    modes = variational_modes(np.cos(0.2 * np.arange(1000)), 1.0, VmdSettings(3, max_iterations=5000))
+    modes = vmd(np.cos(0.2 * np.arange(1000)), 1.0, VmdSettings(3, max_iterations=5000))
     assert any("share the same lines" in note for note in modes.notes)
-    assert not variational_modes(_signal(1000), 1.0, VmdSettings(2, max_iterations=5000)).notes
+    assert not vmd(_signal(1000), 1.0, VmdSettings(2, max_iterations=5000)).notes
 
 
 def test_modes_are_sorted_by_rising_centre():
-    modes = variational_modes(_signal(2000), 1000.0, VmdSettings(2, start=(120.0, 30.0)), unit="g", source="a1")
+    modes = vmd(UniformSignal(_signal(2000), 1000.0, unit="g", source="a1"), None, VmdSettings(2, start=(120.0, 30.0)))
     assert modes.centres[0] > modes.centres[1]
     assert modes.by_centre() == (1, 0)
     assert list(modes.to_frame()["centres"]) == list(modes.centres)
@@ -206,14 +207,13 @@ def test_modes_are_sorted_by_rising_centre():
     [
         (np.r_[np.nan, np.ones(50)], "NaN"),
         (np.full(100, 3.0), "constant"),
-        (np.arange(7.0), "7 sample"),
-        (np.arange(11.0), "n_modes is 3 for 11 samples"),
+        (np.arange(23.0), "n_modes is 6 for 23 samples"),
         (np.ones((2, 50)), "shape"),
     ],
 )
 def test_signals_that_do_not_do(values, message):
     with pytest.raises(InputError, match=message):
-        variational_modes(values, 1.0, VmdSettings(3))
+        vmd(values, 1.0, VmdSettings(6))
 
 
 @pytest.mark.parametrize(
@@ -237,22 +237,22 @@ def test_settings_that_do_not_do(wrong):
 @pytest.mark.parametrize("start", [(0.1, 0.6), (-0.1, 0.2), (0.1, float("nan"))])
 def test_starts_outside_the_spectrum(start):
     with pytest.raises(InputError, match="half the sampling rate"):
-        variational_modes(_signal(100), 1.0, VmdSettings(2, start=start))
+        vmd(_signal(100), 1.0, VmdSettings(2, start=start))
 
 
 def test_random_starts_need_a_generator():
     with pytest.raises(InputError, match="rng"):
-        variational_modes(_signal(100), 1.0, VmdSettings(2, start="random"))
+        vmd(_signal(100), 1.0, VmdSettings(2, start="random"))
 
 
 def test_a_tolerance_above_the_signals_energy_is_no_tolerance():
     with pytest.raises(InputError, match="leave tolerance out"):
-        variational_modes(1e-6 * _signal(100), 1.0, VmdSettings(2, tolerance=1e-5))
+        vmd(1e-6 * _signal(100), 1.0, VmdSettings(2, tolerance=1e-5))
 
 
 def _by_both_engines(n: int):
     x = 1e-3 * _signal(n)
-    return x, *(variational_modes(x, 500.0, VmdSettings(3, engine=engine)) for engine in ("gearsig", "vmdpy"))
+    return x, *(vmd(x, 500.0, VmdSettings(3, engine=engine)) for engine in ("gearsig", "vmdpy"))
 
 
 def test_the_engine_vmdpy_gives_the_same_modes():
@@ -282,12 +282,12 @@ def test_what_vmdpy_cannot_be_told_is_refused(wrong):
 def test_an_engine_that_is_missing_or_fails_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "vmdpy", None)
     with pytest.raises(InputError, match="pip install vmdpy"):
-        variational_modes(_signal(64), 1.0, VmdSettings(2, engine="vmdpy"))
+        vmd(_signal(64), 1.0, VmdSettings(2, engine="vmdpy"))
 
     def out_of_memory(*_):
         raise MemoryError("too much")
 
     monkeypatch.setitem(sys.modules, "vmdpy", SimpleNamespace(VMD=out_of_memory))
     with pytest.raises(InputError, match="MemoryError: too much"):
-        variational_modes(_signal(64), 1.0, VmdSettings(2, engine="vmdpy"))
-    assert variational_modes(_signal(64), 1.0, VmdSettings(2)).n_modes == 2
+        vmd(_signal(64), 1.0, VmdSettings(2, engine="vmdpy"))
+    assert vmd(_signal(64), 1.0, VmdSettings(2)).n_modes == 2

@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders import frequency_map, order_map, order_spectrum, times_of_revolutions
+from gearsig.orders import (
+    frequency_map,
+    order_map,
+    order_spectrum,
+    synchronous_average,
+    times_of_revolutions,
+    track_orders,
+    track_vold_kalman,
+)
 from gearsig.spectra import amplitude_spectrum
 
 
@@ -97,3 +105,28 @@ def test_less_than_a_revolution_is_refused(angle_signal):
         order_map(angle_signal(np.cos, 5), "a")
     with pytest.raises(InputError, match="1 to 5"):
         order_spectrum(angle_signal(np.cos, 5), "a", revolutions_per_block=6)
+
+
+@pytest.mark.parametrize("speed_rpm", [900.0, np.full(8192, 900.0)])
+def test_an_array_with_its_speed_needs_no_recording(speed_rpm) -> None:
+    """15 revolutions a second: 45 Hz is order 3, whichever function is asked."""
+    rate_hz = 1024.0
+    x = 2.0 * np.cos(2 * np.pi * 45.0 * np.arange(8192) / rate_hz)
+    spectrum = order_spectrum(x, rate_hz, speed_rpm=speed_rpm)
+    assert spectrum.largest_near(3.0, 1.0) == pytest.approx((3.0, 2.0), rel=1e-3)
+    levels = order_map(x, rate_hz, speed_rpm=speed_rpm)
+    assert levels.speed_rpm == pytest.approx(900.0, rel=1e-6)
+    assert levels.positions[np.argmax(levels.values.mean(axis=0))] == pytest.approx(3.0)
+    (tracked,) = track_orders(x, rate_hz, [3.0], speed_rpm=speed_rpm)
+    assert tracked.amplitude == pytest.approx(2.0, rel=1e-3)
+    average = synchronous_average(x, rate_hz, speed_rpm=speed_rpm)
+    assert abs(average.lines()[3]) == pytest.approx(2.0, rel=1e-3)
+    (separated,) = track_vold_kalman(x, rate_hz, [3.0], bandwidth_hz=2.0, speed_rpm=speed_rpm).orders
+    assert separated.amplitude[separated.settled] == pytest.approx(2.0, rel=1e-3)
+
+
+def test_the_speed_is_given_once() -> None:
+    x, angle = np.ones(1024), ShaftAngle("s", np.array([0.0, 1.0]), np.array([0.0, 20.0]), np.full(2, 20.0), "constant")
+    for speeds in ({}, {"speed_rpm": 900.0, "shaft_angle": angle}, {"speed_rpm": np.full(7, 900.0)}):
+        with pytest.raises(InputError):
+            order_spectrum(x, 1024.0, **speeds)

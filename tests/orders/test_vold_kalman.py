@@ -12,7 +12,6 @@ from gearsig.orders import (
     FrequencyTrack,
     cosine_and_sine,
     envelope_weight,
-    separate_frequencies,
     track_vold_kalman,
     waveform_weight,
 )
@@ -226,9 +225,7 @@ def test_linear_and_complete(n, n_poles, bandwidth_hz, scale, seed, coupled):
     tracks = [np.linspace(300, 600, n), np.full(n, 450.0)]
 
     def solve(signal):
-        return separate_frequencies(
-            signal, RATE_HZ, tracks, bandwidth_hz=bandwidth_hz, n_poles=n_poles, coupled=coupled
-        )
+        return track_vold_kalman(signal, RATE_HZ, tracks, bandwidth_hz=bandwidth_hz, n_poles=n_poles, coupled=coupled)
 
     first, scaled = solve(y), solve(scale * y)
     for a, b in zip(first.orders, scaled.orders, strict=True):

@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.angle import AngleSignal, ShaftAngle, resample_to_angle
 from gearsig.errors import InputError
-from gearsig.orders import FrequencyTrack, separate_frequencies, settling_time, track_vold_kalman
+from gearsig.orders import FrequencyTrack, settling_time, track_vold_kalman
 from gearsig.recording import Channel, Recording
 from tests.orders.test_vold_kalman import gain_of
 
@@ -39,9 +39,9 @@ def test_far_orders_apart_are_the_same_as_all_together(generation, n_poles):
     y, tracks, _ = three_orders()
     bandwidth_hz = {("second", 2): 2.0, ("second", 3): 6.0, ("first", 2): 1.0}[generation, n_poles]
     kwargs = {"bandwidth_hz": bandwidth_hz, "generation": generation, "n_poles": n_poles}
-    automatic = separate_frequencies(y, RATE_HZ, tracks, **kwargs)
-    together = separate_frequencies(y, RATE_HZ, tracks, coupled=True, **kwargs)
-    apart = separate_frequencies(y, RATE_HZ, tracks, coupled=[[0, 1]], **kwargs)
+    automatic = track_vold_kalman(y, RATE_HZ, tracks, **kwargs)
+    together = track_vold_kalman(y, RATE_HZ, tracks, coupled=True, **kwargs)
+    apart = track_vold_kalman(y, RATE_HZ, tracks, coupled=[[0, 1]], **kwargs)
     assert together.groups == ((0, 1, 2),)
     assert apart.groups == ((0, 1), (2,))
     assert automatic.groups == ((0, 1), (2,))
@@ -56,30 +56,30 @@ def test_far_orders_apart_are_the_same_as_all_together(generation, n_poles):
 def test_one_pole_and_a_wide_band_share_by_skirts():
     """One pole lets through 1e-4 at 78 bandwidths still: more orders end up together than with three."""
     y, tracks, _ = three_orders()
-    assert separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=10.0, n_poles=1).groups == ((0, 1, 2),)
-    assert separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=10.0, n_poles=3).groups == ((0, 1), (2,))
+    assert track_vold_kalman(y, RATE_HZ, tracks, bandwidth_hz=10.0, n_poles=1).groups == ((0, 1, 2),)
+    assert track_vold_kalman(y, RATE_HZ, tracks, bandwidth_hz=10.0, n_poles=3).groups == ((0, 1), (2,))
 
 
 def test_narrow_bands_are_solved_for_together():
     """At 0.5 Hz the coarse grid does all orders in less time than two groups in turn; far ones are told so."""
     y, tracks, _ = three_orders()
-    found = separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=0.5)
+    found = track_vold_kalman(y, RATE_HZ, tracks, bandwidth_hz=0.5)
     assert found.groups == ((0, 1, 2),)
-    far = separate_frequencies(y, RATE_HZ, tracks[1:], bandwidth_hz=0.5)
+    far = track_vold_kalman(y, RATE_HZ, tracks[1:], bandwidth_hz=0.5)
     assert far.groups == ((0, 1),)
     assert any("though they lie far apart" in note for note in far.notes)
 
 
 def test_groups_by_the_user():
     y, tracks, _ = three_orders()
-    found = separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=2.0, coupled=[[2, 0]])
+    found = track_vold_kalman(y, RATE_HZ, tracks, bandwidth_hz=2.0, coupled=[[2, 0]])
     assert found.groups == ((0, 2), (1,))
     assert found.coupled
     assert any("leak into each other" in note for note in found.notes)
-    assert separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=2.0, coupled=False).groups == ((0,), (1,), (2,))
+    assert track_vold_kalman(y, RATE_HZ, tracks, bandwidth_hz=2.0, coupled=False).groups == ((0,), (1,), (2,))
     for wrong in ([[0, 0]], [[0, 3]], [[0], [0, 1]], [0, 1], "close"):
         with pytest.raises(InputError, match="coupled"):
-            separate_frequencies(y, RATE_HZ, tracks, bandwidth_hz=2.0, coupled=wrong)
+            track_vold_kalman(y, RATE_HZ, tracks, bandwidth_hz=2.0, coupled=wrong)
 
 
 def test_orders_left_out_at_different_times_never_meet():
@@ -87,7 +87,7 @@ def test_orders_left_out_at_different_times_never_meet():
     n = 8000
     tracks = [np.concatenate([np.full(4000, 300.0), np.full(4000, 1100.0)]), np.full(n, 305.0)]
     tracks[1][:4200] = 1200.0
-    found = separate_frequencies(np.ones(n), RATE_HZ, tracks, bandwidth_hz=4.0)
+    found = track_vold_kalman(np.ones(n), RATE_HZ, tracks, bandwidth_hz=4.0)
     assert found.groups == ((0,), (1,))
 
 
@@ -108,14 +108,14 @@ def test_settled_parts():
     n = 20_000
     t = np.arange(n) / RATE_HZ
     y = np.cos(2 * np.pi * 200 * t)
-    found = separate_frequencies(y, RATE_HZ, [np.full(n, 200.0)], bandwidth_hz=2.0).orders[0]
+    found = track_vold_kalman(y, RATE_HZ, [np.full(n, 200.0)], bandwidth_hz=2.0).orders[0]
     expected = settling_time(np.array([2.0]), 2)[0]
     inside = t[found.settled]
     assert inside[0] == pytest.approx(expected, abs=2 / RATE_HZ)
     assert inside[-1] == pytest.approx(t[-1] - expected, abs=2 / RATE_HZ)
     disturbed = y.copy()
     disturbed[:20] += 10.0
-    other = separate_frequencies(disturbed, RATE_HZ, [np.full(n, 200.0)], bandwidth_hz=2.0).orders[0]
+    other = track_vold_kalman(disturbed, RATE_HZ, [np.full(n, 200.0)], bandwidth_hz=2.0).orders[0]
     change = np.abs(other.envelope - found.envelope)
     assert change[found.settled].max() < 0.03 * change.max()
 
@@ -136,7 +136,7 @@ def test_settled_parts_follow_the_bandwidth_and_the_gaps():
 
 def test_a_recording_too_short_to_settle_is_noted():
     n = 2000
-    found = separate_frequencies(np.ones(n), RATE_HZ, [np.full(n, 200.0)], bandwidth_hz=1.5, n_poles=3)
+    found = track_vold_kalman(np.ones(n), RATE_HZ, [np.full(n, 200.0)], bandwidth_hz=1.5, n_poles=3)
     assert not found.orders[0].settled.any()
     assert any("too short for order(s) 'component 1' to settle" in note for note in found.notes)
 
@@ -220,7 +220,7 @@ def test_bandwidth_in_hz_over_angle(over_angle):
         ({"orders": [("out", 1.0)]}, "ratio of shaft 'out'"),
         ({"orders": []}, "no orders"),
         ({"channel": "b"}, "no channel 'b'"),
-        ({"shaft_angle": run_up()}, "its own shaft angle"),
+        ({"shaft_angle": run_up()}, "over the angle of shaft"),
         ({"bandwidth_orders": 7.0}, "order zero"),
         ({"bandwidth_orders": 0.001}, "400 revolutions only"),
     ],

@@ -7,7 +7,6 @@ from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import (
     FrequencyTrack,
-    separate_frequencies,
     track_vold_kalman,
 )
 from gearsig.recording import Channel, Recording
@@ -55,11 +54,11 @@ def test_wrong_input(changes, message):
 
 def test_nan_and_short_signals():
     with pytest.raises(InputError, match="NaN"):
-        separate_frequencies(np.full(N, np.nan), RATE_HZ, [np.full(N, 50.0)], bandwidth_hz=2.0)
-    with pytest.raises(InputError, match="signal is empty"):
-        separate_frequencies(np.array([]), RATE_HZ, [np.array([])], bandwidth_hz=2.0)
+        track_vold_kalman(np.full(N, np.nan), RATE_HZ, [np.full(N, 50.0)], bandwidth_hz=2.0)
+    with pytest.raises(InputError, match="empty"):
+        track_vold_kalman(np.array([]), RATE_HZ, [np.array([])], bandwidth_hz=2.0)
     with pytest.raises(InputError, match="at least 16"):
-        separate_frequencies(np.ones(15), RATE_HZ, [np.full(15, 50.0)], bandwidth_hz=90.0)
+        track_vold_kalman(np.ones(15), RATE_HZ, [np.full(15, 50.0)], bandwidth_hz=90.0)
     with pytest.raises(InputError, match="NaN"):
         FrequencyTrack("f", np.array([1.0, np.nan]))
     with pytest.raises(InputError, match="negative"):
@@ -73,7 +72,7 @@ def test_nan_and_short_signals():
 )
 def test_no_part_to_track(frequency_hz, message):
     with pytest.raises(RefusalError, match=message):
-        separate_frequencies(np.ones(N), RATE_HZ, [np.full(N, frequency_hz)], bandwidth_hz=2.0)
+        track_vold_kalman(np.ones(N), RATE_HZ, [np.full(N, frequency_hz)], bandwidth_hz=2.0)
 
 
 def test_a_machine_at_rest_is_refused():
@@ -83,14 +82,14 @@ def test_a_machine_at_rest_is_refused():
 
 
 def test_a_frequency_track_has_no_speed():
-    found = separate_frequencies(RECORDING.values("a"), RATE_HZ, [np.full(N, 50.0)], bandwidth_hz=2.0)
+    found = track_vold_kalman(RECORDING.values("a"), RATE_HZ, [np.full(N, 50.0)], bandwidth_hz=2.0)
     with pytest.raises(RefusalError, match="without a speed"):
         found.orders[0].tracked()
     assert found.time_s()[-1] == pytest.approx((N - 1) / RATE_HZ)
 
 
 def test_bandwidths_too_different_for_one_solution_are_noted():
-    found = separate_frequencies(
+    found = track_vold_kalman(
         RECORDING.values("a"), RATE_HZ, [np.full(N, 50.0), np.full(N, 200.0)], bandwidth_hz=[0.3, 150.0], n_poles=3
     )
     assert any("rounding" in note for note in found.notes) == (found.expected_error > 1e-5)
@@ -99,4 +98,4 @@ def test_bandwidths_too_different_for_one_solution_are_noted():
 @pytest.mark.parametrize(("frequency_hz", "width_hz", "room"), [(50.0, 600.0, "100 Hz"), (450.0, 120.0, "100 Hz")])
 def test_a_bandwidth_wider_than_the_room_is_named(frequency_hz, width_hz, room):
     with pytest.raises(RefusalError, match=f"narrow the bandwidth below {room}"):
-        separate_frequencies(np.ones(N), RATE_HZ, [np.full(N, frequency_hz)], bandwidth_hz=width_hz)
+        track_vold_kalman(np.ones(N), RATE_HZ, [np.full(N, frequency_hz)], bandwidth_hz=width_hz)

@@ -153,7 +153,7 @@ def _show_suggestion(page: MethodPage, signal: UniformSignal) -> None:
     about = "Tries up to 8 modes at 6 penalties on up to 16 384 samples: a few seconds."
     if not page.asked("suggested", signal, "Suggest K and penalty", icon=":material/lightbulb:", about=about):
         return
-    suggestion = suggestion_of(signal.values, signal.rate, axis=signal.axis, source=signal.source)
+    suggestion = suggestion_of(signal)
     settings = suggestion.settings
     with st.container(border=True):
         head, button = st.columns((4, 1), vertical_alignment="center")

@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.angle import AngleSignal, ShaftAngle, find_shaft_angle
-from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.checks import FloatArray, count, one_of
 from gearsig.errors import InputError
-from gearsig.orders._average import unit_of
+from gearsig.orders._average import angle_of, as_recording, over_angle, unit_of
 from gearsig.orders.vold_kalman._joint import Group, Problem, solve_groups
 from gearsig.orders.vold_kalman._kernels import HALF_POWER, settling_time
 from gearsig.orders.vold_kalman._tracks import (
@@ -24,6 +24,7 @@ from gearsig.orders.vold_kalman._tracks import (
     SeparatedOrder,
     Tracks,
     bandwidths_of,
+    named_orders,
     tracks_of_orders,
     tracks_over_angle,
     valid_parts,
@@ -37,8 +38,8 @@ NOTED_LEAK = 0.03
 
 
 def track_vold_kalman(
-    recording: Recording | AngleSignal,
-    channel: str,
+    signal: Recording | AngleSignal | FloatArray,
+    channel: str | float,
     orders: Sequence[OrderLike],
     *,
     bandwidth_hz: float | Sequence[float] | None = None,
@@ -48,6 +49,7 @@ def track_vold_kalman(
     coupled: Coupling = "automatic",
     mirror: bool = True,
     shaft_angle: ShaftAngle | None = None,
+    speed_rpm: float | FloatArray | None = None,
 ) -> OrderSeparation:
     """Return orders of a recording as waveforms and complex envelopes over time, and what is left without them.
 
@@ -56,11 +58,13 @@ def track_vold_kalman(
 
     Parameters
     ----------
-    recording : Recording or AngleSignal
+    signal : Recording, AngleSignal or array, (n_samples,)
         Over angle, every order has a constant frequency, and the envelope's smoothness is one per revolution.
-    channel : str
+    channel : str or float
+        The channel's name; of an array its sampling rate in Hz.
     orders : sequence
-        Each a number (cycles per revolution of the angle's shaft), a pair (shaft, number) or a `FrequencyTrack`.
+        Each a number (cycles per revolution of the angle's shaft), a pair (shaft, number), a `FrequencyTrack`, or its
+        frequency in Hz at each sample.
     bandwidth_hz, bandwidth_orders : float or one per order
         One of both: width between the -3 dB points, in Hz or in orders of the order's own shaft (of a frequency track
         without order: of the angle's shaft). In orders, it varies with speed. At least one over the duration. Noise
@@ -77,8 +81,8 @@ def track_vold_kalman(
     mirror : bool
         Of the second generation: count each order's mirror image at negative frequency as part of the signal, which it
         is. False leaves it out, as most textbooks do: faster, but amplitudes near the ends are off by some percent.
-    shaft_angle : ShaftAngle, optional
-        Default: from the recording's speed source, as `find_shaft_angle`. Not needed for frequency tracks alone.
+    shaft_angle, speed_rpm
+        As in `order_spectrum`; not needed for frequency tracks alone.
 
     Returns
     -------
@@ -108,62 +112,25 @@ def track_vold_kalman(
     C. Feldbauer, R. Höldrich, "Realization of a Vold-Kalman tracking filter – a least squares problem", 2000.
     J. Tůma, "Setting the passband width in the Vold-Kalman order tracking filter", 2005.
     """
-    y = recording.values(channel)
-    how = (n_poles, generation, coupled, mirror)
-    if isinstance(recording, AngleSignal):
-        if shaft_angle is not None:
-            raise InputError("a signal over angle has its own shaft angle", where="shaft_angle", remedy="leave it out")
-        tracks, rate = tracks_over_angle(orders, recording), float(recording.samples_per_revolution)
-        unit = unit_of(recording, channel)
+    how, orders = (n_poles, generation, coupled, mirror), named_orders(orders)
+    if isinstance(signal, AngleSignal):
+        angle_signal, name = over_angle(signal, channel, "", shaft_angle, speed_rpm)
+        y, unit = angle_signal.values(name), unit_of(angle_signal, name)
+        tracks, rate = tracks_over_angle(orders, angle_signal), float(angle_signal.samples_per_revolution)
     else:
-        rate, unit = recording.sampling_rate_hz, recording.channels[recording.index(channel)].unit
+        recording, name = as_recording(signal, channel)
+        y, rate, unit = (
+            recording.values(name),
+            recording.sampling_rate_hz,
+            recording.channels[recording.index(name)].unit,
+        )
         # An order, or a bandwidth in orders of a track without one, cannot be told without the shaft's angle.
         in_orders = bandwidth_orders is not None
         needed = any(not isinstance(o, FrequencyTrack) or (in_orders and np.isnan(o.order)) for o in orders)
-        angle = find_shaft_angle(recording) if shaft_angle is None and needed else shaft_angle
+        angle = angle_of(recording, shaft_angle, speed_rpm) if needed else shaft_angle
         tracks = tracks_of_orders(orders, angle, recording.rig, len(y), rate)
     widths = bandwidths_of(tracks, bandwidth_hz, bandwidth_orders)
-    return _separated(y, rate, tracks, widths, *how, unit=unit, source=channel)
-
-
-def separate_frequencies(
-    signal: FloatArray,
-    sampling_rate_hz: float,
-    frequencies_hz: Sequence[FloatArray],
-    *,
-    bandwidth_hz: float | Sequence[float],
-    n_poles: int = 2,
-    generation: Generation = "second",
-    coupled: Coupling = "automatic",
-    mirror: bool = True,
-) -> OrderSeparation:
-    """Return components of a plain signal, each known by its frequency at every sample.
-
-    Parameters
-    ----------
-    signal : array, (n,)
-    sampling_rate_hz : float
-    frequencies_hz : arrays, (n,)
-        One per component.
-    bandwidth_hz, n_poles, generation, coupled, mirror
-        As in `track_vold_kalman`.
-
-    Returns
-    -------
-    OrderSeparation
-
-    Raises
-    ------
-    InputError, RefusalError
-        As `track_vold_kalman`.
-    """
-    y, rate = frozen_array(signal, "signal", ndim=1), positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    if len(y) == 0:
-        raise InputError("the signal is empty", where="signal", remedy="give samples")
-    given = [FrequencyTrack(f"component {k}", f) for k, f in enumerate(frequencies_hz, start=1)]
-    tracks = tracks_of_orders(given, None, None, len(y), rate)
-    widths = bandwidths_of(tracks, bandwidth_hz, None)
-    return _separated(y, rate, tracks, widths, n_poles, generation, coupled, mirror)
+    return _separated(y, rate, tracks, widths, *how, unit=unit, source=name)
 
 
 def _separated(
@@ -176,8 +143,8 @@ def _separated(
     coupled: Coupling,
     mirror: bool,
     *,
-    unit: str = "",
-    source: str = "",
+    unit: str,
+    source: str,
 ) -> OrderSeparation:
     """Return the orders and the residual; widths (n_orders, n) or (n_orders, 1) in the unit of the tracks."""
     one_of(generation, "generation", ("first", "second"))

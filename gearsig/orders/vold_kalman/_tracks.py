@@ -187,7 +187,8 @@ class OrderSeparation(Result, rows="orders"):
 
 
 BoolArray = NDArray[np.bool_]
-OrderLike = float | tuple[str, float] | FrequencyTrack
+NamedOrder = float | tuple[str, float] | FrequencyTrack
+OrderLike = NamedOrder | FloatArray
 CHUNK_SAMPLES = 2**17
 
 
@@ -212,14 +213,14 @@ class Tracks:
 
 
 def tracks_of_orders(
-    orders: Sequence[OrderLike], angle: ShaftAngle | None, rig: Rig | None, n: int, sampling_rate_hz: float
+    orders: Sequence[NamedOrder], angle: ShaftAngle | None, rig: Rig | None, n: int, sampling_rate_hz: float
 ) -> Tracks:
     """Return the tracks of orders given as number (of the angle's shaft), (shaft, number) or frequency track."""
     cycles, frequency = np.empty((len(orders), n)), np.empty((len(orders), n))
     labels: list[tuple[str, str, float]] = []
     known = np.ones(n, dtype=bool)
     turns, speed = (None, None) if angle is None else _sampled_angle(angle, n, sampling_rate_hz)
-    for k, order in enumerate(_given(orders)):
+    for k, order in enumerate(orders):
         if isinstance(order, FrequencyTrack):
             f = order.frequency_hz.astype(np.float64)
             if len(f) != n:
@@ -246,11 +247,11 @@ def tracks_of_orders(
     return Tracks(names, shafts, np.array(numbers), cycles, frequency, known, time_s, speed)
 
 
-def tracks_over_angle(orders: Sequence[OrderLike], signal: AngleSignal) -> Tracks:
+def tracks_over_angle(orders: Sequence[NamedOrder], signal: AngleSignal) -> Tracks:
     """Return the tracks of orders in a signal over angle, where all have a constant frequency."""
     angle, n = signal.shaft_angle, signal.samples.shape[1]
     numbers = []
-    for order in _given(orders):
+    for order in orders:
         if isinstance(order, FrequencyTrack):
             raise InputError(
                 f"{order.name!r} is a frequency over time, the signal is one over angle",
@@ -282,10 +283,14 @@ def tracks_over_angle(orders: Sequence[OrderLike], signal: AngleSignal) -> Track
     )
 
 
-def _given(orders: Sequence[OrderLike]) -> Sequence[OrderLike]:
+def named_orders(orders: Sequence[OrderLike]) -> list[NamedOrder]:
+    """Return the orders, plain frequencies over time as tracks."""
     if len(orders) == 0:
         raise InputError("no orders are given", where="orders", remedy="name at least one")
-    return orders
+    return [
+        FrequencyTrack(f"component {k}", order) if isinstance(order, np.ndarray) and order.ndim else order  # type: ignore[misc]
+        for k, order in enumerate(orders, start=1)
+    ]
 
 
 def _of_shaft(order: float | tuple[str, float], angle: ShaftAngle, rig: Rig | None) -> tuple[str, float, float]:

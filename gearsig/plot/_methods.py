@@ -1,0 +1,84 @@
+"""A figure in one call: of a result, or of a method and its signal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import singledispatch, wraps
+from typing import ParamSpec
+
+from matplotlib.figure import Figure
+
+from gearsig import angle, decompose, orders, phase, recording, spectra, timefreq
+from gearsig.errors import InputError
+from gearsig.plot._average import average_figure
+from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_figure, time_frequency_figure
+from gearsig.plot._modes import modes_figure
+from gearsig.plot._phase import bifurcation_figure, divergence_figure, phase_portrait_figure, recurrence_figure
+from gearsig.plot._spectrum import spectrum_figure, speed_figure, time_figure
+
+Asked = ParamSpec("Asked")
+
+
+@singledispatch
+def figure_of(result: object) -> Figure:
+    """Draw a result as the function for its type does, which takes limits, marks and titles besides.
+
+    Parameters
+    ----------
+    result : Recording, ShaftAngle, Spectrum, OrderMap, TimeFrequencyMap, SynchronousAverage, …
+
+    Raises
+    ------
+    InputError
+        If there is no figure of such a result.
+    """
+    drawn = sorted(cls.__name__ for cls in figure_of.registry if cls is not object)
+    raise InputError(f"there is no figure of a {type(result).__name__}", allowed=", ".join(drawn))
+
+
+@figure_of.register
+def _(result: orders.SynchronousAverage) -> Figure:
+    return average_figure([result])
+
+
+figure_of.register(recording.Recording, time_figure)
+figure_of.register(angle.ShaftAngle, speed_figure)
+figure_of.register(spectra.Spectrum, spectrum_figure)
+figure_of.register(spectra.Kurtogram, kurtogram_figure)
+figure_of.register(spectra.SpectralCoherence, coherence_figure)
+figure_of.register(orders.OrderMap, order_map_figure)
+figure_of.register(timefreq.TimeFrequencyMap, time_frequency_figure)
+figure_of.register(decompose.Modes, modes_figure)
+figure_of.register(phase.PhasePortrait, phase_portrait_figure)
+figure_of.register(phase.BifurcationDiagram, bifurcation_figure)
+figure_of.register(phase.LyapunovExponent, divergence_figure)
+figure_of.register(phase.RecurrencePlot, recurrence_figure)
+
+
+def _drawn(method: Callable[Asked, object]) -> Callable[Asked, Figure]:
+    """Return the method followed by the figure of its result; arguments and text are those of the method."""
+
+    @wraps(method)
+    def figure(*args: Asked.args, **settings: Asked.kwargs) -> Figure:
+        return figure_of(method(*args, **settings))
+
+    figure.__annotations__ = method.__annotations__ | {"return": "Figure"}
+    return figure
+
+
+amplitude_spectrum = _drawn(spectra.amplitude_spectrum)
+power_density = _drawn(spectra.power_density)
+envelope_spectrum = _drawn(spectra.envelope_spectrum)
+cepstrum = _drawn(spectra.cepstrum)
+kurtogram = _drawn(spectra.kurtogram)
+spectral_coherence = _drawn(spectra.spectral_coherence)
+order_spectrum = _drawn(orders.order_spectrum)
+order_map = _drawn(orders.order_map)
+synchronous_average = _drawn(orders.synchronous_average)
+stft = _drawn(timefreq.stft_map)
+cwt = _drawn(timefreq.cwt_map)
+squeezed_stft = _drawn(timefreq.squeezed_stft_map)
+squeezed_cwt = _drawn(timefreq.squeezed_cwt_map)
+vmd = _drawn(decompose.vmd)
+phase_plane = _drawn(phase.phase_plane)
+delay_embedding = _drawn(phase.delay_embedding)
