@@ -26,6 +26,7 @@ from .errors import (
     InputError as InputError,
     RefusalError as RefusalError,
 )
+from .fleet import open_fleet as open_fleet
 from .gap import diagnose_gap as diagnose_gap
 from .indicators import (
     gear_indicators as gear_indicators,

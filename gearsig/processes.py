@@ -1,16 +1,23 @@
-"""Fresh local processes with one computing thread each, which a script can use without a guard."""
+"""Where jobs run: in this process, in fresh local ones with one computing thread each, or on a cluster."""
 
 from __future__ import annotations
 
 import os
 import pickle
 import sys
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from itertools import islice
 from multiprocessing.context import SpawnContext, SpawnProcess
 from threading import Lock
-from typing import Any
+from typing import Any, TypeVar
+
+from gearsig.errors import InputError
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _MAIN = "__main__"
@@ -86,3 +93,180 @@ def _start_worker() -> None:
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+# --------------------
+# One seam for everything that is many jobs: reports, fleets, sweeps, bifurcations, simulations of a gap diagnosis.
+# --------------------
+
+
+def run_jobs(
+    function: Callable[[Job], Result],
+    jobs: Iterable[Job],
+    *,
+    n_workers: int,
+    executor: Executor | None = None,
+    if_killed: Callable[[Job], Result],
+) -> Generator[tuple[int, Result], None, None]:
+    """Run jobs and yield each result with the job's number, once, as they finish.
+
+    Jobs are taken as workers become free, so that they may be made, or claimed, at the last moment. Where a job kills
+    its local process, those that ran beside it get a process each: the one that kills again is told by `if_killed`.
+
+    Parameters
+    ----------
+    function : callable
+        Of a module; it must not raise. Its job and its result can be pickled.
+    jobs : iterable
+    n_workers : int
+        Local processes; with 1 everything runs in this one.
+    executor : concurrent.futures.Executor or None
+        Runs the jobs instead, e.g. that of `cluster`.
+    if_killed : callable
+        Returns the result of a job whose worker was killed.
+    """
+    waiting = iter(enumerate(jobs))
+    running: dict[Future[Result], tuple[int, Job]] = {}
+    if executor is not None:
+        yield from _collect(executor, function, waiting, running, 4 * n_workers, if_killed)
+        return
+    if n_workers == 1:
+        for number, job in waiting:
+            yield number, function(job)
+        return
+    while True:
+        try:
+            with process_pool(n_workers) as pool:
+                yield from _collect(pool, function, waiting, running, 2 * n_workers)
+        except BrokenProcessPool:
+            suspects = sorted(running.values(), key=lambda item: item[0])
+            running.clear()
+            for number, job in suspects:
+                try:
+                    with process_pool(1) as pool:
+                        result = pool.submit(function, job).result()
+                except BrokenProcessPool:
+                    result = if_killed(job)
+                yield number, result
+        else:
+            return
+
+
+def _collect(
+    executor: Executor,
+    function: Callable[[Job], Result],
+    waiting: Iterator[tuple[int, Job]],
+    running: dict[Future[Result], tuple[int, Job]],
+    n_at_once: int,
+    if_killed: Callable[[Job], Result] | None = None,
+) -> Iterator[tuple[int, Result]]:
+    """Keep so many jobs with an executor; what `running` still holds after an error has no result."""
+    try:
+        while True:
+            for number, job in islice(waiting, n_at_once - len(running)):
+                try:
+                    running[executor.submit(function, job)] = number, job
+                except BrokenProcessPool:
+                    running[Future()] = number, job
+                    raise
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                try:
+                    result = future.result()
+                except BrokenProcessPool:
+                    raise
+                except Exception:
+                    if if_killed is None:
+                        raise
+                    result = if_killed(running[future][1])
+                number, _ = running.pop(future)
+                yield number, result
+    finally:
+        for future in running:
+            future.cancel()
+
+
+class Cluster:
+    """Workers of a Dask cluster as one executor, and what became of them.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    """
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._seen: set[str] = set(self._workers())
+        self.executor: Executor = client.get_executor(pure=False)
+
+    @property
+    def n_workers(self) -> int:
+        """Threads of all workers that are there now, at least 1."""
+        return max(1, sum(int(worker["nthreads"]) for worker in self._workers().values()))
+
+    def lost(self) -> tuple[str, ...]:
+        """Return the addresses of workers that were there, and are not any more."""
+        now = set(self._workers())
+        self._seen |= now
+        return tuple(sorted(self._seen - now))
+
+    def text(self) -> str:
+        """Say in one sentence where the jobs ran, and which workers were lost."""
+        lost, here = self.lost(), self._workers()
+        text = f"on {len(here)} worker{'s' * (len(here) != 1)} of a Dask cluster"
+        if not lost:
+            return text
+        return f"{text}; {len(lost)} more {'was' if len(lost) == 1 else 'were'} lost, and what it ran was run again"
+
+    def _workers(self) -> dict[str, Any]:
+        workers: dict[str, Any] = self._client.scheduler_info(n_workers=-1)["workers"]
+        return workers
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Cluster]:
+    """Open a Dask cluster's executor. Its workers must see the same files under the same paths, and the same gearsig.
+
+    Dask sends pickled code both ways: only a cluster that is trusted may be named.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, e.g. "tcp://10.0.0.5:8786".
+
+    Raises
+    ------
+    InputError
+        If `distributed` is not installed, no scheduler answers, it has no workers, or they have another gearsig.
+    """
+    from gearsig import __version__
+
+    try:
+        from distributed import Client
+    except ImportError:
+        remedy = "install it with: pip install 'gearsig[cluster]'"
+        raise InputError("a cluster needs the package distributed", remedy=remedy) from None
+    try:
+        client = Client(address, timeout=10, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError(
+            f"no Dask scheduler answers ({' '.join(str(error).split())})",
+            where=address,
+            remedy="give its address, e.g. tcp://10.0.0.5:8786, and start it with: dask scheduler",
+        ) from None
+    try:
+        versions = set(client.run(gearsig_version).values())
+        if versions != {__version__}:
+            here = f"gearsig {__version__} is here, and {', '.join(sorted(versions)) or 'no worker'} there"
+            raise InputError(here, where=address, remedy="start workers with the same gearsig: dask worker ADDRESS")
+        yield Cluster(client)
+    finally:
+        client.close()
+
+
+def gearsig_version() -> str:
+    """Return the version of gearsig, as a worker is asked for it."""
+    from gearsig import __version__
+
+    return __version__

@@ -29,6 +29,7 @@ CHAIN = (
     "diagnosis",
     "comparison",
     "gap",
+    "fleet",
     "plot",
     "report",
 )

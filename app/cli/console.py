@@ -6,6 +6,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
 
 import typer
 
@@ -21,7 +22,7 @@ def typed_command() -> str:
 
 @contextmanager
 def progress_bar(stage: str, n: int | None = None) -> Iterator[Callable[..., None]]:
-    """Show a bar on standard error while a command works, on a terminal only.
+    """Show a bar on standard error while a command works; where that is no terminal, a line every ten seconds.
 
     Parameters
     ----------
@@ -33,7 +34,7 @@ def progress_bar(stage: str, n: int | None = None) -> Iterator[Callable[..., Non
     Yields
     ------
     callable
-        Takes what is complete, and the stage where it changes.
+        Takes what is complete, and, where they change, the stage and what there is in all.
     """
     from rich.console import Console
     from rich.progress import (
@@ -51,15 +52,39 @@ def progress_bar(stage: str, n: int | None = None) -> Iterator[Callable[..., Non
     share: tuple[ProgressColumn, ...] = (TaskProgressColumn(), TimeElapsedColumn())
     columns = share if n is None else (MofNCompleteColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
-    with Progress(
-        text, BarColumn(), *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
+    if not console.is_terminal:
+        yield _progress_lines(stage, n)
+        return
+    with Progress(text, BarColumn(), *columns, console=console, transient=True) as progress:
         task = progress.add_task(stage, total=1.0 if n is None else n)
 
-        def show(completed: float, stage: str | None = None) -> None:
-            progress.update(task, completed=completed, description=stage)
+        def show(completed: float, stage: str | None = None, total: float | None = None) -> None:
+            progress.update(task, completed=completed, description=stage, total=total)
 
         yield show
+
+
+SECONDS_BETWEEN_LINES = 10.0
+
+
+def _progress_lines(stage: str, n: int | None) -> Callable[..., None]:
+    """Return what says how far a long command is, in lines for a log file; quick ones say nothing."""
+    began_s = said_s = monotonic()
+    now, whole = stage, 1.0 if n is None else float(n)
+
+    def show(completed: float, stage: str | None = None, total: float | None = None) -> None:
+        nonlocal said_s, now, whole
+        now, whole = stage or now, total or whole
+        passed_s = monotonic() - began_s
+        if monotonic() - said_s < SECONDS_BETWEEN_LINES:
+            return
+        said_s = monotonic()
+        share = f"{100 * completed:.0f} %" if n is None else f"{completed:.0f} of {whole:.0f}"
+        left_s = passed_s * (whole - completed) / completed if completed else 0.0
+        rest = f", {left_s:.0f} s left" if completed else ""
+        typer.echo(f"{now}: {share} after {passed_s:.0f} s{rest}", err=True)
+
+    return show
 
 
 def stopped(kept: str) -> typer.Exit:

@@ -14,6 +14,7 @@ from app.cli.benchmark import benchmark_app
 from app.cli.compare import compare
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED
 from app.cli.dashboard import dashboard
+from app.cli.fleet import fleet_app
 from app.cli.flexible import flexible, gear_body
 from app.cli.gap import gap
 from app.cli.motion import force, identify, start_stop
@@ -35,7 +36,7 @@ app = typer.Typer(
     A rig file says what is known of the machine: **gearsig rig example** prints one to start from.""",
 )
 COMMANDS: tuple[Callable[..., None] | typer.Typer, ...] = (
-    *(analyze, crack, force, start_stop, identify, compare, report, rig_app),
+    *(analyze, crack, force, start_stop, identify, compare, report, fleet_app, rig_app),
     *(simulate, sweep, bifurcation, flexible, gear_body, gap, benchmark_app, demo, dashboard),
 )
 for command in COMMANDS:

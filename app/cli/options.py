@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,6 +15,7 @@ from gearsig.errors import InputError
 
 if TYPE_CHECKING:
     from gearsig.motion import PairMotion
+    from gearsig.processes import Cluster
     from gearsig.recording import Recording
     from gearsig.rig import Rig, SpeedSource
     from sims.effects import Effect, EffectSetting
@@ -65,6 +67,27 @@ ChannelsOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")]
 JobsOption = Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")]
+ClusterOption = Annotated[
+    str,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Dask scheduler whose workers do it instead, e.g. tcp://10.0.0.5:8786; they see the same files. "
+        "Code is sent both ways: name only one that you trust.",
+    ),
+]
+
+
+@contextmanager
+def open_cluster(address: str) -> Iterator[Cluster | None]:
+    """Open the cluster that the option names; None without one."""
+    if not address:
+        yield None
+        return
+    from gearsig.processes import cluster
+
+    with cluster(address) as opened:
+        yield opened
 
 
 def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:

@@ -1,0 +1,426 @@
+"""`gearsig fleet`: recordings of many machines over time."""
+
+from __future__ import annotations
+
+import json as json_text
+from collections.abc import Sequence
+from contextlib import ExitStack
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.cli import options
+from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED, EXIT_SOME_FAILED, progress_bar
+
+if TYPE_CHECKING:
+    from gearsig.fleet import AddResult, Fleet, Origin
+    from gearsig.processes import Cluster
+
+fleet_app = typer.Typer(
+    name="fleet",
+    no_args_is_help=True,
+    help="""Keep the results of many machines over time: trends, limits, alarms.
+
+    Start with **gearsig fleet add FOLDER --dry-run**, then **gearsig fleet status**.""",
+)
+
+StoreOption = Annotated[
+    Path,
+    typer.Option("--store", metavar="DIR", envvar="GEARSIG_FLEET", help="Folder where results are kept."),
+]
+PlacesArgument = Annotated[
+    list[Path], typer.Argument(help="Recordings, or folders with their sub-folders, or 'FOLDER/*.csv'.")
+]
+PatternOption = Annotated[
+    str,
+    typer.Option(
+        "--pattern",
+        help="How paths name machine, point and date, from their end: '{machine}/{point}_{date:%Y%m%d}.csv'; "
+        "{} is anything.",
+    ),
+]
+MachineOption = Annotated[str, typer.Option("--machine", help="Name of the machine, for all of these recordings.")]
+PointOption = Annotated[str, typer.Option("--point", help="Measuring point, for all of these recordings.")]
+OnlyMachineOption = Annotated[str, typer.Option("--machine", help="Only this machine.")]
+OnlyPointOption = Annotated[str, typer.Option("--point", help="Only this measuring point.")]
+DateOption = Annotated[
+    datetime | None, typer.Option("--date", help="Date of these recordings, where their names do not state it.")
+]
+StartOption = Annotated[datetime | None, typer.Option("--from", help="From this date on, e.g. 2026-01-31.")]
+EndOption = Annotated[datetime | None, typer.Option("--to", help="Up to this date.")]
+DEFAULT_STORE = Path("fleet")
+N_SHOWN = 10
+
+
+@fleet_app.command()
+def add(
+    places: PlacesArgument,
+    store: StoreOption = DEFAULT_STORE,
+    pattern: PatternOption = "",
+    machine: MachineOption = "",
+    point: PointOption = "",
+    date: DateOption = None,
+    rig: options.RigOption = None,
+    fs: options.SamplingRateOption = None,
+    speed_rpm: options.SpeedOption = None,
+    reference: options.ReferenceOption = None,
+    torque: options.TorqueOption = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show machine, point and date of each recording; analyse nothing.")
+    ] = False,
+    jobs: options.JobsOption = None,
+    cluster: options.ClusterOption = "",
+    json: options.JsonOption = False,
+) -> None:
+    """Analyse recordings that are new and keep their results; what is known already is passed over.
+
+    Machine and date are taken from the options, the pattern, sub-folders, rig files and file names, in this order, and
+    shown first. It can be stopped, or killed, at any time: the same command goes on from there. The exit code is 1 if
+    some recordings could not be analysed.
+
+    Example: gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv'
+    """
+    from gearsig.fleet import open_fleet, origins
+
+    opened = options.open_rig(rig)
+    found = origins(places, pattern=pattern, machine=machine, point=point, date=date, rig=opened)
+    if dry_run:
+        if json:
+            typer.echo(json_text.dumps([_origin_json(origin) for origin in found], indent=1, ensure_ascii=False))
+        else:
+            _show_origins(found, len(found), err=False)
+        return
+    _show_origins(found, N_SHOWN, err=True)
+    fleet = open_fleet(store, create=True, on_message=_say)
+    n_done = 0
+
+    def advance(done: int, total: int, _added: object) -> None:
+        nonlocal n_done
+        n_done = done
+        show(done, total=total)
+
+    with ExitStack() as stack:
+        workers = stack.enter_context(options.open_cluster(cluster))
+        try:
+            show = stack.enter_context(progress_bar("analysing", len(found)))
+            result = fleet.add(
+                found,
+                rig=opened,
+                sampling_rate_hz=fs,
+                speed=options.stated_speed(speed_rpm, None, 1),
+                reference=reference,
+                torque_nm=options.torque_of(torque),
+                n_processes=workers.n_workers if workers else jobs,
+                executor=workers.executor if workers else None,
+                on_progress=advance,
+            )
+        except KeyboardInterrupt:
+            typer.echo(
+                f"gearsig: stopped; {n_done} results are in {store}; the same command goes on from there", err=True
+            )
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+        _show_added(result, store, workers, json=json)
+    if result.failures:
+        raise typer.Exit(EXIT_INPUT_ERROR if len(result.failures) == len(found) else EXIT_SOME_FAILED)
+
+
+@fleet_app.command()
+def status(
+    store: StoreOption = DEFAULT_STORE,
+    machine: OnlyMachineOption = "",
+    all_points: Annotated[bool, typer.Option("--all", help="All measuring points, not the 40 worst.")] = False,
+    json: options.JsonOption = False,
+) -> None:
+    """Show every measuring point, the worst first: diagnosis of the last recording, alarms, what rose most."""
+    table = _open(store).status()
+    if machine:
+        table = table[table["machine"] == machine]
+    if json:
+        typer.echo(table.to_json(orient="records", date_format="iso", indent=1, force_ascii=False))
+        return
+    shown = table if all_points else table.head(40)
+    rows = [
+        (
+            str(row["level"]),
+            str(row["machine"]),
+            str(row["point"]) or "–",
+            f"{row['last']:%Y-%m-%d %H:%M}",
+            str(row["n_recordings"]) + (f" (+{row['n_failed']} failed)" if row["n_failed"] else ""),
+            str(row["outcome"] or "–"),
+            _worst(row),
+        )
+        for row in shown.to_dict("records")
+    ]
+    _table(("", "machine", "point", "last", "recordings", "diagnosis", "trends"), rows, styles=_STYLES)
+    counts = table["level"].value_counts()
+    text = ", ".join(f"{counts[name]} {name}" for name in ("alarm", "warning", "ok") if name in counts)
+    more = f"; {len(table) - len(shown)} more with --all" if len(shown) < len(table) else ""
+    typer.echo(f"{len(table)} measuring points: {text}{more}")
+
+
+@fleet_app.command()
+def trend(
+    machine: Annotated[str, typer.Argument(help="Machine.")],
+    indicator: Annotated[str, typer.Argument(help="E.g. 'overall velocity'; without it all, the worst first.")] = "",
+    store: StoreOption = DEFAULT_STORE,
+    point: OnlyPointOption = "",
+    channel: Annotated[str, typer.Option("--channel", help="Only this channel.")] = "",
+    json: options.JsonOption = False,
+) -> None:
+    """Show an indicator over time with its limits, or all indicators of a machine against theirs.
+
+    Limits are the zones of ISO 20816-3 for the overall velocity, where the rig file says what the machine is, and
+    statistical ones from the baseline otherwise; docs/fleet.md says how often they are wrong.
+    """
+    fleet = _open(store)
+    if not indicator:
+        table = fleet.series(machine, point)
+        if json:
+            typer.echo(table.to_json(orient="records", date_format="iso", indent=1, force_ascii=False))
+            return
+        _table(
+            ("", "indicator", "of", "last", "expected", "limit", "change", "since", "limits"),
+            [_series_row(row) for row in table.to_dict("records")],
+            styles=_STYLES,
+        )
+        return
+    trends = fleet.trend(machine, indicator, point=point, channel=channel)
+    if json:
+        typer.echo(json_text.dumps([_trend_json(t) for t in trends], indent=1, ensure_ascii=False))
+        return
+    for one in trends:
+        typer.echo(repr(one))
+        rows = [
+            (
+                row["level"] if not row["in_baseline"] else "baseline",
+                f"{row['date']:%Y-%m-%d %H:%M}",
+                *(_number(row[name]) for name in ("value", "expected", "high", "alarm", "speed_rpm", "load_nm")),
+            )
+            for row in one.table.to_dict("records")
+        ]
+        unit = f" ({one.unit})" if one.unit else ""
+        _table(("", "date", f"{one.name}{unit}", "expected", "limit", "alarm", "rpm", "N m"), rows, styles=_STYLES)
+
+
+@fleet_app.command()
+def export(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help=".csv, .parquet or .jsonl.")],
+    table: Annotated[
+        str, typer.Option("--table", help="indicators, recordings, trends (limits and alarms) or status.")
+    ] = "indicators",
+    store: StoreOption = DEFAULT_STORE,
+    machine: OnlyMachineOption = "",
+    point: OnlyPointOption = "",
+    indicator: Annotated[str, typer.Option("--indicator", metavar="NAME", help="Only this indicator.")] = "",
+    start: StartOption = None,
+    end: EndOption = None,
+) -> None:
+    """Write results as a table for other programs.
+
+    Example: gearsig fleet export -o kurtosis.csv --indicator kurtosis --from 2026-01-01
+    """
+    n = _open(store).export(output, table, machine, point, name=indicator, start=start, end=end)
+    typer.echo(f"{n} rows in {output}.")
+
+
+@fleet_app.command()
+def baseline(
+    machine: Annotated[str, typer.Argument(help="Machine.")],
+    start: Annotated[datetime, typer.Argument(help="First date, e.g. 2026-01-31.")],
+    end: Annotated[datetime, typer.Argument(help="Last date.")],
+    store: StoreOption = DEFAULT_STORE,
+    point: OnlyPointOption = "",
+) -> None:
+    """State when a machine was healthy, e.g. after an overhaul; without it the first 20 healthy recordings count."""
+    from datetime import timedelta
+
+    if end == end.replace(hour=0, minute=0, second=0, microsecond=0):  # a day ends when it is over
+        end += timedelta(days=1, microseconds=-1)
+    _open(store).set_baseline(machine, start, end, point=point)
+    typer.echo(f"The baseline of {machine} is from {start:%Y-%m-%d} to {end:%Y-%m-%d}.")
+
+
+@fleet_app.command()
+def watch(
+    places: PlacesArgument,
+    store: StoreOption = DEFAULT_STORE,
+    pattern: PatternOption = "",
+    machine: MachineOption = "",
+    point: PointOption = "",
+    rig: options.RigOption = None,
+    fs: options.SamplingRateOption = None,
+    interval: Annotated[float, typer.Option("--interval", metavar="S", help="Seconds between two looks.")] = 5.0,
+    settle: Annotated[
+        float, typer.Option("--settle", metavar="S", help="Seconds for which a file must not change.")
+    ] = 10.0,
+    once: Annotated[bool, typer.Option("--once", help="End when all that is there has been taken.")] = False,
+    jobs: options.JobsOption = None,
+    cluster: options.ClusterOption = "",
+    json: Annotated[bool, typer.Option("--json", help="A line of JSON for each recording.")] = False,
+) -> None:
+    """Take new recordings as they appear, with a line for each, until it is stopped (Ctrl-C or SIGTERM).
+
+    A file is taken when it has stopped changing. Several watches on one folder share the work; after a restart it goes
+    on where it was. The exit code is 0 when it was stopped, 1 if with --once some recordings failed.
+
+    Example: gearsig fleet watch incoming --pattern '{machine}/{date:%Y%m%d-%H%M}.wav' --json
+    """
+    from gearsig.fleet import WatchEvent, open_fleet
+    from gearsig.fleet import watch as run_watch
+
+    opened = options.open_rig(rig)
+    fleet = open_fleet(store, create=True, on_message=_say)
+
+    def tell(event: WatchEvent) -> None:
+        if json:
+            typer.echo(json_text.dumps(event.as_dict(), ensure_ascii=False))
+            return
+        words = event.text
+        if event.added is not None:
+            o = event.added.origin
+            where = " ".join(part for part in (o.machine, o.point) if part)
+            words = f"{where} {o.date:%Y-%m-%d %H:%M} {o.path.name}: {event.added.outcome}: {event.text}"
+        typer.echo(f"{event.time:%Y-%m-%dT%H:%M:%SZ} {event.kind}: {words}", err=event.kind == "problem")
+
+    with options.open_cluster(cluster) as workers:
+        try:
+            n_failed = run_watch(
+                fleet,
+                places,
+                on_event=tell,
+                interval_s=interval,
+                settle_s=settle,
+                once=once,
+                n_processes=workers.n_workers if workers else jobs,
+                executor=workers.executor if workers else None,
+                pattern=pattern,
+                machine=machine,
+                point=point,
+                rig=opened,
+                sampling_rate_hz=fs,
+            )
+        except KeyboardInterrupt:
+            typer.echo("gearsig: the watch was stopped", err=True)
+            return
+    if n_failed:
+        raise typer.Exit(EXIT_SOME_FAILED)
+
+
+# --------------------
+# How results are shown.
+# --------------------
+
+_STYLES = {"alarm": "bold red", "warning": "yellow", "ok": "green"}
+
+
+def _open(store: Path) -> Fleet:
+    from gearsig.fleet import open_fleet
+
+    return open_fleet(store, on_message=_say)
+
+
+def _say(text: str) -> None:
+    typer.echo(f"gearsig: {text}", err=True)
+
+
+def _table(
+    headings: tuple[str, ...], rows: Sequence[tuple[str, ...]], *, styles: dict[str, str], err: bool = False
+) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in headings:
+        table.add_column(heading, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(cell, styles.get(cell, "")) for cell in row))  # names from files are no markup
+    console = Console(stderr=err)
+    if not console.is_terminal:
+        console = Console(stderr=err, width=200)
+    console.print(table)
+
+
+def _show_origins(found: list[Origin], n_shown: int, *, err: bool) -> None:
+    from gearsig.fleet import origin_rows
+
+    _table(("file", "machine", "point", "date"), origin_rows(found[:n_shown]), styles={}, err=err)
+    if len(found) > n_shown:
+        typer.echo(f"… and {len(found) - n_shown} more; --dry-run shows them all", err=err)
+
+
+def _origin_json(origin: Origin) -> dict[str, Any]:
+    return {name: str(value) if name in ("path", "date") else value for name, value in vars(origin).items()}
+
+
+def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json: bool) -> None:
+    ran = workers.text() if workers else ""
+    if json:
+        failures = [{"file": str(a.origin.path), "reason": a.verdict} for a in result.failures]
+        summary = {
+            "added": len(result.added) - len(failures),
+            "known": result.n_known,
+            "taken_by_others": result.n_elsewhere,
+            "failures": failures,
+            "ran": ran,
+        }
+        typer.echo(json_text.dumps(summary, indent=1, ensure_ascii=False))
+        return
+    for failure in result.failures:
+        typer.echo(f"{failure.origin.path}: not analysed: {failure.verdict}", err=True)
+    parts = [f"{len(result.added) - len(result.failures)} recordings added to {store}"]
+    parts += [f"{len(result.failures)} failed"] if result.failures else []
+    parts += [f"{result.n_known} were there already"] if result.n_known else []
+    parts += [f"{result.n_elsewhere} are being analysed by another process"] if result.n_elsewhere else []
+    typer.echo("; ".join(parts) + (f"; {ran}" if ran else "") + ".")
+
+
+def _worst(row: dict[Any, Any]) -> str:
+    from pandas import isna
+
+    counts = [
+        f"{row[key]} {name}" for key, name in (("n_alarms", "alarm(s)"), ("n_warnings", "warning(s)")) if row[key]
+    ]
+    if not counts:
+        n = row["n_baseline"]
+        return "" if isna(n) or n else "baseline not complete"
+    change = f"{row['change']:+.1f} dB" if row["change_in_db"] is True else f"{row['change']:+.3g}"
+    since = "" if isna(row["since"]) else f" since {row['since']:%Y-%m-%d}"
+    return f"{', '.join(counts)}{since}; worst: {row['worst']} {change}"
+
+
+def _series_row(row: dict[Any, Any]) -> tuple[str, ...]:
+    from pandas import isna
+
+    from gearsig.fleet import LEVEL_NAMES
+    from gearsig.formatting import signed
+
+    unit = f" {row['unit']}" if row["unit"] else ""
+    of = " ".join(part for part in (row["point"], row["place"], row["channel"], row["computed_on"]) if part)
+    change = f"{signed(row['change'])} dB" if row["in_db"] else _number(row["change"])
+    return (
+        LEVEL_NAMES[row["level"]],
+        row["name"],
+        of,
+        _number(row["value"]) + unit,
+        _number(row["expected"]),
+        _number(row["upper_limit"]),
+        change,
+        "" if isna(row["since"]) else f"{row['since']:%Y-%m-%d}",
+        row["basis"],
+    )
+
+
+def _number(value: float) -> str:
+    from gearsig.formatting import readable
+
+    return readable(value, 4)
+
+
+def _trend_json(trend: Any) -> dict[str, Any]:
+    facts = {name: value for name, value in vars(trend).items() if name != "table"}
+    facts["changed"] = trend.changed.isoformat() if trend.changed else None
+    facts["table"] = json_text.loads(trend.table.to_json(orient="records", date_format="iso"))
+    return facts

@@ -1,0 +1,388 @@
+"""Recordings into a store: what is new is analysed, what is done is passed over."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cache
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gearsig.errors import GearsigError, InputError
+from gearsig.fleet._origin import Origin
+from gearsig.fleet._store import Row, Store
+from gearsig.processes import n_processors, run_jobs
+from gearsig.recording import sha256_of
+from gearsig.rig import Rig, SpeedSource, read_rig, rig_file_beside, rig_to_dict
+
+if TYPE_CHECKING:
+    from gearsig.diagnosis import Analysis
+
+Progress = Callable[[int, int, "AddedRecording"], object]
+
+FAILED = "failed"
+"""Outcome of a recording that could not be analysed."""
+
+
+@dataclass(frozen=True)
+class AnalysisOptions:
+    """What recordings are analysed with, besides what their files say.
+
+    Parameters
+    ----------
+    rig : Rig or None
+        Of all; None: the rig file of the same name beside each, if there is one.
+    sampling_rate_hz : float or None
+        For files that do not state it.
+    speed : SpeedSource or None
+        Instead of what file and rig say.
+    reference : Path or None
+        Recording of the machine when it was healthy.
+    torque_nm : float or None
+        Instead of the rig's operating point.
+    """
+
+    rig: Rig | None = None
+    sampling_rate_hz: float | None = None
+    speed: SpeedSource | None = None
+    reference: Path | None = None
+    torque_nm: float | None = None
+
+
+@dataclass(frozen=True)
+class AddedRecording:
+    """What became of one recording.
+
+    Parameters
+    ----------
+    origin : Origin
+    outcome : str
+        "fault", "suspicion", "cannot tell", "no fault", or "failed".
+    verdict : str
+        In one sentence; of a failure the reason.
+    """
+
+    origin: Origin
+    outcome: str
+    verdict: str
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no result."""
+        return self.outcome == FAILED
+
+
+@dataclass(frozen=True)
+class AddResult:
+    """What an addition did.
+
+    Parameters
+    ----------
+    added : tuple of AddedRecording
+        In the order of completion; failures among them.
+    n_known : int
+        Recordings that the store held already.
+    n_elsewhere : int
+        Those that another process took meanwhile.
+    ran : str
+        Where the jobs ran, and which workers were lost; empty for local processes.
+    """
+
+    added: tuple[AddedRecording, ...]
+    n_known: int
+    n_elsewhere: int = 0
+    ran: str = ""
+
+    @property
+    def failures(self) -> tuple[AddedRecording, ...]:
+        """Recordings without a result."""
+        return tuple(item for item in self.added if item.failed)
+
+
+@dataclass(frozen=True)
+class _AnalysisJob:
+    """One recording, and everything that a worker needs."""
+
+    origin: Origin
+    options: AnalysisOptions
+    sha256: str
+    setup: str
+    replaces: str = ""
+
+
+def add_recordings(
+    store: Store,
+    found: Sequence[Origin],
+    options: AnalysisOptions,
+    *,
+    n_processes: int | None = None,
+    executor: Executor | None = None,
+    on_progress: Progress | None = None,
+) -> AddResult:
+    """Analyse what the store does not hold yet; see `Fleet.add`."""
+    from gearsig import __version__
+
+    setups = _setups(options)
+    known = _known(store, found, __version__)
+    missing = [origin for origin in found if _identity(origin, setups(origin.path)) not in known]
+    elsewhere: list[Origin] = []
+    unseen: list[Origin] = []  # of known content under a new name or date of change
+    results: list[AddedRecording] = []
+    workers = min(max(len(missing), 1), n_processors()) if n_processes is None else n_processes
+    claims: dict[str, ExitStack] = {}
+
+    def jobs() -> Iterator[_AnalysisJob]:
+        remaining = iter(missing)
+        while batch := list(islice(remaining, 32)):
+            held: dict[Origin, str] = {}
+            for origin in batch:
+                claim, name = ExitStack(), _digest(_identity(origin, setups(origin.path)))
+                if not claim.enter_context(store.claim(name)):
+                    elsewhere.append(origin)
+                    continue
+                claims[name] = claim
+                try:
+                    held[origin] = sha256_of(origin.path)
+                except OSError as error:
+                    results.append(AddedRecording(origin, FAILED, f"cannot be read ({error.strerror})"))
+            of_content = _of_content(store, held)
+            for origin, sha256 in held.items():
+                setup = setups(origin.path)
+                key, *before = of_content.get(origin, ("",))
+                if before == [setup, __version__]:
+                    unseen.append(origin)
+                    claims.pop(_digest(_identity(origin, setup))).close()
+                else:
+                    yield _AnalysisJob(origin, options, sha256, setup, key)
+
+    running = run_jobs(analyse_file, jobs(), n_workers=max(1, min(workers, 64)), executor=executor, if_killed=_killed)
+    n_since = 0
+    try:
+        with closing(running):
+            for _, (row, indicators, origin) in running:
+                if row["key"]:
+                    store.add(row, indicators)
+                claims.pop(_digest(_identity(origin, setups(origin.path)))).close()
+                results.append(AddedRecording(origin, str(row["outcome"]), str(row["verdict"] or row["reason"])))
+                if on_progress is not None:
+                    on_progress(len(results), len(missing), results[-1])
+                n_since += 1
+                if n_since % 64 == 0 and store.n_new() >= COMPACT_FROM:
+                    store.compact()
+    finally:
+        for claim in claims.values():
+            claim.close()
+    if store.n_new() >= COMPACT_FROM:
+        store.compact()
+    n_known = len(found) - len(missing) + len(unseen)
+    return AddResult(tuple(results), n_known, len(elsewhere))
+
+
+COMPACT_FROM = 128
+"""Small files that are merged: to read them takes a tenth of a second."""
+
+
+def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
+    """Analyse one recording; every error becomes a reason. The key is empty where nothing is to be kept."""
+    from gearsig.diagnosis import analyze, rig_of_reference
+    from gearsig.recording import read_recording
+    from gearsig.rig import PulseTimes
+
+    options, path, began = job.options, job.origin.path, time.process_time()
+    try:
+        rig = options.rig
+        if rig is None and (beside := rig_file_beside(path)) is not None:
+            rig = read_rig(beside)
+        rate_hz = options.sampling_rate_hz
+        recording = read_recording(path, rig=rig, sampling_rate_hz=rate_hz, speed=options.speed)
+        if recording.provenance.sha256 != job.sha256:
+            return _row(job, outcome=FAILED, reason="it was written while it was read", key=""), [], job.origin
+        reference = None
+        if options.reference is not None and options.reference.resolve() != path.resolve():
+            speed = None if isinstance(options.speed, PulseTimes) else options.speed
+            own = rig_of_reference(options.reference, rig)
+            reference = read_recording(options.reference, rig=own, sampling_rate_hz=rate_hz, speed=speed)
+        analysis = analyze(recording, reference=reference, torque_nm=options.torque_nm)
+    except GearsigError as error:
+        return _row(job, outcome=FAILED, reason=str(error)), [], job.origin
+    except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
+        text = " ".join(str(error).split())
+        reason = f"unexpected error, please report: {type(error).__name__}: {text}"
+        return _row(job, outcome=FAILED, reason=reason), [], job.origin
+    row = _row(job, **_facts(analysis, options), cpu_s=time.process_time() - began)
+    return row, _indicators(analysis), job.origin
+
+
+def _facts(analysis: Analysis, options: AnalysisOptions) -> Row:
+    from gearsig.angle import ShaftAngle
+    from gearsig.diagnosis import Kind
+    from gearsig.severity import CrackEstimate
+
+    recording, rig, angle = analysis.recording, analysis.rig, analysis.shaft_angle
+    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION)]
+    top = min(claims, key=lambda finding: finding.kind is not Kind.FAULT, default=None)
+    judged = rig is not None and any(f.code == "vibration-zone" for f in analysis.findings)
+    machine = rig.machine if rig is not None and judged else None
+    load = options.torque_nm
+    if load is None and rig is not None:
+        load = rig.operating_point.torque_nm
+    crack = analysis.crack
+    return {
+        "rig": rig.name if rig is not None else "",
+        "n_channels": len(recording.channels),
+        "duration_s": recording.duration_s,
+        "sampling_rate_hz": recording.sampling_rate_hz,
+        "speed_rpm": angle.mean_speed_rpm if isinstance(angle, ShaftAngle) else None,
+        "load_nm": _measured_load_nm(analysis, load),
+        "outcome": analysis.outcome.value,
+        "verdict": analysis.verdict,
+        "confidence": top.confidence if top is not None else None,
+        "crack_mm": crack.depth_mm if isinstance(crack, CrackEstimate) else None,
+        "iso_group": machine.group if machine is not None else None,
+        "iso_mounting": machine.mounting if machine is not None else "",
+        "findings": json.dumps(
+            [
+                {"code": f.code, "kind": f.kind.value, "title": f.title, "confidence": round(f.confidence, 4)}
+                for f in analysis.findings
+            ],
+            ensure_ascii=False,
+        ),
+    }
+
+
+def _measured_load_nm(analysis: Analysis, stated: float | None) -> float | None:
+    """Return the mean of the first torque channel in N m, else what is stated."""
+    factor = {"nm": 1.0, "n*m": 1.0, "n·m": 1.0, "n m": 1.0, "knm": 1e3}
+    for channel in analysis.recording.channels:
+        unit = channel.unit.strip().casefold()
+        if channel.quantity == "torque" and unit in factor:
+            return float(analysis.recording.values(channel.name).mean()) * factor[unit]
+    return stated
+
+
+def _indicators(analysis: Analysis) -> list[Row]:
+    from math import isfinite
+
+    return [
+        {
+            "name": i.name,
+            "value": float(i.value),
+            "unit": i.unit,
+            "channel": i.channel,
+            "place": i.gear or i.bearing or i.shaft,
+            "computed_on": i.computed_on,
+            "band": i.band,
+        }
+        for i in analysis.indicators
+        if isfinite(i.value)
+    ]
+
+
+def _row(job: _AnalysisJob, **facts: Any) -> Row:
+    from gearsig import __version__
+
+    origin = job.origin
+    key = [job.sha256, origin.machine, origin.point, origin.date.isoformat(), job.setup, __version__]
+    return {
+        "key": _digest(key),
+        "machine": origin.machine,
+        "point": origin.point,
+        "date": origin.date,
+        "source": _printable(origin.path),
+        "sha256": job.sha256,
+        "n_bytes": origin.n_bytes,
+        "mtime_ns": origin.mtime_ns,
+        "origin": f"machine: {origin.machine_from}; point: {origin.point_from}; date: {origin.date_from}",
+        "rig": "",
+        "setup": job.setup,
+        "version": __version__,
+        "added": datetime.now(UTC).replace(tzinfo=None),
+        "verdict": "",
+        "iso_mounting": "",
+        "findings": "[]",
+        "reason": "",
+        "replaces": job.replaces,
+    } | facts
+
+
+def _killed(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
+    reason = "the process that analysed it was killed: perhaps it ran out of memory"
+    return _row(job, outcome=FAILED, reason=reason, key=""), [], job.origin
+
+
+def _known(store: Store, found: Sequence[Origin], version: str) -> set[tuple[Any, ...]]:
+    """Return the identities of files that the store holds results of, as far as size and time of change tell."""
+    wanted = {_printable(origin.path) for origin in found}
+    sql = "SELECT source, n_bytes, mtime_ns, machine, point, date, setup FROM recordings WHERE version = ? " + (
+        "AND source IN (SELECT unnest(?))" if len(wanted) < 100_000 else ""
+    )
+    arguments: list[Any] = [version, sorted(wanted)] if len(wanted) < 100_000 else [version]
+    return set(store.read(lambda connection: connection.execute(sql, arguments).fetchall()))
+
+
+def _identity(origin: Origin, setup: str) -> tuple[Any, ...]:
+    place = origin.machine, origin.point, origin.date
+    return _printable(origin.path), origin.n_bytes, origin.mtime_ns, *place, setup
+
+
+def _of_content(store: Store, files: Mapping[Origin, str]) -> dict[Origin, tuple[str, ...]]:
+    """Return key, setup and version of the latest result of a file's content at its place.
+
+    Where there is none, the key alone of a result that a new one replaces: that of the same file at another place, or
+    its failure before it was copied completely.
+    """
+    sql = (
+        "SELECT sha256, machine, point, date, source, key, setup, version, outcome FROM recordings "
+        f"WHERE sha256 IN (SELECT unnest($1)) OR (outcome = '{FAILED}' AND source IN (SELECT unnest($2))) "
+        "ORDER BY added"
+    )
+    asked = [[*files.values()], [_printable(origin.path) for origin in files]]
+    rows = store.read(lambda connection: connection.execute(sql, asked).fetchall())
+    of_place = {tuple(row[:4]): tuple(row[5:8]) for row in rows}
+    of_file = {(row[0], row[4]): row[5] for row in rows} | {row[4]: row[5] for row in rows if row[8] == FAILED}
+    result: dict[Origin, tuple[str, ...]] = {}
+    for origin, sha256 in files.items():
+        place, source = (sha256, origin.machine, origin.point, origin.date), _printable(origin.path)
+        replaced = of_file.get((sha256, source), of_file.get(source))
+        if place in of_place:
+            result[origin] = of_place[place]
+        elif replaced is not None:
+            result[origin] = (replaced,)
+    return result
+
+
+def _setups(options: AnalysisOptions) -> Callable[[Path], str]:
+    """Return a function that hashes what decides a file's result besides its content."""
+    reference = sha256_of(options.reference) if options.reference is not None else ""
+    shared = [reference, options.sampling_rate_hz, options.torque_nm, repr(options.speed)]
+
+    @cache
+    def of_rig_file(path: Path) -> object:
+        try:
+            return rig_to_dict(read_rig(path))
+        except InputError as error:
+            return str(error)
+
+    @cache
+    def setup(path: Path) -> str:
+        beside = rig_file_beside(path) if options.rig is None else None
+        rig = rig_to_dict(options.rig) if options.rig is not None else of_rig_file(beside) if beside else None
+        return _digest([rig, *shared])
+
+    return setup
+
+
+def _digest(parts: object) -> str:
+    return hashlib.sha256(json.dumps(parts, default=str).encode("utf-8", "surrogateescape")).hexdigest()[:32]
+
+
+def _printable(path: Path) -> str:
+    """Return a path as UTF-8, which Parquet asks for; other bytes of a file's name are escaped."""
+    return str(path).encode("utf-8", "backslashreplace").decode("utf-8")

@@ -1,0 +1,613 @@
+"""A fleet: recordings of many machines over time, their trends and alarms, in one folder."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearsig.checks import closest_match_hint, count, one_of
+from gearsig.errors import InputError
+from gearsig.fleet._add import FAILED, AddResult, AnalysisOptions, Progress, add_recordings
+from gearsig.fleet._origin import Origin, origins
+from gearsig.fleet._statistics import ALARM, OK, WARNING
+from gearsig.fleet._store import SERIES, Store
+from gearsig.fleet._trends import (
+    Baseline,
+    PointTrends,
+    TrendSettings,
+    judge,
+    read_settings,
+    state_rows,
+    write_settings,
+)
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from duckdb import DuckDBPyConnection
+    from pandas import DataFrame
+
+    from gearsig.rig import Rig, SpeedSource
+
+LEVEL_NAMES = {OK: "ok", WARNING: "warning", ALARM: "alarm"}
+TRENDS = "trends.parquet"
+TABLES = ("recordings", "indicators", "trends", "status")
+
+_STATE = {
+    **dict.fromkeys(("machine", "point", *SERIES), "VARCHAR"),
+    "n": "BIGINT",
+    "n_baseline": "BIGINT",
+    "baseline_from": "TIMESTAMP",
+    "baseline_to": "TIMESTAMP",
+    "value": "DOUBLE",
+    "date": "TIMESTAMP",
+    "expected": "DOUBLE",
+    "upper_limit": "DOUBLE",
+    "change": "DOUBLE",
+    "in_db": "BOOLEAN",
+    "level": "BIGINT",
+    "since": "TIMESTAMP",
+    "basis": "VARCHAR",
+    "normalised": "VARCHAR",
+    "changed": "TIMESTAMP",
+    "changed_added": "TIMESTAMP",
+    "changed_by": "DOUBLE",
+    "events": "VARCHAR",
+    "fingerprint": "VARCHAR",
+}
+"""Columns of a series' state: see `state_rows`."""
+
+
+@dataclass(frozen=True)
+class Trend:
+    """One indicator of a measuring point over time, with its limits.
+
+    Parameters
+    ----------
+    machine, point, name, channel, place, computed_on, band, unit : str
+    table : DataFrame
+        By date: value, speed_rpm, load_nm, expected, low, high, alarm (limits), level, in_baseline.
+    basis : str
+        "ISO 20816-3", "statistical" or "none".
+    level : str
+        "ok", "warning" or "alarm" after the last recording.
+    changed : datetime or None
+        Since when it is another level than before.
+    normalised : tuple of str
+        What the expected value depends on: "speed", "load".
+    false_alarm_rate : float
+        Of one value of this series; of an unchanged machine.
+    """
+
+    machine: str
+    point: str
+    name: str
+    channel: str
+    place: str
+    computed_on: str
+    band: str
+    unit: str
+    table: DataFrame
+    basis: str
+    level: str
+    changed: datetime | None
+    normalised: tuple[str, ...]
+    false_alarm_rate: float
+
+    def __repr__(self) -> str:
+        of = " ".join(part for part in (self.machine, self.point, self.place, self.channel) if part)
+        since = f", changed since {self.changed:%Y-%m-%d}" if self.changed is not None else ""
+        return f"Trend {self.name!r} of {of}: {len(self.table)} recordings, {self.level} ({self.basis} limits){since}"
+
+
+class Fleet:
+    """Results of many recordings; see `open_fleet`."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def __repr__(self) -> str:
+        n, machines, points = self._rows(
+            "SELECT count(*), count(DISTINCT machine), count(DISTINCT (machine, point)) FROM recordings"
+        )[0]
+        return f"Fleet {self.folder}: {n} recordings of {machines} machines at {points} measuring points"
+
+    @property
+    def folder(self) -> Path:
+        """Where it is kept."""
+        return self._store.folder
+
+    # ---------------- adding
+
+    def add(
+        self,
+        recordings: str | Path | Iterable[str | Path | Origin],
+        *,
+        pattern: str = "",
+        machine: str = "",
+        point: str = "",
+        date: datetime | None = None,
+        rig: Rig | None = None,
+        sampling_rate_hz: float | None = None,
+        speed: SpeedSource | None = None,
+        reference: str | Path | None = None,
+        torque_nm: float | None = None,
+        n_processes: int | None = None,
+        executor: Executor | None = None,
+        on_progress: Progress | None = None,
+    ) -> AddResult:
+        """Analyse recordings that are new, and keep their results.
+
+        What the store holds already, by content, rig and version of gearsig, is passed over. Any number of processes
+        may add to one store at once; one that is killed loses nothing but what it was analysing.
+
+        Parameters
+        ----------
+        recordings : str, Path, or iterable of these or of Origin
+            Files, folders with sub-folders, "folder/*.csv"; or what `gearsig.fleet.origins` found, for a look first.
+        pattern, machine, point, date
+            See `gearsig.fleet.origins`.
+        rig, sampling_rate_hz, speed, reference, torque_nm
+            As for `gearsig.batch.report_many`; None: what files and rig files say.
+        n_processes : int or None
+            Local processes; None: one per processor.
+        executor : concurrent.futures.Executor or None
+            Runs the analyses instead, e.g. that of `gearsig.processes.cluster`.
+        on_progress : callable or None
+            Called as ``on_progress(n_done, n_total, added)``.
+
+        Raises
+        ------
+        InputError
+            If nothing is found, the pattern is no pattern, or the store cannot be written.
+        """
+        if n_processes is not None:
+            count(n_processes, "n_processes")
+        places = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
+        found = [item for item in places if isinstance(item, Origin)]
+        paths = [item for item in places if not isinstance(item, Origin)]
+        if paths or not found:
+            found += origins(paths, pattern=pattern, machine=machine, point=point, date=date, rig=rig)
+        options = AnalysisOptions(
+            rig, sampling_rate_hz, speed, Path(reference) if reference is not None else None, torque_nm
+        )
+        result = add_recordings(
+            self._store, found, options, n_processes=n_processes, executor=executor, on_progress=on_progress
+        )
+        self._refreshed()
+        return result
+
+    # ---------------- settings
+
+    @property
+    def settings(self) -> TrendSettings:
+        """How trends are judged."""
+        return read_settings(self.folder)
+
+    def set(self, settings: TrendSettings) -> None:
+        """Judge trends by other settings from now on."""
+        write_settings(self.folder, settings)
+
+    def set_baseline(self, machine: str, start: datetime, end: datetime, *, point: str = "") -> None:
+        """State a period in which a machine was healthy, e.g. after an overhaul; it replaces an earlier one."""
+        self._check_place(machine, point)
+        settings = self.settings
+        others = tuple(b for b in settings.baselines if (b.machine, b.point) != (machine, point))
+        self.set(replace(settings, baselines=(*others, Baseline(machine, point, start, end))))
+
+    # ---------------- tables
+
+    def recordings(
+        self, machine: str = "", point: str = "", *, start: datetime | None = None, end: datetime | None = None
+    ) -> DataFrame:
+        """Return a row per recording, by machine, point and date; failures have the outcome "failed" and a reason.
+
+        Parameters
+        ----------
+        machine, point : str
+            Empty: all.
+        start, end : datetime or None
+        """
+        return self._table("recordings", machine, point, {}, start, end, "machine, point, date")
+
+    def indicators(
+        self,
+        machine: str = "",
+        point: str = "",
+        name: str = "",
+        *,
+        channel: str = "",
+        place: str = "",
+        start: datetime | None = None,
+        end: datetime | None = None,
+    ) -> DataFrame:
+        """Return a row per indicator and recording: machine, point, date, name, value, unit, channel, place, band.
+
+        Parameters
+        ----------
+        machine, point : str
+            Empty: all.
+        name : str
+            Of the indicator, e.g. "kurtosis"; empty: all.
+        channel, place : str
+            The place is a gear ("stage 1/input"), a bearing or a shaft.
+        start, end : datetime or None
+        """
+        only = {"name": name, "channel": channel, "place": place}
+        return self._table("indicators", machine, point, only, start, end, "machine, point, date")
+
+    def series(self, machine: str = "", point: str = "", *, minimum_level: int = OK) -> DataFrame:
+        """Return a row per indicator of a measuring point: its last value against its limits, the worst first."""
+        self._refreshed()
+        where, values = _where(machine, point, {})
+        sql = (
+            f"SELECT * EXCLUDE (fingerprint) FROM trends {where} AND name <> '' AND level >= ? "
+            "ORDER BY level DESC, coalesce(abs(change), 0) DESC, machine, point, name"
+        )
+        return self._frame(sql, [*values, minimum_level])
+
+    def status(self) -> DataFrame:
+        """Return a row per measuring point, the worst first.
+
+        Columns: machine, point, n_recordings, n_failed, first, last, outcome and verdict of the last recording, level
+        ("alarm", "warning" or "ok": the worse of diagnosis and trends), n_alarms, n_warnings, since, worst (indicator),
+        change (of that one against what is expected, in dB where change_in_db), changed (since when the level of some
+        indicator is another one).
+        """
+        self._refreshed()
+        sql = f"""
+            WITH latest AS (
+                SELECT machine, point, count(*) FILTER (outcome <> '{FAILED}') AS n_recordings,
+                    count(*) FILTER (outcome = '{FAILED}') AS n_failed, min(date) AS first, max(date) AS last,
+                    arg_max(outcome, date) FILTER (outcome <> '{FAILED}') AS outcome,
+                    arg_max(verdict, date) FILTER (outcome <> '{FAILED}') AS verdict
+                FROM recordings GROUP BY machine, point
+            ), judged AS (
+                SELECT machine, point, max(level) AS level, count(*) FILTER (level = {ALARM}) AS n_alarms,
+                    count(*) FILTER (level = {WARNING}) AS n_warnings, min(since) AS since,
+                    arg_max(name, (level, coalesce(abs(change), 0))) FILTER (level > 0) AS worst,
+                    arg_max(change, (level, coalesce(abs(change), 0))) FILTER (level > 0) AS change,
+                    arg_max(in_db, (level, coalesce(abs(change), 0))) FILTER (level > 0) AS change_in_db,
+                    min(changed) AS changed, max(n_baseline) AS n_baseline
+                FROM trends GROUP BY machine, point
+            ), joined AS (
+                SELECT l.*, greatest(coalesce(j.level, 0), CASE l.outcome WHEN 'fault' THEN {ALARM}
+                    WHEN 'suspicion' THEN {WARNING} ELSE {OK} END) AS number,
+                    j.* EXCLUDE (machine, point, level)
+                FROM latest l LEFT JOIN judged j USING (machine, point)
+            )
+            SELECT machine, point, CASE number WHEN {ALARM} THEN 'alarm' WHEN {WARNING} THEN 'warning' ELSE 'ok' END
+                AS level, * EXCLUDE (machine, point, number)
+            FROM joined
+            ORDER BY number DESC, n_alarms DESC, n_warnings DESC, abs(change) DESC NULLS LAST, machine, point
+        """
+        return self._frame(sql, [])
+
+    def point_trends(self, machine: str, point: str = "") -> PointTrends:
+        """Return all series of a measuring point with their limits, judged anew."""
+        self._check_place(machine, point, exactly=True)
+        return self._store.read(lambda connection: _judged(connection, machine, point, self.settings))
+
+    def trend(
+        self, machine: str, name: str, *, point: str = "", channel: str = "", place: str = "", computed_on: str = ""
+    ) -> tuple[Trend, ...]:
+        """Return an indicator of a machine over time, for each channel and place that has it, the worst first.
+
+        Parameters
+        ----------
+        machine, name : str
+        point, channel, place, computed_on : str
+            Empty: all.
+
+        Raises
+        ------
+        InputError
+            If there is no such machine, point or indicator.
+        """
+        self._check_place(machine, point)
+        points = [point] if point else [p for (p,) in self._rows(_POINTS, [machine])]
+        only = {"name": name, "channel": channel, "place": place, "computed_on": computed_on}
+        result: list[Trend] = []
+        known: set[str] = set()
+        for chosen in points:
+            trends = self.point_trends(machine, chosen)
+            known |= set(trends.series["name"])
+            for column, row in enumerate(trends.series.to_dict("records")):
+                if all(not value or row[key] == value for key, value in only.items()):
+                    result.append(_trend(trends, column, machine, chosen))
+        if not result:
+            what = ", ".join(f"{key} {value!r}" for key, value in only.items() if value)
+            raise InputError(
+                f"there is no indicator of {what}",
+                where=machine,
+                allowed=", ".join(sorted(known)),
+                remedy=closest_match_hint(name, known),
+            )
+        return tuple(sorted(result, key=lambda t: -[*LEVEL_NAMES.values()].index(t.level)))
+
+    def export(
+        self,
+        path: str | Path,
+        table: str = "indicators",
+        machine: str = "",
+        point: str = "",
+        *,
+        name: str = "",
+        start: datetime | None = None,
+        end: datetime | None = None,
+    ) -> int:
+        """Write a table as CSV, Parquet or JSON lines, by the file's ending; return how many rows it has.
+
+        Parameters
+        ----------
+        path : str or Path
+            ".csv", ".parquet" or ".jsonl".
+        table : str
+            "indicators", "recordings", "trends" (limits and alarms of each series) or "status".
+        machine, point, name, start, end
+            See `indicators`.
+        """
+        one_of(table, "table", TABLES)
+        target = Path(path)
+        forms = {".csv": "csv, HEADER", ".parquet": "parquet, COMPRESSION zstd", ".jsonl": "json"}
+        form = forms[one_of(target.suffix.lower(), f"ending of {target.name}", forms)]
+        self._check_place(machine, point)
+        dated = table in ("indicators", "recordings")
+        if table == "status":
+            frame = self.status()
+            frame = frame[(frame["machine"] == machine) | (not machine)]
+            frame = frame[(frame["point"] == point) | (not point)]
+        elif table == "trends":
+            frame = self.series(machine, point)
+            frame = frame[(frame["name"] == name) | (not name)]
+        where, values = _where(machine, point, {"name": name if table == "indicators" else ""}, start, end)
+        part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+
+        def write(connection: DuckDBPyConnection) -> int:
+            if dated:
+                source = f"(SELECT * FROM {table} {where})"
+            else:
+                connection.register("chosen", frame)
+                source, values[:] = "(FROM chosen)", []
+            text = str(part).replace("'", "''")
+            return int(connection.execute(f"COPY {source} TO '{text}' (FORMAT {form})", values).fetchall()[0][0])
+
+        try:
+            if not target.parent.is_dir():
+                raise InputError(
+                    "there is no such folder", where=str(target.parent), remedy="make it, or choose another"
+                )
+            n = self._store.read(write)
+            part.replace(target)
+        except OSError as error:
+            raise InputError(f"cannot be written ({error.strerror})", where=str(target)) from None
+        finally:
+            part.unlink(missing_ok=True)
+        return n
+
+    def compact(self) -> None:
+        """Merge all small files; an addition does it by itself when there are many."""
+        self._store.compact(everything=True)
+
+    # ---------------- the rest
+
+    def _refreshed(self) -> None:
+        """Judge anew the measuring points that have other results, or were judged by other settings, than before."""
+        settings = self.settings
+        self._store.read(lambda connection: self._refresh(connection, settings))
+
+    def _refresh(self, connection: DuckDBPyConnection, settings: TrendSettings) -> None:
+        self._view_of_trends(connection)
+        from gearsig import __version__
+
+        mark = f"{settings.digest}-{__version__}"
+        stale = connection.execute(
+            f"""
+            WITH now AS (
+                SELECT machine, point, concat_ws('-', count(*), epoch_us(max(added)), ?::VARCHAR) AS fingerprint
+                FROM recordings WHERE outcome <> '{FAILED}' GROUP BY machine, point
+            ), kept AS (SELECT DISTINCT machine, point, fingerprint FROM trends)
+            SELECT coalesce(n.machine, k.machine), coalesce(n.point, k.point), n.fingerprint
+            FROM now n FULL JOIN kept k USING (machine, point)
+            WHERE n.fingerprint IS DISTINCT FROM k.fingerprint
+            """,
+            [mark],
+        ).fetchall()
+        if not stale:
+            return
+        import pandas as pd
+
+        rows: list[dict[str, Any]] = []
+        for machine, point, fingerprint in stale:
+            if fingerprint is None:
+                continue
+            trends = _judged(connection, machine, point, settings)
+            found = state_rows(trends, machine, point, fingerprint)
+            rows += found or [
+                dict.fromkeys(_STATE)
+                | {"machine": machine, "point": point, "name": "", "level": OK, "fingerprint": fingerprint}
+            ]
+        new = pd.DataFrame(rows, columns=list(_STATE))
+        connection.register("judged_anew", new)
+        connection.register("stale", pd.DataFrame([place[:2] for place in stale], columns=["machine", "point"]))
+        part = self.folder / f".{TRENDS}.{secrets.token_hex(4)}.part"
+        columns = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
+        text = str(part).replace("'", "''")
+        try:
+            connection.execute(
+                f"COPY (SELECT {columns} FROM trends ANTI JOIN stale USING (machine, point) UNION ALL "
+                f"SELECT {columns} FROM judged_anew) TO '{text}' (FORMAT parquet, COMPRESSION zstd)"
+            )
+            part.replace(self.folder / TRENDS)
+        finally:
+            part.unlink(missing_ok=True)
+
+    def _view_of_trends(self, connection: DuckDBPyConnection) -> None:
+        """Make the view `trends`; a damaged file is as if there were none."""
+        import pyarrow.parquet as pq
+
+        path = self.folder / TRENDS
+        try:
+            whole = path.exists() and list(pq.read_schema(path).names) == list(_STATE)
+        except Exception:  # noqa: BLE001 - damaged bytes make readers raise anything
+            whole = False
+        if not whole:
+            columns = ", ".join(f"NULL::{kind} AS {name}" for name, kind in _STATE.items())
+            connection.execute(f"CREATE OR REPLACE TEMP VIEW trends AS SELECT {columns} WHERE false")
+            return
+        text = str(path).replace("'", "''")
+        connection.execute(f"CREATE OR REPLACE TEMP VIEW trends AS FROM read_parquet(['{text}'])")
+
+    def _table(
+        self,
+        table: str,
+        machine: str,
+        point: str,
+        only: dict[str, str],
+        start: datetime | None,
+        end: datetime | None,
+        order: str,
+    ) -> DataFrame:
+        self._check_place(machine, point)
+        where, values = _where(machine, point, only, start, end)
+        return self._frame(f"SELECT * FROM {table} {where} ORDER BY {order}", values)
+
+    def _frame(self, sql: str, values: Sequence[object]) -> DataFrame:
+        def read(connection: DuckDBPyConnection) -> DataFrame:
+            self._view_of_trends(connection)
+            frame: DataFrame = connection.execute(sql, list(values)).df()
+            return frame
+
+        return self._store.read(read)
+
+    def _rows(self, sql: str, values: Sequence[object] = ()) -> list[Any]:
+        return self._store.read(lambda connection: connection.execute(sql, list(values)).fetchall())
+
+    def _check_place(self, machine: str, point: str, *, exactly: bool = False) -> None:
+        if not machine and not point and not exactly:
+            return
+        where = (
+            "machine = ? AND point = ?" if machine and (point or exactly) else "machine = ?" if machine else "point = ?"
+        )
+        values = [machine, point] if machine and (point or exactly) else [machine or point]
+        if self._rows(f"SELECT 1 FROM recordings WHERE {where} LIMIT 1", values):
+            return
+        machines = sorted({m for (m,) in self._rows("SELECT DISTINCT machine FROM recordings")})
+        if machine not in machines and machine:
+            raise InputError(
+                f"there is no machine {machine!r}",
+                where=str(self.folder),
+                allowed=", ".join(machines[:20]) + (" …" if len(machines) > 20 else ""),
+                remedy=closest_match_hint(machine, machines),
+            )
+        points = [p for (p,) in self._rows(_POINTS, [machine])]
+        raise InputError(
+            f"there is no measuring point {point!r}",
+            where=machine,
+            allowed=", ".join(repr(p) for p in points),
+            remedy=closest_match_hint(point, points),
+        )
+
+
+_POINTS = "SELECT DISTINCT point FROM recordings WHERE machine = ? ORDER BY point"
+
+
+def open_fleet(folder: str | Path, *, create: bool = False, on_message: Callable[[str], object] | None = None) -> Fleet:
+    """Open the results of many recordings, kept in a folder.
+
+    Parameters
+    ----------
+    folder : str or Path
+    create : bool
+        Whether to make it where there is none.
+    on_message : callable or None
+        Told in one sentence what was noticed, e.g. that a damaged file was set aside; None: a warning of Python.
+
+    Raises
+    ------
+    InputError
+        If there is no fleet, or the packages that it needs are not installed.
+
+    Examples
+    --------
+    >>> fleet = open_fleet("fleet", create=True)  # doctest: +SKIP
+    >>> fleet.add("recordings", pattern="{machine}/{point}_{date:%Y%m%d}.csv")  # doctest: +SKIP
+    >>> fleet.status()  # doctest: +SKIP
+    """
+
+    def warn(text: str) -> None:
+        import warnings
+
+        warnings.warn(text, stacklevel=2)
+
+    return Fleet(Store(Path(folder), on_message or warn, create=create))
+
+
+def _where(
+    machine: str, point: str, only: dict[str, str], start: datetime | None = None, end: datetime | None = None
+) -> tuple[str, list[object]]:
+    parts: list[str] = ["true"]
+    values: list[object] = []
+    for name, value in {"machine": machine, "point": point, **only}.items():
+        if value:
+            parts.append(f"{name} = ?")
+            values.append(value)
+    for sign, moment in ((">=", start), ("<=", end)):
+        if moment is not None:
+            parts.append(f"date {sign} ?")
+            values.append(moment.replace(tzinfo=None))
+    return "WHERE " + " AND ".join(parts), values
+
+
+def _judged(connection: DuckDBPyConnection, machine: str, point: str, settings: TrendSettings) -> PointTrends:
+    place = [machine, point]
+    recordings = connection.execute(
+        "SELECT key, date, added, speed_rpm, load_nm, outcome, iso_group, iso_mounting FROM recordings "
+        f"WHERE machine = ? AND point = ? AND outcome <> '{FAILED}'",
+        place,
+    ).df()
+    names = ", ".join(SERIES)
+    indicators = connection.execute(
+        f"SELECT key, value, {names} FROM indicators WHERE machine = ? AND point = ?", place
+    ).df()
+    return judge(recordings, indicators, settings, settings.baseline_of(machine, point))
+
+
+def _trend(trends: PointTrends, column: int, machine: str, point: str) -> Trend:
+    import pandas as pd
+
+    known = np.isfinite(trends.values[:, column])
+    dates = trends.recordings["date"]
+    table = pd.DataFrame(
+        {
+            "date": dates,
+            "value": trends.values[:, column],
+            "speed_rpm": trends.recordings["speed_rpm"],
+            "load_nm": trends.recordings["load_nm"],
+            "expected": trends.expected[:, column],
+            "low": trends.low[:, column],
+            "high": trends.high[:, column],
+            "alarm": trends.alarm[:, column],
+            "level": [LEVEL_NAMES[int(level)] for level in trends.levels[:, column]],
+            "in_baseline": trends.baseline,
+        }
+    )[known].reset_index(drop=True)
+    row = {str(key): str(value) for key, value in trends.series.iloc[column].items()}
+    began = int(trends.began[column])
+    return Trend(
+        machine,
+        point,
+        **row,
+        table=table,
+        basis=trends.basis[column],
+        level=LEVEL_NAMES[int(trends.levels[-1, column])],
+        changed=dates.iloc[began].to_pydatetime() if began >= 0 else None,
+        normalised=trends.normalised,
+        false_alarm_rate=trends.false_alarm_rate,
+    )

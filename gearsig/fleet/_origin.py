@@ -1,0 +1,340 @@
+"""Which recordings there are, and of which machine, measuring point and date each is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+
+from gearsig.errors import InputError
+from gearsig.recording import FORMAT_OF_EXTENSION
+from gearsig.rig import Rig, read_rig, rig_file_beside
+
+FIELDS = ("machine", "point", "date")
+"""What a pattern may name, besides `{}` for what does not matter."""
+
+LONGEST_NAME = 200
+
+_FIELD = re.compile(r"\{(?P<name>\w*)(?::(?P<form>[^{}]*))?\}")
+_FORMS = {
+    "%Y": r"\d{4}",
+    "%y": r"\d\d",
+    "%m": r"\d\d",
+    "%d": r"\d\d",
+    "%H": r"\d\d",
+    "%M": r"\d\d",
+    "%S": r"\d\d",
+    "%j": r"\d{3}",
+    "%f": r"\d{1,6}",
+    "%b": r"[A-Za-z]{3}",
+    "%%": "%",
+}
+_DATE_IN_NAME = re.compile(
+    r"(?<!\d)(?P<day>(?:19|20)\d\d[-_.]?[01]\d[-_.]?[0-3]\d)"
+    r"(?:[-_T ]?(?P<time>[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d)?))?(?!\d)"
+)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A recording's file, and where it belongs.
+
+    Parameters
+    ----------
+    path : Path
+        Absolute.
+    machine, point : str
+        The point is empty where nothing names one; the channels then tell the places apart.
+    date : datetime
+        Without time zone, as a name or a folder states it; of files' times in UTC.
+    machine_from, point_from, date_from : str
+        What each rests on: "pattern", "folder", "rig file", "file name", "time of the file", "stated", "none".
+    n_bytes, mtime_ns : int
+        Of the file, when it was looked at.
+    """
+
+    path: Path
+    machine: str
+    point: str
+    date: datetime
+    machine_from: str
+    point_from: str
+    date_from: str
+    n_bytes: int
+    mtime_ns: int
+
+
+@dataclass(frozen=True)
+class FilePattern:
+    """A pattern of paths such as "{machine}/{point}_{date:%Y%m%d}.csv", matched from a path's end.
+
+    `{machine}` and `{point}` are letters without "/", `{date:…}` has the fields of `strptime`, `{}` is anything but
+    "/", `*` likewise, and `**` also "/".
+    """
+
+    text: str
+
+    def __post_init__(self) -> None:
+        self._compiled()
+
+    def match(self, path: Path, root: Path | None = None) -> dict[str, str | datetime] | None:
+        """Return what the pattern names in a path, None if the path is of another kind.
+
+        Below `root` it is tried on the whole of the path first.
+
+        Examples
+        --------
+        >>> found = FilePattern("{machine}/{point}_{date:%Y%m%d}.csv").match(Path("/data/pump 3/DE_20260131.csv"))
+        >>> found["machine"], found["point"], found["date"].isoformat()
+        ('pump 3', 'DE', '2026-01-31T00:00:00')
+        """
+        expression, form = self._compiled()
+        found = None
+        if root is not None and path.is_relative_to(root):
+            found = expression.fullmatch(path.relative_to(root).as_posix())
+        found = found or expression.search(path.absolute().as_posix())
+        if found is None:
+            return None
+        result: dict[str, str | datetime] = {k: v for k, v in found.groupdict().items() if k != "date"}
+        if form:
+            try:
+                result["date"] = datetime.strptime(found["date"], form)  # noqa: DTZ007 - as the name states it
+            except ValueError:  # the 31st of February
+                return None
+        return result
+
+    def _compiled(self) -> tuple[re.Pattern[str], str]:
+        return _compile(self.text)
+
+
+@cache
+def _compile(text: str) -> tuple[re.Pattern[str], str]:
+    where, form, parts, end = "--pattern", "", ["(?:^|/)"], 0
+    seen: set[str] = set()
+    for field in _FIELD.finditer(text):
+        parts.append(_literal(text[end : field.start()]))
+        name, end = field["name"], field.end()
+        if name and name not in FIELDS:
+            raise InputError(f"{{{name}}} is not known", where=where, allowed=", ".join(f"{{{n}}}" for n in FIELDS))
+        if name in seen:
+            raise InputError(f"{{{name}}} stands twice", where=where)
+        if bool(field["form"]) != (name == "date"):
+            raise InputError(f"{field[0]} has no date's form", where=where, remedy="write for example {date:%Y%m%d}")
+        seen.add(name)
+        if name == "date":
+            form = field["form"]
+            parts.append(f"(?P<date>{_of_form(form)})")
+        else:
+            parts.append(f"(?P<{name}>[^/]+?)" if name else "[^/]*?")
+    parts.append(_literal(text[end:]))
+    if "{" in text[end:] or "}" in text[end:]:
+        raise InputError(f"{text!r} has a bracket that is not closed", where=where)
+    return re.compile("".join(parts) + "$"), form
+
+
+def _literal(text: str) -> str:
+    parts = re.split(r"(\*\*/?|\*)", text.lstrip("/") if text.startswith("./") else text)
+    return "".join({"**": ".*", "**/": "(?:.*/)?", "*": "[^/]*"}.get(part, re.escape(part)) for part in parts)
+
+
+def _of_form(form: str) -> str:
+    parts = re.split(r"(%.)", form)
+    unknown = [part for part in parts if part.startswith("%") and part not in _FORMS]
+    if unknown:
+        raise InputError(f"{unknown[0]} of {{date:{form}}} is not known", where="--pattern", allowed=" ".join(_FORMS))
+    return "".join(_FORMS.get(part, re.escape(part)) for part in parts)
+
+
+def date_in_name(name: str) -> datetime | None:
+    """Return the date, with its time if there is one, that a name states, year first.
+
+    Examples
+    --------
+    >>> [str(date_in_name(name)) for name in ("pump_2026-01-31T1405.csv", "20260131_140512", "run_1234.h5")]
+    ['2026-01-31 14:05:00', '2026-01-31 14:05:12', 'None']
+    """
+    for found in _DATE_IN_NAME.finditer(name):
+        digits = re.sub(r"\D", "", found["day"])
+        time = re.sub(r"\D", "", found["time"] or "")
+        for rest in (time, ""):
+            try:
+                return datetime.strptime(digits + rest.ljust(6, "0"), "%Y%m%d%H%M%S")  # noqa: DTZ007
+            except ValueError:
+                continue
+    return None
+
+
+def find_recordings(places: Iterable[str | Path], pattern: FilePattern | None = None) -> list[tuple[Path, Path]]:
+    """Return the recordings that files, folders and their sub-folders hold, each with the folder it was found from.
+
+    A folder gives what has the ending of a format, hidden files and links out of it left out; with a pattern, what
+    matches it. A file that is named stands as it is.
+
+    Raises
+    ------
+    InputError
+        If a place does not exist.
+    """
+    found: dict[Path, Path] = {}
+    for place in places:
+        root = Path(place)
+        if root.is_dir():
+            for path in _walk(root):
+                if _is_recording(path) and (pattern is None or pattern.match(path, root)):
+                    found.setdefault(path, root)
+        elif any(letter in root.name for letter in "*?[") and not root.exists():
+            matches = sorted(root.parent.glob(root.name)) if root.parent.is_dir() else []
+            if not matches:
+                raise InputError("no file matches", where=str(root), remedy="check the folder and the pattern")
+            found |= {path: path.parent for path in matches if path.is_file()}
+        else:
+            found.setdefault(root, root.parent)
+    return list(found.items())
+
+
+def _walk(root: Path) -> Iterable[Path]:
+    import os
+
+    for folder, subfolders, names in os.walk(root):  # links to folders are not followed
+        subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
+        if "store.json" in names and "new" in subfolders:  # a fleet's own store
+            subfolders.clear()
+            continue
+        for name in sorted(names):
+            if not name.startswith("."):
+                yield Path(folder) / name
+
+
+def _is_recording(path: Path) -> bool:
+    name = path.name.lower()
+    return any(name.endswith((ending, f"{ending}.gz")) for ending in FORMAT_OF_EXTENSION)
+
+
+def origins(
+    places: Iterable[str | Path],
+    *,
+    pattern: str = "",
+    machine: str = "",
+    point: str = "",
+    date: datetime | None = None,
+    rig: Rig | None = None,
+) -> list[Origin]:
+    """Find recordings and say of which machine, point and date each is.
+
+    The machine is what is stated, else what the pattern names, else the first sub-folder below the place searched,
+    else the name in the rig file, else the folder. The point is stated, in the pattern, or the second sub-folder. The
+    date is stated, in the pattern, in the file's name, or when the file was written.
+
+    Parameters
+    ----------
+    places : iterable of str or Path
+        Files, folders with their sub-folders, "folder/*.csv".
+    pattern : str
+        See `FilePattern`; files that do not match are left out.
+    machine, point : str
+    date : datetime or None
+    rig : Rig or None
+        Of all; None: the rig file of the same name beside each.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, the pattern is no pattern, or nothing is found.
+    """
+    wanted = FilePattern(pattern) if pattern else None
+    found = find_recordings(places, wanted)
+    rigs = _rig_names(rig)
+    result = []
+    for path, root in found:
+        named = wanted.match(path, root) if wanted is not None else {}
+        if named is None:
+            continue
+        try:
+            stat = path.stat()
+        except OSError as error:
+            raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the name") from None
+        written = datetime.fromtimestamp(stat.st_mtime, UTC).replace(tzinfo=None, microsecond=0)
+        below = path.relative_to(root).parts[:-1] if path.is_relative_to(root) else ()
+        folder = path.absolute().parent.name
+        of_machine = _first(
+            ("stated", machine),
+            ("pattern", named.get("machine", "")),
+            ("folder", below[0] if below else ""),
+            ("rig file", rigs(path)),
+            ("folder", folder),
+        )
+        of_point = _first(
+            ("stated", point), ("pattern", named.get("point", "")), ("folder", below[1] if len(below) > 1 else "")
+        )
+        of_date = _first(
+            ("stated", date),
+            ("pattern", named.get("date")),
+            ("file name", date_in_name(path.name)),
+            ("time of the file", written),
+        )
+        moment = of_date[1]
+        assert isinstance(moment, datetime)  # noqa: S101 - the file's time is always there
+        result.append(
+            Origin(
+                path.absolute(),
+                _clean(of_machine[1]),
+                _clean(of_point[1]),
+                moment,
+                of_machine[0],
+                of_point[0],
+                of_date[0],
+                stat.st_size,
+                stat.st_mtime_ns,
+            )
+        )
+    if not result:
+        raise InputError(
+            "there are no recordings" + (f" that match {pattern!r}" if pattern else ""),
+            where=", ".join(str(place) for place in places),
+            allowed=" ".join(FORMAT_OF_EXTENSION),
+            remedy="check the folder and the pattern",
+        )
+    return result
+
+
+def _rig_names(rig: Rig | None) -> Callable[[Path], str]:
+    @cache
+    def of_file(path: Path) -> str:
+        try:
+            return read_rig(path).name
+        except InputError:
+            return ""
+
+    def name(path: Path) -> str:
+        if rig is not None:
+            return rig.name
+        beside = rig_file_beside(path)
+        return of_file(beside) if beside is not None else ""
+
+    return name
+
+
+def _first(*choices: tuple[str, object]) -> tuple[str, object]:
+    return next(((source, value) for source, value in choices if value), ("none", ""))
+
+
+def _clean(text: object) -> str:
+    """Return a name of one printable line, as tables and files show it."""
+    line = "".join(c if c.isprintable() else " " for c in str(text).encode("utf-8", "replace").decode("utf-8"))
+    return " ".join(line.split())[:LONGEST_NAME]
+
+
+def origin_rows(found: Sequence[Origin]) -> list[tuple[str, str, str, str]]:
+    """Return file, machine, point and date of each, with what it rests on, as a person checks them."""
+    return [
+        (
+            o.path.name,
+            f"{o.machine} ({o.machine_from})",
+            f"{o.point} ({o.point_from})" if o.point else "–",
+            f"{o.date:%Y-%m-%d %H:%M} ({o.date_from})",
+        )
+        for o in found
+    ]

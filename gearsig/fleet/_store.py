@@ -1,0 +1,466 @@
+"""Results of recordings in Parquet files, which are only ever added, read through DuckDB.
+
+A result appears as one small file, named by what it is of, whole or not at all; so any number of processes may add to
+one store without waiting for each other, and one that is killed leaves nothing half there. Now and then small files
+are merged into segments that are sorted by machine and indicator.
+
+    store.json              which segments count, and which results in them were replaced
+    new/KEY.parquet         one result, with its indicators as a list
+    segments/NAME/          recordings.parquet, indicators.parquet
+    claims/                 locks of files that some process analyses right now
+    damaged/                what could not be read, set aside
+    trends.parquet          limits and alarms of all series, computed again where it is missing
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import shutil
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from math import log
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from gearsig.cache import write_whole
+from gearsig.errors import InputError
+
+if TYPE_CHECKING:
+    from duckdb import DuckDBPyConnection
+
+Value = TypeVar("Value")
+
+SCHEMA, SCHEMA_VERSION = "gearsig-fleet", 1
+MANIFEST, NEW, SEGMENTS, DAMAGED, CLAIMS = "store.json", "new", "segments", "damaged", "claims"
+MERGED = "merged.json"
+
+RECORDING = {
+    "key": "string",
+    "machine": "string",
+    "point": "string",
+    "date": "timestamp",
+    "source": "string",
+    "sha256": "string",
+    "n_bytes": "int64",
+    "mtime_ns": "int64",
+    "origin": "string",
+    "rig": "string",
+    "setup": "string",
+    "version": "string",
+    "added": "timestamp",
+    "n_channels": "int64",
+    "duration_s": "double",
+    "sampling_rate_hz": "double",
+    "speed_rpm": "double",
+    "load_nm": "double",
+    "outcome": "string",
+    "verdict": "string",
+    "confidence": "double",
+    "crack_mm": "double",
+    "iso_group": "int64",
+    "iso_mounting": "string",
+    "findings": "string",
+    "reason": "string",
+    "cpu_s": "double",
+    "replaces": "string",
+}
+"""Columns of a recording's result; `setup` is a hash of rig, reference and options, `reason` why there is none."""
+
+INDICATOR = {
+    "name": "string",
+    "value": "double",
+    "unit": "string",
+    "channel": "string",
+    "place": "string",
+    "computed_on": "string",
+    "band": "string",
+}
+"""Of an indicator, besides key, machine, point and date of its recording."""
+
+SERIES = ("name", "channel", "place", "computed_on", "band", "unit")
+"""What tells one indicator of a measuring point from another."""
+
+_SQL = {"string": "VARCHAR", "double": "DOUBLE", "int64": "BIGINT", "timestamp": "TIMESTAMP"}
+TIER = 8
+"""So many segments of like size are merged into one: each result is written again once for each power of it."""
+
+Row = dict[str, Any]
+
+
+class Store:
+    """A folder with results.
+
+    Parameters
+    ----------
+    folder : Path
+    on_message : callable
+        Told what was noticed and set aside.
+    create : bool
+        Whether to make the folder where there is none.
+
+    Raises
+    ------
+    InputError
+        If there is no store, the folder holds other things, or DuckDB is not installed.
+    """
+
+    def __init__(self, folder: Path, on_message: Callable[[str], object], *, create: bool = False) -> None:
+        self.folder, self.on_message = folder, on_message
+        self._loose_known: frozenset[str] = frozenset()
+        self._segments_known: tuple[str, ...] | None = None
+        required()
+        if not (folder / MANIFEST).exists() and not (folder / SEGMENTS).is_dir():
+            if not create:
+                raise InputError(
+                    "there is no fleet", where=str(folder), remedy="make one with: gearsig fleet add RECORDINGS"
+                )
+            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+                raise InputError("holds other things", where=str(folder), remedy="choose another with --store")
+        if create:
+            try:
+                for name in (NEW, SEGMENTS, CLAIMS):
+                    (folder / name).mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise InputError(
+                    f"cannot be made ({error.strerror})", where=str(folder), remedy="choose another with --store"
+                ) from None
+            if not (folder / MANIFEST).exists():
+                self._write_manifest([], [])
+
+    # ---------------- what there is
+
+    def _manifest(self) -> tuple[list[str], list[str]]:
+        """Return segments and replaced keys; where the list itself is damaged, every segment that there is."""
+        try:
+            data = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
+            if data["schema"] == SCHEMA and data["schema_version"] > SCHEMA_VERSION:
+                raise InputError(
+                    f"was written by a later gearsig (schema {data['schema_version']})",
+                    where=str(self.folder),
+                    remedy="update gearsig",
+                )
+            segments, replaced = [str(name) for name in data["segments"]], [str(key) for key in data["replaced"]]
+        except FileNotFoundError:
+            return self._segments_there(), []
+        except (ValueError, KeyError, TypeError, RecursionError):
+            self._set_aside(self.folder / MANIFEST, "the list of segments is damaged; all segments count")
+            return self._segments_there(), []
+        return [name for name in segments if Path(name).name == name and self._segment(name).is_dir()], replaced
+
+    def _segments_there(self) -> list[str]:
+        """Return the segments without those that another one holds already."""
+        there = {path.name for path in (self.folder / SEGMENTS).glob("[0-9]*") if path.is_dir()}
+        for name in sorted(there):
+            with suppress(OSError, ValueError, TypeError):
+                there -= set(json.loads((self._segment(name) / MERGED).read_text(encoding="utf-8")))
+        return sorted(there)
+
+    def _write_manifest(self, segments: Sequence[str], replaced: Sequence[str]) -> None:
+        content = {
+            "schema": SCHEMA,
+            "schema_version": SCHEMA_VERSION,
+            "segments": list(segments),
+            "replaced": list(replaced),
+        }
+        text = json.dumps(content, indent=1) + "\n"
+        write_whole(self.folder / MANIFEST, lambda file: file.write(text.encode()))
+
+    def _segment(self, name: str) -> Path:
+        return self.folder / SEGMENTS / name
+
+    def _new(self) -> list[Path]:
+        return sorted((self.folder / NEW).glob("[0-9a-f]*.parquet"))
+
+    # ---------------- reading
+
+    def read(self, work: Callable[[DuckDBPyConnection], Value]) -> Value:
+        """Return what `work` makes of the views `recordings` and `indicators`; damaged files are set aside first.
+
+        Raises
+        ------
+        InputError
+            If the query fails though all files can be read.
+        """
+        import duckdb
+
+        problem = ""
+        for _ in range(4):  # a segment that is merged while it is read is another one a moment later
+            try:
+                with self._connection() as connection:
+                    return work(connection)
+            except duckdb.Error as error:
+                problem = str(error)
+                self._check_files()
+        raise InputError(f"cannot be read ({problem})", where=str(self.folder), remedy="please report")
+
+    @contextmanager
+    def _connection(self) -> Iterator[DuckDBPyConnection]:
+        import duckdb
+
+        settings = {"autoinstall_known_extensions": "false", "autoload_known_extensions": "false"}
+        connection = duckdb.connect(":memory:", config=settings)
+        try:
+            segments, replaced = self._manifest()
+            loose = self._new()
+            recordings = [str(self._segment(name) / "recordings.parquet") for name in segments]
+            indicators = [str(self._segment(name) / "indicators.parquet") for name in segments]
+            self._drop_doubled(connection, loose, recordings)
+            loose = [path for path in loose if path.exists()]
+            replaced += self._replaced_by(connection, [*recordings, *map(str, loose)])
+            connection.execute("CREATE TEMP TABLE replaced (key VARCHAR)")
+            if replaced:
+                connection.execute("INSERT INTO replaced SELECT unnest(?)", [replaced])
+            kept = " WHERE key NOT IN (FROM replaced)" if replaced else ""
+            files = [str(path) for path in loose]
+            of_recording, of_indicator = ", ".join(RECORDING), ", ".join(INDICATOR)
+            connection.execute(
+                f"CREATE TEMP VIEW recordings AS {_parts(of_recording, recordings, RECORDING, kept)} UNION ALL "
+                f"{_parts(of_recording, files, RECORDING, kept)}"
+            )
+            every = {"key": "string", "machine": "string", "point": "string", "date": "timestamp"} | INDICATOR
+            loose_indicators = (
+                f"SELECT key, machine, point, date, {', '.join(f'i.{name} AS {name}' for name in INDICATOR)} FROM "
+                f"(SELECT key, machine, point, date, unnest(indicators) AS i FROM read_parquet({_list(files)}){kept})"
+                if files
+                else _parts("", [], every, "")
+            )
+            columns = f"key, machine, point, date, {of_indicator}"
+            connection.execute(
+                f"CREATE TEMP VIEW indicators AS {_parts(columns, indicators, every, kept)} "
+                f"UNION ALL {loose_indicators}"
+            )
+            yield connection
+        finally:
+            connection.close()
+
+    def _drop_doubled(self, connection: DuckDBPyConnection, loose: Sequence[Path], segments: Sequence[str]) -> None:
+        """Delete small files whose result is in a segment: two processes added it, or a merge was cut short."""
+        names = frozenset(path.stem for path in loose)
+        state = tuple(segments)
+        unseen = names if state != self._segments_known else names - self._loose_known
+        if unseen and segments:
+            found = connection.execute(
+                f"SELECT key FROM read_parquet({_list(segments)}) WHERE key IN (SELECT unnest(?))", [sorted(unseen)]
+            ).fetchall()
+            for (key,) in found:
+                (self.folder / NEW / f"{key}.parquet").unlink(missing_ok=True)
+        self._loose_known, self._segments_known = names, state
+
+    def _replaced_by(self, connection: DuckDBPyConnection, files: Sequence[str]) -> list[str]:
+        if not files:
+            return []
+        sql = f"SELECT DISTINCT replaces FROM read_parquet({_list(files)}) WHERE replaces <> ''"
+        return [key for (key,) in connection.execute(sql).fetchall()]
+
+    def _check_files(self) -> None:
+        """Read every file through and set aside those that are damaged."""
+        import pyarrow.parquet as pq
+
+        loose_schema, columns = _arrow_schema(), [*RECORDING]
+        for path in self._new():
+            try:
+                with path.open("rb") as file:
+                    table = pq.ParquetFile(file).read()
+                if table.schema.remove_metadata() != loose_schema:
+                    raise ValueError("columns")  # noqa: TRY301
+            except FileNotFoundError:
+                continue
+            except Exception:  # noqa: BLE001 - damaged bytes make readers raise anything
+                self._set_aside(path, "it is damaged; its recording is analysed again by the next add")
+        for name in self._manifest()[0]:
+            folder = self._segment(name)
+            try:
+                for table_name, wanted in (("recordings", columns), ("indicators", [*INDICATOR, "key"])):
+                    with (folder / f"{table_name}.parquet").open("rb") as file:
+                        parts = pq.ParquetFile(file)
+                        if not set(wanted) <= set(parts.schema_arrow.names):
+                            raise ValueError("columns")  # noqa: TRY301
+                        for group in range(parts.num_row_groups):
+                            parts.read_row_group(group)
+            except Exception:  # noqa: BLE001
+                if folder.is_dir():
+                    self._set_aside(folder, "it is damaged; its recordings are analysed again by the next add")
+
+    def _set_aside(self, path: Path, why: str) -> None:
+        target = self.folder / DAMAGED
+        with suppress(OSError):
+            target.mkdir(exist_ok=True)
+            path.rename(target / f"{path.name}.{secrets.token_hex(4)}")
+            self.on_message(f"{path.relative_to(self.folder)} is set aside in {DAMAGED}: {why}")
+
+    # ---------------- adding
+
+    def add(self, row: Row, indicators: Sequence[Row]) -> bool:
+        """Write one result; False where the store holds it already.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written: the disk is full.
+        """
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        path = self.folder / NEW / f"{row['key']}.parquet"
+        if path.exists():
+            return False
+        table = pa.Table.from_pylist([row | {"indicators": list(indicators)}], schema=_arrow_schema())
+        write_whole(path, lambda file: pq.write_table(table, file, compression="zstd"))
+        return True
+
+    @contextmanager
+    def claim(self, name: str) -> Iterator[bool]:
+        """Hold the right to analyse a file while the process lives; yields False where another one has it."""
+        from filelock import FileLock, Timeout
+
+        lock = FileLock(self.folder / CLAIMS / name)
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            yield False
+            return
+        try:
+            yield True
+        finally:
+            with suppress(OSError):
+                Path(lock.lock_file).unlink()
+            lock.release()
+
+    def n_new(self) -> int:
+        """Return how many small files there are."""
+        return len(self._new())
+
+    def compact(self, *, everything: bool = False) -> bool:
+        """Merge small files into a segment, and small segments into one; False where another process is at it.
+
+        Nothing is lost whenever it is killed: a segment counts from when the list names it, and a small file is
+        deleted after that.
+        """
+        from filelock import FileLock, Timeout
+
+        lock = FileLock(self.folder / ".lock")
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            return False
+        try:
+            self._remove_left_over()
+            self.read(lambda connection: self._merge(connection, everything=everything))
+        finally:
+            lock.release()
+        return True
+
+    def _merge(self, connection: DuckDBPyConnection, *, everything: bool) -> None:
+        segments, replaced = self._manifest()
+        loose = self._new()
+        sizes = {
+            name: connection.execute(
+                f"SELECT count(*) FROM read_parquet({_list([str(self._segment(name) / 'recordings.parquet')])})"
+            ).fetchall()[0][0]
+            for name in segments
+        }
+        replaced = sorted({*replaced, *(key for (key,) in connection.execute("FROM replaced").fetchall())})
+        merged = segments if everything else _alike(sizes)
+        if not loose and len(merged) < 2 and not (everything and replaced):
+            return
+        files = [str(path) for path in loose]
+        old = [str(self._segment(name) / "recordings.parquet") for name in merged]
+        of = [str(self._segment(name) / "indicators.parquet") for name in merged]
+        connection.execute("CREATE OR REPLACE TEMP TABLE gone AS SELECT unnest(?::VARCHAR[]) AS key", [replaced])
+        columns, kept = ", ".join(RECORDING), " WHERE key NOT IN (FROM gone)"
+        name = f"{time.time_ns():020d}-{secrets.token_hex(4)}"
+        part = self.folder / SEGMENTS / f".{name}"
+        part.mkdir()
+        try:
+            once = " QUALIFY row_number() OVER (PARTITION BY key) = 1"
+            union = " UNION ALL ".join(
+                f"SELECT {columns} FROM read_parquet({_list(paths)}){kept}" for paths in (old, files) if paths
+            )
+            options = "(FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE 60000)"
+            connection.execute(
+                f"COPY (SELECT * FROM ({union}){once} ORDER BY machine, point, date) "
+                f"TO {_text(str(part / 'recordings.parquet'))} {options}"
+            )
+            names = ", ".join(INDICATOR)
+            of_loose = (
+                f"SELECT key, machine, point, date, {', '.join(f'i.{n} AS {n}' for n in INDICATOR)} FROM (SELECT key, "
+                f"machine, point, date, unnest(indicators) AS i FROM read_parquet({_list(files)}){kept})"
+            )
+            of_old = f"SELECT key, machine, point, date, {names} FROM read_parquet({_list(of)}){kept}"
+            both = " UNION ALL ".join(sql for sql, there in ((of_old, of), (of_loose, files)) if there)
+            order = ", ".join(("machine", "point", *SERIES, "date"))
+            connection.execute(
+                f"COPY (SELECT * FROM ({both}) ORDER BY {order}) TO {_text(str(part / 'indicators.parquet'))} {options}"
+            )
+            (part / MERGED).write_text(json.dumps(merged), encoding="utf-8")
+            part.rename(self._segment(name))
+        except BaseException:
+            shutil.rmtree(part, ignore_errors=True)
+            raise
+        left = [old_name for old_name in segments if old_name not in merged]
+        self._write_manifest([*left, name], replaced if left else [])
+        for path in loose:
+            path.unlink(missing_ok=True)
+
+    def _remove_left_over(self) -> None:
+        """Delete segments that do not count any more; they outlive one merge, for those who still read them."""
+        counting, _ = self._manifest()
+        for path in (self.folder / SEGMENTS).iterdir():
+            if path.name not in counting:
+                shutil.rmtree(path, ignore_errors=True)
+        for path in (self.folder / NEW).glob(".*.part"):
+            with suppress(OSError):
+                if time.time() - path.stat().st_mtime > 3600.0:  # of a process that was killed
+                    path.unlink()
+
+
+def _alike(sizes: dict[str, int]) -> list[str]:
+    """Return the segments of the lowest tier that is full, with all that are smaller; nothing where none is full."""
+    tiers = {name: int(log(max(size, 1), TIER)) for name, size in sizes.items()}
+    full = [tier for tier in set(tiers.values()) if list(tiers.values()).count(tier) >= TIER]
+    return [name for name, tier in tiers.items() if full and tier <= min(full)]
+
+
+def required() -> None:
+    """Check that what a fleet needs is installed.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    from importlib.util import find_spec
+
+    missing = [name for name in ("duckdb", "filelock") if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"a fleet needs the package{'s' * (len(missing) > 1)} {' and '.join(missing)}",
+            remedy="install with: pip install 'gearsig[fleet]'",
+        )
+
+
+def _text(value: str) -> str:
+    """Return a text as SQL writes it."""
+    return "'" + value.replace("'", "''") + "'"
+
+
+def _list(paths: Iterable[str]) -> str:
+    """Return paths as SQL writes them; marks of patterns in a folder's name stand for themselves."""
+    return "[" + ", ".join(_text("".join(f"[{c}]" if c in "*?[" else c for c in path)) for path in paths) + "]"
+
+
+def _parts(columns: str, files: Sequence[str], types: dict[str, str], kept: str) -> str:
+    if files:
+        return f"SELECT {columns} FROM read_parquet({_list(files)}){kept}"
+    return f"SELECT {', '.join(f'NULL::{_SQL[kind]} AS {name}' for name, kind in types.items())} WHERE false"
+
+
+def _arrow_schema() -> Any:
+    import pyarrow as pa
+
+    kinds = {"string": pa.string(), "double": pa.float64(), "int64": pa.int64(), "timestamp": pa.timestamp("us")}
+    indicator = pa.struct([(name, kinds[kind]) for name, kind in INDICATOR.items()])
+    fields = [(name, kinds[kind]) for name, kind in RECORDING.items()]
+    return pa.schema([*fields, ("indicators", pa.list_(pa.field("element", indicator)))])

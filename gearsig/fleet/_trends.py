@@ -1,0 +1,421 @@
+"""From the stored results of a measuring point to limits, alarms and change points of each of its indicators."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import date, datetime, time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearsig.cache import write_whole
+from gearsig.checks import FloatArray, count, not_negative, within
+from gearsig.errors import InputError
+from gearsig.fleet._statistics import (
+    ALARM,
+    MIN_SCATTER,
+    OK,
+    WARNING,
+    BoolArray,
+    IntArray,
+    alarm_levels,
+    change_points,
+    decibels,
+    prediction_limits,
+    regressors,
+    standardised_innovations,
+)
+from gearsig.fleet._store import SERIES
+from gearsig.indicators import ZONE_LIMITS_MM_PER_S
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+SETTINGS = "settings.toml"
+HEALTHY = ("no fault", "cannot tell")
+"""Outcomes of a recording that may belong to a baseline that nobody stated."""
+
+SERIOUS_DB = 20.0
+"""A rise that is serious: R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, ch. 5."""
+
+RETURN = 0.75
+"""An alarm is cleared below this share of the way from the expected value to the limit."""
+
+CLEARED_ZONE = 0.9
+"""Share of the boundary of zone C below which an alarm by zones is cleared."""
+
+ISO, STATISTICAL, NONE = "ISO 20816-3", "statistical", "none"
+"""What limits rest on."""
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """A period in which a machine was healthy.
+
+    Parameters
+    ----------
+    machine, point : str
+        An empty point stands for all of the machine's.
+    start, end : datetime
+    """
+
+    machine: str
+    point: str
+    start: datetime
+    end: datetime
+
+    def __post_init__(self) -> None:
+        if not self.start < self.end:
+            raise InputError(
+                f"the baseline of {self.machine!r} ends at {self.end}, before it starts at {self.start}",
+                remedy="give the earlier date first",
+            )
+
+
+@dataclass(frozen=True)
+class TrendSettings:
+    """How trends are judged.
+
+    Parameters
+    ----------
+    n_baseline : int
+        First healthy recordings that are the baseline where no period is stated.
+    false_alarm_rate : float
+        Probability that an unchanged measuring point raises a statistical alarm at one recording, over all its
+        indicators (Bonferroni); the same for change points, as one over the mean number of recordings between them.
+    minimum_change_db : float
+        Smaller changes raise no alarm, however regular they are: two recordings of one machine in one state differ by
+        less than 6 dB (Randall).
+    n_to_clear : int
+        Recordings on end that must lie below the level of return before an alarm is cleared.
+    baselines : tuple of Baseline
+    """
+
+    n_baseline: int = 20
+    false_alarm_rate: float = 1e-3
+    minimum_change_db: float = 6.0
+    n_to_clear: int = 3
+    baselines: tuple[Baseline, ...] = ()
+
+    def __post_init__(self) -> None:
+        count(self.n_baseline, "n_baseline", minimum=7)
+        within(self.false_alarm_rate, "false_alarm_rate", 1e-9, 0.2)
+        not_negative(self.minimum_change_db, "minimum_change_db", "dB")
+        count(self.n_to_clear, "n_to_clear")
+
+    def baseline_of(self, machine: str, point: str) -> Baseline | None:
+        """Return the latest stated period of a measuring point, None where none is stated."""
+        of_point = [b for b in self.baselines if b.machine == machine and b.point in ("", point)]
+        return max(of_point, key=lambda b: (b.point != "", b.end), default=None)
+
+    @property
+    def digest(self) -> str:
+        """Short hash, by which it shows that trends were judged by other settings."""
+        return hashlib.sha256(repr(self).encode()).hexdigest()[:12]
+
+
+def read_settings(folder: Path) -> TrendSettings:
+    """Read a store's settings; the defaults where it has none.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged or a value is not allowed.
+    """
+    path = folder / SETTINGS
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return TrendSettings()
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"is no settings file ({' '.join(str(error).split())})", where=str(path)) from None
+    known = [name for name in TrendSettings.__dataclass_fields__ if name != "baselines"]
+    unknown = sorted(set(data) - {*known, "baseline"})
+    if unknown:
+        raise InputError(f"{unknown[0]!r} is not known", where=str(path), allowed=", ".join([*known, "[[baseline]]"]))
+    tables = data.get("baseline", [])
+    try:
+        baselines = tuple(
+            Baseline(str(t["machine"]), str(t.get("point", "")), _moment(t["start"]), _moment(t["end"], ends=True))
+            for t in tables
+        )
+        return TrendSettings(**{name: data[name] for name in known if name in data}, baselines=baselines)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"a value is missing or of another kind ({error})",
+            where=str(path),
+            remedy="[[baseline]] has machine, point, start, end",
+        ) from None
+    except InputError as error:
+        raise InputError(error.what, where=str(path), allowed=error.allowed, remedy=error.remedy) from None
+
+
+def _moment(value: object, *, ends: bool = False) -> datetime:
+    if isinstance(value, datetime):
+        return value.replace(tzinfo=None)
+    if isinstance(value, date):
+        return datetime.combine(value, time.max if ends else time.min)
+    raise InputError(f"{value!r} is no date", remedy="write for example 2026-01-31")
+
+
+def write_settings(folder: Path, settings: TrendSettings) -> None:
+    """Write a store's settings."""
+    import tomli_w
+
+    data: dict[str, Any] = {name: value for name, value in asdict(settings).items() if name != "baselines"}
+    data["baseline"] = [asdict(baseline) for baseline in settings.baselines]
+    write_whole(folder / SETTINGS, lambda file: file.write(tomli_w.dumps(data).encode()))
+
+
+@dataclass(frozen=True)
+class AlarmEvent:
+    """An alarm of a series: when it was raised and, if it was, cleared.
+
+    Parameters
+    ----------
+    level : int
+        The highest it had: `WARNING` or `ALARM`.
+    raised : datetime
+        Date of the recording.
+    added : datetime
+        When that recording came into the store.
+    cleared : datetime or None
+    """
+
+    level: int
+    raised: datetime
+    added: datetime
+    cleared: datetime | None = None
+
+
+@dataclass(frozen=True)
+class PointTrends:
+    """All series of a measuring point, judged.
+
+    Parameters
+    ----------
+    recordings : DataFrame
+        Of the point, by date: key, date, added, speed_rpm, load_nm, outcome.
+    series : DataFrame
+        Name, channel, place, … of each column of the arrays.
+    values, expected, low, high, alarm : array, (n_recordings, n_series)
+        In the indicators' units; limits nan where there are none. Beyond `low` and `high` is a warning.
+    in_db : bool array, (n_series,)
+        Whether changes are counted in dB.
+    baseline : bool array, (n_recordings,)
+    levels : int array, (n_recordings, n_series)
+        Level that stands after each recording.
+    basis : tuple of str
+        Of each series: `ISO`, `STATISTICAL` or `NONE`.
+    began, noticed : int array, (n_series,)
+        Recordings at which each series first changed, and at which that was noticed; -1: it has not.
+    normalised : tuple of str
+        What the expected values depend on: "speed", "load".
+    false_alarm_rate : float
+        Of one value of one series.
+    """
+
+    recordings: DataFrame
+    series: DataFrame
+    values: FloatArray
+    expected: FloatArray
+    low: FloatArray
+    high: FloatArray
+    alarm: FloatArray
+    in_db: BoolArray
+    baseline: BoolArray
+    levels: IntArray
+    basis: tuple[str, ...]
+    began: IntArray
+    noticed: IntArray
+    normalised: tuple[str, ...]
+    false_alarm_rate: float
+
+    def change(self) -> FloatArray:
+        """How far each value is from the expected one: in dB, or in the indicator's unit."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            in_db = 20.0 * np.log10(self.values / self.expected)
+        result: FloatArray = np.where(self.in_db, in_db, self.values - self.expected)
+        return result
+
+    def events(self, column: int) -> list[AlarmEvent]:
+        """Return the alarms of a series, the earliest first."""
+        levels = self.levels[:, column]
+        dates, added = self.recordings["date"], self.recordings["added"]
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], levels > OK, [0])).astype(np.int8)))
+        return [
+            AlarmEvent(
+                int(levels[start:end].max()),
+                dates.iloc[start].to_pydatetime(),
+                added.iloc[start].to_pydatetime(),
+                dates.iloc[end].to_pydatetime() if end < len(levels) else None,
+            )
+            for start, end in edges.reshape(-1, 2)
+        ]
+
+
+def judge(
+    recordings: DataFrame, indicators: DataFrame, settings: TrendSettings, stated: Baseline | None
+) -> PointTrends:
+    """Judge all series of a measuring point.
+
+    Parameters
+    ----------
+    recordings : DataFrame
+        Of the point, without failures: key, date, added, speed_rpm, load_nm, outcome, iso_group, iso_mounting.
+    indicators : DataFrame
+        key, value and what tells series apart.
+    settings : TrendSettings
+    stated : Baseline or None
+    """
+    recordings = recordings.sort_values(["date", "added"], kind="stable").reset_index(drop=True)
+    values, series = _matrix(recordings, indicators)
+    baseline = _baseline(recordings, settings, stated)
+    y, in_db = decibels(values, baseline)
+    speed, load = (recordings[name].to_numpy(np.float64) for name in ("speed_rpm", "load_nm"))
+    x, inside, normalised = regressors(speed, load, baseline)
+    rate = settings.false_alarm_rate / max(len(series), 1)
+    limits = prediction_limits(y, x, baseline, rate, min_scatter=np.where(in_db, MIN_SCATTER, 1e-9))
+    judged = (~baseline & inside)[:, None] & np.isfinite(y) & np.isfinite(limits.high)
+    least = np.where(in_db, settings.minimum_change_db, 0.0)
+    reach, rise = np.maximum(limits.high - limits.expected, least), y - limits.expected
+    with np.errstate(invalid="ignore"):
+        sample = np.where(np.abs(rise) > reach, np.where(in_db & (rise >= SERIOUS_DB), ALARM, WARNING), OK)
+        calm = np.abs(rise) <= RETURN * reach
+    sample = np.where(judged, sample, -1)
+    basis = [STATISTICAL if known else NONE for known in np.asarray(np.isfinite(reach).any(axis=0)).tolist()]
+    expected, low, high = (_natural(limits.expected + part, in_db) for part in (0.0 * reach, -reach, reach))
+    alarm = np.where(in_db, _natural(limits.expected + np.maximum(reach, SERIOUS_DB), in_db), np.nan)
+    zones = _zone_limits(recordings)
+    is_velocity = np.asarray(series["name"] == "overall velocity", dtype=np.bool_)
+    for column in np.flatnonzero(is_velocity):
+        if zones is None:
+            break
+        _, warning, limit = zones
+        velocity = values[:, column]
+        with np.errstate(invalid="ignore"):
+            level = (velocity > warning).astype(np.int64) + (velocity > limit)
+            calm[:, column] = velocity <= CLEARED_ZONE * warning
+        sample[:, column] = np.where(np.isfinite(velocity), level, -1)
+        low[:, column], high[:, column], alarm[:, column] = np.nan, warning, limit
+        basis[column] = ISO
+    q = standardised_innovations(y, x)
+    began, noticed = change_points(q, 1.0 / rate)
+    return PointTrends(
+        recordings,
+        series,
+        values,
+        expected,
+        low,
+        high,
+        alarm,
+        in_db,
+        baseline,
+        alarm_levels(sample, calm, settings.n_to_clear),
+        tuple(basis),
+        began,
+        noticed,
+        normalised,
+        rate,
+    )
+
+
+def _matrix(recordings: DataFrame, indicators: DataFrame) -> tuple[FloatArray, DataFrame]:
+    """Return values by recording and series, and what tells series apart."""
+    columns: list[str] = [*SERIES]
+    groups = indicators.groupby(columns, sort=True, dropna=False)
+    series = groups.size().reset_index()[columns]
+    values = np.full((len(recordings), len(series)), np.nan)
+    place = dict(zip(recordings["key"], range(len(recordings)), strict=True))
+    rows = indicators["key"].map(place).to_numpy(np.float64)
+    kept = np.isfinite(rows)
+    number = groups.ngroup().to_numpy()
+    values[rows[kept].astype(np.int64), number[kept]] = indicators["value"].to_numpy(np.float64)[kept]
+    return values, series
+
+
+def _baseline(recordings: DataFrame, settings: TrendSettings, stated: Baseline | None) -> BoolArray:
+    """Return which recordings are the baseline: all of the stated period, or the first healthy ones, once complete."""
+    if stated is not None:
+        dates = recordings["date"]
+        result: BoolArray = ((dates >= stated.start) & (dates <= stated.end)).to_numpy(np.bool_)
+        return result
+    healthy = recordings["outcome"].isin(HEALTHY).to_numpy(np.bool_)
+    first = healthy & (np.cumsum(healthy) <= settings.n_baseline)
+    return first if int(first.sum()) == settings.n_baseline else np.zeros(len(healthy), dtype=np.bool_)
+
+
+def _natural(levels: FloatArray, in_db: BoolArray) -> FloatArray:
+    result: FloatArray = np.where(in_db, 10.0 ** (np.clip(levels, -6000.0, 6000.0) / 20.0), levels)
+    return result
+
+
+def _zone_limits(recordings: DataFrame) -> tuple[float, float, float] | None:
+    """Return the boundaries of the zones of ISO 20816-3, where the latest recording was judged by them."""
+    known = recordings[recordings["iso_group"].notna()]
+    if known.empty:
+        return None
+    last = known.iloc[-1]
+    return ZONE_LIMITS_MM_PER_S.get((int(last["iso_group"]), str(last["iso_mounting"])))
+
+
+def state_rows(trends: PointTrends, machine: str, point: str, fingerprint: str) -> list[dict[str, Any]]:
+    """Return what status and reports need of each series: its last value against its limits, alarms, change."""
+    change, dates = trends.change(), trends.recordings["date"]
+    reached = trends.recordings["date"][trends.baseline]
+    rows: list[dict[str, Any]] = []
+    known = np.isfinite(trends.values)
+    for column, names in enumerate(trends.series.to_dict("records")):
+        at = np.flatnonzero(known[:, column])
+        last = int(at[-1])
+        events, level = trends.events(column), int(trends.levels[-1, column])
+        began, noticed = int(trends.began[column]), int(trends.noticed[column])
+        rows.append(
+            {"machine": machine, "point": point}
+            | {str(key): value for key, value in names.items()}
+            | {
+                "n": len(at),
+                "n_baseline": int((trends.baseline & known[:, column]).sum()),
+                "baseline_from": reached.iloc[0] if len(reached) else None,
+                "baseline_to": reached.iloc[-1] if len(reached) else None,
+                "value": float(trends.values[last, column]),
+                "date": dates.iloc[last],
+                "expected": float(trends.expected[last, column]),
+                "upper_limit": float(trends.high[last, column]),
+                "change": float(change[last, column]),
+                "in_db": bool(trends.in_db[column]),
+                "level": level,
+                "since": events[-1].raised if level > OK and events else None,
+                "basis": trends.basis[column],
+                "normalised": ", ".join(trends.normalised),
+                "changed": dates.iloc[began] if began >= 0 else None,
+                "changed_added": trends.recordings["added"].iloc[noticed] if noticed >= 0 else None,
+                "changed_by": float(np.nanmean(change[began:, column])) if began >= 0 else float("nan"),
+                "events": json.dumps([asdict(event) for event in events], default=str),
+                "fingerprint": fingerprint,
+            }
+        )
+    return rows
+
+
+def events_of(text: str) -> list[AlarmEvent]:
+    """Return the alarms that `state_rows` wrote."""
+
+    def moment(value: str | None) -> datetime | None:
+        return datetime.fromisoformat(value) if value else None
+
+    found: Sequence[Mapping[str, Any]] = json.loads(text)
+    return [
+        AlarmEvent(
+            int(e["level"]),
+            datetime.fromisoformat(e["raised"]),
+            datetime.fromisoformat(e["added"]),
+            moment(e["cleared"]),
+        )
+        for e in found
+    ]

@@ -1,0 +1,261 @@
+"""Adding: once each, by any number of processes, whatever is killed or damaged."""
+
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError
+from gearsig.fleet import FilePattern, TrendSettings, date_in_name, open_fleet, origins
+from tests.fleet.recordings import PATTERN, write_recording_file
+
+pytest.importorskip("duckdb", reason="the extra fleet is not installed")
+pytest.importorskip("filelock", reason="the extra fleet is not installed")
+
+
+def test_what_is_known_is_passed_over_by_content_and_place(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0, 1.1, 0.9])
+    fleet = open_fleet(tmp_path / "store", create=True)
+    assert len(fleet.add(data, pattern=PATTERN, n_processes=1).added) == 3
+    again = fleet.add(data, pattern=PATTERN, n_processes=1)
+    assert (len(again.added), again.n_known) == (0, 3)
+    (data / "pump 1" / "DE_20260101.csv").touch()
+    touched = fleet.add(data, pattern=PATTERN, n_processes=1)
+    assert (len(touched.added), touched.n_known) == (0, 3)
+    (data / "pump 1").rename(data / "pump 2")  # another machine, the same bytes
+    moved = fleet.add(data, pattern=PATTERN, n_processes=1)
+    assert len(moved.added) == 3
+    assert sorted(set(fleet.recordings()["machine"])) == ["pump 1", "pump 2"]
+
+
+def test_a_result_under_a_wrong_name_is_replaced(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0, 1.1])
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(data, machine="pmup", n_processes=1)
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    for _ in range(2):
+        assert set(fleet.recordings()["machine"]) == {"pump 1"}
+        assert set(fleet.indicators()["machine"]) == {"pump 1"}
+        fleet.compact()
+
+
+def test_tables_are_the_same_before_and_after_merging(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0, 1.1, 0.9])
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    before = [fleet.recordings(), fleet.indicators("pump 1", "DE", "rms")]
+    fleet.compact()
+    assert not list((tmp_path / "store" / "new").iterdir())
+    after = [fleet.recordings(), fleet.indicators("pump 1", "DE", "rms")]
+    assert all(a.equals(b) for a, b in zip(before, after, strict=True))
+    make_recordings("pump 3", [1.0])
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    assert len(fleet.recordings()) == 4
+
+
+def test_indicators_are_those_of_the_analysis(make_recordings, tmp_path):
+    from gearsig.diagnosis import analyze
+    from gearsig.recording import read_recording
+
+    data = make_recordings("pump 1", [1.0])
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    expected = {
+        (i.name, i.computed_on): i.value
+        for i in analyze(read_recording(data / "pump 1" / "DE_20260101.csv")).indicators
+        if np.isfinite(i.value)
+    }
+    table = fleet.indicators()
+    assert dict(zip(zip(table["name"], table["computed_on"], strict=True), table["value"], strict=True)) == expected
+
+
+@pytest.mark.parametrize("merged", [False, True])
+@pytest.mark.parametrize("damage", ["cut", "noise", "empty"])
+def test_a_damaged_part_is_set_aside_and_analysed_again(make_recordings, tmp_path, merged, damage):
+    data = make_recordings("pump 1", [1.0, 1.1, 0.9])
+    messages: list[str] = []
+    fleet = open_fleet(tmp_path / "store", create=True, on_message=messages.append)
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    if merged:
+        fleet.compact()
+    victim = next((tmp_path / "store").glob("segments/*/indicators.parquet" if merged else "new/*.parquet"))
+    content = victim.read_bytes()
+    half = len(content) // 2
+    victim.write_bytes({"cut": content[:half], "noise": b"\x5a" * len(content), "empty": b""}[damage])
+    assert len(fleet.indicators(name="rms")) == (0 if merged else 2)
+    assert len(messages) == 1
+    assert "set aside" in messages[0]
+    assert len(fleet.add(data, pattern=PATTERN, n_processes=1).added) == (3 if merged else 1)
+    assert len(fleet.indicators(name="rms")) == 3
+    assert len(messages) == 1
+
+
+def test_a_damaged_list_of_segments_loses_nothing(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0, 1.1])
+    fleet = open_fleet(tmp_path / "store", create=True, on_message=[].append)
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    fleet.compact()
+    make_recordings("pump 3", [1.0])
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    fleet.compact()  # the first segment stays in the folder for those who still read it
+    (tmp_path / "store" / "store.json").write_text("{")
+    assert len(fleet.recordings()) == 3
+    assert len(fleet.indicators(name="rms")) == 3
+
+
+def test_an_unreadable_recording_is_kept_as_a_failure_until_it_changes(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0, 1.0])
+    victim = data / "pump 1" / "DE_20260102.csv"
+    whole = victim.read_bytes()
+    victim.write_bytes(b"time (s),a1\n0,1\n0.1,abc\n")
+    fleet = open_fleet(tmp_path / "store", create=True)
+    first = fleet.add(data, pattern=PATTERN, n_processes=1)
+    assert [a.origin.path.name for a in first.failures] == ["DE_20260102.csv"]
+    assert "abc" in first.failures[0].verdict
+    assert not fleet.add(data, pattern=PATTERN, n_processes=1).added
+    assert list(fleet.status()["n_failed"]) == [1]
+    victim.write_bytes(whole)
+    assert not fleet.add(data, pattern=PATTERN, n_processes=1).failures
+    assert list(fleet.status()["n_failed"]) == [0]
+
+
+ADDING = """
+import sys
+from gearsig.fleet import open_fleet
+from tests.fleet.recordings import PATTERN
+if __name__ == "__main__":
+    result = open_fleet(sys.argv[1], create=True).add(sys.argv[2], pattern=PATTERN, n_processes=int(sys.argv[3]))
+    print(len(result.added))
+"""
+
+
+def _adding(store: Path, data: Path, n_processes: int = 1) -> "subprocess.Popen[str]":
+    words = [sys.executable, "-c", ADDING, str(store), str(data), str(n_processes)]
+    root = str(Path(__file__).parents[2])
+    return subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": root})
+
+
+def test_two_processes_share_a_folder_and_add_each_recording_once(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0 + 0.01 * i for i in range(16)])
+    running = [_adding(tmp_path / "store", data) for _ in range(2)]
+    counts = [int(process.communicate()[0]) for process in running]
+    fleet = open_fleet(tmp_path / "store")
+    assert len(fleet.recordings()) == 16
+    assert len(fleet.indicators(name="rms")) == 16
+    assert sum(counts) == 16
+
+
+def test_what_was_killed_goes_on_where_it_was(make_recordings, tmp_path):
+    data, store = make_recordings("pump 1", [1.0 + 0.01 * i for i in range(24)]), tmp_path / "store"
+    process = _adding(store, data)
+    while len(list(store.glob("new/*.parquet"))) < 5 and process.poll() is None:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    kept = len(open_fleet(store).recordings())
+    assert kept >= 5
+    result = open_fleet(store).add(data, pattern=PATTERN, n_processes=1)
+    assert len(result.added) + kept == 24
+    assert len(open_fleet(store).recordings()) == 24
+
+
+def test_a_merge_that_is_killed_before_it_deletes_doubles_nothing(make_recordings, tmp_path):
+    data, store = make_recordings("pump 1", [1.0, 1.1]), tmp_path / "store"
+    fleet = open_fleet(store, create=True)
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    parts = {path: path.read_bytes() for path in (store / "new").iterdir()}
+    fleet.compact()
+    for path, content in parts.items():
+        path.write_bytes(content)
+    assert len(fleet.recordings()) == 2
+    assert len(fleet.indicators(name="rms")) == 2
+
+
+def test_other_folders_are_not_taken_for_a_store(tmp_path):
+    (tmp_path / "a.txt").write_text("mine")
+    with pytest.raises(InputError, match="other things"):
+        open_fleet(tmp_path, create=True)
+    with pytest.raises(InputError, match="no fleet"):
+        open_fleet(tmp_path / "absent")
+
+
+@pytest.mark.parametrize(
+    ("pattern", "path", "found"),
+    [
+        ("{machine}/{point}_{date:%Y%m%d}.csv", "/d/p 1/DE_20260131.csv", ("p 1", "DE", datetime(2026, 1, 31))),
+        ("{machine}/**/{point}-{date:%d.%m.%y}*", "/d/m/x/y/NDE-03.02.26_a.h5", ("m", "NDE", datetime(2026, 2, 3))),
+        ("{machine}_{}_{date:%Y%m%d}.csv", "/d/m_test_20260131.csv", ("m", None, datetime(2026, 1, 31))),
+    ],
+)
+def test_patterns_name_machine_point_and_date(pattern, path, found):
+    match = FilePattern(pattern).match(Path(path), Path("/d"))
+    assert match is not None
+    assert (match["machine"], match.get("point"), match["date"]) == found
+
+
+@pytest.mark.parametrize("pattern", ["{mashine}/x", "{date}.csv", "{date:%Q}", "{point}{point}", "{machine:%Y}", "{a"])
+def test_what_is_no_pattern_is_refused(pattern):
+    with pytest.raises(InputError):
+        FilePattern(pattern)
+
+
+def test_a_date_that_is_none_does_not_match():
+    assert FilePattern("{date:%Y%m%d}.csv").match(Path("20260231.csv")) is None
+    assert date_in_name("x_20260231_y") is None
+
+
+def test_without_a_pattern_folders_rigs_and_names_say_it(tmp_path):
+    rng = np.random.default_rng(0)
+    write_recording_file(tmp_path / "site" / "pump 7" / "gearbox" / "2026-03-01T0710.csv", 1.0, rng, 300)
+    write_recording_file(tmp_path / "site" / "lone.csv", 1.0, rng, 300)
+    (tmp_path / "site" / "lone.toml").write_text('name = "Mill"\n')
+    os.utime(tmp_path / "site" / "lone.csv", (1_700_000_000, 1_700_000_000))
+    found = {origin.path.name: origin for origin in origins([tmp_path / "site"])}
+    deep, lone = found["2026-03-01T0710.csv"], found["lone.csv"]
+    assert (deep.machine, deep.point, deep.date) == ("pump 7", "gearbox", datetime(2026, 3, 1, 7, 10))
+    assert (deep.machine_from, deep.point_from, deep.date_from) == ("folder", "folder", "file name")
+    assert (lone.machine, lone.machine_from, lone.date_from) == ("Mill", "rig file", "time of the file")
+    assert lone.date == datetime(2023, 11, 14, 22, 13, 20)
+    stated = origins([tmp_path / "site" / "lone.csv"], machine="A", date=datetime(2020, 1, 1))[0]
+    assert (stated.machine, stated.date) == ("A", datetime(2020, 1, 1))
+
+
+def test_settings_are_kept_and_checked(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0] * 3)
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    fleet.set(TrendSettings(n_baseline=9))
+    fleet.set_baseline("pump 1", datetime(2026, 1, 1), datetime(2026, 1, 2))
+    settings = fleet.settings
+    assert (settings.n_baseline, settings.baselines[0].machine) == (9, "pump 1")
+    with pytest.raises(InputError, match="pump 1"):
+        fleet.set_baseline("pump 11", datetime(2026, 1, 1), datetime(2026, 1, 2))
+    (tmp_path / "store" / "settings.toml").write_text("n_baseline = 2\n")
+    with pytest.raises(InputError, match="n_baseline"):
+        fleet.status()
+
+
+def test_a_table_is_exported_in_each_form(make_recordings, tmp_path):
+    import pandas as pd
+
+    data = make_recordings("pump 1", [1.0, 1.2])
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    n = fleet.export(tmp_path / "a.csv", name="rms")
+    assert n == 2
+    assert list(pd.read_csv(tmp_path / "a.csv")["name"]) == ["rms", "rms"]
+    assert fleet.export(tmp_path / "r.parquet", "recordings", start=datetime(2026, 1, 2)) == 1
+    assert list(pd.read_parquet(tmp_path / "r.parquet")["machine"]) == ["pump 1"]
+    fleet.export(tmp_path / "s.jsonl", "status")
+    assert json.loads((tmp_path / "s.jsonl").read_text())["machine"] == "pump 1"
+    with pytest.raises(InputError, match="ending"):
+        fleet.export(tmp_path / "a.xlsx")
+    assert multiprocessing.active_children() == []
