@@ -191,19 +191,19 @@ def _hint(name: str, names: Sequence[str]) -> str:
     return f"there are {', '.join(n for n in names if n.partition('_')[0] == words[0])}"
 
 
-def checked_value(wanted: Parameter, value: object) -> ParameterValue | None:
+def checked_value(parameter: Parameter, value: object) -> ParameterValue | None:
     """Return a value that the parameter may have; a number as float; None or "none" where it may follow from others."""
-    if wanted.default is None and (value is None or value == "none"):
+    if parameter.default is None and (value is None or value == "none"):
         return None
-    if wanted.choices:
-        return one_of(str(value), wanted.name, wanted.choices)
+    if parameter.choices:
+        return one_of(str(value), parameter.name, parameter.choices)
     if isinstance(value, bool):
-        raise InputError(f"{wanted.name} is {value}", allowed="a number")
-    low = -float("inf") if wanted.low is None else wanted.low
-    high = float("inf") if wanted.high is None else wanted.high
-    number = within(value, wanted.name, low, high, wanted.unit)  # type: ignore[arg-type]  # it says so itself
-    if wanted.whole and number != round(number):
-        raise InputError(f"{wanted.name} is {number:g}", allowed="a whole number")
+        raise InputError(f"{parameter.name} is {value}", allowed="a number")
+    low = -float("inf") if parameter.low is None else parameter.low
+    high = float("inf") if parameter.high is None else parameter.high
+    number = within(value, parameter.name, low, high, parameter.unit)  # type: ignore[arg-type]  # it says so itself
+    if parameter.whole and number != round(number):
+        raise InputError(f"{parameter.name} is {number:g}", allowed="a whole number")
     return number
 
 

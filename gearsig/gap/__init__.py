@@ -29,6 +29,7 @@ from gearsig.gap._change import (
 from gearsig.gap._conditions import (
     Condition,
     HealthyReference,
+    check_steady,
     compare,
     conditions_of,
     exchanged,
@@ -37,6 +38,7 @@ from gearsig.gap._conditions import (
     strange_pattern,
     strange_teeth,
     with_channels_of,
+    with_common_channels,
     wrong_teeth,
 )
 from gearsig.gap._curves import (
@@ -48,7 +50,10 @@ from gearsig.gap._curves import (
     lines_beyond,
     spectrum_curves,
 )
-from gearsig.gap._diagnose import diagnose_gap
+from gearsig.gap._diagnose import (
+    diagnose_gap,
+    effects_without_place,
+)
 from gearsig.gap._evidence import (
     SIGNS,
     ShaftSigns,
@@ -78,7 +83,15 @@ from gearsig.gap._floors import (
 )
 from gearsig.gap._gearless import Standing, beside_standing, standing_place, stood_out
 from gearsig.gap._inputs import GapRequest, read_gap_inputs
-from gearsig.gap._places import counted_against, gap_places, mesh_spot, ranked_places, tail_spot
+from gearsig.gap._next_recording import next_recordings
+from gearsig.gap._places import (
+    all_round_spot,
+    counted_against,
+    gap_places,
+    mesh_spot,
+    ranked_places,
+    tail_spot,
+)
 from gearsig.gap._prediction import (
     EffectPath,
     Fit,
@@ -249,6 +262,7 @@ __all__ = [
     "WaveformMatch",
     "against_reference",
     "alike_features",
+    "all_round_spot",
     "angle_curves",
     "apart_features",
     "at_its_tooth",
@@ -260,12 +274,14 @@ __all__ = [
     "beyond_the_mesh",
     "change_features",
     "change_once",
+    "check_steady",
     "compare",
     "conditions_of",
     "counted_against",
     "credibility_of",
     "diagnose_gap",
     "difference_features",
+    "effects_without_place",
     "even_weights",
     "evidence_of",
     "exchanged",
@@ -297,6 +313,7 @@ __all__ = [
     "matching_reference",
     "mesh_spot",
     "mirrored",
+    "next_recordings",
     "odds_text",
     "once",
     "over_floors",
@@ -341,6 +358,7 @@ __all__ = [
     "waveform_log_likelihood",
     "weighed_evidence",
     "with_channels_of",
+    "with_common_channels",
     "within_the_floor",
     "without_machines_of",
     "wrong_teeth",

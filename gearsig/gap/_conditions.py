@@ -586,9 +586,9 @@ def _condition(
     if match is not None:
         facts = replace(facts, reference=match.name)
         now = as_long_as(recording, now, match.reduced)
-        now = _with_channels_of(now, match.reduced, healthy, name, notices)
+        now = with_common_channels(now, match.reduced, healthy, name, notices)
     reference = None if match is None else match.reduced
-    _check_steady(now, reference)
+    check_steady(now, reference)
     condition = Condition(facts, now, simulated(twin, facts, now), reference, population)
     if reference is not None:
         notices += strange_pattern(now, reference, name)
@@ -596,7 +596,7 @@ def _condition(
     return condition, notices
 
 
-def _with_channels_of(
+def with_common_channels(
     now: ReducedRecording,
     reference: ReducedRecording,
     healthy: Sequence[HealthyReference],
@@ -612,7 +612,7 @@ def _with_channels_of(
     return now.with_channels({channel: now.channels[channel] for channel in reference.channels})
 
 
-def _check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> None:
+def check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> None:
     """Refuse a run-up, but beside one of the reference's: the simulation is at one speed."""
     drift, usual = now.speed.drift, 0.0 if reference is None else reference.speed.drift
     if abs(drift - usual) > LARGEST_DRIFT:

@@ -275,7 +275,7 @@ def diagnose_gap(
                 (OWN_EFFECT if name in tried else NOT_SIMULATED).format(title=known[name].title)
                 for name in attribution.unheard_of
             ),
-            *_without_place(twin, allowed),
+            *effects_without_place(twin, allowed),
             *remarks,
             *(depths or _of_the_fit(named)),
             *_of_the_waveforms(tried, known),
@@ -338,7 +338,7 @@ def _check_rigs(recordings: Sequence[Recording]) -> Rig:
     return recordings[0].rig or Rig()
 
 
-def _without_place(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[str]:
+def effects_without_place(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[str]:
     """Name the effects that the rig has no place for, a bearing, say."""
     titles = [effect.title for name, effect in allowed.items() if not twin.candidates(name)]
     if not titles:

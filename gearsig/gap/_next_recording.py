@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -25,7 +25,13 @@ OWN = ""
 
 
 def next_recordings(
-    first: TriedEffect, second: TriedEffect, titles: tuple[str, str], twin: Twin, conditions: Sequence[Condition]
+    first: TriedEffect,
+    second: TriedEffect,
+    titles: tuple[str, str],
+    twin: Twin,
+    conditions: Sequence[Condition],
+    *,
+    simulate: Callable[..., Sequence[Reduced | str]] = finished_runs,
 ) -> tuple[NextRecording, ...]:
     """Return points and places at which both effects lie further apart than in the recordings there are, best first.
 
@@ -40,6 +46,8 @@ def next_recordings(
         Of both effects, for people.
     twin : Twin
     conditions : sequence of Condition
+    simulate : callable
+        Runs the tasks, as `finished_runs` does in processes.
     """
     base = conditions[0].facts
     measured, places = twin.with_further_sensors() if isinstance(twin, HasFurtherPlaces) else (twin, {})
@@ -52,7 +60,7 @@ def next_recordings(
         for p in points
     ]
     tasks = [Task(run, SEED, tried.fit.added, tuple(places)) for run in runs for tried in (first, second)]
-    rows = finished_runs(tasks, PROCESSES, lambda *_: None, n_together=2)
+    rows = simulate(tasks, PROCESSES, lambda *_: None, n_together=2)
     at = {
         point: _distances(conditions, one, other)
         for point, one, other in zip(points, rows[::2], rows[1::2], strict=True)

@@ -717,7 +717,7 @@ def tooth_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
     if pattern.own_share < OWN_SHARE:
         return None
     if pattern.prominence < STANDS_OUT:
-        return _all_round(comparison, side, shaft, name)
+        return all_round_spot(comparison, side, shaft, name)
     place, teeth = pattern.place_rev, frame.teeth[side]
     above, angle = 10.0 * float(np.log10(pattern.prominence)), 360.0 * place
     tooth = int(place * teeth) % teeth + 1 if now.marks[side] else None
@@ -726,7 +726,7 @@ def tooth_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
     return LocatedChange(title, above, angle_deg=angle, tooth=tooth, channel=name)
 
 
-def _all_round(comparison: ComparedPair, side: int, shaft: str, channel: str) -> LocatedChange:
+def all_round_spot(comparison: ComparedPair, side: int, shaft: str, channel: str) -> LocatedChange:
     """Return that no tooth in particular stands out, with the figure of the feature that was scored."""
     scored = comparison.strongest(*(f"{kind}.{SIDES[side]}." for kind in ("tooth", "change", "surprise")))
     level = f"tooth.{SIDES[side]}.level"

@@ -350,9 +350,10 @@ def input_rows(
     )
 
 
-def fit_recogniser(population: Population, *, with_reference: bool) -> Recogniser:
+def fit_recogniser(population: Population, *, with_reference: bool, n_trees: int = N_TREES) -> Recogniser:
     """Return the recogniser that is fitted to a population."""
-    return _with_floor(population, _fit(population, with_reference=with_reference), with_reference=with_reference)
+    fitted = _fit(population, with_reference=with_reference, n_trees=n_trees)
+    return _with_floor(population, fitted, with_reference=with_reference)
 
 
 def _with_floor(population: Population, fitted: Fitted, *, with_reference: bool) -> Recogniser:
@@ -361,7 +362,7 @@ def _with_floor(population: Population, fitted: Fitted, *, with_reference: bool)
     return Recogniser(causes, population.floor(with_reference=with_reference), trees, usual_load, linear)
 
 
-def _fit(population: Population, *, with_reference: bool) -> Fitted:
+def _fit(population: Population, *, with_reference: bool, n_trees: int = N_TREES) -> Fitted:
     """Fit to a population, and to the same with driver and driven gear exchanged.
 
     Extremely randomised trees: P. Geurts, D. Ernst, L. Wehenkel, "Extremely randomized trees", 2006. The linear
@@ -375,7 +376,7 @@ def _fit(population: Population, *, with_reference: bool) -> Fitted:
         (population.changes, population.change_scatter) if with_reference else (population.gaps, population.gap_scatter)
     )
     forest = ExtraTreesClassifier(
-        N_TREES,
+        n_trees,
         bootstrap=True,
         max_samples=ROW_SHARE,
         max_features=FEATURE_SHARE,

@@ -1,6 +1,6 @@
 """Recordings: channels over time, readers, quality of the data."""
 
-from gearsig.recording._limits import check_memory, free_memory_bytes
+from gearsig.recording._limits import check_memory, container_free_bytes, free_memory_bytes
 from gearsig.recording._quality import ChannelProblem, find_problems
 from gearsig.recording._read import (
     FORMAT_NAMES,
@@ -25,6 +25,7 @@ __all__ = [
     "Provenance",
     "Recording",
     "check_memory",
+    "container_free_bytes",
     "find_problems",
     "free_memory_bytes",
     "metres_per_second_squared",

@@ -97,9 +97,17 @@ def available_memory_bytes() -> int:
     return UNTOLD_BYTES if free is None else int(free)
 
 
-def check_memory(needed_bytes: int, where: str) -> None:
-    """Raise if decoding needs more than half of the available memory; the other half is for the analysis."""
-    allowed = available_memory_bytes() // 2
+def check_memory(needed_bytes: int, where: str, free_bytes: float | None = None) -> None:
+    """Raise if decoding needs more than half of the available memory; the other half is for the analysis.
+
+    Parameters
+    ----------
+    needed_bytes : int
+    where : str
+    free_bytes : float or None
+        None: what can be had without swapping.
+    """
+    allowed = int(available_memory_bytes() if free_bytes is None else free_bytes) // 2
     if needed_bytes > allowed:
         raise InputError(
             f"decoded size is about {needed_bytes / 1e9:.3g} GB",

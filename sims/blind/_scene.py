@@ -236,18 +236,24 @@ def run(scene: Scene, *, sub_steps: int = SUB_STEPS) -> BlindMotion:
     return BlindMotion(rate_hz, whole[:n_lead, :4].T, out[:, :4].T, out[:, 4:7].T, out[:, 7:9].T, out[:, 9], out[:, 10])
 
 
-def march_arguments(scene: Scene, sub_steps: int) -> tuple[Any, ...]:
-    """Return what `march` takes, in its order; `sub_steps` steps per sample, an even number."""
+def march_arguments(scene: Scene, sub_steps: int, **numbers: float) -> tuple[Any, ...]:
+    """Return what `march` takes, in its order; `sub_steps` steps per sample, an even number.
+
+    `numbers` take the place of single values of the march by their names there, e.g. `mesh_damping=0.0`.
+    """
     rig, condition = scene.rig, scene.condition
     rate_hz, step_s = 2 * rig.sampling_rate_hz, 1 / (rig.sampling_rate_hz * sub_steps)
     modes = modes_of(rig.parts)
     q, p, steady = _start(scene, modes)
+    number = _numbers(scene)
+    for name, value in numbers.items():
+        number[getattr(at, name.upper())] = value
     return (
         2 * round(condition.duration_s * rig.sampling_rate_hz),
         round(WARM_UP_S * rate_hz),
         sub_steps // 2,
         step_s,
-        _numbers(scene),
+        number,
         (step_coefficients(modes, step_s), modes.shapes, modes.seen, modes.omega, modes.zeta),
         q,
         p,

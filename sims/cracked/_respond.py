@@ -408,6 +408,7 @@ def respond(
     with_energy: bool = False,
     first: PairState | None = None,
     on_progress: Callable[[float], None] | None = None,
+    steps_per_call: int = STEPS_PER_CALL,
 ) -> Response:
     """Integrate the sixteen coordinates from the static balance on, or from where another run ended.
 
@@ -432,6 +433,8 @@ def respond(
         `Response.last` of another run; None: the static balance at `start_s`.
     on_progress : callable or None
         Called now and then with the part that is done, 0 to 1.
+    steps_per_call : int
+        Of compiled code between two of these calls.
 
     Raises
     ------
@@ -448,7 +451,7 @@ def respond(
     from sims.cracked._kernels import integrate
 
     step = default_step_s(machine, operation) if step_s is None else step_s
-    plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
+    plan = RunPlan(start_s, duration_s, step, stride, steps_per_call)
     ready = prepare(machine, operation, rng, start_s)
     q, v, set_angle = _first_state(ready, first)
     select = np.array([_place(name) for name in signals], dtype=np.int64)

@@ -450,23 +450,23 @@ SIDES = ("driver", "driven")
 N_PLACES = 65
 
 
-def gear_pair(wanted: ParameterValues) -> PairGeometry:
+def gear_pair(values: ParameterValues) -> PairGeometry:
     """Return the teeth of both gears as `sims.mesh` knows them."""
-    module, angle, width = (wanted.number(n) for n in ("module_mm", "pressure_angle_deg", "face_width_mm"))
-    gears = [GearGeometry(wanted.whole(f"teeth_{side}"), module, angle, face_width_mm=width) for side in SIDES]
+    module, angle, width = (values.number(n) for n in ("module_mm", "pressure_angle_deg", "face_width_mm"))
+    gears = [GearGeometry(values.whole(f"teeth_{side}"), module, angle, face_width_mm=width) for side in SIDES]
     return PairGeometry(gears[0], gears[1])
 
 
-def worn_um(wanted: ParameterValues, path: PathOfContact) -> tuple[float, ...]:
+def worn_um(values: ParameterValues, path: PathOfContact) -> tuple[float, ...]:
     """Return the depth that both drive flanks of a pair lost together, from where it enters to where it leaves.
 
     Each gear's share has the shape of Archard's law, see `sims.mesh.wear_profile`: greatest at the ends of the path,
     nothing at the pitch point. Empty where nothing is worn.
     """
-    deepest = [wanted.number(f"sliding_wear_{side}_um") for side in SIDES]
+    deepest = [values.number(f"sliding_wear_{side}_um") for side in SIDES]
     if not any(deepest):
         return ()
-    pair = gear_pair(wanted)
+    pair = gear_pair(values)
     driver_mm = 1e3 * path.driver_lever_m(np.linspace(0.0, path.contact_ratio, N_PLACES))
     rolls = (driver_mm, 1e3 * path.length_m - driver_mm)
     shares = [
@@ -487,82 +487,82 @@ BRISTLE_DAMPING = 0.5
 """Damping ratio of an inertia that swings on its bristles at rest."""
 
 
-def build_drive(wanted: ParameterValues, speed_limit_rpm: float, weak_tooth: WeakTooth | None = None) -> ForgingDrive:
+def build_drive(values: ParameterValues, speed_limit_rpm: float, weak_tooth: WeakTooth | None = None) -> ForgingDrive:
     """Return the drive that complete values of `PARAMETERS` describe."""
     path = standard_path(
-        (wanted.whole("teeth_driver"), wanted.whole("teeth_driven")),
-        wanted.number("module_mm") * 1e-3,
-        radians(wanted.number("pressure_angle_deg")),
-        phase=wanted.number("mesh_phase"),
-        contact_ratio=wanted.optional("contact_ratio"),
-        ramp=wanted.number("mesh_ramp"),
+        (values.whole("teeth_driver"), values.whole("teeth_driven")),
+        values.number("module_mm") * 1e-3,
+        radians(values.number("pressure_angle_deg")),
+        phase=values.number("mesh_phase"),
+        contact_ratio=values.optional("contact_ratio"),
+        ramp=values.number("mesh_ramp"),
     )
-    contact = build_contact(wanted, path)
-    brake = wanted.number("brake_nm")
-    drag, held = wanted.number("drag_nm"), wanted.number("load_friction_nm")
+    contact = build_contact(values, path)
+    brake = values.number("brake_nm")
+    drag, held = values.number("drag_nm"), values.number("load_friction_nm")
     pinion_side = contact.motor_inertia_kg_m2 + contact.driver_inertia_kg_m2
     motor = HydraulicMotor(
         contact.motor_inertia_kg_m2,
-        _bristle(wanted, "drag", drag, drag + brake, pinion_side),
-        wanted.number("motor_speed_band"),
-        wanted.number("torque_ripple"),
-        wanted.number("torque_ripple_order"),
+        _bristle(values, "drag", drag, drag + brake, pinion_side),
+        values.number("motor_speed_band"),
+        values.number("torque_ripple"),
+        values.number("torque_ripple_order"),
     )
     load = GrippedLoad(
-        _bristle(wanted, "load", held, held, contact.driven_inertia_kg_m2 or 0.0),
-        wanted.number("piece_mass_kg") * GRAVITY_MPS2 * wanted.number("piece_offset_mm") * 1e-3,
-        radians(wanted.number("piece_angle_deg")),
+        _bristle(values, "load", held, held, contact.driven_inertia_kg_m2 or 0.0),
+        values.number("piece_mass_kg") * GRAVITY_MPS2 * values.number("piece_offset_mm") * 1e-3,
+        radians(values.number("piece_angle_deg")),
     )
     flanks = Bristle(
         1.0,
-        wanted.number("flank_static_ratio"),
-        wanted.number("flank_stribeck_mps"),
-        wanted.number("flank_presliding_um") * 1e-6,
+        values.number("flank_static_ratio"),
+        values.number("flank_stribeck_mps"),
+        values.number("flank_presliding_um") * 1e-6,
     )
     limit = speed_limit_rpm * pi / 30.0
-    return ForgingDrive(path, contact, motor, load, flanks, limit, weak_tooth, worn_um(wanted, path))
+    return ForgingDrive(path, contact, motor, load, flanks, limit, weak_tooth, worn_um(values, path))
 
 
-def build_contact(wanted: ParameterValues, path: PathOfContact) -> ToothContact:
+def build_contact(values: ParameterValues, path: PathOfContact) -> ToothContact:
     """Return the contact of the flanks, with the inertias behind them."""
-    piece = 0.5 * wanted.number("piece_mass_kg") * (wanted.number("piece_radius_mm") * 1e-3) ** 2
-    offset = wanted.number("piece_mass_kg") * (wanted.number("piece_offset_mm") * 1e-3) ** 2
+    piece = 0.5 * values.number("piece_mass_kg") * (values.number("piece_radius_mm") * 1e-3) ** 2
+    offset = values.number("piece_mass_kg") * (values.number("piece_offset_mm") * 1e-3) ** 2
     return ToothContact(
-        _stiffness(wanted, path),
+        _stiffness(values, path),
         "stage 1",
-        wanted.number("exponent"),
-        wanted.number("half_backlash_um") + 0.5 * wanted.number("wear_um"),
-        wanted.number("restitution"),
-        wanted.word("damping_law"),
-        wanted.number("impact_speed_floor_mps"),
-        wanted.number("friction_coefficient"),
-        wanted.number("pinion_inertia_kg_m2"),
-        wanted.number("wheel_inertia_kg_m2") + piece + offset,
+        values.number("exponent"),
+        values.number("half_backlash_um") + 0.5 * values.number("wear_um"),
+        values.number("restitution"),
+        values.word("damping_law"),
+        values.number("impact_speed_floor_mps"),
+        values.number("friction_coefficient"),
+        values.number("pinion_inertia_kg_m2"),
+        values.number("wheel_inertia_kg_m2") + piece + offset,
         path.phase,
         path.contact_ratio,
-        wanted.number("motor_inertia_kg_m2"),
+        values.number("motor_inertia_kg_m2"),
         path.ramp,
     )
 
 
-def build_cycle(wanted: ParameterValues) -> Cycle:
+def build_cycle(values: ParameterValues) -> Cycle:
     """Return when the drive works and stands."""
     return Cycle(
-        wanted.word("mode"),
-        wanted.number("on_s"),
-        wanted.number("off_s"),
-        wanted.number("valve_rise_s"),
-        wanted.number("brake_nm"),
-        wanted.number("brake_delay_s"),
-        wanted.number("press_nm"),
-        wanted.number("press_delay_s"),
-        wanted.number("press_duration_s"),
+        values.word("mode"),
+        values.number("on_s"),
+        values.number("off_s"),
+        values.number("valve_rise_s"),
+        values.number("brake_nm"),
+        values.number("brake_delay_s"),
+        values.number("press_nm"),
+        values.number("press_delay_s"),
+        values.number("press_duration_s"),
     )
 
 
 def build_rig(
     drive: ForgingDrive,
-    wanted: ParameterValues,
+    values: ParameterValues,
     operation: Operation,
     sensors: Sequence[Sensor],
     *,
@@ -570,15 +570,15 @@ def build_rig(
     sources: Sequence[str] = (),
 ) -> Rig:
     """Return what somebody who knows the machine's drawing would write into a rig file; wear is not in it."""
-    contact = build_contact(ParameterValues(wanted.values | {"wear_um": 0.0}), drive.path)
+    contact = build_contact(ParameterValues(values.values | {"wear_um": 0.0}), drive.path)
     torque = operation.torque_nm
     pair = GearPair(
         "stage 1",
         *SHAFTS,
         *drive.path.teeth,
-        wanted.number("module_mm"),
-        wanted.number("pressure_angle_deg"),
-        wanted.number("face_width_mm"),
+        values.number("module_mm"),
+        values.number("pressure_angle_deg"),
+        values.number("face_width_mm"),
     )
     return Rig(
         name=name,
@@ -592,32 +592,32 @@ def build_rig(
     )
 
 
-def _stiffness(wanted: ParameterValues, path: PathOfContact) -> float:
-    own = wanted.optional("stiffness_n_per_m_lambda")
+def _stiffness(values: ParameterValues, path: PathOfContact) -> float:
+    own = values.optional("stiffness_n_per_m_lambda")
     if own is not None:
         return own
-    if wanted.number("exponent") != 1.5:
+    if values.number("exponent") != 1.5:
         raise InputError(
-            f"exponent is {wanted.number('exponent'):g}, and both named stiffnesses hold for 1.5",
+            f"exponent is {values.number('exponent'):g}, and both named stiffnesses hold for 1.5",
             remedy="give stiffness_n_per_m_lambda",
         )
-    if wanted.word("contact_stiffness") == "table":
+    if values.word("contact_stiffness") == "table":
         return TABLE_STIFFNESS
     z1, z2 = path.teeth
     return hertz_stiffness_n_per_m1p5(
-        z2 / z1, 0.5 * z1 * wanted.number("module_mm") * 1e-3, radians(wanted.number("pressure_angle_deg"))
+        z2 / z1, 0.5 * z1 * values.number("module_mm") * 1e-3, radians(values.number("pressure_angle_deg"))
     )
 
 
-def _bristle(wanted: ParameterValues, name: str, level: float, held: float, inertia_kg_m2: float) -> Bristle:
+def _bristle(values: ParameterValues, name: str, level: float, held: float, inertia_kg_m2: float) -> Bristle:
     """Friction of a shaft; its bristles are damped for the inertia that swings on them while it is held."""
-    presliding = wanted.number(f"{name}_presliding_rad")
+    presliding = values.number(f"{name}_presliding_rad")
     swing = sqrt(held / presliding / inertia_kg_m2) if held > 0.0 else 0.0
     return Bristle(
         level,
-        wanted.number("static_ratio"),
-        wanted.number(f"{name}_stribeck_rad_per_s"),
+        values.number("static_ratio"),
+        values.number(f"{name}_stribeck_rad_per_s"),
         presliding,
         2.0 * BRISTLE_DAMPING / swing if swing > 0.0 else 0.0,
-        wanted.number(f"{name}_viscous_nm_s_per_rad"),
+        values.number(f"{name}_viscous_nm_s_per_rad"),
     )

@@ -99,7 +99,7 @@ def sensors(sampling_rate_hz: float) -> tuple[Sensor, ...]:
 def record(
     drive: ForgingDrive,
     profiles: Schedule,
-    wanted: ParameterValues,
+    values: ParameterValues,
     *,
     rig: Rig,
     rng: np.random.Generator,
@@ -116,17 +116,17 @@ def record(
     """
     motion_rng, vibration_rng = rng.spawn(2)
     motion = respond(drive, profiles, duration_s=duration_s, interval_s=1.0 / sampling_rate_hz)
-    is_filtered = wanted.word("slow_channels") == FILTERED
-    folds = not is_filtered and wanted.word("mode") == CONTINUOUS and sampling_rate_hz < MIN_VIBRATION_HZ
+    is_filtered = values.word("slow_channels") == FILTERED
+    folds = not is_filtered and values.word("mode") == CONTINUOUS and sampling_rate_hz < MIN_VIBRATION_HZ
     true = {c.name: motion[c.name] for c in CHANNELS}
     if is_filtered:
         slow = [c.name for c in CHANNELS if c.quantity != "angle"]
         n = len(true[slow[0]])
         true |= filtered_signals(drive, profiles, slow, sampling_rate_hz=sampling_rate_hz, n_samples=n)
-    rows = list(_readings(true, wanted, motion_rng))
+    rows = list(_readings(true, values, motion_rng))
     channels = list(CHANNELS)
     if sampling_rate_hz >= MIN_VIBRATION_HZ:
-        rows.append(_vibration(drive, profiles, wanted, vibration_rng, sampling_rate_hz, len(rows[0])))
+        rows.append(_vibration(drive, profiles, values, vibration_rng, sampling_rate_hz, len(rows[0])))
         channels.append(VIBRATION)
     return Recording(
         np.vstack(rows),
@@ -150,19 +150,21 @@ def _sampling_text(rate_hz: float, *, is_filtered: bool) -> str:
     return "torque, force, speeds and accelerations sampled at instants, without a filter"
 
 
-def _readings(true: Mapping[str, FloatArray], wanted: ParameterValues, rng: np.random.Generator) -> list[FloatArray]:
+def _readings(
+    true: Mapping[str, FloatArray], parameters: ParameterValues, rng: np.random.Generator
+) -> list[FloatArray]:
     noise = {
-        "torque": wanted.number("torque_noise_nm"),
-        "angle": wanted.number("angle_noise_urad") * 1e-6,
-        "rotational_speed": wanted.number("speed_noise_mrad_per_s") * 1e-3,
-        "angular_acceleration": wanted.number("acceleration_noise_rad_per_s2"),
+        "torque": parameters.number("torque_noise_nm"),
+        "angle": parameters.number("angle_noise_urad") * 1e-6,
+        "rotational_speed": parameters.number("speed_noise_mrad_per_s") * 1e-3,
+        "angular_acceleration": parameters.number("acceleration_noise_rad_per_s2"),
         "force": 0.0,
     }
-    counts = wanted.whole("encoder_counts")
+    counts = parameters.whole("encoder_counts")
     rows = []
     for channel in CHANNELS:
         values = true[channel.name]
-        gain = wanted.number("torque_gain") if channel.quantity == "torque" else 1.0
+        gain = parameters.number("torque_gain") if channel.quantity == "torque" else 1.0
         reading: FloatArray = gain * values + noise[channel.quantity] * rng.standard_normal(len(values))
         if channel.quantity == "angle" and counts:
             step = 2.0 * pi / counts
@@ -174,36 +176,36 @@ def _readings(true: Mapping[str, FloatArray], wanted: ParameterValues, rng: np.r
 def _vibration(
     drive: ForgingDrive,
     profiles: Schedule,
-    wanted: ParameterValues,
+    values: ParameterValues,
     rng: np.random.Generator,
     rate_hz: float,
     n_samples: int,
 ) -> FloatArray:
     """Acceleration of the housing's mass, which the force of the teeth shakes; the drive does not feel it."""
     fine_s = 1.0 / (FINE_POINTS * rate_hz)
-    chain = MeasurementChain(rate_hz, (_channel(wanted),), AntiAlias())
+    chain = MeasurementChain(rate_hz, (_channel(values),), AntiAlias())
     lead = ceil(chain.lead_in_s * rate_hz) * FINE_POINTS
     lasts_s = n_samples / rate_hz + chain.anti_alias.reach_s(rate_hz) + 4.0 / rate_hz
     force = respond(drive, profiles, duration_s=lasts_s, interval_s=fine_s, signals=("interaction force",))
-    shaken = _housing(np.concatenate([np.zeros(lead), force["interaction force"]]), wanted, fine_s)
+    shaken = _housing(np.concatenate([np.zeros(lead), force["interaction force"]]), values, fine_s)
     motion = Motion(fine_s, (PLACE,), shaken[:, None])
     measured = chain.record(motion, rng=rng, duration_s=n_samples / rate_hz, lead_in_s=lead * fine_s)
     return measured.values(VIBRATION.name)
 
 
-def _housing(force_n: FloatArray, wanted: ParameterValues, step_s: float) -> FloatArray:
+def _housing(force_n: FloatArray, values: ParameterValues, step_s: float) -> FloatArray:
     """Apply s²/(s² + 2ζωs + ω²)/m, exact for a force that runs straight between steps."""
-    w, zeta = 2.0 * pi * wanted.number("housing_frequency_hz"), wanted.number("housing_damping_ratio")
+    w, zeta = 2.0 * pi * values.number("housing_frequency_hz"), values.number("housing_damping_ratio")
     section = discrete((1.0, 0.0, 0.0), (1.0, 2.0 * zeta * w, w * w), step_s)
-    return apply(section, force_n / wanted.number("housing_mass_kg"))
+    return apply(section, force_n / values.number("housing_mass_kg"))
 
 
-def _channel(wanted: ParameterValues) -> MeasuredChannel:
+def _channel(values: ParameterValues) -> MeasuredChannel:
     return MeasuredChannel(
         VIBRATION.name,
         ModalPath({PLACE: 1.0}),
         Accelerometer(lower_limit_hz=0.5),
-        background=ColouredNoise(wanted.number("vibration_noise_mps2")),
+        background=ColouredNoise(values.number("vibration_noise_mps2")),
         position=VIBRATION.position,
     )
 

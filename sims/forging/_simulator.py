@@ -151,14 +151,13 @@ class ForgingManipulator(Simulator):
         """Build the drive and its cycle, with its effects."""
         chosen = preset(NAME, preset_name)
         healthy = complete_values(PARAMETERS, chosen.parameters, parameters)
-        wanted_effects = (*chosen.effects, *settings)
-        values, weak = with_effects(healthy, wanted_effects)
+        effects = (*chosen.effects, *settings)
+        values, weak = with_effects(healthy, effects)
         run = operation or chosen.operation
         within(run.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
-        wanted = ParameterValues(values)
-        drive = build_drive(wanted, _constant(run.speed_rpm), weak)
-        complete = completed(wanted_effects)
-        return PreparedDrive(drive, build_cycle(wanted), run, chosen.name, values, healthy, complete)
+        read = ParameterValues(values)
+        drive = build_drive(read, _constant(run.speed_rpm), weak)
+        return PreparedDrive(drive, build_cycle(read), run, chosen.name, values, healthy, completed(effects))
 
     def simulate(
         self,
@@ -189,7 +188,6 @@ class ForgingManipulator(Simulator):
         if sampling_rate_hz * duration_s > MAX_SAMPLES:
             raise InputError(f"{sampling_rate_hz * duration_s:.3g} samples are wanted", allowed=f"up to {MAX_SAMPLES}")
         ready = self.prepare(parameters, operation, preset_name=preset, settings=effects)
-        wanted = ParameterValues(ready.values)
         rig = build_rig(
             ready.drive,
             ParameterValues(ready.healthy_values),
@@ -202,7 +200,7 @@ class ForgingManipulator(Simulator):
         return record(
             ready.drive,
             ready.profiles(duration_s + 1.0),
-            wanted,
+            ParameterValues(ready.values),
             rig=rig,
             rng=rng,
             sampling_rate_hz=sampling_rate_hz,

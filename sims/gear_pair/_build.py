@@ -68,7 +68,7 @@ _HORIZONTAL = 0.85
 
 
 def build_chain(
-    wanted: ParameterValues,
+    values: ParameterValues,
     line_of_action_deg: float,
     first_pulse_rev: tuple[float, float],
     sampling_rate_hz: float,
@@ -78,7 +78,7 @@ def build_chain(
 
     Parameters
     ----------
-    wanted : ParameterValues
+    values : ParameterValues
     line_of_action_deg : float
         β: upwards is x sin β + y cos β, to the right x cos β − y sin β.
     first_pulse_rev : (float, float)
@@ -91,21 +91,21 @@ def build_chain(
     directions = {"vertical": (sin(beta), cos(beta)), "horizontal": (cos(beta), -sin(beta))}
     modes = _HOUSING if installed is None else installed.modes
     channels = [
-        _channel(seat, wanted, directions[seat.direction], modes if wanted.is_on("path_modes") else ())
-        for seat in (_usual_seats(wanted) if installed is None else installed.sensors)
+        _channel(seat, values, directions[seat.direction], modes if values.is_on("path_modes") else ())
+        for seat in (_usual_seats(values) if installed is None else installed.sensors)
     ]
     names, pickup = (("input", "output"), Pickup()) if installed is None else (installed.shafts, installed.pickup)
     return MeasurementChain(
         sampling_rate_hz,
         tuple(channels),
         AntiAlias(),
-        _tachometer(wanted, pickup, names[pickup.side], first_pulse_rev[pickup.side], installed is None),
-        _encoders(wanted, names),
+        _tachometer(values, pickup, names[pickup.side], first_pulse_rev[pickup.side], installed is None),
+        _encoders(values, names),
     )
 
 
-def _usual_seats(wanted: ParameterValues) -> tuple[SensorSeat, ...]:
-    everything = wanted.word("channels") == "all"
+def _usual_seats(values: ParameterValues) -> tuple[SensorSeat, ...]:
+    everything = values.word("channels") == "all"
     seats = [(*place, "vertical") for place in (_PLACES if everything else _PLACES[:2])]
     if everything:
         seats += [(*place, "horizontal") for place in _PLACES]
@@ -116,24 +116,24 @@ def _usual_seats(wanted: ParameterValues) -> tuple[SensorSeat, ...]:
 
 
 def _channel(
-    seat: SensorSeat, wanted: ParameterValues, direction: tuple[float, float], housing: tuple[HousingMode, ...]
+    seat: SensorSeat, values: ParameterValues, direction: tuple[float, float], housing: tuple[HousingMode, ...]
 ) -> MeasuredChannel:
-    range_mps2 = wanted.number("sensor_range_mps2")
-    hum = wanted.number("hum_mps2")
+    range_mps2 = values.number("sensor_range_mps2")
+    hum = values.number("hum_mps2")
     return MeasuredChannel(
         seat.channel,
         _path(seat.bearing, direction, _HORIZONTAL if seat.direction == "horizontal" else 1.0, housing),
         Accelerometer(
-            resonance_hz=wanted.number("sensor_resonance_hz") or None,
+            resonance_hz=values.number("sensor_resonance_hz") or None,
             lower_limit_hz=0.5,
             range_mps2=range_mps2,
-            noise_mps2_per_sqrt_hz=wanted.number("sensor_noise_mps2_per_sqrt_hz"),
-            bias_mps2=wanted.number("sensor_bias_mps2"),
-            drift_mps2_per_s=wanted.number("sensor_drift_mps2_per_s"),
+            noise_mps2_per_sqrt_hz=values.number("sensor_noise_mps2_per_sqrt_hz"),
+            bias_mps2=values.number("sensor_bias_mps2"),
+            drift_mps2_per_s=values.number("sensor_drift_mps2_per_s"),
         ),
-        MainsHum((hum, 0.3 * hum, 0.2 * hum) if hum else (), wanted.number("hum_frequency_hz")),
-        ColouredNoise(wanted.number("noise_mps2"), wanted.number("noise_slope")),
-        Converter(range_mps2, wanted.whole("converter_bits")),
+        MainsHum((hum, 0.3 * hum, 0.2 * hum) if hum else (), values.number("hum_frequency_hz")),
+        ColouredNoise(values.number("noise_mps2"), values.number("noise_slope")),
+        Converter(range_mps2, values.whole("converter_bits")),
         seat.position,
     )
 
@@ -160,18 +160,18 @@ def _along(bearing: int, direction: tuple[float, float], gain: float) -> dict[st
 
 
 def _tachometer(
-    wanted: ParameterValues, pickup: Pickup, shaft: str, first_pulse_rev: float, usual: bool
+    values: ParameterValues, pickup: Pickup, shaft: str, first_pulse_rev: float, usual: bool
 ) -> Tachometer | None:
-    pulses = wanted.whole("tachometer_pulses") if usual else pickup.pulses_per_revolution
+    pulses = values.whole("tachometer_pulses") if usual else pickup.pulses_per_revolution
     if not pulses:
         return None
-    jitter_s = 1e-6 * wanted.number("tachometer_jitter_us")
+    jitter_s = 1e-6 * values.number("tachometer_jitter_us")
     return Tachometer(shaft, pulses, pickup.channel, jitter_s=jitter_s, first_pulse_rev=first_pulse_rev, noise_v=0.01)
 
 
-def _encoders(wanted: ParameterValues, shafts: tuple[str, str]) -> tuple[Encoder, ...]:
+def _encoders(values: ParameterValues, shafts: tuple[str, str]) -> tuple[Encoder, ...]:
     """One at each gear: what lies between both is the transmission error."""
-    counts, noise_deg = wanted.whole("encoder_counts"), wanted.number("encoder_noise_arcsec") / 3600.0
+    counts, noise_deg = values.whole("encoder_counts"), values.number("encoder_noise_arcsec") / 3600.0
     return tuple(Encoder(f"{shaft} encoder", shaft, counts, noise_deg=noise_deg) for shaft in shafts if counts)
 
 
@@ -188,55 +188,57 @@ def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0, installe
     InputError
         If parameters do not fit each other: teeth that interfere, a crack past the tooth, balls that overlap.
     """
-    wanted = ParameterValues(values)
-    mesh = build_mesh(wanted)
-    line_deg = wanted.optional("line_of_action_deg")
+    parameters = ParameterValues(values)
+    mesh = build_mesh(parameters)
+    line_deg = parameters.optional("line_of_action_deg")
     if line_deg is None:  # the line of centres, α_w ahead of x, lies level
         line_deg = -degrees(mesh.pair.working_pressure_angle_rad)
     return Machine(
         mesh=mesh,
-        wheels=(_wheel(wanted, mesh, 0), _wheel(wanted, mesh, 1)),
-        shafts=(_shaft(wanted, 0, installed), _shaft(wanted, 1, installed)),
+        wheels=(_wheel(parameters, mesh, 0), _wheel(parameters, mesh, 1)),
+        shafts=(_shaft(parameters, 0, installed), _shaft(parameters, 1, installed)),
         bearings=(
-            _bearing(wanted, 1, installed),
-            _bearing(wanted, 2, installed),
-            _bearing(wanted, 3, installed),
-            _bearing(wanted, 4, installed),
+            _bearing(parameters, 1, installed),
+            _bearing(parameters, 2, installed),
+            _bearing(parameters, 3, installed),
+            _bearing(parameters, 4, installed),
         ),
-        chain=build_chain(wanted, line_deg, _first_pulse_rev(mesh.pair), sampling_rate_hz, installed),
-        mesh_damping_ratio=wanted.number("mesh_damping_ratio"),
-        half_backlash_um=wanted.number("half_backlash_um"),
+        chain=build_chain(parameters, line_deg, _first_pulse_rev(mesh.pair), sampling_rate_hz, installed),
+        mesh_damping_ratio=parameters.number("mesh_damping_ratio"),
+        half_backlash_um=parameters.number("half_backlash_um"),
         lubrication=Lubrication(
-            wanted.is_on("friction"),
-            wanted.number("viscosity_cp"),
-            wanted.number("friction_factor"),
-            wanted.number("dry_friction"),
+            parameters.is_on("friction"),
+            parameters.number("viscosity_cp"),
+            parameters.number("friction_factor"),
+            parameters.number("dry_friction"),
         ),
         roughness=Roughness(
-            wanted.number("roughness_um"), wanted.word("roughness_locked_to"), wanted.number("roughness_dimension")
+            parameters.number("roughness_um"),
+            parameters.word("roughness_locked_to"),
+            parameters.number("roughness_dimension"),
         ),
-        drive=Drive(wanted.optional("governor_nm_s_per_rad")),
-        gravity_mps2=wanted.number("gravity_mps2"),
+        drive=Drive(parameters.optional("governor_nm_s_per_rad")),
+        gravity_mps2=parameters.number("gravity_mps2"),
         line_of_action_deg=line_deg,
     )
 
 
-def build_mesh(wanted: ParameterValues) -> GearMesh:
+def build_mesh(values: ParameterValues) -> GearMesh:
     """Return geometry, material, crack and flanks of the pair."""
-    pair = PairGeometry(gear_geometry(wanted, 0), gear_geometry(wanted, 1), wanted.optional("centre_distance_mm"))
+    pair = PairGeometry(gear_geometry(values, 0), gear_geometry(values, 1), values.optional("centre_distance_mm"))
     material = Material(
-        wanted.number("youngs_modulus_gpa"), wanted.number("poisson_ratio"), wanted.number("density_kg_m3")
+        values.number("youngs_modulus_gpa"), values.number("poisson_ratio"), values.number("density_kg_m3")
     )
     return GearMesh(
         pair,
         material,
         material,
-        contact_law=wanted.word("contact_law"),
-        cracks_1=_cracks(wanted, 0),
-        cracks_2=_cracks(wanted, 1),
-        flank_1=_flank(wanted, pair.driver, 0),
-        flank_2=_flank(wanted, pair.driven, 1),
-        ramp=wanted.number("mesh_ramp"),
+        contact_law=values.word("contact_law"),
+        cracks_1=_cracks(values, 0),
+        cracks_2=_cracks(values, 1),
+        flank_1=_flank(values, pair.driver, 0),
+        flank_2=_flank(values, pair.driven, 1),
+        ramp=values.number("mesh_ramp"),
     )
 
 
@@ -288,96 +290,96 @@ def _first_pulse_rev(pair: PairGeometry) -> tuple[float, float]:
     return pitches / pair.driver.teeth, pitches / pair.driven.teeth
 
 
-def gear_geometry(wanted: ParameterValues, side: int) -> GearGeometry:
+def gear_geometry(values: ParameterValues, side: int) -> GearGeometry:
     """Return the driver's (0) or the driven gear's (1) geometry."""
     name = _SIDES[side]
     return GearGeometry(
-        wanted.whole(f"teeth_{name}"),
-        wanted.number("module_mm"),
-        wanted.number("pressure_angle_deg"),
-        wanted.number(f"profile_shift_{name}"),
-        wanted.number("face_width_mm"),
-        wanted.number("addendum"),
-        wanted.number("dedendum"),
-        wanted.number("tool_tip_radius"),
-        wanted.optional(f"bore_radius_{name}_mm"),
+        values.whole(f"teeth_{name}"),
+        values.number("module_mm"),
+        values.number("pressure_angle_deg"),
+        values.number(f"profile_shift_{name}"),
+        values.number("face_width_mm"),
+        values.number("addendum"),
+        values.number("dedendum"),
+        values.number("tool_tip_radius"),
+        values.optional(f"bore_radius_{name}_mm"),
     )
 
 
-def _cracks(wanted: ParameterValues, side: int) -> tuple[RootCrack, ...]:
-    depth_mm, percent = wanted.number("crack_depth_mm"), wanted.number("crack_width_percent")
-    if depth_mm == 0.0 or wanted.word("crack_gear") != _SIDES[side]:
+def _cracks(values: ParameterValues, side: int) -> tuple[RootCrack, ...]:
+    depth_mm, percent = values.number("crack_depth_mm"), values.number("crack_width_percent")
+    if depth_mm == 0.0 or values.word("crack_gear") != _SIDES[side]:
         return ()
-    width_mm = None if percent == 100.0 else percent / 100.0 * wanted.number("face_width_mm")
-    tooth = int(within(wanted.whole("crack_tooth"), "crack_tooth", 1, wanted.whole(f"teeth_{_SIDES[side]}"))) - 1
-    return (RootCrack(depth_mm, wanted.number("crack_angle_deg"), tooth, width_mm),)
+    width_mm = None if percent == 100.0 else percent / 100.0 * values.number("face_width_mm")
+    tooth = int(within(values.whole("crack_tooth"), "crack_tooth", 1, values.whole(f"teeth_{_SIDES[side]}"))) - 1
+    return (RootCrack(depth_mm, values.number("crack_angle_deg"), tooth, width_mm),)
 
 
-def _flank(wanted: ParameterValues, gear: GearGeometry, side: int) -> FlankDeviation:
+def _flank(values: ParameterValues, gear: GearGeometry, side: int) -> FlankDeviation:
     return FlankDeviation(
-        tip_relief_um=wanted.number("tip_relief_um"),
-        tip_relief_length_mm=wanted.number("tip_relief_length_mm"),
-        pitch_um=_pitch_um(wanted, gear.teeth, side),
+        tip_relief_um=values.number("tip_relief_um"),
+        tip_relief_length_mm=values.number("tip_relief_length_mm"),
+        pitch_um=_pitch_um(values, gear.teeth, side),
     )
 
 
-def _pitch_um(wanted: ParameterValues, teeth: int, side: int) -> tuple[float, ...]:
+def _pitch_um(values: ParameterValues, teeth: int, side: int) -> tuple[float, ...]:
     """Deviations of one specimen's teeth from their places, of the wanted rms and zero mean; the same in every run."""
-    rms_um = wanted.number("pitch_deviation_um")
+    rms_um = values.number("pitch_deviation_um")
     if rms_um == 0.0:
         return ()
-    drawn = np.random.default_rng([wanted.whole("tolerance_seed"), side]).standard_normal(teeth)
+    drawn = np.random.default_rng([values.whole("tolerance_seed"), side]).standard_normal(teeth)
     drawn -= drawn.mean()
     return tuple(float(v) for v in rms_um * drawn / np.sqrt(np.mean(drawn**2)))
 
 
-def _wheel(wanted: ParameterValues, mesh: GearMesh, side: int) -> Wheel:
+def _wheel(values: ParameterValues, mesh: GearMesh, side: int) -> Wheel:
     name, gear = _SIDES[side], (mesh.pair.driver, mesh.pair.driven)[side]
-    density = wanted.number("density_kg_m3")
-    mass, inertia = wanted.optional(f"mass_{name}_kg"), wanted.optional(f"inertia_{name}_kg_m2")
+    density = values.number("density_kg_m3")
+    mass, inertia = values.optional(f"mass_{name}_kg"), values.optional(f"inertia_{name}_kg_m2")
     return Wheel(
         disc_mass_kg(gear, density) if mass is None else mass,
         disc_inertia_kg_m2(gear, density) if inertia is None else inertia,
-        wanted.number(f"runout_{name}_um"),
-        wanted.number(f"runout_angle_{name}_deg"),
-        wanted.number(f"unbalance_{name}_g_mm"),
-        wanted.number(f"unbalance_angle_{name}_deg"),
+        values.number(f"runout_{name}_um"),
+        values.number(f"runout_angle_{name}_deg"),
+        values.number(f"unbalance_{name}_g_mm"),
+        values.number(f"unbalance_angle_{name}_deg"),
     )
 
 
-def _shaft(wanted: ParameterValues, side: int, installed: Installed | None) -> ShaftLine:
+def _shaft(values: ParameterValues, side: int, installed: Installed | None) -> ShaftLine:
     return ShaftLine(
         SHAFTS[side] if installed is None else installed.shafts[side],
-        wanted.number("bending_stiffness_n_per_m"),
-        wanted.number("bending_damping_n_s_per_m"),
-        wanted.number("torsional_stiffness_nm_per_rad"),
-        wanted.number("torsional_damping_nm_s_per_rad"),
-        wanted.number(f"rotor_inertia_{SHAFTS[side]}_kg_m2"),
-        bearing_distance_m=1e-3 * wanted.number("bearing_distance_mm"),
-        coupling_bending_nm_per_rad=wanted.number("coupling_bending_nm_per_rad"),
+        values.number("bending_stiffness_n_per_m"),
+        values.number("bending_damping_n_s_per_m"),
+        values.number("torsional_stiffness_nm_per_rad"),
+        values.number("torsional_damping_nm_s_per_rad"),
+        values.number(f"rotor_inertia_{SHAFTS[side]}_kg_m2"),
+        bearing_distance_m=1e-3 * values.number("bearing_distance_mm"),
+        coupling_bending_nm_per_rad=values.number("coupling_bending_nm_per_rad"),
     )
 
 
-def _bearing(wanted: ParameterValues, number: int, installed: Installed | None) -> BearingSupport:
-    bearing = _usual_bearing(wanted, number) if installed is None else installed.bearings[number - 1]
+def _bearing(values: ParameterValues, number: int, installed: Installed | None) -> BearingSupport:
+    bearing = _usual_bearing(values, number) if installed is None else installed.bearings[number - 1]
     _check_balls(bearing)
     return BearingSupport(
         bearing,
-        wanted.number("bearing_mass_kg"),
-        wanted.number("bearing_stiffness_n_per_m"),
-        wanted.number("bearing_damping_n_s_per_m"),
-        wanted.number("bearing_clearance_um"),
+        values.number("bearing_mass_kg"),
+        values.number("bearing_stiffness_n_per_m"),
+        values.number("bearing_damping_n_s_per_m"),
+        values.number("bearing_clearance_um"),
     )
 
 
-def _usual_bearing(wanted: ParameterValues, number: int) -> Bearing:
+def _usual_bearing(values: ParameterValues, number: int) -> Bearing:
     return Bearing(
         f"bearing {number}",
         SHAFTS[(number - 1) // 2],
-        wanted.whole("n_balls"),
-        wanted.number("ball_diameter_mm"),
-        wanted.number("ball_pitch_diameter_mm"),
-        wanted.number("ball_contact_angle_deg"),
+        values.whole("n_balls"),
+        values.number("ball_diameter_mm"),
+        values.number("ball_pitch_diameter_mm"),
+        values.number("ball_contact_angle_deg"),
     )
 
 

@@ -187,8 +187,7 @@ def _checked(value: ArrayLike, name: str, *, signed: bool = False, above_zero: b
 
 # Compiled friction of one line contact, for right-hand sides; `sims.mesh` states the formulas and units.
 
-B1, B2, B3, B4, B5 = -8.916465, 1.03303, 1.036077, -0.354068, 2.812084
-B6, B7, B8, B9 = -0.100601, 0.752755, -0.390958, 0.620305
+B1, B2, B3, B4, B5, B6, B7, B8, B9 = COEFFICIENTS
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]

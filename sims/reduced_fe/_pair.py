@@ -730,7 +730,9 @@ MIN_HZ = 1.0
 """Of modes that the balance bends; slower ones are rigid motion."""
 
 
-def start_state(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, start_s: float) -> FlexState:
+def start_state(
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, start_s: float
+) -> FlexState:
     """Return the state in which the flanks carry the first torque, everything turning evenly, tooth 0 at its entry.
 
     The modes take the deflection of the mean contact force; the driven side is turned back until the contact carries.
@@ -738,17 +740,17 @@ def start_state(pair: FlexiblePair, own: FlexiblePairConstants, operation: Opera
     from sims.reduced_fe._respond import FlexState
 
     torque = float(operation.torque_nm.at(start_s))
-    q = np.zeros((2, own.sides[0].n_modes))
-    force = torque / own.base_radius_m[0]
-    column = own.table.column(0.0)
-    for index, side in enumerate(own.sides):
-        drive = torque if index == 0 else -torque * float(own.record["ratio"])
+    q = np.zeros((2, pair_constants.sides[0].n_modes))
+    force = torque / pair_constants.base_radius_m[0]
+    column = pair_constants.table.column(0.0)
+    for index, side in enumerate(pair_constants.sides):
+        drive = torque if index == 0 else -torque * float(pair_constants.record["ratio"])
         load = side.inputs[0] * drive
         load[: side.rows.shape[-1]] -= force * side.rows[column].mean(axis=0)
         soft = side.omega_rad_s > 2.0 * np.pi * MIN_HZ
         q[index, soft] = load[soft] / side.omega_rad_s[soft] ** 2
-    shape = own.table.n_slots, own.table.n_slices
-    small = float(own.record["small"])
+    shape = pair_constants.table.n_slots, pair_constants.table.n_slices
+    small = float(pair_constants.record["small"])
     state = FlexState(
         q,
         np.zeros_like(q),
@@ -756,13 +758,13 @@ def start_state(pair: FlexiblePair, own: FlexiblePairConstants, operation: Opera
         np.zeros_like(q),
         np.zeros(shape),
         np.full(shape, small**-0.1),
-        np.full(own.table.n_slots, -1e9),
+        np.full(pair_constants.table.n_slots, -1e9),
         np.zeros(3),
     )
-    return state if force <= 0.0 else _closed(pair, own, state, force)
+    return state if force <= 0.0 else _closed(pair, pair_constants, state, force)
 
 
-def _closed(pair: FlexiblePair, own: FlexiblePairConstants, state: FlexState, force: float) -> FlexState:
+def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: FlexState, force: float) -> FlexState:
     """Turn the driven side as a whole until the flanks carry `force` at ζ = 0."""
     from dataclasses import replace
 
@@ -770,15 +772,15 @@ def _closed(pair: FlexiblePair, own: FlexiblePairConstants, state: FlexState, fo
 
     from sims.reduced_fe._contact import force_map
 
-    table = own.table
-    rigid = own.sides[1]
+    table = pair_constants.table
+    rigid = pair_constants.sides[1]
     free = np.flatnonzero(rigid.omega_rad_s == 0.0)
     free = free[np.abs(rigid.hub[free]) > 0.0][0]
     column = table.column(0.0)
 
     def approach(q: FloatArray) -> float:
         total = 0.0
-        for index, side in enumerate(own.sides):
+        for index, side in enumerate(pair_constants.sides):
             n = side.rows.shape[-1]
             total += float(side.rows[column].mean(axis=0) @ q[index, :n])
         return total
@@ -821,9 +823,11 @@ def eigenfrequencies_hz(
     ready : FlexiblePairConstants or None
         Where they are at hand.
     """
-    own = constants(pair, operation) if ready is None else ready
+    pair_constants = constants(pair, operation) if ready is None else ready
     cycles = one_mesh_cycle(50) if mesh_cycles is None else mesh_cycles
-    return np.array([np.sqrt(np.maximum(_squares(pair, own, operation, c)[0], 0.0)) / (2.0 * pi) for c in cycles])
+    return np.array(
+        [np.sqrt(np.maximum(_squares(pair, pair_constants, operation, c)[0], 0.0)) / (2.0 * pi) for c in cycles]
+    )
 
 
 @dataclass(frozen=True)
@@ -867,8 +871,8 @@ def torsional_mode(
     n_points : int
         Mesh angles in a cycle.
     """
-    own = constants(pair, operation) if ready is None else ready
-    frequency, contact, other = _torsional(pair, own, operation, one_mesh_cycle(n_points)).mean(axis=0)
+    pair_constants = constants(pair, operation) if ready is None else ready
+    frequency, contact, other = _torsional(pair, pair_constants, operation, one_mesh_cycle(n_points)).mean(axis=0)
     return TorsionalMode(float(frequency), float(contact), float(other))
 
 
@@ -878,13 +882,13 @@ def torsional_curve_hz(pair: FlexiblePair, operation: Operation, mesh_cycles: Fl
 
 
 def _torsional(
-    pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, mesh_cycles: FloatArray
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, mesh_cycles: FloatArray
 ) -> FloatArray:
     """Frequency, contact part and damping ratio of others at each mesh angle, (n_c, 3)."""
-    rates = np.concatenate([side.damping_rate for side in own.sides])
+    rates = np.concatenate([side.damping_rate for side in pair_constants.sides])
     found = []
     for c in mesh_cycles:
-        squares, shapes, rows, stiff = _squares(pair, own, operation, c)
+        squares, shapes, rows, stiff = _squares(pair, pair_constants, operation, c)
         energy = np.einsum("ij,ik,kj->j", rows @ shapes, stiff, rows @ shapes)
         part = energy / np.maximum(squares, (2.0 * pi * MIN_TORSIONAL_HZ) ** 2)
         mode = int(np.argmax(part))
@@ -894,28 +898,28 @@ def _torsional(
 
 
 def _squares(
-    pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, cycles: float
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Squared angular frequencies, shapes, and what `contact_rows` returns, at one mesh angle."""
-    rows, stiff = contact_rows(pair, own, operation, cycles)
-    k = np.diag(np.concatenate([side.omega_rad_s for side in own.sides]) ** 2) + rows.T @ stiff @ rows
+    rows, stiff = contact_rows(pair, pair_constants, operation, cycles)
+    k = np.diag(np.concatenate([side.omega_rad_s for side in pair_constants.sides]) ** 2) + rows.T @ stiff @ rows
     squares, shapes = np.linalg.eigh(k)
     return squares, shapes, rows, stiff
 
 
 def contact_rows(
-    pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, cycles: float
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return ∂D/∂η of the points that touch under the set torque, (n, n_modes), and their stiffness, (n, n)."""
-    force = max(operation.torque_nm.largest / own.base_radius_m[0], MIN_FORCE_N)
-    at = contact_state(own.table, pair.machine.mesh, force, cycles)
-    one, two = own.sides
-    turn, n = own.turn(), one.n_modes
+    force = max(operation.torque_nm.largest / pair_constants.base_radius_m[0], MIN_FORCE_N)
+    at = contact_state(pair_constants.table, pair.machine.mesh, force, cycles)
+    one, two = pair_constants.sides
+    turn, n = pair_constants.turn(), one.n_modes
     rows = np.zeros((len(at.force_n), 2 * n))
     for point, (number, column, part) in enumerate(zip(at.pair, at.column, at.part, strict=True)):
         for index, side in enumerate((one, two)):
-            tooth = int(number % own.record["teeth"][index])
-            s = point % own.table.n_slices
+            tooth = int(number % pair_constants.record["teeth"][index])
+            s = point % pair_constants.table.n_slices
             seen = (1.0 - part) * side.rows[column, s] + part * side.rows[column + 1, s]
             cosine, sine = turn[index, tooth]
             c, d = np.split(seen[side.n_single :], 2)

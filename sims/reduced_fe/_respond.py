@@ -39,20 +39,24 @@ USUAL_HUB = 2.0
 """Inertia of a hub over its toothed body's."""
 
 
-def followed_step_s(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, longest_s: float) -> float:
+def followed_step_s(
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, longest_s: float
+) -> float:
     """Return the step, or its half, quarter or eighth, that the contact can be followed with in one pass.
 
     Where none can, the longest: `check_step` then says why.
     """
     for halvings in range(MAX_HALVINGS + 1):
         step = longest_s * 0.5**halvings
-        coefficients = np.array([step_coefficients(s.omega_rad_s, s.damping_rate, step) for s in own.sides])
-        if growth(pair, own, operation, coefficients) <= MAX_GROWTH:
+        coefficients = np.array([step_coefficients(s.omega_rad_s, s.damping_rate, step) for s in pair_constants.sides])
+        if growth(pair, pair_constants, operation, coefficients) <= MAX_GROWTH:
             return step
     return longest_s
 
 
-def growth(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, coefficients: FloatArray) -> float:
+def growth(
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, coefficients: FloatArray
+) -> float:
     """Return by how much errors of the loaded, linear pair grow in a step of one pass, at the worst of some angles.
 
     The spectral radius, less 1, of the map of (q, v, f, f of the step before) that `integrate_kernel.march` makes, with
@@ -61,7 +65,7 @@ def growth(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation,
     Parameters
     ----------
     pair : FlexiblePair
-    own : FlexiblePairConstants
+    pair_constants : FlexiblePairConstants
     operation : Operation
     coefficients : array, (2, 8, n_modes)
         See `step_coefficients`.
@@ -70,10 +74,10 @@ def growth(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation,
     nothing, same = np.zeros_like(qq), np.eye(len(qq))
     extrapolated = np.hstack((nothing, nothing, 2.0 * same, -same))
     free_q, free_v = np.hstack((qq, qv, q0, nothing)), np.hstack((vq, vv, v0, nothing))
-    seen = free_q + q1 @ extrapolated + float(own.record["damping_time"]) * (free_v + v1 @ extrapolated)
+    seen = free_q + q1 @ extrapolated + float(pair_constants.record["damping_time"]) * (free_v + v1 @ extrapolated)
     found = 0.0
     for cycles in one_mesh_cycle(N_POINTS):
-        rows, stiff = contact_rows(pair, own, operation, cycles)
+        rows, stiff = contact_rows(pair, pair_constants, operation, cycles)
         force = -rows.T @ stiff @ rows @ seen
         step = np.vstack(
             (free_q + q1 @ force, free_v + v1 @ force, force, np.hstack((nothing, nothing, same, nothing)))
@@ -83,7 +87,11 @@ def growth(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation,
 
 
 def check_step(
-    pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, coefficients: FloatArray, method: Method
+    pair: FlexiblePair,
+    pair_constants: FlexiblePairConstants,
+    operation: Operation,
+    coefficients: FloatArray,
+    method: Method,
 ) -> None:
     """Refuse a step in which errors grow, or, of the method that repeats its passes, one whose passes do not settle.
 
@@ -92,9 +100,9 @@ def check_step(
     InputError
         Where hubs are too heavy for their teeth, the damping ratio is too great, or the step too long.
     """
-    if method == "exponential" and growth(pair, own, operation, coefficients) <= MAX_GROWTH:
+    if method == "exponential" and growth(pair, pair_constants, operation, coefficients) <= MAX_GROWTH:
         return
-    if method == "newmark" and _pass_gain(pair, own, operation, coefficients) <= 1.0:
+    if method == "newmark" and _pass_gain(pair, pair_constants, operation, coefficients) <= 1.0:
         return
     hubs = [hub_inertia(pair.machine, i, gear)[1] / gear.polar_inertia_kg_m2 for i, gear in enumerate(pair.gears)]
     worst = int(np.argmax(hubs))
@@ -107,12 +115,14 @@ def check_step(
     )
 
 
-def _pass_gain(pair: FlexiblePair, own: FlexiblePairConstants, operation: Operation, coefficients: FloatArray) -> float:
+def _pass_gain(
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, coefficients: FloatArray
+) -> float:
     """Change of a contact force over that of the force that a pass was made with: below 1 passes settle."""
-    moved = np.concatenate(coefficients[:, 5] + float(own.record["damping_time"]) * coefficients[:, 7])
+    moved = np.concatenate(coefficients[:, 5] + float(pair_constants.record["damping_time"]) * coefficients[:, 7])
     gain = 0.0
     for cycles in one_mesh_cycle(N_POINTS):
-        rows, stiff = contact_rows(pair, own, operation, cycles)
+        rows, stiff = contact_rows(pair, pair_constants, operation, cycles)
         gain = max(gain, float(np.abs(np.linalg.eigvals(stiff @ (rows * moved) @ rows.T)).max(initial=0.0)))
     return gain
 
@@ -169,6 +179,7 @@ def respond(
     first: FlexState | None = None,
     ready: FlexiblePairConstants | None = None,
     on_progress: Callable[[float], None] | None = None,
+    steps_per_call: int = STEPS_PER_CALL,
 ) -> FlexResponse:
     """Integrate from the static balance on, or from where another run ended.
 
@@ -196,6 +207,8 @@ def respond(
         Of this pair and operation, where they are at hand.
     on_progress : callable or None
         Called now and then with the part that is done, 0 to 1.
+    steps_per_call : int
+        Of compiled code between two of these calls.
 
     Raises
     ------
@@ -207,22 +220,24 @@ def respond(
     from sims.reduced_fe._integrate import march, room
 
     step = positive(step_s, "step_s", "s")
-    plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
-    own = constants(pair, operation) if ready is None else ready
-    lines = _lines(own, signals)
-    coefficients = np.array([step_coefficients(s.omega_rad_s, s.damping_rate, step, method) for s in own.sides])
-    check_step(pair, own, operation, coefficients, method)
-    state = (start_state(pair, own, operation, start_s) if first is None else first).arrays
+    plan = RunPlan(start_s, duration_s, step, stride, steps_per_call)
+    pair_constants = constants(pair, operation) if ready is None else ready
+    lines = _lines(pair_constants, signals)
+    coefficients = np.array(
+        [step_coefficients(s.omega_rad_s, s.damping_rate, step, method) for s in pair_constants.sides]
+    )
+    check_step(pair, pair_constants, operation, coefficients, method)
+    state = (start_state(pair, pair_constants, operation, start_s) if first is None else first).arrays
     fixed = (
-        own.record,
-        own.table.arrays,
-        own.stacked("rows"),
-        own.turn(),
+        pair_constants.record,
+        pair_constants.table.arrays,
+        pair_constants.stacked("rows"),
+        pair_constants.turn(),
         coefficients,
-        np.array([[s.omega_rad_s**2, s.damping_rate] for s in own.sides]),
-        own.stacked("inputs"),
-        own.stacked("rigid"),
-        back_rows(pair.machine, own.sides),
+        np.array([[s.omega_rad_s**2, s.damping_rate] for s in pair_constants.sides]),
+        pair_constants.stacked("inputs"),
+        pair_constants.stacked("rigid"),
+        back_rows(pair.machine, pair_constants.sides),
     )
     profiles = profile_points(operation.speed_rpm, pi / 30.0), profile_points(operation.torque_nm, 1.0)
     scratch = room(state[4].shape, state[0].shape[1], fixed[2].shape[3])
@@ -258,11 +273,13 @@ def slot_names(ready: FlexiblePairConstants) -> tuple[str, ...]:
     )
 
 
-def _lines(own: FlexiblePairConstants, signals: Sequence[str]) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+def _lines(
+    pair_constants: FlexiblePairConstants, signals: Sequence[str]
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """Kind, factors and factor of the set angle of each signal."""
-    shape = (len(signals), 2, own.sides[0].n_modes)
+    shape = (len(signals), 2, pair_constants.sides[0].n_modes)
     kinds, factors, along = np.zeros(len(signals), dtype=np.int64), np.zeros(shape), np.zeros(len(signals))
-    extras = (*EXTRAS, *slot_names(own))
+    extras = (*EXTRAS, *slot_names(pair_constants))
     for line, name in enumerate(signals):
         if name in extras:
             kinds[line] = 3 + extras.index(name)
@@ -270,16 +287,16 @@ def _lines(own: FlexiblePairConstants, signals: Sequence[str]) -> tuple[NDArray[
         kind = next((i for i in (2, 1) if name.endswith(KINDS[i])), 0)
         place = name.removesuffix(KINDS[kind]) if kind else name
         if place not in (*MOVING, TRANSMISSION_ERROR):
-            known = signal_names(own)
+            known = signal_names(pair_constants)
             raise InputError(f"there is no signal {name!r}", remedy=closest_match_hint(name, known))
         kinds[line] = kind
-        along[line] = _place(own, place, factors[line])
+        along[line] = _place(pair_constants, place, factors[line])
     return kinds, factors, along
 
 
-def _place(own: FlexiblePairConstants, name: str, factors: FloatArray) -> float:
+def _place(pair_constants: FlexiblePairConstants, name: str, factors: FloatArray) -> float:
     """Fill the modal factors of a place; return that of the set angle."""
-    one, two = own.sides
+    one, two = pair_constants.sides
     if name == TRANSMISSION_ERROR:
         factors[0], factors[1] = one.hub, -two.hub
         return 0.0
@@ -287,12 +304,16 @@ def _place(own: FlexiblePairConstants, name: str, factors: FloatArray) -> float:
     if number < 4:
         side = number // 2
         rotor = number in (0, 3)
-        factors[side] = own.sides[side].shapes[0] if rotor else own.sides[side].hub / own.base_radius_m[side]
-        return 1.0 if side == 0 else 1.0 / float(own.record["ratio"])
+        factors[side] = (
+            pair_constants.sides[side].shapes[0]
+            if rotor
+            else pair_constants.sides[side].hub / pair_constants.base_radius_m[side]
+        )
+        return 1.0 if side == 0 else 1.0 / float(pair_constants.record["ratio"])
     if number < 8:
-        factors[(number - 4) // 2] = own.sides[(number - 4) // 2].shapes[8 + number % 2]
+        factors[(number - 4) // 2] = pair_constants.sides[(number - 4) // 2].shapes[8 + number % 2]
     else:
-        factors[(number - 8) // 4] = own.sides[(number - 8) // 4].shapes[4 + (number - 8) % 4]
+        factors[(number - 8) // 4] = pair_constants.sides[(number - 8) // 4].shapes[4 + (number - 8) % 4]
     return 0.0
 
 
@@ -418,8 +439,8 @@ def check_convergence(pair: FlexiblePair, operation: Operation, step_s: float, t
     time_s : float
         Over which runs are compared.
     """
-    own = constants(pair, operation)
-    step = followed_step_s(pair, own, operation, positive(step_s, "step_s", "s"))
+    pair_constants = constants(pair, operation)
+    step = followed_step_s(pair, pair_constants, operation, positive(step_s, "step_s", "s"))
     signals = (TRANSMISSION_ERROR, "mesh_force_n", "driver angle acceleration")
-    run = partial(respond, pair, operation, duration_s=time_s, signals=signals, ready=own)
+    run = partial(respond, pair, operation, duration_s=time_s, signals=signals, ready=pair_constants)
     return StepConvergence.of([run(step_s=step), run(step_s=step / 4, stride=4, method="newmark")], ALLOWED)

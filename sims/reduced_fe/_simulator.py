@@ -242,8 +242,8 @@ def simulate_pair(
     machine, _ = draw_roughness(pair.machine, machine_rng)
     pair = replace(pair, machine=machine)
     check_depth(pair, operation)
-    own = constants(pair, operation, rng=machine_rng)
-    step = followed_step_s(pair, own, operation, positive(step_s, "step_s", "s"))
+    pair_constants = constants(pair, operation, rng=machine_rng)
+    step = followed_step_s(pair, pair_constants, operation, positive(step_s, "step_s", "s"))
     measured = Measurement.of(machine, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s, longest_step_s=step)
     response = respond(
         pair,
@@ -254,21 +254,21 @@ def simulate_pair(
         step_s=measured.step_s,
         stride=measured.stride,
         first=first,
-        ready=own,
+        ready=pair_constants,
         on_progress=on_progress,
     )
     recording = measured.record(
         response,
         rng=chain_rng if noise_rng is None else noise_rng,
         rig=rig,
-        truth={**(truth or {}), **_known(pair, operation, own, response)},
+        truth={**(truth or {}), **_known(pair, operation, pair_constants, response)},
         source="simulation: pair of reduced finite-element gears",
         reader="sims.reduced_fe",
     )
-    return replace(recording, warnings=(*recording.warnings, *model_notes(pair, operation, own))), response
+    return replace(recording, warnings=(*recording.warnings, *model_notes(pair, operation, pair_constants))), response
 
 
-def model_notes(pair: FlexiblePair, operation: Operation, own: FlexiblePairConstants) -> tuple[str, ...]:
+def model_notes(pair: FlexiblePair, operation: Operation, pair_constants: FlexiblePairConstants) -> tuple[str, ...]:
     """Where the model is used near its limits."""
     notes = []
     mesh_hz = operation.speed_rpm.largest / 60.0 * pair.machine.mesh.pair.driver.teeth
@@ -277,17 +277,17 @@ def model_notes(pair: FlexiblePair, operation: Operation, own: FlexiblePairConst
             f"the mesh frequency reaches {mesh_hz:.0f} Hz: its fourth harmonic lies above {pair.mode_limit_hz:.0f} Hz, "
             "up to where the gears' elastic modes move"
         )
-    if pair.machine.mesh_damping_ratio > 0.0 and float(own.record["damping_time"]) == 0.0:
+    if pair.machine.mesh_damping_ratio > 0.0 and float(pair_constants.record["damping_time"]) == 0.0:
         notes.append("shafts, bearings and gear bodies damp the torsional mode more than mesh_damping_ratio asks for")
     return tuple(notes)
 
 
 def _known(
-    pair: FlexiblePair, operation: Operation, own: FlexiblePairConstants, response: FlexResponse
+    pair: FlexiblePair, operation: Operation, pair_constants: FlexiblePairConstants, response: FlexResponse
 ) -> dict[str, Any]:
     """What is worth knowing of the machine and the run."""
-    mode = torsional_mode(pair, operation, ready=own)
-    frequencies = eigenfrequencies_hz(pair, operation, np.array([0.5]), ready=own)[0]
+    mode = torsional_mode(pair, operation, ready=pair_constants)
+    frequencies = eigenfrequencies_hz(pair, operation, np.array([0.5]), ready=pair_constants)[0]
     return {
         "machine": plain(replace(pair.machine, chain=None)),  # type: ignore[arg-type]  # it stands under "measurement"
         "gears": [
@@ -297,7 +297,7 @@ def _known(
         "solver": {
             "step_s": response.step_s,
             "torsional_hz": mode.frequency_hz,
-            "mesh_stiffness_n_per_m": own.mean_stiffness_n_per_m,
+            "mesh_stiffness_n_per_m": pair_constants.mean_stiffness_n_per_m,
             "eigenfrequencies_hz": frequencies.tolist(),
         },
     }
@@ -335,48 +335,48 @@ def reduced_gears(values: Values) -> Gears:
     InputError
         If a gear cannot be made or meshed, or memory does not suffice.
     """
-    wanted = ParameterValues(values)
-    n_dof = wanted.whole("mesh_dof")
-    return _gear(_blank(wanted, 0), n_dof), _gear(_blank(wanted, 1), n_dof)
+    parameters = ParameterValues(values)
+    n_dof = parameters.whole("mesh_dof")
+    return _gear(_blank(parameters, 0), n_dof), _gear(_blank(parameters, 1), n_dof)
 
 
 def healthy_machine(
     values: Values, gears: Gears, *, sampling_rate_hz: float = 20480.0, installed: Installed | None = None
 ) -> Machine:
     """Return the machine without effects: that of the 16-DOF pair, with masses and inertias of gears and hubs."""
-    wanted = ParameterValues(values)
+    parameters = ParameterValues(values)
     shared: Values = {name: value for name, value in values.items() if name not in OWN}
     shared.update(MEANINGLESS)
     for side, gear in zip(SIDES, gears, strict=True):
-        shared[f"mass_{side}_kg"] = gear.mass_kg + wanted.number(f"hub_mass_{side}_kg")
-        hub = wanted.number(f"hub_inertia_{side}_kg_m2")
+        shared[f"mass_{side}_kg"] = gear.mass_kg + parameters.number(f"hub_mass_{side}_kg")
+        hub = parameters.number(f"hub_inertia_{side}_kg_m2")
         shared[f"inertia_{side}_kg_m2"] = gear.polar_inertia_kg_m2 + hub
     return build_machine(shared, sampling_rate_hz=sampling_rate_hz, installed=installed)
 
 
 def flexible_pair(values: Values, machine: Machine, gears: Gears) -> FlexiblePair:
     """Return the pair of a machine, effects included."""
-    wanted = ParameterValues(values)
+    parameters = ParameterValues(values)
     return FlexiblePair(
         machine,
         gears,
-        body_damping_ratio=wanted.number("body_damping_ratio"),
-        restitution=wanted.optional("restitution"),
-        lead_error_um=wanted.number("lead_error_um"),
-        mode_limit_hz=wanted.number("mode_limit_hz"),
+        body_damping_ratio=parameters.number("body_damping_ratio"),
+        restitution=parameters.optional("restitution"),
+        lead_error_um=parameters.number("lead_error_um"),
+        mode_limit_hz=parameters.number("mode_limit_hz"),
     )
 
 
-def _blank(wanted: ParameterValues, side: int) -> GearBlank:
+def _blank(values: ParameterValues, side: int) -> GearBlank:
     name = SIDES[side]
     material = Material(
-        wanted.number("youngs_modulus_gpa"), wanted.number("poisson_ratio"), wanted.number("density_kg_m3")
+        values.number("youngs_modulus_gpa"), values.number("poisson_ratio"), values.number("density_kg_m3")
     )
     return GearBlank(
-        gear_geometry(wanted, side),
-        wanted.optional(f"web_thickness_{name}_mm"),
-        wanted.optional(f"rim_thickness_{name}_mm"),
-        wanted.optional(f"hub_thickness_{name}_mm"),
+        gear_geometry(values, side),
+        values.optional(f"web_thickness_{name}_mm"),
+        values.optional(f"rim_thickness_{name}_mm"),
+        values.optional(f"hub_thickness_{name}_mm"),
         material,
     )
 

@@ -19,15 +19,16 @@ from gearsig.gap import (
     OperatingCondition,
     SpeedFigures,
     TriedEffect,
+    check_steady,
     conditions_of,
     diagnose_gap,
+    effects_without_place,
     is_calibrated,
     once,
     reduce_recording,
     with_channels_of,
+    with_common_channels,
 )
-from gearsig.gap._conditions import _check_steady, _with_channels_of
-from gearsig.gap._diagnose import _without_place
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
 from gearsig.rig import Rig
@@ -113,11 +114,11 @@ def test_a_run_up_is_refused_but_beside_the_same_one() -> None:
         replace(reduce_recording(run(noise=1), rig()), speed=SpeedFigures(drift, 0.0, 0.0, 0.0))
         for drift in (0.02, 0.9)
     )
-    _check_steady(steady, None)
-    _check_steady(rising, rising)
+    check_steady(steady, None)
+    check_steady(rising, rising)
     for reference in (None, steady):
         with pytest.raises(RefusalError, match="the speed goes from about 825 to 2175 rpm"):
-            _check_steady(rising, reference)
+            check_steady(rising, reference)
 
 
 def test_accelerations_in_g_are_compared_in_si_units_and_unknown_units_are_told() -> None:
@@ -138,7 +139,7 @@ def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
     first, *others = now.channels
     reference = now.with_channels({first: now.channels[first]})
     healthy = [HealthyReference(reference, rig(), "healthy.h5")]
-    assert list(_with_channels_of(now, reference, healthy, "now", notices).channels) == [first]
+    assert list(with_common_channels(now, reference, healthy, "now", notices).channels) == [first]
     assert notices == [f"now: {', '.join(others)} is left out, for the reference has no such channel."]
 
 
@@ -163,6 +164,6 @@ def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:
 def test_an_effect_that_the_rig_has_no_place_for_is_told() -> None:
     simulator, bare = gap_simulator("cracked"), replace(rig(), bearings=())
     known = {name: simulator.gap_effects()[name] for name in ("bearing_outer_race", "backlash")}
-    (text,) = _without_place(simulator.twin_of(bare), known)
+    (text,) = effects_without_place(simulator.twin_of(bare), known)
     assert text.startswith("The rig file names nothing that spall on an outer race could be in")
-    assert _without_place(simulator.twin_of(rig()), known) == []
+    assert effects_without_place(simulator.twin_of(rig()), known) == []

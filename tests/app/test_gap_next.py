@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
-import pytest
 
-import gearsig.gap._next_recording as room
 from gearsig.gap import (
     Added,
     Condition,
     HasFurtherPlaces,
+    NextRecording,
     OperatingCondition,
     Reduced,
     StructuralFloor,
     Task,
     TriedEffect,
     Twin,
+    next_recordings,
 )
 
 HERE = OperatingCondition(1500.0, 60.0)
@@ -48,65 +48,59 @@ def condition(point: OperatingCondition = HERE) -> Condition:
     )
 
 
-@pytest.fixture
-def simulated(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Task]]:
-    """Let the spall change nothing and the crack so many dB of the mesh, by speed and torque factor and channel."""
+class Simulated:
+    """Stands for the simulator: the spall changes nothing, the crack so many dB, by speed and torque factor."""
 
-    def answer_with(own_db: Mapping[tuple[float, float], float], further_db: float = 0.0) -> list[Task]:
-        asked: list[Task] = []
+    def __init__(self, own_db: Mapping[tuple[float, float], float], further_db: float = 0.0) -> None:
+        self.own_db, self.further_db = own_db, further_db
+        self.tasks: list[Task] = []
 
-        def rows(tasks: Sequence[Task], *_: object, **__: object) -> list[Reduced | str]:
-            asked.extend(tasks)
-            return [row(task) for task in tasks]
+    def __call__(self, tasks: Sequence[Task], *_: object, **__: object) -> list[Reduced | str]:
+        self.tasks.extend(tasks)
+        return [self.row(task) for task in tasks]
 
-        def row(task: Task) -> Reduced | str:
-            key = (round(task.run.point.speed_rpm / 1500.0, 3), round(task.run.point.torque_nm / 60.0, 3))
-            if key not in own_db:
-                return "it cannot be simulated"
-            is_crack = task.added == CRACK.fit.added
-            own = np.array([own_db[key] * is_crack, 0.0])
-            alone = {"a": own, "b": np.array([further_db * is_crack, 0.0])} if task.further else {}
-            return Reduced((), np.empty(0), NAMES, own, np.empty(0, dtype=complex), alone)
+    def row(self, task: Task) -> Reduced | str:
+        key = (round(task.run.point.speed_rpm / 1500.0, 3), round(task.run.point.torque_nm / 60.0, 3))
+        if key not in self.own_db:
+            return "it cannot be simulated"
+        is_crack = task.added == CRACK.fit.added
+        own = np.array([self.own_db[key] * is_crack, 0.0])
+        alone = {"a": own, "b": np.array([self.further_db * is_crack, 0.0])} if task.further else {}
+        return Reduced((), np.empty(0), NAMES, own, np.empty(0, dtype=complex), alone)
 
-        monkeypatch.setattr(room, "finished_runs", rows)
-        return asked
+    def recordings(self, twin: Any = None, conditions: Sequence[Condition] = ()) -> tuple[NextRecording, ...]:
+        points = conditions or [condition()]
+        return next_recordings(CRACK, SPALL, TITLES, cast("Twin", twin), points, simulate=self)
 
-    return cast("Callable[..., list[Task]]", answer_with)
+    def answer(
+        self, twin: Any = None, conditions: Sequence[Condition] = ()
+    ) -> list[tuple[OperatingCondition, str, float, float]]:
+        recordings = self.recordings(twin, conditions)
+        return [(each.point, each.place, each.standard_deviations, each.now) for each in recordings]
 
 
-def found(twin: Any = None, conditions: Sequence[Condition] = ()) -> list[tuple[OperatingCondition, str, float, float]]:
-    answer = room.next_recordings(CRACK, SPALL, TITLES, cast("Twin", twin), conditions or [condition()])
-    return [(one.point, one.place, one.standard_deviations, one.now) for one in answer]
-
-
-def test_the_best_point_is_first_and_points_hardly_better_are_left_out(simulated: Callable[..., list[Task]]) -> None:
-    simulated({(1.0, 1.0): 2.0, (1.0, 0.3): 9.0, (1.0, 0.6): 2.2, (1.4, 1.0): 4.0})
-    assert found() == [
+def test_the_best_point_is_first_and_points_hardly_better_are_left_out() -> None:
+    simulated = Simulated({(1.0, 1.0): 2.0, (1.0, 0.3): 9.0, (1.0, 0.6): 2.2, (1.4, 1.0): 4.0})
+    assert simulated.answer() == [
         (OperatingCondition(1500.0, 18.0), "", 9.0, 2.0),
         (OperatingCondition(2100.0, 60.0), "", 4.0, 2.0),
     ]
 
 
-def test_distances_are_held_against_the_same_simulation_at_the_points_there_are(
-    simulated: Callable[..., list[Task]],
-) -> None:
-    asked = simulated({(1.0, 1.0): 2.0, (1.0, 0.3): 9.0, (2.0, 1.0): 8.5})
-    assert found(conditions=[condition(), condition(OperatingCondition(3000.0, 60.0))]) == []
-    assert OperatingCondition(3000.0, 60.0) in {task.run.point for task in asked}
-    simulated({(1.0, 0.3): 9.0})
-    assert found() == []  # nothing to compare with
+def test_distances_are_held_against_the_same_simulation_at_the_points_there_are() -> None:
+    simulated = Simulated({(1.0, 1.0): 2.0, (1.0, 0.3): 9.0, (2.0, 1.0): 8.5})
+    assert simulated.answer(conditions=[condition(), condition(OperatingCondition(3000.0, 60.0))]) == []
+    assert OperatingCondition(3000.0, 60.0) in {task.run.point for task in simulated.tasks}
+    assert Simulated({(1.0, 0.3): 9.0}).answer() == []  # nothing to compare with
 
 
-def test_a_further_sensor_is_named_only_if_it_shows_more_than_those_there_are(
-    simulated: Callable[..., list[Task]],
-) -> None:
+def test_a_further_sensor_is_named_only_if_it_shows_more_than_those_there_are() -> None:
     assert isinstance(Placed(), HasFurtherPlaces)
-    simulated({(1.0, 1.0): 2.0}, further_db=3.0)
-    assert found(Placed()) == [(HERE, "the far end", 3.0, 2.0)]
-    (one,) = room.next_recordings(CRACK, SPALL, TITLES, cast("Twin", Placed()), [condition()])
+    simulated = Simulated({(1.0, 1.0): 2.0}, further_db=3.0)
+    assert simulated.answer(Placed()) == [(HERE, "the far end", 3.0, 2.0)]
+    (one,) = simulated.recordings(Placed())
     assert one.text == (
         "at the same speed and load, add a further sensor at the far end: there a crack and a spall lie 3 structural "
         "floors apart, 2 so far."
     )
-    simulated({(1.0, 1.0): 2.0}, further_db=2.2)
-    assert found(Placed()) == []
+    assert Simulated({(1.0, 1.0): 2.0}, further_db=2.2).answer(Placed()) == []

@@ -16,6 +16,7 @@ from gearsig.gap import (
     PlaceKind,
     ReducedRecording,
     StructuralFloor,
+    all_round_spot,
     beyond_the_mesh,
     change_features,
     difference_features,
@@ -23,7 +24,6 @@ from gearsig.gap import (
     mesh_spot,
     reduce_recording,
 )
-from gearsig.gap._places import _all_round
 from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
 
 Added = Callable[[FloatArray, FloatArray], FloatArray]
@@ -197,13 +197,13 @@ def compared(change_db: dict[str, float]) -> ComparedPair:
 def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
     """The level of a pattern hardly moved; what exceeds its floor is how much the patterns differ."""
     level, apart = "tooth.driven.level", "change.driven.elsewhere"
-    round_it = _all_round(compared({level: 0.18, apart: 6.0}), DRIVEN, "shaft out", "a1")
+    round_it = all_round_spot(compared({level: 0.18, apart: 6.0}), DRIVEN, "shaft out", "a1")
     assert round_it.change_db == 6.0
     assert "up by 6 dB against what healthy machines change by" in round_it.title
     assert "0.18" not in round_it.title
-    louder = _all_round(compared({level: -4.0, apart: 2.0}), DRIVEN, "shaft out", "a1")
+    louder = all_round_spot(compared({level: -4.0, apart: 2.0}), DRIVEN, "shaft out", "a1")
     assert louder.title == "pattern of the teeth of shaft out all round, down by 4 dB"
-    shape = _all_round(compared({level: 0.5, "tooth.driven.kurtosis": 3.0}), DRIVEN, "shaft out", "a1")
+    shape = all_round_spot(compared({level: 0.5, "tooth.driven.kurtosis": 3.0}), DRIVEN, "shaft out", "a1")
     assert shape.follows
     assert "dB" not in shape.title
 

@@ -24,8 +24,6 @@ from gearsig.gap import (
     load_recogniser,
     without_machines_of,
 )
-from gearsig.gap import _recognition as recognise
-from gearsig.gap._recognition import _load
 from sims.effects import effects
 
 
@@ -37,9 +35,7 @@ def population() -> Population:
 @pytest.fixture(scope="module")
 def on_half(population: Population) -> Recogniser:
     """A forest, smaller than the shipped one, that has seen the machines of even number only."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(recognise, "N_TREES", 60)
-        return fit_recogniser(population.of_rows(population.rigs % 2 == 0), with_reference=True)
+    return fit_recogniser(population.of_rows(population.rigs % 2 == 0), with_reference=True, n_trees=60)
 
 
 def row(population: Population, i: int) -> Features:
@@ -122,10 +118,9 @@ def test_a_kept_one_says_the_same(
     population: Population, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, on_half: Recogniser
 ) -> None:
     monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path))
-    keep_fitted("with_reference", (on_half.causes, on_half.trees, None))
-    _load.cache_clear()
-    kept = load_recogniser(with_reference=True)
-    _load.cache_clear()
+    keep_fitted("with_reference_nobody", (on_half.causes, on_half.trees, None))
+    with without_machines_of("nobody"):
+        kept = load_recogniser(with_reference=True)
     change = row(population, 5)
     assert kept.probabilities(change, 100.0).keys() == on_half.probabilities(change, 100.0).keys()
     assert np.array_equal(kept.trees.shares, on_half.trees.shares)

@@ -10,7 +10,6 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.ensemble import ExtraTreesClassifier
 
 from gearsig.gap import Fitted, LinearRule, Trees, keep_fitted, read_fitted
-from gearsig.gap import _recognition as kept_recogniser
 
 
 @pytest.fixture(scope="module")
@@ -82,14 +81,13 @@ def test_a_damaged_file_counts_for_nothing(fitted: Fitted, tmp_path: Path) -> No
     assert read_fitted("any") is None
 
 
-def test_another_state_of_the_code_takes_the_place(
-    fitted: Fitted, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_another_state_of_the_code_left_is_not_read_and_goes(fitted: Fitted, tmp_path: Path) -> None:
     keep_fitted("any", fitted)
-    monkeypatch.setattr(kept_recogniser, "_made_of", lambda: "other")
+    (path,) = (tmp_path / "forests").iterdir()
+    path.rename(path.with_name("any-0123456789abcdef.npz"))
     assert read_fitted("any") is None
     keep_fitted("any", fitted)
-    assert [path.name for path in (tmp_path / "forests").iterdir()] == ["any-other.npz"]
+    assert list((tmp_path / "forests").iterdir()) == [path]
 
 
 def test_a_folder_that_cannot_be_written_stops_nothing(

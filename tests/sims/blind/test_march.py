@@ -22,7 +22,6 @@ from sims.blind import (
     step_coefficients,
     stiffness_matrix,
 )
-from sims.blind import _march as at
 
 NUMBER, MODAL, Q, P, SUPPORTS, TABLES, LINES, SPEED = 4, 5, 6, 7, 8, 9, 11, 12
 
@@ -102,21 +101,19 @@ def energy_swing(sub_steps: int) -> float:
     """
     base = replace(rig(), parts=replace(rig().parts, damping_ratios=(0.0,) * 11))
     scene = scene_of(base, condition(base, rpm=200.0, duration_s=0.002))
-    args = list(march_arguments(scene, sub_steps))
+    off = ("mesh_damping", "load_nm", "load_slope", "wedge_m", "motor_nm", "motor_gain", "line_inertia")
+    args = list(march_arguments(scene, sub_steps, **dict.fromkeys(off, 0.0)))
     path, ratio = base.pair.path, base.pair.contact_ratio
     from_start, to_end = path - path[0], path[-1] - path
     shape = np.clip(np.minimum(from_start, to_end), 0, 1) * base.mesh_stiffness_n_per_m() / (ratio + 0.7 - 1)
     flat = np.zeros_like(path)
     args[TABLES] = (flat, shape, flat, *(np.zeros_like(g) for g in scene.gap_m), *scene.weak)
-    number = args[NUMBER]
-    number[[at.MESH_DAMPING, at.LOAD_NM, at.LOAD_SLOPE, at.WEDGE_M]] = 0.0
-    number[[at.MOTOR_NM, at.MOTOR_GAIN, at.LINE_INERTIA]] = 0.0
     zero = np.zeros_like
     steady, bearing_k, clearance, unbalance = args[SUPPORTS]
     args[SUPPORTS] = (zero(steady), bearing_k, zero(clearance), zero(unbalance))
     args[LINES] = tuple(np.zeros((0, rows.shape[1])) for rows in args[LINES])
     _, _, seen, omega, _ = args[MODAL]
-    h, k, backlash = number[at.SOFT_M], base.mesh_stiffness_n_per_m(), number[at.BACKLASH_M]
+    h, k, backlash = base.soft_m, base.mesh_stiffness_n_per_m(), scene.backlash_m
 
     def stored(x: float) -> float:
         x = max(x, 0.0)

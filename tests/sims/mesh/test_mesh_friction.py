@@ -12,15 +12,13 @@ from sims.mesh import (
     ToothChip,
     ToothSpall,
     back_stiffness_n_per_m,
+    contact_friction_n,
     friction_over_mesh,
     mesh_stiffness,
     mesh_table,
+    oil_terms,
     reduced_modulus_pa,
     share_torque,
-)
-from sims.mesh import _friction as kernel
-from sims.mesh import (
-    _mesh_stiffness as stiffness,
 )
 from tests.sims.mesh.meshes import MESH, PAIR, PITCH_POINT
 
@@ -43,7 +41,7 @@ def test_each_pair_as_the_compiled_friction_has_it() -> None:
     cycles = np.linspace(0.0, 3.0, 61)
     found = friction_over_mesh(MESH, 110.0, 500.0, *OIL, cycles)
     modulus = reduced_modulus_pa(206e9, 0.3, 206e9, 0.3)
-    terms = kernel.oil_terms(*OIL)
+    terms = oil_terms(*OIL)
     omega = 500.0 * np.pi / 30.0
     for row, c in enumerate(cycles):
         for j in range(MESH.n_slots):
@@ -51,9 +49,7 @@ def test_each_pair_as_the_compiled_friction_has_it() -> None:
             rho_1, rho_2 = (float(r) * 1e-3 for r in PAIR.contact_radii_mm(c, k))
             u_1, u_2 = omega * rho_1, omega * 55 / 75 * rho_2
             radius = rho_1 * rho_2 / (rho_1 + rho_2)
-            force = kernel.contact_friction_n(
-                found.normal_n[row, j], u_1, u_2, 0.0, radius, 0.02, modulus, *terms, 1e-12
-            )
+            force = contact_friction_n(found.normal_n[row, j], u_1, u_2, 0.0, radius, 0.02, modulus, *terms, 1e-12)
             assert found.friction_n[row, j] == pytest.approx(force, rel=1e-9, abs=1e-9)
             assert found.sliding_mps[row, j] == pytest.approx(float(PAIR.sliding_speed_m_s(c, 500.0, k)), abs=1e-12)
 
@@ -92,21 +88,17 @@ def test_back_flanks_are_healthy_whatever_ails_the_drive_flanks() -> None:
     assert back_stiffness_n_per_m(ailing) == pytest.approx(back_stiffness_n_per_m(MESH), rel=1e-12)
 
 
-def test_a_table_at_hand_is_read_and_none_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_table_at_hand_is_read() -> None:
+    """Given the table of the cracked mesh, the healthy one yields as the cracked: nothing else of it is asked."""
     mesh = replace(MESH, cracks_1=(RootCrack(2.0),), flank_1=FlankDeviation(10.0, 2.0))
     cycles = np.linspace(0.0, 2.0, 41)
     stiff, shared = mesh_stiffness(mesh, cycles), share_torque(mesh, 50.0, cycles)
     rubbed = friction_over_mesh(mesh, 50.0, 500.0, *OIL, cycles)
     table = mesh_table(mesh)
-
-    def none(*_: object) -> None:
-        raise AssertionError
-
-    monkeypatch.setattr(stiffness, "mesh_table", none)
-    np.testing.assert_array_equal(mesh_stiffness(mesh, cycles, table=table).total_n_per_m, stiff.total_n_per_m)
-    again = share_torque(mesh, 50.0, cycles, table=table)
+    healthy = replace(mesh, cracks_1=())
+    np.testing.assert_array_equal(mesh_stiffness(healthy, cycles, table=table).total_n_per_m, stiff.total_n_per_m)
+    again = share_torque(healthy, 50.0, cycles, table=table)
     np.testing.assert_array_equal(again.pair_forces_n, shared.pair_forces_n)
-    found = friction_over_mesh(mesh, 50.0, 500.0, *OIL, cycles, table=table)
+    found = friction_over_mesh(healthy, 50.0, 500.0, *OIL, cycles, table=table)
     np.testing.assert_array_equal(found.friction_n, rubbed.friction_n)
-    with pytest.raises(AssertionError):
-        mesh_stiffness(mesh, cycles)
+    assert np.any(mesh_stiffness(healthy, cycles).total_n_per_m != stiff.total_n_per_m)

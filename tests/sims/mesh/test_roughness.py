@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError
-from sims.mesh import FlankRoughness, FractalSurface, TimeLockedRoughness
-from sims.mesh import _roughness as kernel
+from sims.mesh import FlankRoughness, FractalSurface, TimeLockedRoughness, advance, height_now
 
 # As published for γ = 1.5; read from a spectrum, so the lowest are off by a line of it.
 LISTED_HZ = [17.9, 26.9, 39.4, 59.1, 89.6, 133.4, 200.5, 300.8, 451.2, 667.7, 1016.0, 1524.0]
@@ -80,10 +79,10 @@ def test_rate_is_the_derivative(t, seed):
 def test_phasors_follow_the_profile_for_a_million_steps():
     r = TimeLockedRoughness.draw(FractalSurface.of_roughness(0.84), np.random.default_rng(3))
     real, imaginary, omega, cosine, sine = r.phasors(2e-6)
-    assert kernel.height_now(real, imaginary, omega) == pytest.approx((float(r.height_m(0)), float(r.rate_mps(0))))
+    assert height_now(real, imaginary, omega) == pytest.approx((float(r.height_m(0)), float(r.rate_mps(0))))
     for _ in range(1_000_000):
-        kernel.advance(real, imaginary, cosine, sine)
-    height, rate = kernel.height_now(real, imaginary, omega)
+        advance(real, imaginary, cosine, sine)
+    height, rate = height_now(real, imaginary, omega)
     assert height == pytest.approx(float(r.height_m(2.0)), abs=1e-8 * r.surface.rms_m)
     assert rate == pytest.approx(float(r.rate_mps(2.0)), rel=1e-6)
 

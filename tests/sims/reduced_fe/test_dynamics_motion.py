@@ -19,7 +19,6 @@ from sims.reduced_fe import (
     start_state,
     torsional_mode,
 )
-from sims.reduced_fe import _respond as dynamics_respond
 from tests.sims.reduced_fe.flexible_pairs import pair_of, synthetic_pair
 
 STEADY = Operation.steady(2000.0, 170.0)
@@ -180,15 +179,16 @@ def test_reversed_torque_is_carried_by_the_flanks_behind_across_the_backlash():
     assert depth.min() > 75e-6  # 80 µm of play, less what shafts yield
 
 
-def test_runs_go_on_where_others_ended(monkeypatch):
+def test_runs_go_on_where_others_ended():
     pair = synthetic_pair()
     whole = respond(pair, STEADY, duration_s=0.004)[TRANSMISSION_ERROR]
     first = respond(pair, STEADY, duration_s=0.002)
     second = respond(pair, STEADY, duration_s=0.002, start_s=0.002, first=first.last)
     joined = np.concatenate((first[TRANSMISSION_ERROR], second[TRANSMISSION_ERROR]))
     assert joined == pytest.approx(whole, abs=1e-12)
-    monkeypatch.setattr(dynamics_respond, "STEPS_PER_CALL", 150)
-    assert respond(pair, STEADY, duration_s=0.004)[TRANSMISSION_ERROR] == pytest.approx(whole, abs=1e-12)
+    assert respond(pair, STEADY, duration_s=0.004, steps_per_call=150)[TRANSMISSION_ERROR] == pytest.approx(
+        whole, abs=1e-12
+    )
 
 
 def test_restitution_turns_the_closing_speed_round():
