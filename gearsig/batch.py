@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearsig.errors import GearsigError, InputError
+from gearsig.formatting import file_label
 from gearsig.processes import n_processors, process_pool
 
 if TYPE_CHECKING:
@@ -124,7 +125,7 @@ def report_many(
     jobs = []
     for file, page in zip(files, page_names(files), strict=True):
         # Files of the same name are told apart by their folders.
-        name = file.name if file.name and names.count(file.name) == 1 else str(file)
+        name = file_label(file, whole=not file.name or names.count(file.name) > 1)
         is_healthy = healthy is not None and file.exists() and healthy.exists() and file.samefile(healthy)
         compared = None if is_healthy else healthy
         path = folder / f"{page}.html"

@@ -69,6 +69,21 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
             Path(part).unlink(missing_ok=True)
 
 
+def keep(path: Path, write: Callable[[IO[bytes]], object]) -> bool:
+    """Write a file that can be made again; where its place cannot be written, the next process makes it again.
+
+    Returns
+    -------
+    bool
+        Whether it is kept. Work of minutes is never lost for it: results do not hang on a cache.
+    """
+    try:
+        write_whole(path, write)
+    except InputError:
+        return False
+    return True
+
+
 def read_arrays(path: Path, most_bytes: int) -> dict[str, Any] | None:
     """Return a kept file's arrays; None where there is no such file, or it is damaged, or unpacks to more than that."""
     try:

@@ -36,7 +36,7 @@ def count(value: int, name: str, *, minimum: int = 1, remedy: str = "") -> int:
     """Return `value` as int if it is a whole number of at least `minimum`."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or value < minimum:
-        raise InputError(f"{name} is {value!r}", allowed=f"a whole number of at least {minimum}", remedy=remedy)
+        raise InputError(f"{name} is {short(value)}", allowed=f"a whole number of at least {minimum}", remedy=remedy)
     return int(value)
 
 
@@ -44,8 +44,25 @@ def one_of(value: str, name: str, allowed: Iterable[str]) -> str:
     """Return `value` if it is among `allowed`; name the closest match if it is not."""
     choices = tuple(allowed)
     if value not in choices:
-        raise InputError(f"{name} is {value!r}", allowed=", ".join(choices), remedy=closest_match_hint(value, choices))
+        raise InputError(
+            f"{name} is {short(value)}", allowed=", ".join(choices), remedy=closest_match_hint(value, choices)
+        )
     return value
+
+
+def short(value: object) -> str:
+    """Return a value as an error shows it, whoever wrote it: 80 characters at most.
+
+    Examples
+    --------
+    >>> short(5), len(short("x" * 5000)), short(10**5000)
+    ('5', 80, 'a number of thousands of digits')
+    """
+    try:
+        text = repr(value)
+    except ValueError:
+        return "a number of thousands of digits"
+    return text if len(text) <= 80 else f"{text[:79]}…"
 
 
 def closest_match_hint(value: object, choices: Iterable[str]) -> str:
@@ -58,7 +75,7 @@ def closest_match_hint(value: object, choices: Iterable[str]) -> str:
     """
     from difflib import get_close_matches
 
-    matches = get_close_matches(str(value), list(choices), n=1)
+    matches = get_close_matches(str(value)[:200], list(choices), n=1)
     return f"did you mean {matches[0]}?" if matches else ""
 
 
@@ -120,8 +137,8 @@ def _number(
 ) -> float:
     try:
         number = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} is {value!r}", allowed="a number", remedy=remedy) from None
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} is {short(value)}", allowed="a number", remedy=remedy) from None
     if not np.isfinite(number) or number < minimum or (exclusive and number == minimum):
         sign = ">" if exclusive else ">="
         allowed = f"a finite number {sign} {minimum:g}" if minimum > -np.inf else "a finite number"

@@ -3,9 +3,21 @@
 from __future__ import annotations
 
 from math import floor, isfinite, log10
+from pathlib import Path
 
 N_DIGITS = 9
 """Significant digits kept in JSON: more than any measurement has, and free of rounding noise."""
+
+
+def file_label(path: str | Path, *, whole: bool = False) -> str:
+    r"""Return a file's name, or its whole path, as text: bytes that are no UTF-8, which names may hold, become "?".
+
+    Examples
+    --------
+    >>> file_label("runs/monday\udcff.csv")
+    'monday?.csv'
+    """
+    return (str(path) if whole else Path(path).name).encode("utf-8", "replace").decode()
 
 
 def rounded(value: float, n_digits: int = N_DIGITS) -> float | None:

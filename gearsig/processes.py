@@ -10,8 +10,9 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from itertools import islice
+from multiprocessing import parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any, TypeVar
 
 from gearsig.errors import InputError
@@ -22,6 +23,8 @@ Result = TypeVar("Result")
 _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _MAIN = "__main__"
 _STARTING = Lock()
+_CALLING = Lock()
+_APART: ProcessPoolExecutor | None = None
 
 
 @contextmanager
@@ -43,6 +46,35 @@ def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def call_apart(function: Callable[..., Result], *arguments: object, longest_s: float) -> Result:
+    """Call a function in a process that may die of it, as compiled readers do of damaged files; it is kept for more.
+
+    Raises
+    ------
+    BrokenProcessPool
+        If the process has died, or has not answered for so long and was ended; the next call gets a new one.
+    """
+    global _APART  # noqa: PLW0603 - one process for all calls, which starts in a second
+    with _CALLING:
+        if _APART is None:
+            _APART = ProcessPoolExecutor(1, mp_context=_Context(), initializer=_start_worker)
+        try:
+            _APART.submit(_nothing).result()  # it has started: the time that follows is the function's own
+            return _APART.submit(function, *arguments).result(longest_s)
+        except TimeoutError:
+            for process in list(_APART._processes.values()):
+                process.kill()
+            _APART = None
+            raise BrokenProcessPool(f"no answer for {longest_s:g} s") from None
+        except BrokenProcessPool:
+            _APART = None
+            raise
+
+
+def _nothing() -> None:
+    """Answer."""
 
 
 def n_processors() -> int:
@@ -89,10 +121,28 @@ def _script_out_of_sight() -> Iterator[None]:
 
 
 def _start_worker() -> None:
-    """Let Ctrl-C end a worker at once and without a traceback; the parent tidies up."""
+    """Let Ctrl-C end a worker at once and without a traceback; the parent tidies up. It ends with its parent."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    parent = parent_process()
+    if parent is not None and hasattr(signal, "SIGIO"):
+        # The kernel ends it when the parent's end of this pipe closes, even where compiled code holds the interpreter.
+        import fcntl
+
+        signal.signal(signal.SIGIO, signal.SIG_DFL)
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
+        flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process where its parent is gone: one that was killed could not tidy up."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 # --------------------

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from gearsig.recording import Recording
 
 
-MAX_POINTS = 1_000_000
+MAX_POINTS = 100_000
+"""Each a file of its own: more is a mistyped number."""
 OPERATION_AXES = ("speed_rpm", "torque_nm")
 """Names of axes that are neither a parameter nor an effect."""
 

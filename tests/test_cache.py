@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearsig.cache import read_arrays
+from gearsig.cache import keep, read_arrays
 
 ARRAYS = {"about": np.array('{"key": 1}'), "values": np.random.default_rng(0).normal(size=(12, 9))}
 ENOUGH = 1_000_000
@@ -42,3 +42,9 @@ def test_what_is_missing_or_too_large_is_not_read(tmp_path: Path) -> None:
     assert read_arrays(tmp_path / "kept.npz", ENOUGH) is None
     np.savez(tmp_path / "kept.npz", **ARRAYS)
     assert read_arrays(tmp_path / "kept.npz", 100) is None
+
+
+def test_a_place_that_cannot_be_written_costs_no_result(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert not keep(tmp_path / "file" / "kept.npz", lambda file: file.write(b"x"))
+    assert keep(tmp_path / "kept.npz", lambda file: file.write(b"x"))

@@ -1,10 +1,15 @@
 """Fresh processes from scripts as people write them, without a guard against being run again."""
 
+import os
 import subprocess
 import sys
+import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
-from gearsig.processes import can_be_sent
+import pytest
+
+from gearsig.processes import call_apart, can_be_sent
 
 SCRIPT = """
 from gearsig.processes import can_be_sent, process_pool
@@ -31,3 +36,48 @@ def test_what_cannot_be_pickled_cannot_be_sent() -> None:
     assert not can_be_sent(lambda: None)
     assert not can_be_sent(sys.stdout)
     assert can_be_sent({"a": Path("b")})
+
+
+ENDLESS = """
+import os, re
+from gearsig.processes import process_pool
+
+with process_pool(2) as pool:
+    ids = list(pool.map(hash, (1, 2)))
+    running = [pool.submit(re.match, "(a*)*b", "a" * 64) for _ in range(2)]  # compiled code that lets nobody in
+    print(*pool._processes, flush=True)
+    running[0].result()
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are looked for in Linux' /proc")
+def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(ENDLESS)
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        workers = [Path(f"/proc/{number}") for number in parent.stdout.readline().split()]
+        assert len(workers) == 2
+        assert all(worker.exists() for worker in workers)
+        parent.kill()
+    for _ in range(100):
+        if not any(_runs(worker) for worker in workers):
+            break
+        time.sleep(0.1)
+    assert not any(_runs(worker) for worker in workers)
+
+
+def _runs(process: Path) -> bool:
+    try:
+        return process.joinpath("stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def test_what_is_called_apart_may_die_or_never_end() -> None:
+    assert call_apart(abs, -2, longest_s=30.0) == 2
+    with pytest.raises(BrokenProcessPool):
+        call_apart(os._exit, 1, longest_s=30.0)
+    with pytest.raises(BrokenProcessPool, match="no answer"):
+        call_apart(time.sleep, 60, longest_s=0.2)
+    assert call_apart(abs, -3, longest_s=30.0) == 3

@@ -25,7 +25,7 @@ def answered(name: str, seen: VisibleCase) -> Answer:
         report = diagnoser(name)(seen)
     except GearsigError as error:
         return Answer("", seconds=time.perf_counter() - started, cpu_seconds=_cpu_s() - cpu, error=str(error))
-    except Exception as error:  # noqa: BLE001 - one case must not stop the others; the reason is passed on
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - one case must not stop the others; the reason is passed on
         text = f"unexpected error: {type(error).__name__}: {' '.join(str(error).split())}"
         return Answer("", seconds=time.perf_counter() - started, cpu_seconds=_cpu_s() - cpu, error=text)
     return answer_of(report, time.perf_counter() - started, _cpu_s() - cpu)

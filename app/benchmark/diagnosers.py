@@ -106,6 +106,8 @@ def diagnoser(name: str) -> Diagnoser:
         shared = getattr(import_module(module), function) if is_shared else None
     except (ImportError, AttributeError):
         shared = None
+    except (Exception, SystemExit) as error:  # anything: it is somebody else's program
+        raise InputError(f"the module of {name!r} does not run ({type(error).__name__}: {error})") from error
     if not callable(shared):
         raise InputError(f"there is no diagnoser {name!r}", allowed=f"{', '.join(DIAGNOSERS)} or MODULE:FUNCTION")
     return shared  # type: ignore[no-any-return]  # what a user's function returns shows when it is called

@@ -24,8 +24,8 @@ def _benchmarks() -> None:
 @benchmark_app.command("gap")
 def gap(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the report.")],
-    cases: Annotated[int, typer.Option("--cases", help="Blind cases.")] = 200,
-    seed: Annotated[int, typer.Option("--seed", help="Decides the cases.")] = 1,
+    cases: Annotated[int, typer.Option("--cases", min=1, max=100_000, help="Blind cases.")] = 200,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Decides the cases.")] = 1,
     role: Annotated[
         str, typer.Option("--role", help="evaluation, calibration or development; they share no gear geometry.")
     ] = "evaluation",
@@ -46,7 +46,8 @@ def gap(
             "--diagnoser",
             metavar="NAME",
             help="gap, forest, either with -unseen (nothing learned from the rig that makes the cases), majority, "
-            "rules, or MODULE:FUNCTION; the first is judged, more stand beside it. Default: gap.",
+            "rules, or MODULE:FUNCTION, whose code is executed. The first is judged, more stand beside it. Default: "
+            "gap.",
         ),
     ] = None,
     longest: Annotated[

@@ -55,8 +55,9 @@ def gap(
         typer.Option(
             "--effect-file",
             metavar="FILE",
-            help="Python file with an effect of your own, which is looked for, too; repeatable. The variable "
-            "GEARSIG_EFFECTS names such files for every command and the dashboard.",
+            help="Python file with an effect of your own, which is looked for, too; repeatable. Its code is executed: "
+            "give files that you trust. The variable GEARSIG_EFFECTS names such files for every command and the "
+            "dashboard, which execute them, too.",
         ),
     ] = None,
     list_effects: Annotated[bool, typer.Option("--list-effects", help="Show the effects that are looked for.")] = False,
@@ -83,9 +84,12 @@ def gap(
         raise InputError("no folder for the results is given", remedy="give -o DIR")
     from app.gap_job import check_folder, write_results
     from gearsig.gap import GapRequest
+    from gearsig.report import check_writable
 
     asked = GapRequest(tuple(recordings or ()), tuple(reference or ()), rig, _torques(torque), fs)
     check_folder(output)
+    if cache is not None:
+        check_writable(cache)
     if fresh and model == "reduced-fe":
         clear_other_versions(model)
     report = _diagnosed(asked, model, cache, fresh=fresh)

@@ -140,7 +140,7 @@ def torque_of(text: str | None) -> float | None:
     """Return the torque that the option states, in N m."""
     from gearsig.checks import positive
 
-    return positive(quantity(text, "N m", "--torque"), "--torque", "N m") if text else None
+    return positive(quantity(text, "N m", "--torque"), "--torque", "N m") if text is not None else None
 
 
 ModelArgument = Annotated[str, typer.Argument(help="Model, e.g. cracked; `gearsig simulate --list` shows them.")]
@@ -364,4 +364,4 @@ def read_uses(texts: Sequence[str] | None) -> dict[str, str]:
 
 def read_bandwidth(text: str | None) -> float | None:
     """Return it in Hz."""
-    return quantity(text, "Hz", "--bandwidth") if text else None
+    return quantity(text, "Hz", "--bandwidth") if text is not None else None

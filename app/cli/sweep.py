@@ -11,6 +11,7 @@ import typer
 from app.cli import options
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_SOME_FAILED, progress_bar, stopped
 from app.cli.quantities import quantity, span, split_quantity
+from gearsig.checks import within
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -239,7 +240,9 @@ def read_values(items: Sequence[str], unit: str, name: str) -> tuple[float, ...]
                 f"{name} is {items[0]!r}", where="--vary", allowed="FROM..TO:COUNT with a count of at least 2"
             )
         first, last = span(reach, unit, name)
-        n = int(number)
-        return tuple(first + (last - first) * i / (n - 1) for i in range(n))
+        from sims.sweep import MAX_POINTS
+
+        n = within(float(number), f"number of values of {name}", 2, MAX_POINTS)
+        return tuple(first + (last - first) * i / (n - 1) for i in range(int(n)))
     later = split_quantity(items[-1], unit, name)[1] if items else ""
     return tuple(quantity(t if split_quantity(t, unit, name)[1] else f"{t}{later}", unit, name) for t in items)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.cache import cache_folder, modules_digest, read_arrays, write_whole
+from gearsig.cache import cache_folder, keep, modules_digest, read_arrays
 from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
 from gearsig.gap._change import beyond_the_mesh, counted_from_the_mesh, mirrored, seen_rows
@@ -156,9 +156,9 @@ def keep_fitted(name: str, fitted: Fitted) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         for old in path.parent.glob(f"{name}-*.npz"):
             old.unlink(missing_ok=True)
-        write_whole(path, lambda file: np.savez(file, allow_pickle=False, causes=np.array(causes), **arrays))
-    except (OSError, InputError):
+    except OSError:
         return
+    keep(path, lambda file: np.savez(file, allow_pickle=False, causes=np.array(causes), **arrays))
 
 
 def _path(name: str) -> Path:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.cache import modules_digest, read_arrays, write_whole
+from gearsig.cache import keep, modules_digest, read_arrays
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.gap._conditions import SEED, Condition, halves, observed
@@ -65,7 +65,7 @@ def read_bank(path: Path, key: str) -> Bank | None:
 
 
 def write_bank(path: Path, key: str, bank: Bank) -> None:
-    """Write a bank beside its place and move it there."""
+    """Keep a bank for the next diagnosis of its rig, where the folder can be written."""
     about = {
         "key": key,
         "point": [bank.point.speed_rpm, bank.point.torque_nm],
@@ -75,10 +75,7 @@ def write_bank(path: Path, key: str, bank: Bank) -> None:
         "left_out": [[_plain(a), why] for a, why in bank.left_out],
     }
     arrays: dict[str, Any] = {name: getattr(bank, name) for name in _ARRAYS}
-    try:
-        write_whole(path, lambda file: np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays))
-    except InputError as error:
-        raise InputError(error.what, where=str(path.parent), remedy="choose another folder with --cache") from None
+    keep(path, lambda file: np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays))
 
 
 def _checked(about: dict[str, Any], arrays: dict[str, Any]) -> Bank | None:

@@ -83,9 +83,9 @@ def _system_free_bytes() -> float | None:
 
 CHUNK_BYTES = 1 << 22
 HEAD_BYTES = 1 << 16
-MAX_GZIP_RATIO = 200
-"""Text of numbers shrinks by 2 to 20; anything far beyond carries no information."""
-GZIP_FREE_BYTES = 1 << 26
+MAX_RATIO = 200
+"""Numbers shrink by 2 to 20 in any format; anything far beyond carries no information."""
+FREE_BYTES = 1 << 26
 """Below this decoded size the ratio is not looked at: short files may be very regular."""
 UNTOLD_BYTES = 4 << 30
 """Taken as free where the system does not tell."""
@@ -117,30 +117,41 @@ def check_memory(needed_bytes: int, where: str, free_bytes: float | None = None)
         )
 
 
-def read_gzip(path: Path) -> bytes:
-    """Return the decompressed bytes, stopping at a decompression bomb.
+def check_decoded(decoded_bytes: int, path: Path) -> None:
+    """Raise if what a file unpacks to is a decompression bomb, or does not fit into memory twice.
+
+    Formats that state their sizes are checked before anything is decoded, streams as they grow.
 
     Raises
     ------
     InputError
-        If the stream is damaged or cut off, shrinks by more than `MAX_GZIP_RATIO`, or would not fit into memory.
+        Above `FREE_BYTES`, if it is more than `MAX_RATIO` times the file's own size.
     """
-    packed = path.stat().st_size
-    largest = max(GZIP_FREE_BYTES, MAX_GZIP_RATIO * packed)
+    if decoded_bytes > max(FREE_BYTES, MAX_RATIO * path.stat().st_size):
+        raise InputError(
+            f"decompresses to more than {MAX_RATIO} times its size",
+            where=path.name,
+            allowed=f"a ratio up to {MAX_RATIO}",
+            remedy="this is no recording; if it is, unpack it first",
+        )
+    check_memory(2 * decoded_bytes, path.name)
+
+
+def read_gzip(path: Path) -> bytes:
+    """Return the decompressed bytes.
+
+    Raises
+    ------
+    InputError
+        If the stream is damaged, cut off or empty; see also `check_decoded`.
+    """
     chunks: list[bytes] = []
     size = 0
     try:
         with gzip.open(path, "rb") as file:
             while chunk := file.read(CHUNK_BYTES):
                 size += len(chunk)
-                if size > largest:
-                    raise InputError(
-                        f"decompresses to more than {MAX_GZIP_RATIO} times its size",
-                        where=path.name,
-                        allowed=f"a ratio up to {MAX_GZIP_RATIO}",
-                        remedy="this is no recording; if it is, unpack it first",
-                    )
-                check_memory(2 * size, path.name)
+                check_decoded(size, path)
                 refuse_nul(chunk, path.name)
                 chunks.append(chunk)
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
@@ -150,6 +161,8 @@ def read_gzip(path: Path) -> bytes:
             allowed="a complete gzip file",
             remedy="copy the file again",
         ) from error
+    if not size:
+        raise InputError("is empty", where=path.name, allowed="a file with data", remedy="copy or export it again")
     return b"".join(chunks)
 
 
@@ -201,9 +214,16 @@ def _from_utf16(path: Path) -> bytes:
 
 @contextmanager
 def foreign_errors(where: str, file_format: str) -> Iterator[None]:
-    """Raise `InputError` where a library fails inside the block; gearsig's own errors pass."""
+    """Raise `InputError` where reading fails inside the block; gearsig's own errors pass, with the file's name."""
     try:
         yield
+    except InputError as error:
+        if where in error.where:
+            raise
+        place = f"{where}: {error.where}" if error.where else where
+        raise InputError(
+            error.what, where=place, allowed=error.allowed, remedy=error.remedy or "export it again"
+        ) from error
     except GearsigError:
         raise
     except Exception as error:  # parsers raise anything on damaged bytes, one of them bare Exception

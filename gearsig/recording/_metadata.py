@@ -75,13 +75,13 @@ def table_from_metadata(
             is_own_layout=True,
             warnings=tuple(map(str, facts["warnings"])),
             speed=speed,
-            truth=facts["truth"],
+            truth=None if facts["truth"] is None else dict(facts["truth"]),
             history=tuple(map(str, facts["history"])),
             row_place=row_place,
         )
     except InputError:
         raise
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError) as error:
         raise InputError(
             f"gearsig's description in the file is damaged ({type(error).__name__}: {error})",
             where=where,

@@ -7,14 +7,16 @@ import os
 import re
 import stat
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from gearsig.checks import closest_match_hint, count
+from gearsig.checks import FloatArray, closest_match_hint, count
 from gearsig.errors import InputError
+from gearsig.formatting import file_label
 from gearsig.recording._assemble import assemble
-from gearsig.recording._limits import CHUNK_BYTES, read_text_bytes
+from gearsig.recording._limits import CHUNK_BYTES, foreign_errors, read_text_bytes
 from gearsig.recording._table import SECONDS_PER_UNIT, one_condition
 from gearsig.recording._types import Recording, split_unit
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
@@ -60,16 +62,21 @@ def read_recording(
         holds columns that make no recording; if no sampling rate is known.
     """
     file, condition = _without_condition(Path(path))
-    table, name = identify(file).read(file), file.name
-    if condition is not None:
-        table, name = one_condition(table, condition, file.name), f"{file.name}#{condition}"
-    return assemble(table, name, sha256_of(file), rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    file_format, name = identify(file), file_label(file)
+    with foreign_errors(name, file_format.name):
+        table = file_format.read(file)
+        if condition is not None:
+            table, name = one_condition(table, condition, file.name), f"{name}#{condition}"
+        return assemble(table, name, sha256_of(file), rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
 
 
 def _without_condition(path: Path) -> tuple[Path, int | None]:
     """Split "runs.mat#2"; a file that is really called so is that file."""
     name, sign, number = path.name.rpartition("#")
-    if not (sign and name and number.isascii() and number.isdigit()) or path.exists():
+    if not (sign and name and number.isascii() and number.isdigit()):
+        return path, None
+    with suppress(OSError, ValueError):
+        path.lstat()
         return path, None
     return path.with_name(name), int(number)
 
@@ -283,9 +290,13 @@ def read_pulse_times(path: str | Path, pulses_per_revolution: int = 1, shaft: st
         If there are fewer than two pulses, more than one column, or a time is not after the one before it; the line
         is named.
     """
-    file = Path(path)
-    where = file.name
     count(pulses_per_revolution, "pulses_per_revolution")
+    with foreign_errors(Path(path).name, "pulse times"):
+        return PulseTimes(_pulse_times_s(Path(path)), pulses_per_revolution, shaft)
+
+
+def _pulse_times_s(file: Path) -> FloatArray:
+    where = file.name
     if (file_format := identify(file)) is not CSV:
         raise InputError(
             f"is {file_format.name}", where=where, allowed="text with one pulse time per line", remedy="export as text"
@@ -337,4 +348,4 @@ def read_pulse_times(path: str | Path, pulses_per_revolution: int = 1, shaft: st
             allowed="s, ms, us, min",
             remedy="convert them to seconds",
         )
-    return PulseTimes(times * SECONDS_PER_UNIT[unit], pulses_per_revolution, shaft)
+    return times * SECONDS_PER_UNIT[unit]

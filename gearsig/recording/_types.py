@@ -52,13 +52,11 @@ UNITS_OF_QUANTITY = {
 _QUANTITY_OF_UNIT = {unit: quantity for quantity, units in UNITS_OF_QUANTITY.items() for unit in units}
 RPM_UNITS = frozenset(("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1"))
 
-_RATE_LINE = re.compile(
-    r"[#%/;\s]*(?P<name>[^=:;,\t]+?)\s*[=:;,\t]+\s*"
-    r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(?P<unit>k?hz)?[\s;,]*$",
-    re.IGNORECASE,
-)
+# Texts of files may be made to be slow to match: quantifiers are possessive, and what stands about is stripped.
+_RATE_SIGN = re.compile(r"[=:;,\t]")
+_RATE = re.compile(r"(?P<value>[-+]?(?:\d++\.?\d*+|\.\d++)(?:e[-+]?\d++)?)\s*+(?P<unit>k?hz)?", re.IGNORECASE)
+_BRACKETS = {"]": "[", ")": "("}
 _AXIS = re.compile(r"^[XYZ]:\s*(?=\S)", re.IGNORECASE)
-_UNIT_AT_END = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]\[]*)\]|\((?P<round>[^()]*)\))\s*$", re.DOTALL)
 
 
 def plain_name(name: str) -> str:
@@ -85,14 +83,12 @@ def split_unit(header: str) -> tuple[str, str]:
     (('Time', 'Seconds'), ('', 'g'))
     """
     header = _AXIS.sub("", header.strip())
-    match = _UNIT_AT_END.match(header)
-    if match is None:
+    sign = _BRACKETS.get(header[-1:], "")
+    at = header.rfind(sign) if sign else -1
+    unit = header[at + 1 : -1]
+    if at < 0 or header[-1] in unit or not (sign == "[" or is_unit(unit)):
         return header, ""
-    if match["square"] is not None:
-        return match["name"], match["square"].strip()
-    if is_unit(match["round"]):
-        return match["name"], match["round"].strip()
-    return header, ""
+    return header[:at].rstrip(), unit.strip()
 
 
 def rate_in_line(line: str) -> float | None:
@@ -103,8 +99,12 @@ def rate_in_line(line: str) -> float | None:
     >>> rate_in_line("# fs = 25600"), rate_in_line("Sampling rate [Hz];25.6e3"), rate_in_line("# run 5: good")
     (25600.0, 25600.0, None)
     """
-    match = _RATE_LINE.match(line)
-    if match is None or re.sub(r"[\[(]hz[\])]$", "", plain_name(match["name"])) not in RATE_NAMES:
+    line = line.lstrip("#%/; \t\r\n\f\v").rstrip("; ,\t\r\n\f\v")
+    sign = _RATE_SIGN.search(line)
+    if sign is None or re.sub(r"[\[(]hz[\])]$", "", plain_name(line[: sign.start()])) not in RATE_NAMES:
+        return None
+    match = _RATE.fullmatch(line[sign.start() :].lstrip("=:;, \t"))
+    if match is None:
         return None
     return float(match["value"]) * (1e3 if (match["unit"] or "").casefold() == "khz" else 1.0)
 

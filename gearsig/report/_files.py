@@ -84,7 +84,7 @@ def write_text(path: Path, text: str) -> Path:
     made_folder(path.parent)
     part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
     try:
-        with part.open("x", encoding="utf-8", newline="\n") as file:
+        with part.open("x", encoding="utf-8", errors="replace", newline="\n") as file:
             file.write(text)
         part.replace(path)
     except OSError as error:

@@ -15,6 +15,7 @@ from gearsig.rig._orders import OrderLine, describe_rig, hunting_tooth_order, or
 from gearsig.rig._toml import (
     from_table,
     read_rig,
+    read_toml,
     recording_stem,
     rig_file_beside,
     rig_from_dict,
@@ -71,6 +72,7 @@ __all__ = [
     "order_lines",
     "path_of_contact",
     "read_rig",
+    "read_toml",
     "recording_stem",
     "rig_file_beside",
     "rig_from_dict",

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from contextlib import suppress
 from dataclasses import MISSING, fields
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, get_args, get_type_hints
 
-from gearsig.checks import closest_match_hint
+from gearsig.cache import write_whole
+from gearsig.checks import closest_match_hint, short
 from gearsig.errors import InputError
 from gearsig.rig._contact import ToothContact
 from gearsig.rig._types import (
@@ -27,8 +30,12 @@ from gearsig.rig._types import (
     TachometerChannel,
 )
 
-MAX_RIG_FILE_BYTES = 1_000_000
-"""A rig file is a page of text; anything larger is something else."""
+MAX_TOML_BYTES = 1_000_000
+MAX_TABLES = 1000
+"""A rig file or preset is a page or two of text; anything larger is something else."""
+
+# Seventeen names with dots between: parsing takes the square of their number. Only a name's beginning is tried.
+_DEEP_KEY = re.compile(r"(?<![\w\"'-])[\w\"'-]++(?:[ \t]*+\.[ \t]*+[\w\"'-]++){16}")
 
 _LISTS = {"shaft": Shaft, "pair": GearPair, "bearing": Bearing, "sensor": Sensor}
 _PLAIN = ("name", "sources", "assumed", "sampling_rate_hz")
@@ -55,21 +62,34 @@ def read_rig(path: str | Path) -> Rig:
         that does not fit; it names the file, the table and the key.
     """
     path = Path(path)
+    return rig_from_dict(read_toml(path, remedy="`gearsig rig example` prints one to start from"), where=path.name)
+
+
+def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
+    """Return the tables of a TOML file that may come from anybody.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is longer than 1 MB, nested too deep, or not valid TOML in UTF-8.
+    """
     try:
-        if path.stat().st_size > MAX_RIG_FILE_BYTES:
-            raise InputError(
-                f"{path.stat().st_size} bytes is too long for a rig file", where=path.name, allowed="up to 1 MB"
-            )
-        data = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        with path.open("rb") as file:
+            data = file.read(MAX_TOML_BYTES + 1)
+        text = data.decode("utf-8-sig") if len(data) <= MAX_TOML_BYTES else ""
+        deep = _DEEP_KEY.search(text)
+        tables: dict[str, Any] = {} if deep else tomllib.loads(text)
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
     except UnicodeDecodeError:
-        raise InputError("is not text in UTF-8", where=path.name, remedy="save the rig file as UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            f"is not valid TOML: {error}", where=path.name, remedy="`gearsig rig example` prints one to start from"
-        ) from None
-    return rig_from_dict(data, where=path.name)
+        raise InputError("is not text in UTF-8", where=path.name, remedy="save it as UTF-8") from None
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError, numbers of thousands of digits, nesting
+        raise InputError(f"is not valid TOML: {error}", where=path.name, remedy=remedy) from None
+    if len(data) > MAX_TOML_BYTES:
+        raise InputError("is too long", where=path.name, allowed="up to 1 MB of TOML")
+    if deep is not None:
+        raise InputError(f"{deep[0][:40]!r} is too deep", where=path.name, allowed="keys of up to 16 names")
+    return tables
 
 
 def rig_file_beside(recording: str | Path) -> Path | None:
@@ -78,7 +98,10 @@ def rig_file_beside(recording: str | Path) -> Path | None:
     if not path.name:
         return None
     beside = path.with_name(f"{recording_stem(path.name)}.toml")
-    return beside if beside.is_file() else None
+    try:
+        return beside if beside.is_file() else None
+    except (OSError, ValueError):  # the name is too long, or no name
+        return None
 
 
 def recording_stem(name: str) -> str:
@@ -105,6 +128,8 @@ def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
         tables = data.get(name, [])
         if not isinstance(tables, list) or not all(isinstance(t, dict) for t in tables):
             raise InputError(f"{name!r} is not a list of tables", where=where, remedy=f"write [[{name}]]")
+        if len(tables) > MAX_TABLES:
+            raise InputError(f"{len(tables)} tables [[{name}]]", where=where, allowed=f"up to {MAX_TABLES}")
         parts[name + "s"] = tuple(from_table(kind, t, f"{where}: [[{name}]] {i}") for i, t in enumerate(tables, 1))
     parts["shafts"] = _with_implied_shafts(parts["shafts"], parts["pairs"], parts["bearings"])
     if "operating_point" in data:
@@ -142,7 +167,8 @@ def write_rig(rig: Rig, path: str | Path) -> None:
     """Write `rig` as a rig file that `read_rig` reads back to the same rig."""
     import tomli_w
 
-    Path(path).write_text(tomli_w.dumps(rig_to_dict(rig)), encoding="utf-8")
+    text = tomli_w.dumps(rig_to_dict(rig))
+    write_whole(Path(path), lambda file: file.write(text.encode()))
 
 
 def _speed(table: Any, where: str) -> SpeedSource | None:
@@ -196,7 +222,8 @@ def _typed(value: Any, hint: Any, where: str) -> Any:
     wanted = [t for t in get_args(hint) if t is not NoneType] if isinstance(hint, UnionType) else [hint]
     kind = wanted[0]
     if kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
-        return float(value)
+        with suppress(OverflowError):
+            return float(value)
     if kind in (str, bool) and isinstance(value, kind):
         return value
     if kind is int and isinstance(value, int) and not isinstance(value, bool):
@@ -206,7 +233,7 @@ def _typed(value: Any, hint: Any, where: str) -> Any:
     if get_args(kind)[:1] == (float,) and isinstance(value, list):
         return tuple(_typed(v, float, where) for v in value)
     names = {float: "a number", int: "a whole number", str: "text in quotes", bool: "true or false"}
-    raise InputError(f"is {value!r}", where=where, allowed=names.get(kind, "a list of texts"))
+    raise InputError(f"is {short(value)}", where=where, allowed=names.get(kind, "a list of texts"))
 
 
 def _with_implied_shafts(

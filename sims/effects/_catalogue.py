@@ -55,7 +55,7 @@ def loaded(path: Path) -> Effect:
     module = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # anything: it is somebody else's program
+    except (Exception, SystemExit) as error:  # anything: it is somebody else's program
         raise InputError(f"does not run ({type(error).__name__}: {error})", where=str(path)) from error
     found = getattr(module, "EFFECT", None)
     if not isinstance(found, Effect):
@@ -86,7 +86,7 @@ def _changed(
         changed = own.change(machine, severity, options, rng)
     except GearsigError:
         raise
-    except Exception as error:  # anything: it is somebody else's program
+    except (Exception, SystemExit) as error:  # anything: it is somebody else's program
         raise InputError(f"the effect {own.name!r} fails ({type(error).__name__}: {error})", where=str(path)) from error
     if not isinstance(changed, Machine):
         raise InputError(

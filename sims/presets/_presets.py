@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -10,8 +9,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from gearsig.checks import closest_match_hint, not_negative
+from gearsig.checks import closest_match_hint, not_negative, short
 from gearsig.errors import InputError
+from gearsig.rig import read_toml
 from sims.effects import EffectSetting
 from sims.machine import Operation
 
@@ -23,8 +23,6 @@ _ABOUT = ("model", "title", "sources", "assumed", "does_not_represent")
 _OPERATION = ("speed_rpm", "torque_nm")
 _OPTIONAL = ("effects", "installed")
 _EFFECT = ("name", "severity", "options")
-MAX_BYTES = 1_000_000
-"""A preset is a page or two; anything larger is something else."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ def read_preset(path: Path) -> Preset:
         If the file cannot be read, or a table or key is missing, not known or of another form. Values of parameters,
         effects and of what is installed are checked by their simulator.
     """
-    data, where = _read(path), path.name
+    data, where = read_toml(path), path.name
     _check_keys(data, _TABLES, where, _OPTIONAL)
     about, operation = (_table(data[name], f"{where}: [{name}]") for name in ("about", "operation"))
     _check_keys(about, _ABOUT, f"{where}: [about]")
@@ -131,19 +129,6 @@ def _of_model(found: Preset, model: str) -> Preset:
     if found.model != model:
         raise InputError(f"is a preset of the model {found.model!r}", where=f"{found.name}.toml", allowed=f"{model!r}")
     return found
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path.stat().st_size} bytes", where=path.name, allowed="a preset of up to 1 MB")
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
-    except UnicodeDecodeError:
-        raise InputError("is not text in UTF-8", where=path.name) from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"is not valid TOML: {error}", where=path.name) from None
 
 
 def _effects(rows: object, where: str) -> tuple[EffectSetting, ...]:
@@ -185,8 +170,8 @@ def _text(value: object, where: str) -> str:
 
 
 def _number(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f"is {value!r}", where=where, allowed="a number")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or abs(value) > 1e300:
+        raise InputError(f"is {short(value)}", where=where, allowed="a number")
     return float(value)
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
-from gearsig.cache import FRESH, OtherVersionError, cache_folder, modules_digest, read_arrays, write_whole
+from gearsig.cache import FRESH, OtherVersionError, cache_folder, keep, modules_digest, read_arrays, write_whole
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from sims.mesh import RootCrack, check_crack, crack_mouth_mm, crack_tip_mm, deepest_crack_mm
@@ -383,7 +383,7 @@ def _kept(path: Path, solve: Callable[[], FloatArray], grid: tuple[int, int, int
     if added is not None and added.shape[1:] == (grid[1], grid[2], grid[2]) and np.isfinite(added).all():
         return added
     solved = solve()
-    write_whole(path, lambda file: np.savez(file, code=np.array(_code()), added=solved))
+    keep(path, lambda file: np.savez(file, code=np.array(_code()), added=solved))
     return solved
 
 

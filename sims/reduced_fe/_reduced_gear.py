@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache
 from hashlib import sha256
@@ -753,7 +754,11 @@ def cached_gear(blank: GearBlank, plan: ReductionPlan, folder: str | Path | None
         raise
     except InputError:  # not there, or damaged
         gear = reduce_gear(blank, plan)
-        write_gear(path, gear)
+        if folder is not None:
+            write_gear(path, gear)
+        else:
+            with suppress(InputError):  # the cache folder cannot be written: the next process reduces it again
+                write_gear(path, gear)
         return gear
     if kept.key != gear_key(blank, plan):
         raise OtherVersionError(

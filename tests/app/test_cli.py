@@ -351,3 +351,46 @@ def test_crack_refuses_a_torque_in_millimetres(capsys: pytest.CaptureFixture[str
     code, _, err = run(capsys, "crack", sample("root_crack_3mm"), "--torque", "3mm")
     assert code == 2
     assert "give it in N m" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("benchmark", "gap", "--seed", "-1", "-o", "b"), "seed"),
+        (("sweep", "cracked", "--vary", "speed=300..1500rpm:1000000000", "-o", "s"), "100000"),
+        (("bifurcation", "cracked", "--vary", "speed=300..1500rpm:1000000000", "-o", "s"), "100000"),
+        (("gap", "x.csv", "--torque", "", "-o", "g"), "--torque"),
+    ],
+)
+def test_numbers_that_no_run_could_serve_are_refused_at_once(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(capsys, *arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_effect_file_that_ends_the_program_is_an_error(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "own.py"
+    file.write_text("import sys\nsys.exit(0)\n")
+    code, _, err = run(capsys, "gap", "--list-effects", "--effect-file", file)
+    assert code == 2
+    assert "SystemExit" in err
+
+
+def test_name_that_is_no_utf8_does_not_end_a_report(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    good = sample("healthy")
+    bad = tmp_path / "bad\udcff.csv"
+    bad.write_text("time,a\n0,1\n1,2\n")
+    code, _, err = run(capsys, "report", bad, good, "-o", tmp_path / "out", "-j", 1)
+    assert code == 1
+    assert "bad?.csv" in err
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "bad?.csv" in page
+    assert good.name in page

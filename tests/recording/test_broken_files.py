@@ -1,10 +1,13 @@
 """Files that are not what they say: each ends in one line that names file, place, allowed and remedy."""
 
 import gzip
+import json
 import os
 import pickle
 import time
 import tracemalloc
+from contextlib import suppress
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -12,7 +15,8 @@ import pytest
 from scipy.io import savemat, wavfile
 
 from gearsig.errors import InputError
-from gearsig.recording import read_recording
+from gearsig.recording import Channel, Recording, read_pulse_times, read_recording, write_recording
+from gearsig.rig import rig_file_beside
 
 EXTENSIONS = (".csv", ".txt", ".csv.gz", ".mat", ".wav", ".h5", ".parquet", ".tdms", ".uff")
 
@@ -181,3 +185,96 @@ def test_packed_bomb_in_mat(tmp_path, monkeypatch):
     savemat(tmp_path / "x.mat", {"s": {"a": np.zeros(1 << 21)}, "fs": 1.0}, do_compression=True)
     assert (tmp_path / "x.mat").stat().st_size < 1 << 15
     refused(tmp_path / "x.mat", "decoded size")
+
+
+TABLE = "1.0,2.0\n1.5,2.5\n" * 20
+
+
+@pytest.mark.parametrize("sign", ["1", " ", "\t", "[", "(", "= ", "a(", '"', ":"])
+@pytest.mark.parametrize("ending", ["", "x", "b,c"])
+def test_long_runs_of_one_sign_cost_no_more_than_their_length(tmp_path, sign, ending):
+    path = tmp_path / "x.csv"
+    path.write_text("a" + sign * 100_000 + ending + "\n" + TABLE)
+    begin = time.process_time()
+    for read in (read_recording, read_pulse_times):
+        with suppress(InputError):
+            read(path)
+    assert time.process_time() - begin < 5  # the square of it would be hours
+
+
+def test_many_lines_of_digits_that_are_no_table(tmp_path):
+    path = tmp_path / "x.csv"
+    path.write_text(("1" * 200 + "x\n") * 5000 + TABLE)
+    begin = time.process_time()
+    with pytest.raises(InputError, match="no line of numbers"):
+        read_recording(path)
+    assert time.process_time() - begin < 5
+
+
+def test_gzip_without_content_and_a_bare_return_in_quotes(tmp_path):
+    (tmp_path / "x.csv.gz").write_bytes(gzip.compress(b""))
+    refused(tmp_path / "x.csv.gz", "empty")
+    (tmp_path / "x.csv").write_text('"1\r2",3\n' * 9, newline="")
+    refused(tmp_path / "x.csv")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"truth": 5},
+        {"truth": [1]},
+        {"sampling_rate_hz": 10**400},
+        {"speed": {"kind": "constant", "speed_rpm": 10**400}},
+        {"speed": {"kind": "pulse_times", "times_s": 5, "pulses_per_revolution": 10**400, "shaft": 5}},
+        {"channels": 5},
+    ],
+)
+def test_description_that_is_not_what_was_written(tmp_path, change):
+    path = write_recording(Recording(np.zeros((1, 9)), 1.0, (Channel("a"),)), tmp_path / "x.csv")
+    first, rest = path.read_text().split("\n", 1)
+    facts = json.loads(first.removeprefix("# gearsig: ")) | change
+    path.write_text(f"# gearsig: {json.dumps(facts)}\n{rest}")
+    refused(path)
+
+
+def test_text_beside_numbers_is_not_unpacked(tmp_path):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    texts = pa.DictionaryArray.from_arrays(pa.array(np.zeros(40_000, np.int32)), pa.array(["x" * 50_000]))
+    parquet.write_table(pa.table({"a": np.arange(40_000.0), "text": texts}), tmp_path / "x.parquet")
+    most = pa.default_memory_pool().max_memory()
+    assert read_recording(tmp_path / "x.parquet", sampling_rate_hz=1.0).channel_names == ("a",)
+    assert pa.default_memory_pool().max_memory() < most + 50e6  # the texts are 2 GB
+
+
+@pytest.mark.parametrize("ending", [".h5", ".parquet"])
+def test_numbers_that_are_packed_to_almost_nothing(tmp_path, ending):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    path = tmp_path / f"x{ending}"
+    if ending == ".h5":
+        with h5py.File(path, "w") as file:
+            file.create_dataset("a", (1 << 28,), "f4", chunks=(1 << 20,), compression="gzip")[:9] = 1
+            file["again"] = file["a"]
+    else:
+        parquet.write_table(pa.table({"a": np.zeros(1 << 25, np.float32)}), path)
+    refused(path, "200 times")
+
+
+def test_small_dataset_in_a_huge_chunk(tmp_path):
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file.create_dataset("a", (300,), "f8", chunks=(1 << 28,), maxshape=(None,), compression="gzip")
+    refused(tmp_path / "x.h5", "200 times")
+
+
+def test_name_that_is_no_utf8_and_one_as_long_as_names_can_be(tmp_path):
+    path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/a\xff.csv"))
+    path.write_text(TABLE)
+    read_recording(path, sampling_rate_hz=1.0).name.encode()
+    path = path.replace(tmp_path / ("x" * 251 + ".csv"))
+    assert rig_file_beside(path) is None
+    assert read_recording(path, sampling_rate_hz=1.0).n_samples == 40
+    refused_missing(tmp_path / ("x" * 300 + ".csv"))
+    refused_missing(tmp_path / ("x" * 300 + ".csv#2"))

@@ -1,5 +1,6 @@
 """Rig files: round trip, closest name for a misspelt key, errors that name file, table and key."""
 
+import time
 from pathlib import Path
 
 import pytest
@@ -124,3 +125,29 @@ def test_description_lists_every_order() -> None:
     for part in ("mesh order 23", "460.000 Hz", "BPFO", "BPFI", "BSF", "FTF", "hunting tooth", "1× mesh p + 1× out"):
         assert part in text
     assert "No shafts" in describe_rig(Rig())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a=" + "[" * 5000 + "]" * 5000,
+        "sampling_rate_hz=" + "1" * 5000,
+        "sampling_rate_hz=1" + "0" * 400,
+        "a" + ".a" * 20_000 + "=1",
+        "".join(f'[[shaft]]\nname="{i}"\n' for i in range(40_000)),
+        "#" * 1_000_001,
+    ],
+)
+def test_hostile_toml_is_refused_quickly(tmp_path, text):
+    path = tmp_path / "x.toml"
+    path.write_text(text)
+    begin = time.process_time()
+    with pytest.raises(InputError, match=r"x\.toml"):
+        read_rig(path)
+    assert time.process_time() - begin < 5
+
+
+def test_rig_is_not_written_where_nothing_can_be(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="cannot be written"):
+        write_rig(Rig(), tmp_path / "file" / "x.toml")

@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.errors import InputError
 from sims.cracked import CrackedPair
-from sims.presets import MAX_BYTES, preset, preset_text
+from sims.presets import preset, preset_text
 
 GOOD = """
 [about]
@@ -115,7 +115,7 @@ def test_files_that_are_no_presets(tmp_path: Path) -> None:
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="UTF-8"):
         preset("cracked", str(tmp_path / "binary.toml"))
-    (tmp_path / "large.toml").write_bytes(b"#" * (MAX_BYTES + 1))
+    (tmp_path / "large.toml").write_bytes(b"#" * 1_000_001)
     with pytest.raises(InputError, match="up to 1 MB"):
         preset("cracked", str(tmp_path / "large.toml"))
 

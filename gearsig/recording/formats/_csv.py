@@ -32,9 +32,12 @@ N_PROOF_LINES = 5
 # Tried in this order; the first that reads most columns wins. The comma is last among the separators because it is
 # also a decimal sign: "1,5;2,7" must not become three columns of text.
 CANDIDATES = (("\t", "."), (";", "."), ("\t", ","), (";", ","), (",", "."), (" ", "."), (" ", ","))
+MAX_LINES_ABOVE = 2000
+"""More lines than that are no header of a table."""
 COMMENT_SIGNS = ("#", "%", "//")
 
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\Z|[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
+# Possessive: digits that no number ends are looked at once.
+_NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:e[+-]?\d++)?\Z|[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -143,10 +146,10 @@ def _first_lines(data: bytes) -> list[bytes]:
 
 def _table_start(texts: list[str], where: str) -> tuple[int, str, str]:
     """Return the first line of numbers with the separator and decimal sign that read most columns there."""
-    for start, text in enumerate(texts):
+    for start, text in enumerate(texts[:MAX_LINES_ABOVE]):
         if not text.strip() or not any(c.isdigit() for c in text):
             continue
-        proof = list(islice((t for t in texts[start:] if t.strip()), N_PROOF_LINES))
+        proof = list(islice((t for t in islice(texts, start, None) if t.strip()), N_PROOF_LINES))
         counts = [_n_columns(proof, separator, decimal) for separator, decimal in CANDIDATES]
         if max(counts) > 0:
             return (start, *CANDIDATES[counts.index(max(counts))])
@@ -202,7 +205,10 @@ def _header_fields(text: str, separator: str, n_columns: int) -> tuple[str, ...]
         return (field,) if field and "=" not in field and ":" not in field else None
     attempts = [split(text, separator)]
     if separator == " ":  # names with their unit in brackets, or separated by tabs or two blanks
-        attempts += [re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?", text), re.split(r"\s{2,}|\t", text.strip())]
+        attempts += [
+            re.findall(r"[^\s\[(]++(?:\s*+[\[(][^\])\[(]*+[\])])?", text),
+            re.split(r"\s{2,}|\t", text.strip()),
+        ]
     for fields in attempts:
         cleaned = tuple(field.strip() for field in fields)
         if len(cleaned) == n_columns + 1 and cleaned[-1] == "":

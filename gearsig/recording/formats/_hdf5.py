@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import struct
+from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gearsig.errors import InputError
-from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._limits import check_decoded
 from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
 from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, Recording, plain_name
@@ -36,25 +38,51 @@ def read_hdf5(path: Path) -> RawTable:
     import h5py
 
     where = path.name
-    with foreign_errors(where, "HDF5"), h5py.File(path, "r", locking=False) as file:
+    with h5py.File(path, "r", locking=False) as file:
         arrays: dict[str, NumberArray] = {}
         units: dict[str, str] = {}
         rates_hz = _rates_of(file.attrs, "")
         skipped: list[str] = []
         datasets = own_datasets(file, skipped)
         by_path = dict(datasets)
-        if OWN_NAME in by_path and OWN_SAMPLES in by_path:
+        is_own = OWN_NAME in by_path and OWN_SAMPLES in by_path and by_path[OWN_NAME].shape == ()
+        datasets = [(p, d) for p, d in datasets if d.dtype.kind in "fiubc" and d.ndim <= 2 and d.size]
+        check_decoded(sum(decoded_bytes(d) for p, d in datasets if not is_own or p == OWN_SAMPLES), path)
+        if is_own:
             samples = load_dataset(by_path[OWN_SAMPLES], where)
-            text = by_path[OWN_NAME].asstr()[()]
-            return table_from_metadata(str(text), list(np.atleast_2d(samples)), READER, where)
+            return table_from_metadata(_own_text(by_path[OWN_NAME], path), list(np.atleast_2d(samples)), READER, where)
         for dataset_path, dataset in datasets:
-            if dataset.dtype.kind not in "fiubc" or dataset.ndim > 2 or dataset.size == 0:
-                continue
             arrays[dataset_path] = np.atleast_1d(load_dataset(dataset, where))
             units[dataset_path] = _unit_of(dataset.attrs)
             rates_hz |= _rates_of(dataset.attrs, dataset_path)
     notes = [f"not followed, because they lead out of the file: {', '.join(skipped[:8])}"] if skipped else []
     return table_from_arrays(NamedArrays(arrays, {}, units, rates_hz, tuple(notes)), READER, where)
+
+
+def _own_text(dataset: Any, path: Path) -> str:
+    """Return the single text of a dataset, taken from the file's heap by hand.
+
+    The library takes as much memory as a damaged reference says, and goes round for ever in a damaged heap. A reference
+    is length (4 bytes), address of the collection (8), number of the object (4); a collection begins "GCOL", version,
+    size, 16 bytes in all; each object with number, count, 4 bytes unused and its size, 16 bytes in all, and is filled
+    up to 8. Source: The HDF Group, *HDF5 File Format Specification*, version 3.0, III.E.
+    """
+    at, n_bytes = dataset.id.get_offset(), path.stat().st_size
+    with path.open("rb") as file:
+        file.seek(at or 0)
+        length, place, wanted = struct.unpack("<IQI", file.read(16))
+        file.seek(min(place, n_bytes))
+        mark, size = struct.unpack("<4s4xQ", file.read(16))
+        heap = file.read(min(size, n_bytes)) if mark == b"GCOL" else b""
+    place = 0
+    while at is not None and place + 16 <= len(heap):
+        number, size = struct.unpack_from("<H6xQ", heap, place)
+        if number == wanted and length <= size <= len(heap) - place - 16:
+            return heap[place + 16 : place + 16 + length].decode("utf-8", "replace")
+        place += 16 + size + -size % 8
+    raise InputError(
+        f"dataset {dataset.name!r} is damaged", where=path.name, allowed="a text", remedy="write the file again"
+    )
 
 
 def own_datasets(group: Any, skipped: list[str], prefix: str = "", depth: int = MAX_DEPTH) -> list[tuple[str, Any]]:
@@ -82,9 +110,13 @@ def own_datasets(group: Any, skipped: list[str], prefix: str = "", depth: int = 
     return found
 
 
+def decoded_bytes(dataset: Any) -> int:
+    """Return what a dataset takes when it is read; chunks are unpacked whole, be the dataset smaller than one."""
+    return int(max(dataset.size, prod(dataset.chunks or (0,))) * dataset.dtype.itemsize)
+
+
 def load_dataset(dataset: Any, where: str) -> NumberArray:
-    """Return a dataset's values after checking that they were written and fit into memory."""
-    check_memory(2 * dataset.size * dataset.dtype.itemsize, where)
+    """Return a dataset's values after checking that they were written."""
     if dataset.size > 1 and dataset.id.get_storage_size() == 0:
         raise InputError(
             f"dataset {dataset.name!r} was allocated but never written",
@@ -98,8 +130,9 @@ def load_dataset(dataset: Any, where: str) -> NumberArray:
 
 def _rates_of(attributes: Any, path: str) -> dict[str, float]:
     rates: dict[str, float] = {}
-    for name, value in attributes.items():
-        if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
+    numbers = (name for name in attributes if attributes.get_id(name).dtype.kind in "fiu")
+    for name, value in ((name, attributes[name]) for name in numbers):
+        if np.size(value) != 1:
             continue
         number = float(np.reshape(value, -1)[0])
         if plain_name(name) in RATE_NAMES:

@@ -12,12 +12,12 @@ from typing import Any, NoReturn
 import numpy as np
 
 from gearsig.errors import InputError
-from gearsig.recording._limits import CHUNK_BYTES, check_memory, foreign_errors
+from gearsig.recording._limits import CHUNK_BYTES, check_decoded
 from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
 from gearsig.recording._types import Recording
 from gearsig.recording.formats._format import OWN_NAME, FileFormat
-from gearsig.recording.formats._hdf5 import load_dataset, own_datasets
+from gearsig.recording.formats._hdf5 import decoded_bytes, load_dataset, own_datasets
 
 # --------------------
 # The arrays, structs, cells and texts in the elements of a MAT v5 file.
@@ -196,10 +196,10 @@ def variables(path: Path) -> Iterator[tuple[str, Any]]:
             kind, size = struct.unpack(order + "II", tag)
             if at + 8 + size > n_bytes:
                 _fail(path.name, at, f"a variable of {size} bytes is cut off")
-            check_memory(3 * (total + size), path.name)
+            check_decoded(total + size, path)
             body = tag + file.read(size)
             if kind == COMPRESSED:
-                body = _unpacked(body[8:], path.name, at, total)
+                body = _unpacked(body[8:], path, at, total)
             total += len(body)
             yield _decoded(memoryview(body), order, path.name, at)
             at += 8 + size
@@ -219,7 +219,7 @@ def _decoded(body: memoryview, order: str, where: str, at: int) -> tuple[str, An
         _fail(where, at, error.what)
 
 
-def _unpacked(packed: bytes, where: str, at: int, before: int) -> bytes:
+def _unpacked(packed: bytes, path: Path, at: int, before: int) -> bytes:
     """Decompress in chunks, so that a bomb is noticed early."""
     stream = zlib.decompressobj()
     chunks: list[bytes] = []
@@ -229,11 +229,11 @@ def _unpacked(packed: bytes, where: str, at: int, before: int) -> bytes:
             chunks.append(stream.decompress(packed, CHUNK_BYTES))
             packed = stream.unconsumed_tail
             size += len(chunks[-1])
-            check_memory(3 * (before + size), where)
+            check_decoded(before + size, path)
     except zlib.error as error:
-        _fail(where, at, f"a compressed variable is damaged ({error})")
+        _fail(path.name, at, f"a compressed variable is damaged ({error})")
     if not stream.eof:
-        _fail(where, at, "a compressed variable is cut off")
+        _fail(path.name, at, "a compressed variable is cut off")
     return b"".join(chunks)
 
 
@@ -359,8 +359,10 @@ def read_mat73(path: Path) -> RawTable:
     arrays: dict[str, NumberArray] = {}
     texts: dict[str, str] = {}
     skipped: list[str] = []
-    with foreign_errors(where, "MAT v7.3"), h5py.File(path, "r", locking=False) as file:
-        for name, dataset in own_datasets(file, skipped):
+    with h5py.File(path, "r", locking=False) as file:
+        datasets = own_datasets(file, skipped)
+        check_decoded(sum(decoded_bytes(dataset) for _, dataset in datasets if dataset.dtype.kind in "fiub"), path)
+        for name, dataset in datasets:
             if dataset.size == 0 or dataset.ndim > 2 or "MATLAB_empty" in dataset.attrs:
                 continue
             if _matlab_class(dataset) == "char":

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from gearsig.errors import InputError
-from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._limits import check_decoded
 from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import RawColumn, RawTable
 from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, Recording, plain_name, split_unit
@@ -30,16 +30,18 @@ def read_parquet(path: Path) -> RawTable:
     from pyarrow import parquet, types
 
     where = path.name
-    with foreign_errors(where, "Parquet"), path.open("rb") as file:
+    with path.open("rb") as file:
         parts = parquet.ParquetFile(file)
         schema = parts.schema_arrow
-        check_memory(2 * parts.metadata.num_rows * _row_bytes(schema), where)
         metadata = schema.metadata or {}
         is_number = (types.is_integer, types.is_floating, types.is_boolean)
         numeric = [f for f in schema if any(test(f.type) for test in is_number)]
         kept = [f for f in numeric if not f.name.startswith("__index_level_")]
-        table = parts.read()
-        values = {f.name: table.column(f.name).to_numpy() for f in kept if schema.names.count(f.name) == 1}
+        row_bytes = sum(max(1, int(f.type.bit_width) // 8) for f in kept)
+        check_decoded(max(parts.metadata.num_rows * row_bytes, _stated_bytes(parts, kept)), path)
+        # Other columns are not even decoded: texts unpack to any size.
+        single = [f.name for f in kept if schema.names.count(f.name) == 1]
+        values = {name: parts.read(columns=[name]).column(name).to_numpy() for name in single}
     doubled = [f.name for f in kept if f.name not in values]
     if doubled:
         raise InputError(
@@ -65,16 +67,12 @@ def _column(field: Any, values: Any) -> RawColumn:
     return RawColumn(name or field.name, values, unit)
 
 
-def _row_bytes(schema: Any) -> int:
-    """Return the decoded bytes of one row; a column whose type has no fixed width counts 32."""
-    return sum(_bytes_of(field.type) for field in schema)
-
-
-def _bytes_of(kind: Any) -> int:
-    try:
-        return max(1, int(kind.bit_width) // 8)
-    except ValueError:
-        return 32
+def _stated_bytes(parts: Any, fields: Sequence[Any]) -> int:
+    """Return the unpacked size that the file states of some columns, pages and dictionaries included."""
+    names = {field.name for field in fields}
+    groups = (parts.metadata.row_group(i) for i in range(parts.metadata.num_row_groups))
+    chunks = (group.column(i) for group in groups for i in range(group.num_columns))
+    return sum(int(chunk.total_uncompressed_size) for chunk in chunks if chunk.path_in_schema in names)
 
 
 def _stated_rate(metadata: Mapping[bytes, bytes]) -> float | None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gearsig.errors import InputError
-from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._limits import check_decoded, check_memory
 from gearsig.recording._table import NamedArrays, RawTable, table_from_arrays
 from gearsig.recording._types import RATE_NAMES, plain_name
 from gearsig.recording.formats._format import FileFormat
@@ -35,12 +35,13 @@ def read_tdms(path: Path) -> RawTable:
     where = path.name
     check_memory(3 * path.stat().st_size, where)
     # The open file is given, not its name: the index file beside it, which may be of another recording, is not read.
-    with foreign_errors(where, "TDMS"), _quiet(), path.open("rb") as stream, TdmsFile.open(stream) as file:
+    with _quiet(), path.open("rb") as stream, TdmsFile.open(stream) as file:
         _check_complete(file, where)
         channels = {}
         units = {}
         rates_hz = _stated_rates(file.properties, "file")
         left_out = []
+        check_decoded(sum(8 * len(channel) for group in file.groups() for channel in group.channels()), path)
         for group in file.groups():
             rates_hz |= _stated_rates(group.properties, group.name)
             for channel in group.channels():
@@ -49,7 +50,6 @@ def read_tdms(path: Path) -> RawTable:
                 if channel.dtype.kind not in "fiub":
                     left_out.append(channel.name)
                     continue
-                check_memory(2 * len(channel) * 8, where)
                 channels[name] = np.asarray(channel[:])
                 units[name] = str(channel.properties.get("unit_string", ""))
                 rates_hz |= _waveform_rate(channel, name, where) or _stated_rates(channel.properties, name)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gearsig.errors import InputError
-from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._limits import check_memory
 from gearsig.recording._table import RawColumn, RawTable
 from gearsig.recording.formats._format import FileFormat
 
@@ -44,7 +44,7 @@ def read_uff58(path: Path) -> RawTable:
 
     where = path.name
     check_memory(8 * path.stat().st_size, where)
-    with foreign_errors(where, "UFF58"), warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         file = pyuff.UFF(str(path))
         numbers = [i for i, kind in enumerate(file.get_set_types()) if int(kind) == 58]

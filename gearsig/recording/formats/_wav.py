@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from gearsig.errors import InputError
-from gearsig.recording._limits import check_memory, foreign_errors
+from gearsig.recording._limits import check_memory
 from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NumberArray, RawColumn, RawTable
 from gearsig.recording._types import Recording
@@ -135,7 +135,7 @@ def read_wav(path: Path) -> RawTable:
     chunks, end = find_chunks(path)
     n_bytes = path.stat().st_size
     check_memory(6 * n_bytes, where)
-    with foreign_errors(where, "WAV"), warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("error")  # a warning means a damaged file, and becomes an error
         # Chunks that scipy does not know are none of its business; find_chunks has checked the lengths.
         warnings.filterwarnings("ignore", message="Chunk .*not understood")
