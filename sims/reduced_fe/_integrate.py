@@ -318,15 +318,23 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
                     n, pairs, columns, k.teeth, own, cross, extra, table_rows, k.column_step, elastic
                 )
                 along_torque = -k.cycles_per_rad * along_cycles
-            torque_1 = along_torque - total * k.runout[0] * cos(phi_1)
-            torque_2 = -total * k.runout[1] * cos(phi_2)
+            off_1, across_1 = k.runout[0] * sin(phi_1), k.runout[0] * cos(phi_1)
+            off_2, across_2 = k.runout[1] * sin(phi_2), k.runout[1] * cos(phi_2)
+            torque_1 = along_torque - total * across_1
+            torque_2 = -total * across_2
             # Friction across the line of action, and the flanks behind.
             if k.friction:
                 slip_x = on_input(inputs, 0, 2, v1) - on_input(inputs, 1, 2, v1)
                 rubbing, moment_1, moment_2 = _rubbing(k, n, n_s, pairs, cycles, force, w1, slip_x)
                 torque_1, torque_2 = torque_1 + moment_1, torque_2 + moment_2
+            # Those see the run-out along their own line of action: it takes up play by what it brings the gears nearer.
+            arm_1 = k.cos_back * across_1 + k.sin_back * off_1
+            arm_2 = k.cos_back * across_2 - k.sin_back * off_2
             depth = product(back_row, q1) + k.damping_time * product(back_row, v1) - k.backlash
+            depth += k.sin_back * (across_1 - across_2) - k.cos_back * (off_1 + off_2)
+            depth -= k.damping_time * (arm_1 + arm_2 / k.ratio) * w1
             back = k.back_stiffness * depth if depth > 0.0 else 0.0
+            torque_1, torque_2 = torque_1 + back * arm_1, torque_2 + back * arm_2
             # All forces as modal ones; the reference repeats the pass until the contact's stay.
             for side in range(2):
                 pull, across = (torque_1, -rubbing) if side == 0 else (torque_2, rubbing)

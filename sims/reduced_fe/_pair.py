@@ -490,6 +490,8 @@ _SCALARS = (
     "nominal_force",
     "damping_time",
     "back_stiffness",
+    "cos_back",
+    "sin_back",
     "restitution",
     "nominal_torque",
 )
@@ -619,6 +621,8 @@ def constants(
         "small": SMALL_PART * nominal,
         "nominal_force": nominal,
         "back_stiffness": stiffness,
+        "cos_back": cos(2.0 * mesh.pair.working_pressure_angle_rad),
+        "sin_back": sin(2.0 * mesh.pair.working_pressure_angle_rad),
         "restitution": -1.0 if pair.restitution is None else pair.restitution,
         "teeth": teeth_of(mesh),
         "unbalance": [w.unbalance_g_mm * 1e-6 for w in wheels],

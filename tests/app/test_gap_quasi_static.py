@@ -52,6 +52,14 @@ def machine(seed: int = 3) -> StaticMachine:
     return StaticMachine.of(np.random.default_rng(seed))
 
 
+def test_a_recording_ends_without_the_blow_of_a_slow_motion_that_is_cut_off() -> None:
+    made = machine()
+    state = made.healthy()
+    state.runout_m.append((0, 1.0, 60.0 * made.rated_m, 0.3))
+    samples = np.abs(record(made, state, QuasiStaticDay.drawn(np.random.default_rng(1)), None).samples[:-1])
+    assert np.all(samples[:, -100:].max(axis=1) < 1.5 * samples[:, :-100].max(axis=1))
+
+
 def test_the_same_day_is_the_same_recording_and_the_teeth_keep_their_mark() -> None:
     made, day = machine(), QuasiStaticDay.drawn(np.random.default_rng(1))
     one, again = (record(made, made.healthy(), day, None) for _ in range(2))

@@ -662,7 +662,9 @@ EFFECTS: dict[str, Callable[[StaticMachine, QuasiStaticState, np.random.Generato
 FINER = 2
 """Times the recording's rate at which the contact is solved: its corners reach beyond half of that."""
 LEAD_S = 0.3
-"""Before the recording, in which modes settle."""
+"""Before and after the recording, in which modes settle."""
+SETTLING_S = 0.15
+"""At either end of that, in which motions begin and end."""
 OUT_OF_REACH_M = 1.0
 TURNS_BEFORE = 40
 """Whole turns of the driver, at most, by which the teeth that meet differ from day to day."""
@@ -710,25 +712,25 @@ def record(
     """
     rng = np.random.default_rng([day.seed, 1])
     rate = FINER * machine.rate_hz
-    time = np.arange(int((machine.drawn.duration_s + LEAD_S) * rate)) / rate
+    time = np.arange(int((machine.drawn.duration_s + 2.0 * LEAD_S) * rate)) / rate
     turns = _turns(machine, state, day, time, rng)
     motions = _motions(machine, state, day, turns, time, rng)
     structure = state.structure.mounted_anew(np.random.default_rng([day.seed, 2])) if day.anew else state.structure
     first, rows = round(LEAD_S * machine.rate_hz), []
+    lasting = slice(first, first + int(machine.drawn.duration_s * machine.rate_hz))
     for channel in range(N_CHANNELS):
-        row = _heard(structure, channel, motions, rate)[first:]
+        row = _heard(structure, channel, motions, rate)[lasting]
         if levels is not None:
-            inside = _heard(structure, channel, {INSIDE: rng.standard_normal(len(time))}, rate)[first:]
+            inside = _heard(structure, channel, {INSIDE: rng.standard_normal(len(time))}, rate)[lasting]
             row = row + inside * (machine.inside_share[channel] * levels[channel] / inside.std())
         if state.paths:
             row = state.paths[channel].of(row, machine.rate_hz)
         if levels is not None:
             row = row + _noise(len(row), machine, channel, rng) * levels[channel] * day.noise_factor
         rows.append(row * day.gains[channel])
-    later = time[::FINER][first:]
+    later = time[::FINER][lasting]
     tacho = _tachometer(turns, time, later, rng)
-    n = min(len(later), len(rows[0]))
-    samples = np.stack([row[:n] for row in (*rows, tacho)])
+    samples = np.stack([*rows, tacho])
     point = machine.rig.operating_point
     channels = tuple(Channel(s.channel, s.quantity, s.unit, s.position) for s in machine.rig.sensors)
     return Recording(samples, machine.rate_hz, channels, rig=replace(machine.rig, operating_point=point))
@@ -790,13 +792,17 @@ def _through_play(pressed: FloatArray, moving: FloatArray, state: QuasiStaticSta
 def _heard(structure: Structure, channel: int, motions: dict[int, FloatArray], rate: float) -> FloatArray:
     """Return a channel's acceleration at the recording's rate."""
     from scipy.fft import irfft, rfft, rfftfreq
+    from scipy.signal.windows import tukey
 
     n = len(next(iter(motions.values())))
     frequency = rfftfreq(n, 1.0 / rate)
     kept = frequency < 0.48 * rate / FINER
     lines = np.zeros(len(frequency), dtype=np.complex128)
+    # A step from the last sample to the first would be the loudest blow of the whole recording.
+    both_ends = tukey(n, 2.0 * SETTLING_S * rate / n)
     for way, motion in motions.items():
-        lines[kept] += rfft(motion - motion.mean())[kept] * structure.accelerations(channel, frequency[kept], way)
+        settled = both_ends * (motion - motion.mean())
+        lines[kept] += rfft(settled)[kept] * structure.accelerations(channel, frequency[kept], way)
     m = n // FINER
     return np.asarray(irfft(lines[: m // 2 + 1], m) * (m / n))
 

@@ -179,6 +179,14 @@ def test_reversed_torque_is_carried_by_the_flanks_behind_across_the_backlash():
     assert depth.min() > 75e-6  # 80 µm of play, less what shafts yield
 
 
+@pytest.mark.parametrize(("runout_um", "is_wedged"), [(100.0, False), (170.0, True)])
+def test_runout_takes_up_the_play_by_twice_the_sine_of_what_it_brings_the_gears_nearer(runout_um, is_wedged):
+    pair = pair_of(half_backlash_um=40.0, runout_driver_um=runout_um)  # 2 sin 20° e: 68 and 116 of 80 µm
+    slow = Operation.steady(600.0, 170.0)
+    run = respond(pair, slow, duration_s=0.12, step_s=8e-6, signals=("back_force_n",), ready=constants(pair, slow))
+    assert np.any(run["back_force_n"] > 0.0) == is_wedged
+
+
 def test_runs_go_on_where_others_ended():
     pair = synthetic_pair()
     whole = respond(pair, STEADY, duration_s=0.004)[TRANSMISSION_ERROR]
