@@ -460,14 +460,17 @@ def _over_pitches(
     n = np.bincount(place, minlength=size).reshape(n_rows, n_steps)
     sums = np.bincount(place, error_um, minlength=size).reshape(n_rows, n_steps)
     times = np.bincount(place, time_s, minlength=size).reshape(n_rows, n_steps)
-    full = np.flatnonzero((n > 0).all(axis=1))
+    # Steps hardly longer than a reading now and then hold none: a single one lies on the line between its neighbours.
+    empty = n.ravel() == 0
+    means = np.interp(np.arange(size), np.flatnonzero(~empty), sums.ravel()[~empty] / n.ravel()[~empty])
+    full = np.flatnonzero(~(empty & np.roll(empty, 1)).reshape(n_rows, n_steps).any(axis=1) & (n.sum(axis=1) > 0))
     full = full[(full > 0) & (full < n_rows - 1)]  # of the first and the last pitch a part may be missing
     if len(full) and np.any(np.diff(full) > 1):  # the longest run without a hole
         runs = np.split(full, np.flatnonzero(np.diff(full) > 1) + 1)
         full = max(runs, key=len)
     if not len(full):
         return np.empty((0, n_steps)), start, np.empty(0)
-    rows = sums[full] / n[full]
+    rows = means.reshape(n_rows, n_steps)[full]
     return rows, start + int(full[0]), times[full].sum(axis=1) / n[full].sum(axis=1)
 
 

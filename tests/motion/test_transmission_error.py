@@ -76,6 +76,13 @@ def test_the_mean_over_hunting_periods_holds_everything_that_repeats() -> None:
         transmission_error(recording(duration_s=5.0)).hunting_um()
 
 
+def test_steps_of_hardly_one_reading_lose_no_pitches() -> None:
+    found = transmission_error(recording(duration_s=1.0, rpm=60.0 * RATE_HZ / (9.02 * Z1)))
+    assert found.n_steps == 9
+    assert len(found.cycles_um) > 0.98 * found.mesh_hz
+    assert found.driver_um[5].mean() == pytest.approx(4.0 * (1.0 - 1.0 / Z1), rel=0.03)
+
+
 def test_the_error_as_an_angle() -> None:
     found = transmission_error(recording())
     assert found.in_urad(np.array([RADII_M[1] * 1e6]))[0] == pytest.approx(1e6)
