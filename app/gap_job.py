@@ -68,6 +68,8 @@ def run_gap(
         inputs.recordings,
         simulator,
         references=inputs.references,
+        learn=inputs.labelled,
+        stage=asked.stage,
         cache=cache,
         fresh=fresh,
         on_stage=lambda stage, done: on_stage(stage, READING + (1 - READING) * done),

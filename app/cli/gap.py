@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli.console import progress_bar, typed_command
-from app.cli.options import SamplingRateOption, clear_other_versions
+from app.cli.options import SamplingRateOption, SpeedOption, clear_other_versions
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -44,7 +44,21 @@ def gap(
         list[str] | None,
         typer.Option("--torque", metavar="N", help="Of the input shaft, e.g. 60Nm: one for all, or one for each."),
     ] = None,
+    speed_rpm: SpeedOption = None,
+    stage: Annotated[
+        str,
+        typer.Option("--stage", metavar="NAME", help="Of several gear pairs the one to diagnose: its name or shaft."),
+    ] = "",
     fs: SamplingRateOption = None,
+    learn: Annotated[
+        Path | None,
+        typer.Option(
+            "--learn",
+            metavar="FOLDER",
+            help="Labelled recordings of this rig, or of your own simulation of it: labels.csv there names file, "
+            "effect, reference, severity. Two of each effect help most of all.",
+        ),
+    ] = None,
     cache: Annotated[
         Path | None,
         typer.Option("--cache", metavar="DIR", help="Keeps what is prepared once per rig. Default: your cache folder."),
@@ -86,7 +100,16 @@ def gap(
     from gearsig.gap import GapRequest
     from gearsig.report import check_writable
 
-    asked = GapRequest(tuple(recordings or ()), tuple(reference or ()), rig, _torques(torque), fs)
+    asked = GapRequest(
+        tuple(recordings or ()),
+        tuple(reference or ()),
+        rig,
+        _torques(torque),
+        fs,
+        learn=learn,
+        stage=stage,
+        speed_rpm=speed_rpm,
+    )
     check_folder(output)
     if cache is not None:
         check_writable(cache)
@@ -149,7 +172,7 @@ def _print_effects(model: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from gearsig.gap import DriveSimulator, load_population, severity_unit
+    from gearsig.gap import DriveSimulator, load_learned, severity_unit
     from sims.effects import is_own
     from sims.registry import gap_simulator
 
@@ -157,7 +180,7 @@ def _print_effects(model: str) -> None:
     simulator = gap_simulator(model)
     found = simulator.gap_effects()
     # Starts and stops are compared by their equation of motion: nothing is learned, and nothing is unknown to it.
-    learned = found if isinstance(simulator, DriveSimulator) else load_population().causes
+    learned = found if isinstance(simulator, DriveSimulator) else load_learned().causes
     last = ""
     for effect in found.values():
         where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from math import cos, exp, radians
 from pathlib import Path
@@ -19,7 +19,7 @@ import numpy as np
 
 from gearsig.gap._conditions import Condition
 from gearsig.gap._evidence import ONE_TOOTH
-from gearsig.gap._recognition import load_recogniser
+from gearsig.gap._labelled import LabelledChange, LabelledEvidence, labelled_evidence, with_labelled
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
 from gearsig.gap._types import LIKELIER_THAN_NOT, NONE, UNKNOWN, GapOutcome, Shrinkage
@@ -258,6 +258,8 @@ class Attribution(Generic[TriedT]):
     n_conditions : int
     unheard_of : tuple of str
         Effects that the forests do not know, the user's own: each was to be tried.
+    labelled : LabelledEvidence or None
+        What labelled recordings of the rig say.
     """
 
     evidence: Mapping[str, float]
@@ -266,6 +268,7 @@ class Attribution(Generic[TriedT]):
     size: float = 1.0
     n_conditions: int = 1
     unheard_of: tuple[str, ...] = ()
+    labelled: LabelledEvidence | None = None
 
     @property
     def scores(self) -> dict[str, float]:
@@ -284,6 +287,8 @@ class Attribution(Generic[TriedT]):
         found = (calibration or self.calibration).probabilities(
             self.evidence, self.scores, self.size, self.n_conditions
         )
+        if self.labelled is not None:
+            found = with_labelled(found, self.labelled.ratios, self.labelled.alike)
         found = told_apart(found, self.matches)
         return shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
 
@@ -339,8 +344,9 @@ def attribute(
     *,
     max_tried: int = MAX_TRIED,
     fresh: bool = False,
+    labelled: Sequence[LabelledChange] = (),
 ) -> Attribution[TriedEffect]:
-    """Ask the forests, then simulate, fit and score the likeliest effects, `max_tried` at most.
+    """Ask the forests and what is labelled, then simulate, fit and score the likeliest effects, `max_tried` at most.
 
     Effects that the forests do not know are tried as well, unless nothing is.
 
@@ -353,7 +359,9 @@ def attribute(
     with_reference = all(c.reference is not None for c in conditions)
     size = max(condition.size.structural.value for condition in conditions)
     calibration = load_gap_calibration(with_reference=with_reference)
-    first = calibration.probabilities(forest, {}, size, len(conditions))
+    evidence = labelled_evidence(conditions, _loads(conditions), labelled) if labelled else None
+    asked = Attribution[TriedEffect](forest, {}, calibration, size, len(conditions), labelled=evidence)
+    first = asked.probabilities()
     likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
     heard_of = _known_to_forests(conditions)
     own = [name for name in effects or known if name not in heard_of] if max_tried else []
@@ -362,11 +370,11 @@ def attribute(
     likely += own
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_where_none_ran(tried, likely, twin)
-    return Attribution(forest, tried, calibration, size, len(conditions), tuple(own))
+    return replace(asked, tried=tried, unheard_of=tuple(own))
 
 
 def _known_to_forests(conditions: Sequence[Condition]) -> set[str]:
-    return {name for c in conditions for name in load_recogniser(with_reference=c.reference is not None).causes}
+    return {name for c in conditions for name in c.learned.causes}
 
 
 def _forest(
@@ -374,9 +382,12 @@ def _forest(
 ) -> dict[str, float]:
     """Return the forests' joint probabilities over what may be named."""
     allowed = {NONE, UNKNOWN, *(effects or known)} & _known_to_forests(conditions)
-    found, loads = [], []
-    for condition in conditions:
-        recogniser = load_recogniser(with_reference=condition.reference is not None)
-        loads.append(tooth_load_n_per_mm(condition.now.frame.pair, condition.facts.point.torque_nm))
-        found.append(recogniser.probabilities(condition.change, loads[-1], known.values()))
+    found, loads = [], _loads(conditions)
+    for condition, load in zip(conditions, loads, strict=True):
+        recogniser = condition.learned.recognisers[condition.reference is not None]
+        found.append(recogniser.probabilities(condition.change, load, known.values()))
     return joint_probabilities(found, loads, allowed)
+
+
+def _loads(conditions: Sequence[Condition]) -> list[float]:
+    return [tooth_load_n_per_mm(one.now.frame.pair, one.facts.point.torque_nm) for one in conditions]

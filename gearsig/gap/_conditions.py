@@ -19,13 +19,13 @@ from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_ener
 from gearsig.gap._floors import (
     REPEATABLE,
     GapSize,
-    Population,
     StructuralFloor,
     gap_size,
-    load_population,
     pooled_scatter,
 )
+from gearsig.gap._population import load_learned
 from gearsig.gap._prediction import ObservedChange
+from gearsig.gap._recognition import Learned
 from gearsig.gap._reduction import (
     DRIVEN,
     DRIVER,
@@ -77,7 +77,7 @@ class Condition:
     now, simulated : ReducedRecording
         The recording, and the healthy twin at its point.
     reference : ReducedRecording or None
-    population : Population
+    learned : Learned
         By which distances are judged.
     """
 
@@ -85,7 +85,7 @@ class Condition:
     now: ReducedRecording
     simulated: ReducedRecording
     reference: ReducedRecording | None
-    population: Population = field(repr=False)
+    learned: Learned = field(repr=False)
 
     @property
     def other(self) -> ReducedRecording:
@@ -94,7 +94,7 @@ class Condition:
 
     def change_of(self, part: ReducedRecording) -> Features:
         """Return the change of the recording, or of some of its blocks, against what it is compared with."""
-        return compare(part, self.simulated, self.reference, self.population)
+        return compare(part, self.simulated, self.reference, self.learned)
 
     @cached_property
     def change(self) -> Features:
@@ -104,7 +104,7 @@ class Condition:
     @cached_property
     def floor(self) -> StructuralFloor:
         """How far healthy machines lie from what it is compared with."""
-        return self.population.floor(with_reference=self.reference is not None)
+        return self.learned.floor(with_reference=self.reference is not None)
 
     @cached_property
     def size(self) -> GapSize:
@@ -159,12 +159,12 @@ def with_channels_of(simulation: ReducedRecording, now: ReducedRecording) -> Red
 
 
 def compare(
-    now: ReducedRecording, simulation: ReducedRecording, reference: ReducedRecording | None, population: Population
+    now: ReducedRecording, simulation: ReducedRecording, reference: ReducedRecording | None, learned: Learned
 ) -> Features:
     """Return the change against the reference, or else against the simulation as far as it is credible."""
     if reference is not None:
         return change_features(now, reference)
-    return difference_features(now, simulation, population.credibility)
+    return difference_features(now, simulation, learned.credibility)
 
 
 def facts_of(prepared: PreparedRecording, now: ReducedRecording, twin: Twin) -> ConditionFacts:
@@ -489,7 +489,7 @@ def conditions_of(
     twin: Twin,
     *,
     tell: Stage = lambda _what, _done: None,
-    population: Population | None = None,
+    learned: Learned | None = None,
 ) -> tuple[list[Condition], list[str]]:
     """Return the conditions, and what is worth a remark.
 
@@ -500,23 +500,23 @@ def conditions_of(
     twin : Twin
     tell : callable
         Is told what is being done, and which share of the whole is complete.
-    population : Population or None
-        Default: the one that comes with this version.
+    learned : Learned or None
+        Default: what comes with this version.
 
     Raises
     ------
     RefusalError
         If in no recording, or in no reference, the speed can be known and there are enough revolutions.
     """
-    population = load_population() if population is None else population
+    learned = load_learned() if learned is None else learned
     notices: list[str] = []
-    healthy = readable(references, _healthy, "reference", notices)
+    healthy = readable(references, read_healthy, "reference", notices)
     done = iter(range(len(recordings)))
 
     def condition_of(recording: PreparedRecording) -> tuple[Condition, list[str]]:
         name = recording.recording.name
         tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * next(done) / len(recordings))
-        return _condition(recording, healthy, twin, population)
+        return _condition(recording, healthy, twin, learned)
 
     conditions = readable(recordings, condition_of, "recording", notices)
     if not references:
@@ -567,13 +567,14 @@ def readable(
     return found
 
 
-def _healthy(recording: PreparedRecording) -> tuple[HealthyReference, list[str]]:
+def read_healthy(recording: PreparedRecording) -> tuple[HealthyReference, list[str]]:
+    """Return a healthy recording reduced, and what is worth a remark."""
     name, (reduced, notices) = recording.recording.name, _reduced(recording)
     return HealthyReference(reduced, recording.rig, name, recording), [*notices, *strange_teeth(reduced, name)]
 
 
 def _condition(
-    recording: PreparedRecording, healthy: Sequence[HealthyReference], twin: Twin, population: Population
+    recording: PreparedRecording, healthy: Sequence[HealthyReference], twin: Twin, learned: Learned
 ) -> tuple[Condition, list[str]]:
     """Return a recording beside its reference and the healthy twin at its point, and what is worth a remark."""
     name, (now, notices) = recording.recording.name, _reduced(recording)
@@ -589,7 +590,7 @@ def _condition(
         now = with_common_channels(now, match.reduced, healthy, name, notices)
     reference = None if match is None else match.reduced
     check_steady(now, reference)
-    condition = Condition(facts, now, simulated(twin, facts, now), reference, population)
+    condition = Condition(facts, now, simulated(twin, facts, now), reference, learned)
     if reference is not None:
         notices += strange_pattern(now, reference, name)
         notices += _strange_reference(condition)
@@ -662,8 +663,8 @@ def _assumed(prepared: PreparedRecording, facts: ConditionFacts) -> list[str]:
 
 def _strange_reference(condition: Condition) -> list[str]:
     """Say so where the reference itself is far from the simulation of a healthy machine."""
-    change = compare(condition.other, condition.simulated, None, condition.population)
-    size = gap_size(change, condition.population.simulation_floor).structural.value
+    change = compare(condition.other, condition.simulated, None, condition.learned)
+    size = gap_size(change, condition.learned.floor(with_reference=False)).structural.value
     if size < CLEAR_WITHOUT:
         return []
     remark = (

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
 from gearsig.checks import closest_match_hint
 from gearsig.errors import GearsigError, InputError, RefusalError
-from gearsig.gap._attribution import attribute, is_calibrated
+from gearsig.gap._attribution import Attribution, attribute, is_calibrated
 from gearsig.gap._conditions import (
     Condition,
     Stage,
@@ -21,10 +21,12 @@ from gearsig.gap._conditions import (
 )
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import evidence_of
-from gearsig.gap._floors import load_population
 from gearsig.gap._gearless import beside_standing, diagnose_gearless, standing_place, stood_out
+from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings
 from gearsig.gap._places import counted_against, gap_places, ranked_places
+from gearsig.gap._population import load_learned
+from gearsig.gap._rigs import is_gearless, twin_rig, with_stage
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
 from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, observed_changes, steps_of
 from gearsig.gap._types import (
@@ -34,6 +36,7 @@ from gearsig.gap._types import (
     GapPlace,
     GapReport,
     Interval,
+    LabelledFacts,
     NextRecording,
     group_probabilities,
 )
@@ -42,64 +45,8 @@ from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording, metres_per_second_squared
-from gearsig.rig import Bearing, GearPair, Rig
+from gearsig.rig import Rig
 from gearsig.severity import CrackEstimate, estimate_crack
-
-# --------------------
-# Whether a rig file says enough for a gap diagnosis, and in which of its two ways it can be diagnosed.
-# --------------------
-
-
-EXAMPLE = "`gearsig rig example` prints a file to start from"
-
-
-def is_gearless(rig: Rig) -> bool:
-    """Return whether the rig has bearings only, so that there is nothing to set a simulator to.
-
-    Raises
-    ------
-    RefusalError
-        If the rig's data suffice neither for a simulation nor for a search for the bearings, with all that is missing.
-    """
-    if rig.pairs:
-        _check_teeth(rig)
-        return False
-    if not rig.bearings:
-        raise RefusalError(
-            "the rig file describes neither a gear pair nor a bearing: there is nothing to set a simulator to, and "
-            "nothing to look for",
-            remedy=f"describe the gear pair (teeth, module) or the bearings (geometry or orders); {EXAMPLE}",
-        )
-    if not known_bearings(rig):
-        names = ", ".join(repr(bearing.name) for bearing in rig.bearings)
-        raise RefusalError(
-            f"the rig has no gear pair, and of no bearing ({names}) the orders and the speed of its shaft are known",
-            remedy="give the bearings' geometry or orders, on the shaft whose speed is known",
-        )
-    return True
-
-
-def known_bearings(rig: Rig) -> tuple[Bearing, ...]:
-    """Return the bearings whose orders per revolution of the reference shaft are known."""
-    return tuple(b for b in rig.bearings if b.orders() and rig.ratio(b.shaft) is not None)
-
-
-def _check_teeth(rig: Rig) -> None:
-    missing = [f"{' and '.join(names)} of pair {pair.name!r}" for pair in rig.pairs if (names := _unknown(pair))]
-    if all(pair.driver_teeth and pair.driven_teeth for pair in rig.pairs):
-        return  # what else a simulator needs, it says itself
-    several = f"; the rig has {len(rig.pairs)} gear pairs, and the simulators have one" if len(rig.pairs) > 1 else ""
-    raise RefusalError(
-        f"the rig data are missing that a simulation needs: {', '.join(missing)}{several}",
-        remedy="complete the rig file; `gearsig analyze` says what can be said without them",
-    )
-
-
-def _unknown(pair: GearPair) -> list[str]:
-    gears = [name for name, teeth in (("driver", pair.driver_teeth), ("driven", pair.driven_teeth)) if teeth is None]
-    teeth = {0: [], 1: [f"teeth of the {' '.join(gears)} gear"], 2: ["teeth of both gears"]}[len(gears)]
-    return [*teeth, *(["module"] if pair.module_mm is None else [])]
-
 
 UNCALIBRATED = (
     "The probabilities are not calibrated on blind cases yet, and how often they are right has not been measured: "
@@ -140,6 +87,8 @@ def diagnose_gap(
     *,
     references: Sequence[Recording] = (),
     effects: Sequence[str] = (),
+    learn: Sequence[LabelledRecording] = (),
+    stage: str = "",
     cache: Path | None = None,
     fresh: bool = False,
     on_stage: Stage | None = None,
@@ -160,8 +109,14 @@ def diagnose_gap(
     effects : sequence of str
         Which effects may be named; empty: all that the simulator has, those of the user's own files included, see
         `sims.effects.add_effect`.
+    learn : sequence of LabelledRecording
+        Recordings of this rig whose cause is known, or of your own simulation of it; `gearsig.gap.read_labelled` reads
+        a folder of them. They join what is known of other machines: two of each effect are worth more than all else.
+    stage : str
+        Of a rig with several gear pairs the one that is diagnosed, by its name or that of a shaft that only it sits
+        on; the others are background.
     cache : Path or None
-        Folder that keeps simulations; None: nothing is kept.
+        Folder that keeps simulations, and what labelled recordings show; None: nothing is kept.
     fresh : bool
         Simulate anew what the folder holds already.
     on_stage : callable or None
@@ -184,40 +139,53 @@ def diagnose_gap(
     # 1. What is given must fit together, and each recording count once.
     _check(recordings, effects, known)
     recordings, references = _named_apart(recordings), _named_apart(references)
-    _check_distinct([*recordings, *references])
-    rig = _check_rigs([*recordings, *references])
+    _check_distinct([*recordings, *references, *(one.recording for one in learn)])
+    rig = _check_rigs([*recordings, *references, *(one.recording for one in learn)])
     allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
 
     # 2. Machines that start and stop are compared by their motion, those without gears by their bearings alone.
     if isinstance(simulator, DriveSimulator):
+        _refuse_labelled(learn, "a machine that starts and stops")
         return drive_report(diagnose_start_stop(recordings, references, simulator, allowed, tell))
     refuse_start_stop(recordings, simulator.name)
+    rig, recordings, references, learn = _on_stage(rig, recordings, references, learn, stage)
     prepared, healthy = [PreparedRecording(r) for r in recordings], [PreparedRecording(r) for r in references]
     if is_gearless(rig):
+        _refuse_labelled(learn, "a rig without gears")
         return diagnose_gearless(prepared, healthy, allowed, tell)
 
     # 3. Each recording is reduced to features, beside the healthy twin at its point and the reference.
-    twin, population = simulator.twin_of(rig), load_population()
-    _check_own(twin, set(allowed) - set(population.causes))
+    alone, assumed = twin_rig(rig)
+    twin, learned = simulator.twin_of(alone), load_learned()
+    _check_own(twin, set(allowed) - set(learned.causes))
     tell("reading the recordings", 0.02)
-    conditions, notices = conditions_of(prepared, healthy, twin, tell=tell, population=population)
+    conditions, notices = conditions_of(prepared, healthy, twin, tell=tell, learned=learned)
     clearest = max(conditions, key=lambda condition: condition.size.structural.value)
     recording = next(one for one in prepared if one.recording.name == clearest.facts.name)
 
-    # 4. Which effect: what the forests say, and of the likeliest what trials on the twin say.
+    # 4. Which effect: what the forests and labelled recordings say, and of the likeliest what trials on the twin say.
     tell("recognising", 0.2)
+    labelled, left_out = labelled_changes(learn, healthy, conditions, twin, cache, fresh=fresh)
     attribution = attribute(
-        conditions, known, effects, twin, cache, lambda what, done: tell(what, 0.25 + 0.55 * done), fresh=fresh
+        conditions,
+        known,
+        effects,
+        twin,
+        cache,
+        lambda what, done: tell(what, 0.25 + 0.55 * done),
+        fresh=fresh,
+        labelled=labelled,
     )
     tried, gap = attribution.tried, _places(clearest)
-    probabilities = within_the_floor(attribution.probabilities(), clearest.size.structural)
-    probabilities = counted_against(probabilities, known, gap, clearest.now.frame)
+    probabilities = _weighed(attribution, clearest, known, gap)
 
     # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
     standing, remarks, faults = stood_out(recording, healthy)
     groups = {name: effect.group for name, effect in known.items()}
     outcome, unseen = beside_standing(attribution.calibration.outcome(probabilities, groups), standing)
+    without = _weighed(replace(attribution, labelled=None), clearest, known, gap)
+    labels = _labelled_facts(attribution, without, groups)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
@@ -255,9 +223,9 @@ def diagnose_gap(
             clearest.now,
             clearest.simulated,
             after,
-            structural=population.simulation_floor,
+            structural=learned.floor(with_reference=False),
             reference=reference,
-            reference_structural=None if reference is None else population.reference_floor,
+            reference_structural=None if reference is None else learned.floor(with_reference=True),
             unit=_unit(recording.recording),
         ),
         angles=angle_curves(
@@ -270,6 +238,9 @@ def diagnose_gap(
         averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recording.recording)),
         notices=(
             *uncalibrated,
+            *(() if labels is None else (labels.text,)),
+            *left_out,
+            *assumed,
             *notices,
             *(
                 (OWN_EFFECT if name in tried else NOT_SIMULATED).format(title=known[name].title)
@@ -282,6 +253,7 @@ def diagnose_gap(
         ),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
         warnings=warnings,
+        labelled=labels,
     )
 
 
@@ -319,13 +291,55 @@ def _named_apart(recordings: Sequence[Recording]) -> list[Recording]:
 
 def _check_distinct(recordings: Sequence[Recording]) -> None:
     """Refuse copies: they tell nothing more, and a recording does not differ from itself."""
-    for one, other in combinations(recordings, 2):
-        if np.array_equal(one.samples, other.samples):
+    seen: dict[bytes, str] = {}
+    for recording in recordings:
+        digest = sha256(np.ascontiguousarray(recording.samples).tobytes()).digest()
+        if digest in seen:
             raise InputError(
-                f"holds the same samples as {one.name}",
-                where=other.name,
+                f"holds the same samples as {seen[digest]}",
+                where=recording.name,
                 remedy="give each recording once, in one role",
             )
+        seen[digest] = recording.name
+
+
+def _on_stage(
+    rig: Rig,
+    recordings: Sequence[Recording],
+    references: Sequence[Recording],
+    learn: Sequence[LabelledRecording],
+    stage: str,
+) -> tuple[Rig, Sequence[Recording], Sequence[Recording], Sequence[LabelledRecording]]:
+    """Return everything with the pair that is asked for as the rig's first."""
+    if not stage and len(rig.pairs) < 2:
+        return rig, recordings, references, learn
+
+    def chosen(recording: Recording) -> Recording:
+        return replace(recording, rig=None if recording.rig is None else with_stage(recording.rig, stage))
+
+    labelled = [
+        replace(
+            one, recording=chosen(one.recording), reference=None if one.reference is None else chosen(one.reference)
+        )
+        for one in learn
+    ]
+    return with_stage(rig, stage), [*map(chosen, recordings)], [*map(chosen, references)], labelled
+
+
+def _labelled_facts(
+    attribution: Attribution[TriedEffect], without: Mapping[str, float], groups: Mapping[str, str]
+) -> LabelledFacts | None:
+    """Return what labelled recordings changed; None where there are none."""
+    if attribution.labelled is None:
+        return None
+    return LabelledFacts(attribution.labelled.counts, without, attribution.calibration.outcome(without, groups))
+
+
+def _refuse_labelled(learn: Sequence[LabelledRecording], what: str) -> None:
+    if learn:
+        raise InputError(
+            f"labelled recordings of {what} tell nothing yet", where="learn", remedy="give a healthy reference instead"
+        )
 
 
 def _check_rigs(recordings: Sequence[Recording]) -> Rig:
@@ -370,6 +384,17 @@ def _of_the_fit(named: GapCause | None) -> list[str]:
         return []
     nearer = [OF_THE_TWIN] if named.severity is not None and not named.severity.is_unbounded else []
     return [*nearer, *([NOT_NEARER.format(title=named.title)] if not named.fitted and named.shrinkage else [])]
+
+
+def _weighed(
+    attribution: Attribution[TriedEffect],
+    clearest: Condition,
+    known: Mapping[str, GapEffect],
+    gap: Sequence[GapPlace],
+) -> dict[str, float]:
+    """Return cause → probability, with what the whole gap and its places say."""
+    found = within_the_floor(attribution.probabilities(), clearest.size.structural)
+    return counted_against(found, known, gap, clearest.now.frame)
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:

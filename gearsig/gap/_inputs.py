@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import csv
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gearsig.errors import InputError
+from gearsig.gap._labelled import LabelledRecording
+from gearsig.gap._types import NONE, UNKNOWN
 from gearsig.recording import Recording, read_recording
-from gearsig.rig import Rig, read_rig, rig_file_beside
+from gearsig.rig import ConstantSpeed, Rig, read_rig, rig_file_beside
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,12 @@ class GapRequest:
         Of files that do not state it.
     names, reference_names : tuple of str
         Of recordings and references, for people; empty: those of the files.
+    learn : Path or None
+        Folder of labelled recordings of this rig, see `read_labelled`.
+    stage : str
+        Gear pair that is diagnosed, of several, see `diagnose_gap`.
+    speed_rpm : float or None
+        Constant speed of the reference shaft in all recordings and references, where nothing measures it.
     """
 
     recordings: tuple[Path, ...]
@@ -35,14 +44,18 @@ class GapRequest:
     sampling_rate_hz: float | None = None
     names: tuple[str, ...] = ()
     reference_names: tuple[str, ...] = ()
+    learn: Path | None = None
+    stage: str = ""
+    speed_rpm: float | None = None
 
 
 @dataclass(frozen=True)
 class GapInputs:
-    """Recordings and references, each with its rig and its name for people."""
+    """Recordings and references, each with its rig and its name for people, and what is labelled."""
 
     recordings: tuple[Recording, ...]
     references: tuple[Recording, ...] = ()
+    labelled: tuple[LabelledRecording, ...] = ()
 
 
 def read_gap_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda _: None) -> GapInputs:
@@ -69,9 +82,16 @@ def read_gap_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda
     recordings = []
     for path, name, rig in zip(files, names, _rigs(asked, files), strict=True):
         on_file(path.name)
-        recordings.append(read_recording(path, rig=rig, sampling_rate_hz=asked.sampling_rate_hz).with_name(name))
-    n = len(asked.recordings)
-    return GapInputs(tuple(recordings[:n]), tuple(recordings[n:]))
+        speed = None if asked.speed_rpm is None else ConstantSpeed(asked.speed_rpm)
+        recording = read_recording(path, rig=rig, sampling_rate_hz=asked.sampling_rate_hz, speed=speed)
+        recordings.append(recording.with_name(name))
+    n, labelled = len(asked.recordings), tuple[LabelledRecording, ...]()
+    if asked.learn is not None:
+        on_file(asked.learn.name)
+        labelled = read_labelled(
+            asked.learn, rig=recordings[0].rig, sampling_rate_hz=asked.sampling_rate_hz, on_file=on_file
+        )
+    return GapInputs(tuple(recordings[:n]), tuple(recordings[n:]), labelled)
 
 
 def _check_files(asked: GapRequest) -> None:
@@ -175,3 +195,143 @@ def _names(paths: Sequence[Path]) -> tuple[str, ...]:
     """Return the names of files; with their folders where names alone are not unique."""
     plain = [path.name for path in paths]
     return tuple(plain) if len(set(plain)) == len(plain) else tuple(f"{p.parent.name}/{p.name}" for p in paths)
+
+
+# --------------------
+# A folder of labelled recordings: labels.csv and what it names.
+# --------------------
+
+
+TABLE, COLUMNS = "labels.csv", ("file", "effect", "reference", "severity")
+HEALTHY_LABELS = ("healthy", NONE, "no_fault", "ok")
+MAX_LABELLED = 500
+
+
+def read_labelled(
+    folder: Path,
+    *,
+    rig: Rig | None = None,
+    sampling_rate_hz: float | None = None,
+    on_file: Callable[[str], object] = lambda _: None,
+) -> tuple[LabelledRecording, ...]:
+    """Read the recordings that a folder's `labels.csv` names.
+
+    The table has a line for each recording: `file`, `effect` (a name of the catalogue, "healthy", or a name of your
+    own), and, if there are any, `reference` (the file of the same rig when it was healthy) and `severity`.
+
+    Parameters
+    ----------
+    folder : Path
+    rig : Rig or None
+        Of all recordings; NAME.toml beside a recording overrides its operating point and speed source.
+    sampling_rate_hz : float or None
+        Of files that do not state it.
+    on_file : callable
+        Is told the name of each file before it is read.
+
+    Raises
+    ------
+    InputError
+        With the table's name and line: if it cannot be read, a column is missing, or a file, a label or a number is
+        not what it must be.
+    """
+    references: dict[Path, Recording] = {}
+
+    def read(path: Path) -> Recording:
+        on_file(path.name)
+        beside = rig_file_beside(path)
+        own = read_rig(beside) if beside is not None else None
+        if own is not None and rig is not None:
+            _check_same(rig, own, path.name)
+        if own is None and rig is None:
+            raise InputError("no rig is given, and none lies beside it", where=path.name, remedy="give --rig RIG.toml")
+        recording = read_recording(path, rig=_merged(rig, own), sampling_rate_hz=sampling_rate_hz)
+        return recording.with_name(f"{folder.name}/{path.name}")
+
+    found = []
+    for where, line in _lines(folder / TABLE):
+        path = _named(folder, line["file"], where, "file")
+        label, severity = _label(line["effect"], where), _severity(line.get("severity", ""), where)
+        healthy = None
+        if line.get("reference"):
+            there = _named(folder, line["reference"], where, "reference")
+            if there == path:
+                raise InputError("a recording is its own reference", where=where, remedy="name a healthy one, or none")
+            healthy = references[there] = references.get(there) or read(there)
+        found.append(LabelledRecording(read(path), label, healthy, severity))
+    return tuple(found)
+
+
+def _lines(path: Path) -> list[tuple[str, Mapping[str, str]]]:
+    """Return the lines of the table, each with where it stands."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        example = "a line of names, file,effect,reference,severity, and a line for each recording"
+        raise InputError(
+            f"cannot be read ({error.strerror})", where=str(path), remedy=f"put {TABLE} there: {example}"
+        ) from None
+    except UnicodeDecodeError:
+        raise InputError("is no text in UTF-8", where=str(path), remedy="save it as CSV UTF-8") from None
+    header = text.partition("\n")[0]
+    rows = csv.reader(text.splitlines(), delimiter=";" if header.count(";") > header.count(",") else ",", strict=True)
+    lines: list[tuple[str, Mapping[str, str]]] = []
+    try:
+        names = [name.strip().lower() for name in next(rows, [])]
+        missing = [name for name in COLUMNS[:2] if name not in names]
+        if missing:
+            raise InputError(
+                f"the column {missing[0]!r} is missing", where=f"{path.name}, line 1", allowed=", ".join(COLUMNS)
+            )
+        for row in rows:
+            where = f"{path.name}, line {rows.line_num}"
+            if not any(cell.strip() for cell in row):
+                continue
+            if len(row) > len(names):
+                raise InputError(f"{len(row)} cells stand under {len(names)} names", where=where, allowed="one each")
+            lines.append((where, dict(zip(names, (cell.strip() for cell in row), strict=False))))
+    except csv.Error as error:
+        raise InputError(f"is no table ({error})", where=f"{path.name}, line {rows.line_num}") from None
+    if not 0 < len(lines) <= MAX_LABELLED:
+        raise InputError(
+            f"names {len(lines)} recordings", where=path.name, allowed=f"1 to {MAX_LABELLED}, a line for each"
+        )
+    return lines
+
+
+def _named(folder: Path, name: str, where: str, column: str) -> Path:
+    """Return a file that the table names; it lies in the table's folder or below it."""
+    if not name:
+        raise InputError(f"no {column} is named", where=where, allowed="the name of a file in the folder")
+    path, root = (folder / name).resolve(), folder.resolve()
+    if not path.is_relative_to(root):
+        raise InputError(f"{name!r} lies outside the folder", where=where, allowed="files in it, or in folders below")
+    if not path.is_file():
+        raise InputError(f"there is no file {name!r}", where=where, remedy="check its name")
+    return path
+
+
+def _label(text: str, where: str) -> str:
+    """Return a label as names of effects are written; "none" of a healthy machine."""
+    label = "_".join(text.lower().replace("-", " ").split())
+    if label in HEALTHY_LABELS:
+        return NONE
+    if not label or label == UNKNOWN or len(label) > 60 or not label.replace("_", "").isalnum():
+        raise InputError(
+            f"the effect is {text!r}",
+            where=where,
+            allowed="a name of `gearsig gap --list-effects`, healthy, or a name of your own of letters and digits",
+        )
+    return label
+
+
+def _severity(text: str, where: str) -> float | None:
+    if not text:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0.0 <= value < float("inf"):
+        raise InputError(f"the severity is {text!r}", where=where, allowed="a number from 0, or nothing")
+    return value

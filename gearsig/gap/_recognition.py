@@ -1,12 +1,10 @@
-"""Which causes changed features look like: decision trees, and a linear rule, over the population of drawn machines."""
+"""Which causes changed features look like: decision trees, and a linear rule, learned from the population."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import cache
-from hashlib import sha256
-from importlib.metadata import version
+from dataclasses import dataclass, field
+from functools import cached_property
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -14,26 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.cache import cache_folder, keep, modules_digest, read_arrays
+from gearsig.cache import read_arrays, write_whole
 from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
-from gearsig.gap._change import beyond_the_mesh, counted_from_the_mesh, mirrored, seen_rows
+from gearsig.gap._change import beyond_the_mesh, counted_from_the_mesh, seen_rows
 from gearsig.gap._features import SIDES, Features
-from gearsig.gap._floors import (
-    LEFT_OUT,
-    MAKE_POPULATION,
-    POPULATION_FILE,
-    REPEATABLE,
-    Population,
-    StructuralFloor,
-    load_population,
-    soft_size,
-)
+from gearsig.gap._floors import REPEATABLE, StructuralFloor
 from gearsig.gap._simulator import GapEffect
-from gearsig.gap._types import NONE, UNKNOWN
+from gearsig.gap._types import UNKNOWN
 
 # --------------------
-# Decision trees as plain arrays: they can be kept in a file without running anything from it.
+# Decision trees as plain arrays, packed for a file that comes with the library.
 # --------------------
 
 
@@ -42,58 +31,71 @@ LEAF = -1
 
 @dataclass(frozen=True)
 class Trees:
-    """Trees one after another, their nodes numbered throughout.
+    """Trees one after another, their nodes numbered throughout, depth first: a node's left branch follows it.
 
     Parameters
     ----------
-    columns : int array, (n_nodes,)
+    columns : int16 array, (n_nodes,)
         Of the input, by which a node splits; `LEAF` for a leaf.
-    thresholds : array, (n_nodes,)
-        At or below which it goes on with `left`.
-    left, right : int arrays, (n_nodes,)
-        Node; of a leaf, `left` is its row of `shares`.
-    roots : int array, (n_trees,)
-    shares : float16 array, (n_leaves, n_causes)
-        Of the causes, in each leaf.
+    thresholds : float16 array, (n_nodes,)
+        At or below which it goes on to the left.
+    roots : int32 array, (n_trees,)
+    shares : uint8 array, (n_leaves, n_causes)
+        Of the causes in each leaf, in `WHOLE`ths.
     """
 
     columns: NDArray[np.int16]
-    thresholds: FloatArray
-    left: NDArray[np.int32]
-    right: NDArray[np.int32]
+    thresholds: NDArray[np.float16]
     roots: NDArray[np.int32]
-    shares: NDArray[np.float16]
+    shares: NDArray[np.uint8]
 
     @classmethod
     def of(cls, forest: Any) -> Trees:
-        """Return those of a fitted forest of scikit-learn, which sorts by single-precision input."""
+        """Return those of a fitted forest of scikit-learn, whose trees are numbered depth first, left before right."""
         trees = [one.tree_ for one in forest.estimators_]
         roots = np.cumsum([0, *(tree.node_count for tree in trees[:-1])]).astype(np.int32)
         columns = np.concatenate([tree.feature for tree in trees]).astype(np.int16)
-        left, right = (
-            np.concatenate([getattr(tree, side) + root for tree, root in zip(trees, roots, strict=True)])
-            for side in ("children_left", "children_right")
-        )
         leaves = columns < 0
-        columns[leaves], right[leaves] = LEAF, 0
-        left[leaves] = np.arange(int(leaves.sum()))
+        columns[leaves] = LEAF
         counts = np.concatenate([tree.value[:, 0] for tree in trees])[leaves]
-        shares = (counts / counts.sum(axis=1, keepdims=True)).astype(np.float16)
-        thresholds = np.concatenate([tree.threshold for tree in trees])
-        return cls(columns, thresholds, left.astype(np.int32), right.astype(np.int32), roots, shares)
+        shares = np.round(WHOLE * counts / counts.sum(axis=1, keepdims=True)).astype(np.uint8)
+        largest = float(np.finfo(np.float16).max)
+        thresholds = np.clip(np.concatenate([tree.threshold for tree in trees]), -largest, largest).astype(np.float16)
+        return cls(columns, thresholds, roots, shares)
+
+    @cached_property
+    def _leaf(self) -> NDArray[np.intp]:
+        """Row of `shares` of each node that is a leaf."""
+        return np.cumsum(self.columns == LEAF) - 1
+
+    @cached_property
+    def _right(self) -> NDArray[np.intp]:
+        """Where the right branch of each node begins: after a leaf comes that of the last node that waits for it."""
+        right, waiting = np.zeros(len(self.columns), dtype=np.intp), list[int]()
+        for node, is_leaf in enumerate((self.columns == LEAF).tolist()):
+            if not is_leaf:
+                waiting.append(node)
+            elif waiting:
+                right[waiting.pop()] = node + 1
+        return right
 
     def probabilities(self, row: FloatArray) -> FloatArray:
         """Return the mean of the trees' shares, (n_causes,), for one row of input."""
-        values, nodes = row.astype(np.float32), self.roots
+        values, nodes = row.astype(np.float32), self.roots.astype(np.intp)
         while True:
             columns = self.columns[nodes]
             leaves = columns == LEAF
             if leaves.all():
                 break
-            on = np.where(values[columns] <= self.thresholds[nodes], self.left[nodes], self.right[nodes])
-            nodes = np.where(leaves, nodes, on)
-        found: FloatArray = self.shares[self.left[nodes]].astype(np.float64).mean(axis=0)
+            goes_left = values[columns] <= self.thresholds[nodes]
+            nodes = np.where(leaves, nodes, np.where(goes_left, nodes + 1, self._right[nodes]))
+        found: FloatArray = self.shares[self._leaf[nodes]].astype(np.float64).mean(axis=0)
+        found /= found.sum()
         return found
+
+
+WHOLE = 15
+"""What shares are counted in: the mean over hundreds of trees is finer by far."""
 
 
 @dataclass(frozen=True)
@@ -118,58 +120,100 @@ class LinearRule:
 
 
 # --------------------
-# A fitted recogniser on disk, so that not every command fits it anew: plain arrays; a damaged file is no file.
+# Where effects of one machine lie: learned from machines with several recordings of each effect.
 # --------------------
 
 
-MAX_BYTES = 200_000_000
-"""Of a file's arrays; a real one has a tenth."""
+N_DIRECTIONS = 40
+"""In which recordings are compared: of 20, 40, 80 no worse than the others on simulators left out."""
 
-_MODULES = ("_change", "_features", "_floors", "_recognition")
-_TREES = ("columns", "thresholds", "left", "right", "roots", "shares")
-_LINEAR = ("weights", "offsets")
+WITHIN_SHRINKAGE = 0.3
+"""How far the covariance within a machine's effect is drawn towards a diagonal one."""
 
-Fitted = tuple[tuple[str, ...], Trees, LinearRule | None]
-"""Causes, trees, and what is heard besides them."""
+MIN_BETWEEN = 0.05
 
 
-def read_fitted(name: str) -> Fitted | None:
-    """Return what was kept under a name for this very code and population; None where nothing was, or it is damaged."""
-    arrays = read_arrays(_path(name), MAX_BYTES)
-    if arrays is None:
-        return None
-    try:
-        trees = Trees(*(arrays[key] for key in _TREES))
-        linear = LinearRule(*(arrays[key] for key in _LINEAR)) if _LINEAR[0] in arrays else None
-        return tuple(map(str, arrays["causes"])), trees, linear
-    except (KeyError, TypeError):
-        return None
+@dataclass(frozen=True)
+class LabelSpace:
+    """Directions in which a machine's effects lie apart, x = Dᵀ z; one effect's recordings scatter by 1 in each.
+
+    x ~ N(μ, 1), μ ~ N(m_c, b): cause c of one machine lies at μ, of all machines about m_c. With n labelled
+    recordings of mean x̄ of it, μ ~ N((m_c/b + n x̄)/(1/b + n), 1/(1/b + n)), and a further one is as likely as that
+    and the unit scatter together make it.
+
+    Source: S. Ioffe, "Probabilistic linear discriminant analysis", ECCV 2006.
+
+    Parameters
+    ----------
+    directions : array, (n_columns, k)
+        Of a recogniser's input.
+    causes : tuple of str
+    means : array, (n_causes, k)
+    between : array, (k,)
+        Variance of machines about them.
+    whole : arrays, (2, k)
+        Mean and variance over all causes and machines: of an effect that nothing was learned of.
+    """
+
+    directions: FloatArray
+    causes: tuple[str, ...]
+    means: FloatArray
+    between: FloatArray
+    whole: FloatArray
+
+    def log_ratio(self, row: FloatArray, rows: FloatArray, cause: str) -> float:
+        """Return ln p(x | cause, its labelled recordings) − ln p(x | cause).
+
+        Parameters
+        ----------
+        row : array, (n_columns,)
+            Of a recording.
+        rows : array, (n, n_columns)
+            Of labelled ones.
+        cause : str
+            Label of those.
+        """
+        known = cause in self.causes and cause != UNKNOWN
+        mean = self.means[self.causes.index(cause)] if known else self.whole[0]
+        between = self.between if known else self.whole[1]
+        x, n = row @ self.directions, len(rows)
+        variance = 1.0 / (1.0 / between + n)
+        centre = variance * (mean / between + (rows @ self.directions).sum(axis=0))
+        labelled = (x - centre) ** 2 / (1.0 + variance) + np.log(1.0 + variance)
+        alone = (x - mean) ** 2 / (1.0 + between) + np.log(1.0 + between)
+        return float(0.5 * np.sum(alone - labelled))
 
 
-def keep_fitted(name: str, fitted: Fitted) -> None:
-    """Keep it, in place of what other versions kept; where the folder cannot be written, the next process fits anew."""
-    causes, trees, linear = fitted
-    arrays = {key: getattr(trees, key) for key in _TREES}
-    arrays |= {key: getattr(linear, key) for key in _LINEAR} if linear is not None else {}
-    path = _path(name)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        for old in path.parent.glob(f"{name}-*.npz"):
-            old.unlink(missing_ok=True)
-    except OSError:
-        return
-    keep(path, lambda file: np.savez(file, allow_pickle=False, causes=np.array(causes), **arrays))
+def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArray[np.int64]) -> LabelSpace:
+    """Return the directions of the largest variance between machines' effects over that within one.
 
+    Parameters
+    ----------
+    rows : array, (n, n_columns)
+        Input of a recogniser.
+    causes : array of str, (n,)
+    machines : int array, (n,)
+    """
+    from scipy.linalg import eigh
 
-def _path(name: str) -> Path:
-    return cache_folder("forests") / f"{name}-{_made_of()}.npz"
-
-
-@cache
-def _made_of() -> str:
-    """Return a short hash of all that a fit depends on."""
-    code = modules_digest(f"gearsig.gap.{module}" for module in _MODULES)
-    return sha256(POPULATION_FILE.read_bytes() + f"{code} {version('scikit-learn')}".encode()).hexdigest()[:16]
+    names, cause = np.unique(causes, return_inverse=True)
+    _, first, group = np.unique(machines * len(names) + cause, return_index=True, return_inverse=True)
+    counts = np.bincount(group)
+    centres = np.zeros((len(counts), rows.shape[1]))
+    np.add.at(centres, group, rows)
+    centres /= counts[:, None]
+    several = counts[group] > 1
+    apart = rows[several] - centres[group[several]]
+    within = apart.T @ apart / max(int((counts[counts > 1] - 1).sum()), 1)
+    diagonal = np.diag(within) + 1e-3 / WITHIN_SHRINKAGE  # features that never moved still may
+    regular = (1.0 - WITHIN_SHRINKAGE) * within + WITHIN_SHRINKAGE * np.diag(diagonal)
+    _, vectors = eigh(np.cov(centres.T), regular)
+    directions = vectors[:, ::-1][:, :N_DIRECTIONS]
+    found, of = centres @ directions, cause[first]
+    means = np.array([found[of == i].mean(axis=0) for i in range(len(names))])
+    spread = np.mean((found - means[of]) ** 2, axis=0) - np.mean(1.0 / counts)
+    whole = np.array([found.mean(axis=0), found.var(axis=0)])
+    return LabelSpace(directions, tuple(map(str, names)), means, np.maximum(spread, MIN_BETWEEN), whole)
 
 
 # --------------------
@@ -230,34 +274,20 @@ def textbook_strengths(rules: Iterable[tuple[str, Signs]], deviations: Mapping[s
     return strongest
 
 
-N_TREES = 400
-ROW_SHARE, FEATURE_SHARE, MIN_IN_A_LEAF = 0.4, 0.1, 3
-"""Of the rows that each tree is fitted to, of the columns that each split may choose from, and the least rows that a
-split leaves on either side. Two forests of 200 trees that differ in their random numbers alone have log losses on blind
-cases that scatter by 0.02, and name three in a hundred differently."""
-
-LINEAR_SHARE, LINEAR_SHRINKAGE, LINEAR_REACH = 0.5, 0.2, 8.0
-"""Of the probabilities without a reference that a linear discriminant gives; how far its covariance is drawn towards a
-diagonal one; where its input is cut. Without a reference nearly all that is seen is what one machine differs from
-another by: trees cut along single features and miss a small change across it, a pooled covariance takes it out."""
+LINEAR_SHARE, LINEAR_REACH = 0.5, 8.0
+"""Of the probabilities without a reference that a linear discriminant gives; where its input is cut. Without a
+reference nearly all that is seen is what one machine differs from another by: trees cut along single features and miss
+a small change across it, a pooled covariance takes it out."""
 
 RULES_WEIGHT = 0.3
 """Of what the textbook's rules say without a reference, p ∝ p_learned exp(w strength): the population's balance of a
 machine's lines is its own, and where nothing cancels what is usual, the rules' few signs hold on any machine."""
-
-EVENNESS = 0.5
-"""0: every row counts alike; 1: every source of a cause does."""
-
-MIN_SIZE = 0.6
-"""Structural floors, below which a drawn effect changed nothing that could be learned."""
 
 MIN_PROBABILITY = 2e-3
 """That a forest gives any cause: no tree having voted for it is no proof."""
 
 MIN_LOAD_N_PER_MM = 0.01
 """Of the teeth: less is none."""
-
-_SEED = 0
 
 
 @dataclass(frozen=True)
@@ -272,6 +302,8 @@ class Recogniser:
     trees : Trees
     usual_load_n_per_mm : float
         Of the teeth, where a rig does not say.
+    labels : LabelSpace
+        Where effects of one machine lie, for what is labelled.
     linear : LinearRule or None
         What is heard besides the forest, by `LINEAR_SHARE`.
     """
@@ -280,6 +312,7 @@ class Recogniser:
     floor: StructuralFloor
     trees: Trees
     usual_load_n_per_mm: float
+    labels: LabelSpace
     linear: LinearRule | None = None
 
     def probabilities(
@@ -296,20 +329,25 @@ class Recogniser:
         effects : iterable of GapEffect
             Whose textbook signs are asked, without a reference.
         """
-        if change.names != self.floor.names:
-            raise InputError(
-                "the population belongs to other features than this version computes",
-                remedy=MAKE_POPULATION,
-            )
-        load = tooth_load_n_per_mm if tooth_load_n_per_mm > 0.0 else self.usual_load_n_per_mm
-        row = input_rows(self.floor, change.values[None], change.scatter[None], np.array([load]))[0]
+        row = self.input_row(change, tooth_load_n_per_mm)
         found = self.trees.probabilities(row)
         if self.linear is not None:
-            told = self.linear.probabilities(_within_reach(row))
+            told = self.linear.probabilities(within_reach(row))
             found = (1.0 - LINEAR_SHARE) * found + LINEAR_SHARE * told
             found = found * self._by_the_rules(change, textbook_rules(effects))
         found = np.maximum(found, MIN_PROBABILITY)
         return dict(zip(self.causes, (found / found.sum()).tolist(), strict=True))
+
+    def input_row(self, change: Features, tooth_load_n_per_mm: float = nan) -> FloatArray:
+        """Return what trees and rules see of a change, see `probabilities`."""
+        if change.names != self.floor.names:
+            raise InputError(
+                "what was learned belongs to other features than this version computes",
+                remedy="make it anew: python -m app.studies.gap.population learn",
+            )
+        load = tooth_load_n_per_mm if tooth_load_n_per_mm > 0.0 else self.usual_load_n_per_mm
+        row: FloatArray = input_rows(self.floor, change.values[None], change.scatter[None], np.array([load]))[0]
+        return row
 
     def _by_the_rules(self, change: Features, rules: Iterable[tuple[str, Signs]]) -> FloatArray:
         """Return the factors of the causes, by how far features are from usual, in standard deviations."""
@@ -350,91 +388,111 @@ def input_rows(
     )
 
 
-def fit_recogniser(population: Population, *, with_reference: bool, n_trees: int = N_TREES) -> Recogniser:
-    """Return the recogniser that is fitted to a population."""
-    fitted = _fit(population, with_reference=with_reference, n_trees=n_trees)
-    return _with_floor(population, fitted, with_reference=with_reference)
-
-
-def _with_floor(population: Population, fitted: Fitted, *, with_reference: bool) -> Recogniser:
-    causes, trees, linear = fitted
-    usual_load = float(np.median(population.loads_n_per_mm))
-    return Recogniser(causes, population.floor(with_reference=with_reference), trees, usual_load, linear)
-
-
-def _fit(population: Population, *, with_reference: bool, n_trees: int = N_TREES) -> Fitted:
-    """Fit to a population, and to the same with driver and driven gear exchanged.
-
-    Extremely randomised trees: P. Geurts, D. Ernst, L. Wehenkel, "Extremely randomized trees", 2006. The linear
-    discriminant with a shrunken covariance: J. H. Friedman, "Regularized discriminant analysis", 1989.
-    """
-    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
-    from sklearn.ensemble import ExtraTreesClassifier
-
-    floor = population.floor(with_reference=with_reference)
-    tables = (
-        (population.changes, population.change_scatter) if with_reference else (population.gaps, population.gap_scatter)
-    )
-    forest = ExtraTreesClassifier(
-        n_trees,
-        bootstrap=True,
-        max_samples=ROW_SHARE,
-        max_features=FEATURE_SHARE,
-        min_samples_leaf=MIN_IN_A_LEAF,
-        class_weight="balanced",
-        n_jobs=2,
-        random_state=_SEED,
-    )
-    seen = _visible(floor, tables[0], population.causes)
-    exchanged = mirrored(floor.names)
-    changes, scatter = (np.concatenate([table[seen], table[seen][:, exchanged]]) for table in tables)
-    loads = np.tile(population.loads_n_per_mm[seen], 2)
-    rows = input_rows(floor, changes, scatter, loads).astype(np.float32)
-    causes = np.tile(population.causes[seen], 2)
-    forest.fit(rows, causes, sample_weight=np.tile(even_weights(population.sources[seen], population.causes[seen]), 2))
-    names = tuple(map(str, forest.classes_))
-    if with_reference:
-        return names, Trees.of(forest), None
-    even = np.full(len(names), 1.0 / len(names))
-    linear = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=LINEAR_SHRINKAGE, priors=even)
-    linear.fit(_within_reach(rows), causes)
-    return names, Trees.of(forest), LinearRule(linear.coef_, linear.intercept_)
-
-
-def even_weights(sources: NDArray[np.str_], causes: NDArray[np.str_]) -> FloatArray:
-    """Return weights of rows by which the sources of a cause count more alike than they have rows: n^(−`EVENNESS`).
-
-    None of them shows an effect as it is; what they have in common is what holds for a machine.
-    """
-    _, kind, counts = np.unique(np.char.add(np.char.add(sources, "/"), causes), return_inverse=True, return_counts=True)
-    weights: FloatArray = counts[kind] ** -EVENNESS
-    weights /= weights.mean()
-    return weights
-
-
-def _within_reach(rows: FloatArray) -> FloatArray:
+def within_reach(rows: FloatArray) -> FloatArray:
+    """Return input of the linear discriminant, cut where it would count for too much."""
     reached: FloatArray = np.clip(rows, -LINEAR_REACH, LINEAR_REACH)
     return reached
 
 
-def _visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str_]) -> NDArray[np.bool_]:
-    """Return which rows to learn from: an effect that changes nothing would only teach that nothing is that effect."""
-    rows = floor.from_centre(floor.names, changes) / floor.of(floor.names)
-    sizes = np.array([soft_size(floor.names, row) for row in rows]) / floor.whole_of(floor.names)
-    seen: NDArray[np.bool_] = (sizes > MIN_SIZE) | np.isin(causes, (NONE, UNKNOWN))
-    return seen
+# --------------------
+# All that a diagnosis asks of the population, in one file that comes with the library: plain arrays.
+# --------------------
 
 
-def load_recogniser(*, with_reference: bool) -> Recogniser:
-    """Return the one for the population that comes with this version: fitted once, then kept among the user's files."""
-    return _load(with_reference, LEFT_OUT.get())
+LEARNED_FILE = Path(__file__).with_name("learned.npz")
+MAX_BYTES = 100_000_000
+"""Of its arrays; a real one has a tenth."""
+_TREES = ("columns", "thresholds", "roots", "shares")
+_LINEAR = ("weights", "offsets")
+_LABELS = ("directions", "means", "between", "whole")
+_WAYS = {True: "with_reference", False: "without_reference"}
 
 
-@cache
-def _load(with_reference: bool, left_out: str) -> Recogniser:
-    name = "_".join(["with" if with_reference else "without", "reference", *([left_out] if left_out else [])])
-    population, fitted = load_population(), read_fitted(name)
-    if fitted is None:
-        fitted = _fit(population, with_reference=with_reference)
-        keep_fitted(name, fitted)
-    return _with_floor(population, fitted, with_reference=with_reference)
+@dataclass(frozen=True)
+class Learned:
+    """What the population teaches.
+
+    Parameters
+    ----------
+    feature_names : tuple of str
+    credibility : array, (n_features,)
+        How much of what the simulation says of each feature holds for healthy machines, 0 to 1.
+    recognisers : mapping
+        With a reference (True) and without (False).
+    """
+
+    feature_names: tuple[str, ...]
+    credibility: FloatArray
+    recognisers: Mapping[bool, Recogniser] = field(repr=False)
+
+    @property
+    def change_names(self) -> tuple[str, ...]:
+        """Of changes against a reference; the features' names come first."""
+        return self.recognisers[True].floor.names
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """That can be recognised, those of no effect among them."""
+        return self.recognisers[True].causes
+
+    def floor(self, *, with_reference: bool) -> StructuralFloor:
+        """Return how far healthy machines lie from themselves on another day, or from their simulation."""
+        return self.recognisers[with_reference].floor
+
+
+def write_learned(learned: Learned, path: Path) -> None:
+    """Write it as plain arrays, rounded as far as no answer notices; whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    arrays: dict[str, Any] = {
+        "feature_names": np.array(learned.feature_names),
+        "credibility": learned.credibility.astype(np.float32),
+    }
+    for flag, way in _WAYS.items():
+        one = learned.recognisers[flag]
+        found = {key: getattr(one.trees, key) for key in _TREES} | {
+            "causes": np.array(one.causes),
+            "usual_load_n_per_mm": np.float64(one.usual_load_n_per_mm),
+            "floor_names": np.array(one.floor.names),
+            "floors": one.floor.values.astype(np.float32),
+            "centres": np.asarray(one.floor.centres, dtype=np.float32),
+            "largest": np.float64(one.floor.whole_of(one.floor.names)),
+            "labels": np.array(one.labels.causes),
+        }
+        found |= {key: getattr(one.labels, key).astype(np.float32) for key in _LABELS}
+        if one.linear is not None:
+            found |= {key: getattr(one.linear, key).astype(np.float16) for key in _LINEAR}
+        arrays |= {f"{way}/{key}": array for key, array in found.items()}
+    write_whole(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
+
+
+def read_learned(path: Path) -> Learned | None:
+    """Return what a file holds; None where there is none, or it is damaged."""
+    arrays = read_arrays(path, MAX_BYTES)
+    if arrays is None:
+        return None
+    try:
+        names = tuple(map(str, arrays["feature_names"]))
+        recognisers = {flag: _recogniser(arrays, way) for flag, way in _WAYS.items()}
+        return Learned(names, arrays["credibility"].astype(np.float64), recognisers)
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def _recogniser(arrays: Mapping[str, Any], way: str) -> Recogniser:
+    found = {key.removeprefix(f"{way}/"): array for key, array in arrays.items() if key.startswith(f"{way}/")}
+    floor = StructuralFloor(
+        tuple(map(str, found["floor_names"])),
+        found["floors"].astype(np.float64),
+        found["centres"].astype(np.float64),
+        float(found["largest"]),
+    )
+    linear = LinearRule(*(found[key].astype(np.float64) for key in _LINEAR)) if _LINEAR[0] in found else None
+    directions, *others = (found[key].astype(np.float64) for key in _LABELS)
+    labels = LabelSpace(directions, tuple(map(str, found["labels"])), *others)
+    trees, usual_load = Trees(*(found[key] for key in _TREES)), float(found["usual_load_n_per_mm"])
+    return Recogniser(tuple(map(str, found["causes"])), floor, trees, usual_load, labels, linear)

@@ -61,12 +61,15 @@ class GearFrame:
         Of driver and driven gear.
     teeth : (int, int)
     bearings : tuple of BearingFrame
+    background : tuple of float
+        Orders at which a machine's other pairs and shafts are heard, per revolution of the driver: `other_lines`.
     """
 
     pair: GearPair
     shafts: tuple[str, str]
     teeth: tuple[int, int]
     bearings: tuple[BearingFrame, ...]
+    background: tuple[float, ...] = ()
 
     @property
     def shaft_orders(self) -> tuple[float, float]:
@@ -75,17 +78,16 @@ class GearFrame:
 
 
 def gear_frame(rig: Rig) -> GearFrame:
-    """Return the frame of a rig's only gear pair.
+    """Return the frame of a rig's first gear pair, the one under study; other pairs are background.
 
     Raises
     ------
     RefusalError
-        If there is no pair or more than one, or its teeth are not known.
+        If there is no pair, or its teeth are not known.
     """
     remedy = "describe one pair with both tooth counts in the rig file"
-    if len(rig.pairs) != 1:
-        have = "no gear pair" if not rig.pairs else f"{len(rig.pairs)} gear pairs"
-        raise RefusalError(f"the rig has {have}; the models have one", remedy=remedy)
+    if not rig.pairs:
+        raise RefusalError("the rig has no gear pair", remedy=remedy)
     pair = rig.pairs[0]
     if pair.driver_teeth is None or pair.driven_teeth is None:
         raise RefusalError(f"the teeth of pair {pair.name!r} are not known", remedy=remedy)
@@ -102,7 +104,53 @@ def gear_frame(rig: Rig) -> GearFrame:
         bearings.append(
             BearingFrame(bearing.name, side, *(own.get(name, nan) for name in ("BPFO", "BPFI", "BSF", "FTF")))
         )
-    return GearFrame(pair, shafts, teeth, tuple(bearings))
+    return GearFrame(pair, shafts, teeth, tuple(bearings), other_lines(rig))
+
+
+N_BACKGROUND_HARMONICS, N_BACKGROUND_SIDEBANDS, N_BACKGROUND_ORDERS = 20, 2, 4
+"""Of another pair's mesh, beside each of its harmonics by either of its shafts, and of another shaft."""
+
+
+def other_lines(rig: Rig) -> tuple[float, ...]:
+    """Return the orders of a rig's pairs but the first, per revolution of that one's driver, rising.
+
+    Mesh harmonics with sidebands at both of a pair's shafts, and the first orders of shafts that the first pair does
+    not sit on. Pairs whose ratio or teeth are not known are passed over: nobody knows where they are heard.
+    """
+    if len(rig.pairs) < 2:
+        return ()
+    first, *others = rig.pairs
+    found: set[float] = set()
+    for pair in others:
+        mesh = rig.mesh_order(pair, first.driver)
+        turns = [rig.ratio(shaft, to=first.driver) for shaft in (pair.driver, pair.driven)]
+        for shaft, ratio in zip((pair.driver, pair.driven), turns, strict=True):
+            if ratio is not None and shaft not in (first.driver, first.driven):
+                found |= {k * ratio for k in range(1, N_BACKGROUND_ORDERS + 1)}
+        if mesh is None:
+            continue
+        beside = {0.0} | {
+            sign * k * ratio
+            for ratio in turns
+            if ratio is not None
+            for k in range(1, N_BACKGROUND_SIDEBANDS + 1)
+            for sign in (-1, 1)
+        }
+        found |= {k * mesh + step for k in range(1, N_BACKGROUND_HARMONICS + 1) for step in beside}
+    own_turns = (1.0, rig.ratio(first.driven, to=first.driver) or 1.0)
+    steps = np.array([k * ratio for ratio in own_turns for k in range(-SMOOTH_SIDEBANDS, SMOOTH_SIDEBANDS + 1)])
+    teeth = float(first.driver_teeth or np.inf)
+
+    def is_own(order: float) -> bool:
+        beside = order - steps
+        return bool(np.min(np.abs(beside - teeth * np.maximum(np.round(beside / teeth), 1.0))) < CLOSE)
+
+    return tuple(sorted(order for order in found if order > 0.0 and not is_own(order)))
+
+
+CLOSE = 0.03
+"""Orders, closer than which to the first pair's mesh harmonics and first sidebands nobody can tell two lines apart in
+a hundred revolutions: such lines stay."""
 
 
 # --------------------
@@ -596,6 +644,7 @@ def _channel_sums(
     speed_hz: float,
 ) -> tuple[ChannelSums, float, float]:
     """Return one channel's sums, and the steps of its residual's and its envelopes' lines in orders of the driver."""
+    signals = [_without_background(signal, frame, side) for side, signal in enumerate(signals)]
     separated = orders.separate_shafts(signals, frame.teeth)
     lines = []
     for signal in separated.signals:
@@ -605,14 +654,64 @@ def _channel_sums(
         blocks[:, : average.highest_order + 1] = average.parts[:, 0]
         blocks[:, 0] *= 2.0  # the mean counts as a peak, too: the floors were learned so, and it is in their noise
         lines.append((blocks, average.n_revolutions))
-    residual = separated.residual.samples[0]
     n = signals[DRIVER].samples_per_revolution
+    residual = separated.residual.samples[0]
     power, order_step = _segment_power(residual, n, n_blocks)
     highest_cycle = min(max(HIGHEST_CYCLE, frame.teeth[0] + BEYOND_THE_MESH), 0.4 * n)
     envelopes, moments, cycle_step = _envelopes(residual, n, n_blocks, bands, speed_hz, highest_cycle)
     (driver, n_driver), (driven, n_driven) = lines
     sums = ChannelSums((driver, driven), (n_driver, n_driven), power, envelopes, moments, _tail(raw, n_blocks))
     return sums, order_step, cycle_step
+
+
+def _without_background(signal: AngleSignal, frame: GearFrame, side: int) -> AngleSignal:
+    """Return a signal over a shaft's angle without the machine's other pairs and shafts."""
+    if not frame.background:
+        return signal
+    at = np.array(frame.background) / frame.shaft_orders[side]
+    return replace(
+        signal, samples=np.stack([_without_lines(x, at, signal.samples_per_revolution) for x in signal.samples])
+    )
+
+
+REACH = 2000
+"""Lines of a whole record's spectrum on either side of an order, over which its leakage is taken out: −76 dB beyond."""
+
+N_PASSES = 2
+"""Over all orders: what leaks from one into the estimate of another is gone in the second."""
+
+
+def _without_lines(values: FloatArray, background: FloatArray, n_per_rev: int) -> FloatArray:
+    """Return a signal over angle without what is heard at given orders, each a steady line.
+
+    A line a exp(2πi f n/N) has X_k = a (e^{2πi(f−k)} − 1)/(e^{2πi(f−k)/N} − 1). Its amplitude is read through a Hann
+    window, X_k/2 − (X_{k−1} + X_{k+1})/4 at the nearest k, which hardly sees the others; then it is subtracted.
+    """
+    from scipy.fft import irfft, rfft
+
+    n = len(values)
+    at = background * n / n_per_rev
+    at = at[(at > 2.0) & (at < n // 2 - 2)]
+    if not len(at):
+        return values
+    lines = rfft(values)
+    near = np.round(at).astype(np.intp)
+    three = near[:, None] + np.array([-1, 0, 1])
+    hann = np.array([-0.25, 0.5, -0.25])
+    unit = _line(at[:, None] - three, n) @ hann
+    for _ in range(N_PASSES):
+        for f, k, beside, whole in zip(at, near, three, unit, strict=True):
+            kept = slice(max(k - REACH, 0), min(k + REACH, len(lines)))
+            away = f - np.arange(kept.start, kept.stop)
+            lines[kept] -= (lines[beside] @ hann) / whole * _line(away, n)
+    rest: FloatArray = irfft(lines, n)
+    return rest
+
+
+def _line(away: FloatArray, n: int) -> ComplexArray:
+    """Return the spectrum of a line of unit amplitude, so many lines away from it."""
+    away = np.where(np.abs(away) < 1e-9, 1e-9, away)
+    return np.asarray(np.expm1(2j * np.pi * away) / np.expm1(2j * np.pi * away / n))
 
 
 def _segment_power(values: FloatArray, rate: float, n_segments: int) -> tuple[FloatArray, float]:

@@ -613,7 +613,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     if condition.reference is not None:
         compared, baseline = bank.change_names, own[0]
     else:
-        compared, baseline = names, condition.population.credibility * own[0] + usual
+        compared, baseline = names, condition.learned.credibility * own[0] + usual
     real = dict(zip(own_names, baseline.tolist(), strict=True))
     repeated = dict(zip(floor.names, usual.tolist(), strict=True))
     again = np.zeros(len(bank.change_names))  # a mere second run changes something, too

@@ -334,6 +334,9 @@ def group_probabilities(causes: Sequence[GapCause]) -> dict[str, float]:
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
+OWN_LABELS = "your own labels"
+"""Group of causes that only the user's labelled recordings know."""
+
 KIND_TITLES = {
     "tooth-local": "a damaged tooth",
     "flank": "the flanks of the teeth",
@@ -341,6 +344,7 @@ KIND_TITLES = {
     "drive and load": "the drive or the load",
     "bearing": "a bearing",
     "measurement chain": "the measurement chain",
+    OWN_LABELS: "what you have labelled",
 }
 """Group of effects → the kind of fault, in words; of another group, its name."""
 
@@ -431,6 +435,36 @@ class ConditionFacts:
 
 
 @dataclass(frozen=True)
+class LabelledFacts:
+    """What labelled recordings of the rig, or of somebody's own simulation of it, changed in the answer.
+
+    Parameters
+    ----------
+    counts : mapping
+        Label → recordings that were used.
+    without : mapping
+        Cause → probability that it would have had without them, likeliest first.
+    outcome_without : GapOutcome
+        What the diagnosis would have come to.
+    """
+
+    counts: Mapping[str, int]
+    without: Mapping[str, float]
+    outcome_without: GapOutcome
+
+    @property
+    def text(self) -> str:
+        """What they are, and what the answer would be without them, in a sentence or two."""
+        n, first = sum(self.counts.values()), next(iter(self.without), NONE)
+        kinds = ", ".join(f"{label.replace('_', ' ')} {count}" for label, count in self.counts.items())
+        return (
+            f"Labelled recordings of this rig that joined what is known of other machines: {n} ({kinds}). "
+            f"Without {'them' if n > 1 else 'it'} the likeliest would be {first.replace('_', ' ')}, "
+            f"{100.0 * min(self.without.get(first, 0.0), 0.99):.0f} % (outcome: {self.outcome_without.value})."
+        )
+
+
+@dataclass(frozen=True)
 class GapReport:
     """The answer.
 
@@ -470,6 +504,8 @@ class GapReport:
         exchanged. The rest of the report is as if it were not so.
     twin_toml : str
         The simulator with the effect fitted, as a preset; empty where none is named.
+    labelled : LabelledFacts or None
+        What labelled recordings of the rig changed; None: none were given.
     """
 
     rig: str
@@ -491,6 +527,7 @@ class GapReport:
     notices: tuple[str, ...] = ()
     twin_toml: str = field(default="", repr=False)
     warnings: tuple[str, ...] = ()
+    labelled: LabelledFacts | None = None
 
     @property
     def kind(self) -> GapKind | None:

@@ -12,6 +12,7 @@ from gearsig.gap._types import (
     LIKELIER_THAN_NOT,
     NAMING,
     NONE,
+    OWN_LABELS,
     UNKNOWN,
     GapCause,
     GapKind,
@@ -112,10 +113,12 @@ def _which_unknown(report: GapReport) -> str:
 
 
 def named_cause(name: str, probability: float, effects: Mapping[str, GapEffect], place: str = "") -> GapCause:
-    """Return a cause by its name: one of the effects, none or unknown."""
+    """Return a cause by its name: one of the effects, none or unknown, or somebody's own label."""
     if name in effects:
         e = effects[name]
         return GapCause(name, e.group, e.title, e.unit, probability, place=place, is_nuisance=e.is_nuisance)
+    if name not in (NONE, UNKNOWN):
+        return GapCause(name, OWN_LABELS, f"“{name.replace('_', ' ')}”", "", probability)
     title = "nothing beyond what healthy machines differ by" if name == NONE else "nothing in the catalogue"
     return GapCause(name, name, title, "", probability)
 

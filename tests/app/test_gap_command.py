@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from app.cli.main import main
@@ -303,11 +302,12 @@ def test_the_catalogue_is_listed(capsys) -> None:
 
 
 def test_an_effect_that_was_not_learned_is_listed_as_such(capsys, monkeypatch) -> None:
-    from gearsig.gap import load_population
+    from gearsig.gap import load_learned
 
-    learned = load_population()
-    fewer = replace(learned, causes=np.array(["none", "tooth_wear"]))
-    monkeypatch.setattr("gearsig.gap.load_population", lambda: fewer)
+    learned = load_learned()
+    fewer = replace(learned.recognisers[True], causes=("none", "tooth_wear"))
+    only = replace(learned, recognisers={True: fewer, False: fewer})
+    monkeypatch.setattr("gearsig.gap.load_learned", lambda: only)
     _, out, _ = run(capsys, "--list-effects")
     assert out.count("not recognised") == 18
     _, out, _ = run(capsys, "--list-effects", "--model", "forging")

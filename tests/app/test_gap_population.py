@@ -16,17 +16,19 @@ from gearsig.errors import InputError
 from gearsig.gap import (
     BY_HAND,
     INDEPENDENT,
+    LEARNED_FILE,
     NONE,
-    POPULATION_FILE,
     UNKNOWN,
+    load_learned,
     load_population,
+    read_learned,
     reduce_recording,
     soft_size,
 )
 from sims.blind import CATALOGUE
 from sims.effects import EffectSetting
 
-FLOOR = load_population().floor(with_reference=True)
+FLOOR = load_learned().floor(with_reference=True)
 
 
 def size(sample: PopulationSample) -> float:
@@ -114,6 +116,7 @@ def test_an_unbalance_is_heard_where_the_housing_yields() -> None:
 
 
 def test_a_damaged_population_is_named(tmp_path) -> None:
-    (tmp_path / "population.npz").write_bytes(POPULATION_FILE.read_bytes()[:10_000])
+    (tmp_path / "population.npz").write_bytes(LEARNED_FILE.read_bytes()[:10_000])
+    assert read_learned(tmp_path / "population.npz") is None
     with pytest.raises(InputError, match=r"population\.npz: the population is not there, or damaged"):
         load_population(tmp_path / "population.npz")

@@ -11,7 +11,7 @@ from gearsig.gap import (
     ReducedRecording,
     change_features,
     gap_size,
-    load_population,
+    load_learned,
     matching_reference,
     reduce_recording,
 )
@@ -42,7 +42,7 @@ def test_few_revolutions_are_compared_with_as_many_of_a_longer_reference() -> No
     found, _ = matching_reference(short, RIG, [HealthyReference(run(1), RIG, "healthy.h5", whole)])
     assert found is not None
     assert found.reduced.n_revolutions == pytest.approx(short.n_revolutions, abs=2.0)
-    floor = load_population().floor(with_reference=True)
+    floor = load_learned().floor(with_reference=True)
     same, longer = (
         gap_size(change_features(short, reference), floor).structural.value for reference in (found.reduced, run(1))
     )

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.gap import load_population, mirrored, seen_rows
+from gearsig.gap import load_learned, mirrored, seen_rows
 
-NAMES = load_population().change_names
-FEATURES = load_population().feature_names
+NAMES = load_learned().change_names
+FEATURES = load_learned().feature_names
 
 
 @pytest.mark.parametrize("names", [NAMES, FEATURES])

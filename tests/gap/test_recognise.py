@@ -1,4 +1,4 @@
-"""The population that is shipped, its floors, and the forest over it."""
+"""What is learned of a population: a small one here, and of the one that was made, where it is kept."""
 
 from __future__ import annotations
 
@@ -15,63 +15,101 @@ from gearsig.gap import (
     NONE,
     UNKNOWN,
     Features,
+    Learned,
     Population,
-    Recogniser,
     even_weights,
-    fit_recogniser,
-    keep_fitted,
+    learn,
+    load_learned,
     load_population,
-    load_recogniser,
+    population_file,
+    read_learned,
     without_machines_of,
+    write_learned,
 )
 from sims.effects import effects
 
+SHIFTS = {"tooth_wear": {"mesh.total": 9.0}, "mains_hum": {"hum": 12.0}, UNKNOWN: {"line.strange": 12.0}, NONE: {}}
+KEPT = population_file()
+made = pytest.mark.skipif(not KEPT.exists(), reason="the population is made by hours of simulation")
+
+
+def drawn(n_machines: int, seed: int) -> Population:
+    """Machines whose effects shift one feature each, three recordings of every cause."""
+    rng = np.random.default_rng(seed)
+    learned = load_learned()
+    causes = np.tile(np.repeat(list(SHIFTS), 3), n_machines)
+    rigs = np.repeat(np.arange(n_machines), 3 * len(SHIFTS))
+    tables = []
+    for names in (learned.change_names, learned.feature_names):
+        table = rng.normal(size=(len(causes), len(names)))
+        for i, cause in enumerate(causes):
+            for name, shift in SHIFTS[cause].items():
+                table[i, names.index(name)] += shift + 2.0 * np.sin(rigs[i])
+        tables += [table, np.full(table.shape, 0.3)]
+    simulators = np.where(rigs % 2 == 0, "even", "odd")
+    simulated = [np.zeros(tables[2].shape), np.full(tables[2].shape, 0.1)]
+    by_hand = np.zeros(len(causes), dtype=bool)
+    names = learned.change_names, learned.feature_names
+    return Population(rigs, simulators, causes, by_hand, *names, *tables, *simulated, np.full(len(causes), 100.0))
+
 
 @pytest.fixture(scope="module")
-def population() -> Population:
-    return load_population()
+def learned() -> Learned:
+    return learn(drawn(20, 1), n_trees=20)
 
 
-@pytest.fixture(scope="module")
-def on_half(population: Population) -> Recogniser:
-    """A forest, smaller than the shipped one, that has seen the machines of even number only."""
-    return fit_recogniser(population.of_rows(population.rigs % 2 == 0), with_reference=True, n_trees=60)
+def rows(population: Population, *, with_reference: bool) -> list[Features]:
+    if with_reference:
+        names, values, scatter = population.change_names, population.changes, population.change_scatter
+    else:
+        names, values, scatter = population.feature_names, population.gaps, population.gap_scatter
+    return [Features(names, *both) for both in zip(values, scatter, strict=True)]
 
 
-def row(population: Population, i: int) -> Features:
-    return Features(population.change_names, population.changes[i], population.change_scatter[i])
+@pytest.mark.parametrize("with_reference", [True, False])
+def test_machines_that_nothing_was_learned_from_are_recognised(learned: Learned, *, with_reference: bool) -> None:
+    others = drawn(4, 2)
+    recogniser = learned.recognisers[with_reference]
+    found = [recogniser.probabilities(change, 100.0) for change in rows(others, with_reference=with_reference)]
+    right = [max(p, key=p.__getitem__) == cause for p, cause in zip(found, others.causes, strict=True)]
+    assert np.mean(right) > 0.8
+    assert all(sum(p.values()) == pytest.approx(1.0) for p in found)
 
 
-def test_every_effect_is_in_the_population(population: Population) -> None:
-    assert set(effects()) | {NONE, UNKNOWN} == set(population.causes)
-    assert len(set(population.rigs)) >= 20
-    assert population.change_names[: len(population.feature_names)] == population.feature_names
+def test_a_file_says_the_same(learned: Learned, tmp_path: Path) -> None:
+    path = tmp_path / "learned.npz"
+    write_learned(learned, path)
+    again = read_learned(path)
+    assert again is not None
+    assert (again.feature_names, again.change_names) == (learned.feature_names, learned.change_names)
+    for flag in (True, False):
+        for change in rows(drawn(1, 3), with_reference=flag):
+            before, after = (one.recognisers[flag].probabilities(change, 50.0) for one in (learned, again))
+            assert after == pytest.approx(before, abs=0.02)
+            assert max(after, key=after.__getitem__) == max(before, key=before.__getitem__)
+    path.write_bytes(path.read_bytes()[:-300])
+    assert read_learned(path) is None
 
 
-AT_THE_END = {"clipping", "transfer_path"}
+def test_other_features_than_were_learned_of_are_an_error(learned: Learned) -> None:
+    change = rows(drawn(1, 3), with_reference=True)[0]
+    with pytest.raises(InputError, match="belongs to other features"):
+        learned.recognisers[True].probabilities(replace(change, names=change.names[::-1]))
 
 
-@pytest.mark.parametrize(
-    ("source", "cannot"),
-    [
-        (BY_HAND, {"mains_hum", "speed_fluctuation"}),
-        ("cracked", AT_THE_END),
-        ("reduced-fe", AT_THE_END),
-        ("quasi-static", AT_THE_END | {"backlash", "mains_hum"}),
-        (INDEPENDENT, set()),
-    ],
-)
-def test_every_source_shows_every_effect_that_it_can(population: Population, source: str, cannot: set[str]) -> None:
-    missing = set(effects()) - set(population.causes[population.sources == source])
-    assert missing <= cannot
+def test_what_ships_knows_every_effect_and_is_small() -> None:
+    shipped = load_learned()
+    assert set(effects()) | {NONE, UNKNOWN} == set(shipped.causes)
+    assert shipped.change_names[: len(shipped.feature_names)] == shipped.feature_names
+    from gearsig.gap import LEARNED_FILE
+
+    assert LEARNED_FILE.stat().st_size < 2_000_000
 
 
-def test_machines_can_be_left_out(population: Population) -> None:
-    with without_machines_of(INDEPENDENT):
-        rest = load_population()
-    assert set(population.simulators) - set(rest.simulators) == {INDEPENDENT}
-    assert np.array_equal(rest.changes, population.changes[population.simulators != INDEPENDENT])
-    assert load_population() is population
+def test_a_reference_lowers_the_floor() -> None:
+    shipped = load_learned()
+    with_it, without = (shipped.floor(with_reference=flag).of(shipped.feature_names) for flag in (True, False))
+    assert np.median(without / with_it) > 1.5
 
 
 def test_rarer_sources_count_more_each_and_less_together() -> None:
@@ -82,45 +120,39 @@ def test_rarer_sources_count_more_each_and_less_together() -> None:
     assert weights.mean() == pytest.approx(1.0)
 
 
-def test_a_reference_lowers_the_floor(population: Population) -> None:
-    names = population.feature_names
-    with_it, without = (population.floor(with_reference=flag).of(names) for flag in (True, False))
-    assert np.median(without / with_it) > 1.5
+def test_a_missing_population_says_how_to_make_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEARSIG_POPULATION", str(tmp_path / "none.npz"))
+    with pytest.raises(InputError, match=r"python -m app\.studies\.gap\.population make"):
+        load_population()
+    with without_machines_of(INDEPENDENT), pytest.raises(InputError, match="population make"):
+        load_learned()
 
 
-def test_machines_that_the_forest_never_saw_are_recognised_far_above_chance(
-    population: Population, on_half: Recogniser
-) -> None:
-    others = np.flatnonzero(population.rigs % 2 == 1)[::9]
-    found = [on_half.probabilities(row(population, int(i))) for i in others]
-    right = np.mean([max(p, key=p.__getitem__) == population.causes[i] for p, i in zip(found, others, strict=True)])
-    assert right > 0.4
-    assert all(sum(p.values()) == pytest.approx(1.0) for p in found)
+AT_THE_END = {"clipping", "transfer_path"}
 
 
-def test_other_features_than_the_population_has_are_an_error(population: Population, on_half: Recogniser) -> None:
-    change = row(population, 0)
-    with pytest.raises(InputError, match="belongs to other features"):
-        on_half.probabilities(replace(change, names=change.names[::-1]))
+@made
+@pytest.mark.parametrize(
+    ("source", "cannot"),
+    [
+        (BY_HAND, {"mains_hum", "speed_fluctuation"}),
+        ("cracked", AT_THE_END),
+        ("reduced-fe", AT_THE_END),
+        ("quasi-static", AT_THE_END | {"backlash", "mains_hum"}),
+        (INDEPENDENT, set()),
+    ],
+)
+def test_every_source_shows_every_effect_that_it_can(source: str, cannot: set[str]) -> None:
+    population = load_population(KEPT)
+    missing = set(effects()) - set(population.causes[population.sources == source])
+    assert missing <= cannot
 
 
-def test_a_missing_population_says_how_to_make_it(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"python -m app\.studies\.gap\.population"):
-        load_population(tmp_path / "none.npz")
-
-
-@pytest.mark.slow
-def test_the_forest_is_fitted_once() -> None:
-    assert load_recogniser(with_reference=False) is load_recogniser(with_reference=False)
-
-
-def test_a_kept_one_says_the_same(
-    population: Population, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, on_half: Recogniser
-) -> None:
-    monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path))
-    keep_fitted("with_reference_nobody", (on_half.causes, on_half.trees, None))
-    with without_machines_of("nobody"):
-        kept = load_recogniser(with_reference=True)
-    change = row(population, 5)
-    assert kept.probabilities(change, 100.0).keys() == on_half.probabilities(change, 100.0).keys()
-    assert np.array_equal(kept.trees.shares, on_half.trees.shares)
+@made
+def test_machines_can_be_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEARSIG_POPULATION", str(KEPT))
+    population = load_population()
+    with without_machines_of(INDEPENDENT):
+        rest = load_population()
+    assert set(population.simulators) - set(rest.simulators) == {INDEPENDENT}
+    assert load_population() is population

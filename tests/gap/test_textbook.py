@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gearsig.gap import NONE, load_population, textbook_rules, textbook_strengths
+from gearsig.gap import NONE, load_learned, textbook_rules, textbook_strengths
 from sims.effects import as_gap_effect, effects
 
 RULES = textbook_rules(map(as_gap_effect, effects().values()))
@@ -12,7 +12,7 @@ RULES = textbook_rules(map(as_gap_effect, effects().values()))
 
 def test_every_effect_has_a_rule_of_features_that_there_are() -> None:
     assert {cause for cause, _ in RULES} >= set(effects())
-    names = load_population().feature_names
+    names = load_learned().feature_names
     for _, signs in RULES:
         for name, _ in signs:
             assert name.format(side="driven") in names

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap import load_population, once, reduce_recording, transplanted
+from gearsig.gap import load_learned, once, reduce_recording, transplanted
 from tests.gap.synthetic import RIG, record
 
-POPULATION = load_population()
-FEATURES, NAMES = POPULATION.feature_names, POPULATION.change_names
+LEARNED = load_learned()
+FEATURES, NAMES = LEARNED.feature_names, LEARNED.change_names
 HEALTHY = dict(zip(*once(reduce_recording(record(), RIG)), strict=True))
-USUAL = dict(zip(NAMES, np.median(POPULATION.changes[POPULATION.causes == "none"], axis=0).tolist(), strict=True))
+USUAL = dict(zip(NAMES, np.asarray(LEARNED.floor(with_reference=True).centres).tolist(), strict=True))
 ONLY = len(FEATURES)
 
 

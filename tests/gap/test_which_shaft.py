@@ -16,7 +16,7 @@ from gearsig.gap import (
     ReducedRecording,
     ShaftSigns,
     change_features,
-    load_population,
+    load_learned,
     over_floors,
     reduce_recording,
     shaft_signs,
@@ -70,7 +70,7 @@ def test_signs_on_both_shafts_cannot_be_told_but_for_an_order_that_one_shaft_can
 
 
 def test_every_sign_is_a_feature() -> None:
-    names = load_population().change_names
+    names = load_learned().change_names
     assert {sign.format(side) for signs in SIGNS.values() for sign in signs for side in SIDES} <= set(names)
 
 
@@ -100,7 +100,7 @@ def healthy(point: OperatingCondition) -> ReducedRecording:
 
 
 def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, float]:
-    floor = load_population().floor(with_reference=True)
+    floor = load_learned().floor(with_reference=True)
     return over_floors(change_features(run(*added, noise=2, point=point), healthy(point)), floor, is_reference=True)
 
 

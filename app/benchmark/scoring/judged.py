@@ -123,11 +123,11 @@ Floors = Mapping[bool, StructuralFloor | None]
 
 def known_floors(truths: Sequence[Truth]) -> Floors:
     """Return the floors that the diagnosis itself uses, or the batch's own where none come with this version."""
-    from gearsig.gap import load_population
+    from gearsig.gap import load_learned
 
     try:
-        population = load_population()
-        return {with_reference: population.floor(with_reference=with_reference) for with_reference in (False, True)}
+        learned = load_learned()
+        return {with_reference: learned.floor(with_reference=with_reference) for with_reference in (False, True)}
     except InputError:
         return batch_floors(truths)
 

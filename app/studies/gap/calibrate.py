@@ -27,11 +27,12 @@ from gearsig.gap import (
     UNKNOWN,
     Features,
     GapCalibration,
+    Learned,
     Population,
     gap_size,
     joint_probabilities,
+    load_learned,
     load_population,
-    load_recogniser,
     without_machines_of,
 )
 from sims.cracked import cracked_gap_simulator
@@ -192,12 +193,12 @@ def two_conditions(population: Population, rows: Iterable[int]) -> list[tuple[in
 
 
 def _weighed(population: Population, rows: tuple[int, ...], simulator: str, *, with_reference: bool) -> WeighedCase:
-    recogniser = load_recogniser(with_reference=with_reference)
+    learned = load_learned()
+    recogniser = learned.recognisers[with_reference]
     effects = cracked_gap_simulator().gap_effects().values()
-    known = load_population()
     found, sizes = [], []
     for row in rows:
-        change = _change(population, known, row, with_reference=with_reference)
+        change = _change(population, learned, row, with_reference=with_reference)
         found.append(recogniser.probabilities(change, float(population.loads_n_per_mm[row]), effects))
         sizes.append(gap_size(change, recogniser.floor).structural.value)
     loads = [float(population.loads_n_per_mm[row]) for row in rows]
@@ -205,12 +206,12 @@ def _weighed(population: Population, rows: tuple[int, ...], simulator: str, *, w
     return WeighedCase((str(population.causes[rows[0]]),), forest, {}, max(sizes), len(rows), simulator)
 
 
-def _change(population: Population, known: Population, row: int, *, with_reference: bool) -> Features:
+def _change(population: Population, learned: Learned, row: int, *, with_reference: bool) -> Features:
     """Return what a row's machine changed, the twin as credible as the others' machines show it to be."""
     if with_reference:
         return Features(population.change_names, population.changes[row], population.change_scatter[row])
-    values = population.features[row] - known.credibility * population.simulated[row]
-    scatter = np.hypot(population.feature_scatter[row], known.credibility * population.simulated_scatter[row])
+    values = population.features[row] - learned.credibility * population.simulated[row]
+    scatter = np.hypot(population.feature_scatter[row], learned.credibility * population.simulated_scatter[row])
     return Features(population.feature_names, values, scatter)
 
 

@@ -1,7 +1,8 @@
-"""Make the population of the gap diagnosis.
+"""Make the population of the gap diagnosis, and what of it comes with the library.
 
-`python -m app.studies.gap.population simulate --to RAW` draws machines and records them; `… pack RAW…` packs one or
-several such tables into the file that comes with the library.
+`python -m app.studies.gap.population make` does all of it, in some hours. Its steps: `… simulate --to RAW` draws
+machines and records them; `… pack RAW…` packs one or several such tables into the population, which is kept where
+`gearsig.gap.population_file` says; `… learn` writes what a diagnosis asks of it into the library's own file.
 
 Each drawn gearbox is recorded healthy as the reference, healthy again on other days, with each effect, with foreign
 vibration, and with each effect's signature by hand; what differs goes into the table, with its label. Gearboxes are
@@ -14,6 +15,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import typer
@@ -22,7 +24,7 @@ from numpy.typing import NDArray
 from app.studies.gap.quasi_static import QUASI_STATIC, one_static
 from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
 from app.studies.pool import answers_of
-from gearsig.gap import BY_HAND, INDEPENDENT, POPULATION_FILE
+from gearsig.gap import BY_HAND, INDEPENDENT, LEARNED_FILE, learn, load_population, population_file, write_learned
 
 MACHINES = {CRACKED.name: 80, REDUCED.name: 45, INDEPENDENT: 400, QUASI_STATIC: 150}
 """Of each simulator, unless asked for otherwise."""
@@ -45,15 +47,28 @@ def main() -> None:
         simulation.add_argument(f"--{name}", type=int, default=n, help=f"machines of this simulator (default: {n})")
     simulation.add_argument("--processes", type=int, default=2)
     simulation.add_argument("--to", type=Path, required=True)
+    whole = steps.add_parser("make", help="simulate, pack and learn")
+    whole.add_argument("--processes", type=int, default=2)
     packing = steps.add_parser("pack", help="pack raw tables for the library")
     packing.add_argument("raw", type=Path, nargs="+")
-    packing.add_argument("--to", type=Path, default=POPULATION_FILE)
+    packing.add_argument("--to", type=Path, default=population_file())
+    learning = steps.add_parser("learn", help="write what a diagnosis asks of the population")
+    learning.add_argument("--to", type=Path, default=LEARNED_FILE)
     given = vars(parser.parse_args())
     if given["step"] == "pack":
         pack(given["raw"], given["to"])
-    else:
+    elif given["step"] == "learn":
+        write_learned(learn(load_population()), given["to"])
+        typer.echo(f"{given['to'].stat().st_size / 1e6:.2f} MB")
+    elif given["step"] == "simulate":
         jobs = [(name, i) for name in MACHINES for i in range(given[name.replace("-", "_")])]
         simulate(jobs, given["processes"], given["to"])
+    else:
+        with TemporaryDirectory() as folder:
+            raw = Path(folder) / "raw.npz"
+            simulate([(name, i) for name, n in MACHINES.items() for i in range(n)], given["processes"], raw)
+            pack([raw], population_file())
+        write_learned(learn(load_population()), LEARNED_FILE)
 
 
 def simulate(jobs: Sequence[tuple[str, int]], n_processes: int, to: Path) -> None:
@@ -90,6 +105,7 @@ def pack(paths: Sequence[Path], to: Path) -> None:
     simulated_rigs, first = np.unique(rigs, return_index=True)  # one twin for all recordings of a machine
     for name in ("simulated", "simulated_scatter"):
         tables[name] = _rounded(np.concatenate([one[name] for one in raw])[first])
+    to.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(
         to,
         allow_pickle=False,

@@ -1,0 +1,296 @@
+"""Labelled recordings of the very rig that is diagnosed: what they show, and what that adds to the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from math import log
+from pathlib import Path
+
+import numpy as np
+
+from gearsig.cache import keep, read_arrays
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap._change import change_features, difference_features
+from gearsig.gap._conditions import (
+    Condition,
+    HealthyReference,
+    facts_of,
+    matching_reference,
+    read_healthy,
+    simulated,
+)
+from gearsig.gap._features import Features
+from gearsig.gap._recognition import Learned, within_reach
+from gearsig.gap._reduction import ReducedRecording, reduce_recording
+from gearsig.gap._simulator import OperatingCondition, Twin
+from gearsig.gap._trials import features_digest
+from gearsig.prepared import PreparedRecording
+from gearsig.recording import Recording
+
+
+@dataclass(frozen=True)
+class LabelledRecording:
+    """A recording of the rig, or of somebody's own simulation of it, of which the cause is known.
+
+    Parameters
+    ----------
+    recording : Recording
+        Carries its rig, with speed and torque.
+    effect : str
+        Name of an effect, "none" (healthy), or a name of one's own, which becomes a class of its own.
+    reference : Recording or None
+        The same rig when it was healthy; None: the diagnosis's own reference at the same speed and torque, if any.
+    severity : float or None
+        In the effect's unit; kept for the report.
+    """
+
+    recording: Recording
+    effect: str
+    reference: Recording | None = None
+    severity: float | None = None
+
+
+# --------------------
+# What they show: changes as those of the recordings that are diagnosed, kept on disk by content.
+# --------------------
+
+
+@dataclass(frozen=True)
+class LabelledChange:
+    """What a labelled recording shows.
+
+    Parameters
+    ----------
+    label : str
+    point : OperatingCondition
+    changes : mapping
+        Against a healthy reference (True), against the twin (False): the ways in which it can be compared.
+    """
+
+    label: str
+    point: OperatingCondition
+    changes: Mapping[bool, Features]
+
+
+MAX_BYTES = 10_000_000
+"""Of kept changes; real ones have some thousand."""
+
+
+def labelled_changes(
+    labelled: Sequence[LabelledRecording],
+    references: Sequence[PreparedRecording],
+    conditions: Sequence[Condition],
+    twin: Twin,
+    cache: Path | None,
+    *,
+    fresh: bool = False,
+) -> tuple[list[LabelledChange], list[str]]:
+    """Return what each labelled recording shows, and what is worth a remark: those left out, and why.
+
+    Parameters
+    ----------
+    labelled : sequence of LabelledRecording
+    references : sequence of PreparedRecording
+        Of the diagnosis, for those that bring none.
+    conditions : sequence of Condition
+        That are diagnosed: compared in the same ways, on the same channels.
+    twin : Twin
+    cache : Path or None
+        Folder that keeps what was computed, by the content of the files; None: nothing is kept.
+    fresh : bool
+        Compute anew what the folder holds.
+    """
+    ways = sorted({c.reference is not None for c in conditions})
+    channels = tuple(conditions[0].now.channels)
+    shared = [read_healthy(one)[0] for one in references]
+    found, remarks = list[LabelledChange](), list[str]()
+    for one in labelled:
+        try:
+            found.append(_change(one, shared, ways, channels, conditions[0].learned, twin, None if fresh else cache))
+        except RefusalError as refusal:
+            remarks.append(f"{one.recording.name}: {refusal.reason}; this labelled recording is left out.")
+    if cache is not None:
+        for change in found:
+            _keep(change, cache)
+    return found, remarks
+
+
+def _change(
+    one: LabelledRecording,
+    shared: Sequence[HealthyReference],
+    ways: Sequence[bool],
+    channels: Sequence[str],
+    learned: Learned,
+    twin: Twin,
+    cache: Path | None,
+) -> LabelledChange:
+    prepared = PreparedRecording(one.recording)
+    key = _key(one, shared, ways, channels, twin)
+    kept = None if cache is None else _kept(cache, key, one.effect)
+    if kept is not None:
+        return kept
+    now = _on(reduce_recording(prepared), channels)
+    facts = facts_of(prepared, now, twin)
+    healthy = list(shared) if one.reference is None else [read_healthy(PreparedRecording(one.reference))[0]]
+    match, why = matching_reference(now, prepared.rig, healthy)
+    changes: dict[bool, Features] = {}
+    if True in ways and match is not None:
+        common = match.reduced.channels
+        here = now.with_channels({name: now.channels[name] for name in common})
+        changes[True] = change_features(here, match.reduced)
+    if False in ways:
+        changes[False] = difference_features(now, simulated(twin, facts, now), learned.credibility)
+    if not changes:
+        reason = why or "it has no healthy reference, and the diagnosis compares with one"
+        raise RefusalError(reason, remedy="name its reference in the table")
+    return KeptChange(one.effect, facts.point, changes, key)
+
+
+@dataclass(frozen=True)
+class KeptChange(LabelledChange):
+    """The same with the name that it is kept by."""
+
+    key: str = ""
+
+
+def _on(reduced: ReducedRecording, channels: Sequence[str]) -> ReducedRecording:
+    """Return a recording with those of the diagnosed ones' channels that it has; with all its own where it has none."""
+    common = {name: reduced.channels[name] for name in channels if name in reduced.channels}
+    return reduced.with_channels(common) if common else reduced
+
+
+def _key(
+    one: LabelledRecording,
+    shared: Sequence[HealthyReference],
+    ways: Sequence[bool],
+    channels: Sequence[str],
+    twin: Twin,
+) -> str:
+    digest = sha256(repr((ways, tuple(channels), features_digest(), twin.key if False in ways else "")).encode())
+    healthy = [one.reference] if one.reference is not None else [s.whole.recording for s in shared if s.whole]
+    for recording in (one.recording, *healthy):
+        digest.update(np.ascontiguousarray(recording.samples).tobytes())
+        digest.update(repr((recording.sampling_rate_hz, recording.channels, recording.rig)).encode())
+    return digest.hexdigest()[:32]
+
+
+def _path(folder: Path, key: str) -> Path:
+    return folder / f"labelled-{key}.npz"
+
+
+def _keep(change: LabelledChange, folder: Path) -> None:
+    assert isinstance(change, KeptChange)  # noqa: S101 - made above, said to the type checker
+    arrays = {"point": np.array([change.point.speed_rpm, change.point.torque_nm])}
+    for way, features in change.changes.items():
+        arrays |= {f"names{way:d}": np.array(features.names), f"values{way:d}": features.values}
+        arrays |= {f"scatter{way:d}": features.scatter}
+    keep(_path(folder, change.key), lambda file: np.savez(file, allow_pickle=False, **arrays))
+
+
+def _kept(folder: Path, key: str, label: str) -> LabelledChange | None:
+    arrays = read_arrays(_path(folder, key), MAX_BYTES)
+    if arrays is None:
+        return None
+    try:
+        changes = {
+            way: Features(tuple(map(str, arrays[f"names{way:d}"])), arrays[f"values{way:d}"], arrays[f"scatter{way:d}"])
+            for way in (False, True)
+            if f"names{way:d}" in arrays
+        }
+        return KeptChange(label, OperatingCondition(*map(float, arrays["point"])), changes, key)
+    except (KeyError, TypeError, ValueError, InputError):
+        return None
+
+
+# --------------------
+# What they add.
+# --------------------
+
+
+WEIGHT = 0.2
+"""Of the log-likelihood ratio: what differs from recording to recording of one effect, place and severity foremost, is
+no normal scatter, and its directions are not independent."""
+
+SAME_SPEED = 1.25
+"""Ratio of speeds up to which recordings of a label are compared first."""
+
+
+@dataclass(frozen=True)
+class LabelledEvidence:
+    """What labelled recordings say of those that are diagnosed.
+
+    Parameters
+    ----------
+    counts : mapping
+        Label → recordings.
+    ratios : mapping
+        Label → ln p(x | it, its labelled recordings) − ln p(x | it), mean over the operating conditions.
+    alike : mapping
+        Label that nothing was learned of → how far recognition says the same of these recordings as of those, 0 to 1.
+    """
+
+    counts: Mapping[str, int]
+    ratios: Mapping[str, float]
+    alike: Mapping[str, float]
+
+
+def labelled_evidence(
+    conditions: Sequence[Condition], loads_n_per_mm: Sequence[float], labelled: Sequence[LabelledChange]
+) -> LabelledEvidence:
+    """Return what labelled recordings say of the conditions, see `LabelSpace`."""
+    labels = list(dict.fromkeys(one.label for one in labelled))
+    ratios: dict[str, list[float]] = {label: [] for label in labels}
+    alike: dict[str, list[float]] = {}
+    for condition, load in zip(conditions, loads_n_per_mm, strict=True):
+        way = condition.reference is not None
+        recogniser = condition.learned.recognisers[way]
+        row = within_reach(recogniser.input_row(condition.change, load))
+        here = recogniser.probabilities(condition.change, load)
+        for label in labels:
+            given = [one for one in labelled if one.label == label and way in one.changes]
+            near = [one for one in given if _speed_ratio(one, condition) <= SAME_SPEED] or given
+            if not near:
+                continue
+            rows = np.array([within_reach(recogniser.input_row(one.changes[way], load)) for one in near])
+            ratios[label].append(recogniser.labels.log_ratio(row, rows, label))
+            if label not in recogniser.causes:
+                there = [recogniser.probabilities(one.changes[way], load) for one in near]
+                mean = {name: float(np.mean([p[name] for p in there])) for name in here}
+                alike.setdefault(label, []).append(sum(min(here[name], mean[name]) for name in here))
+    counts = {label: sum(one.label == label for one in labelled) for label in labels}
+    means = {label: float(np.mean(values)) for label, values in ratios.items() if values}
+    return LabelledEvidence(counts, means, {label: float(np.mean(values)) for label, values in alike.items()})
+
+
+def _speed_ratio(one: LabelledChange, condition: Condition) -> float:
+    return float(np.exp(abs(log(one.point.speed_rpm / condition.facts.point.speed_rpm))))
+
+
+def with_labelled(
+    probabilities: Mapping[str, float], ratios: Mapping[str, float], alike: Mapping[str, float], weight: float = WEIGHT
+) -> dict[str, float]:
+    """Return the probabilities with what labelled recordings say, likeliest first: p_c ∝ p_c exp(w ln r_c).
+
+    A label that nothing was learned of enters with p = max_c p_c times how much recognition says the same of the
+    recording as of those with that label.
+
+    Parameters
+    ----------
+    probabilities : mapping
+        Cause → probability.
+    ratios : mapping
+        Label → log-likelihood ratio, see `LabelSpace.log_ratio`.
+    alike : mapping
+        Label that nothing was learned of → 0 … 1.
+    weight : float
+        w.
+    """
+    top = max(probabilities.values())
+    prior = dict(probabilities) | {name: top * share for name, share in alike.items()}
+    levels = {name: np.log(max(p, 1e-9)) + weight * ratios.get(name, 0.0) for name, p in prior.items()}
+    highest = max(levels.values())
+    weights = {name: float(np.exp(level - highest)) for name, level in levels.items()}
+    total = sum(weights.values())
+    return {name: weight / total for name, weight in sorted(weights.items(), key=lambda item: -item[1])}

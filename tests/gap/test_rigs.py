@@ -1,0 +1,89 @@
+"""What is diagnosed of a machine: one pair of several, and gears of which only the teeth are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap import once, other_lines, reduce_recording, twin_rig, with_stage
+from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Shaft
+from sims.registry import gap_simulator
+from tests.gap.synthetic import RIG, TEETH, record
+
+SECOND = GearPair("second", "out", "slow", 19, 61, 3.0)
+TRAIN = replace(
+    RIG,
+    shafts=(*RIG.shafts, Shaft("slow")),
+    pairs=(SECOND, *RIG.pairs),
+    bearings=(*RIG.bearings, Bearing("b3", "slow", 8, 9.5, 46.0)),
+    operating_point=OperatingPoint("slow", 100.0, torque_nm=400.0),
+)
+
+
+def test_of_several_pairs_one_must_be_asked_for() -> None:
+    with pytest.raises(RefusalError, match="second, stage"):
+        with_stage(TRAIN)
+    assert with_stage(RIG) is RIG
+    assert with_stage(TRAIN, "stage").pairs[0] == RIG.pairs[0]
+    assert with_stage(TRAIN, "in").pairs[0] == RIG.pairs[0]
+    assert with_stage(TRAIN, "slow").pairs[0] == SECOND
+    for wrong in ("third", "out"):
+        with pytest.raises(InputError) as error:
+            with_stage(TRAIN, wrong)
+        assert error.value.where == "stage"
+
+
+def test_the_twin_has_one_pair_at_its_own_speed_and_torque() -> None:
+    train = with_stage(TRAIN, "stage")
+    alone, remarks = twin_rig(train)
+    assert [pair.name for pair in alone.pairs] == ["stage"]
+    assert [bearing.name for bearing in alone.bearings] == ["b1", "b2"]
+    ratio = (37 / 23) * (61 / 19)
+    assert alone.nominal_speed_rpm("in") == pytest.approx(100.0 * ratio)
+    assert alone.nominal_torque_nm("in") == pytest.approx(400.0 / ratio)
+    assert len(remarks) == 1
+    gap_simulator("cracked").twin_of(alone)
+    assert twin_rig(RIG) == (RIG, [])
+
+
+def test_teeth_alone_are_enough_and_a_stated_torque_says_how_large_the_gears_are() -> None:
+    bare = Rig(shafts=RIG.shafts, pairs=(GearPair("stage", "in", "out", *TEETH),))
+    heavy = replace(bare, operating_point=OperatingPoint("in", torque_nm=2000.0))
+    light = replace(bare, operating_point=OperatingPoint("in", torque_nm=2.0))
+    modules = []
+    for rig in (light, bare, heavy):
+        alone, remarks = twin_rig(rig)
+        assert len(remarks) == 1
+        assert "module_mm" in alone.assumed
+        gap_simulator("cracked").twin_of(alone)
+        modules.append(alone.pairs[0].module_mm)
+    assert modules == sorted(modules)
+    assert modules[2] / modules[0] == pytest.approx(10.0, rel=0.1)  # the torque grows with the cube of the module
+
+
+def test_lines_of_the_other_pair_are_background() -> None:
+    train = with_stage(TRAIN, "stage")
+    mesh = 19 * TEETH[0] / TEETH[1]
+    lines = other_lines(train)
+    assert other_lines(RIG) == ()
+    slow = mesh / 61
+    for order in (mesh, 3 * mesh, mesh + 2 * slow, mesh - TEETH[0] / TEETH[1], slow):
+        assert min(abs(order - line) for line in lines) < 1e-6
+
+    def heard(_time: np.ndarray, revolutions: np.ndarray) -> np.ndarray:
+        swing = 1.0 + 0.3 * np.cos(2 * np.pi * slow * revolutions)
+        return sum(swing * 2.0 * np.cos(2 * np.pi * k * mesh * revolutions) for k in (1, 2, 3))
+
+    def features(recording, rig):
+        names, values = once(reduce_recording(recording.with_rig(rig), rig))
+        return dict(zip(names, values, strict=True))
+
+    quiet, loud = features(record(), RIG), record(heard)
+    as_one, as_stage = features(loud, RIG), features(loud, train)
+    changed = [name for name in quiet if abs(as_one[name] - quiet[name]) > 6.0]
+    assert {"line.strange", "tooth.driven.level"} <= set(changed)
+    for name in [name for name in changed if not name.startswith("sideband.driven")]:  # 38 on the shaft of 37 teeth
+        assert abs(as_stage[name] - quiet[name]) < 2.0 + 0.1 * abs(as_one[name] - quiet[name]), name
