@@ -22,7 +22,7 @@ from sims.cracked import CrackedPair, simulate_with_motion
 from sims.effects import EffectSetting
 from sims.gear_pair import build_rig, draw_roughness
 from sims.machine import Machine, Operation, Profile
-from sims.simulator import ParameterValue
+from sims.simulator import ParameterValue, SimulationSetup
 
 RATE_HZ = 12800.0
 SOURCE = "simulated: sample_data/make_samples.py"
@@ -127,7 +127,8 @@ def dynamic(
 ) -> Made:
     """Simulate a sample in 16 degrees of freedom; the rig states the nominal speed, not the true one."""
     rng = np.random.default_rng(seed)
-    ready = CrackedPair().prepare(parameters, effects, operation, rng, preset_name=preset, sampling_rate_hz=RATE_HZ)
+    setup = SimulationSetup(preset, parameters, effects, operation)
+    ready = CrackedPair().prepare(setup, rng, sampling_rate_hz=RATE_HZ)
     rig = build_rig(ready.machine, ready.operation, name=name, sources=[SOURCE])
     rig = replace(rig, operating_point=OperatingPoint("input", nominal_rpm, torque_nm=operation.torque_nm.largest))
     rig = replace(rig, sensors=tuple(s for s in rig.sensors if s.channel in CHANNELS))

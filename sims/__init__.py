@@ -68,16 +68,11 @@ def simulate(
 
     from gearsig.checks import count
     from sims.registry import simulator
-    from sims.simulator import effect_settings, operation_of
+    from sims.simulator import SimulationSetup, effect_settings, operation_of
 
-    chosen = simulator(model)
-    recording = chosen.simulate(
-        parameters or {},
-        effect_settings(effects),
-        operation_of(model, preset, speed_rpm, torque_nm),
-        np.random.default_rng(count(seed, "seed", minimum=0)),
-        preset=preset,
-        sampling_rate_hz=sampling_rate_hz,
-        duration_s=duration_s,
-    )
+    simulates = simulator(model)
+    operation = operation_of(model, preset, speed_rpm, torque_nm)
+    setup = SimulationSetup(preset, parameters or {}, effect_settings(effects), operation)
+    rng = np.random.default_rng(count(seed, "seed", minimum=0))
+    recording = simulates.simulate(setup, rng, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s)
     return replace(recording, truth={**(recording.truth or {}), "seed": seed})

@@ -14,7 +14,7 @@ from gearsig.errors import InputError
 from gearsig.recording import Recording
 from sims.effects import EffectSetting, effect
 from sims.machine import Operation, Profile
-from sims.presets import preset, presets
+from sims.presets import Preset, preset, presets
 
 if TYPE_CHECKING:
     from sims import ProfileLike
@@ -53,6 +53,32 @@ class Parameter:
     def choice(cls, name: str, meaning: str, choices: tuple[str, ...], default: str) -> Parameter:
         """Return a word."""
         return cls(name, "", meaning, default=default, choices=choices)
+
+
+@dataclass(frozen=True)
+class SimulationSetup:
+    """What a simulator is to simulate: a preset, and what differs from it.
+
+    Parameters
+    ----------
+    preset : str or Preset
+        The preset, its name or its file; empty: the simulator's first.
+    parameters : mapping
+        Name → value; what is not given is the preset's.
+    effects : sequence of EffectSetting
+        Besides the preset's.
+    operation : Operation or None
+        None: the preset's own speed and torque.
+    """
+
+    preset: str | Preset = ""
+    parameters: Mapping[str, ParameterValue] = field(default_factory=dict)
+    effects: Sequence[EffectSetting] = ()
+    operation: Operation | None = None
+
+    def preset_of(self, model: str) -> Preset:
+        """Return the preset of that model."""
+        return self.preset if isinstance(self.preset, Preset) else preset(model, self.preset)
 
 
 class HasText(Protocol):
@@ -106,41 +132,19 @@ class Simulator(ABC):
 
     @abstractmethod
     def simulate(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-        sampling_rate_hz: float = 20480.0,
-        duration_s: float = 5.0,
+        self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
     ) -> Recording:
         """Make a recording with rig and truth.
 
-        Parameters
-        ----------
-        parameters : mapping
-            Name → value; what is not given is the preset's.
-        effects : sequence of EffectSetting
-        operation : Operation or None
-            None: the preset's own speed and torque.
-        rng : numpy.random.Generator
-        preset : str
-            Empty: the simulator's first.
-        sampling_rate_hz, duration_s : float
+        Raises
+        ------
+        InputError
+            If a name does not exist, a value is out of its range, the values do not fit each other, or an effect has no
+            meaning here.
         """
 
     @abstractmethod
-    def check_convergence(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-    ) -> HasText:
+    def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> HasText:
         """Tell how far a smaller step changes the result of the very machine that would be simulated."""
 
 

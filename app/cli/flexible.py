@@ -46,15 +46,15 @@ def flexible(
     from app.flexible import RANGE, flexible_study, write_study
     from sims.presets import preset as preset_named
     from sims.reduced_fe import ReducedPair
+    from sims.simulator import SimulationSetup
 
     request = options.read_request(MODEL, preset, settings, effects, None, None, "1s", "20480Hz", seed)
     first, last = _range(speeds)
     wanted = tuple(quantity(f"{t.strip().removesuffix('Nm')}Nm", "N m", "--torques") for t in torques.split(","))
     if fresh:
         options.clear_other_versions(MODEL)
-    ready = ReducedPair().prepare(
-        request.parameters, request.effects, None, np.random.default_rng(seed), preset_name=request.preset
-    )
+    setup = SimulationSetup(request.preset, request.parameters, request.effects)
+    ready = ReducedPair().prepare(setup, np.random.default_rng(seed))
     chosen = preset_named(MODEL, request.preset)
     with progress_bar("preparing") as show:
         study = flexible_study(

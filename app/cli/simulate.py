@@ -96,12 +96,11 @@ def _convergence(request: options.SimulationChoices) -> str:
     import numpy as np
 
     from sims.registry import simulator
-    from sims.simulator import operation_of
+    from sims.simulator import SimulationSetup, operation_of
 
-    model = simulator(request.model)
     operation = operation_of(request.model, request.preset, request.speed_rpm, request.torque_nm)
-    rng = np.random.default_rng(request.seed)
-    return model.check_convergence(request.parameters, request.effects, operation, rng, preset=request.preset).text
+    setup = SimulationSetup(request.preset, request.parameters, request.effects, operation)
+    return simulator(request.model).check_convergence(setup, np.random.default_rng(request.seed)).text
 
 
 def preset_text(preset: Preset) -> str:

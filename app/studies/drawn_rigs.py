@@ -11,14 +11,14 @@ import numpy as np
 
 from gearsig.recording import Recording
 from sims.cracked import NAME as CRACKED
-from sims.cracked import CrackedPair, PreparedCrackedPair, default_step_s, simulate_with_motion
+from sims.cracked import CrackedPair, default_step_s, simulate_with_motion
 from sims.effects import EffectSetting, with_effects
-from sims.gear_pair import build_rig, draw_roughness
+from sims.gear_pair import ReadyPair, build_rig, draw_roughness
 from sims.machine import Machine, Operation, log_uniform
 from sims.measure import MeasuredChannel, ModalPath, PathMode
 from sims.mesh import GearGeometry, deepest_crack_mm
 from sims.reduced_fe import TWIN_STEP_S, PreparedPair, ReducedPair, simulate_pair, twin_parameters
-from sims.simulator import ParameterValue
+from sims.simulator import ParameterValue, SimulationSetup
 
 CALIBRATION_MODULES_MM = (1.5, 2.0, 2.5, 3.0, 4.0)
 OTHER_MODULES_MM = (1.75, 2.25, 2.75, 3.5)
@@ -299,14 +299,13 @@ def simulate_rig(
     return _cut(recording, round(lead_s * SAMPLING_RATE_HZ)) if run else recording
 
 
-def _prepared(
-    model: str, drawn: DrawnRig, operation: Operation, rng: np.random.Generator
-) -> PreparedCrackedPair | PreparedPair:
+def _prepared(model: str, drawn: DrawnRig, operation: Operation, rng: np.random.Generator) -> ReadyPair | PreparedPair:
     """Return the healthy machine; finite-element gears are of full discs, with the mesh of a twin's."""
     if model == CRACKED:
-        return CrackedPair().prepare(drawn.parameters, [], operation, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
+        setup = SimulationSetup("", drawn.parameters, (), operation)
+        return CrackedPair().prepare(setup, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
     values = twin_parameters(drawn.parameters, drawn.teeth) | {"roughness_locked_to": "flank"}
-    return ReducedPair().prepare(values, [], operation, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
+    return ReducedPair().prepare(SimulationSetup("", values, (), operation), rng, sampling_rate_hz=SAMPLING_RATE_HZ)
 
 
 def turns_before(drawn: DrawnRig, run: int) -> int:

@@ -22,7 +22,6 @@ from sims.cracked._simulator import (
     STEP_ANGLE_RAD,
     CrackedPair,
     CrackedTwin,
-    PreparedCrackedPair,
     cracked_gap_simulator,
     simulate_with_motion,
 )
@@ -41,7 +40,6 @@ __all__ = [
     "End",
     "PairConstants",
     "PairState",
-    "PreparedCrackedPair",
     "Response",
     "SteadyRun",
     "check_convergence",

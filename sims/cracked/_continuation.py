@@ -11,10 +11,10 @@ from gearsig.checks import FloatArray, closest_match_hint, count, one_of, within
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from sims.cracked._respond import SIGNALS, PairState, Response, default_step_s, respond, slowest_decay_s
-from sims.cracked._simulator import NAME, CrackedPair, PreparedCrackedPair, simulate_with_motion
-from sims.gear_pair import COORDINATES, MIN_MOTION_HZ
+from sims.cracked._simulator import NAME, CrackedPair, simulate_with_motion
+from sims.gear_pair import COORDINATES, MIN_MOTION_HZ, ReadyPair
 from sims.machine import Machine, Operation, Profile
-from sims.simulator import operation_of
+from sims.simulator import SimulationSetup, operation_of
 from sims.sweep import Sweep
 
 SECTIONS = ("mesh", "shaft")
@@ -153,18 +153,12 @@ class Branch:
         end = End(response.last, speed, operation.torque_nm.largest)
         return SteadyRun(value, machine, _from_zero(response), recording, settle_s, end)
 
-    def _prepared(self, value: float, rng: np.random.Generator) -> PreparedCrackedPair:
+    def _prepared(self, value: float, rng: np.random.Generator) -> ReadyPair:
         point = self.sweep.points()[self.sweep.axes[0].values.index(value)]
         own = self.sweep.at(point)
         operation = operation_of(own.model, own.preset, own.speed_rpm, own.torque_nm)
-        return CrackedPair().prepare(
-            own.parameters,
-            own.effects,
-            operation,
-            rng,
-            preset_name=own.preset,
-            sampling_rate_hz=own.sampling_rate_hz,
-        )
+        setup = SimulationSetup(own.preset, own.parameters, own.effects, operation)
+        return CrackedPair().prepare(setup, rng, sampling_rate_hz=own.sampling_rate_hz)
 
     def _wanted(self) -> tuple[str, ...]:
         own = [self.signal] if self.signal in SIGNALS else []
@@ -175,7 +169,7 @@ class Branch:
 
     def _settled(
         self,
-        ready: PreparedCrackedPair,
+        ready: ReadyPair,
         rng: np.random.Generator,
         first: PairState | None,
         settle_s: float,
@@ -197,7 +191,7 @@ class Branch:
         )
 
     def _measured(
-        self, ready: PreparedCrackedPair, rng: np.random.Generator, first: PairState | None, duration_s: float
+        self, ready: ReadyPair, rng: np.random.Generator, first: PairState | None, duration_s: float
     ) -> tuple[Recording, Response]:
         return simulate_with_motion(
             ready.machine,
@@ -210,7 +204,7 @@ class Branch:
         )
 
 
-def _ramped(ready: PreparedCrackedPair, before: End | None, seed: int) -> PairState | None:
+def _ramped(ready: ReadyPair, before: End | None, seed: int) -> PairState | None:
     """Go from one operation to the next slowly."""
     if before is None:
         return None

@@ -34,26 +34,7 @@ NAME = "cracked"
 
 
 @dataclass(frozen=True)
-class PreparedCrackedPair(ReadyPair):
-    """A machine with its effects switched on, ready to run.
-
-    Parameters
-    ----------
-    asked : SimulationRequest
-    made : Machine
-        With its effects.
-    """
-
-    made: Machine
-
-    @property
-    def machine(self) -> Machine:
-        """The machine, effects included."""
-        return self.made
-
-
-@dataclass(frozen=True)
-class CrackedPair(PairModel[PreparedCrackedPair]):
+class CrackedPair(PairModel[ReadyPair]):
     """Spur gear pair on four bearings between two rotors, 16 degrees of freedom; see `sims.cracked`."""
 
     name: str = NAME
@@ -61,17 +42,15 @@ class CrackedPair(PairModel[PreparedCrackedPair]):
     parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
     effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
 
-    def _built(
-        self, asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float
-    ) -> PreparedCrackedPair:
-        healthy = build_machine(asked.values, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
-        check_load(healthy, asked.operation)
-        return PreparedCrackedPair(asked, with_effects(healthy, asked.effects, rng))
+    def _built(self, request: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> ReadyPair:
+        healthy = build_machine(request.values, sampling_rate_hz=sampling_rate_hz, installed=request.installed)
+        check_load(healthy, request.operation)
+        return ReadyPair(request, with_effects(healthy, request.effects, rng))
 
-    def _run(self, ready: PreparedCrackedPair, **asked: Any) -> Recording:
-        return simulate_with_motion(ready.machine, ready.operation, **asked)[0]
+    def _run(self, ready: ReadyPair, **how: Any) -> Recording:
+        return simulate_with_motion(ready.machine, ready.operation, **how)[0]
 
-    def _converges(self, ready: PreparedCrackedPair, rng: np.random.Generator) -> StepConvergence:
+    def _converges(self, ready: ReadyPair, rng: np.random.Generator) -> StepConvergence:
         return check_convergence(ready.machine, ready.operation, rng)
 
 

@@ -18,7 +18,7 @@ from sims.forging._simulator import NAME, ForgingManipulator, with_effects
 from sims.machine import Operation
 from sims.mesh import GearGeometry, PairGeometry, wear_profile
 from sims.presets import Preset, preset_text
-from sims.simulator import ParameterValue, complete_values
+from sims.simulator import ParameterValue, SimulationSetup, complete_values
 
 N_CYCLES = 2
 SAMPLING_RATE_HZ = 1000.0
@@ -94,10 +94,9 @@ class ForgingTwin:
         parameters = self.parameters
         for each in added:
             parameters = _with_wrong_value(each, parameters)
+        operation = Operation.steady(self.point.speed_rpm, self.point.torque_nm)
         return ForgingManipulator().simulate(
-            parameters,
-            _settings(added),
-            Operation.steady(self.point.speed_rpm, self.point.torque_nm),
+            SimulationSetup("", parameters, _settings(added), operation),
             np.random.default_rng(SEED),
             sampling_rate_hz=SAMPLING_RATE_HZ,
             duration_s=N_CYCLES * (float(parameters["on_s"]) + float(parameters["off_s"])) - 1e-6,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -25,11 +25,10 @@ from sims.forging._drive import (
 )
 from sims.machine import Operation, Profile, WeakTooth
 from sims.mesh import PairGeometry
-from sims.presets import preset
 from sims.simulator import (
     Parameter,
-    ParameterValue,
     ParameterValues,
+    SimulationSetup,
     Simulator,
     Values,
     complete_values,
@@ -140,46 +139,25 @@ class ForgingManipulator(Simulator):
     effects: tuple[str, ...] = field(default=WITH_MEANING, repr=False)
     usual_sampling_rate_hz: float = field(default=1000.0, repr=False)  # a motion controller's, 1 ms
 
-    def prepare(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        operation: Operation | None,
-        *,
-        preset_name: str = "",
-        settings: Sequence[EffectSetting] = (),
-    ) -> PreparedDrive:
+    def prepare(self, setup: SimulationSetup) -> PreparedDrive:
         """Build the drive and its cycle, with its effects."""
-        chosen = preset(NAME, preset_name)
-        healthy = complete_values(PARAMETERS, chosen.parameters, parameters)
-        effects = (*chosen.effects, *settings)
+        chosen = setup.preset_of(NAME)
+        healthy = complete_values(PARAMETERS, chosen.parameters, setup.parameters)
+        effects = (*chosen.effects, *setup.effects)
         values, weak = with_effects(healthy, effects)
-        run = operation or chosen.operation
+        run = setup.operation or chosen.operation
         within(run.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
         read = ParameterValues(values)
         drive = build_drive(read, _constant(run.speed_rpm), weak)
         return PreparedDrive(drive, build_cycle(read), run, chosen.name, values, healthy, completed(effects))
 
     def simulate(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-        sampling_rate_hz: float = 1000.0,
-        duration_s: float = 6.0,
+        self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
     ) -> Recording:
         """Make a recording with rig and truth, from rest on; see `sims.simulator.Simulator.simulate`.
 
         The operation's torque is that of the open valve, its speed the pinion's that the flow allows (0: no limit).
-        Vibration is recorded from 5 kHz on.
-
-        Raises
-        ------
-        InputError
-            If a name does not exist, a value is out of its range, the values do not fit each other, or a stop is longer
-            than the record.
+        Vibration is recorded from 5 kHz on. A stop that is longer than the record is an error.
         """
         from sims.forging._measure import record, sensors
 
@@ -187,7 +165,7 @@ class ForgingManipulator(Simulator):
         within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
         if sampling_rate_hz * duration_s > MAX_SAMPLES:
             raise InputError(f"{sampling_rate_hz * duration_s:.3g} samples are wanted", allowed=f"up to {MAX_SAMPLES}")
-        ready = self.prepare(parameters, operation, preset_name=preset, settings=effects)
+        ready = self.prepare(setup)
         rig = build_rig(
             ready.drive,
             ParameterValues(ready.healthy_values),
@@ -208,20 +186,12 @@ class ForgingManipulator(Simulator):
             truth=ready.truth(),
         )
 
-    def check_convergence(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-    ) -> ForgingConvergence:
+    def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> ForgingConvergence:
         """Tell how far shorter steps change the motion of this very drive, which nothing random enters."""
         from sims.forging._respond import check_convergence
 
         del rng
-        ready = self.prepare(parameters, operation, preset_name=preset, settings=effects)
+        ready = self.prepare(setup)
         return check_convergence(ready.drive, ready.cycle, ready.operation.torque_nm)
 
 

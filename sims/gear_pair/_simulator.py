@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -15,8 +14,7 @@ from gearsig.rig import Rig
 from sims.effects import EffectSetting, completed
 from sims.gear_pair._installed import Installed, installed_of
 from sims.machine import Machine, Operation
-from sims.presets import Preset, preset
-from sims.simulator import HasText, Parameter, ParameterValue, Simulator, Values, complete_values, truth_of
+from sims.simulator import HasText, Parameter, SimulationSetup, Simulator, Values, complete_values, truth_of
 
 # What a simulated gear pair can be asked for: speeds, loads, sampling rates, durations.
 
@@ -45,7 +43,7 @@ def check_load(machine: Machine, operation: Operation) -> None:
 
 @dataclass(frozen=True)
 class SimulationRequest:
-    """What is asked of a model, complete.
+    """What a model is to simulate, complete.
 
     Parameters
     ----------
@@ -67,68 +65,65 @@ class SimulationRequest:
 
     @classmethod
     def of(
-        cls,
-        chosen: Preset,
-        known: tuple[Parameter, ...],
-        parameters: Mapping[str, ParameterValue],
-        settings: Sequence[EffectSetting],
-        operation: Operation | None,
-        sampling_rate_hz: float,
+        cls, model: str, known: tuple[Parameter, ...], setup: SimulationSetup, sampling_rate_hz: float
     ) -> SimulationRequest:
-        """Complete a preset's values and effects by those given.
+        """Complete a preset's values and effects by those of the setup.
 
         Raises
         ------
         InputError
             If a name does not exist, or a value, speed or sampling rate is out of its range.
         """
-        values = complete_values(known, chosen.parameters, parameters)
-        run = operation or chosen.operation
-        check_run(run, sampling_rate_hz)
-        effects = completed((*chosen.effects, *settings))
-        installed = installed_of(chosen.installed) if chosen.installed else None
-        return cls(chosen.model, chosen.name, run, values, effects, installed)
+        chosen = setup.preset_of(model)
+        operation = setup.operation or chosen.operation
+        check_run(operation, sampling_rate_hz)
+        return cls(
+            chosen.model,
+            chosen.name,
+            operation,
+            complete_values(known, chosen.parameters, setup.parameters),
+            completed((*chosen.effects, *setup.effects)),
+            installed_of(chosen.installed) if chosen.installed else None,
+        )
 
 
 @dataclass(frozen=True)
-class ReadyPair(ABC):
+class ReadyPair:
     """A pair with its effects switched on, ready to run.
 
     Parameters
     ----------
-    asked : SimulationRequest
+    request : SimulationRequest
+    machine : Machine
+        Effects included.
     """
 
-    asked: SimulationRequest
-
-    @property
-    @abstractmethod
-    def machine(self) -> Machine:
-        """The machine, effects included."""
+    request: SimulationRequest
+    machine: Machine
 
     @property
     def operation(self) -> Operation:
         """Speed and torque."""
-        return self.asked.operation
+        return self.request.operation
 
     @property
     def preset(self) -> str:
         """Name of the preset."""
-        return self.asked.preset
+        return self.request.preset
 
     @property
     def values(self) -> Values:
         """Every parameter; None where it follows from the others."""
-        return self.asked.values
+        return self.request.values
 
     @property
     def effects(self) -> tuple[EffectSetting, ...]:
         """With every option."""
-        return self.asked.effects
+        return self.request.effects
 
     def truth(self) -> dict[str, Any]:
         """What was put in, as plain values."""
-        return truth_of(self.asked.model, self.preset, self.values, self.effects, self.operation)
+        return truth_of(self.request.model, self.preset, self.values, self.effects, self.operation)
 
 
 Ready = TypeVar("Ready", bound=ReadyPair)
@@ -138,60 +133,19 @@ Ready = TypeVar("Ready", bound=ReadyPair)
 class PairModel(Simulator, Generic[Ready]):
     """Base of the simulators of a gear pair."""
 
-    def prepare(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        settings: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset_name: str = "",
-        sampling_rate_hz: float = 20480.0,
-    ) -> Ready:
+    def prepare(self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float = 20480.0) -> Ready:
         """Build the pair and switch its effects on; one number is drawn from `rng`, with and without effects."""
-        chosen = preset(self.name, preset_name)
-        return self.prepare_preset(chosen, parameters, settings, operation, rng, sampling_rate_hz=sampling_rate_hz)
-
-    def prepare_preset(
-        self,
-        chosen: Preset,
-        parameters: Mapping[str, ParameterValue],
-        settings: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        sampling_rate_hz: float = 20480.0,
-    ) -> Ready:
-        """Build a preset's pair and switch on its effects and `settings`; one number is drawn from `rng`."""
-        return self._built(
-            SimulationRequest.of(chosen, self.parameters, parameters, settings, operation, sampling_rate_hz),
-            rng,
-            sampling_rate_hz,
-        )
+        request = SimulationRequest.of(self.name, self.parameters, setup, sampling_rate_hz)
+        return self._built(request, rng, sampling_rate_hz)
 
     def simulate(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-        sampling_rate_hz: float = 20480.0,
-        duration_s: float = 5.0,
+        self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
     ) -> Recording:
-        """Make a recording with rig and truth; see `sims.simulator.Simulator.simulate`.
-
-        Raises
-        ------
-        InputError
-            If a name does not exist, a value is out of its range, the values do not fit each other, or an effect has no
-            meaning here.
-        """
+        """Make a recording with rig and truth; see `sims.simulator.Simulator.simulate`."""
         from sims.gear_pair._build import build_rig
 
         within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
-        ready = self.prepare(parameters, effects, operation, rng, preset_name=preset, sampling_rate_hz=sampling_rate_hz)
+        ready = self.prepare(setup, rng, sampling_rate_hz=sampling_rate_hz)
         rig = build_rig(
             ready.machine,
             ready.operation,
@@ -201,12 +155,12 @@ class PairModel(Simulator, Generic[Ready]):
         return self.record(ready, rng, rig=rig, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s)
 
     @abstractmethod
-    def _built(self, asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> Ready:
+    def _built(self, request: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> Ready:
         """Build what is asked for."""
 
     @abstractmethod
-    def _run(self, ready: Ready, **asked: Any) -> Recording:
-        """Run a prepared pair and measure it; `asked` as of `record`, by name."""
+    def _run(self, ready: Ready, **how: Any) -> Recording:
+        """Run a prepared pair and measure it; `how` as of `record`, by name."""
 
     @abstractmethod
     def _converges(self, ready: Ready, rng: np.random.Generator) -> HasText:
@@ -238,7 +192,7 @@ class PairModel(Simulator, Generic[Ready]):
         noise_rng : numpy.random.Generator or None
             For the chain: the same machine with other noise.
         """
-        asked: dict[str, Any] = {} if step_s is None else {"step_s": step_s}
+        step: dict[str, Any] = {} if step_s is None else {"step_s": step_s}
         return self._run(
             ready,
             rng=rng,
@@ -247,17 +201,9 @@ class PairModel(Simulator, Generic[Ready]):
             duration_s=duration_s,
             truth=ready.truth(),
             noise_rng=noise_rng,
-            **asked,
+            **step,
         )
 
-    def check_convergence(
-        self,
-        parameters: Mapping[str, ParameterValue],
-        effects: Sequence[EffectSetting],
-        operation: Operation | None,
-        rng: np.random.Generator,
-        *,
-        preset: str = "",
-    ) -> HasText:
+    def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> HasText:
         """Tell how far a smaller step of the integrator changes the result of this very machine."""
-        return self._converges(self.prepare(parameters, effects, operation, rng, preset_name=preset), rng)
+        return self._converges(self.prepare(setup, rng), rng)

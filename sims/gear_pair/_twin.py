@@ -24,7 +24,7 @@ from sims.machine import Nominal, log_uniform, nominal_of, pitch_tolerance_um, r
 from sims.mesh import PairGeometry
 from sims.presets import Preset, preset_text
 from sims.registry import sources_digest
-from sims.simulator import ParameterValue
+from sims.simulator import ParameterValue, SimulationSetup
 
 # Parameters of a pair of which only the rig's data are known: the rest is usual for its size.
 #
@@ -356,7 +356,7 @@ class PairTwin:
         return MachineFacts(self.nominal, (pair.driver, pair.driven), bearings, float(rms))
 
     def _prepared(self, own: Preset, rng: np.random.Generator, sampling_rate_hz: float = 20480.0) -> ReadyPair:
-        ready: ReadyPair = self.pair_model.prepare_preset(own, {}, (), None, rng, sampling_rate_hz=sampling_rate_hz)
+        ready: ReadyPair = self.pair_model.prepare(SimulationSetup(own), rng, sampling_rate_hz=sampling_rate_hz)
         return ready
 
     def _step_s(self, own: Preset) -> float:

@@ -131,16 +131,12 @@ class PreparedPair(ReadyPair):
 
     Parameters
     ----------
-    asked : SimulationRequest
+    request, machine
+        As in `ReadyPair`.
     pair : FlexiblePair
     """
 
     pair: FlexiblePair
-
-    @property
-    def machine(self) -> Machine:
-        """The machine, effects included."""
-        return self.pair.machine
 
     @property
     def step_s(self) -> float:
@@ -165,21 +161,21 @@ class ReducedPair(PairModel[PreparedPair]):
         "surface_roughness with locked_to=time: flanks are shapes here, which return with their teeth.",
     )
 
-    def _built(self, asked: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
-        gears = reduced_gears(asked.values)
-        healthy = healthy_machine(asked.values, gears, sampling_rate_hz=sampling_rate_hz, installed=asked.installed)
-        check_load(healthy, asked.operation)
-        machine = with_effects(healthy, asked.effects, rng)
+    def _built(self, request: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
+        gears = reduced_gears(request.values)
+        healthy = healthy_machine(request.values, gears, sampling_rate_hz=sampling_rate_hz, installed=request.installed)
+        check_load(healthy, request.operation)
+        machine = with_effects(healthy, request.effects, rng)
         if machine.roughness.locked_to == "time" and machine.roughness.rms_um > 0.0:
             raise InputError(
                 "a roughness locked to time has no meaning here: flanks are shapes that return with their teeth",
                 where="locked_to of surface_roughness",
                 allowed="'flank'",
             )
-        return PreparedPair(asked, flexible_pair(asked.values, machine, gears))
+        return PreparedPair(request, machine, flexible_pair(request.values, machine, gears))
 
-    def _run(self, ready: PreparedPair, **asked: Any) -> Recording:
-        return simulate_pair(ready.pair, ready.operation, **({"step_s": ready.step_s} | asked))[0]
+    def _run(self, ready: PreparedPair, **how: Any) -> Recording:
+        return simulate_pair(ready.pair, ready.operation, **({"step_s": ready.step_s} | how))[0]
 
     def _converges(self, ready: PreparedPair, rng: np.random.Generator) -> StepConvergence:
         del rng

@@ -13,6 +13,7 @@ from sims.effects import EffectSetting, effects
 from sims.presets import Preset, presets
 from sims.reduced_fe import static_table
 from sims.registry import simulator
+from sims.simulator import SimulationSetup
 from tests.app.pages import FOLDER, shown_text
 
 CHARTS = {"Time": 3, "Spectrum": 1, "Envelope": 1, "Phase portrait": 2, "Bifurcation": 0, "Mesh": 2}
@@ -184,7 +185,7 @@ def test_sliders_end_where_the_machine_does(name: str) -> None:
 
 def prepared(chosen: Preset, setting: EffectSetting) -> None:
     """Make the machine as far as its contact, without a simulation."""
-    ready = simulator(chosen.model).prepare({}, (setting,), None, np.random.default_rng(0), preset_name=chosen.name)  # type: ignore[attr-defined]
+    ready = simulator(chosen.model).prepare(SimulationSetup(chosen.name, {}, (setting,)), np.random.default_rng(0))  # type: ignore[attr-defined]
     if chosen.model == "reduced-fe":
         static_table(ready.pair.gears, ready.pair.machine.mesh)
 

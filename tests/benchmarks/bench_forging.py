@@ -3,12 +3,13 @@
 from time import perf_counter
 
 from sims.forging import ForgingManipulator, respond
+from sims.simulator import SimulationSetup
 
 
 def main() -> None:
     for name in ("manipulator_formula", "manipulator_table"):
         for mode in ("start-stop", "continuous"):
-            ready = ForgingManipulator().prepare({"mode": mode}, None, preset_name=name)
+            ready = ForgingManipulator().prepare(SimulationSetup(name, {"mode": mode}))
             respond(ready.drive, ready.profiles(3.0), duration_s=3.0)  # compiles
             times = []
             for _ in range(3):

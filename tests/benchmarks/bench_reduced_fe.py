@@ -8,14 +8,14 @@ import time
 
 import numpy as np
 
-from sims.presets import preset
-from sims.reduced_fe import NAME, FlexiblePair, ReducedPair, speed_sweep
+from sims.reduced_fe import FlexiblePair, ReducedPair, speed_sweep
+from sims.simulator import SimulationSetup
 
 SWEEP_S = 15.0
 
 
 def pair_of(name: str, **parameters: float) -> FlexiblePair:
-    return ReducedPair().prepare_preset(preset(NAME, name), parameters, (), None, np.random.default_rng(0)).pair
+    return ReducedPair().prepare(SimulationSetup(name, parameters), np.random.default_rng(0)).pair
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ from gearsig.motion import (
     motion_segments,
     torque_twist,
 )
+from sims.simulator import SimulationSetup
 from tests.motion.recordings import continuous, start_stop, without
 
 RATE = 1000.0
@@ -110,7 +111,7 @@ def test_work_and_loss_of_the_loop_are_those_of_the_model() -> None:
     assert loop.n_cycles == 2
     from sims.forging import ForgingManipulator, respond
 
-    ready = ForgingManipulator().prepare({}, None)
+    ready = ForgingManipulator().prepare(SimulationSetup())
     run = respond(ready.drive, ready.profiles(6.0), duration_s=6.0, interval_s=1e-4)
     work = np.trapezoid(run["torque"] * run["pinion speed"], dx=1e-4)
     assert loop.work_per_cycle_j == pytest.approx(work / 2.0, rel=1e-3)

@@ -13,7 +13,7 @@ from sims import simulate
 from sims.effects import EffectSetting
 from sims.forging import ForgingManipulator, build_rig, record, sensors
 from sims.machine import WeakTooth
-from sims.simulator import ParameterValues
+from sims.simulator import ParameterValues, SimulationSetup
 from tests.motion.recordings import start_stop, without
 
 
@@ -35,7 +35,7 @@ def cracked(
 def test_the_min_loss_parts_what_shows_from_what_does_not(part: float) -> None:
     """A tooth that has lost two fifths of it is not named, one that has lost twice as much is."""
     healthy = tooth_compliance(measure_motion(cracked(0.0, "manipulator_formula", "start-stop")))
-    prepared = ForgingManipulator().prepare({}, None, preset_name="manipulator_formula")
+    prepared = ForgingManipulator().prepare(SimulationSetup("manipulator_formula"))
     drive = replace(prepared.drive, weak_tooth=WeakTooth(0, 6, part * healthy.min_loss(1.5)))
     wanted = ParameterValues(prepared.values)
     recording = record(
@@ -55,7 +55,7 @@ def test_the_min_loss_parts_what_shows_from_what_does_not(part: float) -> None:
 @pytest.mark.parametrize("mode", ["start-stop", "continuous"])
 def test_the_cracked_tooth_and_the_stiffness_it_has_lost(preset: str, mode: str) -> None:
     effect = EffectSetting("root_crack", 6.0, {"tooth": 13})
-    weak = ForgingManipulator().prepare({}, None, preset_name=preset, settings=[effect]).drive.weak_tooth
+    weak = ForgingManipulator().prepare(SimulationSetup(preset, effects=[effect])).drive.weak_tooth
     assert weak is not None
     slow = "filtered" if mode == "continuous" else "instants"
     found = tooth_compliance(measure_motion(cracked(6.0, preset, mode, tooth=13, slow=slow)))

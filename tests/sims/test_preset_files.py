@@ -8,6 +8,7 @@ import pytest
 from gearsig.errors import InputError
 from sims.cracked import CrackedPair
 from sims.presets import preset, preset_text
+from sims.simulator import SimulationSetup
 
 GOOD = """
 [about]
@@ -48,14 +49,14 @@ def written(folder: Path, text: str) -> str:
 
 
 def prepare(name: str) -> object:
-    return CrackedPair().prepare({}, [], None, np.random.default_rng(0), preset_name=name)
+    return CrackedPair().prepare(SimulationSetup(name), np.random.default_rng(0))
 
 
 def test_a_file_may_carry_effects_and_what_is_fitted(tmp_path: Path) -> None:
     name = written(tmp_path, GOOD + INSTALLED)
     chosen = preset("cracked", name)
     assert (chosen.name, chosen.speed_rpm, chosen.effects[0].options["tooth"]) == ("mine", 1000.0, 3)
-    machine = CrackedPair().prepare({}, [], None, np.random.default_rng(0), preset_name=name).machine
+    machine = CrackedPair().prepare(SimulationSetup(name), np.random.default_rng(0)).machine
     assert machine.mesh.cracks_2[0].tooth == 2
     assert machine.shaft_names == ("in", "out")
     assert [b.bearing.name for b in machine.bearings] == ["1", "2", "3", "4"]

@@ -10,14 +10,14 @@ from gearsig.diagnosis import analyze
 from gearsig.errors import InputError
 from gearsig.rig import Rig, read_rig, write_rig
 from sims import simulate
-from sims.cracked import CrackedPair, PreparedCrackedPair
+from sims.cracked import CrackedPair
 from sims.effects import EffectSetting
-from sims.gear_pair import PARAMETERS, build_machine, build_rig
+from sims.gear_pair import PARAMETERS, ReadyPair, build_machine, build_rig
 from sims.machine import Machine, Operation, Profile
 from sims.measure import Tachometer
 from sims.presets import preset, presets
 from sims.registry import simulator, simulators
-from sims.simulator import ParameterValue, checked_value, complete_values
+from sims.simulator import ParameterValue, SimulationSetup, checked_value, complete_values
 
 PRESETS = tuple(presets("cracked"))
 SUFFIXES = {
@@ -29,8 +29,8 @@ SUFFIXES = {
 }  # fmt: skip
 
 
-def prepared(name: str = "", operation: Operation | None = None, **values: ParameterValue) -> PreparedCrackedPair:
-    return CrackedPair().prepare(values, [], operation, np.random.default_rng(0), preset_name=name)
+def prepared(name: str = "", operation: Operation | None = None, **values: ParameterValue) -> ReadyPair:
+    return CrackedPair().prepare(SimulationSetup(name, values, (), operation), np.random.default_rng(0))
 
 
 def machine(name: str = "", **values: ParameterValue) -> Machine:
@@ -143,7 +143,7 @@ def test_half_a_pitch_after_the_tachometers_edge_tooth_0_is_half_through_its_con
     assert float(pair.contact_radii_mm(cycles, pair=0)[0]) == pytest.approx(middle, rel=1e-12)
 
 
-@pytest.mark.parametrize("tooth", [18, 55])
+@pytest.mark.parametrize("tooth", [18, pytest.param(55, marks=pytest.mark.slow)])
 def test_the_diagnosis_names_the_cracked_tooth(tooth: int) -> None:
     """Tooth 1 is the one that engages after the mark, for the simulator and for the diagnosis."""
     cracked = [EffectSetting("root_crack", 3.0, {"tooth": float(tooth)})]
@@ -152,7 +152,7 @@ def test_the_diagnosis_names_the_cracked_tooth(tooth: int) -> None:
     assert (first.code, first.where.gear, first.where.tooth) == ("tooth-local-damage", "stage 1/input", tooth)
 
 
-def rig_of(ready: PreparedCrackedPair) -> Rig:
+def rig_of(ready: ReadyPair) -> Rig:
     return build_rig(ready.machine, ready.operation, name="x", sources=["simulated"])
 
 
@@ -238,8 +238,8 @@ def test_names_that_do_not_exist() -> None:
 def test_effects_change_the_machine_and_stand_in_the_truth() -> None:
     rng, other = np.random.default_rng(3), np.random.default_rng(3)
     settings = [EffectSetting("root_crack", 1.0, {"tooth": 4.0})]
-    ready = CrackedPair().prepare({}, settings, None, rng, preset_name="published_55_75")
-    healthy = CrackedPair().prepare({}, [], None, other, preset_name="published_55_75")
+    ready = CrackedPair().prepare(SimulationSetup("published_55_75", effects=settings), rng)
+    healthy = CrackedPair().prepare(SimulationSetup("published_55_75"), other)
     assert ready.machine.mesh.cracks_1[0].tooth == 3  # the model counts from 0
     assert healthy.machine.mesh.cracks_1 == ()
     assert rng.random() == other.random()  # healthy and faulty runs go on with the same random numbers
@@ -254,8 +254,8 @@ def test_every_effect_has_a_meaning_here(name: str) -> None:
 
     settings = [EffectSetting(name, effect(name).severity.typical)]
     values = {"sensor_range_mps2": 1000.0}
-    ready = CrackedPair().prepare(values, settings, None, np.random.default_rng(0), preset_name="workshop_29_47")
-    plain = CrackedPair().prepare(values, [], None, np.random.default_rng(0), preset_name="workshop_29_47")
+    ready = CrackedPair().prepare(SimulationSetup("workshop_29_47", values, settings), np.random.default_rng(0))
+    plain = CrackedPair().prepare(SimulationSetup("workshop_29_47", values), np.random.default_rng(0))
     assert ready.machine != plain.machine
 
 

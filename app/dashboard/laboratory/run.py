@@ -29,6 +29,7 @@ from sims.effects import completed, effect
 from sims.gear_pair import build_rig
 from sims.machine import Machine, Operation
 from sims.reduced_fe import FlexiblePair, FlexResponse
+from sims.simulator import SimulationSetup
 
 R = TypeVar("R")
 MOTION = (
@@ -99,10 +100,10 @@ def run_setup(setup: Setup) -> LaboratoryRun:
 
     operation, rng = Operation.steady(setup.speed_rpm, setup.torque_nm), np.random.default_rng(setup.seed)
     rate_hz, duration_s = setup.sampling_rate_hz, setup.duration_s
-    asked = (dict(setup.parameters), setup.effects, operation, rng)
+    asked = SimulationSetup(setup.preset, dict(setup.parameters), setup.effects, operation)
     rig_name = f"simulated: {setup.preset}"
     if setup.model == MODEL:
-        ready = CrackedPair().prepare(*asked, preset_name=setup.preset, sampling_rate_hz=rate_hz)
+        ready = CrackedPair().prepare(asked, rng, sampling_rate_hz=rate_hz)
         recording, response = simulate_with_motion(
             ready.machine,
             operation,
@@ -114,7 +115,7 @@ def run_setup(setup: Setup) -> LaboratoryRun:
             also=MOTION,
         )
         return LaboratoryRun(setup, ready.machine, recording, _shown_part(response, duration_s))
-    flexible = ReducedPair().prepare(*asked, preset_name=setup.preset, sampling_rate_hz=rate_hz)
+    flexible = ReducedPair().prepare(asked, rng, sampling_rate_hz=rate_hz)
     pair, machine = flexible.pair, flexible.pair.machine
     recording, bent = simulate_pair(
         pair,

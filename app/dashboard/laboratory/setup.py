@@ -16,9 +16,9 @@ from app.dashboard.theme import capitalised
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from sims.effects import Effect, EffectSetting, Option, effect, effects
-from sims.presets import Preset, preset, presets
+from sims.presets import Preset, presets
 from sims.registry import simulator
-from sims.simulator import ParameterValue, parameter
+from sims.simulator import ParameterValue, SimulationSetup, parameter
 
 if TYPE_CHECKING:
     from sims.machine import Machine
@@ -265,10 +265,10 @@ def _machine(model: str, preset_name: str) -> tuple[Machine, tuple[ReducedGear, 
     from sims.cracked import CrackedPair
     from sims.reduced_fe import ReducedPair
 
-    rng, name = np.random.default_rng(0), preset(model, preset_name).name
+    rng, setup = np.random.default_rng(0), SimulationSetup(preset_name)
     if model == MODEL:
-        return CrackedPair().prepare({}, (), None, rng, preset_name=name).machine, ()
-    pair = ReducedPair().prepare({}, (), None, rng, preset_name=name).pair
+        return CrackedPair().prepare(setup, rng).machine, ()
+    pair = ReducedPair().prepare(setup, rng).pair
     return pair.machine, pair.gears
 
 

@@ -32,6 +32,7 @@ from sims.effects import textbook
 from sims.gear_pair import build_rig
 from sims.machine import Nominal, Operation, log_uniform, nominal_of
 from sims.measure import Tachometer, pulse_voltage
+from sims.simulator import SimulationSetup
 
 # --------------------
 # What lies between forces and sensors: modes of the machine, shared by all channels, and each channel's own part.
@@ -313,7 +314,9 @@ class StaticMachine:
         """Draw one."""
         drawn = draw_machine(rng)
         operation = Operation.steady(drawn.speed_rpm, drawn.torque_nm)
-        ready = CrackedPair().prepare(drawn.parameters, [], operation, rng, sampling_rate_hz=max(RATES_HZ))
+        ready = CrackedPair().prepare(
+            SimulationSetup("", drawn.parameters, (), operation), rng, sampling_rate_hz=max(RATES_HZ)
+        )
         rig = build_rig(ready.machine, operation, name="drawn")
         nominal = nominal_of(rig)
         path = Path.of(drawn.teeth, nominal.module_mm, nominal.pressure_angle_deg)

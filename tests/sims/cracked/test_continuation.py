@@ -10,6 +10,7 @@ from sims.cracked import DECAYS, Branch, CrackedPair, PairState, respond, slowes
 from sims.effects import EffectSetting
 from sims.gear_pair import total_inertia_kg_m2
 from sims.machine import Operation, Profile
+from sims.simulator import SimulationSetup
 from sims.sweep import Axis, Sweep
 
 OPERATION = Operation.steady(1500.0, 40.0)
@@ -18,7 +19,9 @@ SMOOTH = {"roughness_um": 0.0, "friction": "off"}
 
 def machine(**parameters):
     values = {**SMOOTH, **parameters}
-    return CrackedPair().prepare(values, (), OPERATION, np.random.default_rng(0), preset_name="small_30_25").machine
+    return (
+        CrackedPair().prepare(SimulationSetup("small_30_25", values, (), OPERATION), np.random.default_rng(0)).machine
+    )
 
 
 def branch(name, values, preset="symmetric_50_50", torque_nm=20.0, effects=(), parameters=SMOOTH, **more):

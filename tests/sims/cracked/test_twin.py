@@ -19,6 +19,7 @@ from sims.effects import effect, effects
 from sims.gear_pair import BODY_KG, completed
 from sims.machine import nominal_of
 from sims.registry import gap_simulator
+from sims.simulator import SimulationSetup
 
 FS = 20480.0
 POINT = OperatingCondition(1800.0, 40.0)
@@ -97,7 +98,7 @@ def test_ordinary_gears_can_be_made(teeth: tuple[int, int], angle_deg: float) ->
 
 
 def machine_of(made: CrackedTwin, *added: Added):  # type: ignore[no-untyped-def]  # of the machine's room
-    return CrackedPair().prepare_preset(made.preset(POINT, added), {}, (), None, np.random.default_rng(0)).machine
+    return CrackedPair().prepare(SimulationSetup(made.preset(POINT, added)), np.random.default_rng(0)).machine
 
 
 def test_recordings_have_the_rigs_channels_and_can_be_gathered_with_it() -> None:

@@ -9,13 +9,14 @@ from gearsig.recording import Recording
 from sims import simulate
 from sims.effects import EffectSetting
 from sims.forging import ForgingManipulator, PreparedDrive, respond
+from sims.simulator import SimulationSetup
 from tests.sims.forging.drives import driven_by, largest
 
 CRACK = EffectSetting("root_crack", 4.0, {"tooth": 7})
 
 
 def made(*settings: EffectSetting) -> PreparedDrive:
-    return ForgingManipulator().prepare({"mode": "continuous"}, None, settings=settings)
+    return ForgingManipulator().prepare(SimulationSetup("", {"mode": "continuous"}, settings))
 
 
 def recorded(**effects: float) -> Recording:

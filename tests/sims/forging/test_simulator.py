@@ -13,7 +13,7 @@ from sims import simulate
 from sims.forging import PARAMETERS, ForgingManipulator
 from sims.presets import preset, presets
 from sims.registry import simulators
-from sims.simulator import ParameterValue
+from sims.simulator import ParameterValue, SimulationSetup
 from tests.app.test_cli import run
 
 UNITS = {
@@ -42,7 +42,7 @@ def test_every_name_ends_in_its_unit_and_defaults_fit() -> None:
 def test_the_two_stiffnesses_of_the_source_are_presets() -> None:
     """(13) with the stated geometry gives 1.8366e10 N/m^1.5; table 1 prints 1.72e9. Both say so."""
     assert set(presets("forging")) == {"manipulator_formula", "manipulator_table"}
-    prepared = {name: ForgingManipulator().prepare({}, None, preset_name=name) for name in presets("forging")}
+    prepared = {name: ForgingManipulator().prepare(SimulationSetup(name)) for name in presets("forging")}
     formula, table = prepared["manipulator_formula"].drive, prepared["manipulator_table"].drive
     assert formula.contact.stiffness_n_per_m_lambda == pytest.approx(1.8366e10, rel=5e-5)
     assert table.contact.stiffness_n_per_m_lambda == 1.72e9
@@ -60,7 +60,7 @@ def test_the_two_stiffnesses_of_the_source_are_presets() -> None:
 
 @pytest.mark.parametrize("name", ["manipulator_formula", "manipulator_table"])
 def test_the_presets_hold_what_the_source_states(name: str) -> None:
-    prepared = ForgingManipulator().prepare({}, None, preset_name=name)
+    prepared = ForgingManipulator().prepare(SimulationSetup(name))
     v, cycle = prepared.values, prepared.cycle
     assert (v["teeth_driver"], v["teeth_driven"], v["module_mm"], v["pressure_angle_deg"]) == (20, 100, 5.0, 20.0)
     assert (v["exponent"], v["friction_coefficient"], v["restitution"], v["piece_mass_kg"]) == (1.5, 0.05, 0.95, 290.0)

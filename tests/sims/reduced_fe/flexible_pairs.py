@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 
 from sims.mesh import GearMesh, PairGeometry
-from sims.presets import preset
-from sims.reduced_fe import NAME, FlexiblePair, ReducedPair, ready_gear
+from sims.reduced_fe import FlexiblePair, ReducedPair, ready_gear
+from sims.simulator import SimulationSetup
 from tests.sims.reduced_fe.synthetic import synthetic_gear
 
 
 @cache
 def pair_of(preset_name="flexible_50_50", **parameters) -> FlexiblePair:
-    return ReducedPair().prepare_preset(preset(NAME, preset_name), parameters, (), None, np.random.default_rng(0)).pair
+    return ReducedPair().prepare(SimulationSetup(preset_name, parameters), np.random.default_rng(0)).pair
 
 
 @cache

@@ -19,6 +19,7 @@ from sims.reduced_fe import (
     start_state,
     torsional_mode,
 )
+from sims.simulator import SimulationSetup
 from tests.sims.reduced_fe.flexible_pairs import pair_of, synthetic_pair
 
 STEADY = Operation.steady(2000.0, 170.0)
@@ -251,6 +252,8 @@ def test_a_run_starts_on_a_tooth_that_stands_ahead_of_its_place():
     chosen, operation = preset(NAME, "flexible_50_50"), Operation.steady(2000.0, 1.0)
     for seed in range(4):
         setting = EffectSetting("pitch_error", 50.0, {})
-        pair = ReducedPair().prepare_preset(chosen, {}, (setting,), operation, np.random.default_rng(seed)).pair
+        pair = (
+            ReducedPair().prepare(SimulationSetup(chosen, {}, (setting,), operation), np.random.default_rng(seed)).pair
+        )
         response = respond(pair, operation, duration_s=1e-4)
         assert response["mesh_force_n"][0] == pytest.approx(1.0 / RB_M, rel=0.3)

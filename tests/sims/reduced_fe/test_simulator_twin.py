@@ -14,6 +14,7 @@ from sims import simulate
 from sims.effects import effects
 from sims.reduced_fe import TRANSMISSION_ERROR, TWIN_STEP_S, ReducedPair, ReducedTwin, constants, respond
 from sims.registry import gap_simulator
+from sims.simulator import SimulationSetup
 from tests.sims.reduced_fe.synthetic import synthetic_gear
 
 POINT = OperatingCondition(1800.0, 40.0)
@@ -105,7 +106,7 @@ def test_a_rig_without_a_module_is_refused():
 
 def test_the_step_is_short_enough_for_what_is_compared(twin):
     """Lines of acceleration up to 10 kHz, within 60 dB of the greatest, against a step of a fourth."""
-    ready = ReducedPair().prepare_preset(twin.preset(POINT), {}, (), None, np.random.default_rng(0))
+    ready = ReducedPair().prepare(SimulationSetup(twin.preset(POINT)), np.random.default_rng(0))
     own, found = constants(ready.pair, ready.operation), []
     for part in (1, 4):
         signals = ("driver y acceleration", "bearing 1 y acceleration", TRANSMISSION_ERROR)
