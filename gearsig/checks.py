@@ -42,12 +42,17 @@ def count(value: int, name: str, *, minimum: int = 1, remedy: str = "") -> int:
 
 def one_of(value: str, name: str, allowed: Iterable[str]) -> str:
     """Return `value` if it is among `allowed`; name the closest match if it is not."""
-    choices = tuple(allowed)
-    if value not in choices:
-        raise InputError(
-            f"{name} is {short(value)}", allowed=", ".join(choices), remedy=closest_match_hint(value, choices)
-        )
-    return value
+    return known_name(value, tuple(allowed), f"{name} is {short(value)}")
+
+
+def known_name(name: str, names: Iterable[str], complaint: str, *, where: str = "", remedy: str = "") -> str:
+    """Return `name` if it is among `names`; else raise with the complaint, all names, and the closest or the remedy."""
+    choices = tuple(names)
+    if name not in choices:
+        shown = choices if len(choices) <= 30 else (*choices[:30], "…")
+        hint = closest_match_hint(name, choices) or remedy
+        raise InputError(complaint, where=where, allowed=", ".join(shown) or "none", remedy=hint)
+    return name
 
 
 def short(value: object) -> str:

@@ -6,8 +6,7 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-from gearsig.checks import closest_match_hint
-from gearsig.errors import InputError
+from gearsig.checks import known_name
 from gearsig.gap import DriveSimulator, GapSimulator
 from sims.simulator import Simulator
 
@@ -25,12 +24,7 @@ def simulators() -> dict[str, Simulator]:
 
 def simulator(name: str) -> Simulator:
     """Return the simulator called `name`."""
-    found = simulators()
-    if name not in found:
-        raise InputError(
-            f"there is no model {name!r}", allowed=", ".join(found), remedy=closest_match_hint(name, found)
-        )
-    return found[name]
+    return simulators()[known_name(name, simulators(), f"there is no model {name!r}")]
 
 
 @cache
@@ -46,14 +40,7 @@ def gap_simulators() -> dict[str, GapSimulator | DriveSimulator]:
 
 def gap_simulator(name: str) -> GapSimulator | DriveSimulator:
     """Return the simulator called `name` as the gap diagnosis takes it."""
-    found = gap_simulators()
-    if name not in found:
-        raise InputError(
-            f"there is no model {name!r} with a gap diagnosis",
-            allowed=", ".join(found),
-            remedy=closest_match_hint(name, found),
-        )
-    return found[name]
+    return gap_simulators()[known_name(name, gap_simulators(), f"there is no model {name!r} with a gap diagnosis")]
 
 
 # Which state of the simulators' code made a result.

@@ -289,19 +289,13 @@ def read_effect(text: str) -> EffectSetting:
 
 def read_effect_options(wanted: Effect, texts: Sequence[str]) -> dict[str, float | str]:
     """Return the options of ["gear=driven", "tooth=5"]."""
-    from gearsig.checks import closest_match_hint
+    from gearsig.checks import known_name
 
-    known = {option.name: option for option in wanted.options}
+    options = {option.name: option for option in wanted.options}
     found: dict[str, float | str] = {}
     for text in texts:
         name, value = _split(text, f"effect {wanted.name}", "gear=driven")
-        if name not in known:
-            raise InputError(
-                f"{wanted.name} has no option {name!r}",
-                allowed=", ".join(known) or "none",
-                remedy=closest_match_hint(name, known),
-            )
-        option = known[name]
+        option = options[known_name(name, options, f"{wanted.name} has no option {name!r}")]
         is_text = isinstance(option.default, str)
         found[name] = value if is_text else quantity(value, option.unit, f"{name} of {wanted.name}")
     return found

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, frozen_array, positive
+from gearsig.checks import FloatArray, frozen_array, known_name, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
 
@@ -175,9 +175,8 @@ class AngleSignal(Result, matrix=("samples.T", "revolutions", "channel_names")):
 
     def values(self, name: str) -> FloatArray:
         """Samples of one channel, (n_samples,)."""
-        if name not in self.channel_names:
-            raise InputError(f"there is no channel {name!r}", allowed=", ".join(self.channel_names))
-        row: FloatArray = self.samples[self.channel_names.index(name)]
+        at = self.channel_names.index(known_name(name, self.channel_names, f"there is no channel {name!r}"))
+        row: FloatArray = self.samples[at]
         return row
 
 

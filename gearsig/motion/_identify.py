@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray
-from gearsig.errors import InputError, RefusalError
+from gearsig.checks import FloatArray, known_name
+from gearsig.errors import RefusalError
 from gearsig.motion._backlash import MIN_SAMPLES, dependence, estimate_backlash
 from gearsig.motion._force import find_datum, friction_share
 from gearsig.motion._impacts import meeting_speeds
@@ -382,10 +382,8 @@ class Identification(Result, rows="parameters"):
 
     def parameter(self, name: str) -> FittedParameter:
         """Return one parameter by its name."""
-        for parameter in self.parameters:
-            if parameter.name == name:
-                return parameter
-        raise InputError(f"there is no parameter {name!r}", allowed=", ".join(p.name for p in self.parameters))
+        parameters = {parameter.name: parameter for parameter in self.parameters}
+        return parameters[known_name(name, parameters, f"there is no parameter {name!r}")]
 
 
 TOLD = 0.5

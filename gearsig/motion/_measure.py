@@ -8,7 +8,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, count, positive
+from gearsig.checks import FloatArray, count, known_name, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.motion._types import PairMotion, stands
 from gearsig.recording import Channel, Recording
@@ -53,10 +53,7 @@ def find_roles(recording: Recording, pair: GearPair, given: Mapping[str, str] | 
     """
     chosen = dict(given or {})
     for role, name in chosen.items():
-        if role not in ROLES:
-            raise InputError(
-                f"there is no role {role!r}", allowed=", ".join(ROLES), remedy=closest_match_hint(role, ROLES)
-            )
+        known_name(role, ROLES, f"there is no role {role!r}")
         if name:
             recording.index(name)
     for role in ROLES:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, frozen_array, one_of, positive, within
+from gearsig.checks import FloatArray, frozen_array, known_name, one_of, positive, within
 from gearsig.errors import InputError
 from gearsig.rig import QUANTITIES, PulseTimes, Rig, SpeedSource
 
@@ -317,14 +317,8 @@ class Recording:
 
     def index(self, name: str) -> int:
         """Row of the channel called `name`."""
-        if name not in self.channel_names:
-            raise InputError(
-                f"there is no channel {name!r}",
-                where=self.name,
-                allowed=", ".join(self.channel_names),
-                remedy=closest_match_hint(name, self.channel_names),
-            )
-        return self.channel_names.index(name)
+        names = self.channel_names
+        return names.index(known_name(name, names, f"there is no channel {name!r}", where=self.name))
 
     def values(self, name: str) -> FloatArray:
         """Samples of one channel, (n_samples,), read-only."""

@@ -11,7 +11,7 @@ from types import NoneType, UnionType
 from typing import Any, get_args, get_type_hints
 
 from gearsig.cache import write_whole
-from gearsig.checks import closest_match_hint, short
+from gearsig.checks import closest_match_hint, known_name, short
 from gearsig.errors import InputError
 from gearsig.rig._contact import ToothContact
 from gearsig.rig._types import (
@@ -119,10 +119,7 @@ def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
     """Build a rig from the tables of a rig file (or of any mapping of the same shape)."""
     allowed = (*_LISTS, *_PLAIN, "operating_point", "speed", "contact", "machine")
     for key in data:
-        if key not in allowed:
-            raise InputError(
-                f"there is no {key!r}", where=where, allowed=", ".join(allowed), remedy=closest_match_hint(key, allowed)
-            )
+        known_name(key, allowed, f"there is no {key!r}", where=where)
     parts: dict[str, Any] = {}
     for name, kind in _LISTS.items():
         tables = data.get(name, [])
@@ -201,9 +198,7 @@ def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
     hints = get_type_hints(kind)
     values = {}
     for key, value in table.items():
-        if key not in known:
-            hint = closest_match_hint(key, known)
-            raise InputError(f"there is no key {key!r}", where=where, allowed=", ".join(known), remedy=hint)
+        known_name(key, known, f"there is no key {key!r}", where=where)
         values[key] = _typed(value, hints[key], f"{where}: {key}")
     missing = [
         n for n, f in known.items() if f.default is MISSING and f.default_factory is MISSING and n not in values | ready

@@ -6,7 +6,17 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import cos, isclose, isfinite, radians
 
-from gearsig.checks import FloatArray, closest_match_hint, count, frozen_array, not_negative, one_of, positive, within
+from gearsig.checks import (
+    FloatArray,
+    closest_match_hint,
+    count,
+    frozen_array,
+    known_name,
+    not_negative,
+    one_of,
+    positive,
+    within,
+)
 from gearsig.errors import InputError
 from gearsig.rig._catalogue import catalogue_bearing
 from gearsig.rig._contact import ToothContact
@@ -535,11 +545,8 @@ class Rig:
 
     def pair(self, name: str) -> GearPair:
         """Return the pair called `name`."""
-        for pair in self.pairs:
-            if pair.name == name:
-                return pair
-        names = [pair.name for pair in self.pairs]
-        raise InputError(f"there is no pair {name!r}", allowed=", ".join(names), remedy=closest_match_hint(name, names))
+        pairs = {pair.name: pair for pair in self.pairs}
+        return pairs[known_name(name, pairs, f"there is no pair {name!r}")]
 
     def mesh_order(self, pair: GearPair, shaft: str = "") -> float | None:
         """Mesh cycles of `pair` per revolution of `shaft` (default: the reference shaft); None if it cannot be known.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, closest_match_hint
+from gearsig.checks import FloatArray, known_name
 from gearsig.errors import InputError
 from sims.cracked._kernels import MAX_LATE
 from sims.gear_pair import (
@@ -500,13 +500,7 @@ def _first_state(ready: PreparedRun, given: PairState | None) -> tuple[FloatArra
 
 
 def _place(name: str) -> int:
-    if name not in SIGNALS:
-        raise InputError(
-            f"there is no signal {name!r}",
-            allowed="names of sims.cracked.SIGNALS",
-            remedy=closest_match_hint(name, SIGNALS),
-        )
-    return SIGNALS.index(name)
+    return SIGNALS.index(known_name(name, SIGNALS, f"there is no signal {name!r}"))
 
 
 TOLERANCE = 1e-4

@@ -14,7 +14,7 @@ from zlib import crc32
 
 import numpy as np
 
-from gearsig.checks import closest_match_hint
+from gearsig.checks import known_name
 from gearsig.errors import GearsigError, InputError
 from gearsig.gap import GapEffect
 from sims.effects._effect import GROUPS, Effect, EffectSetting, Options
@@ -160,14 +160,8 @@ def _listed() -> dict[str, Effect]:
 
 def effect(name: str) -> Effect:
     """Return the effect called `name`."""
-    found = effects()
-    if name not in found:
-        raise InputError(
-            f"there is no effect {name!r}",
-            allowed=", ".join(found),
-            remedy=closest_match_hint(name, found) or f"name the file of an effect of your own in {VARIABLE}",
-        )
-    return found[name]
+    remedy = f"name the file of an effect of your own in {VARIABLE}"
+    return effects()[known_name(name, effects(), f"there is no effect {name!r}", remedy=remedy)]
 
 
 def as_gap_effect(shown: Effect) -> GapEffect:

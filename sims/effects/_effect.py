@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from gearsig.checks import closest_match_hint, one_of, within
+from gearsig.checks import known_name, one_of, within
 from gearsig.errors import InputError
 from gearsig.rig import Bearing
 from sims.effects.textbook import Textbook
@@ -298,12 +298,7 @@ class Effect:
         """Return the options, checked, with defaults for those not given; those left to be drawn are not in it."""
         names = [option.name for option in self.options]
         for name in options:
-            if name not in names:
-                raise InputError(
-                    f"{self.name} has no option {name!r}",
-                    allowed=", ".join(names) or "none",
-                    remedy=closest_match_hint(name, names),
-                )
+            known_name(name, names, f"{self.name} has no option {name!r}")
         given = {o: options.get(o.name, o.default) for o in self.options}
         return {o.name: o.check(value, self.name) for o, value in given.items() if value is not None}
 

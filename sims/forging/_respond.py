@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, closest_match_hint, one_of, positive, within
+from gearsig.checks import FloatArray, known_name, one_of, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.rig import damping_ratio_s_per_m
 from sims.forging._drive import CONTINUOUS, Cycle, ForgingDrive, Schedule, schedule
@@ -140,10 +140,7 @@ class DriveResponse:
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return a signal by its name."""
-        if name not in self.signals:
-            hint = closest_match_hint(name, self.signals)
-            raise InputError(f"there is no signal {name!r}", allowed=", ".join(self.signals), remedy=hint)
-        return self.signals[name]
+        return self.signals[known_name(name, self.signals, f"there is no signal {name!r}")]
 
     def contact(self, column: str) -> FloatArray:
         """Return a column of the contacts by its name."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import cos, isfinite, pi, radians
 
-from gearsig.checks import count, not_negative, one_of, positive, within
+from gearsig.checks import count, known_name, not_negative, one_of, positive, within
 from gearsig.errors import InputError
 from gearsig.rig import Bearing
 from sims.measure import MeasurementChain
@@ -387,11 +387,5 @@ class Machine:
 
 def bearing_index(machine: Machine, name: str) -> int:
     """Place of a bearing in `machine.bearings` by its name."""
-    from gearsig.checks import closest_match_hint
-
     names = [support.bearing.name for support in machine.bearings]
-    if name not in names:
-        raise InputError(
-            f"there is no bearing {name!r}", allowed=", ".join(names), remedy=closest_match_hint(name, names)
-        )
-    return names.index(name)
+    return names.index(known_name(name, names, f"there is no bearing {name!r}"))

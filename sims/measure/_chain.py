@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, frozen_array, not_negative, positive, within
+from gearsig.checks import FloatArray, frozen_array, known_name, not_negative, positive, within
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Provenance, Recording
 from gearsig.rig import EncoderChannel, PulseTimes, Rig, SpeedSource, TachometerChannel
@@ -66,13 +66,8 @@ class Motion:
 
     def angle_rad(self, shaft: str, user: str) -> FloatArray:
         """Angle of a shaft that a sensor is fitted to, (n_steps,)."""
-        if shaft not in self.shaft_angles_rad:
-            raise InputError(
-                f"the {user} sits on shaft {shaft!r}, whose angle the simulation does not give",
-                allowed=", ".join(self.shaft_angles_rad) or "none",
-                remedy=closest_match_hint(shaft, self.shaft_angles_rad),
-            )
-        return self.shaft_angles_rad[shaft]
+        complaint = f"the {user} sits on shaft {shaft!r}, whose angle the simulation does not give"
+        return self.shaft_angles_rad[known_name(shaft, self.shaft_angles_rad, complaint)]
 
     def time_s(self, start_s: float = 0.0) -> FloatArray:
         """Time of each step, counted from `start_s`, (n_steps,)."""

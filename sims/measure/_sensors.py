@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from gearsig.checks import FloatArray, closest_match_hint, not_negative, positive, within
+from gearsig.checks import FloatArray, known_name, not_negative, positive, within
 from gearsig.errors import InputError
 
 # Linear systems on a solver's grid, exact for an input that runs straight from step to step.
@@ -308,13 +308,8 @@ class ModalPath:
 
 
 def _weights(gains: Mapping[str, float], positions: tuple[str, ...]) -> FloatArray:
-    unknown = [name for name in gains if name not in positions]
-    if unknown:
-        raise InputError(
-            f"the path starts at {unknown[0]!r}, which the simulation does not give",
-            allowed=", ".join(positions),
-            remedy=closest_match_hint(unknown[0], positions),
-        )
+    for name in gains:
+        known_name(name, positions, f"the path starts at {name!r}, which the simulation does not give")
     return np.array([gains.get(name, 0.0) for name in positions])
 
 

@@ -57,7 +57,13 @@ def test_the_same_seed_gives_the_same_recording(two_healthy_turns):
     np.testing.assert_array_equal(two_healthy_turns.samples, again.samples)
 
 
-@pytest.mark.parametrize("name", effects())
+# One of each group, and the one that changes nothing; all of them take minutes.
+QUICK = {"backlash", *{e.group: name for name, e in effects().items()}.values()}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in effects()]
+)
 def test_every_effect_changes_the_recording_or_says_why_not(two_healthy_turns, name):
     changed = sims.simulate(MODEL, effects={name: effect(name).severity.typical}, **TWO_TURNS)
     assert changed.truth["effects"][0]["name"] == name
