@@ -12,6 +12,7 @@ import numpy as np
 from gearsig.diagnosis._bearing_families import (
     BEARING_PARTS,
     Candidate,
+    Families,
     clearest_family,
     expected_parts,
     find_families,
@@ -85,7 +86,7 @@ def detect_bearings(
     claimed = any(f.kind in (Kind.FAULT, Kind.SUSPICION) for f in findings)
     if not claimed and signals.rig.bearings and cleaned:
         fixed = cleaned[: len(envelopes)]  # where a damage rings is not known beforehand; an own band follows it
-        findings += _none_shows(signals, fixed, families.unclear)
+        findings += _none_shows(signals, fixed, families)
     return findings
 
 
@@ -117,7 +118,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         f"{_family_text(candidate)}, {100 * slip:+.2f} % from the kinematic order {candidate.expected:.4f}.",
         _modulation_text(candidate),
         *(["Bearings of the same orders cannot be told apart by their envelope."] if candidate.twins else []),
-        *(f"Within its slip, the {rival} would show at the same order." for rival in candidate.rivals),
+        *(f"Within its slip, {rival} would show at the same order." for rival in candidate.rivals),
     ]
     if only_stated:
         evidence.append("The speed is a stated one that no line of a shaft or mesh confirms.")
@@ -258,18 +259,20 @@ def _modulation_text(candidate: Candidate) -> str:
 # Bearings in which nothing shows: good as far as damage would have shown, else undecided.
 
 
-def _none_shows(
-    signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], unclear: Sequence[Candidate]
-) -> list[Finding]:
+def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], families: Families) -> list[Finding]:
     """State that nothing shows as far as it would have shown, and which parts could not have shown."""
     where = Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes)))
     if not speed_is_confirmed(signals):
         why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
         return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
-    if unclear:
-        parts = ", ".join(part_text(c.name, c.bearing.name) for c in unclear if c.bearing)
-        why = f"lines stand at the order of the {parts}, but families beside it are as clear"
-        return [_undecided(why, "A longer recording, or another sensor.", where)]
+    for seen, but in (
+        (families.named, "something else explains them as well"),
+        (families.unclear, "families beside it are as clear"),
+    ):
+        if seen:
+            parts = ", ".join(part_text(c.name, c.bearing.name) for c in seen if c.bearing)
+            why = f"lines stand at the order of the {parts}, but {but}"
+            return [_undecided(why, "A longer recording, or another sensor.", where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
     expected = expected_parts(signals)
     probability = signals.settings.false_alarm_probability / max(1, len(expected) * len(envelopes))

@@ -13,6 +13,9 @@ from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
 from gearsig.prepared import Comb, LineExcess, best_comb, comb_at
 from gearsig.rig import Bearing
 
+AS_STRONG_DB = 9.0
+"""Scatter of a train's lines about a smooth course: a line of two resonances' beats is weakened by so much."""
+
 
 def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ()) -> Comb | None:
     """Return the train of impacts whose lines a family is a part of, or None if the family stands alone.
@@ -20,7 +23,9 @@ def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ())
     Tried are p/q of the family's fundamental (q to 30, p to 3), over the range of the family's own lines. The best is
     that of the largest sum of log ratios less a cost per line: a train that is too slow pays for lines of noise, one
     that is too fast leaves lines to others. It counts if at least half of its lines beside the family's are seen, and
-    beside the sidebands of the family: a race that turns through the load has them a shaft's order apart.
+    beside the sidebands of the family: a race that turns through the load has them a shaft's order apart. And they
+    must be as strong as the family's, within `AS_STRONG_DB`: nothing makes every q-th line of a train stronger than the
+    others, whereas lines of a strong family's second-order sidebands, or of its foot, lie everywhere.
 
     Parameters
     ----------
@@ -73,14 +78,15 @@ def stands_out_from_neighbours(excess: LineExcess, comb: Comb, slip: float, othe
 
 def _unmasked(excess: LineExcess, fundamental: float, reach: float) -> FloatArray:
     """Return the log ratios of the multiples up to `reach` that are not explained already."""
-    return _free_ratios(excess, np.arange(1, int(reach / fundamental) + 1) * fundamental)
+    ratios: FloatArray = excess.log_ratio[_free_lines(excess, np.arange(1, int(reach / fundamental) + 1) * fundamental)]
+    return ratios
 
 
-def _free_ratios(excess: LineExcess, places: FloatArray) -> FloatArray:
+def _free_lines(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
+    """Return the numbers of the lines at some places that are not explained already."""
     index = _line_numbers(excess, places)
     index = index[(index >= 0) & (index < len(excess.log_ratio))]
-    ratios: FloatArray = excess.log_ratio[index[~excess.masked[index]]]
-    return ratios
+    return index[~excess.masked[index]]
 
 
 def _line_numbers(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
@@ -99,8 +105,22 @@ def _is_seen_between(
     places = np.arange(1, int(reach / fundamental) + 1) * fundamental
     sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in (1, 2, 3) for side in (-1, 1))]
     explained = np.any([_is_of_family(excess, places, family, sideband) for sideband in sidebands], axis=0)
-    further = _free_ratios(excess, places[~explained])
-    return len(further) >= 3 and float(np.mean(further >= np.log(4.0))) >= 0.5
+    further = _free_lines(excess, places[~explained])
+    seen = excess.log_ratio[further] >= np.log(4.0)
+    if len(further) < 3 or float(np.mean(seen)) < 0.5:
+        return False
+    multiples = _free_lines(excess, np.arange(1, int(reach / family) + 1) * family)
+    own_db, between_db = (_over_floor_db(excess, lines) for lines in (multiples, further[seen]))
+    return bool(np.median(between_db) >= np.median(own_db) - AS_STRONG_DB)
+
+
+def _over_floor_db(excess: LineExcess, lines: NDArray[np.int64]) -> FloatArray:
+    """Return the height of the largest of each line and its two neighbours over the floor, not cut at any limit."""
+    values, last = excess.spectrum.values, len(excess.spectrum.values) - 1
+    near = np.clip(lines[:, None] + np.arange(-1, 2), 0, last)
+    ratio = values[near].max(axis=1) / np.maximum(excess.floor[np.clip(lines, 0, last)], 1e-300)
+    heights: FloatArray = 20 * np.log10(np.maximum(ratio, 1e-300))
+    return heights
 
 
 def _is_of_family(excess: LineExcess, places: FloatArray, family: float, sideband: float) -> NDArray[np.bool_]:
@@ -131,6 +151,9 @@ def part_text(name: str, bearing: str) -> str:
 SAME_BEARING_ORDER = 1e-3
 """Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
 
+N_MULTIPLES = 6
+"""Of a family's fundamental that are looked at."""
+
 MINIMUM_LINES = 3
 """Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
 
@@ -153,6 +176,13 @@ class Candidate:
     twins: tuple[Bearing, ...] = ()
     share: float = 1.0
     in_train: bool = False
+
+    @property
+    def strength_db(self) -> float:
+        """Mean height of the first six multiples over the floor; those that do not stand out count 0."""
+        highest = (N_MULTIPLES + 0.5) * self.comb.fundamental
+        lines = zip(self.comb.positions, self.comb.ratios_db, strict=True)
+        return float(sum(ratio for position, ratio in lines if position < highest)) / N_MULTIPLES
 
     @property
     def modulation(self) -> float:
@@ -183,17 +213,28 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
     """Return the families of the envelopes, each put down to a part of a bearing only if nothing else explains it.
 
     A family at a part's order that belongs to a slower train of impacts is the train's; the train is then hidden and
-    the search begins anew, so that a damaged part beside it is found.
+    the search begins anew, so that a damaged part beside it is found. A train whose lines are those of a stronger
+    family explains nothing: sums and differences of that family and the shaft lie on it.
     """
     trains: list[Candidate] = []
     for _ in range(3):
-        named = _significant(signals, envelopes)
-        train = next((t for c in named if (t := _train_of(signals, c)) is not None), None)
+        candidates = _distinct(_significant(signals, envelopes))
+        named: list[Candidate] = []
+        train = None
+        for candidate in candidates:
+            train = _train_of(signals, candidate)
+            if train is None:
+                named.append(candidate)
+            elif _shaft_beside(signals, train) or any(_is_multiple(c.comb.fundamental, train) for c in named):
+                train = None  # and the candidate is a by-product
+            else:
+                break
         if train is None:
             break
         trains.append(train)
         envelopes = [replace(e, excess=e.excess.without_multiples(train.comb.fundamental)) for e in envelopes]
-    named = [c for c in named if _train_of(signals, c) is None]
+    trains = [t for t in trains if not any(t.strength_db < c.strength_db - SECOND_DB for c in named)]
+    named = [c for c in named if not any(c.strength_db < t.strength_db - SECOND_DB for t in trains)]
     clear = [c for c in named if _stands_out(signals, c)]
     unclear = [c for c in named if c not in clear]
     if not clear and not trains:  # combinations with shaft orders make further families, which are no second fault
@@ -202,6 +243,37 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
             return Families((free,), (), tuple(unclear))
         trains = [] if free is None else [free]
     return Families(tuple(clear), tuple(trains), tuple(unclear))
+
+
+SAME_FAMILY = 5e-3
+"""Relative distance of two fundamentals that are one: a bearing's slip differs from day to day."""
+
+SECOND_DB = 12.0
+"""A family so much weaker than another, in its own envelope or in the clearest one, is a by-product of it: sums and
+differences with the shaft and the cage, and the other bearing's sensor."""
+
+
+def _distinct(candidates: list[Candidate]) -> list[Candidate]:
+    """Return the candidates, strongest first, without those that are by-products of a stronger one."""
+    kept: list[Candidate] = []
+    for candidate in sorted(candidates, key=lambda c: -c.strength_db):
+        beside = (max(s.strength_db, _strength_in(candidate.envelope, s.comb.fundamental)) for s in kept)
+        if all(candidate.strength_db >= level - SECOND_DB for level in beside):
+            kept.append(candidate)
+    return kept
+
+
+def _strength_in(envelope: BandEnvelope, fundamental: float) -> float:
+    """Return the strength of a family in another envelope."""
+    places = fundamental * np.arange(1, N_MULTIPLES + 1)
+    lines = _free_lines(envelope.excess, places)
+    return float(np.maximum(_over_floor_db(envelope.excess, lines), 0.0).sum()) / N_MULTIPLES
+
+
+def _is_multiple(fundamental: float, train: Candidate) -> bool:
+    """Whether a family's fundamental is among the train's lines."""
+    of_train, resolution = train.comb.fundamental, train.envelope.excess.spectrum.resolution
+    return abs(fundamental - round(fundamental / of_train) * of_train) <= 2 * resolution
 
 
 def speed_is_only_stated(signals: AnalysisSignals) -> bool:
@@ -247,10 +319,13 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
 
 
 def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:
-    """Return the surest family with a fundamental between `low` and `high`, its p-value over all envelopes."""
+    """Return the surest family with a fundamental between `low` and `high`, its p-value over all envelopes.
+
+    Of families that are no chance at all, the strongest.
+    """
     combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
     families = [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
-    best = min(families, key=lambda family: (family.p_value, -family.comb.score), default=None)
+    best = min(families, key=lambda family: (max(family.p_value, 1e-9), -family.strength_db), default=None)
     return None if best is None else replace(best, p_value=min(1.0, best.p_value * len(envelopes)))
 
 
@@ -267,7 +342,7 @@ def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> lis
         # Once it is fitted to the lines, the fundamental must still be near the order.
         near = slip * order + best.envelope.excess.spectrum.resolution / 6
         is_near = abs(best.comb.fundamental - order) <= near
-        if is_near and p_value <= signals.settings.false_alarm_probability:
+        if is_near and p_value <= signals.settings.false_alarm_probability and _has_own_lines(best.comb):
             candidates.append(replace(best, p_value=p_value, bearing=bearing, name=name, expected=order))
     candidates.sort(key=lambda c: -_weight(signals, c.name, c.comb.fundamental / c.expected - 1))
     kept: list[Candidate] = []
@@ -277,11 +352,18 @@ def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> lis
     return sorted(kept, key=lambda c: c.p_value)
 
 
+def _has_own_lines(comb: Comb) -> bool:
+    """Whether the lines have no common divisor: those of twice the order are another family's."""
+    return gcd(*(round(position / comb.fundamental) for position in comb.positions)) == 1
+
+
 def _train_of(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
     """Return the train of impacts that a candidate's lines are a part of, if it is one."""
     train = slower_train(candidate.envelope.excess, candidate.comb, tuple(signals.known_shaft_orders.values()))
     if train is None or _is_modulated_by_cage(signals, candidate, train):
         return None
+    if candidate.name == "BSF" and abs(2 * train.fundamental / candidate.comb.fundamental - 1) < SAME_FAMILY:
+        return None  # an element that strikes one race harder than the other has lines at its spin, too
     free = replace(candidate, comb=train, bearing=None, name="", expected=0.0, rivals=(), share=1.0, in_train=True)
     return _as_cage(signals, free)
 
@@ -333,10 +415,16 @@ def _weight(signals: AnalysisSignals, name: str, slip: float) -> float:
 
 
 def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
-    """Note the other parts whose order is so near, or half or twice, that slip alone could make it this one."""
+    """Note what else would show at the same lines.
+
+    Other parts whose order is so near, or half or twice, that slip alone could make it this one; a multiple of the
+    shaft beside it; and of an outer race, elements that differ, where lines a cage's turn apart are as strong.
+    """
     own = _weight(signals, candidate.name, candidate.comb.fundamental / candidate.expected - 1)
     parts = expected_parts(signals)
     order_of_part = next(o for b, name, o in parts if (b, name) == (candidate.bearing, candidate.name))
+    near = nearest_bearing(signals, candidate.envelope.channel)
+    own *= 1.0 if near in (None, candidate.bearing) else 0.5
     others, rivals, twins = 0.0, [], []
     for bearing, name, order in parts:
         if (bearing, name) == (candidate.bearing, candidate.name):
@@ -346,9 +434,78 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
             continue
         slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
         if abs(slip) <= slip_of(signals):
-            others += _weight(signals, name, slip)
-            rivals.append(part_text(name, bearing.name))
+            others += _weight(signals, name, slip) * (1.0 if near in (None, bearing) else 0.5)
+            rivals.append(f"the {part_text(name, bearing.name)}")
+    shaft = _shaft_beside(signals, candidate)
+    if shaft:
+        others += 1.0
+        rivals.append(shaft)
+    if candidate.name == "BPFO":
+        shallow = min(1.0, (SHALLOW / max(candidate.modulation, 1e-9)) ** 2)
+        differ = _elements_differ(signals, candidate)
+        others += own * max(shallow, float(differ))  # at the same order, with the same slip
+        if differ:
+            rivals.append("a damaged element or cage, whose lines a cage's turn apart are there as strong,")
+        elif shallow > 0.5:
+            rivals.append("elements that differ, passing the load of a sound race,")
     return replace(candidate, rivals=tuple(rivals), twins=tuple(twins), share=own / (own + others))
+
+
+SHALLOW = 0.15
+"""Depth of modulation up to which an outer race's order says as little of damage as of what passes by: elements that
+differ, and a stiffness that varies as they pass the load, modulate at the same order."""
+
+BESIDE_SHAFT = 0.015
+"""Relative distance from a multiple of a shaft within which its line, spread by a wandering speed, is a rival."""
+
+
+def _shaft_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
+    """Name the multiple of a shaft that lies beside the family's fundamental and is half as strong, or stronger."""
+    spectrum, own = candidate.envelope.excess.spectrum, candidate.comb.fundamental
+    amplitude = spectrum.largest_near(own, 2 * spectrum.resolution)[1]
+    for shaft, order in signals.known_shaft_orders.items():
+        k = round(own / order)
+        is_beside = k >= 1 and 0 < abs(own / (k * order) - 1) <= BESIDE_SHAFT
+        if is_beside and spectrum.largest_near(k * order, 2 * spectrum.resolution)[1] >= 0.5 * amplitude:
+            return f"the {k}-fold order of shaft {shaft or 'of reference'}"
+    return ""
+
+
+def _elements_differ(signals: AnalysisSignals, candidate: Candidate) -> bool:
+    """Whether lines at the cage's order beside multiples of the shaft are as strong as an outer race's own.
+
+    Elements that differ pass the load in turn, once a turn of the cage: an outer race struck by like elements does not
+    show it.
+    """
+    bearing, excess = candidate.bearing, candidate.envelope.excess
+    shaft = signals.rig.ratio(bearing.shaft) if bearing is not None else None
+    orders = bearing.orders() if bearing is not None else {}
+    if shaft is None or not orders.get("FTF"):
+        return False
+    cage = candidate.comb.fundamental * orders["FTF"] / orders["BPFO"]
+    places = np.array([abs(k * shaft + side * cage) for k in range(6) for side in (-1, 1)])
+    own = [_over_floor_db(excess, _free_lines(excess, candidate.comb.fundamental * np.arange(1, 4)))]
+    beside = _over_floor_db(excess, _free_lines(excess, np.unique(places)))
+    return len(beside) >= 4 and len(own[0]) > 0 and bool(np.median(beside) >= np.median(own[0]) - 6.0)
+
+
+def nearest_bearing(signals: AnalysisSignals, channel: str) -> Bearing | None:
+    """Return the bearing that a channel's position or name tells it to be at, None where none or several fit.
+
+    A name fits where it is part of the position or of the channel's name, or where its words' initials are a word of
+    it: "drive end" in "X130_DE_time".
+    """
+    import re
+
+    text = f"{signals.recording.channels[signals.recording.index(channel)].position} {channel}".lower()
+    words = set(re.split(r"[^a-z0-9]+", text))
+    fitting = []
+    for bearing in signals.rig.bearings:
+        parts = re.split(r"[^a-z0-9]+", bearing.name.lower().removeprefix("bearing").strip())
+        initials = "".join(part[:1] for part in parts)
+        if set(parts) <= words or (len(initials) > 1 and initials in words):
+            fitting.append(bearing)
+    return fitting[0] if len(fitting) == 1 else None
 
 
 def _known_multiple(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:

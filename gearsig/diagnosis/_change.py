@@ -11,7 +11,13 @@ import numpy as np
 from gearsig.angle import AngleSignal
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._bearing import CLEAR_MODULATION
-from gearsig.diagnosis._bearing_families import expected_parts, part_text, slip_of, speed_is_only_stated
+from gearsig.diagnosis._bearing_families import (
+    SAME_FAMILY,
+    expected_parts,
+    part_text,
+    slip_of,
+    speed_is_only_stated,
+)
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
 from gearsig.diagnosis._types import (
     CHANGED,
@@ -40,6 +46,9 @@ STATED_SPEED = 0.01
 
 STANDS_OUT = 4.0
 """Power of a line, averaged over the segments, over the lines' lower quartile around: noise does not reach it."""
+
+STAYS = 0.75
+"""Share of the segments in which a line is higher than what is beside it: a tone that wanders past is no shaft's."""
 
 NOISE_QUANTILE = 0.25
 """Of lines: three in four of them may be tones, as between the harmonics of a loose shaft."""
@@ -92,13 +101,16 @@ def level_changes(
     Returns
     -------
     tuple of LevelChange
-        Empty where a speed is not known or a record is shorter than 16 revolutions.
+        Empty where a speed is not known, a record is shorter than 16 revolutions, or a run-up goes through
+        other speeds.
 
     References
     ----------
     B. L. Welch, "The generalization of 'Student's' problem when several different population variances are involved",
     1947. C. Alexopoulos, A. F. Seila, "Output data analysis", in *Handbook of Simulation*, 1998 (batch means).
     """
+    if (signals.speed_varies or reference.speed_varies) and abs(_speed_off(signals, reference)) > OTHER_SPEED:
+        return ()
     try:
         block_rev = _segment_rev(signals, reference)
         quantities = [
@@ -142,8 +154,11 @@ def family_change(
     return _compared(quantity, 1, signals.settings.false_alarm_probability)
 
 
-SAME_FAMILY = 5e-3
-"""Relative range in which a family is sought that another record shows: a bearing's slip differs from day to day."""
+def _speed_off(signals: AnalysisSignals, reference: AnalysisSignals) -> float:
+    """Return the relative difference of the mean speeds; 0 where one is not known."""
+    if signals.angle is None or reference.angle is None:
+        return 0.0
+    return signals.frequency_per_order_hz / reference.frequency_per_order_hz - 1.0
 
 
 def _in_common(a: tuple[float, float], b: tuple[float, float]) -> float:
@@ -205,7 +220,9 @@ class _Segments:
         top = low + int(np.argmax(mean[low:high]))
         floor = np.quantile(mean[max(low - 32, 1) : high + 32], NOISE_QUANTILE)
         is_peak = mean[top] >= mean[max(top - 2, 1) : top + 3].max()  # and no foot of a line beyond
-        return _Levels(self.power[:, low:high].max(axis=1), bool(is_peak and mean[top] >= STANDS_OUT * floor))
+        largest = self.power[:, low:high].max(axis=1)
+        stays = np.mean(largest >= self.power[:, max(low - 2, 1) : high + 2].max(axis=1)) >= STAYS
+        return _Levels(largest, bool(is_peak and stays and mean[top] >= STANDS_OUT * floor))
 
     def band(self, low: float, high: float) -> _Levels:
         """Return the lower quartile of a band's lines, which tones do not reach."""
@@ -388,14 +405,14 @@ def change_findings(
     """
     if not changes:
         title = "What has changed since the reference cannot be told by order: "
-        title += "the speed of one is not known, or it is too short."
-        surer = "Two recordings with known speed, of 16 revolutions or more."
+        title += "the speed of one is not known, or runs through other speeds, or it is too short."
+        surer = "Two recordings with known speed, alike in both, of 16 revolutions or more."
         return [cannot_tell("change-not-examined", title, surer=surer)]
     findings, rest = _gains(changes)
     changed = [c for c in rest if c.is_change and (c.change_db > 0 or c.kind != "bearing")]  # none heals
     if not changed:
         return [*findings, _unchanged(rest)] if rest else findings
-    off = signals.frequency_per_order_hz / reference.frequency_per_order_hz - 1.0
+    off = _speed_off(signals, reference)
     risen = _largest([c for c in changed if c.change_db > 0 and _matters(c, rest)])
     headline = _changed(_largest(changed), off)
     if abs(off) > OTHER_SPEED or signals.speed_varies or reference.speed_varies:
@@ -478,7 +495,7 @@ def _changed(changes: Sequence[LevelChange], off: float) -> Finding:
     rest = len(risen or fallen) - 4
     texts += [f"{rest} more up" if risen else f"{rest} more down"] if rest > 0 else []
     texts += [f"{len(fallen)} level{'s' if len(fallen) > 1 else ''} down"] if risen and fallen else []
-    repeats = max(c.repeatability_db for c in (risen or fallen)[:4])
+    repeats = max(0.1, *(c.repeatability_db for c in (risen or fallen)[:4]))
     first = max(changes, key=lambda c: abs(c.change_db))
     value, floor = (10 ** (level / 20) for level in (first.level_db, first.reference_db))
     evidence = [

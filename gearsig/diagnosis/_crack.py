@@ -62,7 +62,7 @@ def crack_depth(
     """
     from gearsig.severity import estimate_crack
 
-    if rig.bearings and not rig.pairs:
+    if not rig.pairs:
         return None
     prepared = prepare(recording, rig)
     alive = [c.name for c in prepared.recording.channels if c.quantity == "acceleration" and c.name not in dead]

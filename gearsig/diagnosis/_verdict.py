@@ -59,7 +59,10 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
         return " ".join(["No fault shows.", *said, *([] if has_reference else [WITHOUT_REFERENCE])])
     others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
     gaps = [*unused, *others]
-    why = " ".join(f.title for f in gaps[:2]) or "Nothing was examined that would show a fault."
+    nothing = "Nothing was examined that would show a fault."
+    if has_reference:
+        nothing = "What shows, the reference shows as well."
+    why = " ".join(f.title for f in gaps[:2]) or nothing
     return " ".join(["Cannot tell.", why, *said, *_remedy(gaps)])
 
 

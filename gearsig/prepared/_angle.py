@@ -11,7 +11,16 @@ import numpy as np
 
 from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError, RefusalError
-from gearsig.prepared._lines import CLEAR_LINE_DB, LOG_RATIO_LIMIT, LineExcess, best_comb, floor_of, over_floor_db
+from gearsig.prepared._lines import (
+    CLEAR_LINE_DB,
+    FOOT_LINES,
+    LOG_RATIO_LIMIT,
+    LineExcess,
+    best_comb,
+    floor_of,
+    over_floor_db,
+    peak_position,
+)
 from gearsig.recording import Recording
 from gearsig.rig import ConstantSpeed, Rig, SpeedChannel
 
@@ -146,10 +155,13 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     """Find the shaft's harmonics in all channels and the envelopes of all bands together.
 
     Each shows lines of its own, a bearing's above all; those of the shaft are common to them. A speed other than the
-    stated one must show its first harmonic, and clearer than the stated one does. A family on multiples of the mains
-    says nothing, and is left out: a hum's would be taken for the shaft of any motor of little slip.
+    stated one must show its first harmonic, and that clearer than a channel's own spectrum has one at the stated speed.
+    A family on multiples of the mains says nothing, and is left out: a hum's would be taken for the shaft of any motor
+    of little slip.
     """
-    lines = _common_lines(recording)
+    spectra = list(_spectra_of_shaft(recording))
+    own = spectra[: len(recording.vibration_names())]
+    lines = _common_lines(spectra, len(own))
     hertz, resolution = stated.mean_speed_rpm / 60, lines.spectrum.resolution
     low, high = hertz * (1 - STATED_SPEED_TOLERANCE), hertz * (1 + STATED_SPEED_TOLERANCE)
     harmonics = np.arange(1, N_SHAFT_HARMONICS + 1)
@@ -158,39 +170,77 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     for mains_hz in mains:
         comb = best_comb(lines.without_multiples(mains_hz, skirt=MAINS_TOLERANCE), low, high, harmonics)
     if comb is None or comb.p_value > 1e-3:
-        return None
+        return _from_first_harmonic(own, stated)
     found = comb.fundamental
-    first_db, stated_db = (_line_db(lines, place) for place in (found, hertz))
-    if abs(found - hertz) > resolution and first_db <= max(stated_db, CLEAR_LINE_DB):
-        return None
+    if abs(found - hertz) > resolution:
+        first_db, stated_db = (max(_line_db(excess, place) for excess in own) for place in (found, hertz))
+        if _line_db(lines, found) <= CLEAR_LINE_DB or first_db <= stated_db:
+            return None
+    return _at(stated, found, resolution / (3 * N_SHAFT_HARMONICS), min(0.95, 1 - comb.p_value))
+
+
+def _at(stated: ShaftAngle, hertz: float, uncertainty_hz: float, quality: float) -> ShaftAngle:
+    factor = hertz / (stated.mean_speed_rpm / 60)
     return replace(
         stated,
-        revolutions=stated.revolutions * (found / hertz),
-        speed_rev_per_s=stated.speed_rev_per_s * (found / hertz),
-        relative_speed_uncertainty=resolution / (3 * N_SHAFT_HARMONICS) / found,
-        quality=min(0.95, 1 - comb.p_value),
+        revolutions=stated.revolutions * factor,
+        speed_rev_per_s=stated.speed_rev_per_s * factor,
+        relative_speed_uncertainty=uncertainty_hz / hertz,
+        quality=quality,
     )
 
 
-def _common_lines(recording: Recording) -> LineExcess:
+RULES_DB = 20.0
+"""By which a rotor's own line stands above all others within the tolerance of a stated speed."""
+
+
+def _from_first_harmonic(own: list[LineExcess], stated: ShaftAngle) -> ShaftAngle | None:
+    """Take the one line near the stated speed that rules a channel's spectrum there: that of a rotor without harmonics.
+
+    A line where a supply's may be leaves the speed unconfirmed.
+    """
+    hertz = stated.mean_speed_rpm / 60
+    for excess in own:
+        values, positions = excess.spectrum.values, excess.spectrum.positions
+        near = np.flatnonzero(np.abs(positions / hertz - 1) <= STATED_SPEED_TOLERANCE)
+        if len(near) < 2 * FOOT_LINES + 2:
+            continue
+        top = int(near[np.argmax(values[near])])
+        beside = near[np.abs(near - top) > FOOT_LINES]
+        rules = values[top] >= 10 ** (RULES_DB / 20) * max(values[beside].max(initial=0.0), excess.floor[top])
+        found = peak_position(excess.spectrum, top)
+        if rules and near[0] < top < near[-1]:
+            is_supply = any(abs(found / hz - 1) <= MAINS_TOLERANCE for hz in MAINS_HZ)
+            if not is_supply:
+                return _at(stated, found, excess.spectrum.resolution / 4, 0.9)
+            if abs(found / hertz - 1) <= MAINS_TOLERANCE:  # a shaft's or the supply's: it confirms nothing
+                return _at(stated, found, excess.spectrum.resolution / 4, 0.5)
+    return None
+
+
+def _common_lines(spectra: list[LineExcess], n_own: int) -> LineExcess:
     """Return the lines over frequency that all channels and the envelopes of their bands have in common.
 
-    The mean over the spectra of the logarithm of power over floor, each cut so that no single one decides.
+    The mean over the spectra of the logarithm of power over floor, each cut so that no single one decides. The `n_own`
+    spectra of the channels themselves, which come first, count half of all: unbalance and bow are lines there, and
+    hardly modulate.
     """
-    spectra = list(_spectra_of_shaft(recording))
+    weights = np.full(len(spectra), 0.5 / max(len(spectra) - n_own, 1))
+    weights[:n_own] = 0.5 / n_own
     n = min(len(excess.floor) for excess in spectra)
     log_ratios = [
         np.log(np.maximum(excess.spectrum.values[:n], 1e-300) / np.maximum(excess.floor[:n], 1e-300))
         for excess in spectra
     ]
-    mean = np.mean(np.clip(log_ratios, -1.0, 1.5 * LOG_RATIO_LIMIT / 2), axis=0)
+    mean = np.average(np.clip(log_ratios, -1.0, 1.5 * LOG_RATIO_LIMIT / 2), axis=0, weights=weights)
     first = spectra[0].spectrum
     return floor_of(replace(first, values=np.exp(mean), positions=first.positions[:n], unit=""))
 
 
 def _line_db(excess: LineExcess, place: float) -> float:
-    i = excess.spectrum.index_of(place)
-    return over_floor_db(float(excess.spectrum.values[i]), float(excess.floor[i]))
+    """Return the height over the floor of the largest line within one line of a place."""
+    position, amplitude = excess.spectrum.largest_near(place, excess.spectrum.resolution)
+    return over_floor_db(amplitude, float(excess.floor[excess.spectrum.index_of(position)]))
 
 
 def _spectra_of_shaft(recording: Recording) -> Iterator[LineExcess]:

@@ -323,12 +323,12 @@ def _lines_near(
         floor = float(excess.floor[i])
         ratio = over_floor_db(amplitude, floor)
         if ratio >= CLEAR_LINE_DB and not excess.masked[i]:
-            position = _peak_position(spectrum, i)
+            position = peak_position(spectrum, i)
             found.append(_Line(position, position - float(origin), int(multiple), amplitude, floor, ratio))
     return found
 
 
-def _peak_position(spectrum: Spectrum, i: int) -> float:
+def peak_position(spectrum: Spectrum, i: int) -> float:
     """Return the vertex of the parabola through the logarithms of a line and its neighbours."""
     if not 0 < i < len(spectrum.values) - 1:
         return float(spectrum.positions[i])

@@ -7,6 +7,7 @@ from gearsig.spectra._amplitude import (
     power_density,
     spectrum_of_blocks,
 )
+from gearsig.spectra._bands import BandChoice, coherence_band, compare_bands
 from gearsig.spectra._cepstrum import cepstrum, lifter_families
 from gearsig.spectra._coherence import (
     EnhancedEnvelope,
@@ -15,6 +16,12 @@ from gearsig.spectra._coherence import (
     enhanced_envelope,
     order_coherence,
     spectral_coherence,
+)
+from gearsig.spectra._deconvolution import (
+    Deconvolved,
+    minimum_entropy_deconvolution,
+    multipoint_deconvolution,
+    multipoint_norms,
 )
 from gearsig.spectra._envelope import (
     BandCandidate,
@@ -55,9 +62,11 @@ __all__ = [
     "BATCH_SAMPLES",
     "WINDOW_NAMES",
     "BandCandidate",
+    "BandChoice",
     "BlockPlan",
     "ChosenBand",
     "ComplexArray",
+    "Deconvolved",
     "EnhancedEnvelope",
     "Envelope",
     "EnvelopeKind",
@@ -72,6 +81,8 @@ __all__ = [
     "block_powers",
     "cepstrum",
     "checked_signal",
+    "coherence_band",
+    "compare_bands",
     "enhanced_envelope",
     "envelope_recording",
     "envelope_spectrum",
@@ -81,6 +92,9 @@ __all__ = [
     "lifter_families",
     "make_window",
     "mean_power",
+    "minimum_entropy_deconvolution",
+    "multipoint_deconvolution",
+    "multipoint_norms",
     "named_signal",
     "noise_floor",
     "order_coherence",

@@ -1,0 +1,223 @@
+"""How often the bearing diagnosis names the right part: `python tests/benchmarks/bearing_cases.py [CASES] [SEED]`.
+
+Draws motors on two rolling bearings as they stand on test benches: shaft harmonics, mains, noise that the shaft
+modulates, resonances of their own for each of three sensors, and a damage on one part of one bearing or none. Sound
+machines come with what is mistaken for a bearing: a smooth tone near a ball-pass order, elements that pass through the
+load zone, knocks of another machine, looseness. Prints right, unsure, missed and wrong by part and by the damage's
+strength, and what is named on sound machines. The signal model is after Antoni and Randall (2003), and independent of
+the product's simulators.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.diagnosis import Analysis, Finding, Kind, analyze
+from gearsig.recording import Channel, Recording
+from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft
+
+PARTS = {"outer": "BPFO", "inner": "BPFI", "ball": "BSF"}
+CODES = {"outer": "bearing-outer-race", "inner": "bearing-inner-race", "ball": "bearing-rolling-element"}
+SOUND = ("quiet", "tone", "passage", "other machine", "loose", "hum")
+STRENGTHS = {"weak": (0.5, 1.0), "clear": (1.0, 3.0), "strong": (3.0, 15.0)}
+"""Rms of the damage's ringing over that of all else, at the bearing's own sensor, in the band where it rings."""
+
+LIKELY = 0.5
+SECONDS = 8.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """One drawn motor, and what is the matter with it."""
+
+    recording: Recording
+    part: str
+    bearing: str
+    strength: str
+
+
+def drawn_bearing(rng: np.random.Generator, name: str) -> Bearing:
+    """Return a deep-groove ball bearing of usual proportions."""
+    n = int(rng.integers(7, 12))
+    pitch = rng.uniform(25.0, 60.0)
+    return Bearing(name, "motor", n, round(pitch * rng.uniform(0.6, 0.78) * np.pi / n * 0.9, 3), round(pitch, 3))
+
+
+def draw_case(rng: np.random.Generator, fs_hz: float = 12_000.0) -> Case:
+    """Draw a motor and its recording."""
+    bearings = (drawn_bearing(rng, "drive end"), drawn_bearing(rng, "fan end"))
+    rpm = rng.uniform(1500.0, 3500.0)
+    slip_of_stated = rng.choice([0.0, rng.uniform(-0.003, 0.003), rng.uniform(-0.012, 0.012)])
+    n_channels = int(rng.choice([1, 2, 3], p=[0.25, 0.35, 0.4]))
+    part = str(rng.choice([*PARTS, "sound"], p=[0.25, 0.25, 0.15, 0.35]))
+    own = int(rng.integers(0, 2)) if n_channels > 1 else 0
+    n = int(SECONDS * fs_hz)
+    turns = rpm / 60 * np.arange(n) / fs_hz + rng.uniform()
+    turns = turns + 1e-4 * np.cumsum(rng.standard_normal(n)) / np.sqrt(fs_hz) * rng.uniform(0, 3)  # wanders
+    strength = "sound"
+    hits: tuple[FloatArray, FloatArray] | None = None
+    if part == "sound":
+        strength = str(rng.choice(SOUND))
+        if strength == "other machine":
+            hits = _train(rng, turns, _strange_order(rng, bearings), jitter=0.002)
+        if strength == "loose":
+            hits = _train(rng, turns, float(rng.choice([0.5, 1.0, 2.0])), jitter=0.003)
+    else:
+        strength = str(rng.choice(list(STRENGTHS)))
+        hits = _strikes(rng, turns, bearings[own], part)
+    samples = _sensors(rng, turns, fs_hz, n_channels, hits, own, strength, bearings[own])
+    names = ("X1_DE_time", "X1_FE_time", "X1_BA_time")[:n_channels]
+    rig = Rig(
+        name="drawn motor",
+        shafts=(Shaft("motor"),),
+        bearings=bearings,
+        speed=ConstantSpeed(rpm * (1 + slip_of_stated), "motor"),
+    )
+    channels = tuple(Channel(name, "acceleration", "g") for name in names)
+    return Case(Recording(samples, fs_hz, channels, rig=rig), part, bearings[own].name, strength)
+
+
+def _strange_order(rng: np.random.Generator, bearings: tuple[Bearing, ...]) -> float:
+    """Return an order whose first multiples are no part's: nothing could tell it from one."""
+    orders = [o * (2 if name == "BSF" else 1) for b in bearings for name, o in b.orders().items()]
+    while True:
+        order = rng.uniform(0.15, 9.0)
+        if all(abs(k * order / other - 1) > 0.03 for other in orders for k in (0.5, 1, 2, 3)):
+            return order
+
+
+def _train(
+    rng: np.random.Generator, turns: FloatArray, order: float, jitter: float, spread: float = 0.1
+) -> tuple[FloatArray, FloatArray]:
+    """Return the angles and heights of impacts, each a little beside its even place, the errors adding up."""
+    n = int((turns[-1] - turns[0]) * order) + 2
+    steps = (1 + jitter * rng.standard_normal(n)) / order
+    angles = turns[0] + rng.uniform() / order + np.cumsum(steps)
+    angles = angles[angles < turns[-1]]
+    return angles, np.maximum(1 + spread * rng.standard_normal(len(angles)), 0.05)
+
+
+def _strikes(rng: np.random.Generator, turns: FloatArray, bearing: Bearing, part: str) -> tuple[FloatArray, FloatArray]:
+    orders = bearing.orders()
+    order = orders[PARTS[part]] * (2 if part == "ball" else 1) * (1 + rng.normal(0, 0.005))
+    angles, heights = _train(rng, turns, order, rng.uniform(0.001, 0.01), rng.uniform(0.05, 0.4))
+    load = rng.uniform(0.0, 1.0)
+    cage = orders["FTF"] * (1 + rng.normal(0, 0.003))
+    if part == "outer":
+        depth = rng.uniform(0.0, 0.4)  # the shaft's unbalance and bow move the load zone
+        heights = heights * (1 + depth * np.cos(2 * np.pi * (angles + load)))
+        heights = heights * (1 + rng.uniform(0, 0.3) * np.cos(2 * np.pi * (cage * angles + load)))
+    elif part == "inner":
+        depth = rng.uniform(0.5, 1.0)
+        heights = heights * np.maximum(1 + depth * np.cos(2 * np.pi * (angles + load)), 0) ** rng.uniform(1, 2)
+    else:
+        depth = rng.uniform(0.5, 1.0)
+        heights = heights * np.maximum(1 + depth * np.cos(2 * np.pi * (cage * angles + load)), 0)
+        heights[::2] *= rng.uniform(0.2, 1.0)  # one race is nearer to the sensor
+    return angles, heights
+
+
+def _sensors(
+    rng: np.random.Generator,
+    turns: FloatArray,
+    fs_hz: float,
+    n_channels: int,
+    hits: tuple[FloatArray, FloatArray] | None,
+    own: int,
+    strength: str,
+    bearing: Bearing,
+) -> FloatArray:
+    n = len(turns)
+    mains_hz, time_s = float(rng.choice([50.0, 60.0])), np.arange(n) / fs_hz
+    tone = float(rng.choice([bearing.orders()["BPFO"], bearing.orders()["BPFI"]])) * (1 + rng.normal(0, 0.004))
+    passage = bearing.orders()["BPFO"] * (1 + rng.normal(0, 0.004))
+    loudness = rng.uniform(*STRENGTHS[strength]) if strength in STRENGTHS else rng.uniform(0.5, 4.0)
+    modes = np.sort(rng.uniform(0.1, 0.45, 3)) * fs_hz
+    samples = np.empty((n_channels, n))
+    for i in range(n_channels):
+        x = _ringing(rng.standard_normal(n), rng.uniform(0.05, 0.45, 3) * fs_hz, fs_hz, rng.uniform(0.05, 0.2))
+        x = x / x.std() + 0.7 * rng.standard_normal(n)
+        for k in (1, 2, 3):  # the shaft modulates the noise
+            x *= 1 + rng.uniform(0, 0.15) / k * np.cos(2 * np.pi * (k * turns + rng.uniform()))
+        if strength == "passage":
+            x *= 1 + rng.uniform(0.02, 0.06) * np.cos(2 * np.pi * (passage * turns + rng.uniform()))
+        if strength == "hum":
+            for k in (1, 2, 3):
+                x *= 1 + 0.3 / k * np.cos(2 * np.pi * (2 * mains_hz * k * time_s + rng.uniform()))
+        for k in range(1, 25):
+            x += rng.uniform(0.0, 1.5) / k**0.7 * np.cos(2 * np.pi * (k * turns + rng.uniform()))
+        for k in (1, 2, 6):
+            x += rng.uniform(0, 0.2) * np.cos(2 * np.pi * (k * mains_hz * time_s + rng.uniform()))
+        slots = int(rng.integers(25, 50))  # of the motor, with its slip's sidebands
+        x += (
+            0.4
+            * np.cos(2 * np.pi * (slots * turns + 2 * mains_hz * time_s))
+            * (1 + 0.3 * np.cos(2 * np.pi * 2 * (mains_hz * time_s - turns * (rng.choice([1, 2])))))
+        )
+        if strength == "tone":  # smooth, with a harmonic and little modulation
+            for k, level in enumerate((2.0, 0.5, 0.1), 1):
+                x += level * np.cos(2 * np.pi * k * (tone * turns + rng.uniform()))
+        if hits is not None:
+            away = 1.0 if i == own else rng.uniform(0.1, 0.5)
+            angles, heights = hits
+            at = np.searchsorted(turns, angles)
+            impulses = np.zeros(n)
+            np.add.at(impulses, np.minimum(at, n - 1), heights)
+            ring = _ringing(impulses, modes * (1 + 0.03 * rng.standard_normal(3)), fs_hz, rng.uniform(0.02, 0.08))
+            x += away * loudness * ring / ring.std() * x.std() / 2
+        samples[i] = x
+    return samples * rng.uniform(0.02, 0.2)
+
+
+def _ringing(force: FloatArray, modes_hz: FloatArray, fs_hz: float, damping: float) -> FloatArray:
+    """Return a force's response through some modes."""
+    from scipy.signal import lfilter
+
+    out = np.zeros(len(force))
+    for mode_hz in modes_hz:
+        pole = np.exp((-damping + 1j * np.sqrt(1 - damping**2)) * 2 * np.pi * mode_hz / fs_hz)
+        out += lfilter([0.0, pole.imag], [1.0, -2 * pole.real, abs(pole) ** 2], force)
+    return out
+
+
+def claims(analysis: Analysis) -> Iterator[Finding]:
+    """Yield what is said of bearings, surest first."""
+    named = (f for f in analysis.findings if f.code in {*CODES.values(), "bearing-cage"})
+    yield from sorted((f for f in named if f.kind in (Kind.FAULT, Kind.SUSPICION)), key=lambda f: -f.confidence)
+
+
+def outcome(case: Case, analysis: Analysis) -> str:
+    """Return "right", "wrong" (another part, above 50 %), "unsure" (below, or the right part below) or "missed"."""
+    found = list(claims(analysis))
+    right = [f for f in found if f.code == CODES.get(case.part) and f.where.bearing == case.bearing]
+    if any(f.confidence > LIKELY for f in found if f not in right):
+        return "wrong"
+    if right and right[0].confidence > LIKELY:
+        return "right"
+    return "unsure" if found else "missed"
+
+
+def main(n_cases: int, seed: int) -> None:
+    """Draw, analyse, count and print."""
+    counts: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    for i in range(n_cases):
+        case = draw_case(np.random.default_rng([seed, i]))
+        analysis = analyze(case.recording)
+        result = outcome(case, analysis)
+        counts[case.part, case.strength][result] += 1
+        if result == "wrong" or (result != "right" and case.strength == "strong"):
+            said = "; ".join(f"{f.code} {f.where.bearing} {f.confidence:.2f}" for f in claims(analysis))
+            print(f"{i}: {case.part} of {case.bearing}, {case.strength}: {result}: {said or analysis.verdict[:150]}")
+    for (part, strength), counter in sorted(counts.items()):
+        print(f"{part:6} {strength:14} {', '.join(f'{k} {v}' for k, v in sorted(counter.items()))}")
+
+
+if __name__ == "__main__":
+    numbers = [int(a) for a in sys.argv[1:]]
+    main(*(numbers + [100, 29][len(numbers) :]))
