@@ -509,12 +509,16 @@ def nearest_bearing(signals: AnalysisSignals, channel: str) -> Bearing | None:
 
 
 def _known_multiple(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
-    """Return the candidate named, if its fundamental is a low harmonic of a known part: paths may hide the first."""
+    """Return the candidate named, if its fundamental is a low harmonic of a known part: paths may hide the first.
+
+    As well it is something that strikes twice or three times as often.
+    """
     for bearing, name, order in expected_parts(signals):
         for m in (1, 2, 3):
             if abs(candidate.comb.fundamental / (m * order) - 1) <= signals.settings.bearing_slip:
                 named = replace(candidate, bearing=bearing, name=name, expected=m * order)
-                return _with_rivals(signals, named)
+                named = _with_rivals(signals, named)
+                return named if m == 1 else replace(named, share=0.5 * named.share)
     return None
 
 

@@ -35,7 +35,8 @@ _UNKNOWN_CAUSE = f"{_OVER_FLOOR}; what causes it is not known"
 def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
     """State the speed and how it was found, or that it is not known."""
     if isinstance(angle, CannotTell):
-        title = "The speed is not known: orders, synchronous averages and everything that rests on them are left out."
+        why = "The machine is at rest" if "at rest" in angle.reason else "The speed is not known"
+        title = f"{why}: orders, synchronous averages and everything that rests on them are left out."
         return cannot_tell("speed-unknown", title, evidence=(angle.reason,), surer=angle.remedy)
     low, high = angle.speed_range_rpm
     uncertainty = angle.relative_speed_uncertainty

@@ -221,8 +221,8 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         found = (_strong_lines(excess, highest) for excess in spectra)
         return sum(_log_p(lines, factor, shafts, races) for lines in found if lines is not None)
 
-    if evidence(1.0, HIGHEST_ORDER) <= ENOUGH_EVIDENCE:
-        return None
+    if evidence(1.0, HIGHEST_ORDER) <= 2 * ENOUGH_EVIDENCE:
+        return None  # no other rate will explain four times as much
     # Halves of the shaft's order are looseness, and multiples blades or poles: races must tell these rates apart.
     factors = [f for usual in USUAL_FACTORS for f in (usual, 1 / usual) if (f > 2 or races)]
     # A rate that is too high moves everything up, and more of the spectrum counts.

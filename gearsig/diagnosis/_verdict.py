@@ -60,7 +60,9 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
     gaps = [*unused, *others]
     nothing = "Nothing was examined that would show a fault."
-    if has_reference:
+    if any(f.code == SAMPLING_RATE for f in findings):
+        nothing = "Nothing is said of parts before it is right: all orders would be wrong."
+    elif has_reference:
         nothing = "What shows, the reference shows as well."
     why = " ".join(f.title for f in gaps[:2]) or nothing
     return " ".join(["Cannot tell.", why, *said, *_remedy(gaps)])

@@ -174,7 +174,7 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     found = comb.fundamental
     if abs(found - hertz) > resolution:
         first_db, stated_db = (max(_line_db(excess, place) for excess in own) for place in (found, hertz))
-        if _line_db(lines, found) <= CLEAR_LINE_DB or first_db <= stated_db:
+        if _line_db(lines, found) <= CLEAR_LINE_DB or first_db < stated_db:
             return None
     return _at(stated, found, resolution / (3 * N_SHAFT_HARMONICS), min(0.95, 1 - comb.p_value))
 

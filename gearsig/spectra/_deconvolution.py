@@ -102,7 +102,7 @@ def minimum_entropy_deconvolution(
     """
     x, fs, unit, source = _checked(signal, channel_or_rate_hz, unit, source, n_taps)
     solve = _Normal(x, n_taps)
-    taps = np.zeros(n_taps)
+    taps: FloatArray = np.zeros(n_taps)
     taps[n_taps // 2] = 1.0  # a delay: the signal itself
     best, best_taps, last = -np.inf, taps, -np.inf
     for _ in range(count(n_iterations, "n_iterations") + 1):

@@ -229,6 +229,68 @@ def test_a_train_three_times_as_slow_as_a_shaft_is_one() -> None:
     assert train.fundamental == pytest.approx(true_hz, rel=1e-3)
 
 
+def test_a_train_weaker_than_the_family_on_its_lines_explains_nothing() -> None:
+    """As of a race whose fifth multiple nearly is the eighteenth of the shaft: all sums and differences are a fifth."""
+    rng = np.random.default_rng(11)
+    t = np.arange(20_000) / RATE_HZ
+    tones = sum(1.0 * np.cos(2 * np.pi * 36.0 * k * t + rng.uniform(0, 6.28)) for k in range(1, 7))
+    tones = tones + sum(0.06 * np.cos(2 * np.pi * 2.0 * k * t + rng.uniform(0, 6.28)) for k in range(1, 108))
+    excess = floor_of(amplitude_spectrum(rng.normal(size=len(t)) + tones, RATE_HZ))
+    comb = best_comb(excess, 35.5, 36.5)
+    assert comb is not None
+    assert slower_train(excess, comb) is None
+
+
+def at_sensors(order: float, heights: tuple[float, ...], *, seed: int = 0, odd: float = 1.0) -> Recording:
+    """Return a motor's drive and fan end, with impacts at an order of its shaft, every second `odd` times as high."""
+    rng, fs_hz, shaft_hz = np.random.default_rng(seed), 12_000.0, 29.0
+    n = int(SECONDS * fs_hz)
+    turns = shaft_hz * np.arange(n) / fs_hz
+    hits = np.searchsorted(turns, np.cumsum((1 + 0.003 * rng.standard_normal(int(turns[-1] * order) - 20)) / order))
+    impacts, k = np.zeros(n), np.arange(200)
+    impacts[hits] = np.where(np.arange(len(hits)) % 2, odd, 1.0)
+    ring = np.convolve(impacts, np.exp(-k / 25) * np.sin(1.6 * k))[:n]
+    shaft = sum(0.5 / h * np.cos(2 * np.pi * h * turns + rng.uniform(0, 6.28)) for h in range(1, 9))
+    samples = np.stack([height * ring + shaft + rng.standard_normal(n) for height in heights])
+    names = ("X1_DE_time", "X1_FE_time")[: len(heights)]
+    rig = Rig(
+        shafts=(Shaft("motor"),),
+        bearings=(Bearing("drive end", "motor", 9, 7.94, 39.04), Bearing("fan end", "motor", 8, 6.746, 28.5)),
+        speed=ConstantSpeed(60 * shaft_hz, "motor"),
+    )
+    return Recording(samples, fs_hz, tuple(Channel(name, "acceleration", "g") for name in names), rig=rig)
+
+
+@pytest.mark.parametrize(
+    ("bearing", "part", "code"),
+    [
+        (0, "BPFO", "bearing-outer-race"),
+        (0, "BPFI", "bearing-inner-race"),
+        (1, "BPFI", "bearing-inner-race"),
+        (1, "BPFO", "bearing-outer-race"),
+    ],
+)
+def test_the_part_of_the_right_one_of_two_bearings_is_named(bearing: int, part: str, code: str) -> None:
+    heights = (6.0, 2.0) if bearing == 0 else (2.0, 6.0)
+    recording = at_sensors(1.003, heights)
+    assert recording.rig is not None
+    damaged = recording.rig.bearings[bearing]
+    analysis = analyze(at_sensors(1.003 * damaged.orders()[part], heights, seed=bearing))
+    likely = [(f.code, f.where.bearing) for f in analysis.findings if f.code in NAMED and f.confidence > 0.5]
+    assert likely == [(code, damaged.name)]
+
+
+def test_an_element_that_strikes_the_races_unequally_is_no_slower_train() -> None:
+    spin = 2 * 2.3568 * 1.002  # of the drive end's elements
+    assert codes(analyze(at_sensors(spin, (6.0, 2.0), odd=0.4)), Kind.FAULT) == ["bearing-rolling-element"]
+
+
+def test_impacts_at_twice_a_parts_order_are_not_the_parts() -> None:
+    analysis = analyze(at_sensors(2 * 3.5848 * 1.002, (6.0, 2.0)))
+    assert not NAMED & set(codes(analysis, Kind.FAULT))
+    assert all(f.confidence < 0.5 for f in analysis.findings if f.code in NAMED)
+
+
 def test_a_family_among_others_as_clear_does_not_stand_out() -> None:
     rng = np.random.default_rng(7)
     excess = lines([1.3 * k for k in range(1, 250)], rng)  # any order has a multiple of 1.3 Hz near it
