@@ -353,8 +353,10 @@ def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> lis
 
 
 def _has_own_lines(comb: Comb) -> bool:
-    """Whether the lines have no common divisor: those of twice the order are another family's."""
-    return gcd(*(round(position / comb.fundamental) for position in comb.positions)) == 1
+    """Whether the strong lines have no common divisor: those of twice the order are another family's."""
+    lines = zip(comb.positions, comb.ratios_db, strict=True)
+    strong = [round(position / comb.fundamental) for position, db in lines if db >= max(comb.ratios_db) - SECOND_DB]
+    return gcd(*strong) == 1 or len(strong) == 1
 
 
 def _train_of(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
