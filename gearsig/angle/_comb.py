@@ -176,10 +176,16 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) 
     peaks = np.where((log_ratio >= largest) & (log_ratio > 0), log_ratio, 0.0)
     # Interval i holds the higher of its two ends, so that a candidate may miss a line's middle by half a bin.
     height = np.maximum(peaks[:-1], peaks[1:])
-    rank = (len(height) - np.searchsorted(np.sort(height), height, side="left")) / len(height)
+    high = height > 0
+    positive = height[high]
+    rank = (len(positive) - np.searchsorted(np.sort(positive), positive, side="left")) / len(height)
     # A line that is there stands among the top ranks q: density a·q^(a-1), a = 0.3. ln(1 - p + p·a·q^(a-1)): a line
     # missing costs little, a line of high rank gives a lot, none decides alone.
-    likelihoods = np.array([np.log(1.0 - present + present * 0.3 * rank ** (0.3 - 1.0)) for present in PRESENCE])
+    density = 0.3 * rank ** (0.3 - 1.0)
+    likelihoods = np.empty((len(PRESENCE), len(height)))
+    for row, present in zip(likelihoods, PRESENCE, strict=True):
+        row[:] = np.log(1.0 - present + present * 0.3)  # rank 1: all that is no peak
+        row[high] = np.log(1.0 - present + present * density)
     return LineEvidence(likelihoods, log_ratio, rate / n_segment, top)
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
+from numba import get_num_threads, njit
 
 from gearsig.angle._types import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray, count, positive
@@ -549,11 +548,12 @@ def _fill(
             else:
                 interpolate(signal, positions, half_band, table, out[start:stop])
 
-    starts = range(0, n, _CHUNK)
-    if len(starts) == 1:
-        fill_chunk(0)
+    starts, n_threads = range(0, n, _CHUNK), min(4, get_num_threads())
+    if len(starts) == 1 or n_threads == 1:
+        for start in starts:
+            fill_chunk(start)
         return
-    with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as pool:
+    with ThreadPoolExecutor(n_threads) as pool:
         list(pool.map(fill_chunk, starts))
 
 

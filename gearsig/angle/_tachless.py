@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from gearsig.angle._comb import (
     MIN_QUALITY,
@@ -133,6 +134,8 @@ def refine_by_phase(
 def _refined_once(
     recording: Recording, channels: tuple[str, ...], angle: ShaftAngle, orders: tuple[float, ...], half_width: float
 ) -> ShaftAngle | None:
+    from scipy.fft import rfft
+
     top_speed = angle.speed_range_rpm[1] / 60.0
     usable = [o for o in orders if (o + 1) * top_speed < 0.4 * recording.sampling_rate_hz]
     if not usable:
@@ -142,7 +145,8 @@ def _refined_once(
     except RefusalError:
         return None
     n_per_rev = signal.samples_per_revolution
-    harmonics = [_demodulate(signal.samples, n_per_rev, o, half_width) for o in usable]
+    spectra = rfft(signal.samples, axis=1)
+    harmonics = [_demodulate(spectra, signal.samples.shape[1], n_per_rev, o, half_width) for o in usable]
     best = sorted((h for h in harmonics if h is not None), key=lambda h: -h.ratio)[:3]
     # Power of the band over its median line: noise has 0.5. A band of noise must not be bent into a line.
     best = [h for h in best if h.ratio > max(2.0, 0.05 * best[0].ratio)]
@@ -163,11 +167,12 @@ def _tachless(shaft: str, time_s: FloatArray, revolutions: FloatArray) -> ShaftA
     return ShaftAngle(shaft, time_s, revolutions, monotone_slopes(time_s, revolutions), "tachless")
 
 
-def _demodulate(samples: FloatArray, n_per_rev: int, order: float, half_width: float) -> _Harmonic | None:
+def _demodulate(
+    spectra: NDArray[np.complexfloating], n_samples: int, n_per_rev: int, order: float, half_width: float
+) -> _Harmonic | None:
     """Shift one order to zero and keep ± half_width around it, sampled accordingly."""
-    from scipy.fft import ifft, rfft
+    from scipy.fft import ifft
 
-    n_samples = samples.shape[1]
     per_order = n_samples / n_per_rev  # bins per order
     reach = int(half_width * per_order)
     middle = round(order * per_order)
@@ -176,8 +181,8 @@ def _demodulate(samples: FloatArray, n_per_rev: int, order: float, half_width: f
         return None
     taper = 0.5 + 0.5 * np.cos(np.pi * np.arange(-reach, reach + 1) / (reach + 1))
     basebands = []
-    for row in samples:
-        lines = rfft(row)[middle - reach : middle + reach + 1]
+    for row in spectra:
+        lines = row[middle - reach : middle + reach + 1]
         # In units of its own neighbourhood, so that no channel drowns the others.
         floor = float(np.median(np.abs(lines))) or 1.0
         spread = np.zeros(max(n, 2 * reach + 1), dtype=complex)

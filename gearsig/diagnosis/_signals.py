@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import log10
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
@@ -265,11 +266,20 @@ class BandEnvelope:
 
 def band_envelopes(signals: AnalysisSignals) -> Iterator[BandEnvelope]:
     """Yield the envelope spectra of all channels and bands."""
-    for band in envelope_bands(signals.recording.sampling_rate_hz):
-        yield from envelopes_in(signals, signals.recording, band)
+    from scipy.fft import rfft
+
+    recording = signals.recording
+    transforms = {name: rfft(recording.values(name).astype(np.float64)) for name in recording.vibration_names()}
+    for band in envelope_bands(recording.sampling_rate_hz):
+        yield from envelopes_in(signals, recording, band, transforms)
 
 
-def envelopes_in(signals: AnalysisSignals, recording: Recording, band: tuple[float, float]) -> Iterator[BandEnvelope]:
+def envelopes_in(
+    signals: AnalysisSignals,
+    recording: Recording,
+    band: tuple[float, float],
+    transforms: Mapping[str, NDArray[np.complexfloating]] | None = None,
+) -> Iterator[BandEnvelope]:
     """Yield the envelope spectra of a recording's channels in one band; none if it is too narrow or too short.
 
     Over order where the speed is known: then a speed that varies does not smear them.
@@ -279,7 +289,7 @@ def envelopes_in(signals: AnalysisSignals, recording: Recording, band: tuple[flo
     from gearsig.spectra import amplitude_spectrum, envelope_recording
 
     try:
-        envelopes = envelope_recording(recording, band, kind="magnitude")
+        envelopes = envelope_recording(recording, band, kind="magnitude", transforms=transforms)
     except InputError:
         return  # the record is too short for so narrow a band
     over_angle = None

@@ -93,6 +93,8 @@ def localise(
     J. Theiler, S. Eubank, A. Longtin, B. Galdrikian, J. D. Farmer, "Testing for nonlinearity in time series: the
     method of surrogate data", 1992. J. Besag, P. Clifford, "Sequential Monte Carlo p-values", 1991.
     """
+    from scipy.fft import irfft
+
     n = signals.shape[1]
     width = max(2, round(width_rev * n))
     scale = np.sqrt(np.mean(signals**2, axis=1, keepdims=True))
@@ -106,7 +108,9 @@ def localise(
     while len(drawn) < n_surrogates and np.sum(drawn >= ratio) < 30:
         phases = rng.uniform(0, 2 * np.pi, (min(256, n_surrogates - len(drawn)), 1, lines.shape[1]))
         phases[..., 0] = 0.0
-        surrogates = np.fft.irfft(lines * np.exp(1j * phases), n, axis=-1)
+        turned = np.empty(phases.shape, dtype=np.complex128)
+        turned.real, turned.imag = np.cos(phases), np.sin(phases)  # half the cost of a complex exponential
+        surrogates = irfft(lines * turned, n, axis=-1)
         joint = sliding_mean(np.sum(surrogates**2, axis=1), width)
         drawn = np.append(drawn, joint.max(axis=1) / np.median(joint, axis=1))
     inside = (start + np.arange(width)) % n

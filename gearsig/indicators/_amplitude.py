@@ -42,7 +42,9 @@ def standardised_moment(x: FloatArray, order: int, size: float | None = None) ->
         return float("nan")
     d = x - x.mean()
     d = d / np.abs(d).max()  # powers up to 8 neither overflow nor vanish
-    return float(np.mean(d**order) / np.mean(d * d) ** (order / 2))
+    square = d * d
+    power = square ** (order // 2)  # the power of an array by a whole number above two takes thirty times as long
+    return float(np.mean(power * d if order % 2 else power) / np.mean(square) ** (order / 2))
 
 
 @dataclass(frozen=True)

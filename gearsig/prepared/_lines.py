@@ -8,9 +8,11 @@ spectrum's own lines, and the distribution of their sum is their convolution.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import log
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
@@ -75,7 +77,27 @@ class LineExcess:
 
     def scores(self) -> FloatArray:
         """Log ratios with the masked lines at 0."""
-        return np.where(self.masked, 0.0, self.log_ratio)
+        return self._scores
+
+    @cached_property
+    def _scores(self) -> FloatArray:
+        scores = np.where(self.masked, 0.0, self.log_ratio)
+        scores.flags.writeable = False
+        return scores
+
+    @cached_property
+    def _densities(self) -> list[FloatArray]:
+        """Distributions of sums of 1, 2, … draws: searches over many ranges ask for the same ones."""
+        n_cells = int(np.ceil(LOG_RATIO_LIMIT / _STEP)) + 1
+        terms = self.log_ratio[~self.masked]
+        cells = np.bincount(np.floor(terms / _STEP).astype(np.int64), minlength=n_cells).astype(np.float64)
+        return [(cells + 1e-9) / (cells.sum() + 1e-9 * n_cells)]
+
+    def sum_density(self, n_terms: int) -> FloatArray:
+        """Return the distribution of a sum of independent draws from the unmasked lines, in cells of `_STEP`."""
+        while len(self._densities) < n_terms:
+            self._densities.append(np.convolve(self._densities[-1], self._densities[0]))
+        return self._densities[max(n_terms, 1) - 1]
 
 
 @dataclass(frozen=True)
@@ -193,7 +215,7 @@ def score_needed(excess: LineExcess, n_terms: int, low: float, high: float, prob
     Infinite if even lines that all count in full would be likelier than that.
     """
     n_candidates = int((high - low) * 3 * n_terms / excess.spectrum.resolution) + 2
-    tail = np.cumsum(_sum_density(excess, n_terms)[::-1])[::-1]
+    tail = np.cumsum(excess.sum_density(n_terms)[::-1])[::-1]
     allowed = np.flatnonzero(tail <= probability / independent_trials(n_candidates))
     score = float(allowed[0]) * _STEP + n_terms * _STEP / 2 if len(allowed) else np.inf
     return score if score <= n_terms * LOG_RATIO_LIMIT else np.inf
@@ -218,17 +240,27 @@ def _highest(
     highest = -np.inf
     for begin in range(0, n_candidates, CHUNK):
         candidates = low + step * np.arange(begin, min(begin + CHUNK, n_candidates))
-        total = np.zeros(len(candidates))
-        for i, (origin, factor) in enumerate(zip(origins, factors, strict=True)):
-            index = np.rint((origin + factor * candidates - excess.spectrum.positions[0]) / resolution).astype(np.int64)
-            inside = (index >= 0) & (index < len(scores))
-            inside_once[i] |= bool(inside.any())
-            total += np.where(inside, scores[np.clip(index, 0, len(scores) - 1)], 0.0)
+        total = _comb_totals(
+            scores, candidates, origins, factors, float(excess.spectrum.positions[0]), resolution, inside_once
+        )
         highest = max(highest, float(total.max()))
         among = np.flatnonzero(total >= highest - 0.5)[:CHUNK]
         kept.append(np.stack([candidates[among], total[among]]))
     found = np.concatenate([part[:, part[1] >= highest - 0.5] for part in kept], axis=1)[:, :CHUNK]
     return found[0], found[1], int(inside_once.sum())
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _comb_totals(scores, candidates, origins, factors, first, resolution, inside_once):  # type: ignore[no-untyped-def]
+    """Sum the scores nearest to origin + factor · candidate; note which terms met the spectrum at all."""
+    total = np.zeros(len(candidates))
+    for i in range(len(factors)):
+        for j in range(len(candidates)):
+            index = int(np.rint((origins[i] + factors[i] * candidates[j] - first) / resolution))
+            if 0 <= index < len(scores):
+                inside_once[i] = True
+                total[j] += scores[index]
+    return total
 
 
 def _sharpest(excess: LineExcess, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
@@ -249,19 +281,7 @@ def tail_probability(excess: LineExcess, n_terms: int, score: float) -> float:
     """Return P(sum of n_terms independent draws from the unmasked lines >= score)."""
     # Draws were floored to their cell, so the sum may lie half a cell per term higher than its cell says.
     threshold = int(np.floor((score - n_terms * _STEP / 2) / _STEP))
-    return float(np.clip(_sum_density(excess, n_terms)[max(threshold, 0) :].sum(), 0.0, 1.0))
-
-
-def _sum_density(excess: LineExcess, n_terms: int) -> FloatArray:
-    """Return the distribution of a sum of independent draws from the unmasked lines, by convolving their histogram."""
-    n_cells = int(np.ceil(LOG_RATIO_LIMIT / _STEP)) + 1
-    terms = excess.log_ratio[~excess.masked]
-    cells = np.bincount(np.floor(terms / _STEP).astype(np.int64), minlength=n_cells).astype(np.float64)
-    density: FloatArray = (cells + 1e-9) / (cells.sum() + 1e-9 * n_cells)
-    total = density
-    for _ in range(n_terms - 1):
-        total = np.convolve(total, density)
-    return total
+    return min(max(float(excess.sum_density(n_terms)[max(threshold, 0) :].sum()), 0.0), 1.0)
 
 
 def _described(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -57,6 +57,7 @@ def band_envelope(
     edge_fraction: float = 0.1,
     unit: str = "",
     source: str = "",
+    transform: ComplexArray | None = None,
 ) -> Envelope:
     """Return the envelope of a frequency band, decimated to what the band needs.
 
@@ -76,6 +77,8 @@ def band_envelope(
     edge_fraction : float
         0 (brick wall) to 0.5: part of the band that each edge takes.
     unit, source : str
+    transform : array, (n_samples // 2 + 1,), or None
+        The signal's `rfft`, where several bands of one signal are wanted.
 
     Returns
     -------
@@ -99,7 +102,7 @@ def band_envelope(
     one_of(kind, "kind", ("magnitude", "squared"))
     within(edge_fraction, "edge_fraction", 0.0, 0.5)
     first, last = _band_lines(band_hz, fs, len(x))
-    z = _complex_envelope(x, first, last, edge_fraction, 2 if kind == "squared" else 4)
+    z = _complex_envelope(x, first, last, edge_fraction, 2 if kind == "squared" else 4, transform)
     square = z.real**2 + z.imag**2
     return Envelope(
         values=square if kind == "squared" else np.sqrt(square),
@@ -173,11 +176,13 @@ def envelope_recording(
     channels: Iterable[str] | None = None,
     kind: EnvelopeKind = "squared",
     edge_fraction: float = 0.1,
+    transforms: Mapping[str, ComplexArray] | None = None,
 ) -> Recording:
     """Return a recording whose channels are the band envelopes of the given one's vibration channels.
 
     It is what angular resampling takes to give an envelope spectrum over order. The speed source is dropped, since
-    pulses do not survive the lower rate: find the shaft angle on the original.
+    pulses do not survive the lower rate: find the shaft angle on the original. `transforms` holds the `rfft` of each
+    channel, where several bands of one recording are wanted.
     """
     names = tuple(channels) if channels is not None else recording.vibration_names()
     if not names:
@@ -192,6 +197,7 @@ def envelope_recording(
             edge_fraction=edge_fraction,
             unit=c.unit,
             source=c.name,
+            transform=None if transforms is None else transforms[c.name],
         )
         for c in old
     ]
@@ -226,14 +232,16 @@ def _band_lines(band_hz: tuple[float, float], fs: float, n: int) -> tuple[int, i
     return first, last
 
 
-def _complex_envelope(x: FloatArray, first: int, last: int, edge_fraction: float, oversampling: int) -> ComplexArray:
+def _complex_envelope(
+    x: FloatArray, first: int, last: int, edge_fraction: float, oversampling: int, transform: ComplexArray | None = None
+) -> ComplexArray:
     """Return the band's complex envelope with about `oversampling` samples per line of the band."""
     from scipy.fft import ifft, next_fast_len, rfft
 
     n, n_band = len(x), last - first + 1
     m = next_fast_len(oversampling * n_band + 1)
     lines = np.zeros(m, dtype=np.complex128)
-    lines[:n_band] = rfft(x.astype(np.float64))[first : last + 1]
+    lines[:n_band] = (rfft(x.astype(np.float64)) if transform is None else transform)[first : last + 1]
     lines[:n_band] *= band_taper(n_band, edge_fraction)
     z: ComplexArray = ifft(lines, overwrite_x=True)
     z *= 2.0 * m / n

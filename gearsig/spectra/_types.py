@@ -78,7 +78,8 @@ class Spectrum(Result, columns=("positions", "values")):
 
     def index_of(self, position: float) -> int:
         """Index of the line nearest to `position`."""
-        return int(np.clip(round((position - float(self.positions[0])) / self.resolution), 0, len(self.values) - 1))
+        nearest = round((float(position) - float(self.positions[0])) / self.resolution)
+        return min(max(nearest, 0), len(self.values) - 1)
 
     def largest_near(self, position: float, half_width: float) -> tuple[float, float]:
         """Return (position, value) of the largest line within `half_width` of `position`."""
