@@ -5,8 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import wait
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
 from io import StringIO
 from itertools import groupby
@@ -20,7 +19,7 @@ from gearsig import phase
 from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray, count, one_of, within
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.processes import n_processors, process_pool
+from gearsig.processes import active_cluster, n_processors, run_jobs
 from sims.cracked import DECAYS, SIGNALS, TRANSMISSION_ERROR, Branch, End, PairState, SteadyRun
 from sims.gear_pair import COORDINATES
 from sims.sweep import claimed, written
@@ -203,7 +202,6 @@ def load(path: Path) -> KeptValue | None:
 
 DEFINITION, VALUES = "definition.json", "values"
 DIRECTIONS = ("both", "up", "down", "rest")
-LOOK_S = 0.3
 """How often the parent counts what the processes have written."""
 
 
@@ -277,24 +275,45 @@ def run_folder(
     jobs = [(name, places[::-1] if name == "down" else places) for name in request.branches]
     if request.direction == "rest":
         jobs = [("rest", (place,)) for place in places]
+
+    def show() -> None:
+        if on_progress is not None:
+            on_progress(n_complete(request, folder))
+
     try:
-        if workers == 1 or len(jobs) == 1:
+        if active_cluster() is None and (workers == 1 or len(jobs) == 1):
             for job in jobs:
                 run_places(request, folder, *job, on_progress)
         else:
-            with process_pool(min(workers, len(jobs))) as pool:
-                waiting = {pool.submit(run_places, request, folder, *job) for job in jobs}
-                while waiting:
-                    done, waiting = wait(waiting, timeout=LOOK_S)
-                    for future in done:
-                        future.result()
-                    if on_progress is not None:
-                        on_progress(n_complete(request, folder))
+            running = run_jobs(
+                _run_job,
+                ((request, folder, *job) for job in jobs),
+                n_workers=min(workers, len(jobs)),
+                if_killed=_killed,
+                on_wait=show,
+            )
+            with closing(running):
+                for _ in running:
+                    show()
     finally:
         for part in (folder / VALUES).glob(".*.part"):
             with suppress(OSError):
                 part.unlink()
     return complete(request, folder)
+
+
+BranchJob = tuple[BifurcationRequest, Path, str, Sequence[int]]
+
+
+def _run_job(job: BranchJob) -> None:
+    run_places(*job)
+
+
+def _killed(job: BranchJob) -> None:
+    raise RefusalError(
+        f"the process that ran the branch {NAMES[job[2]]!r} was killed: perhaps it ran out of memory",
+        remedy="the same command goes on from what is complete",
+    )
 
 
 def complete(request: BifurcationRequest, folder: Path) -> dict[str, list[KeptValue]]:

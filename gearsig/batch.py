@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import file_label
-from gearsig.processes import n_processors, process_pool
+from gearsig.processes import n_processors, run_jobs
 
 if TYPE_CHECKING:
     from gearsig.recording import Recording
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int, "Entry | Failure"], object]
 
-Results = Generator[tuple[int, "Entry | Failure"], None, None]
+RESULTS = ".results"
+"""Sub-folder that holds what the index says of each page, and of what the page was made: a later run goes on there."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,14 @@ class BatchResult:
         Those that could not be, with the reason, in the order given.
     index_path : Path
         The page that compares them.
+    n_found : int
+        Of the entries, those whose pages stood there already.
     """
 
     entries: tuple[Entry, ...]
     failures: tuple[Failure, ...]
     index_path: Path
+    n_found: int = 0
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,7 @@ class _Job:
     reference: Path | None = None
     torque_nm: float | None = None
     is_reference: bool = False
+    made_of: str = ""
 
 
 def report_many(
@@ -75,12 +81,14 @@ def report_many(
 ) -> BatchResult:
     """Analyse recordings and write a page for each, and an index that compares them.
 
-    A file that fails does not stop the others: the index lists it with its reason. Ctrl-C leaves whole pages only.
+    A file that fails does not stop the others: the index lists it with its reason. A page that was made of the same
+    recording, rig and options by the same gearsig is kept. While the pages are made, and after an interruption, the
+    index says what is missing; the same call goes on from there.
 
     Parameters
     ----------
     paths : sequence of str or Path
-        At least one.
+        Files, folders with their sub-folders, "folder/*.csv".
     output_folder : str or Path
         Made if it is not there; pages of the same name are replaced.
     rig : Rig or None
@@ -93,7 +101,8 @@ def report_many(
         Local processes; None: one per processor, not more than files. With 1, everything runs in this process. With
         more, the caller's script needs the usual ``if __name__ == "__main__":``, as processes are spawned.
     executor : concurrent.futures.Executor or None
-        Runs the recordings instead, e.g. a cluster's. Its workers must see the same files under the same paths.
+        Runs the recordings instead, e.g. that of `gearsig.processes.cluster`; `n_processes` then says how many at
+        once. Its workers must see the same files under the same paths.
     on_progress : callable or None
         Called as ``on_progress(n_done, n_total, result)`` with an `Entry` or a `Failure`, in the order of completion.
     command : str
@@ -113,11 +122,13 @@ def report_many(
         If there are no paths, `n_processes` is below 1, or the folder cannot be made.
     """
     from gearsig.checks import count
+    from gearsig.fleet import find_recordings
     from gearsig.report import Entry, Failure, made_folder, page_names, remove_parts, write_index
 
-    files = [Path(path) for path in paths]
+    files = [path for path, _ in find_recordings(paths)]
     if not files:
-        raise InputError("there are no recordings to report on", remedy="name at least one file")
+        where = ", ".join(str(path) for path in paths)
+        raise InputError("there are no recordings to report on", where=where, remedy="name at least one file")
     workers = min(len(files), n_processors()) if n_processes is None else count(n_processes, "n_processes")
     folder = made_folder(Path(output_folder))
     healthy = Path(reference) if reference is not None else None
@@ -132,67 +143,87 @@ def report_many(
         jobs.append(
             _Job(file, name, path, rig, sampling_rate_hz, speed, command, compared, torque_nm, is_reference=is_healthy)
         )
-    results: dict[int, Entry | Failure] = {}
+    made_of = _made_of()
+    jobs = [replace(job, made_of=made_of(job)) for job in jobs]
+    results: dict[int, Entry | Failure] = {n: kept for n, job in enumerate(jobs) if (kept := _kept(job)) is not None}
+    missing, n_found = [n for n in range(len(jobs)) if n not in results], len(results)
+
+    def index() -> BatchResult:
+        ordered = [results[number] for number in sorted(results)]
+        entries = tuple(item for item in ordered if isinstance(item, Entry))
+        failures = tuple(item for item in ordered if isinstance(item, Failure))
+        n_missing = len(jobs) - len(results)
+        path = write_index(entries, folder / "index.html", failures=failures, command=command, n_missing=n_missing)
+        return BatchResult(entries, failures, path, n_found)
+
+    if missing:
+        index()  # an earlier one would speak of other pages
+    running = run_jobs(
+        _report_one,
+        (jobs[number] for number in missing),
+        n_workers=min(workers, max(len(missing), 1)) if executor is None else workers,
+        executor=executor,
+        if_killed=_killed,
+    )
     try:
-        with closing(_run(jobs, min(workers, len(jobs)), executor)) as running:
-            for number, result in running:
-                results[number] = result
+        with closing(running):
+            for place, result in running:
+                results[missing[place]] = result
                 if on_progress is not None:
                     on_progress(len(results), len(jobs), result)
     finally:
         remove_parts(folder, [job.page.name for job in jobs])
-    ordered = [results[number] for number in sorted(results)]
-    entries = tuple(item for item in ordered if isinstance(item, Entry))
-    failures = tuple(item for item in ordered if isinstance(item, Failure))
-    index = write_index(entries, folder / "index.html", failures=failures, command=command)
-    return BatchResult(entries, failures, index)
+        made = index()
+    return made
 
 
-def _run(jobs: Sequence[_Job], n_workers: int, executor: Executor | None) -> Results:
-    """Run the jobs and yield each result with its number, as they finish."""
-    numbered = dict(enumerate(jobs))
-    if executor is not None:
-        yield from _collect(executor, numbered)
-    elif n_workers == 1:
-        for number, job in numbered.items():
-            yield number, _report_one(job)
-    else:
-        yield from _run_local(numbered, n_workers)
+def _made_of() -> Callable[[_Job], str]:
+    """Return a function that says of what a page is made, as a hash; empty where the recording cannot be looked at."""
+    from functools import cache
+
+    from gearsig import __version__
+    from gearsig.rig import rig_file_beside
+
+    @cache
+    def state(path: Path) -> tuple[str, int, int]:
+        stat = path.stat()
+        return str(path.absolute()), stat.st_size, stat.st_mtime_ns
+
+    def made_of(job: _Job) -> str:
+        try:
+            beside = rig_file_beside(job.path) if job.rig is None else None
+            files = [state(path) for path in (job.path, beside, job.reference) if path is not None]
+        except OSError:
+            return ""
+        parts = [__version__, files, job.name, repr(job.rig), repr(job.speed), job.sampling_rate_hz, job.torque_nm]
+        return hashlib.sha256(json.dumps([*parts, job.is_reference]).encode("utf-8", "surrogateescape")).hexdigest()
+
+    return made_of
 
 
-def _run_local(jobs: Mapping[int, _Job], n_workers: int) -> Results:
-    """Run jobs in local processes; where one kills its process, the unfinished ones get a process each."""
-    unfinished = dict(jobs)
+def _result_path(job: _Job) -> Path:
+    return job.page.parent / RESULTS / f"{job.page.stem}.json"
+
+
+def _kept(job: _Job) -> Entry | None:
+    """Return what the index says of a page that stands there already, None where it is another one or none."""
+    from gearsig.report import Entry, from_plain
+
     try:
-        with process_pool(n_workers) as pool:
-            for number, result in _collect(pool, jobs):
-                del unfinished[number]
-                yield number, result
-    except BrokenProcessPool:
-        for number, job in unfinished.items():
-            try:
-                with process_pool(1) as pool:
-                    result = pool.submit(_report_one, job).result()
-            except BrokenProcessPool:
-                result = _failure(job, "the process that analysed it was killed: perhaps it ran out of memory")
-            yield number, result
-
-
-def _collect(executor: Executor, jobs: Mapping[int, _Job]) -> Results:
-    futures: dict[Future[Entry | Failure], int] = {executor.submit(_report_one, j): n for n, j in jobs.items()}
-    try:
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    finally:
-        for future in futures:
-            future.cancel()
+        data = json.loads(_result_path(job).read_text(encoding="utf-8"))
+        if not job.made_of or data["made_of"] != job.made_of or not job.page.is_file():
+            return None
+        entry: Entry = from_plain(Entry, data["entry"], "entry")
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # damaged: made again
+        return None
+    return entry
 
 
 def _report_one(job: _Job) -> Entry | Failure:
     """Analyse one recording and write its page; every error becomes a reason."""
     from gearsig.diagnosis import analyze
     from gearsig.recording import read_recording
-    from gearsig.report import entry_of, write_page
+    from gearsig.report import entry_of, plain, write_page, write_text
     from gearsig.rig import read_rig, rig_file_beside
 
     try:
@@ -204,7 +235,10 @@ def _report_one(job: _Job) -> Entry | Failure:
             torque_nm=job.torque_nm,
         )
         write_page(analysis, job.page, command=job.command, index="index.html")
-        return replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference)
+        entry = replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference)
+        with suppress(GearsigError):  # a page that the next run makes again
+            write_text(_result_path(job), json.dumps({"made_of": job.made_of, "entry": plain(entry)}) + "\n")
+        return entry  # noqa: TRY300
     except GearsigError as error:
         return _failure(job, str(error))
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
@@ -222,6 +256,10 @@ def _reference_of(job: _Job, rig: Rig | None) -> Recording | None:
     speed = None if isinstance(job.speed, PulseTimes) else job.speed
     own = rig_of_reference(job.reference, rig)
     return read_recording(job.reference, rig=own, sampling_rate_hz=job.sampling_rate_hz, speed=speed)
+
+
+def _killed(job: _Job) -> Failure:
+    return _failure(job, "the process that analysed it was killed: perhaps it ran out of memory")
 
 
 def _failure(job: _Job, reason: str) -> Failure:

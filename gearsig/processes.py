@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from contextvars import ContextVar
 from itertools import islice
 from multiprocessing import parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
@@ -157,6 +158,7 @@ def run_jobs(
     n_workers: int,
     executor: Executor | None = None,
     if_killed: Callable[[Job], Result],
+    on_wait: Callable[[], object] | None = None,
 ) -> Generator[tuple[int, Result], None, None]:
     """Run jobs and yield each result with the job's number, once, as they finish.
 
@@ -171,14 +173,18 @@ def run_jobs(
     n_workers : int
         Local processes; with 1 everything runs in this one.
     executor : concurrent.futures.Executor or None
-        Runs the jobs instead, e.g. that of `cluster`.
+        Runs the jobs instead; None: that of the `cluster` in whose block this is called, if any.
     if_killed : callable
         Returns the result of a job whose worker was killed.
+    on_wait : callable or None
+        Called each second while no job finishes; not where everything runs in this process.
     """
+    if executor is None and (active := active_cluster()) is not None:
+        executor, n_workers = active.executor, active.n_workers
     waiting = iter(enumerate(jobs))
     running: dict[Future[Result], tuple[int, Job]] = {}
     if executor is not None:
-        yield from _collect(executor, function, waiting, running, 4 * n_workers, if_killed)
+        yield from _collect(executor, function, waiting, running, 4 * n_workers, on_wait, if_killed)
         return
     if n_workers == 1:
         for number, job in waiting:
@@ -187,7 +193,7 @@ def run_jobs(
     while True:
         try:
             with process_pool(n_workers) as pool:
-                yield from _collect(pool, function, waiting, running, 2 * n_workers)
+                yield from _collect(pool, function, waiting, running, 2 * n_workers, on_wait)
         except BrokenProcessPool:
             suspects = sorted(running.values(), key=lambda item: item[0])
             running.clear()
@@ -208,6 +214,7 @@ def _collect(
     waiting: Iterator[tuple[int, Job]],
     running: dict[Future[Result], tuple[int, Job]],
     n_at_once: int,
+    on_wait: Callable[[], object] | None,
     if_killed: Callable[[Job], Result] | None = None,
 ) -> Iterator[tuple[int, Result]]:
     """Keep so many jobs with an executor; what `running` still holds after an error has no result."""
@@ -221,7 +228,10 @@ def _collect(
                     raise
             if not running:
                 return
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            done = wait(running, timeout=1.0 if on_wait else None, return_when=FIRST_COMPLETED).done
+            if not done and on_wait is not None:
+                on_wait()
+            for future in done:
                 try:
                     result = future.result()
                 except BrokenProcessPool:
@@ -274,9 +284,17 @@ class Cluster:
         return workers
 
 
+_ACTIVE: ContextVar[Cluster | None] = ContextVar("cluster", default=None)
+
+
+def active_cluster() -> Cluster | None:
+    """Return the cluster in whose block this is called, None outside of any."""
+    return _ACTIVE.get()
+
+
 @contextmanager
 def cluster(address: str) -> Iterator[Cluster]:
-    """Open a Dask cluster's executor. Its workers must see the same files under the same paths, and the same gearsig.
+    """Run the jobs of a block on a Dask cluster. Its workers must see the same files under the same paths.
 
     Dask sends pickled code both ways: only a cluster that is trusted may be named.
 
@@ -310,7 +328,12 @@ def cluster(address: str) -> Iterator[Cluster]:
         if versions != {__version__}:
             here = f"gearsig {__version__} is here, and {', '.join(sorted(versions)) or 'no worker'} there"
             raise InputError(here, where=address, remedy="start workers with the same gearsig: dask worker ADDRESS")
-        yield Cluster(client)
+        opened = Cluster(client)
+        before = _ACTIVE.set(opened)
+        try:
+            yield opened
+        finally:
+            _ACTIVE.reset(before)
     finally:
         client.close()
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from io import StringIO
@@ -17,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from gearsig.checks import count, one_of, positive, within
 from gearsig.errors import GearsigError, InputError
-from gearsig.processes import n_processors, process_pool
+from gearsig.processes import n_processors, run_jobs
 from gearsig.recording import WRITERS
 from sims.effects import EffectSetting, OptionValue
 from sims.files import file_set, write_set
@@ -290,8 +288,10 @@ def run_sweep(
     n_found = len(points) - len(missing)
     done: dict[int, SweepOutcome] = {}
     try:
-        with closing(_run(sweep, missing, target, min(workers, max(len(missing), 1)))) as running:
-            for outcome in running:
+        n_workers = min(workers, max(len(missing), 1))
+        jobs = ((sweep, point, target) for point in missing)
+        with closing(run_jobs(_run_one, jobs, n_workers=n_workers, if_killed=_killed)) as running:
+            for _, outcome in running:
                 done[outcome.point.index] = outcome
                 if on_progress is not None:
                     on_progress(n_found + len(done), len(points), outcome)
@@ -364,40 +364,16 @@ def _check_same(definition: Path, text: str, kind: str) -> None:
         )
 
 
-def _run(
-    sweep: Sweep, points: Sequence[SweepPoint], folder: Path, n_workers: int
-) -> Generator[SweepOutcome, None, None]:
-    if n_workers == 1:
-        for point in points:
-            yield _run_one(sweep, point, folder)
-    else:
-        yield from _run_local(sweep, points, folder, n_workers)
+SweepJob = tuple[Sweep, SweepPoint, Path]
 
 
-def _run_local(sweep: Sweep, points: Sequence[SweepPoint], folder: Path, n_workers: int) -> Iterator[SweepOutcome]:
-    """Run points in local processes; where one kills its process, the unfinished ones get a process each."""
-    unfinished = {point.index: point for point in points}
-    try:
-        with process_pool(n_workers) as pool:
-            futures = [pool.submit(_run_one, sweep, point, folder) for point in points]
-            for future in as_completed(futures):
-                outcome = future.result()
-                del unfinished[outcome.point.index]
-                yield outcome
-    except BrokenProcessPool:
-        for point in unfinished.values():
-            try:
-                with process_pool(1) as pool:
-                    outcome = pool.submit(_run_one, sweep, point, folder).result()
-            except BrokenProcessPool:
-                outcome = SweepOutcome(
-                    point, None, "the process that simulated it was killed: perhaps it ran out of memory"
-                )
-            yield outcome
+def _killed(job: SweepJob) -> SweepOutcome:
+    return SweepOutcome(job[1], None, "the process that simulated it was killed: perhaps it ran out of memory")
 
 
-def _run_one(sweep: Sweep, point: SweepPoint, folder: Path) -> SweepOutcome:
+def _run_one(job: SweepJob) -> SweepOutcome:
     """Simulate a point and write it; every error becomes a reason."""
+    sweep, point, folder = job
     try:
         names = file_set(recording_path(sweep, folder, point), replace=True)
         write_set(sweep.simulate(point), names)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli.console import progress_bar, typed_command
-from app.cli.options import SamplingRateOption, SpeedOption, clear_other_versions
+from app.cli.options import ClusterOption, SamplingRateOption, SpeedOption, clear_other_versions, open_cluster
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ def gap(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for gap.html, gap.json and twin.toml.")
     ] = None,
+    cluster: ClusterOption = "",
 ) -> None:
     """Say where recordings differ from the simulation of their rig, which effect causes it, how far it shrinks then.
 
@@ -115,7 +116,8 @@ def gap(
         check_writable(cache)
     if fresh and model == "reduced-fe":
         clear_other_versions(model)
-    report = _diagnosed(asked, model, cache, fresh=fresh)
+    with open_cluster(cluster):
+        report = _diagnosed(asked, model, cache, fresh=fresh)
     written = write_results(report, output, command=typed_command())
     _tell(report, written)
 

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 def report(
-    files: Annotated[list[Path], typer.Argument(help="Recordings; folders are not searched.")],
+    files: Annotated[
+        list[Path], typer.Argument(help="Recordings, or folders with their sub-folders, or 'FOLDER/*.csv'.")
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the pages.")],
     rig: options.RigOption = None,
     fs: options.SamplingRateOption = None,
@@ -26,18 +28,18 @@ def report(
     reference: options.ReferenceOption = None,
     torque: options.TorqueOption = None,
     jobs: options.JobsOption = None,
+    cluster: options.ClusterOption = "",
 ) -> None:
     """Write one self-contained HTML page per recording, and an index page that compares them.
 
     A file that cannot be read does not stop the others: the index lists it with its reason, and the exit code is 1
-    (2 if no file could be read). With --reference, all recordings are compared with that one.
+    (2 if no file could be read). With --reference, all recordings are compared with that one. It can be stopped at any
+    time: the same command goes on from the pages that are there.
 
     Example: gearsig report monday.csv tuesday.csv --rig gearbox.toml -o report
     """
-    if tach_times is not None and len(files) > 1:
-        raise InputError(
-            f"--tach-times belong to one recording, and there are {len(files)}", remedy="make a report for each"
-        )
+    if tach_times is not None and (len(files) > 1 or files[0].is_dir()):
+        raise InputError("--tach-times belong to one recording, and there are more", remedy="make a report for each")
     speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
     failed = make_report(
         files,
@@ -49,9 +51,10 @@ def report(
         command=typed_command(),
         reference=reference,
         torque_nm=options.torque_of(torque),
+        cluster=cluster,
     )
     if failed:
-        raise typer.Exit(EXIT_INPUT_ERROR if failed == len(files) else EXIT_SOME_FAILED)
+        raise typer.Exit(failed)
 
 
 def make_report(
@@ -64,47 +67,56 @@ def make_report(
     command: str,
     reference: Path | None = None,
     torque_nm: float | None = None,
+    cluster: str = "",
 ) -> int:
-    """Write the pages with a progress bar; return how many files failed."""
+    """Write the pages with their progress; return the exit code."""
     from gearsig.batch import report_many
 
     before, n_done = output.exists(), 0
 
-    def advance(*_: object) -> None:
+    def advance(done: int, total: int, _result: object) -> None:
         nonlocal n_done
-        n_done += 1
-        show(n_done)
+        n_done = done
+        show(done, total=total)
 
-    try:
-        with progress_bar("analysing", len(files)) as show:
-            result = report_many(
-                files,
-                output,
-                rig=options.open_rig(rig),
-                sampling_rate_hz=fs,
-                speed=speed,
-                n_processes=jobs,
-                on_progress=advance,
-                command=command,
-                reference=reference,
-                torque_nm=torque_nm,
-            )
-    except KeyboardInterrupt:
-        typer.echo(f"gearsig: stopped after {n_done} of {len(files)} files; {_kept(output, before)}", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+    with options.open_cluster(cluster) as workers:
+        try:
+            with progress_bar("analysing", len(files)) as show:
+                result = report_many(
+                    files,
+                    output,
+                    rig=options.open_rig(rig),
+                    sampling_rate_hz=fs,
+                    speed=speed,
+                    n_processes=workers.n_workers if workers else jobs,
+                    executor=workers.executor if workers else None,
+                    on_progress=advance,
+                    command=command,
+                    reference=reference,
+                    torque_nm=torque_nm,
+                )
+        except KeyboardInterrupt:
+            typer.echo(f"gearsig: stopped after {n_done} files; {_kept(output, before)}", err=True)
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+        ran = workers.text() if workers else ""
     for entry in result.entries:
         typer.echo(f"{entry.name}: {entry.verdict}")
     for failure in result.failures:
         typer.echo(f"{failure.name}: not analysed: {failure.reason}", err=True)
-    typer.echo(f"Open {result.index_path} in a browser.")
-    return len(result.failures)
+    found = f"{result.n_found} of {len(result.entries)} pages were there already. " if result.n_found else ""
+    typer.echo(f"{found}{f'It ran {ran}. ' if ran else ''}Open {result.index_path} in a browser.")
+    if not result.failures:
+        return 0
+    return EXIT_SOME_FAILED if result.entries else EXIT_INPUT_ERROR
 
 
 def _kept(output: Path, was_there: bool) -> str:
     """Say what an interrupted report left; a new folder without pages is taken away."""
-    n_pages = len(list(output.glob("*.html"))) if output.is_dir() else 0
-    if n_pages:
-        return f"pages in {output} are whole, the index is not made anew"
+    pages = [page for page in output.glob("*.html") if page.name != "index.html"] if output.is_dir() else []
+    if pages:
+        return f"pages in {output} are whole, and the same command goes on from there"
+    if not was_there:
+        (output / "index.html").unlink(missing_ok=True)
     if not was_there and output.is_dir() and not any(output.iterdir()):
         output.rmdir()
     return "nothing was kept"

@@ -53,6 +53,7 @@ def sweep(
     ] = False,
     extension: Annotated[str, typer.Option("--format", metavar="EXT", help="csv, h5, parquet, wav or mat.")] = "h5",
     jobs: options.JobsOption = None,
+    cluster: options.ClusterOption = "",
 ) -> None:
     """Simulate a grid of conditions and faults on all processors, into a folder with an index.
 
@@ -67,8 +68,9 @@ def sweep(
 
     n_points = wanted.n_points
     try:
-        with progress_bar("simulating", n_points) as show:
+        with options.open_cluster(cluster) as workers, progress_bar("simulating", n_points) as show:
             result = run_sweep(wanted, output, n_processes=jobs, on_progress=lambda n_done, _n, _outcome: show(n_done))
+            ran = f" It ran {workers.text()}." if workers else ""
     except KeyboardInterrupt:
         raise stopped(f"{n_complete(wanted, output)} of {n_points} points are in {output}") from None
     for failure in result.failures[:MAX_REASONS]:
@@ -77,7 +79,7 @@ def sweep(
         typer.echo(f"… and {len(result.failures) - MAX_REASONS} more points: see the index", err=True)
     n_made = len(result.outcomes) - len(result.failures)
     found = f"; {result.n_found} were there already" if result.n_found else ""
-    typer.echo(f"{result.n_points} points, {n_made} simulated{found}. They are listed in {result.index_path}.")
+    typer.echo(f"{result.n_points} points, {n_made} simulated{found}. They are listed in {result.index_path}.{ran}")
     if result.failures:
         raise typer.Exit(EXIT_SOME_FAILED if n_made + result.n_found else EXIT_INPUT_ERROR)
 
@@ -133,6 +135,7 @@ def bifurcation(
     fs: options.RateOption = "20480Hz",
     seed: options.SeedOption = 0,
     jobs: options.JobsOption = None,
+    cluster: options.ClusterOption = "",
 ) -> None:
     """Draw a bifurcation diagram: Poincaré points of the steady motion over speed, load, backlash, or anything else.
 
@@ -150,7 +153,7 @@ def bifurcation(
     wanted = study.BifurcationRequest(Branch(varied, signal, section, n_points), direction, phase, kind)
     wanted.branch.check_signal()
     try:
-        with progress_bar("simulating", wanted.n_values) as show:
+        with options.open_cluster(cluster), progress_bar("simulating", wanted.n_values) as show:
             values = study.run_folder(wanted, output, n_processes=jobs, on_progress=show)
     except KeyboardInterrupt:
         n = study.n_complete(wanted, output)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import as_completed
 from dataclasses import dataclass, field, replace
 from functools import cache
 from hashlib import sha256
@@ -39,7 +38,7 @@ from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, OperatingCondit
 from gearsig.gap._types import GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
 from gearsig.gap._waveform import N_HARMONICS, OFFSETS, WaveformMatch, best_match, mesh_sidebands, sideband_weights
 from gearsig.gap._words import shaft_words
-from gearsig.processes import can_be_sent, process_pool
+from gearsig.processes import active_cluster, can_be_sent, run_jobs
 
 # --------------------
 # A bank on disk: arrays without pickles, whole or not at all; a file that does not fit is made again.
@@ -175,22 +174,25 @@ def finished_runs(
     processes could not know, as it is defined in the caller's script, runs in this one.
     """
     found: list[Reduced | str] = [""] * len(tasks)
-    if processes == 1 or not can_be_sent(tasks[:1]):
+    if (processes == 1 and active_cluster() is None) or not can_be_sent(tasks[:1]):
         known: Known = {}
         for i, task in enumerate(tasks):
             found[i] = _reduced(task, known)
             on_progress(i + 1, len(tasks))
         return found
-    with process_pool(processes) as pool:
-        starts = range(0, len(tasks), n_together)
-        waiting = {pool.submit(reduced_in_worker, tasks[i : i + n_together]): i for i in starts}
-        done = 0
-        for future in as_completed(waiting):
-            rows = future.result()
-            found[waiting[future] : waiting[future] + len(rows)] = rows
-            done += len(rows)
-            on_progress(done, len(tasks))
+    batches = [tasks[i : i + n_together] for i in range(0, len(tasks), n_together)]
+    # A cluster's workers outlive a twin: what they know of its healthy runs is forgotten after each batch.
+    work = reduced_in_worker if active_cluster() is None else reduced_apart
+    done = 0
+    for number, rows in run_jobs(work, batches, n_workers=processes, if_killed=_killed_batch):
+        found[number * n_together : number * n_together + len(rows)] = rows
+        done += len(rows)
+        on_progress(done, len(tasks))
     return found
+
+
+def _killed_batch(tasks: Sequence[Task]) -> list[Reduced | str]:
+    return ["the process that simulated it was killed: perhaps it ran out of memory" for _ in tasks]
 
 
 Known = dict[tuple[SoundKey, int], ReducedRecording]
@@ -201,6 +203,12 @@ _KNOWN: Known = {}
 def reduced_in_worker(tasks: Sequence[Task]) -> list[Reduced | str]:
     """Return what tasks give, in a process that lives for one twin only."""
     return [_reduced(task, _KNOWN) for task in tasks]
+
+
+def reduced_apart(tasks: Sequence[Task]) -> list[Reduced | str]:
+    """Return what tasks give, in a process that works for several twins."""
+    known: Known = {}
+    return [_reduced(task, known) for task in tasks]
 
 
 def _reduced(task: Task, known: Known) -> Reduced | str:

@@ -137,6 +137,7 @@ def write_index(
     failures: Sequence[Failure] = (),
     command: str = "",
     date: datetime | None = None,
+    n_missing: int = 0,
 ) -> Path:
     """Write the index page: recordings by severity, key indicators side by side, and the files that failed.
 
@@ -151,6 +152,8 @@ def write_index(
         The command that makes the report again.
     date : datetime or None
         Of the report; None: now.
+    n_missing : int
+        Recordings that are still to be analysed: the page says so, and has no figure yet.
 
     Returns
     -------
@@ -181,7 +184,8 @@ def write_index(
         columns=[heading for heading, _ in columns],
         summary=f"{n_files} recording{'s' * (n_files != 1)}: {', '.join(parts)}" if parts else "No recordings",
         failures=failures,
-        picture=_picture(ordered, names[:6]),
+        picture=_picture(ordered, names[:6]) if not n_missing else None,
+        n_missing=n_missing,
         command=command,
         version=__version__,
         date=(date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip(),

@@ -62,7 +62,7 @@ def test_one_broken_file_does_not_stop_the_rest(recordings, broken, tmp_path):
     html = result.index_path.read_text(encoding="utf-8")
     assert "absent.csv" in html
     assert "<b>abc" not in html
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"one.html", "two.html", "index.html"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"one.html", "two.html", "index.html", ".results"}
 
 
 def test_local_processes_give_the_same_as_one(recordings, broken, tmp_path):
@@ -167,7 +167,57 @@ def test_ctrl_c_ends_the_workers_and_tidies_up(script, tmp_path):
         errors = running.communicate(timeout=20)[1]
     assert running.returncode != 0
     assert "KeyboardInterrupt" in errors
-    assert [path.name for path in out.iterdir()] == ["a.html"]
+    assert {path.name for path in out.iterdir()} == {"a.html", "index.html"}
+    assert "This report is not complete: 1 recording" in (out / "index.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("broken")
+def test_pages_are_kept_until_recording_rig_or_options_change(recordings, tmp_path):
+    folder = recordings[0].parent
+    first = report_many([folder], tmp_path / "out", n_processes=1)
+    page = tmp_path / "out" / "one.html"
+    made = page.stat().st_mtime_ns
+    again = report_many([folder / "*.csv"], tmp_path / "out", n_processes=1)
+    assert (first.n_found, again.n_found, len(again.failures)) == (0, 2, 1)
+    assert [(e.name, e.page, e.verdict) for e in again.entries] == [(e.name, e.page, e.verdict) for e in first.entries]
+    assert page.stat().st_mtime_ns == made
+    (folder / "two.toml").write_text('name = "Mill"\n')
+    assert report_many([folder], tmp_path / "out", n_processes=1).n_found == 1
+    assert report_many([folder], tmp_path / "out", n_processes=1, torque_nm=5.0).n_found == 0
+    (tmp_path / "out" / ".results" / "one.json").write_text("{")
+    page.unlink()
+    assert report_many([folder], tmp_path / "out", n_processes=1, torque_nm=5.0).n_found == 1
+    assert page.exists()
+
+
+def test_the_index_of_an_earlier_report_does_not_outlive_the_start_of_another(recordings, tmp_path, monkeypatch):
+    report_many(recordings[:1], tmp_path / "out", n_processes=1)
+
+    def killed(_job):
+        raise SystemExit  # as a process that is killed: nothing tidies up after it
+
+    monkeypatch.setattr(batch, "_report_one", killed)
+    monkeypatch.setattr("gearsig.report.write_index", _Once())
+    with pytest.raises(SystemExit):
+        report_many(recordings, tmp_path / "out", n_processes=1)
+    text = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "1 recording is still to be analysed" in text
+    assert "one.csv" in text
+
+
+class _Once:
+    """Write an index the first time only."""
+
+    def __init__(self):
+        from gearsig.report import write_index
+
+        self.write, self.is_done = write_index, False
+
+    def __call__(self, entries, path, **others):
+        if not self.is_done:
+            self.is_done = True
+            return self.write(entries, path, **others)
+        return path
 
 
 @pytest.mark.parametrize(

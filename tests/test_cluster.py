@@ -1,0 +1,137 @@
+"""The same jobs on a Dask cluster: a real scheduler and two worker processes on loopback, one of them killed midway."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("distributed", reason="the extra cluster is not installed")
+pytest.importorskip("duckdb", reason="the extra fleet is not installed")
+
+from distributed import Client
+
+from gearsig.batch import report_many
+from gearsig.errors import InputError
+from gearsig.fleet import open_fleet
+from gearsig.processes import cluster, run_jobs
+from tests.fleet.recordings import PATTERN, write_recording_file
+
+ROOT = Path(__file__).parents[1]
+SETTINGS = {
+    "PYTHONPATH": str(ROOT),
+    "OMP_NUM_THREADS": "1",
+    "NUMBA_NUM_THREADS": "1",
+    "DASK_DISTRIBUTED__LOGGING": "{}",
+}
+
+
+def start(module: str, *words: str) -> "subprocess.Popen[bytes]":
+    command = [sys.executable, "-m", f"distributed.cli.{module}", *words, "--no-dashboard"]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ | SETTINGS)
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[tuple[str, "list[subprocess.Popen[bytes]]"]]:
+    """Address of a scheduler, and its two workers."""
+    file = tmp_path / "scheduler.json"
+    with ExitStack() as stack:
+
+        def running(process: "subprocess.Popen[bytes]") -> "subprocess.Popen[bytes]":
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            return process
+
+        running(start("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file)))
+        limit = time.monotonic() + 60
+        while not file.exists():
+            assert time.monotonic() < limit
+            time.sleep(0.1)
+        address = json.loads(file.read_text())["address"]
+        worker = ("dask_worker", address, "--host", "127.0.0.1", "--nthreads", "1", "--no-nanny")
+        workers = [running(start(*worker, "--local-directory", str(tmp_path / f"w{i}"))) for i in range(2)]
+        with Client(address, timeout=60, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=60)
+        yield address, workers
+
+
+def process_of(job: int) -> tuple[int, int]:
+    return job, os.getpid()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_killed_worker_loses_nothing_and_doubles_nothing(scheduler, tmp_path):
+    address, workers = scheduler
+    rng = np.random.default_rng(0)
+    for day in range(1, 13):
+        write_recording_file(tmp_path / "data" / "pump" / f"DE_202601{day:02d}.csv", 1.0, rng)
+    fleet = open_fleet(tmp_path / "store", create=True)
+
+    def kill_one(n_done: int, _total: int, _result: object) -> None:
+        if n_done == 3:
+            os.kill(workers[0].pid, signal.SIGKILL)
+
+    with cluster(address) as opened:
+        assert opened.n_workers == 2
+        result = fleet.add(
+            tmp_path / "data", pattern=PATTERN, executor=opened.executor, n_processes=2, on_progress=kill_one
+        )
+        limit = time.monotonic() + 30
+        while not opened.lost() and time.monotonic() < limit:
+            time.sleep(0.1)
+        assert len(opened.lost()) == 1
+        assert "1 more was lost, and what it ran was run again" in opened.text()
+        assert len(result.added) == 12
+        assert not result.failures
+        assert len(fleet.recordings()) == 12
+        assert len(fleet.indicators(name="rms")) == 12
+        report = report_many([tmp_path / "data"], tmp_path / "report", n_processes=2)  # the block's cluster runs it
+        assert len(report.entries) == 12
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_jobs_of_a_block_run_on_its_cluster(scheduler, tmp_path):
+    from app.bifurcation import BifurcationRequest, run_folder
+    from sims.cracked import Branch
+    from sims.sweep import Axis, Sweep, run_sweep
+
+    def sweep(speeds: tuple[float, ...]) -> Sweep:
+        return Sweep(
+            axes=(Axis("speed_rpm", speeds),),
+            common_seed=True,
+            extension=".h5",
+            model="cracked",
+            preset="symmetric_50_50",
+            parameters={},
+            effects=(),
+            speed_rpm=None,
+            torque_nm=None,
+            duration_s=0.2,
+            sampling_rate_hz=20480.0,
+            seed=0,
+        )
+
+    address, workers = scheduler
+    with cluster(address):
+        found = [result for _, result in run_jobs(process_of, [3, 4, 5], n_workers=1, if_killed=lambda job: (job, 0))]
+        assert sorted(job for job, _ in found) == [3, 4, 5]
+        assert {process for _, process in found} <= {worker.pid for worker in workers}
+        made = run_sweep(sweep((600.0, 900.0)), tmp_path / "sweep")
+        assert [outcome.reason for outcome in made.outcomes] == ["", ""]
+        branch = Branch(sweep((600.0, 900.0)), "transmission_error_m", "mesh", 20)
+        values = run_folder(BifurcationRequest(branch, "rest", 0.0, False), tmp_path / "jump")
+        assert [value.reason for value in values["rest"]] == ["", ""]
+
+
+def test_what_is_no_scheduler_is_said():
+    with pytest.raises(InputError, match="no Dask scheduler"), cluster("tcp://127.0.0.1:9"):
+        pass
