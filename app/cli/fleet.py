@@ -134,6 +134,8 @@ def status(
     json: options.JsonOption = False,
 ) -> None:
     """Show every measuring point, the worst first: diagnosis of the last recording, alarms, what rose most."""
+    from gearsig.report import trends_text
+
     table = _open(store).status()
     if machine:
         table = table[table["machine"] == machine]
@@ -149,7 +151,7 @@ def status(
             f"{row['last']:%Y-%m-%d %H:%M}",
             str(row["n_recordings"]) + (f" (+{row['n_failed']} failed)" if row["n_failed"] else ""),
             str(row["outcome"] or "–"),
-            _worst(row),
+            trends_text(row),
         )
         for row in shown.to_dict("records")
     ]
@@ -223,6 +225,32 @@ def export(
     """
     n = _open(store).export(output, table, machine, point, name=indicator, start=start, end=end)
     typer.echo(f"{n} rows in {output}.")
+
+
+@fleet_app.command()
+def report(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The page, e.g. fleet.html.")],
+    store: StoreOption = DEFAULT_STORE,
+    since: Annotated[
+        datetime | None, typer.Option("--since", help="UTC. Default: since the last report of this fleet.")
+    ] = None,
+    everything: Annotated[bool, typer.Option("--everything", help="Since the beginning.")] = False,
+) -> None:
+    """Write what changed since last time as one HTML page: diagnoses, alarms raised and cleared, levels that moved.
+
+    Example: gearsig fleet report -o monday.html
+    """
+    from datetime import UTC
+
+    from gearsig.fleet import last_report, mark_reported
+    from gearsig.report import write_fleet_page
+
+    fleet = _open(store)
+    now = datetime.now(UTC).replace(tzinfo=None)
+    write_fleet_page(fleet, output, None if everything else since or last_report(fleet))
+    if since is None and not everything:
+        mark_reported(fleet, now)
+    typer.echo(f"Open {output} in a browser.")
 
 
 @fleet_app.command()
@@ -377,29 +405,14 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
     typer.echo("; ".join(parts) + (f"; {ran}" if ran else "") + ".")
 
 
-def _worst(row: dict[Any, Any]) -> str:
-    from pandas import isna
-
-    counts = [
-        f"{row[key]} {name}" for key, name in (("n_alarms", "alarm(s)"), ("n_warnings", "warning(s)")) if row[key]
-    ]
-    if not counts:
-        n = row["n_baseline"]
-        return "" if isna(n) or n else "baseline not complete"
-    change = f"{row['change']:+.1f} dB" if row["change_in_db"] is True else f"{row['change']:+.3g}"
-    since = "" if isna(row["since"]) else f" since {row['since']:%Y-%m-%d}"
-    return f"{', '.join(counts)}{since}; worst: {row['worst']} {change}"
-
-
 def _series_row(row: dict[Any, Any]) -> tuple[str, ...]:
     from pandas import isna
 
     from gearsig.fleet import LEVEL_NAMES
-    from gearsig.formatting import signed
+    from gearsig.report import change_text
 
     unit = f" {row['unit']}" if row["unit"] else ""
     of = " ".join(part for part in (row["point"], row["place"], row["channel"], row["computed_on"]) if part)
-    change = f"{signed(row['change'])} dB" if row["in_db"] else _number(row["change"])
     return (
         LEVEL_NAMES[row["level"]],
         row["name"],
@@ -407,7 +420,7 @@ def _series_row(row: dict[Any, Any]) -> tuple[str, ...]:
         _number(row["value"]) + unit,
         _number(row["expected"]),
         _number(row["upper_limit"]),
-        change,
+        change_text(row["change"], in_db=row["in_db"]),
         "" if isna(row["since"]) else f"{row['since']:%Y-%m-%d}",
         row["basis"],
     )

@@ -1,6 +1,14 @@
 """Recordings of many machines over time: a store of results, trends with limits and alarms, a watch on folders."""
 
 from gearsig.fleet._add import FAILED, AddedRecording, AddResult, AnalysisOptions
+from gearsig.fleet._changes import (
+    AlarmChange,
+    DiagnosisChange,
+    FleetChanges,
+    fleet_changes,
+    last_report,
+    mark_reported,
+)
 from gearsig.fleet._fleet import LEVEL_NAMES, TABLES, Fleet, Trend, open_fleet
 from gearsig.fleet._origin import FilePattern, Origin, date_in_name, find_recordings, origin_rows, origins
 from gearsig.fleet._statistics import (
@@ -27,11 +35,14 @@ __all__ = [
     "WARNING",
     "AddResult",
     "AddedRecording",
+    "AlarmChange",
     "AlarmEvent",
     "AnalysisOptions",
     "Baseline",
+    "DiagnosisChange",
     "FilePattern",
     "Fleet",
+    "FleetChanges",
     "Limits",
     "Origin",
     "PointTrends",
@@ -44,6 +55,9 @@ __all__ = [
     "date_in_name",
     "events_of",
     "find_recordings",
+    "fleet_changes",
+    "last_report",
+    "mark_reported",
     "open_fleet",
     "origin_rows",
     "origins",

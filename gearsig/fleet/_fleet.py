@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
     from pandas import DataFrame
 
+    from gearsig.fleet._changes import DiagnosisChange
     from gearsig.rig import Rig, SpeedSource
 
 LEVEL_NAMES = {OK: "ok", WARNING: "warning", ALARM: "alarm"}
@@ -390,6 +391,35 @@ class Fleet:
         finally:
             part.unlink(missing_ok=True)
         return n
+
+    def news(self, since: datetime) -> tuple[int, int, tuple[tuple[str, str], ...], tuple[DiagnosisChange, ...]]:
+        """Return what came into the store since: how many results, failures, the last of these, other diagnoses."""
+        from gearsig.fleet._changes import DiagnosisChange
+
+        n_new, n_failed = self._rows(
+            f"SELECT count(*), count(*) FILTER (outcome = '{FAILED}') FROM recordings WHERE added > ?", [since]
+        )[0]
+        failures = self._rows(
+            f"SELECT source, reason FROM recordings WHERE added > ? AND outcome = '{FAILED}' "
+            "ORDER BY added DESC LIMIT 100",
+            [since],
+        )
+        rows = self._rows(
+            f"""
+            WITH good AS (FROM recordings WHERE outcome <> '{FAILED}'), split AS (
+                SELECT machine, point, max(date) AS date,
+                    arg_max(outcome, date) FILTER (added <= $1) AS before, arg_max(outcome, date) AS now,
+                    arg_max(verdict, date) AS verdict, max(added) AS added
+                FROM good GROUP BY machine, point
+            )
+            SELECT machine, point, date, coalesce(before, ''), now, verdict FROM split
+            WHERE added > $1 AND now IS DISTINCT FROM before
+                AND (before IS NOT NULL OR now IN ('fault', 'suspicion'))
+            ORDER BY now <> 'fault', now <> 'suspicion', machine, point
+            """,
+            [since],
+        )
+        return n_new, n_failed, tuple(failures), tuple(DiagnosisChange(*row) for row in rows)
 
     def compact(self) -> None:
         """Merge all small files; an addition does it by itself when there are many."""

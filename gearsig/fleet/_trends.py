@@ -184,13 +184,15 @@ class AlarmEvent:
         Date of the recording.
     added : datetime
         When that recording came into the store.
-    cleared : datetime or None
+    cleared, cleared_added : datetime or None
+        Likewise of the recording with which it was cleared.
     """
 
     level: int
     raised: datetime
     added: datetime
     cleared: datetime | None = None
+    cleared_added: datetime | None = None
 
 
 @dataclass(frozen=True)
@@ -254,6 +256,7 @@ class PointTrends:
                 dates.iloc[start].to_pydatetime(),
                 added.iloc[start].to_pydatetime(),
                 dates.iloc[end].to_pydatetime() if end < len(levels) else None,
+                added.iloc[end].to_pydatetime() if end < len(levels) else None,
             )
             for start, end in edges.reshape(-1, 2)
         ]
@@ -416,6 +419,7 @@ def events_of(text: str) -> list[AlarmEvent]:
             datetime.fromisoformat(e["raised"]),
             datetime.fromisoformat(e["added"]),
             moment(e["cleared"]),
+            moment(e["cleared_added"]),
         )
         for e in found
     ]

@@ -6,6 +6,7 @@ from gearsig.plot._comparison import average_overlay_figure, band_levels_figure,
 from gearsig.plot._cursors import LONGEST, PRIORITY, AngleMark, Cursor, marks_of, n_rows, order_cursors, place
 from gearsig.plot._embed import Captioned, Picture, embed
 from gearsig.plot._fe_gear import draw_shaded, gear_mesh_figure, gear_modes_figure, gear_stress_figure
+from gearsig.plot._fleet import fleet_trend_picture
 from gearsig.plot._flexible import (
     contact_spreading_figure,
     frequency_curves_figure,
@@ -123,6 +124,7 @@ __all__ = [
     "envelope",
     "envelope_spectrum",
     "figure_of",
+    "fleet_trend_picture",
     "force_figure",
     "frequency_curves_figure",
     "friction_figure",

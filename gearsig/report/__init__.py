@@ -12,6 +12,7 @@ from gearsig.report._comparison import (
     orders_csv,
 )
 from gearsig.report._files import check_writable, made_folder, page_names, remove_parts, write_text
+from gearsig.report._fleet import change_text, fleet_page_html, trends_text, write_fleet_page
 from gearsig.report._gap_json import gap_from_dict, gap_schema, gap_to_dict, gap_to_json, read_gap_json, write_gap_json
 from gearsig.report._gap_page import (
     CHECK_FIRST,
@@ -77,6 +78,7 @@ __all__ = [
     "bearing_cursors",
     "benchmark_html",
     "cause_rows",
+    "change_text",
     "channel_rows",
     "check_writable",
     "comparison_page",
@@ -86,6 +88,7 @@ __all__ = [
     "condition_rows",
     "entry_of",
     "finding_card",
+    "fleet_page_html",
     "floors_text",
     "force_csv",
     "force_json",
@@ -124,7 +127,9 @@ __all__ = [
     "start_stop_json",
     "start_stop_text",
     "step_rows",
+    "trends_text",
     "verdict_rows",
+    "write_fleet_page",
     "write_gap_json",
     "write_gap_page",
     "write_index",

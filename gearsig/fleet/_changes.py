@@ -1,0 +1,143 @@
+"""What changed in a fleet since a date: new recordings, alarms raised and cleared, other diagnoses, new levels."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from gearsig.cache import write_whole
+from gearsig.fleet._fleet import LEVEL_NAMES, Fleet
+from gearsig.fleet._trends import events_of
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+LAST_REPORT = "last_report.json"
+
+
+@dataclass(frozen=True)
+class AlarmChange:
+    """An alarm that was raised or cleared.
+
+    Parameters
+    ----------
+    machine, point, name, channel, place, computed_on, basis : str
+        Of the series.
+    level : str
+        "warning" or "alarm".
+    raised, cleared : datetime
+        Dates of the recordings; `cleared` None where it stands.
+    value, expected, upper_limit, change : float
+        Of the last recording; the change in dB where `in_db`.
+    unit : str
+    in_db : bool
+    """
+
+    machine: str
+    point: str
+    name: str
+    channel: str
+    place: str
+    computed_on: str
+    basis: str
+    level: str
+    raised: datetime
+    cleared: datetime | None
+    value: float
+    expected: float
+    upper_limit: float
+    change: float
+    unit: str
+    in_db: bool
+
+
+@dataclass(frozen=True)
+class DiagnosisChange:
+    """A measuring point whose last recording is diagnosed otherwise than the last one before."""
+
+    machine: str
+    point: str
+    date: datetime
+    before: str
+    now: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class FleetChanges:
+    """What changed since a date.
+
+    Parameters
+    ----------
+    since : datetime or None
+        In UTC, when results came into the store; None: since ever.
+    n_new, n_failed : int
+        Recordings that came in since, and those among them without a result.
+    failures : tuple of (str, str)
+        File and reason of the last hundred of them.
+    raised, cleared : tuple of AlarmChange
+        Alarms, the highest first.
+    diagnoses : tuple of DiagnosisChange
+        The worst first.
+    shifted : DataFrame
+        Series without an alarm that have changed their level: as `Fleet.series`.
+    status : DataFrame
+        As `Fleet.status`.
+    """
+
+    since: datetime | None
+    n_new: int
+    n_failed: int
+    failures: tuple[tuple[str, str], ...]
+    raised: tuple[AlarmChange, ...]
+    cleared: tuple[AlarmChange, ...]
+    diagnoses: tuple[DiagnosisChange, ...]
+    shifted: DataFrame
+    status: DataFrame
+
+
+def fleet_changes(fleet: Fleet, since: datetime | None = None) -> FleetChanges:
+    """Return what changed since a date (UTC), by when results came into the store; None: since ever."""
+    moment = since or datetime(1900, 1, 1)  # noqa: DTZ001 - the store's times are UTC without a zone
+    status = fleet.status()
+    series = fleet.series()
+    n_new, n_failed, failures, diagnoses = fleet.news(moment)
+    raised, cleared = [], []
+    for row in series[series["events"] != "[]"].to_dict("records"):
+        for event in events_of(str(row["events"])):
+            change = _alarm(row, LEVEL_NAMES[event.level], event.raised, event.cleared)
+            if event.added > moment:
+                raised.append(change)
+            elif event.cleared_added is not None and event.cleared_added > moment:
+                cleared.append(change)
+    standing = series["level"] > 0
+    shifted = series[~standing & (series["changed_added"] > moment)]
+    return FleetChanges(since, n_new, n_failed, failures, _sorted(raised), _sorted(cleared), diagnoses, shifted, status)
+
+
+def last_report(fleet: Fleet) -> datetime | None:
+    """Return when the last report of a fleet was made (UTC), None if none was."""
+    try:
+        return datetime.fromisoformat(json.loads((fleet.folder / LAST_REPORT).read_text(encoding="utf-8"))["until"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def mark_reported(fleet: Fleet, until: datetime | None = None) -> None:
+    """Note that everything up to now has been reported."""
+    now = until or datetime.now(UTC).replace(tzinfo=None)
+    text = json.dumps({"until": now.isoformat()}) + "\n"
+    write_whole(fleet.folder / LAST_REPORT, lambda file: file.write(text.encode()))
+
+
+def _alarm(row: dict[Any, Any], level: str, raised: datetime, cleared: datetime | None) -> AlarmChange:
+    texts = {name: str(row[name]) for name in ("machine", "point", "name", "channel", "place", "computed_on", "basis")}
+    numbers = {name: float(row[name]) for name in ("value", "expected", "upper_limit", "change")}
+    facts: dict[str, Any] = {**texts, **numbers, "unit": str(row["unit"]), "in_db": bool(row["in_db"])}
+    return AlarmChange(level=level, raised=raised, cleared=cleared, **facts)
+
+
+def _sorted(changes: list[AlarmChange]) -> tuple[AlarmChange, ...]:
+    return tuple(sorted(changes, key=lambda c: (c.cleared is not None, c.level != "alarm", -abs(c.change), c.machine)))

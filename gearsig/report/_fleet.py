@@ -1,0 +1,176 @@
+"""The page that says what changed in a fleet since last time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from gearsig import __version__
+from gearsig.errors import InputError
+from gearsig.fleet import AlarmChange, Fleet, FleetChanges, fleet_changes
+from gearsig.formatting import readable, signed
+from gearsig.plot import Picture, fleet_trend_picture, unit_text
+from gearsig.report._files import render, write_text
+
+LEVEL_CLASSES = {"alarm": "fault", "warning": "suspicion", "ok": "no-fault"}
+MAX_ROWS, MAX_POINTS, MAX_PICTURES = 60, 200, 8
+
+
+@dataclass(frozen=True)
+class AlarmRow:
+    """An alarm as the page shows it."""
+
+    level: str
+    css_class: str
+    machine: str
+    name: str
+    of: str
+    value: str
+    expected: str
+    limit: str
+    change: str
+    raised: str
+    cleared: str
+    basis: str
+
+
+def trends_text(row: Mapping[Any, Any]) -> str:
+    """Say what the trends of a measuring point show: a row of `Fleet.status`."""
+    from pandas import isna
+
+    counts = [
+        f"{row[key]:.0f} {name}{'s' * (row[key] != 1)}"
+        for key, name in (("n_alarms", "alarm"), ("n_warnings", "warning"))
+        if not isna(row[key]) and row[key]
+    ]
+    if not counts:
+        n = row["n_baseline"]
+        return "" if isna(n) or n else "baseline not complete"
+    since = "" if isna(row["since"]) else f" since {row['since']:%Y-%m-%d}"
+    change = change_text(row["change"], in_db=bool(row["change_in_db"]))
+    return f"{', '.join(counts)}{since}; worst: {row['worst']}{f' {change}' if change else ''}"
+
+
+def change_text(change: float, *, in_db: bool) -> str:
+    """Write how far a value is from the expected one; empty where nothing is expected."""
+    if change != change:  # noqa: PLR0124 - nan: there is no baseline
+        return ""
+    return f"{signed(change)} dB" if in_db else f"{'+' if change > 0 else ''}{readable(change, 3)}"
+
+
+def fleet_page_html(fleet: Fleet, since: datetime | None = None, *, date: datetime | None = None) -> str:
+    """Return the page that says what changed in a fleet.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    since : datetime or None
+        In UTC; None: since ever.
+    date : datetime or None
+        Of the page; None: now.
+    """
+    changes = fleet_changes(fleet, since)
+    status = changes.status.head(MAX_POINTS).to_dict("records")
+    n_points = len(changes.status)
+    levels = changes.status["level"].value_counts()
+    standing = ", ".join(f"{levels[name]} {name}" for name in ("alarm", "warning", "ok") if name in levels)
+    return render(
+        "fleet.html.j2",
+        since=f"since {since:%Y-%m-%d %H:%M} UTC" if since is not None else "since the beginning",
+        date=(date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip(),
+        version=__version__,
+        summary=_summary(changes),
+        counts=f"{n_points} measuring points: {standing}." if n_points else "",
+        diagnoses=changes.diagnoses[:MAX_ROWS],
+        raised=[_row(change) for change in changes.raised[:MAX_ROWS]],
+        cleared=[_row(change) for change in changes.cleared[:MAX_ROWS]],
+        pictures=_pictures(fleet, changes.raised),
+        shifted=[_shift(row) for row in changes.shifted.head(MAX_ROWS).to_dict("records")],
+        failures=changes.failures,
+        status=[
+            {str(key): value for key, value in row.items()}
+            | {
+                "css_class": LEVEL_CLASSES[row["level"]],
+                "last": f"{row['last']:%Y-%m-%d %H:%M}",
+                "outcome": row["outcome"] or "–",
+                "trends": trends_text(row),
+            }
+            for row in status
+        ],
+        n_more=n_points - len(status),
+    )
+
+
+def write_fleet_page(fleet: Fleet, path: str | Path, since: datetime | None = None) -> Path:
+    """Write the page that `fleet_page_html` makes."""
+    return write_text(Path(path), fleet_page_html(fleet, since))
+
+
+def _summary(changes: FleetChanges) -> str:
+    n_alarms = sum(change.level == "alarm" and change.cleared is None for change in changes.raised)
+    n_warnings = sum(change.level == "warning" and change.cleared is None for change in changes.raised)
+    worse = sum(change.now in ("fault", "suspicion") for change in changes.diagnoses)
+    parts = [
+        f"{n} {name}{'s' * (n != 1)}"
+        for n, name in ((n_alarms, "new alarm"), (n_warnings, "new warning"), (len(changes.cleared), "cleared alarm"))
+        if n
+    ]
+    parts += [f"{worse} measuring point{'s' * (worse != 1)} with a new fault or suspicion"] if worse else []
+    parts += [f"{changes.n_failed} recording{'s' * (changes.n_failed != 1)} not analysed"] if changes.n_failed else []
+    n = changes.n_new
+    head = f"{n} new recording{'s' * (n != 1)}"
+    return f"{head}: {', '.join(parts)}." if parts else f"{head}; nothing changed."
+
+
+def _row(change: AlarmChange) -> AlarmRow:
+    unit = f" {unit_text(change.unit)}" if change.unit else ""
+    return AlarmRow(
+        change.level,
+        LEVEL_CLASSES[change.level],
+        " · ".join(part for part in (change.machine, change.point) if part),
+        change.name,
+        ", ".join(part for part in (change.place, change.channel, change.computed_on) if part),
+        readable(change.value, 4) + unit,
+        readable(change.expected, 4),
+        readable(change.upper_limit, 4),
+        change_text(change.change, in_db=change.in_db),
+        f"{change.raised:%Y-%m-%d}",
+        f"{change.cleared:%Y-%m-%d}" if change.cleared is not None else "",
+        change.basis,
+    )
+
+
+def _shift(row: Mapping[Any, Any]) -> dict[str, str]:
+    return {
+        "machine": " · ".join(part for part in (row["machine"], row["point"]) if part),
+        "name": row["name"],
+        "of": ", ".join(part for part in (row["place"], row["channel"], row["computed_on"]) if part),
+        "since": f"{row['changed']:%Y-%m-%d}",
+        "by": change_text(row["changed_by"], in_db=bool(row["in_db"])),
+    }
+
+
+def _pictures(fleet: Fleet, raised: Sequence[AlarmChange]) -> list[tuple[str, Picture]]:
+    """Return the trends of the largest alarms that stand, one of each measuring point first."""
+    chosen: dict[tuple[str, str], AlarmChange] = {}
+    for change in raised:
+        chosen.setdefault((change.machine, change.point), change)
+    result = []
+    for change in list(chosen.values())[:MAX_PICTURES]:
+        try:
+            found = fleet.trend(
+                change.machine,
+                change.name,
+                point=change.point,
+                channel=change.channel,
+                place=change.place,
+                computed_on=change.computed_on,
+            )
+        except InputError:  # a file was set aside meanwhile
+            continue
+        heading = " · ".join(part for part in (change.machine, change.point) if part)
+        result.append((heading, fleet_trend_picture(found[0])))
+    return result
