@@ -239,7 +239,8 @@ def cusum_threshold(run_length: float) -> float:
 def change_points(q: FloatArray, run_length: float) -> tuple[IntArray, IntArray]:
     """Return where each series first changed, and where that was noticed; -1 where it has not.
 
-    Two-sided CUSUM S = max(0, S + q - k), and likewise downwards; the change began where S last left zero.
+    Two-sided CUSUM S = max(0, S + q - k), and likewise downwards; the change began, since S last left zero, where a
+    step of the mean is likeliest.
 
     Parameters
     ----------
@@ -258,6 +259,11 @@ def change_points(q: FloatArray, run_length: float) -> tuple[IntArray, IntArray]
             total = np.maximum(0.0, total + step)
             first = (total > threshold) & ((noticed < 0) | (i < noticed))
             began, noticed = np.where(first, since, began), np.where(first, i, noticed)
+    for column in np.flatnonzero(noticed >= 0):
+        # Since it left zero, the place that makes a step of the mean likeliest: the sum may have crept up before it.
+        steps = np.nan_to_num(q[began[column] : noticed[column] + 1, column])[::-1]
+        likelihood = np.square(np.cumsum(steps)) / np.arange(1, len(steps) + 1)
+        began[column] = noticed[column] - int(np.argmax(likelihood))
     return began, noticed
 
 

@@ -1,0 +1,113 @@
+"""From recordings to alarms: raised, cleared, by zones, against a stated baseline, reported since last time."""
+
+from datetime import datetime
+
+import numpy as np
+import pytest
+
+from gearsig.errors import InputError
+from gearsig.fleet import Fleet, TrendSettings, fleet_changes, last_report, mark_reported, open_fleet
+from gearsig.report import fleet_page_html
+from gearsig.rig import MachineSize, OperatingPoint, Rig, Sensor, Shaft
+from tests.fleet.recordings import PATTERN
+
+pytest.importorskip("duckdb", reason="the extra fleet is not installed")
+pytest.importorskip("filelock", reason="the extra fleet is not installed")
+
+
+@pytest.fixture
+def fleet(make_recordings, tmp_path) -> Fleet:
+    """One machine that stays as it is, and one that is louder on two days."""
+    make_recordings("calm", [1.0] * 12)
+    data = make_recordings("loud", [1.0] * 8 + [4.0] * 2 + [1.0] * 4)
+    opened = open_fleet(tmp_path / "store", create=True)
+    opened.set(TrendSettings(n_baseline=8))
+    opened.add(data, pattern=PATTERN, n_processes=1)
+    return opened
+
+
+def test_an_alarm_is_raised_and_cleared(fleet):
+    trend = fleet.trend("loud", "rms")[0]
+    levels = list(trend.table["level"])
+    assert levels == ["ok"] * 8 + ["warning"] * 4 + ["ok"] * 2
+    assert list(trend.table["in_baseline"]) == [True] * 8 + [False] * 6
+    assert trend.changed == datetime(2026, 1, 9)
+    assert trend.basis == "statistical"
+    assert trend.table["expected"].iloc[-1] == pytest.approx(np.exp(np.log(trend.table["value"][:8]).mean()))
+    assert set(fleet.trend("calm", "rms")[0].table["level"]) == {"ok"}
+
+
+def test_status_has_the_worst_first(fleet, make_recordings, tmp_path):
+    data = make_recordings("broken", [1.0] * 8 + [30.0])
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    status = fleet.status()
+    assert list(status["machine"]) == ["broken", "calm", "loud"]
+    assert list(status["level"]) == ["alarm", "ok", "ok"]
+    assert list(status["n_recordings"]) == [9, 12, 14]
+    worst = fleet.series("broken").iloc[0]
+    assert worst["change"] == pytest.approx(20 * np.log10(30), abs=1.0)
+    again = open_fleet(tmp_path / "store").status()
+    assert again.equals(status)
+    (tmp_path / "store" / "trends.parquet").write_bytes(b"damaged")
+    assert fleet.status().equals(status)
+
+
+def test_a_stated_baseline_replaces_the_first_recordings(fleet):
+    fleet.set_baseline("loud", datetime(2026, 1, 9), datetime(2026, 1, 13))
+    trend = fleet.trend("loud", "rms")[0]
+    assert list(trend.table["in_baseline"]) == [False] * 8 + [True] * 5 + [False]
+    assert "none" in {t.basis for t in fleet.trend("loud", "rms")}  # five recordings are too few for a limit
+    with pytest.raises(InputError, match="rsm"):
+        fleet.trend("loud", "rsm")
+
+
+def test_zones_of_the_standard_apply_where_the_rig_says_the_machines_size(make_recordings, tmp_path):
+    """90 Hz of 1.4 m/s² rms is 2.5 mm/s: zone B of group 2 on a rigid foundation; more are C and D."""
+    data = make_recordings("fan", [2.0, 3.0, 8.0, 2.0])
+    rig = Rig(
+        name="fan",
+        shafts=(Shaft("shaft"),),
+        operating_point=OperatingPoint("shaft", 1500.0),
+        sensors=(Sensor("a1", "acceleration", "m/s^2"),),
+        machine=MachineSize(55.0, None, "rigid"),
+    )
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(data, pattern=PATTERN, rig=rig, n_processes=1)
+    trend = fleet.trend("fan", "overall velocity")[0]
+    assert trend.basis == "ISO 20816-3"
+    assert list(trend.table["level"]) == ["ok", "warning", "alarm", "alarm"]
+    assert (trend.table["high"].iloc[0], trend.table["alarm"].iloc[0]) == (2.8, 4.5)
+
+
+def test_changes_are_those_since_the_last_report(fleet, make_recordings):
+    first = fleet_changes(fleet)
+    assert (first.n_new, {c.machine for c in first.raised}) == (26, {"loud"})
+    assert all(c.cleared == datetime(2026, 1, 13) for c in first.raised if c.name == "rms")
+    assert last_report(fleet) is None
+    mark_reported(fleet)
+    since = last_report(fleet)
+    assert fleet_changes(fleet, since).n_new == 0
+    data = make_recordings("calm", [9.0], first=datetime(2026, 2, 1))
+    (data / "calm" / "DE_20260202.csv").write_text("<b>nothing</b>")
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    changes = fleet_changes(fleet, since)
+    assert (changes.n_new, changes.n_failed) == (2, 1)
+    assert {c.machine for c in changes.raised} == {"calm"}
+    page = fleet_page_html(fleet, since)
+    assert "<b>nothing" not in page
+    assert page.count("data:image/svg+xml") == 1
+
+
+def test_limits_are_closer_where_speed_is_accounted_for():
+    """Of levels that follow the speed squared."""
+    from gearsig.fleet import prediction_limits, regressors
+
+    random = np.random.default_rng(0)
+    speed = np.concatenate([random.uniform(1000, 1400, 20), [1390.0]])
+    y = (40 * np.log10(speed) + 0.2 * random.normal(size=21))[:, None]
+    baseline = np.arange(21) < 20
+    x, _, _ = regressors(speed, np.full(21, np.nan), baseline)
+    with_speed = prediction_limits(y, x, baseline, 1e-3)
+    without = prediction_limits(y, np.ones((21, 1)), baseline, 1e-3)
+    assert with_speed.high[-1] - with_speed.low[-1] < 0.3 * (without.high[-1] - without.low[-1])
+    assert with_speed.low[-1] < y[-1] < with_speed.high[-1]
