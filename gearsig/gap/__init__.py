@@ -78,7 +78,7 @@ from gearsig.gap._floors import (
 from gearsig.gap._gearless import Standing, beside_standing, standing_place, stood_out
 from gearsig.gap._inputs import GapRequest, read_gap_inputs, read_labelled
 from gearsig.gap._labelled import LabelledRecording, labelled_changes, with_labelled
-from gearsig.gap._next_recording import next_recordings
+from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._places import (
     all_round_spot,
     counted_against,
@@ -181,6 +181,7 @@ from gearsig.gap._types import (
     Interval,
     LabelledFacts,
     NextRecording,
+    NextStep,
     PlaceKind,
     Shrinkage,
     SpectrumCurves,
@@ -256,6 +257,7 @@ __all__ = [
     "Learned",
     "LinearRule",
     "NextRecording",
+    "NextStep",
     "ObservedChange",
     "OperatingCondition",
     "PlaceKind",
@@ -331,6 +333,7 @@ __all__ = [
     "mesh_spot",
     "mirrored",
     "next_recordings",
+    "next_steps",
     "odds_text",
     "once",
     "other_lines",

@@ -323,21 +323,22 @@ flanks and another path to the sensor change all teeth, some of them much."""
 def warnings_of(condition: Condition) -> list[str]:
     """Return what speaks strongly for a wrong rig file, or for recording and reference exchanged."""
     name, reference = condition.facts.name, condition.reference
-    texts = wrong_teeth(condition.now, name)
+    texts = wrong_teeth(condition.now, name, reference)
     if reference is None or texts:
         return texts
     return wrong_teeth(reference, f"The reference of {name}") or exchanged(condition.now, reference, name)
 
 
-def wrong_teeth(now: ReducedRecording, name: str) -> list[str]:
+def wrong_teeth(now: ReducedRecording, name: str, reference: ReducedRecording | None = None) -> list[str]:
     """Say so where a shaft's own mark shows that its gear has not the rig's teeth but another number.
 
     Where angle counts from a mark on the very shaft, its average holds for any teeth. Next to nothing of it must lie at
     the mesh harmonics of the rig's number of teeth, and most of it at those of another one; multiples and divisors of
-    the right number are not noticed.
+    the right number are not noticed. Where the healthy reference fits the rig's teeth, a damaged tooth is what repeats
+    otherwise, and nothing is said.
     """
     for side in (DRIVER, DRIVEN):
-        if not now.marks[side]:
+        if not now.marks[side] or (reference is not None and _fits(reference, side)):
             continue
         stated, shares = now.frame.teeth[side], _explained(now, side)
         best = max(shares, key=shares.__getitem__, default=stated)
@@ -350,6 +351,11 @@ def wrong_teeth(now: ReducedRecording, name: str) -> list[str]:
             )
             return [remark]
     return []
+
+
+def _fits(now: ReducedRecording, side: int) -> bool:
+    """Return whether a gear's mesh harmonics hold as much of its average as those of the right number do."""
+    return _explained(now, side).get(now.frame.teeth[side], 0.0) >= HARDLY_EXPLAINED
 
 
 def _explained(now: ReducedRecording, side: int) -> dict[int, float]:
@@ -578,10 +584,11 @@ def _condition(
 ) -> tuple[Condition, list[str]]:
     """Return a recording beside its reference and the healthy twin at its point, and what is worth a remark."""
     name, (now, notices) = recording.recording.name, _reduced(recording)
-    notices += strange_teeth(now, name)
     facts = facts_of(recording, now, twin)
     notices += _assumed(recording, facts)
     match, why = matching_reference(now, recording.rig, healthy)
+    if match is None or strange_teeth(match.reduced, match.name):  # a healthy one that fits: damage repeats otherwise
+        notices += strange_teeth(now, name)
     if why:
         notices.append(f"{name} is compared with the simulation: {why}.")
     if match is not None:

@@ -23,7 +23,7 @@ from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import evidence_of
 from gearsig.gap._gearless import beside_standing, diagnose_gearless, standing_place, stood_out
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
-from gearsig.gap._next_recording import next_recordings
+from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._places import counted_against, gap_places, ranked_places
 from gearsig.gap._population import load_learned
 from gearsig.gap._rigs import is_gearless, twin_rig, with_stage
@@ -254,6 +254,14 @@ def diagnose_gap(
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
         warnings=warnings,
         labelled=labels,
+        next_steps=next_steps(
+            outcome,
+            causes,
+            [condition.facts.point for condition in conditions],
+            has_reference=all(condition.reference is not None for condition in conditions),
+            has_encoders=sum(channel.quantity == "angle" for channel in recording.recording.channels) > 1,
+            is_labelled=labels is not None,
+        ),
     )
 
 

@@ -372,6 +372,14 @@ def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: boo
 
 def _strange_words(comparison: ComparedPair, order: float) -> str:
     """Return whose order it is by itself, without a family of multiples."""
+    frame, step = comparison.now.frame, 1.5 * comparison.now.order_step
+    mesh = frame.teeth[DRIVER]
+    if abs(order - max(round(order / mesh), 1) * mesh) <= step:
+        k = max(round(order / mesh), 1)
+        return f"at order {order:.4g}, {'that' if k == 1 else f'{k} times that'} of the mesh"
+    for side, turns in enumerate(frame.shaft_orders):
+        if abs(order - max(round(order / turns), 1) * turns) <= min(step, 0.1 * turns):
+            return f"at order {order:.4g}, a multiple of {shaft_words(frame, side)}"
     for bearing in comparison.now.frame.bearings:
         for kind, (attribute, factor) in RACES.items():
             if -SLIP < order / (getattr(bearing, attribute) * factor) - 1.0 < UPWARDS:

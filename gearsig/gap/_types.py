@@ -411,6 +411,21 @@ class NextRecording:
 
 
 @dataclass(frozen=True)
+class NextStep:
+    """Something to do next that no simulation was needed for.
+
+    Parameters
+    ----------
+    code : str
+        "healthy", "encoders", "slow_loads", "run_up" or "label".
+    text : str
+    """
+
+    code: str
+    text: str
+
+
+@dataclass(frozen=True)
 class ConditionFacts:
     """One recording that was diagnosed.
 
@@ -506,6 +521,8 @@ class GapReport:
         The simulator with the effect fitted, as a preset; empty where none is named.
     labelled : LabelledFacts or None
         What labelled recordings of the rig changed; None: none were given.
+    next_steps : tuple of NextStep
+        What would help most besides, best first.
     """
 
     rig: str
@@ -528,6 +545,7 @@ class GapReport:
     twin_toml: str = field(default="", repr=False)
     warnings: tuple[str, ...] = ()
     labelled: LabelledFacts | None = None
+    next_steps: tuple[NextStep, ...] = ()
 
     @property
     def kind(self) -> GapKind | None:

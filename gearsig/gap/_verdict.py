@@ -7,6 +7,7 @@ from math import isfinite
 
 import numpy as np
 
+from gearsig.gap._next_recording import HEALTHY_MACHINE, STEPS
 from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import (
     LIKELIER_THAN_NOT,
@@ -37,7 +38,6 @@ NO_SIMULATION = (
 TOGETHER, MAX_RIVALS = 0.9, 4
 """What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
 more of them than anybody would look at."""
-HEALTHY_MACHINE = "the same machine when it was healthy"
 
 
 def _where(report: GapReport) -> str:
@@ -214,9 +214,9 @@ def _how_far(report: GapReport) -> str:
 
 def _next(report: GapReport) -> str:
     best = report.next_recordings[0].text if report.next_recordings else ""
-    if not report.references:
-        first = f"{HEALTHY_MACHINE}, at the same speed and load; then only what has changed since counts."
-        return f"Next: {first} Or {best}" if best else f"Next: {first}"
+    steps = [step.text for step in report.next_steps] or ([] if report.references else [STEPS["healthy"]])
+    if steps:
+        return f"Next: {steps[0]}. Or {best}" if best else f"Next: {steps[0]}."
     if best:
         return f"Next: {best}"
     if report.outcome in (GapOutcome.UNKNOWN, GapOutcome.UNDECIDED):

@@ -309,6 +309,8 @@ def _show_how_far(finished: Finished) -> None:
 def _show_next(finished: Finished) -> None:
     report = finished.report
     rows = next_rows(report)
+    for step in report.next_steps:
+        st.markdown(as_typed(f"- {step.text[:1].upper()}{step.text[1:]}."))
     if rows:
         st.markdown("What to record next, to tell the likeliest causes apart. Distances are in structural floors.")
         columns = zip(("at", "tells apart", "distance there", "now"), zip(*rows, strict=True), strict=True)
