@@ -260,6 +260,8 @@ class Attribution(Generic[TriedT]):
         Effects that the forests do not know, the user's own: each was to be tried.
     labelled : LabelledEvidence or None
         What labelled recordings of the rig say.
+    courses : mapping
+        Effect → log-likelihood of the transmission error's change, of faults of teeth; empty without encoders.
     """
 
     evidence: Mapping[str, float]
@@ -269,6 +271,7 @@ class Attribution(Generic[TriedT]):
     n_conditions: int = 1
     unheard_of: tuple[str, ...] = ()
     labelled: LabelledEvidence | None = None
+    courses: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def scores(self) -> dict[str, float]:
@@ -289,7 +292,7 @@ class Attribution(Generic[TriedT]):
         )
         if self.labelled is not None:
             found = with_labelled(found, self.labelled.ratios, self.labelled.alike)
-        found = told_apart(found, self.matches)
+        found = told_apart(told_apart(found, self.matches), self.courses)
         return shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
 
 
@@ -298,10 +301,10 @@ MAX_TRIED, MIN_TRIED_PROBABILITY = 3, 0.06
 
 
 def told_apart(probabilities: Mapping[str, float], matches: Mapping[str, float]) -> dict[str, float]:
-    """Return the probabilities with those of faults of one tooth parted anew by their waveforms, likeliest first.
+    """Return the probabilities with those of faults of teeth parted anew by what tells them apart, likeliest first.
 
-    p_i ∝ p_i L_i among those that were tried; what they have together stays: the waveform tells how a tooth is damaged,
-    and that one is, the features tell.
+    p_i ∝ p_i L_i among those that have a likelihood; what they have together stays: a waveform tells how a tooth is
+    damaged, and that one is, the features tell.
 
     Parameters
     ----------
@@ -345,6 +348,7 @@ def attribute(
     max_tried: int = MAX_TRIED,
     fresh: bool = False,
     labelled: Sequence[LabelledChange] = (),
+    courses: Mapping[str, float] = MappingProxyType({}),
 ) -> Attribution[TriedEffect]:
     """Ask the forests and what is labelled, then simulate, fit and score the likeliest effects, `max_tried` at most.
 
@@ -360,7 +364,8 @@ def attribute(
     size = max(condition.size.structural.value for condition in conditions)
     calibration = load_gap_calibration(with_reference=with_reference)
     evidence = labelled_evidence(conditions, _loads(conditions), labelled) if labelled else None
-    asked = Attribution[TriedEffect](forest, {}, calibration, size, len(conditions), labelled=evidence)
+    told = {name: value for name, value in courses.items() if name in forest}
+    asked = Attribution[TriedEffect](forest, {}, calibration, size, len(conditions), labelled=evidence, courses=told)
     first = asked.probabilities()
     likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
     heard_of = _known_to_forests(conditions)

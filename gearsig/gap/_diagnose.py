@@ -28,6 +28,7 @@ from gearsig.gap._places import counted_against, gap_places, ranked_places
 from gearsig.gap._population import load_learned
 from gearsig.gap._rigs import is_gearless, twin_rig, with_stage
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
+from gearsig.gap._tooth_error import ToothErrorEvidence, mean_log_likelihoods, tooth_error_evidence
 from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, observed_changes, steps_of
 from gearsig.gap._types import (
     NAMING,
@@ -166,6 +167,7 @@ def diagnose_gap(
     # 4. Which effect: what the forests and labelled recordings say, and of the likeliest what trials on the twin say.
     tell("recognising", 0.2)
     labelled, left_out = labelled_changes(learn, healthy, conditions, twin, cache, fresh=fresh)
+    courses = _courses(conditions, recordings, references)
     attribution = attribute(
         conditions,
         known,
@@ -175,6 +177,7 @@ def diagnose_gap(
         lambda what, done: tell(what, 0.25 + 0.55 * done),
         fresh=fresh,
         labelled=labelled,
+        courses=mean_log_likelihoods(courses),
     )
     tried, gap = attribution.tried, _places(clearest)
     probabilities = _weighed(attribution, clearest, known, gap)
@@ -250,6 +253,7 @@ def diagnose_gap(
             *remarks,
             *(depths or _of_the_fit(named)),
             *_of_the_waveforms(tried, known),
+            *(_of_the_encoders(courses, known) if named is not None else ()),
         ),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
         warnings=warnings,
@@ -383,6 +387,33 @@ def _of_the_waveforms(tried: Mapping[str, TriedEffect], known: Mapping[str, GapE
     meant = "the highest is likeliest" if told else "too little to part them: the twin is not like this machine"
     return [
         f"As a waveform beside the mesh harmonics, the recorded change correlates with the twin's: {seen}; {meant}."
+    ]
+
+
+def _courses(
+    conditions: Sequence[Condition], recordings: Sequence[Recording], references: Sequence[Recording]
+) -> list[ToothErrorEvidence]:
+    """Return what encoders say, of the conditions that have a reference and encoders in both."""
+    of = {one.name: one for one in (*references, *recordings)}
+    pairs = [(c.facts.name, c.facts.reference) for c in conditions if c.facts.reference]
+    found = [tooth_error_evidence(of[now], of[healthy]) for now, healthy in pairs]
+    return [evidence for evidence in found if evidence is not None]
+
+
+def _of_the_encoders(courses: Sequence[ToothErrorEvidence], known: Mapping[str, GapEffect]) -> list[str]:
+    """Say what the transmission error tells, and where it tells nothing, what would."""
+    if not courses:
+        return []
+    clearest = max(courses, key=lambda one: one.rms_um)
+    changed = f"The transmission error by the encoders changed by {clearest.rms_um:.2g} µm rms where it changed most"
+    if all(one.is_unlike_any for one in courses):
+        slower = "At a few revolutions per second or less its course tells crack, spall and chip apart."
+        return [f"{changed}, which at this speed tells no fault from another: the drive swings along. {slower}"]
+    levels = ToothErrorEvidence(mean_log_likelihoods(courses), clearest.rms_um, clearest.gear).probabilities
+    ranked = sorted(levels.items(), key=lambda item: -item[1])
+    likely = ", ".join(f"{known[name].title} {p:.0%}" for name, p in ranked if p >= 0.05 and name in known)
+    return [
+        f"{changed}, on the {clearest.gear}'s side; its course alone, all faults of teeth as likely before: {likely}."
     ]
 
 

@@ -1,0 +1,79 @@
+"""Faults of teeth by the transmission error: what its course is described by, and how likely each makes it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gearsig.gap import TOOTH_FAULTS, KnownCourses, ToothErrorChange, course_descriptors, tooth_error_evidence
+from gearsig.recording import Recording
+from sims.cracked import CrackedPair
+from sims.effects import EffectSetting
+from sims.machine import Operation
+
+STEPS, TEETH = 32, 20
+
+
+def change(seed: int = 0) -> ToothErrorChange:
+    """A tooth that gives way for 1.2 pitches, more towards the end."""
+    rng = np.random.default_rng(seed)
+    wave = 0.02 * rng.standard_normal(TEETH * STEPS)
+    place = np.arange(38) / 38.0
+    wave[200:238] += np.sin(np.pi * place) ** 2 * (1.0 + place)
+    mesh = np.cos(2.0 * np.pi * (np.arange(STEPS) / STEPS - 0.3))
+    return ToothErrorChange(0, wave.reshape(TEETH, STEPS), mesh, 1.0, 0.01)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.integers(0, TEETH - 1), st.floats(0.1, 50.0))
+def test_descriptors_know_neither_the_tooth_nor_the_size(teeth: int, factor: float) -> None:
+    made = change()
+    other = replace(made, pattern_um=factor * np.roll(made.pattern_um, teeth, axis=0))
+    np.testing.assert_allclose(course_descriptors(other), course_descriptors(made), atol=1e-6)
+
+
+def test_the_driven_gear_is_read_backwards() -> None:
+    """Its contact runs from tip to root; a step of the mean is between readings: 1/32 of a pitch."""
+    made = change()
+    backwards = replace(
+        made, side=1, pattern_um=made.pattern_um.ravel()[::-1].reshape(TEETH, STEPS), mesh_um=made.mesh_um[::-1]
+    )
+    here, there = course_descriptors(made), course_descriptors(backwards)
+    np.testing.assert_allclose(there, here, atol=0.15)
+
+
+def test_a_known_course_is_told_and_a_strange_one_is_not() -> None:
+    rng = np.random.default_rng(1)
+    centres = 3.0 * rng.standard_normal((4, 17))
+    rows = np.concatenate([centre + rng.standard_normal((60, 17)) for centre in centres])
+    known = KnownCourses(rows, np.repeat(TOOTH_FAULTS, 60))
+    for name, centre in zip(TOOTH_FAULTS, centres, strict=True):
+        said = known.log_likelihoods(centre)
+        assert max(said, key=said.__getitem__) == name
+    far = [*known.log_likelihoods(centres.mean(axis=0) + 100.0).values()]
+    assert np.ptp(far) == pytest.approx(0.0, abs=1e-9)
+
+
+def recorded(*settings: EffectSetting) -> Recording:
+    return CrackedPair().simulate(
+        {"encoder_counts": 200_000},
+        settings,
+        Operation.steady(90.0, 110.0),
+        np.random.default_rng(1),
+        preset="published_55_75",
+        duration_s=5.0,
+    )
+
+
+def test_encoders_name_a_crack_at_low_speed() -> None:
+    healthy = recorded()
+    said = tooth_error_evidence(recorded(EffectSetting("root_crack", 3.0, {"gear": "driver", "tooth": 7.0})), healthy)
+    assert said is not None
+    assert said.gear == "driver"
+    assert max(said.probabilities, key=said.probabilities.__getitem__) == "root_crack"
+    assert said.probabilities["root_crack"] > 0.7
+    assert tooth_error_evidence(healthy.between(0.0, 2.5), healthy.between(2.5, 5.0)) is None
