@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import exp, log, log10, pi, sqrt
+from math import exp, hypot, log, log10, pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -93,10 +93,10 @@ def tooth_error_change(now: TransmissionError, healthy: TransmissionError) -> To
     changes = []
     for side in (0, 1):
         here, before = (_resampled((t.driver_um, t.driven_um)[side]) for t in (now, healthy))
-        error = np.hypot(*(float(np.mean((t.driver_error_um, t.driven_error_um)[side])) for t in (now, healthy)))
+        errors = [float(np.mean((t.driver_error_um, t.driven_error_um)[side])) for t in (now, healthy)]
         pattern = here - _turned(before, here)
         rms = sqrt(float(_window_energy(_banded(pattern, LOWEST_ORDER)).max()) / WINDOW)
-        changes.append(ToothErrorChange(side, pattern, _resampled(healthy.mesh_um[None])[0], rms, float(error)))
+        changes.append(ToothErrorChange(side, pattern, _resampled(healthy.mesh_um[None])[0], rms, hypot(*errors)))
     return max(changes, key=lambda change: change.rms_um)
 
 

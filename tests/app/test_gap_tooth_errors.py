@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from app.studies.gap.tooth_errors import SIMULATORS, courses_of, named
+from gearsig.gap import KnownCourses
 
 
 @pytest.fixture(scope="module")
-def courses():
+def courses() -> dict[str, KnownCourses]:
     return {name: courses_of(name, 40) for name in SIMULATORS}
 
 
 @pytest.mark.parametrize("left_out", [*SIMULATORS])
-def test_faults_of_a_simulator_left_out_are_named(courses, left_out):
+def test_faults_of_a_simulator_left_out_are_named(courses: dict[str, KnownCourses], left_out: str) -> None:
     """By chance one in four; 0.87 and 0.82 with 150 of each."""
     (other,) = (own for name, own in courses.items() if name != left_out)
     own = courses[left_out]

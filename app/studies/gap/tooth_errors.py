@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import exp, log
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import typer
@@ -81,14 +82,15 @@ def shared_load(fault: str, rng: np.random.Generator) -> ToothErrorChange:
     teeth = first, int(np.clip(round(first * rng.uniform(0.8, 2.6)), 18, 100))
     module = float(rng.choice((1.5, 2.0, 2.5, 3.0, 4.0)))
     width = module * rng.uniform(6.0, 12.0)
-    pair = PairGeometry(*(GearGeometry(z, module, face_width_mm=width) for z in teeth))
+    driver, driven = (GearGeometry(z, module, face_width_mm=width) for z in teeth)
+    pair = PairGeometry(driver, driven)
     load = log_uniform(rng, *LOAD_N_PER_MM2) * module
     relief = 0.0 if rng.uniform() < 0.25 else load / 14.0 * rng.uniform(0.2, 1.4)
     flank = FlankDeviation(tip_relief_um=relief, tip_relief_length_mm=module * rng.uniform(0.7, 1.5))
     healthy = GearMesh(pair, flank_1=flank, flank_2=flank, contact_law="load-dependent")
     side = int(rng.integers(2))
-    faulty = replace(healthy, **_fault(fault, (pair.driver, pair.driven)[side], flank, side + 1, rng))
-    torque = load * width * pair.driver.base_radius_mm * 1e-3
+    faulty = replace(healthy, **_fault(fault, (driver, driven)[side], flank, side + 1, rng))
+    torque = load * width * driver.base_radius_mm * 1e-3
 
     def error_um(mesh: GearMesh) -> FloatArray:
         return 1e6 * share_torque(mesh, torque, _cycles(teeth[side])).transmission_error_m
@@ -98,7 +100,7 @@ def shared_load(fault: str, rng: np.random.Generator) -> ToothErrorChange:
 
 def _fault(
     name: str, gear: GearGeometry, flank: FlankDeviation, number: int, rng: np.random.Generator
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Return the fields of a mesh that change."""
     module, width = gear.module_mm, gear.face_width_mm
     if name == "root_crack":
@@ -220,8 +222,8 @@ def blind(n_each: int) -> None:
                 continue
             likeliest = max(said.log_likelihoods, key=said.log_likelihoods.__getitem__)
             rows.append((fault, likeliest, said.probabilities[likeliest]))
-    truth, likeliest, probability = (np.array(column) for column in zip(*rows, strict=True))
-    _told(f"independent rig, {unlike} unlike any or not seen", truth, likeliest, probability)
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    _told(f"independent rig, {unlike} unlike any or not seen", columns[0], columns[1], columns[2])
 
 
 def main() -> None:
