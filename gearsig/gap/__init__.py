@@ -77,7 +77,7 @@ from gearsig.gap._floors import (
 )
 from gearsig.gap._gearless import Standing, beside_standing, standing_place, stood_out
 from gearsig.gap._inputs import GapRequest, read_gap_inputs, read_labelled
-from gearsig.gap._labelled import LabelledRecording, labelled_changes, with_labelled
+from gearsig.gap._labelled import LabelledRecording, labelled_changes, labelled_support, with_labelled
 from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._places import (
     all_round_spot,
@@ -123,6 +123,7 @@ from gearsig.gap._recognition import (
     rule_strengths,
     textbook_rules,
     textbook_strengths,
+    within_reach,
     write_learned,
 )
 from gearsig.gap._reduction import (
@@ -339,6 +340,7 @@ __all__ = [
     "is_calibrated",
     "joint_probabilities",
     "labelled_changes",
+    "labelled_support",
     "learn",
     "lines_beyond",
     "load_gap_calibration",
@@ -403,6 +405,7 @@ __all__ = [
     "with_common_channels",
     "with_labelled",
     "with_stage",
+    "within_reach",
     "within_the_floor",
     "without_machines_of",
     "write_learned",

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gearsig.cache import keep, read_arrays
+from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap._change import change_features, difference_features
 from gearsig.gap._conditions import (
@@ -210,8 +211,19 @@ def _kept(folder: Path, key: str, label: str) -> LabelledChange | None:
 
 
 WEIGHT = 0.2
-"""Of the log-likelihood ratio: what differs from recording to recording of one effect, place and severity foremost, is
-no normal scatter, and its directions are not independent."""
+"""Of a log-likelihood ratio: its directions are not independent. On a simulator left out log loss with two labelled
+recordings of each effect is 0.89, 0.81, 0.92 with 0.1, 0.2, 0.4 (58 cases), and 1.21 without."""
+
+
+def labelled_support(log_ratios: FloatArray) -> float:
+    """Return ln of the mean over a label's recordings of r^w: the nearest of them speaks loudest.
+
+    They are kept apart, for one effect at two places, or of two severities, looks like neither in the middle.
+    """
+    weighed = WEIGHT * log_ratios
+    top = float(weighed.max())
+    return top + float(np.log(np.mean(np.exp(weighed - top))))
+
 
 SAME_SPEED = 1.25
 """Ratio of speeds up to which recordings of a label are compared first."""
@@ -226,7 +238,7 @@ class LabelledEvidence:
     counts : mapping
         Label → recordings.
     ratios : mapping
-        Label → ln p(x | it, its labelled recordings) − ln p(x | it), mean over the operating conditions.
+        Label → `labelled_support`, mean over the operating conditions.
     alike : mapping
         Label that nothing was learned of → how far recognition says the same of these recordings as of those, 0 to 1.
     """
@@ -254,7 +266,7 @@ def labelled_evidence(
             if not near:
                 continue
             rows = np.array([within_reach(recogniser.input_row(one.changes[way], load)) for one in near])
-            ratios[label].append(recogniser.labels.log_ratio(row, rows, label))
+            ratios[label].append(labelled_support(recogniser.labels.log_ratios(row, rows, label)))
             if label not in recogniser.causes:
                 there = [recogniser.probabilities(one.changes[way], load) for one in near]
                 mean = {name: float(np.mean([p[name] for p in there])) for name in here}
@@ -269,9 +281,9 @@ def _speed_ratio(one: LabelledChange, condition: Condition) -> float:
 
 
 def with_labelled(
-    probabilities: Mapping[str, float], ratios: Mapping[str, float], alike: Mapping[str, float], weight: float = WEIGHT
+    probabilities: Mapping[str, float], ratios: Mapping[str, float], alike: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the probabilities with what labelled recordings say, likeliest first: p_c ∝ p_c exp(w ln r_c).
+    """Return the probabilities with what labelled recordings say, likeliest first: p_c ∝ p_c exp(s_c).
 
     A label that nothing was learned of enters with p = max_c p_c times how much recognition says the same of the
     recording as of those with that label.
@@ -281,15 +293,13 @@ def with_labelled(
     probabilities : mapping
         Cause → probability.
     ratios : mapping
-        Label → log-likelihood ratio, see `LabelSpace.log_ratio`.
+        Label → s, see `labelled_support`.
     alike : mapping
         Label that nothing was learned of → 0 … 1.
-    weight : float
-        w.
     """
     top = max(probabilities.values())
     prior = dict(probabilities) | {name: top * share for name, share in alike.items()}
-    levels = {name: np.log(max(p, 1e-9)) + weight * ratios.get(name, 0.0) for name, p in prior.items()}
+    levels = {name: np.log(max(p, 1e-9)) + ratios.get(name, 0.0) for name, p in prior.items()}
     highest = max(levels.values())
     weights = {name: float(np.exp(level - highest)) for name, level in levels.items()}
     total = sum(weights.values())

@@ -18,6 +18,10 @@ from gearsig.gap._words import point_text, same_condition
 FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
 """Speeds and torques that are looked at, over those of the first recording, beside the recordings' own."""
 
+OF_A_TRIAL = 0.6
+"""Length of these runs over that of a trial: only how far two effects lie apart is asked, and a third of a diagnosis's
+time went into it."""
+
 ENOUGH = 1.2
 """Times the distance that there is now, from which a further point is worth naming."""
 
@@ -56,7 +60,11 @@ def next_recordings(
     points = _distinct([*here, *(_rounded(v * base.point.speed_rpm, t * base.point.torque_nm) for v, t in FACTORS)])
     runs = [
         TwinRun(
-            measured, p, conditions[0].trial_s * max(1.0, base.point.speed_rpm / p.speed_rpm), base.sampling_rate_hz, 1
+            measured,
+            p,
+            OF_A_TRIAL * conditions[0].trial_s * max(1.0, base.point.speed_rpm / p.speed_rpm),
+            base.sampling_rate_hz,
+            1,
         )
         for p in points
     ]

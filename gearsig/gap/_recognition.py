@@ -137,9 +137,9 @@ MIN_BETWEEN = 0.05
 class LabelSpace:
     """Directions in which a machine's effects lie apart, x = Dᵀ z; one effect's recordings scatter by 1 in each.
 
-    x ~ N(μ, 1), μ ~ N(m_c, b): cause c of one machine lies at μ, of all machines about m_c. With n labelled
-    recordings of mean x̄ of it, μ ~ N((m_c/b + n x̄)/(1/b + n), 1/(1/b + n)), and a further one is as likely as that
-    and the unit scatter together make it.
+    x ~ (μ, 1), μ ~ (m_c, b): cause c of one machine lies at μ, of all machines about m_c. With a labelled recording x_1
+    of it, μ ~ ((m_c + b x_1)/(1 + b), b/(1 + b)), and a further one is as likely as that and the unit scatter together
+    make it, with Student's tails.
 
     Source: S. Ioffe, "Probabilistic linear discriminant analysis", ECCV 2006.
 
@@ -161,8 +161,8 @@ class LabelSpace:
     between: FloatArray
     whole: FloatArray
 
-    def log_ratio(self, row: FloatArray, rows: FloatArray, cause: str) -> float:
-        """Return ln p(x | cause, its labelled recordings) − ln p(x | cause).
+    def log_ratios(self, row: FloatArray, rows: FloatArray, cause: str) -> FloatArray:
+        """Return ln p(x | cause, a labelled recording of it) − ln p(x | cause) by each of the labelled ones, (n,).
 
         Parameters
         ----------
@@ -176,12 +176,22 @@ class LabelSpace:
         known = cause in self.causes and cause != UNKNOWN
         mean = self.means[self.causes.index(cause)] if known else self.whole[0]
         between = self.between if known else self.whole[1]
-        x, n = row @ self.directions, len(rows)
-        variance = 1.0 / (1.0 / between + n)
-        centre = variance * (mean / between + (rows @ self.directions).sum(axis=0))
-        labelled = (x - centre) ** 2 / (1.0 + variance) + np.log(1.0 + variance)
-        alone = (x - mean) ** 2 / (1.0 + between) + np.log(1.0 + between)
-        return float(0.5 * np.sum(alone - labelled))
+        x, variance = row @ self.directions, between / (1.0 + between)
+        centres = (mean + between * (rows @ self.directions)) / (1.0 + between)
+        ratios: FloatArray = np.sum(_log_student(x - centres, 1.0 + variance), axis=1) - np.sum(
+            _log_student(x - mean, 1.0 + between)
+        )
+        return ratios
+
+
+DEGREES = 3.0
+"""Of freedom: place and severity differ between recordings, which is no normal scatter. On a simulator left out
+a normal one is too sure from the first labelled recording on (log loss 1.21 → 1.58), Student's is not (0.95)."""
+
+
+def _log_student(away: FloatArray, variance: FloatArray) -> FloatArray:
+    """Return the logarithm of Student's density but for a constant, with a normal one's variance as squared scale."""
+    return np.asarray(-0.5 * ((DEGREES + 1.0) * np.log1p(away**2 / variance / DEGREES) + np.log(variance)))
 
 
 def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArray[np.int64]) -> LabelSpace:

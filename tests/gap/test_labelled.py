@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import t as student
 
 from gearsig.errors import InputError
 from gearsig.gap import (
@@ -21,6 +21,7 @@ from gearsig.gap import (
     conditions_of,
     fit_label_space,
     labelled_changes,
+    labelled_support,
     read_labelled,
     with_labelled,
 )
@@ -35,23 +36,31 @@ SPACE = LabelSpace(
 )
 
 
-@pytest.mark.parametrize("n", [1, 2, 4])
-def test_the_ratio_is_that_of_jointly_normal_recordings(n: int) -> None:
-    rng = np.random.default_rng(n)
-    rows, row = rng.normal(size=(n, 2)), rng.normal(size=2)
-    expected = 0.0
-    for k, between in enumerate(SPACE.between):
-        both = multivariate_normal(np.zeros(n + 1), between * np.ones((n + 1, n + 1)) + np.eye(n + 1))
-        alone = multivariate_normal(np.zeros(n), between * np.ones((n, n)) + np.eye(n))
-        further = multivariate_normal(0.0, between + 1.0)
-        expected += both.logpdf([*rows[:, k], row[k]]) - alone.logpdf(rows[:, k]) - further.logpdf(row[k])
-    assert SPACE.log_ratio(row, rows, "crack") == pytest.approx(expected)
+def test_the_ratio_is_that_of_students_densities_about_what_the_label_lets_expect() -> None:
+    rng = np.random.default_rng(0)
+    rows, row = 3.0 * rng.normal(size=(4, 2)), 3.0 * rng.normal(size=2)
+    found = SPACE.log_ratios(row, rows, "crack")
+    for labelled, ratio in zip(rows, found, strict=True):
+        expected = 0.0
+        for k, between in enumerate(SPACE.between):
+            joint = np.array([[between + 1.0, between], [between, between + 1.0]])  # of both, by the common place
+            centre = joint[0, 1] / joint[1, 1] * labelled[k]
+            variance = joint[0, 0] - joint[0, 1] ** 2 / joint[1, 1]
+            expected += student.logpdf(row[k], 3.0, centre, variance**0.5)
+            expected -= student.logpdf(row[k], 3.0, 0.0, (between + 1.0) ** 0.5)
+        assert ratio == pytest.approx(expected)
+
+
+def test_the_nearest_of_a_labels_recordings_speaks_loudest() -> None:
+    near, far = labelled_support(np.array([10.0])), labelled_support(np.array([-50.0]))
+    assert near > labelled_support(np.array([10.0, -50.0])) > near - np.log(2.0) - 1e-9 > far
+    assert labelled_support(np.array([10.0, 10.0])) == pytest.approx(near)
 
 
 def test_a_label_that_is_unheard_of_may_lie_anywhere() -> None:
-    rows = np.full((2, 2), 5.0)
-    assert SPACE.log_ratio(np.full(2, 5.0), rows, "mine") > 2.0
-    assert SPACE.log_ratio(np.full(2, -5.0), rows, "mine") < 0.0
+    rows = np.full((1, 2), 5.0)
+    assert SPACE.log_ratios(np.full(2, 5.0), rows, "mine")[0] > 0.5
+    assert SPACE.log_ratios(np.full(2, -5.0), rows, "mine")[0] < 0.0
 
 
 def test_directions_are_those_in_which_machines_differ_and_recordings_do_not() -> None:
@@ -71,7 +80,7 @@ def test_what_says_nothing_changes_nothing_and_sums_stay() -> None:
     given = {"crack": 0.6, NONE: 0.3, UNKNOWN: 0.1}
     assert with_labelled(given, {}, {}) == pytest.approx(given)
     assert with_labelled(given, dict.fromkeys(given, 7.0), {}) == pytest.approx(given)
-    found = with_labelled(given, {NONE: 10.0, "mine": 20.0}, {"mine": 0.5})
+    found = with_labelled(given, {NONE: 2.0, "mine": 4.0}, {"mine": 0.5})
     assert sum(found.values()) == pytest.approx(1.0)
     assert next(iter(found)) == "mine"
     assert found[NONE] > found["crack"]

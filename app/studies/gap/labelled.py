@@ -9,12 +9,14 @@ others are diagnosed.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import typer
 
 from app.studies.gap.by_hand import rig_of, with_foreign_vibration
 from app.studies.gap.machines import MOUNTED_ANEW_SHARE
@@ -31,15 +33,25 @@ from app.studies.gap.rows import (
     write,
 )
 from app.studies.pool import answers_of
+from gearsig.checks import FloatArray
 from gearsig.gap import (
     INDEPENDENT,
     NONE,
     UNKNOWN,
+    Features,
     OperatingCondition,
+    Recogniser,
     ReducedRecording,
+    labelled_support,
+    load_gap_calibration,
+    load_learned,
     reduce_recording,
     run_length_s,
+    soft_size,
     with_channels_of,
+    with_labelled,
+    within_reach,
+    without_machines_of,
 )
 from gearsig.recording import Recording
 from sims.blind import CATALOGUE, MECHANICAL, Scene, draw_case, measure, run, scene_of
@@ -157,15 +169,88 @@ def samples_of_job(job: tuple[str, int]) -> list[PopulationSample]:
     return _MAKE[name](index)
 
 
+# --------------------
+# One, two, four of each effect labelled, the others diagnosed.
+# --------------------
+
+
+COUNTS, STRONG = (0, 1, 2, 4), 3.0
+"""Labelled recordings of each effect; structural floors from which an effect counts as strong."""
+
+
+def score(path: Path) -> None:
+    """Print how often the likeliest effect is the true one, by how many recordings of each are labelled."""
+    table = np.load(path, allow_pickle=False)
+    simulators = table["simulator"].astype(str)
+    for simulator in np.unique(simulators):
+        with without_machines_of(simulator):
+            recogniser = load_learned().recognisers[True]
+        rows = np.flatnonzero(simulators == simulator)
+        cases = [_case(table, int(row), recogniser) for row in rows]
+        for n in COUNTS:
+            typer.echo(f"{simulator}, {n} labelled of each effect: {_scored(cases, recogniser, n)}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Case:
+    machine: int
+    cause: str
+    size: float
+    row: FloatArray
+    probabilities: Mapping[str, float]
+
+
+def _case(table: Mapping[str, Any], i: int, recogniser: Recogniser) -> _Case:
+    values, scatter = (table[key][i].astype(np.float64) for key in ("change", "change_scatter"))
+    change, load = Features(recogniser.floor.names, values, scatter), float(table["load_n_per_mm"][i])
+    floor = recogniser.floor
+    size = soft_size(floor.names, floor.over(change)) / floor.whole_of(floor.names)
+    calibration = load_gap_calibration(with_reference=True)
+    found = calibration.probabilities(recogniser.probabilities(change, load), {}, size)
+    row = within_reach(recogniser.input_row(change, load))
+    return _Case(int(table["rig"][i]), str(table["label"][i]), size, row, found)
+
+
+def _scored(cases: Sequence[_Case], recogniser: Recogniser, n: int) -> str:
+    rng = np.random.default_rng(SEED)
+    right, sure, loss = list[bool](), list[bool](), list[float]()
+    for case in cases:
+        if case.cause in (NONE, UNKNOWN) or case.size < STRONG:
+            continue
+        ratios = {}
+        for cause in {one.cause for one in cases} - {UNKNOWN}:
+            own = [one for one in cases if one.machine == case.machine and one.cause == cause and one is not case]
+            drawn = [own[i] for i in rng.permutation(len(own))[:n]]
+            if drawn:
+                given = np.array([one.row for one in drawn])
+                ratios[cause] = labelled_support(recogniser.labels.log_ratios(case.row, given, cause))
+        found = with_labelled(case.probabilities, ratios, {})
+        first = next(iter(found))
+        right.append(first == case.cause)
+        sure += [first == case.cause] if found[first] >= 0.9 else []
+        loss.append(-np.log(max(found[case.cause], 1e-9)))
+    return (
+        f"likeliest right {np.mean(right):.2f} of {len(right)}; said with 0.9 {len(sure)}, right "
+        f"{np.mean(sure) if sure else 0.0:.2f}; log loss {np.mean(loss):.2f}"
+    )
+
+
 def main() -> None:
-    """Record machines."""
+    """Record machines, or score a table of them."""
     from app.studies.gap.labelled import samples_of_job as of_job
 
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--machines", type=int, default=4)
-    parser.add_argument("--to", type=Path, required=True)
+    steps = parser.add_subparsers(dest="step", required=True)
+    simulation = steps.add_parser("simulate", help="record machines")
+    simulation.add_argument("--machines", type=int, default=4, help="of each simulator")
+    simulation.add_argument("--simulator", choices=list(_MAKE), action="append", help="default: all of these")
+    simulation.add_argument("--to", type=Path, required=True)
+    steps.add_parser("score", help="diagnose them").add_argument("raw", type=Path)
     given = parser.parse_args()
-    jobs = [(name, i) for i in range(given.machines) for name in _MAKE]
+    if given.step == "score":
+        score(given.raw)
+        return
+    jobs = [(name, i) for i in range(given.machines) for name in given.simulator or _MAKE]
     samples: list[PopulationSample] = []
     for _, found in answers_of(of_job, jobs, 2):
         samples += found
