@@ -14,6 +14,7 @@ from gearsig.recording import Recording
 from sims.cracked import CrackedPair
 from sims.effects import EffectSetting
 from sims.machine import Operation
+from sims.simulator import SimulationSetup
 
 STEPS, TEETH = 32, 20
 
@@ -59,14 +60,8 @@ def test_a_known_course_is_told_and_a_strange_one_is_not() -> None:
 
 
 def recorded(*settings: EffectSetting) -> Recording:
-    return CrackedPair().simulate(
-        {"encoder_counts": 200_000},
-        settings,
-        Operation.steady(90.0, 110.0),
-        np.random.default_rng(1),
-        preset="published_55_75",
-        duration_s=5.0,
-    )
+    setup = SimulationSetup("published_55_75", {"encoder_counts": 200_000}, settings, Operation.steady(90.0, 110.0))
+    return CrackedPair().simulate(setup, np.random.default_rng(1), sampling_rate_hz=20480.0, duration_s=5.0)
 
 
 def test_encoders_name_a_crack_at_low_speed() -> None:
