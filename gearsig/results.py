@@ -37,8 +37,8 @@ class Result:
     rows : str
         Keyword of the class: the field whose items are the rows of `to_frame`.
     columns : tuple of str
-        Keyword of the class: fields or properties of equal length that are its columns. By default all fields that are
-        arrays of one dimension and as long as the longest.
+        Keyword of the class: fields or properties of equal length that are its columns, or mappings of such. By default
+        all fields that are arrays of one dimension and as long as the longest.
     matrix : (str, str, str)
         Keyword of the class: an array of two dimensions (or its transpose, "values.T"), what counts its rows, and what
         counts its columns.
@@ -67,7 +67,7 @@ class Result:
         cls, *, rows: str = "", columns: tuple[str, ...] = (), matrix: tuple[str, str, str] | None = None
     ) -> None:
         super().__init_subclass__()
-        cls._rows, cls._columns, cls._matrix = rows, columns, matrix
+        cls._rows, cls._columns, cls._matrix = rows or cls._rows, columns or cls._columns, matrix or cls._matrix
         # The decorator `dataclass`, which comes after this, leaves a `__repr__` that the class has of its own.
         if "__repr__" not in cls.__dict__:
             cls.__repr__ = Result.__repr__  # type: ignore[method-assign]
@@ -154,7 +154,11 @@ def _table_of(result: Result) -> DataFrame | None:
         arrays = {f.name: getattr(result, f.name) for f in fields(result)}  # type: ignore[arg-type]  # a dataclass
         lengths = {name: len(a) for name, a in arrays.items() if isinstance(a, np.ndarray) and a.ndim == 1}
         names = tuple(name for name, n in lengths.items() if n == max(lengths.values()))
-    return DataFrame({_column_name(result, name): getattr(result, name) for name in names}) if names else None
+    table: dict[str, Any] = {}
+    for name in names:
+        value = getattr(result, name)
+        table |= value if isinstance(value, Mapping) else {_column_name(result, name): value}
+    return DataFrame(table) if table else None
 
 
 def _column_name(result: object, name: str) -> str:

@@ -97,6 +97,20 @@ def test_findings_and_parameters_are_rows() -> None:
     assert table.to_dict("list") == {"name": ["a", "b"], "value": [1.0, 2.0]}
 
 
+def test_signals_by_name_are_columns_of_a_subclass_too() -> None:
+    @dataclass(frozen=True)
+    class Run(Result, columns=("time_s", "signals")):
+        time_s: np.ndarray
+        signals: dict[str, np.ndarray]
+
+    @dataclass(frozen=True)
+    class LongRun(Run):
+        n_steps: int = 0
+
+    table = LongRun(np.arange(3.0), {"x": np.ones(3), "y": np.zeros(3)}).to_frame()
+    assert list(table.columns) == ["time_s", "x", "y"]
+
+
 def test_an_average_is_a_table_over_its_revolution() -> None:
     average = SynchronousAverage(np.arange(4.0), np.zeros(4), 3, "s", "a", "g", "average", 2.0)
     assert average.to_frame()["revolutions"].to_list() == [0.0, 0.25, 0.5, 0.75]

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap._simulator import Added, OperatingCondition
+from gearsig.results import Result
 
 # --------------------
 # The curves that a gap report draws: order spectra, energy over the angle, synchronous averages.
@@ -140,7 +141,7 @@ class PlaceKind(Enum):
 
 
 @dataclass(frozen=True)
-class GapPlace:
+class GapPlace(Result):
     """One place at which the recording differs from what it is compared with.
 
     Parameters
@@ -287,7 +288,7 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class GapCause:
+class GapCause(Result):
     """A candidate with its probability; the first is the likeliest.
 
     Parameters
@@ -480,7 +481,7 @@ class LabelledFacts:
 
 
 @dataclass(frozen=True)
-class GapReport:
+class GapReport(Result, rows="causes"):
     """The answer.
 
     Parameters

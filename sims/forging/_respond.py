@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, known_name, one_of, positive, within
 from gearsig.errors import InputError, RefusalError
+from gearsig.results import Result
 from gearsig.rig import damping_ratio_s_per_m
 from sims.forging._drive import CONTINUOUS, Cycle, ForgingDrive, Schedule, schedule
 from sims.machine import Profile
@@ -113,7 +114,7 @@ class FirstState:
 
 
 @dataclass(frozen=True)
-class DriveResponse:
+class DriveResponse(Result, columns=("time_s", "signals")):
     """A run of the drive on an even grid of time from 0, and its contacts.
 
     Parameters

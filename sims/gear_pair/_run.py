@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.results import Result
 from sims.machine import Profile
 
 State = TypeVar("State")
@@ -19,7 +20,7 @@ March = Callable[[float, int, FloatArray, FloatArray], int]
 
 
 @dataclass(frozen=True)
-class PairResponse(Generic[State]):
+class PairResponse(Result, Generic[State], columns=("time_s", "signals")):
     """Signals of a run on an even grid of time.
 
     Parameters

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError
+from gearsig.results import Result
 from sims.mesh._mesh_stiffness import MeshTable, share_torque
 from sims.mesh._stiffness import GearMesh
 
@@ -276,7 +277,7 @@ MIN_PART = 0.2
 
 
 @dataclass(frozen=True)
-class MeshFriction:
+class MeshFriction(Result):
     """Friction over the mesh; column j is pair ⌊c + ramp/2⌋ − j, 0 where a pair does not touch.
 
     Parameters

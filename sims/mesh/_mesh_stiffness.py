@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, frozen_array, positive
 from gearsig.errors import InputError
+from gearsig.results import Result
 from sims.mesh._deviation import flank_separation_m, pitch_separation_m, wear_profile
 from sims.mesh._faults import chip_separation_m, spall_separation_m
 from sims.mesh._pair import arc_length_mm, contact_ends_mm
@@ -112,7 +113,7 @@ def tooth_rows(
 
 
 @dataclass(frozen=True)
-class MeshTable:
+class MeshTable(Result):
     """Compliance and separation of a tooth pair over ζ, base pitches since its ideal entry.
 
     A pair made of tooth i of the driver and tooth j of the driven gear has the sums of both teeth's compliance,
@@ -198,7 +199,7 @@ def _compliance_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple
 
 
 @dataclass(frozen=True)
-class MeshStiffness:
+class MeshStiffness(Result):
     """Stiffness along the line of action over the mesh.
 
     Parameters
@@ -222,7 +223,7 @@ class MeshStiffness:
 
 
 @dataclass(frozen=True)
-class LoadSharing:
+class LoadSharing(Result):
     """Static equilibrium over the mesh.
 
     Parameters

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from gearsig.checks import FloatArray, count, frozen_array
 from gearsig.errors import InputError
+from gearsig.results import Result
 from sims.reduced_fe._mesh import IntArray, SectorMesh, sector_matrices, whole_weights
 
 # A sector is its own mirror image: in the right coordinates its Hermitian matrices are real.
@@ -421,7 +422,7 @@ RIGID_HZ = 10.0
 
 
 @dataclass(frozen=True)
-class CyclicModes:
+class CyclicModes(Result):
     """Modes of a gear, ascending in frequency; those with 0 < n < z/2 stand once here and are pairs.
 
     Parameters

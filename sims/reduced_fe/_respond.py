@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, closest_match_hint, count, positive
 from gearsig.errors import InputError
+from gearsig.results import Result
 from sims.gear_pair import COORDINATES, PairResponse, RunPlan, StepConvergence, profile_points
 from sims.machine import Operation, Profile
 from sims.mesh import one_mesh_cycle
@@ -324,7 +325,7 @@ STRIDE = 10
 
 
 @dataclass(frozen=True)
-class SpeedSweep:
+class SpeedSweep(Result):
     """What a sweep gives in equal parts of its time.
 
     Parameters
