@@ -10,7 +10,6 @@ from sims.measure._sensors import (
     PathMode,
     apply,
     discrete,
-    hold_error,
 )
 from sims.measure._tachometer import Encoder, PulseCounter, Tachometer, disc_edges, pulse_voltage
 
@@ -31,7 +30,6 @@ __all__ = [
     "apply",
     "disc_edges",
     "discrete",
-    "hold_error",
     "plain",
     "pulse_voltage",
     "ratio_of_rates",

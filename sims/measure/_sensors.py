@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike
 
 from gearsig.checks import FloatArray, known_name, not_negative, positive, within
 from gearsig.errors import InputError
@@ -27,7 +26,7 @@ def discrete(numerator: tuple[float, ...], denominator: tuple[float, ...], step_
     """Ramp-invariant (first-order hold) equivalent of a transfer function in s, of second order at most.
 
     Poles map exactly, and so does the response to any input that is straight between steps. A sine is not: its gain
-    is short by `hold_error`, its phase is right.
+    is short by 1 - sinc²(fΔ), about (πfΔ)²/3 or 0.02 % at 2 kHz and 4 µs, its phase is right.
 
     Source: G. F. Franklin, J. D. Powell, M. L. Workman, *Digital Control of Dynamic Systems*, 3rd ed., 1998, ch. 6.
 
@@ -90,12 +89,6 @@ def apply_bank(sections: list[Section], gains: FloatArray, inputs: FloatArray, d
 def apply(section: Section, signal: FloatArray) -> FloatArray:
     """Filter one signal, (n_steps,)."""
     return apply_bank([section], np.ones((1, 1)), signal[:, None], np.zeros(1))
-
-
-def hold_error(frequency_hz: ArrayLike, step_s: float) -> FloatArray:
-    """Relative loss of gain for a sine: 1 - sinc²(fΔ), about (πfΔ)²/3; 0.02 % at 2 kHz and 4 µs."""
-    loss: FloatArray = 1.0 - np.sinc(np.asarray(frequency_hz, dtype=np.float64) * step_s) ** 2
-    return loss
 
 
 def _three(values: FloatArray) -> tuple[float, float, float]:
@@ -285,7 +278,7 @@ class ModalPath:
     def apply(self, accelerations: FloatArray, positions: tuple[str, ...], step_s: float) -> FloatArray:
         """Acceleration at the sensor, (n_steps, n_positions) → (n_steps,).
 
-        Exact for accelerations that run straight between steps; for a sine see `sims.measure.hold_error`. Modes
+        Exact for accelerations that run straight between steps; for a sine see `sims.measure.discrete`. Modes
         begin settled on the mean: a first value may be the middle of a blow, from which a slow mode would ring long.
         """
         settled = np.mean(accelerations, axis=0, keepdims=True)

@@ -39,7 +39,6 @@ from sims.mesh._geometry import (
     involute,
     involute_outline,
     root_half_angle_rad,
-    tooth_outline_mm,
 )
 from sims.mesh._mesh_stiffness import (
     LoadSharing,
@@ -144,7 +143,6 @@ __all__ = [
     "share_torque",
     "spans_face",
     "tooth_compliance",
-    "tooth_outline_mm",
     "tooth_rows",
     "wear_profile",
 ]

@@ -347,20 +347,6 @@ def tip_point_mm(gear: GearGeometry) -> tuple[float, float]:
     return float(point.x_mm[0]), float(point.y_mm[0])
 
 
-def tooth_outline_mm(gear: GearGeometry, n_points: int = 200) -> tuple[FloatArray, FloatArray]:
-    """Half tooth from root circle to tip, for drawing.
-
-    Returns
-    -------
-    x_mm, y_mm : arrays, (about n_points,)
-        Mirror y for the other flank.
-    """
-    half = count(n_points, "n_points", minimum=4) // 2
-    fillet = fillet_outline(gear, np.linspace(pi / 2.0, gear.pressure_angle_rad, half))
-    flank = involute_outline(gear, np.linspace(gear.form_roll_rad, gear.tip_roll_rad, half + 1)[1:])
-    return np.concatenate((fillet.x_mm, flank.x_mm)), np.concatenate((fillet.y_mm, flank.y_mm))
-
-
 def _round_offset_mm(gear: GearGeometry) -> float:
     """b₁, from the tooth's centre to the centre of the tool's tip round, along the pitch line."""
     alpha, m = gear.pressure_angle_rad, gear.module_mm

@@ -191,12 +191,6 @@ class ReducedGear:
         radius: FloatArray = self.blank.geometry.base_radius_mm * 1e-3 * np.hypot(1.0, self.grid.roll_rad)
         return radius
 
-    @property
-    def rigid_masses(self) -> FloatArray:
-        """(m, m, m, J_d, J_d, J_p) in kg and kg m², (6,)."""
-        m, j = self.mass_kg, self.diametral_inertia_kg_m2
-        return np.array([m, m, m, j, j, self.polar_inertia_kg_m2])
-
     def modes_at(self, tooth: int) -> FloatArray:
         """Push displacement of a tooth's points in each elastic mode, (n_modes, n_points), 1/√kg.
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sims.mesh import GearGeometry, GearMesh, MeshTable, PairGeometry, pair_states
+from sims.mesh import GearGeometry, GearMesh, MeshTable, PairGeometry, fillet_outline, involute_outline, pair_states
 
 PAIR = PairGeometry(*(GearGeometry(z, 2.0, face_width_mm=20.0, bore_radius_mm=17.5) for z in (55, 75)))
 MESH = GearMesh(PAIR)
@@ -10,6 +10,13 @@ PITCH_POINT = (PAIR.pitch_point_radius_mm - PAIR.start_radius_mm) / PAIR.base_pi
 """ζ at the pitch point, 0.909: in single contact."""
 SINGLE = np.linspace(0.83, 0.97, 29)
 """Only pair 0 touches."""
+
+
+def tooth_outline_mm(gear: GearGeometry, n_points: int = 200) -> tuple[np.ndarray, np.ndarray]:
+    """Half a tooth from root circle to tip; mirror y for the other flank."""
+    fillet = fillet_outline(gear, np.linspace(np.pi / 2.0, gear.pressure_angle_rad, n_points // 2))
+    flank = involute_outline(gear, np.linspace(gear.form_roll_rad, gear.tip_roll_rad, n_points // 2 + 1)[1:])
+    return np.concatenate((fillet.x_mm, flank.x_mm)), np.concatenate((fillet.y_mm, flank.y_mm))
 
 
 def own_separation(table: MeshTable, progress: np.ndarray, pair: int = 0) -> np.ndarray:

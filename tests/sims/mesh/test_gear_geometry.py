@@ -17,8 +17,8 @@ from sims.mesh import (
     involute,
     involute_outline,
     root_half_angle_rad,
-    tooth_outline_mm,
 )
+from tests.sims.mesh.meshes import tooth_outline_mm
 
 gears = st.builds(
     GearGeometry,

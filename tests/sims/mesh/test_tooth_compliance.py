@@ -24,8 +24,8 @@ from sims.mesh import (
     linear_contact_compliance,
     load_dependent_contact_coefficient,
     tooth_compliance,
-    tooth_outline_mm,
 )
+from tests.sims.mesh.meshes import tooth_outline_mm
 
 STEEL_200 = Material(200.0)
 PINION = GearGeometry(55, 2.0, bore_radius_mm=17.5)
