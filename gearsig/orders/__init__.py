@@ -15,21 +15,6 @@ from gearsig.orders._spectrum import frequency_map, order_map, order_spectrum
 from gearsig.orders._track import amplitude_at_speeds, track_order_bands, track_orders
 from gearsig.orders._types import AverageLines, OrderMap, SynchronousAverage, TrackedOrder
 from gearsig.orders.vold_kalman._filter import track_vold_kalman
-from gearsig.orders.vold_kalman._joint import (
-    accuracy_of,
-    closeness,
-    eliminate,
-    error_alone,
-    expected_error,
-    rotate,
-    samples_per_cell,
-    solve_band,
-    solve_by_splines,
-    solve_envelopes,
-    solve_waveforms,
-)
-from gearsig.orders.vold_kalman._kernels import cosine_and_sine, envelope_weight, settling_time, waveform_weight
-from gearsig.orders.vold_kalman._single import envelope_alone, oscillator, waveform_alone
 from gearsig.orders.vold_kalman._tracks import FrequencyTrack, Generation, OrderSeparation, SeparatedOrder
 
 __all__ = [
@@ -43,39 +28,21 @@ __all__ = [
     "SeparatedShafts",
     "SynchronousAverage",
     "TrackedOrder",
-    "accuracy_of",
     "amplitude_at_speeds",
     "average_lines",
     "band_passed_mesh",
-    "closeness",
-    "cosine_and_sine",
-    "eliminate",
-    "envelope_alone",
-    "envelope_weight",
-    "error_alone",
-    "expected_error",
     "first_whole_sample",
     "frequency_map",
     "mean_and_error",
     "mesh_modulation",
     "order_map",
     "order_spectrum",
-    "oscillator",
-    "rotate",
-    "samples_per_cell",
     "separate",
     "separate_shafts",
-    "settling_time",
-    "solve_band",
-    "solve_by_splines",
-    "solve_envelopes",
-    "solve_waveforms",
     "synchronous_average",
     "times_of_revolutions",
     "track_order_bands",
     "track_orders",
     "track_vold_kalman",
-    "waveform_alone",
-    "waveform_weight",
     "whole_revolutions",
 ]

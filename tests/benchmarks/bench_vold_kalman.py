@@ -20,7 +20,14 @@ from scipy.sparse.linalg import spsolve
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from gearsig.orders import solve_envelopes, solve_waveforms, track_vold_kalman, waveform_weight
+from gearsig.orders import (
+    track_vold_kalman,
+)
+from gearsig.orders.vold_kalman import (
+    solve_envelopes,
+    solve_waveforms,
+    waveform_weight,
+)
 from tests.orders.test_vold_kalman_exact import (
     RATE_HZ,
     differences,

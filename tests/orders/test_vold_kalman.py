@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from gearsig.angle import ShaftAngle
 from gearsig.orders import (
     FrequencyTrack,
+    track_vold_kalman,
+)
+from gearsig.orders.vold_kalman import (
     cosine_and_sine,
     envelope_weight,
-    track_vold_kalman,
     waveform_weight,
 )
 from gearsig.recording import Channel, Recording

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from gearsig.errors import RefusalError
-from gearsig.orders import envelope_alone, envelope_weight, error_alone, waveform_alone, waveform_weight
-from gearsig.orders import oscillator as write_oscillator
+from gearsig.orders.vold_kalman import (
+    envelope_alone,
+    envelope_weight,
+    error_alone,
+    waveform_alone,
+    waveform_weight,
+)
+from gearsig.orders.vold_kalman import oscillator as write_oscillator
 from tests.orders.test_vold_kalman_exact import (
     by_dense_least_squares,
     differences,

@@ -8,7 +8,12 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from gearsig.checks import FloatArray
-from gearsig.orders import accuracy_of, closeness, envelope_weight, solve_envelopes
+from gearsig.orders.vold_kalman import (
+    accuracy_of,
+    closeness,
+    envelope_weight,
+    solve_envelopes,
+)
 
 RATE_HZ, N = 20000.0, 3000
 TIME_S = np.arange(N) / RATE_HZ

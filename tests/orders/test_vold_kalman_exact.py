@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.signal import lfilter
 from scipy.sparse.linalg import spsolve
 
-from gearsig.orders import (
+from gearsig.orders.vold_kalman import (
     eliminate,
     envelope_weight,
     expected_error,

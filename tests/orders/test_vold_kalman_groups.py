@@ -7,7 +7,13 @@ import pytest
 
 from gearsig.angle import AngleSignal, ShaftAngle, resample_to_angle
 from gearsig.errors import InputError
-from gearsig.orders import FrequencyTrack, settling_time, track_vold_kalman
+from gearsig.orders import (
+    FrequencyTrack,
+    track_vold_kalman,
+)
+from gearsig.orders.vold_kalman import (
+    settling_time,
+)
 from gearsig.recording import Channel, Recording
 from tests.orders.test_vold_kalman import gain_of
 

@@ -1,1 +1,41 @@
-"""Vold–Kalman order tracking: orders taken out of a recording as waveforms; offered by `gearsig.orders`."""
+"""Vold–Kalman order tracking: orders taken out of a recording as waveforms.
+
+`gearsig.orders` offers `track_vold_kalman`; here are its solvers, for one order and for several.
+"""
+
+from gearsig.orders.vold_kalman._joint import (
+    accuracy_of,
+    closeness,
+    eliminate,
+    error_alone,
+    expected_error,
+    rotate,
+    samples_per_cell,
+    solve_band,
+    solve_by_splines,
+    solve_envelopes,
+    solve_waveforms,
+)
+from gearsig.orders.vold_kalman._kernels import cosine_and_sine, envelope_weight, settling_time, waveform_weight
+from gearsig.orders.vold_kalman._single import envelope_alone, oscillator, waveform_alone
+
+__all__ = [
+    "accuracy_of",
+    "closeness",
+    "cosine_and_sine",
+    "eliminate",
+    "envelope_alone",
+    "envelope_weight",
+    "error_alone",
+    "expected_error",
+    "oscillator",
+    "rotate",
+    "samples_per_cell",
+    "settling_time",
+    "solve_band",
+    "solve_by_splines",
+    "solve_envelopes",
+    "solve_waveforms",
+    "waveform_alone",
+    "waveform_weight",
+]
