@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import streamlit as st
 
-from app.dashboard.state import AnalysisRequest, Content
+from app.dashboard.state import AnalysisRequest, ChosenFile, Content
 from app.dashboard.theme import one_line
 
 if TYPE_CHECKING:
@@ -169,6 +169,28 @@ def sha256_of_upload(file_id: str, _content: memoryview) -> str:
     """Hash an upload once; `file_id` is Streamlit's own, new for every upload."""
     del file_id  # it is the key of the cache
     return hashlib.sha256(_content).hexdigest()
+
+
+N_RECENT, RECENT_BYTES = 8, 400_000_000
+
+
+@st.cache_resource(show_spinner=False)
+def _recent() -> dict[str, ChosenFile]:
+    return {}
+
+
+def remember_file(file: ChosenFile) -> None:
+    """Keep a file for a reload of its page; the oldest give way where they are too many or too large."""
+    files = _recent()
+    files.pop(file.sha256, None)
+    files[file.sha256] = file
+    while len(files) > 1 and (len(files) > N_RECENT or sum(_size(f.content) for f in files.values()) > RECENT_BYTES):
+        del files[next(iter(files))]
+
+
+def recent_files() -> tuple[ChosenFile, ...]:
+    """Return the files opened last on this server, the latest first."""
+    return tuple(reversed(_recent().values()))
 
 
 def command_of(request: AnalysisRequest) -> str:

@@ -10,11 +10,13 @@ PAGES = Path(__file__).parent / "pages"
 
 st.set_page_config(page_title="gearsig", page_icon=str(PAGES.parent / "icon.svg"), layout="wide")
 st.html(PAGES.parent / "page.css")
+st.logo(str(PAGES.parent / "logo.svg"), size="large")
 st.navigation(
     [
-        st.Page(PAGES / "analysis.py", title="Analysis", icon=":material/troubleshoot:", default=True),
+        st.Page(PAGES / "start.py", title="Start", icon=":material/home:", default=True),
+        st.Page(PAGES / "analysis.py", title="Analysis", icon=":material/troubleshoot:"),
         st.Page(PAGES / "laboratory.py", title="Fault laboratory", icon=":material/experiment:"),
-        st.Page(PAGES / "compare.py", title="Simulation against recording", icon=":material/stacked_line_chart:"),
+        st.Page(PAGES / "compare.py", title="Comparison", icon=":material/stacked_line_chart:"),
         st.Page(PAGES / "gap.py", title="Gap", icon=":material/compare_arrows:"),
     ],
     position="top",

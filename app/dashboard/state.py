@@ -11,6 +11,7 @@ from gearsig.diagnosis import Analysis
 
 ORIGIN, SAMPLE, RECORDING_FILE, RIG_FILE = "origin", "sample", "recording file", "recording file rig"
 TAB, CHANNEL = "tab", "channel"
+START_PAGE = Path(__file__).parent / "pages" / "start.py"
 ANALYSIS_PAGE = Path(__file__).parent / "pages" / "analysis.py"
 OF_LABORATORY = "Laboratory"
 """Origin of a recording that the laboratory made."""
@@ -111,6 +112,25 @@ def carry_over(key: str, default: object = None) -> None:
     """
     if key in st.session_state or default is not None:
         st.session_state[key] = st.session_state.get(key, default)
+
+
+def addressed(key: str, name: str, first: str) -> str:
+    """Return a choice of the session, at first that of the page's address, which is then kept up with it.
+
+    Parameters
+    ----------
+    key : str
+        Of the session.
+    name : str
+        In the address.
+    first : str
+        Where neither says anything.
+    """
+    chosen = str(st.session_state.get(key) or st.query_params.get(name) or first)
+    st.session_state[key] = chosen
+    if st.query_params.get(name) != chosen:
+        st.query_params[name] = chosen
+    return chosen
 
 
 def keep_files(kind: str, files: tuple[ChosenFile, ...]) -> None:

@@ -61,7 +61,7 @@ from gearsig.plot._phase import (
     recurrence_figure,
 )
 from gearsig.plot._response import ResponseCase, crack_comparison_figure, response_figure
-from gearsig.plot._series import envelope, thin
+from gearsig.plot._series import envelope, series_colours, thin
 from gearsig.plot._spectrum import (
     METHODS,
     MIN_SPEED_SPAN,
@@ -81,7 +81,18 @@ from gearsig.plot._start_stop import (
     start_stop_figure,
     start_stop_pair_figure,
 )
-from gearsig.plot._style import FAULT, Scale, above_zero, decibels, new_figure, plain, unit_text, with_unit
+from gearsig.plot._style import (
+    FAULT,
+    Scale,
+    above_zero,
+    decibels,
+    level_colours,
+    new_figure,
+    plain,
+    unit_text,
+    with_unit,
+)
+from gearsig.plot._svg import Curve, svg_lines, svg_map, svg_ring
 
 __all__ = [
     "FAULT",
@@ -96,6 +107,7 @@ __all__ = [
     "AngleMark",
     "Captioned",
     "Cursor",
+    "Curve",
     "Picture",
     "ResponseCase",
     "Scale",
@@ -140,6 +152,7 @@ __all__ = [
     "impacts_figure",
     "kurtogram",
     "kurtogram_figure",
+    "level_colours",
     "load_sharing_figure",
     "marks_of",
     "mesh_maps_figure",
@@ -162,6 +175,7 @@ __all__ = [
     "power_density",
     "recurrence_figure",
     "response_figure",
+    "series_colours",
     "spectral_coherence",
     "spectrum_figure",
     "speed_figure",
@@ -172,6 +186,9 @@ __all__ = [
     "start_stop_figure",
     "start_stop_pair_figure",
     "stft",
+    "svg_lines",
+    "svg_map",
+    "svg_ring",
     "synchronous_average",
     "thin",
     "time_figure",

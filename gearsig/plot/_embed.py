@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from dataclasses import dataclass
 from functools import cache
@@ -33,6 +34,8 @@ class Picture:
         One sentence on what to look at.
     alternative : str
         What the picture shows, for those who do not see it.
+    svg : str
+        An <svg> element that stands in the page itself instead of an address.
     """
 
     uri: str
@@ -40,6 +43,14 @@ class Picture:
     height_px: int
     caption: str
     alternative: str
+    svg: str = ""
+
+    @classmethod
+    def of_svg(cls, svg: str, caption: str, alternative: str) -> Picture:
+        """Return a picture of an <svg> element with a viewBox from 0 0."""
+        width, height = re.findall(r'viewBox="0 0 (\d+)[\d.]* (\d+)', svg)[0]
+        inline = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)  # within HTML the namespace is known
+        return cls("", int(width), int(height), caption, alternative, inline)
 
 
 @dataclass(frozen=True)

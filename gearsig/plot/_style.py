@@ -11,6 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.spectra import Scaling
@@ -206,6 +207,18 @@ def colours() -> Colormap:
     return LinearSegmentedColormap.from_list(
         "level", ["#FFFFFF", "#C9DDF0", "#6FA8D6", "#1F6FB0", "#0B3A69", "#06172E"]
     )
+
+
+def level_colours(*, dark: bool = False) -> NDArray[np.uint8]:
+    """Return 256 colours of levels as (256, 3) bytes, from the paper's colour up; on dark paper light is high.
+
+    Parameters
+    ----------
+    dark : bool
+        Whether the paper is dark.
+    """
+    scale = (255 * colours()(np.linspace(0, 1, 256))[:, :3]).round().astype(np.uint8)
+    return scale[::-1] if dark else scale
 
 
 def colour_bar(axes: Axes, drawn: ScalarMappable, label: str = "", *, gap_in: float = 0.15, **looks: Any) -> Axes:

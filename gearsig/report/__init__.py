@@ -50,6 +50,7 @@ from gearsig.report._motion_text import (
     start_stop_text,
 )
 from gearsig.report._page import (
+    VerdictPicture,
     bearing_cursors,
     highest_order_of_interest,
     line_cursors,
@@ -57,6 +58,8 @@ from gearsig.report._page import (
     page_html,
     speed_is_constant,
     start_stop_figures,
+    teeth_of_shaft,
+    verdict_picture,
     write_page,
 )
 from gearsig.report._sections import FindingCard, analysis_text, finding_card, reference_text
@@ -71,6 +74,7 @@ __all__ = [
     "GapFigure",
     "Question",
     "Section",
+    "VerdictPicture",
     "alignment_texts",
     "analysis_text",
     "analysis_to_dict",
@@ -127,7 +131,9 @@ __all__ = [
     "start_stop_json",
     "start_stop_text",
     "step_rows",
+    "teeth_of_shaft",
     "trends_text",
+    "verdict_picture",
     "verdict_rows",
     "write_fleet_page",
     "write_gap_json",

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from gearsig import plot
 from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray
-from gearsig.diagnosis import Analysis, ChannelAnalysis, Kind, Where, changes
+from gearsig.diagnosis import Analysis, ChannelAnalysis, Finding, Kind, Where, changes
 from gearsig.errors import RefusalError
 from gearsig.formatting import readable
 from gearsig.motion import StartStop
-from gearsig.orders import OrderMap
+from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.plot import Captioned, Cursor, Picture, embed, order_cursors, unit_text
+from gearsig.plot import _style as style
 from gearsig.recording import SI_FACTORS
 from gearsig.report._files import render, write_text
 from gearsig.report._sections import (
+    change_rows,
     css_class,
     finding_card,
     indicator_tables,
@@ -33,6 +36,8 @@ from gearsig.report._sections import (
 from gearsig.severity import CrackEstimate
 from gearsig.spectra import Spectrum
 
+CLAIMED = (Kind.FAULT, Kind.SUSPICION, Kind.DATA_PROBLEM)
+"""Kinds of findings that are read first; the others are a click away."""
 WITHOUT_MESH = 50.0  # highest order shown where no mesh is known
 
 
@@ -138,6 +143,55 @@ def _reference(analysis: Analysis) -> str:
     return analysis.shaft_angle.shaft if isinstance(analysis.shaft_angle, ShaftAngle) else ""
 
 
+@dataclass(frozen=True)
+class VerdictPicture:
+    """What the picture beside the verdict shows.
+
+    Parameters
+    ----------
+    about : str
+        "tooth": the mean revolution of a gear; "bearing": the envelope spectrum; "resonance": levels over speed;
+        "motion": starts and stops; "lines": the order spectrum, or the spectrum where the speed is not known.
+    channel : ChannelAnalysis
+    shaft : str
+        Of a tooth.
+    finding : Finding or None
+        That it shows.
+    """
+
+    about: Literal["tooth", "bearing", "resonance", "motion", "lines"]
+    channel: ChannelAnalysis
+    shaft: str = ""
+    finding: Finding | None = None
+
+    @property
+    def average(self) -> SynchronousAverage:
+        """Of a tooth: the mean revolution in which a single tooth stands out most."""
+        kinds = [kind for kind in ("residual", "difference", "average") if (self.shaft, kind) in self.channel.averages]
+        return self.channel.averages[self.shaft, kinds[0]]
+
+
+def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
+    """Return what shows the most important finding best; None where no channel could be analysed."""
+    channels = {channel.channel: channel for channel in analysis.channels}
+    if not channels:
+        return None
+    if analysis.motion is not None:
+        return VerdictPicture("motion", next(iter(channels.values())))
+    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION) or f.code == "resonance"]
+    for finding in sorted(claims, key=lambda f: (f.kind is not Kind.FAULT, f.code == "changed-since-reference")):
+        where = finding.where
+        channel = next((channels[name] for name in where.channels if name in channels), next(iter(channels.values())))
+        shaft = where.gear.rpartition("/")[2] or where.shaft
+        if (where.tooth or where.angle_deg is not None) and any(of == shaft for of, _ in channel.averages):
+            return VerdictPicture("tooth", channel, shaft, finding)
+        if where.bearing and channel.envelope_spectrum is not None:
+            return VerdictPicture("bearing", channel, "", finding)
+        if finding.code == "resonance" and channel.order_levels:
+            return VerdictPicture("resonance", channel, "", finding)
+    return VerdictPicture("lines", next(iter(channels.values())))
+
+
 def crack_picture(analysis: Analysis) -> Picture | None:
     """Return the picture of a crack that was seen; None without one, or where no channel is an acceleration."""
     crack = analysis.crack
@@ -163,17 +217,16 @@ def crack_picture(analysis: Analysis) -> Picture | None:
     if teeth is None or not averages:
         return None
     _, name, now, then = max(averages, key=lambda entry: entry[0])
-    n_turns = 3  # the middle blow then has room on either side
-    entry = (crack.angle_deg / 360.0 - 0.5 / teeth) % 1.0  # a tooth enters half a pitch before the middle of its own
-    cases = {"now": now} if then is None else {"reference": then, "now": now}
-    figure = plot.crack_comparison_figure(
-        np.arange(n_turns * len(now)) / len(now),
-        {case: np.tile(values, n_turns) for case, values in cases.items()},
-        impacts_rev=[turn + entry for turn in range(n_turns)],
-        n_teeth=teeth,
-        change_mps2=None if then is None else {"now": np.tile(now - then, n_turns)},
-        title=f"Average over a revolution of {crack.shaft}, {n_turns} times on end, {name}",
-    )
+    # A tooth enters half a pitch before the middle of its own; the blow stands in the middle of the figure.
+    entry = (crack.angle_deg / 360.0 - 0.5 / teeth) % 1.0
+    turned = round((entry - 0.5) * len(now))
+    angle = (np.arange(len(now)) + turned) * 360.0 / len(now)
+    curves = [plot.Curve(angle, np.roll(now, -turned), "now")]
+    if then is not None:
+        healthy = np.roll(then, -turned)
+        curves = [plot.Curve(angle, healthy, "reference", style.QUIET), *curves]
+        curves.append(plot.Curve(angle, curves[1].y - healthy, "change", style.FAULT))
+    reach = min(0.5, 8.0 / teeth)  # of a revolution: the blow and a few healthy teeth on either side
     beside = " beside the reference" if then is not None else ""
     caption = (
         "A crack changes the few mesh cycles after its tooth enters, and nothing else; a change all round is another "
@@ -181,7 +234,14 @@ def crack_picture(analysis: Analysis) -> Picture | None:
         if then is not None
         else "A crack swings the few mesh cycles after its tooth enters out of the pattern of the others."
     )
-    return embed(figure, caption, f"Average of {name} over {crack.shaft}{beside}; marked: {crack.text}")
+    svg = plot.svg_lines(
+        curves,
+        x=f"angle of {crack.shaft} (deg)",
+        y=f"{name} (m/s²)",
+        x_limits=((entry - reach) * 360.0, (entry + reach) * 360.0),
+        cursors=[Cursor(entry * 360.0, "finding", "the tooth enters", 0)],
+    )
+    return Picture.of_svg(svg, caption, f"Average of {name} over {crack.shaft}{beside}; marked: {crack.text}")
 
 
 def _on_angles_of(values: FloatArray, reference: FloatArray, *, turn: bool) -> FloatArray:
@@ -262,6 +322,10 @@ class Gallery:
     left_out: str = ""
 
 
+N_DETAILED, N_CHANNELS = 2, 8
+"""Channels with all their figures, and with a figure at all: a page is read in a minute."""
+
+
 def gallery(analysis: Analysis) -> Gallery:
     """Make the pictures of a page: the recording, then each channel, those with findings first and in most detail."""
     groups = []
@@ -270,73 +334,105 @@ def gallery(analysis: Analysis) -> Gallery:
         groups.append(PictureGroup("Starts and stops", tuple(drawn)))
     if (crack := crack_picture(analysis)) is not None:
         groups.append(PictureGroup("The damaged tooth", (crack,)))
-    groups.append(PictureGroup("Recording", tuple(_recording_pictures(analysis))))
     claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION)]
     channels = {channel.channel: channel for channel in analysis.channels}
     named = dict.fromkeys(name for f in claims for name in f.where.channels if name in channels)
-    detailed = list(named)[:3] or list(channels)[:1]  # the first one where no finding names any
-    left_out = []
-    for name in sorted(channels, key=lambda channel: channel not in detailed):
-        # As text; the page then stays below 3 MB.
-        if sum(len(picture.uri) for group in groups for picture in (*group.wide, *group.small)) > 2_500_000:
-            left_out.append(name)
-        else:
-            groups.append(_channel_group(analysis, channels[name], detailed=name in detailed))
-    remark, others = "", [name for name in channels if name not in detailed]
+    detailed = list(named)[:N_DETAILED] or list(channels)[:1]  # the first one where no finding names any
+    ordered = sorted(channels, key=lambda channel: channel not in detailed)
+    groups += [_channel_group(analysis, channels[name], detailed=name in detailed) for name in ordered[:N_CHANNELS]]
+    groups.append(PictureGroup("Recording", tuple(_recording_pictures(analysis))))
+    left_out, others = ordered[N_CHANNELS:], ordered[len(detailed) : N_CHANNELS]
+    remarks = []
+    if others:
+        remarks.append(f"{', '.join(others)}: main picture only; {', '.join(detailed)} in detail.")
     if left_out:
-        remark = (
-            f"To keep the page small there are no pictures of {', '.join(left_out)}; their numbers are in the table."
-        )
-    elif others:
-        remark = f"{', '.join(others)}: main pictures only; {', '.join(detailed)} in detail."
-    return Gallery(tuple(group for group in groups if group.wide or group.small), remark)
+        remarks.append(f"There are no pictures of {', '.join(left_out)}; their numbers are in the table.")
+    return Gallery(tuple(group for group in groups if group.wide or group.small), " ".join(remarks))
 
 
 def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
     recording = analysis.recording
-    names = recording.channel_names[:6]
-    n = len(recording.channels)
-    more = f" The first {len(names)} of {n} channels." if len(names) < n else ""
-    yield embed(
-        plot.time_figure(recording, names),
-        f"Look for steps, spikes, flat stretches and clipped tops: they are the recording's, not the machine's.{more}",
-        f"Signals over {recording.duration_s:.4g} s: {', '.join(names)}.",
+    names = recording.channel_names[:4]
+    more = (
+        f" The first {len(names)} of {len(recording.channels)} channels."
+        if len(names) < len(recording.channels)
+        else ""
     )
+    time = np.arange(recording.n_samples) / recording.sampling_rate_hz
+    for name in names:
+        channel = recording.channels[recording.index(name)]
+        svg = plot.svg_lines(
+            [plot.Curve(time, recording.values(name))],
+            x="time (s)",
+            y=plot.with_unit(name, channel.unit),
+            x_limits=(0.0, max(recording.duration_s, 1.0 / recording.sampling_rate_hz)),
+            height=70,
+        )
+        last = name == names[-1]
+        caption = f"Steps, spikes and clipped tops are the recording's, not the machine's.{more}" if last else ""
+        yield Picture.of_svg(svg, caption, f"Signal of {name} over {recording.duration_s:.4g} s.")
     angle = analysis.shaft_angle
     if isinstance(angle, ShaftAngle):
         low, high = angle.speed_range_rpm
-        yield embed(
-            plot.speed_figure(angle),
-            "Look whether the speed held still: where it changes, only orders keep their lines sharp.",
-            f"Speed over time, {low:.6g} to {high:.6g} rpm.",
-            vector=True,
+        least = plot.MIN_SPEED_SPAN * max(abs(angle.mean_speed_rpm), 1.0)
+        margin = max(0.06 * (high - low), (least - (high - low)) / 2)
+        svg = plot.svg_lines(
+            [plot.Curve(angle.time_s, 60.0 * angle.speed_rev_per_s)],
+            x="time (s)",
+            y="speed (rpm)",
+            x_limits=(angle.start_s, angle.end_s),
+            y_limits=(low - margin, high + margin),
+            height=70,
         )
+        caption = "Look whether the speed held still: where it changes, only orders keep their lines sharp."
+        yield Picture.of_svg(svg, caption, f"Speed over time, {low:.6g} to {high:.6g} rpm.")
 
 
 def _channel_group(analysis: Analysis, channel: ChannelAnalysis, *, detailed: bool) -> PictureGroup:
-    makers: list[Callable[[Analysis, ChannelAnalysis], Iterator[Picture]]]
-    makers = [_spectra_in_detail, _envelope, _kurtogram, _map, _averages] if detailed else [_spectrum]
+    makers: list[Callable[[Analysis, ChannelAnalysis], Iterator[Picture]]] = [_spectrum]
+    if detailed:
+        makers += [_mesh, _envelope, _order_levels, _map, _frequency]
     wide = tuple(picture for maker in makers for picture in maker(analysis, channel))
-    return PictureGroup(f"Channel {channel.channel}", wide, tuple(_polar(analysis, channel)), is_folded=not detailed)
+    small = tuple(_rings(analysis, channel)) if detailed else ()
+    return PictureGroup(f"Channel {channel.channel}", wide, small, is_folded=not detailed)
+
+
+def spectrum_svg(
+    spectrum: Spectrum,
+    cursors: Sequence[Cursor],
+    limits: tuple[float, float],
+    marked: Sequence[float] = (),
+    *,
+    linear: bool = False,
+    height: int = 170,
+) -> str:
+    """Return a spectrum as SVG: what lies at zero, an offset or a drift, does not squeeze the rest."""
+    start = 3 if limits[0] <= spectrum.positions[0] and len(spectrum.values) > 9 else 0
+    values = spectrum.values[start:]
+    points = [(p, spectrum.largest_near(p, 2.0 * spectrum.resolution)[1]) for p in marked]
+    return plot.svg_lines(
+        [plot.Curve(spectrum.positions[start:], values if linear else plot.above_zero(values), peaks=True)],
+        x=spectrum.axis_label,
+        y=plot.with_unit("" if spectrum.scaling == "dimensionless" else spectrum.scaling, spectrum.unit),
+        x_limits=limits,
+        logarithmic=not linear and bool((values > 0).any()),
+        cursors=cursors,
+        marked=points,
+        height=height,
+    )
 
 
 def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
     """The order spectrum where the speed is known, else the spectrum over frequency."""
     spectrum = channel.order_spectrum
     if spectrum is None:
-        yield from _frequency(analysis, channel)
+        yield _frequency_picture(analysis, channel)
         return
     highest = highest_order_of_interest(analysis, spectrum)
-    cursors = line_cursors(analysis, spectrum)
-    figure = plot.spectrum_figure(
-        spectrum,
-        cursors,
-        limits=(0.0, highest),
-        marked=marked_positions(analysis, spectrum, channel.channel),
-        title=f"Order spectrum of {channel.channel}",
-    )
-    yield embed(
-        figure,
+    cursors = line_cursors(analysis, spectrum, n_sidebands=0)
+    marked = marked_positions(analysis, spectrum, channel.channel)
+    yield Picture.of_svg(
+        spectrum_svg(spectrum, cursors, (0.0, highest), marked),
         "Look whether the mesh harmonics stand alone or carry sidebands, and whether a tall line lies off every mark."
         if any(cursor.kind == "mesh" for cursor in cursors)
         else "Look which orders stand out: what keeps its order turns with the shaft.",
@@ -344,77 +440,60 @@ def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]
     )
 
 
-def _spectra_in_detail(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    """The order spectrum, the levels over speed, the spectrum over frequency and the surroundings of each mesh."""
-    yield from _spectrum(analysis, channel)
-    yield from _order_levels(analysis, channel)
+def _mesh(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
+    """The surroundings of each mesh."""
     spectrum = channel.order_spectrum
     if spectrum is None:
         return
-    yield from _frequency(analysis, channel)
     for pair, low, high in mesh_windows(analysis, spectrum):
-        figure = plot.spectrum_figure(
-            spectrum,
-            line_cursors(analysis, spectrum, n_sidebands=4),
-            limits=(low, high),
-            marked=marked_positions(analysis, spectrum, channel.channel),
-            title=f"Around the mesh of {pair}, {channel.channel}",
-        )
-        yield embed(
-            figure,
+        cursors = line_cursors(analysis, spectrum, n_sidebands=4)
+        marked = marked_positions(analysis, spectrum, channel.channel)
+        yield Picture.of_svg(
+            spectrum_svg(spectrum, cursors, (low, high), marked, height=130),
             "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear.",
             f"Order spectrum of {channel.channel} from order {low:.4g} to {high:.4g}, around the mesh of {pair}.",
         )
 
 
 def _frequency(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
+    if channel.order_spectrum is not None:  # else it is shown already
+        yield _frequency_picture(analysis, channel)
+
+
+def _frequency_picture(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
     cursors: tuple[Cursor, ...] = ()
     smeared = " The speed changes, so lines that follow it are smeared here."
     if speed_is_constant(analysis):
         smeared = ""
         cursors = tuple(c for c in line_cursors(analysis, channel.spectrum) if c.kind == "mesh")
     marked = marked_positions(analysis, channel.spectrum, channel.channel)
-    yield embed(
-        plot.spectrum_figure(channel.spectrum, cursors, marked=marked, title=f"Spectrum of {channel.channel}"),
+    limits = (0.0, float(channel.spectrum.positions[-1]))
+    return Picture.of_svg(
+        spectrum_svg(channel.spectrum, cursors, limits, marked, height=120),
         f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}",
         f"Amplitude spectrum of {channel.channel} over frequency.",
     )
 
 
 def _envelope(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    spectrum = channel.envelope_spectrum
-    if spectrum is None:
-        return
+    if channel.envelope_spectrum is not None:
+        yield envelope_picture(analysis, channel, channel.envelope_spectrum)
+
+
+def envelope_picture(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spectrum) -> Picture:
+    """Return the envelope spectrum with shaft and bearing lines."""
     cursors = bearing_cursors(analysis, spectrum)
     bearings = [cursor.position for cursor in cursors if cursor.kind == "bearing"]
     end = float(spectrum.positions[-1])
-    limits = (0.0, min(end, 1.08 * max(bearings))) if bearings and spectrum.resolution < max(bearings) else None
+    reaches = bearings and spectrum.resolution < max(bearings)
+    limits = (0.0, min(end, 1.08 * max(bearings)) if reaches else end)
     band = channel.envelope_band_hz
     where = f" ({band[0]:.0f} to {band[1]:.0f} Hz)" if band is not None else ""
-    yield embed(
-        plot.spectrum_figure(
-            spectrum,
-            cursors,
-            scale="linear",
-            limits=limits,
-            marked=marked_positions(analysis, spectrum, channel.channel, of_bearings=True),
-            title=f"Envelope spectrum of {channel.channel}{where}",
-        ),
+    marked = marked_positions(analysis, spectrum, channel.channel, of_bearings=True)
+    return Picture.of_svg(
+        spectrum_svg(spectrum, cursors, limits, marked, linear=True, height=130),
         "Equally spaced lines at a shaft's order mean one impact per turn; at a bearing's, a damaged race.",
         f"Envelope spectrum of {channel.channel}{where} with shaft and bearing lines.",
-    )
-
-
-def _kurtogram(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    del analysis  # a maker of pictures is given it, and this one needs none of it
-    if channel.kurtogram is None or channel.kurtogram_band is None:
-        return
-    low, high = channel.kurtogram_band.band_hz
-    yield embed(
-        plot.kurtogram_figure(channel.kurtogram, channel.kurtogram_band),
-        f"How impulsive each band is. The outlined one, {low:.0f} to {high:.0f} Hz, is the most impulsive that is wide "
-        "enough for the bearing's harmonics; its envelope bears the finding out.",
-        f"Kurtogram of {channel.channel} with its best band.",
     )
 
 
@@ -429,12 +508,26 @@ def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Pict
         amplitude, rpm, hertz = level.largest
         unit = f" {unit_text(level.unit)}" if level.unit else ""
         largest.append(f"{level.name} {readable(amplitude, 3)}{unit} at {rpm:.0f} rpm ({hertz:.4g} Hz)")
-    yield embed(
-        plot.order_levels_figure(levels, resonances_hz=resonances, title=f"Levels over speed, {channel.channel}"),
+    svg = plot.svg_lines(
+        [
+            plot.Curve(level.speed_rpm, level.amplitude, level.name, colour)
+            for level, colour in zip(levels, plot.series_colours(len(levels)), strict=True)
+        ],
+        x="speed (rpm)",
+        y=plot.with_unit("amplitude", levels[0].unit),
+        x_limits=(float(levels[0].speed_rpm[0]), float(levels[0].speed_rpm[-1])),
+        logarithmic=True,
+        marked=[
+            (60.0 * hertz / level.order, float(np.interp(60.0 * hertz / level.order, level.speed_rpm, level.amplitude)))
+            for hertz in resonances
+            for level in levels
+        ],
+    )
+    yield Picture.of_svg(
+        svg,
         "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance. "
         f"Largest: {'; '.join(largest)}.",
         f"Amplitudes of {len(levels)} orders of {channel.channel} over speed.",
-        vector=True,
     )
 
 
@@ -442,52 +535,49 @@ def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
     order_map = channel.order_map
     if order_map is None:
         return
-    cursors: tuple[Cursor, ...] = ()
-    highest = None
-    if order_map.axis == "order":
-        cursors = tuple(c for c in line_cursors(analysis, order_map) if c.kind == "mesh")
-        highest = highest_order_of_interest(analysis, order_map)
-    yield embed(
-        plot.order_map_figure(order_map, cursors, highest=highest),
+    highest = highest_order_of_interest(analysis, order_map) if order_map.axis == "order" else None
+    yield Picture.of_svg(
+        plot.svg_map(order_map, highest=highest),
         "Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.",
         f"Levels of {channel.channel} over {order_map.axis} and time.",
     )
 
 
-def _averages(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
+def _rings(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
     for shaft in dict.fromkeys(shaft for shaft, _ in channel.averages):
-        chosen = [
-            channel.averages[shaft, kind] for kind in ("average", "residual") if (shaft, kind) in channel.averages
-        ]
-        if not chosen:
-            continue
-        teeth = _teeth(analysis, shaft)
-        yield embed(
-            plot.average_figure(chosen, n_teeth=teeth, marks=plot.marks_of(analysis.findings, shaft, teeth)),
-            "Grey: ± 2 standard errors. Where it stays clear of zero, something comes back at that angle every turn.",
-            f"Synchronous {' and '.join(a.kind for a in chosen)} of {channel.channel} over one revolution of {shaft}.",
-        )
+        yield ring_picture(analysis, VerdictPicture("tooth", channel, shaft))
 
 
-def _polar(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    for shaft in dict.fromkeys(shaft for shaft, _ in channel.averages):
-        kind = next((k for k in ("residual", "difference", "average") if (shaft, k) in channel.averages), None)
-        if kind is None:
-            continue
-        average = channel.averages[shaft, kind]
-        teeth = _teeth(analysis, shaft)
-        marks = plot.marks_of(analysis.findings, shaft, teeth)
-        seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
-        yield embed(
-            plot.polar_figure(average, n_teeth=teeth, marks=marks),
-            f"{shaft}: healthy teeth draw an even ring, a damaged one swings out. Grey is ± 2 standard errors."
-            if teeth
-            else f"{shaft}: what leaves the ring comes back at that angle every turn. Grey is ± 2 standard errors.",
-            f"Polar picture of the {average.kind} of {channel.channel} over one revolution of {shaft}{seen}.",
-        )
+def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
+    """Return the ring of teeth of a shaft."""
+    average, shaft = picture.average, picture.shaft
+    teeth = teeth_of_shaft(analysis, shaft)
+    marks = plot.marks_of(analysis.findings, shaft, teeth)
+    seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
+    return Picture.of_svg(
+        plot.svg_ring(average, n_teeth=teeth, marks=marks),
+        f"{shaft}: healthy teeth draw an even ring, a damaged one swings out."
+        if teeth
+        else f"{shaft}: what leaves the ring comes back at that angle every turn.",
+        f"Polar picture of the {average.kind} of {average.channel} over one revolution of {shaft}{seen}.",
+    )
 
 
-def _teeth(analysis: Analysis, shaft: str) -> int | None:
+def picture_of_verdict(analysis: Analysis) -> Picture | None:
+    """Return the picture that the verdict rests on; see `verdict_picture`."""
+    shown = verdict_picture(analysis)
+    if shown is None or shown.about == "motion":
+        return None
+    if shown.about == "tooth":
+        return ring_picture(analysis, shown)
+    spectrum = shown.channel.envelope_spectrum
+    if shown.about == "bearing" and spectrum is not None:
+        return envelope_picture(analysis, shown.channel, spectrum)
+    makers = _order_levels if shown.about == "resonance" else _spectrum
+    return next(makers(analysis, shown.channel), None)
+
+
+def teeth_of_shaft(analysis: Analysis, shaft: str) -> int | None:
     """Return the teeth of the gear on a shaft; of the gear that a finding names, where there are several."""
     if analysis.rig is None:
         return None
@@ -539,9 +629,12 @@ def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: d
         title=recording.provenance.source or "recording made in memory",
         machine_name=analysis.rig.name if analysis.rig is not None else "",
         verdict=analysis.verdict,
+        verdict_picture=picture_of_verdict(analysis),
+        changes=change_rows(analysis),
         outcome_class=css_class(analysis.outcome),
         outcome=analysis.outcome.value,
-        findings=[finding_card(finding) for finding in analysis.findings],
+        findings=[finding_card(finding) for finding in analysis.findings if finding.kind in CLAIMED],
+        further=[finding_card(finding) for finding in analysis.findings if finding.kind not in CLAIMED],
         machine=machine_rows(analysis.rig),
         recording=recording,
         warnings=[text for text in recording.warnings if text not in {f.title for f in analysis.findings}],

@@ -104,6 +104,25 @@ def _floor_percent(strength: Strength | None) -> float | None:
     return round(100 * strength.floor / strength.value, 1)
 
 
+@dataclass(frozen=True)
+class ChangeRow:
+    """A level that changed since the reference, as a bar."""
+
+    label: str
+    change_db: float
+    repeatability_db: float
+    percent: float
+
+
+def change_rows(analysis: Analysis, most: int = 8) -> tuple[ChangeRow, ...]:
+    """Return the levels that changed most since the reference, largest first; bars are relative to the first."""
+    changed = sorted((c for c in analysis.level_changes if c.is_change), key=lambda c: -abs(c.change_db))[:most]
+    return tuple(
+        ChangeRow(c.label, c.change_db, c.repeatability_db, 100 * abs(c.change_db) / abs(changed[0].change_db))
+        for c in changed
+    )
+
+
 def machine_rows(rig: Rig | None) -> Rows:
     """Return what is known of the machine."""
     if rig is None:

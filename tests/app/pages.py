@@ -16,13 +16,13 @@ from streamlit.testing.v1 import AppTest
 import app.dashboard
 from app.dashboard import state
 from app.dashboard.state import AnalysisRequest, Chosen
+from app.dashboard.widgets.views import OF_CHANNEL
 from app.samples import samples
 from gearsig.recording import read_recording, sha256_of
 from gearsig.rig import read_rig
 
 FOLDER = Path(app.dashboard.__file__).parent
 SAMPLES = {sample.rig.stem: sample for sample in samples()}
-METHODS_TAB = "More methods"
 
 # Tests set widgets ahead of the first run, which Streamlit would remark upon.
 config.set_option("global.disableWidgetStateDuplicationWarning", True)
@@ -36,7 +36,7 @@ def opened(sample: str = "damaged_tooth", *, tab: str = "", **values: Any) -> Ap
         page.session_state[state.TAB] = tab
     for key, value in values.items():
         page.session_state[key] = value
-    return page.run()
+    return page.switch_page("pages/analysis.py").run()
 
 
 def upload(page: AppTest, name: str, content: bytes, rig: str = "") -> AppTest:
@@ -54,22 +54,37 @@ def opened_file(name: str, content: bytes, rig: str = "", *, tab: str = "", **va
     return opened(tab=tab, **chosen, **values)
 
 
-def method_key(digest: str, rate_hz: float) -> str:
-    return f" Method of {digest} at {rate_hz!r}"
+def view_of(method: str) -> str:
+    """Return the view of the chain that a method belongs to."""
+    return next(view for view, methods in OF_CHANNEL.items() if method in methods)
+
+
+def method_key(method: str, digest: str, rate_hz: float) -> str:
+    return f" method of {view_of(method)} of {digest} at {rate_hz!r}"
 
 
 @cache
-def _sample_key(sample: str) -> str:
+def _key_of(sample: str) -> tuple[str, float]:
     chosen = SAMPLES[sample]
     rate_hz = read_recording(chosen.recording, rig=read_rig(chosen.rig)).sampling_rate_hz
-    return method_key(sha256_of(chosen.recording), rate_hz)
+    return sha256_of(chosen.recording), rate_hz
 
 
 def opened_at(method: str, sample: str = "damaged_tooth") -> AppTest:
     """Open a sample at a method, in one run."""
-    page = opened(sample, tab=METHODS_TAB, **{_sample_key(sample): method})
+    page = opened(sample, tab=view_of(method), **{method_key(method, *_key_of(sample)): method})
     assert not page.exception
     return page
+
+
+def go(page: AppTest, method: str) -> AppTest:
+    """Go to a method from another view or method."""
+    view = view_of(method)
+    if page.session_state[state.TAB] != view:
+        page.session_state[state.TAB] = view
+        page.run()
+        assert not page.exception
+    return choose(page, "Method", method) if len(OF_CHANNEL[view]) > 1 else page
 
 
 @cache
@@ -91,8 +106,8 @@ def opened_machine(method: str, *, quantity: str = "acceleration", **values: Any
     """Open the recording of `machine` at a method."""
     content, rig = machine()
     rig = rig.replace('"acceleration"', f'"{quantity}"')
-    values[method_key(sha256(content).hexdigest(), 2000.0)] = method
-    return opened_file("orders.csv", content, rig, tab=METHODS_TAB, **values)
+    values[method_key(method, sha256(content).hexdigest(), 2000.0)] = method
+    return opened_file("orders.csv", content, rig, tab=view_of(method), **values)
 
 
 def choose(page: AppTest, label: str, value: str) -> AppTest:
@@ -117,21 +132,39 @@ def shown_text(page: AppTest) -> str:
     return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "").replace("\u00a0", " ")
 
 
-def charts(page: AppTest) -> list[dict[str, Any]]:
-    return [json.loads(chart.proto.spec) for chart in page.get("plotly_chart")]
+def bars(page: AppTest) -> np.ndarray:
+    """Return the heights of the bars of the page."""
+    values = json.loads(page.get("plotly_chart")[0].proto.spec)["data"][0]["y"]
+    return np.frombuffer(b64decode(values["bdata"]), values["dtype"]) if isinstance(values, dict) else np.array(values)
 
 
-def numbers(values: dict[str, str] | list[float]) -> np.ndarray:
-    """Return the numbers of a plotly trace, which may be packed."""
-    if isinstance(values, dict):
-        return np.frombuffer(b64decode(values["bdata"]), values["dtype"]).astype(float)
-    return np.array(values, float)
+def pictures(page: AppTest) -> list[Any]:
+    """Return the pictures of the page; without the ring of teeth beside the verdict."""
+    return [part for part in page.get("image") if not part.proto.imgs[0].alt.endswith("stands out")]
+
+
+def figures(page: AppTest, *, of_verdict: bool = False) -> list[dict[str, Any]]:
+    """Return what was sent to the figures of the page that zoom; without the one beside the verdict."""
+    sent = [part.proto for part in page.get("bidi_component")]
+    known = [json.loads(proto.json) for proto in sent if proto.component_name == "gearsig.figure"]
+    return known if of_verdict else [figure for figure in known if not figure["name"].startswith("verdict")]
+
+
+def tiles(page: AppTest) -> list[str]:
+    """Return the names of the views in the strip."""
+    strip = next(part.proto for part in page.get("bidi_component") if part.proto.component_name == "gearsig.strip")
+    return [item["name"] for item in json.loads(strip.json)["items"]]
+
+
+def numbers(values: str) -> np.ndarray:
+    """Return the numbers of a curve, which are packed."""
+    return np.frombuffer(b64decode(values), "<f8")
 
 
 def curves(page: AppTest) -> dict[str, np.ndarray]:
-    """Return the values of all named curves of the page, those of the first chart where names return."""
+    """Return the values of all named curves of the page, those of the first figure where names return."""
     found: dict[str, np.ndarray] = {}
-    for chart in charts(page):
-        for line in chart["data"]:
-            found.setdefault(line.get("name", ""), numbers(line["y"]))
+    for figure in figures(page):
+        for line in figure["lines"]:
+            found.setdefault(line["name"], numbers(line["y"]))
     return found

@@ -1,4 +1,4 @@
-"""The page *Simulation against recording*, run without a browser."""
+"""The page *Comparison*, run without a browser."""
 
 from streamlit.testing.v1 import AppTest
 
@@ -13,7 +13,7 @@ def opened(recording: str = "root_crack_3mm", simulation: str = "root_crack_0mm"
     """Choose a recording on the analysis page's own widgets, then go to the comparison."""
     page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=300)
     page.session_state[state.SAMPLE] = SAMPLES[recording]
-    page.run()
+    page.switch_page("pages/analysis.py").run()
     page.session_state[ORIGIN] = "Sample"
     page.session_state["simulation sample"] = SAMPLES[simulation]
     return page.switch_page("pages/compare.py").run()

@@ -16,22 +16,26 @@ from app.dashboard.methods import METHODS
 from app.dashboard.methods.frame import OVER_TIME, Waveforms, recording_of, table_csv, waveforms_file
 from gearsig.recording import read_recording
 from tests.app.pages import (
-    METHODS_TAB,
     SAMPLES,
-    charts,
+    bars,
     choose,
     curves,
+    figures,
+    go,
     labelled,
     machine,
     numbers,
     opened_at,
     opened_file,
     opened_machine,
+    pictures,
     press,
     shown_text,
+    view_of,
 )
 
 OUTER_RACE_HZ = 88.2
+METHOD = "Denoising"
 WITHOUT_DOWNLOADS = ("Phase plane", "Embedding and chaos", "Crack severity")
 
 
@@ -39,9 +43,9 @@ WITHOUT_DOWNLOADS = ("Phase plane", "Embedding and chaos", "Crack severity")
 def test_every_method_answers_for_samples_of_every_kind_and_offers_what_it_shows(sample: str) -> None:
     page = opened_at("Time–frequency", sample)
     for method in METHODS:
-        choose(page, "Method", method)
+        go(page, method)
         assert not page.error, shown_text(page)
-        drawn = len(page.get("plotly_chart")) + len(page.get("image"))
+        drawn = len(figures(page)) + len(page.get("plotly_chart")) + len(pictures(page))
         told = method == "Crack severity" and len(page.info) + len(page.success) == 1
         assert drawn > 0 or told
         assert "Analysed: 0 to" in shown_text(page)
@@ -55,17 +59,17 @@ SHORT = "time (s);a1\n" + "\n".join(f"{i / 1000:g};{(i * 37) % 101}" for i in ra
 
 @pytest.mark.parametrize("content", [DEAD, SHORT], ids=["constant channel", "short recording"])
 def test_what_cannot_be_analysed_is_at_most_one_message_in_every_method(content: str) -> None:
-    page = opened_file("bad.csv", f"{content}\n".encode(), tab=METHODS_TAB)
+    page = opened_file("bad.csv", f"{content}\n".encode(), tab=view_of(METHOD))
     assert not page.exception
     for method in METHODS:
-        choose(page, "Method", method)
+        go(page, method)
         assert len(page.error) <= 1, method
 
 
 def test_a_segment_that_is_too_short_is_at_most_one_message() -> None:
     page = opened_machine("Denoising")
     for method in METHODS:
-        choose(page, "Method", method)
+        go(page, method)
         sliders = [s for s in page.slider if s.label.startswith("Segment")]
         for limits_s in ((2.0, 2.05), (0.0, 0.0)) if sliders else ():
             next(s for s in page.slider if s.label.startswith("Segment")).set_value(limits_s).run()
@@ -77,9 +81,9 @@ def test_names_from_files_are_shown_as_typed_in_every_method() -> None:
     content, rig = machine()
     names = ("<script>alert(1)</script>", "**x** $y$ :smile:")
     rig = rig.replace('"input"', f'"{names[1]}"').replace('"a1"', f'"{names[0]}"')
-    page = opened_file("names.csv", content.replace(b";a1", f";{names[0]}".encode()), rig, tab=METHODS_TAB)
+    page = opened_file("names.csv", content.replace(b";a1", f";{names[0]}".encode()), rig, tab=view_of(METHOD))
     for method in METHODS:
-        choose(page, "Method", method)
+        go(page, method)
         assert not page.error
         raw = "\n".join(part.value for part in [*page.markdown, *page.caption, *page.info, *page.warning])
         for markup in ("<script", "**x**", "$y$", ":smile:"):
@@ -91,7 +95,7 @@ def test_waveforms_open_with_five_mesh_cycles() -> None:
     """The crack's pair has 55 teeth on a shaft of 8.3128 Hz."""
     page = opened_at("Denoising", "root_crack_3mm")
     for method in ("Denoising", "Modes"):  # the others draw as denoising does
-        choose(page, "Method", method)
+        go(page, method)
         low, high = labelled(page, "slider", "Waveforms shown").value
         assert (high - low) * 55 * 8.3128 == pytest.approx(5.0, rel=0.01), method
 
@@ -100,11 +104,11 @@ def test_waveforms_open_with_five_mesh_cycles() -> None:
 def test_other_engines_answer_for_short_segments(method: str, engine: str) -> None:
     pytest.importorskip(engine)
     page = opened_machine("Denoising")
-    choose(page, "Method", method)
+    go(page, method)
     labelled(page, "slider", "Segment").set_value((0.0, 1.0)).run()
     choose(page, "Engine", engine)
     assert not page.error, shown_text(page)
-    assert len(page.get("image")) == 1
+    assert len(pictures(page)) == 1
 
 
 def test_a_ridge_has_the_frequency_and_amplitude_that_was_put_in() -> None:
@@ -117,7 +121,7 @@ def test_a_ridge_has_the_frequency_and_amplitude_that_was_put_in() -> None:
     for transform in ("Fourier", "Wavelet", "Squeezed Fourier", "Squeezed wavelet"):
         choose(page, "Transform", transform)
         assert not page.error, shown_text(page)
-        frequency, amplitude = (numbers(chart["data"][0]["y"]) for chart in charts(page)[:2])
+        frequency, amplitude = (numbers(figure["lines"][0]["y"]) for figure in figures(page)[:2])
         middle = slice(len(frequency) // 4, -len(frequency) // 4)
         assert np.median(frequency[middle]) == pytest.approx(50.0, abs=3.0)
         assert 2.0 < np.median(amplitude[middle]) < 4.2  # with its neighbour of 55 Hz and amplitude 1
@@ -147,7 +151,7 @@ def test_the_depth_of_a_crack_against_the_healthy_sample_at_the_torque_that_is_s
     assert interval is not None
     low, high = (float(text) for text in interval.groups())
     assert low <= 3.0 <= high
-    assert len(page.get("image")) == 1
+    assert len(pictures(page)) == 1
     (torque,) = (w for w in page.number_input if w.label.startswith("Torque"))
     torque.set_value(60.0).run()
     assert "Torque 60 N·m, as stated in the sidebar" in shown_text(page)
@@ -177,7 +181,7 @@ def test_every_transform_draws_its_map() -> None:
         for transform in ("Fourier", "Wavelet", "Squeezed Fourier", "Squeezed wavelet"):
             choose(page, "Transform", transform)
             assert not page.error
-            assert len(page.get("image")) == 1
+            assert len(pictures(page)) == 1
     page.select_slider[0].set_value(page.select_slider[0].options[-3:-1]).run()
     assert not page.exception
     assert not page.error
@@ -248,7 +252,7 @@ def test_modes_of_envelopes_and_over_angle() -> None:
     for kind in ("Envelope", "Over angle"):
         choose(page, "Modes of", kind)
         assert not page.error
-        assert len(page.get("image")) == 1
+        assert len(pictures(page)) == 1
     assert any(s.label == "Orders shown" for s in page.slider)
 
 
@@ -302,7 +306,7 @@ def test_a_longer_segment_than_can_be_answered_soon_is_cut_and_this_is_said() ->
 
 def measured_line(page: AppTest) -> tuple[np.ndarray, np.ndarray]:
     """Return x and y of the measured line of the page's spectrum."""
-    line = next(t for chart in charts(page) for t in chart["data"] if t.get("line", {}).get("width") == 1.1)
+    line = figures(page)[0]["lines"][-1]
     return numbers(line["x"]), numbers(line["y"])
 
 
@@ -367,7 +371,7 @@ def test_coherence_names_the_lines_that_stand_out() -> None:
 
 def test_wavelet_packets_share_the_energy_and_add_up_to_the_signal() -> None:
     page = opened_machine("Wavelet packets")
-    shares = numbers(charts(page)[0]["data"][0]["y"])
+    shares = bars(page)
     assert shares.sum() == pytest.approx(100.0)
     nodes = labelled(page, "multiselect", "Waveform of the nodes")
     nodes.set_value(list(range(16))).run()

@@ -6,7 +6,7 @@ from app.dashboard.laboratory import bifurcation as bifurcation_view
 from app.dashboard.laboratory.views import TAB
 from app.dashboard.methods.phase import VIEWS, two_numbers
 from gearsig.errors import InputError
-from tests.app.pages import choose, opened_at, shown_text
+from tests.app.pages import choose, opened_at, pictures, shown_text
 from tests.app.test_laboratory import opened
 
 METHOD = "Embedding and chaos"
@@ -26,7 +26,7 @@ def test_every_view_answers_or_says_why_not():
             assert "Kind of motion:" in shown_text(page)
             assert "the signal as measured" in shown_text(page)
         else:
-            assert len(page.get("image")) == 1, view
+            assert len(pictures(page)) == 1, view
             assert not page.error
 
 
@@ -73,12 +73,12 @@ def button(page, label):
 @pytest.mark.slow
 def test_a_bifurcation_is_drawn_on_demand():
     page = at_bifurcation()
-    assert not page.get("image")
+    assert not pictures(page)
     assert "Nothing is drawn yet" in shown_text(page)
     button(page, "Draw").click().run()
     assert not page.exception
     assert not page.error
-    assert len(page.get("image")) == 1
+    assert len(pictures(page)) == 1
     assert any(b.proto.label == "Points (CSV)" for b in page.get("download_button"))
 
 
@@ -88,7 +88,7 @@ def test_stopped_it_keeps_what_is_complete(monkeypatch):
 
     monkeypatch.setattr(bifurcation_view, "_go_on", lambda: None)
     button(page, "Draw").click().run()
-    assert not page.get("image")
+    assert not pictures(page)
     button(page, "Stop").click().run()
     assert page.session_state[bifurcation_view.ASKED] == ""
 

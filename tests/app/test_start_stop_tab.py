@@ -6,10 +6,9 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
-from app.dashboard.widgets.views import OF_MOTION
+from app.dashboard.widgets.views import MOTION, VIEWS
 from sims.files import file_set, write_set
-from tests.app.pages import opened, opened_file, shown_text
-from tests.app.test_dashboard import TABS
+from tests.app.pages import opened, opened_file, pictures, shown_text, tiles
 from tests.motion.recordings import start_stop
 
 
@@ -21,11 +20,11 @@ def page(tmp_path: Path) -> AppTest:
 
 
 def test_its_figures_have_a_tab_and_the_others_say_why_they_are_empty(page: AppTest) -> None:
-    assert [tab.label for tab in page.tabs] == [*OF_MOTION, *TABS]
+    assert tiles(page) == [MOTION, *VIEWS]
     page.session_state[state.TAB] = "Starts and stops"
     page.run()
     assert not page.exception
-    assert len(page.get("image")) + len(page.get("imgs")) == 4
+    assert len(pictures(page)) == 4
     assert "Hunt–Crossley, one pair on one flank" in shown_text(page)
     page.session_state[state.TAB] = "Spectrum"
     page.run()
@@ -34,4 +33,4 @@ def test_its_figures_have_a_tab_and_the_others_say_why_they_are_empty(page: AppT
 
 
 def test_other_recordings_have_no_such_tab() -> None:
-    assert [tab.label for tab in opened().tabs] == list(TABS)
+    assert tiles(opened()) == list(VIEWS)

@@ -84,7 +84,10 @@ def test_page_is_strict_html5(html):
 
 def test_the_answer_comes_first_and_what_repeats_is_folded(html):
     """Verdict, findings, figures; tables of indicators and channels without a finding open on request."""
-    places = [html.index(text) for text in ("verdict", "<h2>Findings", "<h2>Recording", "<h2>Machine and", "<h2>Indic")]
+    places = [
+        html.index(text)
+        for text in ("verdict", "<h2>Findings", "<h2>Recording", "machine and recording", "indicators</h2>")
+    ]
     assert places == sorted(places)
     structure = parsed(html)
     folds = [attributes for tag, attributes in structure.elements if tag == "details"]
@@ -93,8 +96,8 @@ def test_the_answer_comes_first_and_what_repeats_is_folded(html):
     assert html.count("<summary>") == len(folds)
     open_part = re.sub(r"(?s)<details.*?</details>", "", html)
     assert "computed on" not in open_part
-    assert open_part.count("<article") == html.count("<article")
-    assert 4 < open_part.count("<img") < html.count("<img")
+    assert 0 < open_part.count("<article") < html.count("<article")
+    assert 4 < open_part.count("<svg") < html.count("<svg")
 
 
 def test_page_loads_nothing(html):
@@ -103,27 +106,18 @@ def test_page_loads_nothing(html):
     assert not tags & {"script", "link", "iframe", "object", "embed", "base", "form"}
     for _, attributes in structure.elements:
         assert attributes.get("src", "data:").startswith("data:")
-        assert attributes.get("href", "index.html") == "index.html"
+        assert attributes.get("href", "index.html") == "index.html" or attributes["href"].startswith("data:image/png")
         assert not any(name.startswith("on") for name in attributes)
     without_data = re.sub(r'"data:[^"]+"', '""', html)
     assert not re.search(r"(?i)https?:|url\(|@import|//[a-z]", without_data)
 
 
-def test_vector_pictures_load_nothing_either(html):
-    from base64 import b64decode
-
-    vectors = re.findall(r"data:image/svg\+xml;base64,([^\"]+)", html)
-    assert vectors
-    for vector in vectors:
-        svg = b64decode(vector).decode()
-        assert not re.search(r"<script|(?:href|src)=\"(?!#)|url\((?!#)|@import", svg)
-
-
 def test_page_is_small_and_pictures_have_words(html):
-    assert len(html) < 3_000_000
-    pictures = [attributes for tag, attributes in parsed(html).elements if tag == "img"]
-    assert len(pictures) > 10
-    assert all(len(picture["alt"]) > 20 for picture in pictures)
+    assert len(html.encode()) < 250_000
+    pictures = [attributes for tag, attributes in parsed(html).elements if attributes.get("role") == "img"]
+    assert len(pictures) == html.count("<svg")
+    assert len(pictures) > 8
+    assert all(len(picture["aria-label"]) > 20 for picture in pictures)
 
 
 @pytest.fixture(scope="module")

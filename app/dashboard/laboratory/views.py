@@ -19,7 +19,7 @@ from app.dashboard.widgets.spectrum import show_spectrum
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.indicators import crest_factor, kurtosis, rms
-from gearsig.plot import Cursor, thin
+from gearsig.plot import Cursor
 from gearsig.recording import Recording
 from gearsig.spectra import Spectrum, amplitude_spectrum, band_envelope, envelope_spectrum
 from sims.effects import effect
@@ -71,7 +71,7 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
 
 def _show_line(line: tuple[FloatArray, FloatArray], name: str, axes: Axes, **looks: Any) -> None:
     colour = MEASURED if name == "healthy" else FAULT
-    show_lines([ChartLine(*thin(*line, 3000), name, colour)], axes, f"time of {name}", **looks)
+    show_lines([ChartLine(*line, name, colour)], axes, f"time of {name}", **looks)
 
 
 def signal_of(run: LaboratoryRun, name: str, end_s: float) -> tuple[tuple[FloatArray, FloatArray], str]:
@@ -248,7 +248,7 @@ def _lines(x: FloatArray, curves: list[FloatArray]) -> list[ChartLine]:
     for place, values in enumerate(curves):
         known = np.isfinite(values)
         if known.any():
-            lines.append(ChartLine(*thin(x[known], values[known]), ("healthy", "faulty")[place], place))
+            lines.append(ChartLine(x[known], values[known], ("healthy", "faulty")[place], place))
     return lines
 
 

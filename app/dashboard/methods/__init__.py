@@ -1,4 +1,4 @@
-"""The further methods of the analysis page, one at a time, so that a newcomer is not shown all at once."""
+"""Methods of the analysis page with parameters of their own: each under the view of the chain it belongs to."""
 
 from __future__ import annotations
 
@@ -66,9 +66,8 @@ METHODS: dict[str, tuple[Callable[[MethodPage], None], str]] = {
 }
 
 
-def show_methods(analysis: Analysis, channel: ChannelAnalysis) -> None:
-    """Show the chosen method's parameters and its answer for one channel."""
-    name = MethodPage(analysis, channel, "").choose(st, "Method", list(METHODS), named=False)
+def show_method(name: str, analysis: Analysis, channel: ChannelAnalysis) -> None:
+    """Show a method's parameters and its answer for one channel."""
     show, about = METHODS[name]
     st.caption(about)
     try:

@@ -22,7 +22,7 @@ from gearsig.angle import PASSBAND, ShaftAngle, resample_to_angle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.errors import RefusalError
-from gearsig.plot import thin, with_unit
+from gearsig.plot import with_unit
 from gearsig.recording import Channel, Provenance, Recording, write_recording
 from gearsig.timefreq import Axis, UniformSignal, at_label, uniform
 
@@ -459,7 +459,7 @@ class MethodPage:
         if residual:
             rows.append((residual.split(maxsplit=1)[0], {residual: charts.FAULT}, 180))
         for label, colours, height_px in rows:
-            lines = [charts.ChartLine(*thin(at, waveforms.columns[c][part]), c, colours[c]) for c in colours]
+            lines = [charts.ChartLine(at, waveforms.columns[c][part], c, colours[c]) for c in colours]
             below = axis if label == rows[-1][0] else ""
             axes = charts.Axes(below, with_unit(label, waveforms.unit), limits)
             charts.show_lines(lines, axes, self.key(f"waveforms {label}"), height_px=height_px, legend=True)

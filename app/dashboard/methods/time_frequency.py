@@ -13,7 +13,7 @@ from app.dashboard.methods.frame import MethodPage, SignalSegment, Waveforms, ca
 from app.dashboard.widgets.charts import Axes, ChartLine, show_lines, show_picture
 from gearsig import timefreq
 from gearsig.checks import FloatArray
-from gearsig.plot import thin, time_frequency_figure, with_unit
+from gearsig.plot import time_frequency_figure, with_unit
 from gearsig.report import highest_order_of_interest
 
 SQUEEZED_TEXT = (
@@ -211,7 +211,7 @@ def show_ridges(page: MethodPage) -> None:
         (left, timefreq.axis_label(first.axis, first.shaft), [ridge.positions for ridge in ridges]),
         (right, peak, [ridge.amplitude for ridge in ridges]),
     ):
-        lines = [ChartLine(*thin(first.at, y), f"ridge {i + 1}", i) for i, y in enumerate(values)]
+        lines = [ChartLine(first.at, y, f"ridge {i + 1}", i) for i, y in enumerate(values)]
         axes = Axes(at, name, (float(first.at[0]), float(first.at[-1])))
         with place:
             show_lines(lines, axes, page.key(f"profile {name}"), height_px=220, legend=True)

@@ -20,13 +20,14 @@ whether the records' own scatter explains it. For the cause of what differs, see
 
 def show() -> None:
     """Choose, read or simulate, compare, show."""
-    st.subheader("Simulation against recording", anchor=False)
-    chosen = choose_recording(with_reference=False)
+    st.subheader("Comparison of a simulation with a recording", anchor=False)
+    opened = choose_recording(with_reference=False)
     simulation = compare.choose_simulation()
     align_by = compare.choose_alignment()
-    if chosen is None or simulation is None:
+    if opened is None or simulation is None:
         st.markdown(WELCOME)
         return
+    _, chosen = opened
     what, content = simulation
     with st.spinner("Reading the recording …", show_time=True):
         recording = recorded(chosen.request, chosen.content)

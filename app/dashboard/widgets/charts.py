@@ -1,28 +1,30 @@
-"""Lines over one axis that can be zoomed and read off, with named cursors across them (plotly); pictures; ranges."""
+"""Figures that are zoomed and read off, with named cursors across them; pictures; ranges."""
 
 from __future__ import annotations
 
+import re
+from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import streamlit as st
+from streamlit.components.v2 import component
 
 from app.dashboard import state
-from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_plot_text, as_typed, is_dark, palette
+from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
-from gearsig.plot import LONGEST, Cursor, place, plain
+from gearsig.plot import LONGEST, Cursor, plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as PictureFigure
     from plotly.graph_objects import Figure
 
-WIDTH_IN = 10.5
-"""Width for which labels are placed; they keep apart on wider pages as well."""
-ROW_PX, LEGEND_PX = 17, 40
 CONFIG = {"displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"], "scrollZoom": False}
 MEASURED, FAULT, QUIET = 0, 1, -1
 """Colours of lines by meaning; further numbers are further colours."""
@@ -30,7 +32,7 @@ MEASURED, FAULT, QUIET = 0, 1, -1
 
 @dataclass(frozen=True)
 class ChartLine:
-    """A line to draw, already thinned; nan where it has a gap.
+    """A line to draw; nan where it has a gap.
 
     Parameters
     ----------
@@ -41,6 +43,8 @@ class ChartLine:
     band : (low, high) or None
         A pale band behind it.
     dotted : bool
+    peaks : bool
+        Where there are more points than pixels, join the highest, over a pale band down to the lowest: of spectra.
     """
 
     x: FloatArray
@@ -49,6 +53,7 @@ class ChartLine:
     colour: int = MEASURED
     band: tuple[FloatArray, FloatArray] | None = None
     dotted: bool = False
+    peaks: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,6 @@ class Axes:
     x_limits: tuple[float, float]
     y_limits: tuple[float, float] | None = None
     logarithmic: bool = False
-    x_step: float | None = None
 
 
 def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[float, float]:
@@ -77,6 +81,28 @@ def show_chart(figure: Figure, key: str, alternative: str) -> None:
     st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt=as_typed(alternative))
 
 
+_FOLDER = Path(__file__).parent.parent / "components"
+_figure = component(
+    "gearsig.figure",
+    html='<div class="figure"></div>',
+    css=(_FOLDER / "figure.css").read_text("utf-8"),
+    js=(_FOLDER / "figure.js").read_text("utf-8"),
+)
+N_COLUMNS = 1600
+"""Points of a line sent to the browser: more than a page has pixel columns."""
+MAP_COLUMNS, MAP_ROWS = 900, 360
+
+
+def looked_at(key: str, whole: tuple[float, float], first: tuple[float, float] | None = None) -> tuple[float, float]:
+    """Return the range of its axis that the figure of that key was zoomed to, `first` until then."""
+    try:
+        low, high = (float(end) for end in st.session_state[key]["range"])
+    except (KeyError, TypeError, ValueError):
+        low, high = first or whole
+    low, high = max(low, whole[0]), min(high, whole[1])
+    return (low, high) if low < high else whole
+
+
 def show_lines(
     lines: Sequence[ChartLine],
     axes: Axes,
@@ -84,14 +110,18 @@ def show_lines(
     *,
     cursors: Sequence[Cursor] = (),
     marked: Sequence[tuple[float, float]] = (),
-    height_px: int = 400,
+    height_px: int = 340,
     legend: bool = False,
+    whole: tuple[float, float] | None = None,
+    per_unit: tuple[float, str] | None = None,
+    step: float | None = None,
 ) -> None:
-    """Show lines with cursors and marked points.
+    """Show lines with cursors and marked points; of long lines the extremes of each pixel column of what is shown.
 
     Parameters
     ----------
     lines : sequence of ChartLine
+        At full length: zooming sends their detail.
     axes : Axes
     key : str
         Of the widget, unique on the page.
@@ -102,115 +132,180 @@ def show_lines(
     height_px : int
         Without labels and legend.
     legend : bool
-        Name several lines above the chart; all such charts have the same left margin, so that those below each other
-        share their axis.
+        Name several lines above the chart.
+    whole : (float, float) or None
+        Limits that zooming out ends at; None: the axis' limits, which are else what is shown at first.
+    per_unit : (float, str) or None
+        What one unit of the x axis is in another unit, for the readout of cursors.
+    step : float or None
+        Distance of the sidebands that are offered first.
     """
-    from plotly.graph_objects import Figure
-
-    colours, figure = palette(), Figure()
-    cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
-    for line in lines:
-        colour = colours.quiet if line.colour == QUIET else cycle[line.colour % len(cycle)]
-        _add_line(figure, line, colour, tag="" if legend else "<extra></extra>")
-    n_rows = _add_cursors(figure, cursors, axes.x_limits, colours)
-    if marked:
-        ring = {"symbol": "circle-open", "size": 13, "color": colours.fault, "line": {"width": 2}}
-        x, y = zip(*marked, strict=True)
-        figure.add_scatter(x=x, y=y, yaxis="y2", mode="markers", marker=ring, name="finding", hoverinfo="skip")
-    above_px = LEGEND_PX if legend else ROW_PX * n_rows
-    figure.update_layout(
-        height=height_px + above_px,
-        margin={"l": 76 if legend else 8, "r": 8, "t": 8 if legend else 12 + above_px, "b": 8},
-        hovermode="closest",
-        showlegend=legend and len(lines) > 1,
-        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0, "xanchor": "left"},
-        dragmode="zoom",
-        xaxis={"title": as_plot_text(axes.x), "range": axes.x_limits, "exponentformat": "none", "dtick": axes.x_step},
-        yaxis={"range": [0, 1], "visible": False, "fixedrange": True},  # of the cursors, behind the lines
-        yaxis2={"automargin": not legend, **_value_axis(axes)},
-    )
-    show_chart(figure, key, f"{axes.y} over {axes.x}")
-
-
-def _add_line(figure: Figure, line: ChartLine, colour: str, *, tag: str) -> None:
-    pale = f"rgba({','.join(str(int(colour[i : i + 2], 16)) for i in (1, 3, 5))},0.22)"
-    for edge, fill in zip(line.band or (), (None, "tonexty"), strict=False):
-        figure.add_scatter(
-            x=line.x,
-            y=edge,
-            yaxis="y2",
-            mode="lines",
-            line={"width": 0},
-            fill=fill,
-            fillcolor=pale,
-            hoverinfo="skip",
-        )
-    figure.add_scatter(
-        x=line.x,
-        y=line.y,
-        yaxis="y2",
-        mode="lines",
-        name=as_plot_text(line.name),
-        line={"width": 1.1, "color": colour, "dash": "dot" if line.dotted else "solid"},
-        hovertemplate="%{x:.6g}: %{y:.4g}" + tag,
-    )
-
-
-def _add_cursors(figure: Figure, cursors: Sequence[Cursor], limits: tuple[float, float], colours: Palette) -> int:
-    """Draw each kind of cursor as one line of many pieces, on a hidden axis from 0 to 1; return the rows of labels."""
-    placed = place(cursors, limits, WIDTH_IN)
-    for kind in dict.fromkeys(cursor.kind for cursor, _ in placed):
-        same = [cursor for cursor, _ in placed if cursor.kind == kind]
-        x = [v for cursor in same for v in (cursor.position, cursor.position, None)]
-        words = [v for cursor in same for v in [as_plot_text(f"{cursor.label}: {cursor.position:.6g}")] * 3]
-        figure.add_scatter(
-            x=x,
-            y=[0, 1, None] * len(same),
-            mode="lines",
-            name=kind,
-            text=words,
-            hovertemplate="%{text}<extra></extra>",
-            line={"color": colours.cursors.get(kind, colours.quiet), "width": 1, "dash": DASHES.get(kind, "dot")},
-            opacity=0.65,
-        )
-    rows = 0
-    for cursor, label in placed:
-        if label is not None:
-            rows = max(rows, label.row + 1)
-            figure.add_annotation(
-                x=cursor.position,
-                y=1,
-                yref="paper",
-                yanchor="bottom",
-                yshift=2 + ROW_PX * label.row,
-                text=as_plot_text(plain(cursor.label, LONGEST)),
-                showarrow=False,
-                font={"size": 12, "color": colours.cursors.get(cursor.kind, colours.quiet)},
-            )
-    return rows
-
-
-def _value_axis(axes: Axes) -> dict[str, object]:
-    """Return the value axis, with ticks at whole decades where there are several, else where plotly chooses.
-
-    Left alone, an overlaying axis would take its ticks from the one below, wherever they fall.
-    """
-    limits, ticks = axes.y_limits, dict[str, object](tickmode="auto")
-    if limits is not None and axes.logarithmic:
-        if limits[1] > 100 * limits[0]:
-            ticks = {"tickmode": "linear", "tick0": 0, "dtick": 1}
-        # plotly takes the limits of a logarithmic axis as powers of ten
-        limits = (float(np.log10(limits[0])), float(np.log10(limits[1])))
-    return {
-        "overlaying": "y",
-        "side": "left",
-        "title": as_plot_text(axes.y),
-        "type": "log" if axes.logarithmic else "linear",
-        "range": limits,
-        "exponentformat": "e",
-        "minexponent": 4,
-        **ticks,
+    colours, ends = palette(), whole or axes.x_limits
+    shown = looked_at(key, ends, axes.x_limits)
+    data = _described(axes, key, shown, ends, height_px) | {
+        "lines": [_sent(line, shown) for line in lines],
+        "cursors": _cursor_rows(cursors, colours),
+        "marked": [[float(x), float(y)] for x, y in marked],
+        "legend": legend,
+        "log": axes.logarithmic,
+        "limits": axes.y_limits,
+        "per_unit": per_unit,
+        "step": step,
     }
+    _figure(key=key, data=data, on_range_change=_ignore, default={"range": None})
+
+
+def show_map(
+    values: FloatArray,
+    x: FloatArray,
+    y: FloatArray,
+    axes: Axes,
+    key: str,
+    *,
+    unit: str,
+    dynamic_range_db: float = 60.0,
+    cursors: Sequence[Cursor] = (),
+    lines: Sequence[ChartLine] = (),
+    also: tuple[FloatArray, str] | None = None,
+    height_px: int = 420,
+    shown: tuple[float, float] | None = None,
+) -> None:
+    """Show levels over two axes, the largest of each pixel; zooming sends their detail.
+
+    Parameters
+    ----------
+    values : array, (n_y, n_x)
+        Levels in dB.
+    x, y : array
+        Ascending; `x` in equal steps.
+    axes : Axes
+    key : str
+        Of the widget, unique on the page.
+    unit : str
+        Of the levels.
+    dynamic_range_db : float
+        Shown below the largest level.
+    cursors : sequence of Cursor
+        In the unit of the x axis.
+    lines : sequence of ChartLine
+        Drawn over the map.
+    also : (array of (n_y,), str) or None
+        A second value of each row with its unit, e.g. the speed.
+    height_px : int
+    shown : (float, float) or None
+        At first.
+    """
+    from gearsig.plot import level_colours
+
+    half = (x[-1] - x[0]) / max(len(x) - 1, 1) / 2
+    ends = (float(x[0] - half), float(x[-1] + half))
+    span = looked_at(key, ends, shown)
+    start = max(int(np.searchsorted(x, span[0] - half)), 0)
+    stop = max(int(np.searchsorted(x, span[1] + half)), start + 2)
+    part = values[:, start:stop]
+    columns, rows = min(part.shape[1], MAP_COLUMNS), min(len(y), MAP_ROWS)
+    # rows of the picture lie at equal steps of y, those of the map need not
+    steps = np.geomspace(y[0], y[-1], rows) if axes.logarithmic else np.linspace(y[0], y[-1], rows)
+    at = np.searchsorted(y, steps).clip(0, len(y) - 1)
+    edges = np.linspace(0, part.shape[1], columns + 1).astype(int)[:-1]
+    pooled = np.maximum.reduceat(np.maximum.reduceat(part, at, axis=0), edges, axis=1) if rows > 1 else part
+    high = float(values.max())
+    low = high - dynamic_range_db
+    levels = np.clip(255 * (pooled - low) / (high - low), 0, 255).astype(np.uint8)
+    first, last = float(x[start] - half), float(x[min(stop, len(x)) - 1] + half)
+    data = _described(axes, key, span, ends, height_px) | {
+        "lines": [_sent(line, span) for line in lines],
+        "log": axes.logarithmic,
+        "cursors": _cursor_rows(cursors, palette()),
+        "marked": [],
+        "map": {
+            "levels": b64encode(levels.tobytes()).decode("ascii"),
+            "columns": levels.shape[1],
+            "rows": levels.shape[0],
+            "span": [first, last],
+            "limits": [float(y[0]), float(y[-1])],
+            "low": low,
+            "high": high,
+            "unit": unit,
+            "colours": b64encode(level_colours(dark=is_dark()).tobytes()).decode("ascii"),
+            "also": None if also is None else [float(also[0][i]) for i in at],
+            "also_unit": "" if also is None else also[1],
+        },
+    }
+    _figure(key=key, data=data, on_range_change=_ignore, default={"range": None})
+
+
+def _ignore() -> None:
+    """The run that follows a zoom looks at its range itself."""
+
+
+def _described(
+    axes: Axes, key: str, shown: tuple[float, float], whole: tuple[float, float], height_px: int
+) -> dict[str, object]:
+    return {
+        "x": one_line(axes.x),
+        "y": one_line(axes.y),
+        "x_unit": _unit_of(axes.x),
+        "y_unit": _unit_of(axes.y),
+        "shown": list(shown),
+        "whole": list(whole),
+        "height": height_px,
+        "fault": palette().fault,
+        "alternative": one_line(f"{axes.y} over {axes.x}"),
+        "name": re.sub(r"[^\w-]+", "-", key.split(" of ", maxsplit=1)[0]).strip("-") or "figure",
+        "has_tools": height_px >= 200,
+    }
+
+
+def _unit_of(label: str) -> str:
+    _, bracket, unit = label.rpartition(" (")
+    return one_line(unit.removesuffix(")") if bracket else "")
+
+
+def _sent(line: ChartLine, shown: tuple[float, float]) -> dict[str, object]:
+    colours = palette()
+    cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
+    colour = colours.quiet if line.colour == QUIET else cycle[line.colour % len(cycle)]
+    x, y, *band = _columns(line, shown)
+    curves = {name: _packed(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
+    return {"name": one_line(line.name), "colour": colour, "dotted": line.dotted, **curves}
+
+
+def _packed(values: FloatArray) -> str:
+    return b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode("ascii")
+
+
+def _columns(line: ChartLine, shown: tuple[float, float]) -> tuple[FloatArray, ...]:
+    """Return (x, y) or (x, y, low, high) of what is shown: all points, or the extremes of each column at their places.
+
+    With one point beyond each end, so that the line goes on to the edge.
+    """
+    start = max(int(np.searchsorted(line.x, shown[0])) - 1, 0)
+    stop = min(int(np.searchsorted(line.x, shown[1], side="right")) + 1, len(line.x))
+    x, y = line.x[start:stop], line.y[start:stop]
+    band = () if line.band is None else tuple(edge[start:stop] for edge in line.band)
+    if len(x) <= 2 * N_COLUMNS:
+        return x, y, *band
+    borders = np.linspace(0, len(x), N_COLUMNS + 1).astype(int)
+    if line.peaks:  # the highest of each column, at its own place, over the lowest
+        highest = np.array([a + int(np.argmax(y[a:b])) for a, b in pairwise(borders)])
+        return x[highest], y[highest], np.minimum.reduceat(y, borders[:-1]), y[highest]
+    chosen = np.unique([(a + int(np.argmin(y[a:b])), a + int(np.argmax(y[a:b]))) for a, b in pairwise(borders)])
+    return x[chosen], y[chosen], *(edge[chosen] for edge in band)
+
+
+def _cursor_rows(cursors: Sequence[Cursor], colours: Palette) -> list[dict[str, object]]:
+    dashes = {"solid": None, "dot": "2 3", "dash": "6 4", "dashdot": "7 3 2 3"}
+    return [
+        {
+            "at": float(cursor.position),
+            "label": plain(cursor.label, LONGEST),
+            "number": cursor.number,
+            "colour": colours.cursors.get(cursor.kind, colours.quiet),
+            "dash": dashes[DASHES.get(cursor.kind, "dot")],
+        }
+        for cursor in cursors
+    ]
 
 
 DOTS_PER_INCH = 180

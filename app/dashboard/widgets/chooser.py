@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from hashlib import sha256
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.cached import sha256_of_upload
+from app.dashboard.cached import recent_files, remember_file, sha256_of_upload
 from app.dashboard.state import Chosen, ChosenFile
 from app.dashboard.theme import as_typed
+from app.dashboard.widgets.machine import machine_text, stated, text_of
 from app.samples import SampleRecording, samples
-from gearsig.errors import InputError
 from gearsig.recording import FORMAT_NAMES, FORMAT_OF_EXTENSION, sha256_of
 
 if TYPE_CHECKING:
@@ -31,7 +29,7 @@ SIMULATED = "Simulated, not measured: what is in them is known."
 
 def sample_name(sample: SampleRecording) -> str:
     """Return a sample's name for people."""
-    return sample.rig.stem.replace("_", " ").capitalize()
+    return sample.title
 
 
 def sample_file(sample: SampleRecording) -> ChosenFile:
@@ -110,7 +108,7 @@ def choose_file(label: str, key: str, *, about: str = KINDS, rig: str = "", abou
     if rig:
         given = st.file_uploader(rig, type=["toml"], key=f"{key} rig", max_upload_size=1, help=about_rig)
         if files and given is not None:
-            files = (replace(files[0], rig_name=given.name, rig_text=_text_of(given)),)
+            files = (replace(files[0], rig_name=given.name, rig_text=text_of(given.name, given.getvalue())),)
             state.keep_files(key, files)
     return files[0] if files else None
 
@@ -119,17 +117,10 @@ def _chosen_file(file: UploadedFile, *, is_rig: bool) -> ChosenFile:
     content = file.getbuffer()
     digest = sha256_of_upload(file.file_id, content)
     return (
-        ChosenFile(file.name, digest, content, file.name, _text_of(file))
+        ChosenFile(file.name, digest, content, file.name, text_of(file.name, file.getvalue()))
         if is_rig
         else ChosenFile(file.name, digest, content)
     )
-
-
-def _text_of(file: UploadedFile) -> str:
-    try:
-        return file.getvalue().decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError("is not text in UTF-8", where=file.name, remedy="save the rig file as UTF-8") from None
 
 
 def choose_number(
@@ -148,15 +139,14 @@ def choose_number(
 
 
 # --------------------
-# The recording of the analysis page, with its rig, its reference, and what its file does not state.
+# The recording of the analysis page, with its machine, its reference, and what its file does not state.
 # --------------------
 
-EXAMPLE_RIG = Path(__file__).parents[2] / "cli" / "example_rig.toml"
 SAMPLE, FILE, NO_REFERENCE = "Sample", "Own file", "None"
 
 
-def choose_recording(*, with_reference: bool = True) -> Chosen | None:
-    """Return what the user chose in the sidebar, None while there is nothing to open.
+def choose_recording(*, with_reference: bool = True) -> tuple[ChosenFile, Chosen] | None:
+    """Return the file that the user chose in the sidebar, and what is asked of it; None while there is nothing to open.
 
     Parameters
     ----------
@@ -170,13 +160,14 @@ def choose_recording(*, with_reference: bool = True) -> Chosen | None:
     """
     with st.sidebar:
         made = state.simulated()
+        _follow_address()
         state.carry_over(state.ORIGIN)
         origins = (SAMPLE, FILE) if made is None else (SAMPLE, FILE, state.OF_LABORATORY)
         origin = st.radio("Recording", origins, horizontal=True, key=state.ORIGIN, persist_state="session")
         if origin == state.OF_LABORATORY and made is not None:
             file: ChosenFile | None = simulated_file(made)
         elif origin == SAMPLE:
-            file = choose_sample("Sample", state.SAMPLE, first="damaged_tooth")
+            file = choose_sample("Sample", state.SAMPLE)
             st.caption(SIMULATED)
         else:
             file = choose_file(
@@ -184,10 +175,50 @@ def choose_recording(*, with_reference: bool = True) -> Chosen | None:
                 state.RECORDING_FILE,
                 about=f"{KINDS} It stays on this machine.",
                 rig="Rig file (TOML), if you have one",
-                about_rig="What is known of the machine: shafts, teeth, bearings, sensors, speed source. Teeth add "
-                "mesh orders and sidebands, bearings their orders.",
+                about_rig="What is known of the machine. Without one, fill in the form under Machine.",
             )
-        return None if file is None else _described(file, with_reference)
+        if file is None:
+            return None
+        _keep_address(file, origin)
+        return file, _described(file, with_reference)
+
+
+def _follow_address() -> None:
+    """Open what the page's address names, where this session has nothing open yet."""
+    if state.ORIGIN in st.session_state or state.SAMPLE in st.session_state:
+        return
+    named = {sample.rig.stem: sample for sample in samples()}.get(st.query_params.get("sample", ""))
+    if named is not None:
+        st.session_state[state.SAMPLE] = named
+    kept = next((f for f in recent_files() if f.sha256.startswith(st.query_params.get("file", "?"))), None)
+    if kept is not None:
+        state.keep_files(state.RECORDING_FILE, (kept,))
+        st.session_state[state.ORIGIN] = FILE
+
+
+def _keep_address(file: ChosenFile, origin: str) -> None:
+    """Name what is open in the page's address; a file by the first digits of its hash."""
+    if origin == FILE:
+        remember_file(replace(file, rig_text=machine_text(file)))
+    named = {"sample": file.rig_name.removesuffix(".toml")} if origin == SAMPLE else {"file": file.sha256[:16]}
+    for name in ("sample", "file"):
+        if named.get(name) is None and name in st.query_params:
+            del st.query_params[name]
+        elif name in named and st.query_params.get(name) != named[name]:
+            st.query_params[name] = named[name]
+
+
+def open_file(file: ChosenFile) -> None:
+    """Let the analysis page open a file of the user's."""
+    state.keep_files(state.RECORDING_FILE, (file,))
+    st.session_state[state.ORIGIN] = FILE
+
+
+def open_sample(stem: str) -> None:
+    """Let the analysis page open a sample, in the view that shows it best."""
+    st.session_state[state.SAMPLE] = next(sample for sample in samples() if sample.rig.stem == stem)
+    st.session_state[state.ORIGIN] = SAMPLE
+    st.session_state.pop(state.TAB, None)
 
 
 def simulated_file(made: Chosen) -> ChosenFile:
@@ -198,19 +229,11 @@ def simulated_file(made: Chosen) -> ChosenFile:
 
 
 def _described(file: ChosenFile, with_reference: bool) -> Chosen:
-    """Let the user change the rig, state what the file does not, and give a reference."""
-    source = f"{file.sha256} {sha256(file.rig_text.encode()).hexdigest()}"
-    with st.expander("Rig", icon=":material/account_tree:"):
-        rig_text = _edit_rig(file.rig_name, file.rig_text, source)
-    rate_key, speed_key = (state.source_key(name, source) for name in ("rate", "speed"))
-    for key in (rate_key, speed_key):
-        state.carry_over(key)
-    with st.expander("Not in the file?", icon=":material/tune:"):
-        placeholder = "from the file or the rig"
-        rate = choose_number("Sampling rate (Hz)", rate_key, placeholder, about="Overrides what the file states.")
-        about = "Of the reference shaft, if it held still and is known well. It is refined where the signal shows it."
-        speed = choose_number("Constant speed (rpm)", speed_key, placeholder, about=about)
-    request = replace(file, rig_text=rig_text).request(sampling_rate_hz=rate, speed_rpm=speed)
+    """Add the machine as it stands in this session, what the file does not state, and a reference."""
+    text = machine_text(file)
+    request = replace(file, rig_text=text).request(
+        sampling_rate_hz=stated(file, "rate"), speed_rpm=stated(file, "speed")
+    )
     if not with_reference:
         return Chosen(request, file.content)
     reference, torque_nm = _choose_comparison(file)
@@ -223,44 +246,28 @@ def _described(file: ChosenFile, with_reference: bool) -> Chosen:
 def _choose_comparison(file: ChosenFile) -> tuple[ChosenFile | None, float | None]:
     """Return the same machine when it was healthy, and the torque in N·m that depths rest on."""
     source = file.sha256
-    with st.expander("Reference (healthy machine)", icon=":material/compare:"):
-        offered = {sample_name(s): s for s in samples() if s.recording.name != file.name}
-        name = st.selectbox(
-            "Compared with",
-            [NO_REFERENCE, FILE, *offered],
-            key=state.source_key("reference", source),
-            persist_state="session",
-            help="The same machine when it was healthy: same sensors, speed and load. Cracks of a millimetre show "
-            "against it, and every indicator is compared. It is read with the rig and the numbers stated above.",
-        )
-        reference = sample_file(offered[name]) if name in offered else None
-        if name == FILE:
-            reference = choose_file("Recording of the healthy machine", state.source_key("reference file", source))
-        torque = choose_number(
-            "Torque (N·m)",
-            state.source_key("torque", source),
-            "from the rig",
-            about="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else "
-            "of the reference shaft.",
-            minimum=0.0,
-        )
-    return reference, torque or None
-
-
-def _edit_rig(name: str, text: str, source: str) -> str:
-    key = state.source_key("rig text", source)
-    state.carry_over(key, text)
-    edited = st.text_area(
-        f"Edit {as_typed(name)} for this session",
-        key=key,
-        height=320,
+    offered = {sample_name(s): s for s in samples() if s.recording.name != file.name}
+    own = next((s.reference for s in samples() if s.recording == file.content), None)
+    first = next((name for name, s in offered.items() if s.recording == own), NO_REFERENCE)
+    names = [NO_REFERENCE, FILE, *offered]
+    name = st.selectbox(
+        "Compared with (healthy machine)",
+        names,
+        names.index(first),
+        key=state.source_key("reference", source),
         persist_state="session",
-        help="TOML. Every table is optional. Ctrl+Enter takes it over.",
+        help="The same machine when it was healthy: same sensors, speed and load. Cracks of a millimetre show "
+        "against it, and every level is compared. It is read with the machine and the numbers stated for the other.",
     )
-    if not (edited or "").strip():
-        st.button("Insert an example", on_click=_insert_example, args=(key,), key=state.source_key("example", source))
-    return edited or ""
-
-
-def _insert_example(key: str) -> None:
-    st.session_state[key] = EXAMPLE_RIG.read_text(encoding="utf-8")
+    reference = sample_file(offered[name]) if name in offered else None
+    if name == FILE:
+        reference = choose_file("Recording of the healthy machine", state.source_key("reference file", source))
+    torque = choose_number(
+        "Torque (N·m)",
+        state.source_key("torque", source),
+        "from the machine",
+        about="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else "
+        "of the reference shaft.",
+        minimum=0.0,
+    )
+    return reference, torque or None

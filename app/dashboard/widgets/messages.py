@@ -12,8 +12,10 @@ from gearsig.diagnosis import CannotTell
 from gearsig.errors import GearsigError, InputError
 
 _PLACES = {
-    "--fs": "the sampling rate under 'Not in the file?'",
-    "--speed-rpm": "the speed under 'Not in the file?'",
+    "--fs": "the sampling rate, below or under Machine",
+    "--speed-rpm": "the constant speed, below or under Machine",
+    "given with --reference": "chosen on the left as healthy machine",
+    "--reference": "the healthy machine on the left",
     "low_cut_hz": "the lowest frequency",
     "high_cut_hz": "the highest frequency",
     "n_modes": "K",
@@ -31,18 +33,19 @@ _PLACES = {
 def show_error(error: GearsigError) -> None:
     """Show an error of the input; texts in it may come from the file."""
     if not isinstance(error, InputError):
-        st.error(as_typed(_in_words_of_the_page(str(error))), icon=":material/help:")
+        st.error(as_typed(in_page_words(str(error))), icon=":material/help:")
         return
-    what = as_typed(_in_words_of_the_page(error.what))
+    what = as_typed(in_page_words(error.what))
     lines = [f"**{as_typed(_PLACES.get(error.where, error.where))}**: {what}" if error.where else what]
     if error.allowed:
         lines.append(f"Allowed: {as_typed(error.allowed)}")
     if error.remedy:
-        lines.append(f"What to do: {as_typed(_in_words_of_the_page(error.remedy))}")
+        lines.append(f"What to do: {as_typed(in_page_words(error.remedy))}")
     st.error("\n\n".join(lines), icon=":material/error:")
 
 
-def _in_words_of_the_page(text: str) -> str:
+def in_page_words(text: str) -> str:
+    """Return a text with the page's names of what the command line calls by its options."""
     for option, place in _PLACES.items():
         text = text.replace(option, place)
     return text
@@ -62,7 +65,7 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
 def show_unknown_speed(reason: CannotTell) -> None:
     """Say why there is no speed and what would give it."""
     remedy = f"\n\nWhat would give it: {as_typed(reason.remedy)}" if reason.remedy else ""
-    hint = "\n\nA constant speed can be given under *Not in the file?*"
+    hint = "\n\nA constant speed can be given under *Machine*."
     st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
 
 

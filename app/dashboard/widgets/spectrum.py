@@ -10,17 +10,15 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import Axes, ChartLine, choose_range, show_lines, show_picture
+from app.dashboard.widgets.charts import N_COLUMNS, Axes, ChartLine, looked_at, show_lines, show_picture
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.formatting import readable
 from gearsig.orders import SynchronousAverage
-from gearsig.plot import Cursor, Scale, above_zero, decibels, envelope, unit_text, with_unit
+from gearsig.plot import Cursor, Scale, above_zero, decibels, unit_text, with_unit
 from gearsig.spectra import Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
-N_COLUMNS = 1600
-"""Points of a line sent to the browser: more than a page has pixel columns."""
 SLIP_SHARE = 0.01
 """Bearings slip by a percent or so: a finding that near to a cursor is the cursor's."""
 KIND_NAMES = {
@@ -44,6 +42,8 @@ def show_spectrum(
     shown: tuple[float, float] | None = None,
     scale: str = "Logarithmic",
     quantity: str = "",
+    per_unit: tuple[float, str] | None = None,
+    plain: bool = False,
 ) -> tuple[float, float]:
     """Show spectra over each other and what can be changed about the view; return the segment that is shown.
 
@@ -67,58 +67,80 @@ def show_spectrum(
         Chosen at first, one of `SCALES`.
     quantity : str
         Name of the values; empty: by their scaling.
+    per_unit : (float, str) or None
+        Hz of an order, or orders of a Hz, with the name of that unit: for the readout of cursors.
+    plain : bool
+        The figure alone, beside a verdict.
     """
     spectra = (spectra,) if isinstance(spectra, Spectrum) else spectra
     first = spectra[0]
-    kinds = [kind for kind in KIND_NAMES if any(cursor.kind == kind for cursor in cursors)]
-    left, right = st.columns((2, 3), vertical_alignment="bottom")
-    key = state.view_key(f"{name} scale", source)
-    label = left.segmented_control("Amplitude", list(SCALES), default=scale, key=key)
-    chosen = kinds
-    if kinds:
-        chosen = right.pills(
-            "Cursors",
-            kinds,
-            default=[kind for kind in kinds if kind != "hunting"],
-            selection_mode="multi",
-            format_func=KIND_NAMES.__getitem__,
-            key=state.view_key(f"{name} cursors {kinds}", source),
-        )
-    unit = {"frequency": "Frequency shown (Hz)", "order": "Orders shown"}.get(first.axis, "Quefrency shown (s)")
-    low, high = choose_range(unit, source, float(first.positions[-1]), shown=shown, name=name)
-
-    scaled, lines, shown_values = SCALES[label or scale], [], []
+    label, chosen = scale, list(KIND_NAMES)
+    if not plain:
+        label, chosen = _choose_looks(source, cursors, name, scale)
+    chart, scaled = state.view_key(f"{name} chart", source), SCALES[label]
+    whole = (float(first.positions[0]), float(first.positions[-1]))
+    low, high = looked_at(chart, whole, shown)
+    lines, shown_values = [], []
     for i, spectrum in enumerate(spectra):
-        start, stop = spectrum.index_of(low), max(spectrum.index_of(high) + 1, spectrum.index_of(low) + 4)
-        values = _displayed(spectrum, scaled)[start:stop]
-        at, lowest, top = envelope(spectrum.positions[start:stop], values, N_COLUMNS)
+        values = _displayed(spectrum, scaled)
         # of several spectra, a band would hide the other lines
-        band = (lowest, top) if len(at) < len(values) and len(spectra) == 1 else None
-        lines.append(ChartLine(at, top, names[i] if names else spectrum.source, i, band))
+        line_name = names[i] if names else spectrum.source
+        lines.append(ChartLine(spectrum.positions, values, line_name, i, peaks=len(spectra) == 1))
+        start, stop = spectrum.index_of(low), max(spectrum.index_of(high) + 1, spectrum.index_of(low) + 4)
         # the lines at zero are an offset or a drift, not vibration: they must not squeeze the rest
-        n_offset = max(3, int(0.005 * len(values))) if start == 0 and len(values) > 9 else 0
-        shown_values.append(values[n_offset:])
+        n_offset = max(3, int(0.005 * (stop - start))) if start == 0 and stop - start > 9 else 0
+        shown_values.append(values[start + n_offset : stop])
     text = quantity or ("value" if first.scaling == "dimensionless" else first.scaling)
     in_db = f"{text} (dB re 1 {unit_text(first.unit)}".rstrip() + ")"
     axes = Axes(
         first.axis_label,
         in_db if scaled == "decibel" else with_unit(text, first.unit),
-        (low, high),
+        shown or whole,
         _value_limits(np.concatenate(shown_values), scaled),
         logarithmic=scaled == "log",
     )
     values = _displayed(first, scaled)
+    shafts = [cursor.position for cursor in cursors if cursor.kind == "shaft"]
     show_lines(
         lines[::-1],
         axes,
-        state.view_key(f"{name} chart", source),
+        chart,
         cursors=[_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen],
-        marked=[(p, float(values[first.index_of(p)])) for p in marked if low <= p <= high],
+        marked=[(p, float(values[first.index_of(p)])) for p in marked],
+        height_px=270 if plain else 340,
+        whole=whole,
+        per_unit=per_unit,
+        step=min(shafts, default=None),
     )
+    if plain:
+        return low, high
     averages = f", {first.n_averages} averages" if first.n_averages > 1 else ""
-    joined = " Peaks are joined; the pale band reaches down to the lowest line of each pixel." if lines[0].band else ""
-    st.caption(f"Resolution {first.resolution:.4g} {first.axis_unit}, {first.window} window{averages}.{joined}")
+    joined = " Peaks are joined; the pale band reaches down to the lowest line of each pixel."
+    many = len(spectra) == 1 and first.index_of(high) - first.index_of(low) > 2 * N_COLUMNS
+    st.caption(
+        f"Resolution {first.resolution:.4g} {first.axis_unit}, {first.window} window{averages}."
+        f"{joined if many else ''} Drag to zoom, double click for all."
+    )
     return low, high
+
+
+def _choose_looks(source: Analysis | str, cursors: Sequence[Cursor], name: str, scale: str) -> tuple[str, list[str]]:
+    """Return the scale and the kinds of cursors that the user chose."""
+    kinds = [kind for kind in KIND_NAMES if any(cursor.kind == kind for cursor in cursors)]
+    left, right = st.columns((2, 3), vertical_alignment="bottom")
+    key = state.view_key(f"{name} scale", source)
+    label = left.segmented_control("Amplitude", list(SCALES), default=scale, key=key)
+    if not kinds:
+        return label or scale, kinds
+    chosen = right.pills(
+        "Cursors",
+        kinds,
+        default=[kind for kind in kinds if kind != "hunting"],
+        selection_mode="multi",
+        format_func=KIND_NAMES.__getitem__,
+        key=state.view_key(f"{name} cursors {kinds}", source),
+    )
+    return label or scale, list(chosen)
 
 
 def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:
@@ -201,12 +223,9 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) 
 
 def _show_unrolled(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, marks: list[Cursor]) -> None:
     """Show the same over the angle, with its largest swing in words."""
-    chosen = np.arange(0, len(average.values), max(1, len(average.values) // 2000))
-    values, error = average.values[chosen], 2 * average.standard_error[chosen]
-    angle = chosen * 360 / len(average.values)
-    axes = Axes(
-        f"angle of {average.shaft or 'the shaft'} (deg)", with_unit(average.kind, average.unit), (0.0, 360.0), x_step=45
-    )
+    values, error = average.values, 2 * average.standard_error
+    angle = np.arange(len(values)) * 360 / len(values)
+    axes = Axes(f"angle of {average.shaft or 'the shaft'} (deg)", with_unit(average.kind, average.unit), (0.0, 360.0))
     line = ChartLine(angle, values, average.kind, band=(values - error, values + error))
     key = state.view_key(f"average {average.channel} {average.shaft} {average.kind}", analysis)
     show_lines([line], axes, key, cursors=marks, height_px=360)

@@ -1,16 +1,31 @@
-"""The answer on top of the page, in words."""
+"""The answer on top of the page: in words, with the picture it rests on."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from html import escape
 from typing import Literal
 
 import streamlit as st
 
-from app.dashboard.theme import as_typed
+from app.dashboard import state
+from app.dashboard.theme import as_typed, one_line, palette
+from app.dashboard.widgets.charts import Axes, ChartLine, show_lines
+from app.dashboard.widgets.messages import in_page_words
+from app.dashboard.widgets.spectrum import SLIP_SHARE, show_spectrum
 from gearsig.diagnosis import Analysis, Finding, Kind, Outcome
-from gearsig.recording import FORMAT_NAMES
-from gearsig.report import FindingCard, finding_card, reference_text
+from gearsig.plot import marks_of, svg_ring, with_unit
+from gearsig.report import (
+    FindingCard,
+    bearing_cursors,
+    finding_card,
+    highest_order_of_interest,
+    line_cursors,
+    marked_positions,
+    reference_text,
+    teeth_of_shaft,
+    verdict_picture,
+)
 
 Colour = Literal["red", "orange", "violet", "gray", "blue", "green"]
 COLOURS: dict[Kind | Outcome, Colour] = {
@@ -40,17 +55,30 @@ ICONS: dict[Kind | Outcome, str] = {
 
 
 LONGEST_HEADLINE = 120
+N_CHANGES = 6
 
 
 def show_verdict(analysis: Analysis) -> None:
-    """Show the verdict, the outcome in one word, and what was examined."""
+    """Show the verdict and beside it the picture that it rests on; below, folded, all findings with their evidence."""
+    with st.container(key="verdict"):
+        words, picture = st.columns((6, 5), gap="medium")
+        with words:
+            _show_words(analysis)
+        with picture:
+            show_verdict_picture(analysis)
+    findings = [f for f in analysis.findings if f.kind is not Kind.INFORMATION]
+    if analysis.findings:
+        with st.expander(f"Findings and their evidence ({len(analysis.findings)})", icon=":material/fact_check:"):
+            for finding in (*findings, *(f for f in analysis.findings if f.kind is Kind.INFORMATION)):
+                _show_card(finding)
+
+
+def _show_words(analysis: Analysis) -> None:
     recording = analysis.recording
     machine = analysis.rig.name if analysis.rig is not None else ""
     n = len(recording.channels)
-    headline, rest = headline_of(analysis.verdict)
-    st.subheader(as_typed(headline), anchor=False)
-    if rest:
-        st.markdown(as_typed(rest))
+    changed = next((f.title for f in analysis.findings if f.code == "changed-since-reference"), "")
+    headline, rest = headline_of(analysis.verdict.removeprefix(changed).strip() or analysis.verdict)
     facts = [
         f"**{as_typed(recording.provenance.source)}**",
         as_typed(machine) or "machine not described",
@@ -59,21 +87,103 @@ def show_verdict(analysis: Analysis) -> None:
     ]
     with st.container(horizontal=True, vertical_alignment="center"):
         show_kind(analysis.outcome)
-        st.markdown(" · ".join(facts), width="content")
+        st.caption(" · ".join(facts), width="content")
+    st.subheader(as_typed(in_page_words(headline)), anchor=False)
+    if rest:
+        st.caption(as_typed(in_page_words(rest)))
     if analysis.reference is not None:
-        st.caption(as_typed(reference_text(analysis.reference)))
+        _show_changes(analysis, analysis.reference)
+    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION) and f.title != changed]
+    for finding in claims[:1] or [f for f in analysis.findings if f.kind is not Kind.INFORMATION][:1]:
+        card = finding_card(finding)
+        if card.title.rstrip(".") not in analysis.verdict:
+            st.markdown(f"**{as_typed(card.title)}**")
+        if card.where:
+            st.caption(" · ".join(as_typed(text) for text in card.where))
+        _show_measures(card)
+
+
+def _show_changes(analysis: Analysis, reference: Analysis) -> None:
+    """Show the levels that changed most since the reference, largest first."""
+    changed = sorted((c for c in analysis.level_changes if c.is_change), key=lambda c: -abs(c.change_db))
+    if not changed:
+        st.caption(as_typed(reference_text(reference)))
+        return
+    st.markdown(f"**Changed since the reference** :gray[{as_typed(reference.recording.provenance.source)}]")
+    shown = changed[:N_CHANGES]
+    widest = max(abs(change.change_db) for change in shown)
+    rows = "".join(
+        f'<tr><td>{escape(one_line(c.label))}</td><td class="bar"><i class="{"up" if c.change_db > 0 else "down"}" '
+        f'style="width:{100 * abs(c.change_db) / widest:.0f}%"></i></td><td>{c.change_db:+.1f} dB</td>'
+        f"<td>± {c.repeatability_db:.1f}</td></tr>"
+        for c in shown
+    )
+    st.html(f'<table class="changes">{rows}</table>')
+    if len(changed) > len(shown):
+        st.caption(f"and {len(changed) - len(shown)} more. ±: how far halves of one recording differ.")
+
+
+def show_verdict_picture(analysis: Analysis) -> None:
+    """Show what the verdict rests on: the ring of teeth, the bearing's family, the resonance, or the order spectrum."""
+    picture = verdict_picture(analysis)
+    if picture is None or picture.about == "motion":
+        return
+    channel, place = picture.channel, f"verdict {picture.about}"
+    if picture.about == "tooth":
+        teeth = teeth_of_shaft(analysis, picture.shaft)
+        marks = marks_of(analysis.findings, picture.shaft, teeth)
+        words = f"Mean revolution of {picture.shaft}: {', '.join(mark.label for mark in marks)} stands out"
+        svg = svg_ring(picture.average, n_teeth=teeth, marks=marks, ink=palette().quiet)
+        st.image(svg, width="stretch", alt=as_typed(words))
+        return
+    if picture.about == "resonance":
+        levels = channel.order_levels
+        lines = [ChartLine(level.speed_rpm, level.amplitude, level.name, i) for i, level in enumerate(levels)]
+        low, high = float(levels[0].speed_rpm[0]), float(levels[0].speed_rpm[-1])
+        axes = Axes("speed (rpm)", with_unit("amplitude", levels[0].unit), (low, high))
+        found = [(level.largest[1], level.largest[0]) for level in levels]
+        show_lines(lines, axes, state.view_key(place, analysis), marked=found, legend=True, height_px=260)
+        if picture.finding is not None:
+            st.caption(as_typed(picture.finding.title))
+        return
+    if picture.about == "bearing":
+        spectrum = channel.envelope_spectrum
+        cursors = bearing_cursors(analysis, spectrum) if spectrum is not None else ()
+    else:
+        spectrum = channel.order_spectrum or channel.spectrum
+        cursors = line_cursors(analysis, spectrum, n_sidebands=1)
+    if spectrum is None:
+        return
+    families = [c.position for c in cursors if c.kind == "bearing"]
+    end = 1.08 * max(families) if families else highest_order_of_interest(analysis, spectrum)
+    marked = marked_positions(analysis, spectrum, channel.channel, of_bearings=picture.about == "bearing")[:1]
+    show_spectrum(
+        analysis,
+        spectrum,
+        [c for c in cursors if not marked or abs(c.position / marked[0] - round(c.position / marked[0])) < SLIP_SHARE]
+        or cursors,
+        place,
+        marked=marked,
+        shown=(0.0, min(end, float(spectrum.positions[-1]))),
+        scale="Linear" if families else "Logarithmic",
+        plain=True,
+    )
 
 
 def headline_of(verdict: str) -> tuple[str, str]:
-    """Split a long verdict after its first sentence; a short one stays whole.
+    """Split a long verdict after its first sentence and how sure it is; a short one stays whole.
 
     Examples
     --------
     >>> headline_of("No fault shows. " + "No damage shows on any tooth or bearing that could be examined. " * 2)[0]
     'No fault shows.'
+    >>> headline_of("Fault: Damage at a tooth. (at most 86 % sure). " + "Its depth cannot be told. " * 5)[0]
+    'Fault: Damage at a tooth. (at most 86 % sure)'
     """
-    first, stop, rest = verdict.partition(". ")
-    return (first + ".", rest.strip()) if stop and len(verdict) > LONGEST_HEADLINE else (verdict, "")
+    if len(verdict) <= LONGEST_HEADLINE:
+        return verdict, ""
+    found = re.match(r"(.+?\.(?: \([^)]*\))?)\.? +(.+)", verdict)
+    return (found[1], found[2].strip()) if found else (verdict, "")
 
 
 def show_kind(kind: Kind | Outcome) -> None:
@@ -81,33 +191,7 @@ def show_kind(kind: Kind | Outcome) -> None:
     st.badge(kind.value, icon=ICONS[kind], color=COLOURS[kind])
 
 
-# --------------------
-# Findings as cards, most important first.
-# --------------------
-
-
-N_OPEN = 3
-"""Cards shown at once; the rest is a click away."""
-
-
-def show_findings(analysis: Analysis) -> None:
-    """Show the first findings in full, the others folded up; notices come first only where nothing weighs more."""
-    findings = [f for f in analysis.findings if f.kind is not Kind.INFORMATION]
-    weighty = [f for f in findings if f.kind is not Kind.NOTICE] or findings
-    for i, finding in enumerate(weighty[:N_OPEN]):
-        _show_card(finding, with_evidence=i == 0)
-    _show_folded("More findings", [f for f in findings if f not in weighty[:N_OPEN]])
-    _show_folded("Further information", [f for f in analysis.findings if f.kind is Kind.INFORMATION])
-
-
-def _show_folded(title: str, findings: Sequence[Finding]) -> None:
-    if findings:
-        with st.expander(f"{title} ({len(findings)})"):
-            for finding in findings:
-                _show_card(finding, with_evidence=True)
-
-
-def _show_card(finding: Finding, *, with_evidence: bool = False) -> None:
+def _show_card(finding: Finding) -> None:
     card = finding_card(finding)
     with st.container(border=True):
         kind, body = st.columns((1, 7))
@@ -120,7 +204,8 @@ def _show_card(finding: Finding, *, with_evidence: bool = False) -> None:
             if card.where:
                 st.caption(" · ".join(as_typed(text) for text in card.where))
             _show_measures(card)
-            _show_evidence(card, folded=not with_evidence)
+            if card.evidence:
+                st.caption("\n".join(f"- {as_typed(sentence)}" for sentence in card.evidence))
 
 
 def _show_measures(card: FindingCard) -> None:
@@ -129,40 +214,6 @@ def _show_measures(card: FindingCard) -> None:
         ("how sure", card.confidence_basis),
         ("surer with", card.surer),
     ]
-    text = "  \n".join(f":gray[{name}:] {as_typed(value)}" for name, value in lines if value)
+    text = "  \n".join(f":small[:gray[{name}:] {as_typed(in_page_words(value))}]" for name, value in lines if value)
     if text:
         st.markdown(text)
-
-
-def _show_evidence(card: FindingCard, *, folded: bool) -> None:
-    text = "\n".join(f"- {as_typed(sentence)}" for sentence in card.evidence)
-    if text and folded:
-        with st.expander(f"Evidence ({len(card.evidence)})"):
-            st.caption(text)
-    elif text:
-        st.caption(text)
-
-
-# --------------------
-# What to do while nothing is open.
-# --------------------
-
-
-TEXT = f"""
-### Open a recording of your own
-
-1. Drop the **recording** in the sidebar: {FORMAT_NAMES}.
-2. Drop its **rig file**, or write one under *Rig*, which opens with the recording. Only what is known need be given:
-   teeth add mesh orders, sidebands and tooth pictures; bearings add their orders; a speed source makes orders out of
-   frequencies.
-3. If the file does not state its **sampling rate** or the **speed**, give them under *Not in the file?*
-
-No recording at hand? The *fault laboratory* makes one, with the faults you choose.
-
-Files stay on this machine. They are read in a private folder that is removed at once.
-"""
-
-
-def show_welcome() -> None:
-    """Say how a recording is opened."""
-    st.markdown(TEXT)

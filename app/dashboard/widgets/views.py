@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from math import isfinite, nan
 from typing import TYPE_CHECKING
 
@@ -11,15 +12,20 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import channel_problems, command_of, report_page, safe_file_name
-from app.dashboard.methods import show_methods
-from app.dashboard.state import AnalysisRequest
+from app.dashboard.methods import show_method
+from app.dashboard.methods.frame import MethodPage, cached
+from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import Axes, ChartLine, choose_end, choose_range, show_lines, show_picture
+from app.dashboard.widgets.charts import Axes, ChartLine, show_lines, show_map, show_picture
+from app.dashboard.widgets.machine import show_machine
 from app.dashboard.widgets.messages import show_facts, show_unknown_speed
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
+from app.dashboard.widgets.strip import choose_view
 from gearsig import plot
+from gearsig.angle import resample_to_angle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
 from gearsig.indicators import Indicator
+from gearsig.orders import OrderMap, frequency_map, order_map
 from gearsig.report import bearing_cursors, highest_order_of_interest, line_cursors, marked_positions, speed_is_constant
 
 if TYPE_CHECKING:
@@ -42,7 +48,7 @@ def show_speed(analysis: Analysis) -> None:
     }
     show_facts(st.columns(len(numbers)), numbers)
     st.caption(f"Shaft {as_typed(angle.shaft or 'of reference')}, {plot.METHODS[angle.method]}.")
-    time, speed = plot.thin(angle.time_s, 60 * angle.speed_rev_per_s)
+    time, speed = angle.time_s, 60 * angle.speed_rev_per_s
     low, high = float(speed.min()), float(speed.max())
     # rounding at constant speed must not look like a fluctuation
     margin = max(0.06 * (high - low), (plot.MIN_SPEED_SPAN * max(abs(angle.mean_speed_rpm), 1) - (high - low)) / 2)
@@ -54,7 +60,7 @@ def show_speed(analysis: Analysis) -> None:
 
 STARTS_AND_STOPS = (
     "The machine starts and stops: spectra, orders and averages want a speed that lasts. Backlash, impacts and forces "
-    "stand on the tab Starts and stops, where the motion of both gears was recorded."
+    "stand under Starts and stops, where the motion of both gears was recorded."
 )
 
 
@@ -136,21 +142,16 @@ def show_channels(analysis: Analysis) -> None:
         max_selections=12,
         key=state.view_key("channels shown", analysis),
     )
-    window = choose_range("Time shown (s)", analysis, recording.duration_s, name="time")
-    rate_hz, n = recording.sampling_rate_hz, recording.n_samples
-    start = min(max(int(window[0] * rate_hz), 0), max(n - 2, 0))
-    stop = min(max(int(np.ceil(window[1] * rate_hz)) + 1, start + 2), n)
+    time = np.arange(recording.n_samples) / recording.sampling_rate_hz
     for name in names:
         channel = recording.channels[recording.index(name)]
+        quantity = channel.quantity.replace("_", " ") if channel.quantity != "unknown" else "value"
         st.markdown(f"**{as_typed(name)}** {as_typed(channel.position)}")
-        label = plot.with_unit(
-            channel.quantity.replace("_", " ") if channel.quantity != "unknown" else "value", channel.unit
-        )
         show_lines(
-            [ChartLine(*plot.thin(np.arange(start, stop) / rate_hz, recording.values(name)[start:stop]), name)],
-            Axes("time (s)", label, window),
+            [ChartLine(time, recording.values(name), name)],
+            Axes("time (s)", plot.with_unit(quantity, channel.unit), (0.0, recording.duration_s)),
             state.view_key(f"time of {name}", analysis),
-            height_px=190,
+            height_px=200,
         )
 
 
@@ -246,25 +247,77 @@ def csv_text(table: DataFrame) -> str:
     return safe.to_csv(index=False)
 
 
-def show_order_map(analysis: Analysis, channel: ChannelAnalysis) -> None:
-    """Show the map of a channel, or say why there is none."""
-    order_map = channel.order_map
-    if order_map is None:
-        st.info("The speed changes by less than 1 %, or is not known. A map is made of a run-up or coast-down.")
+order_map_of = cached(6, "Computing the map …")(order_map)
+frequency_map_of = cached(6, "Computing the map …")(frequency_map)
+RUN_SHARE = 0.05
+"""A speed that changes by more of its mean is an axis of its own."""
+
+
+def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
+    """Show levels over order or frequency, along time or speed: order map, waterfall and Campbell diagram."""
+    angle = analysis.shaft_angle
+    if isinstance(angle, CannotTell):
+        show_unknown_speed(angle)
         return
-    end = float(order_map.positions[-1])
-    first = end
-    if channel.order_spectrum is not None:
-        first = min(end, highest_order_of_interest(analysis, channel.order_spectrum))
-    label = "Highest order shown" if order_map.axis == "order" else "Highest frequency shown (Hz)"
-    highest = choose_end(label, analysis, end, first)
-    on_orders = order_map.axis == "order"
-    cursors = [c for c in line_cursors(analysis, order_map) if c.kind == "mesh"] if on_orders else []
-    show_picture(
-        plot.order_map_figure(order_map, cursors, highest=highest),
-        f"Levels of {channel.channel} over {order_map.axis} and time, with the speed",
+    left, right = st.columns(2)
+    low, high = angle.speed_range_rpm
+    lines = left.segmented_control(
+        "Lines over", ("Order", "Frequency"), default="Order", key=state.view_key("map lines", analysis), required=True
     )
-    st.caption("Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.")
+    ways = ("Time", "Speed") if high - low > RUN_SHARE * angle.mean_speed_rpm else ("Time",)
+    along = right.segmented_control(
+        "Along", ways, default="Time", key=state.view_key(f"map along {ways}", analysis), required=True
+    )
+    shown_map = _map_of(analysis, channel, over_order=lines == "Order")
+    rows = np.argsort(shown_map.speed_rpm, kind="stable") if along == "Speed" else np.arange(len(shown_map.time_s))
+    y, also = shown_map.time_s[rows], (shown_map.speed_rpm[rows], "rpm")
+    if along == "Speed":
+        y, also = also[0], (y, "s")
+    highest = float(shown_map.positions[-1])
+    if channel.order_spectrum is not None:
+        of_interest = highest_order_of_interest(analysis, channel.order_spectrum)
+        highest = min(highest, of_interest * (1.0 if lines == "Order" else high / 60.0))
+    cursors = [c for c in line_cursors(analysis, shown_map) if c.kind == "mesh"]
+    # over frequency and speed an order is a ray
+    rays = [] if lines == "Order" else [ChartLine(c / 60.0 * y, y, "mesh", 2) for c in _mesh_orders(analysis)]
+    x_name = f"order (of {shown_map.shaft or 'the shaft'})" if lines == "Order" else "frequency (Hz)"
+    show_map(
+        plot.decibels(shown_map.values[rows], shown_map.scaling),
+        shown_map.positions,
+        y,
+        Axes(x_name, "time (s)" if along == "Time" else "speed (rpm)", (0.0, highest)),
+        state.view_key(f"map of {channel.channel} {lines} {along}", analysis),
+        unit=f"dB re 1 {plot.unit_text(shown_map.unit)}",
+        cursors=cursors if lines == "Order" else (),
+        lines=rays if along == "Speed" else (),
+        also=also,
+        shown=(0.0, highest),
+    )
+    st.caption(
+        "Lines of the machine stand upright over order and lean over frequency and speed (a Campbell diagram, with "
+        "the mesh as rays); resonances stay at their frequency. Read level, speed and time under the pointer."
+    )
+
+
+def _mesh_orders(analysis: Analysis) -> list[float]:
+    orders = [
+        c for channel in analysis.channels[:1] if (s := channel.order_spectrum) for c in line_cursors(analysis, s)
+    ]
+    return [cursor.position for cursor in orders if cursor.kind == "mesh"]
+
+
+def _map_of(analysis: Analysis, channel: ChannelAnalysis, *, over_order: bool) -> OrderMap:
+    angle, recording, name = analysis.shaft_angle, analysis.recording, channel.channel
+    assert not isinstance(angle, CannotTell)  # noqa: S101 - asked before
+    if over_order and channel.order_map is not None and channel.order_map.axis == "order":
+        return channel.order_map
+    if over_order:
+        signal = resample_to_angle(recording, angle, channels=[name])
+        return order_map_of(signal, name, revolutions_per_block=max(4, min(10, int(angle.n_revolutions) // 8)))
+    unit = recording.channels[recording.index(name)].unit
+    n = 1 << max(8, min(13, (recording.n_samples // 40).bit_length()))
+    values = recording.values(name)
+    return frequency_map_of(values, recording.sampling_rate_hz, angle, n_per_block=n, unit=unit, source=name)
 
 
 def show_start_stop(analysis: Analysis) -> None:
@@ -295,15 +348,6 @@ def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
     )
     st.markdown("The same diagnosis from the command line:")
     st.code(command_of(request), language="bash", wrap_lines=True)
-    if request.rig_text.strip():
-        st.download_button(
-            "Download the rig file, with what was changed here",
-            request.rig_text,
-            file_name=f"{safe_file_name(request.rig_name).removesuffix('.toml')}.toml",
-            mime="application/toml",
-            on_click="ignore",
-            icon=":material/download:",
-        )
     _show_provenance(analysis)
 
 
@@ -321,39 +365,61 @@ def _show_provenance(analysis: Analysis) -> None:
     st.dataframe(table, hide_index=True, width="stretch", column_config=config)
 
 
-OF_RECORDING: dict[str, Callable[[Analysis], None]] = {"Channels": show_channels, "Speed": show_speed}
-OF_MOTION: dict[str, Callable[[Analysis], None]] = {"Starts and stops": show_start_stop}
+Of = Callable[[Analysis, ChannelAnalysis], None]
+Whole = Callable[[Analysis], None]
+
+
+def _methods(*names: str) -> dict[str, Of]:
+    return {name: partial(show_method, name) for name in names}
+
+
+MOTION = "Starts and stops"
 """Of machines that start and stop, where the teeth could be examined."""
-OF_CHANNEL: dict[str, Callable[[Analysis, ChannelAnalysis], None]] = {
-    "Spectrum": show_frequency_spectrum,
-    "Order spectrum": show_order_spectrum,
-    "Order map": show_order_map,
-    "Envelope": show_envelope,
-    "Synchronous average": show_average,
-    "More methods": show_methods,
+OF_RECORDING: dict[str, Whole] = {
+    MOTION: show_start_stop,
+    "Waveform": show_channels,
+    "Speed": show_speed,
+    "Indicators": show_indicators,
 }
+OF_CHANNEL: dict[str, dict[str, Of]] = {
+    "Spectrum": {"Spectrum": show_frequency_spectrum},
+    "Order spectrum": {"Order spectrum": show_order_spectrum},
+    "Map": {"Map": show_map_over_time, **_methods("Orders (Vold–Kalman)")},
+    "Average": {"Synchronous average": show_average, **_methods("Crack severity")},
+    "Envelope": {"Envelope spectrum": show_envelope, **_methods("Kurtogram", "Cyclic coherence")},
+    "Time–frequency": _methods("Time–frequency", "Ridges", "Wavelet packets"),
+    "Modes": _methods("Modes", "Denoising"),
+    "Phase": _methods("Phase plane", "Embedding and chaos"),
+}
+MACHINE, REPORT = "Machine", "Report"
+VIEWS = (MACHINE, "Waveform", "Speed", *OF_CHANNEL, "Indicators", REPORT)
 
 
-def show_tabs(analysis: Analysis, request: AnalysisRequest) -> None:
-    """Show the views as tabs."""
-    of_motion = OF_MOTION if analysis.motion is not None else {}
-    names = (*of_motion, *OF_RECORDING, *OF_CHANNEL, "Indicators", "Report")
-    for name, tab in zip(names, st.tabs(names, key=state.TAB, on_change="rerun"), strict=True):
-        if tab.open:
-            with tab:
-                _show(name, analysis, request)
+def show_views(analysis: Analysis, file: ChosenFile, chosen: Chosen) -> None:
+    """Show the chain as a strip of small pictures, and the one that is chosen in full."""
+    names = (MOTION, *VIEWS) if analysis.motion is not None else VIEWS
+    name = choose_view(analysis, names)
+    with st.container(key="view"):
+        _show(name, analysis, file, chosen.request)
 
 
 @st.fragment
-def _show(name: str, analysis: Analysis, request: AnalysisRequest) -> None:
+def _show(name: str, analysis: Analysis, file: ChosenFile, request: AnalysisRequest) -> None:
     """Show one view; what the user changes in it reruns only this."""
-    if name in OF_MOTION:
-        OF_MOTION[name](analysis)
+    if name == MACHINE:
+        show_machine(file, analysis.recording.channel_names)
     elif name in OF_RECORDING:
         OF_RECORDING[name](analysis)
     elif name in OF_CHANNEL:
-        show_of_channel(analysis, OF_CHANNEL[name])
-    elif name == "Indicators":
-        show_indicators(analysis)
+        show_of_channel(analysis, partial(_show_one_of, OF_CHANNEL[name], name))
     else:
         show_report(analysis, request)
+
+
+def _show_one_of(methods: dict[str, Of], view: str, analysis: Analysis, channel: ChannelAnalysis) -> None:
+    """Show one of the methods of a view; the user chooses where there are several."""
+    name = next(iter(methods))
+    if len(methods) > 1:
+        page = MethodPage(analysis, channel, "")
+        name = page.choose(st, "Method", list(methods), key=f"method of {view}", named=False, as_written=True)
+    methods[name](analysis, channel)

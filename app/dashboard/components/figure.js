@@ -1,0 +1,523 @@
+// A figure of lines or of a map over one axis. Dragging zooms, and the server is told the range that is looked at, so
+// that it sends the detail of it. Cursors, peak table and export need no server.
+
+const NS = "http://www.w3.org/2000/svg";
+const LEFT = 74, RIGHT = 16, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12;
+const TOOLS = { cursor: "Cursor", harmonics: "Harmonics", sidebands: "Sidebands" };
+
+export default function ({ data, parentElement, setStateValue }) {
+  const root = parentElement.querySelector(".figure");
+  const figure = (root.figure ??= new Figure(root));
+  figure.tell = (range) => setStateValue("range", range);
+  figure.update(data);
+}
+
+class Figure {
+  constructor(root) {
+    this.root = root;
+    this.tool = "";
+    this.at = null; // position of the cursor, or of the first harmonic, or of the carrier
+    this.step = null; // distance of the sidebands
+    this.peaks = false;
+    this.svg = element("svg", { role: "img", tabindex: 0 });
+    this.bar = html("div", "bar");
+    this.words = html("div", "words");
+    this.table = html("div", "peaks");
+    this.tip = Object.assign(html("div", "tip"), { hidden: true });
+    const frame = html("div", "frame");
+    frame.append(this.svg, this.tip);
+    root.append(this.bar, frame, this.words, this.table);
+    this.svg.addEventListener("pointerdown", (event) => this.press(event));
+    this.svg.addEventListener("pointermove", (event) => this.hover(event));
+    this.svg.addEventListener("pointerleave", () => this.showTip(null));
+    this.svg.addEventListener("dblclick", () => this.look(this.whole));
+    this.svg.addEventListener("keydown", (event) => this.type(event));
+    new ResizeObserver(() => this.data && this.root.clientWidth !== this.width && this.draw()).observe(root);
+  }
+
+  update(data) {
+    const asked = this.asked;
+    this.data = data;
+    this.lines = data.lines.map((line) => ({ ...line, x: numbers(line.x), y: numbers(line.y), low: numbers(line.low), high: numbers(line.high) }));
+    this.levels = data.map && bytes(data.map.levels);
+    this.whole = data.whole;
+    // An answer to an earlier question does not undo a zoom that is under way.
+    if (!asked || same(asked, data.shown)) {
+      this.view = data.shown;
+      this.asked = null;
+    }
+    this.drawBar();
+    this.draw();
+  }
+
+  // ---------- what is looked at
+
+  look(range) {
+    const least = (this.whole[1] - this.whole[0]) * 1e-6;
+    let [low, high] = range;
+    if (high - low < least) high = low + least;
+    const span = Math.min(high - low, this.whole[1] - this.whole[0]);
+    low = Math.max(this.whole[0], Math.min(low, this.whole[1] - span));
+    this.view = this.asked = [low, low + span];
+    this.draw();
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.tell(this.view), 200);
+  }
+
+  type(event) {
+    const [low, high] = this.view, span = high - low, middle = (low + high) / 2;
+    const moved = (by) => [low + by * span, high + by * span];
+    const next = {
+      ArrowLeft: () => (this.at === null ? this.look(moved(-0.2)) : this.moveTo(this.at - span / 400)),
+      ArrowRight: () => (this.at === null ? this.look(moved(0.2)) : this.moveTo(this.at + span / 400)),
+      "+": () => this.look([middle - span / 4, middle + span / 4]),
+      "-": () => this.look([middle - span, middle + span]),
+      0: () => this.look(this.whole),
+      Escape: () => this.choose(""),
+    }[event.key];
+    if (next) {
+      event.preventDefault();
+      next();
+    }
+  }
+
+  press(event) {
+    const start = this.position(event);
+    if (start === null) return;
+    event.preventDefault();
+    this.svg.focus({ preventScroll: true });
+    this.svg.setPointerCapture(event.pointerId);
+    const held = this.held(start), before = [...this.view], from = event.offsetX;
+    const move = (e) => {
+      const now = this.unscale(e.offsetX);
+      if (held) this.moveTo(now, held);
+      else if (event.shiftKey) {
+        const by = ((from - e.offsetX) / this.plotWidth) * (before[1] - before[0]);
+        this.look([before[0] + by, before[1] + by]);
+      } else this.band(start, now);
+    };
+    const stop = (e) => {
+      this.svg.removeEventListener("pointermove", move);
+      this.svg.removeEventListener("pointerup", stop);
+      this.svg.removeEventListener("pointercancel", stop);
+      this.band(null);
+      if (held || event.shiftKey || e.type === "pointercancel") return;
+      if (Math.abs(e.offsetX - from) > 5) this.look([start, this.unscale(e.offsetX)].sort((a, b) => a - b));
+      else if (this.tool) this.moveTo(start);
+    };
+    this.svg.addEventListener("pointermove", move);
+    this.svg.addEventListener("pointerup", stop);
+    this.svg.addEventListener("pointercancel", stop);
+  }
+
+  // ---------- cursors that are dragged
+
+  choose(tool) {
+    this.tool = this.tool === tool ? "" : tool;
+    const [low, high] = this.view;
+    if (!this.tool) this.at = null;
+    else this.at ??= this.highest(low + 0.02 * (high - low), high)?.[0] ?? (low + high) / 2;
+    this.step ??= this.data.step || (high - low) / 12;
+    this.drawBar();
+    this.draw();
+  }
+
+  own() {
+    if (this.at === null) return [];
+    if (this.tool === "harmonics") return range(1, N_HARMONICS).map((k) => [k * this.at, k === 1 ? "1×" : `${k}×`]);
+    if (this.tool === "sidebands")
+      return range(-N_SIDEBANDS, N_SIDEBANDS).map((k) => [this.at + k * this.step, k ? `${k > 0 ? "+" : "−"}${Math.abs(k)}` : "C"]);
+    return [[this.at, ""]];
+  }
+
+  held(position) {
+    const near = (7 / this.plotWidth) * (this.view[1] - this.view[0]);
+    const index = this.own().findIndex(([at]) => Math.abs(at - position) < near);
+    if (index < 0) return null;
+    if (this.tool === "harmonics") return { of: "at", times: index + 1 };
+    const k = index - N_SIDEBANDS;
+    return this.tool === "sidebands" && k ? { of: "step", times: k } : { of: "at", times: 1 };
+  }
+
+  moveTo(position, held = { of: "at", times: 1 }) {
+    if (held.of === "step") this.step = Math.max((position - this.at) / held.times, 1e-9);
+    else this.at = position / held.times;
+    this.draw();
+  }
+
+  // The highest value between two positions of the first line: [position, value].
+  highest(low, high, line = this.lines.at(-1)) {
+    if (!line) return null;
+    let best = null;
+    for (let i = lowerBound(line.x, low); i < line.x.length && line.x[i] <= high; i++)
+      if (best === null || line.y[i] > line.y[best]) best = i;
+    return best === null ? null : [line.x[best], line.y[best]];
+  }
+
+  // ---------- drawing
+
+  scale(x) { return LEFT + ((x - this.view[0]) / (this.view[1] - this.view[0])) * this.plotWidth; }
+  unscale(px) { return this.view[0] + ((px - LEFT) / this.plotWidth) * (this.view[1] - this.view[0]); }
+  rise(y) {
+    const [low, high] = this.limits;
+    const share = this.data.log ? Math.log(Math.max(y, 1e-300) / low) / Math.log(high / low) : (y - low) / (high - low);
+    return this.top + (1 - share) * this.plotHeight;
+  }
+
+  ofShare(share) {
+    const [low, high] = this.limits;
+    return this.data.log ? low * (high / low) ** share : low + share * (high - low);
+  }
+
+  draw() {
+    const { data, root } = this, style = getComputedStyle(root);
+    this.width = root.clientWidth;
+    if (!this.width) return;
+    this.plotWidth = Math.max(this.width - LEFT - (data.map ? 70 : RIGHT), 60);
+    this.plotHeight = data.height;
+    const named = this.placed();
+    this.top = 10 + ROW * named.rows;
+    const height = this.top + this.plotHeight + BOTTOM;
+    this.ink = style.getPropertyValue("--ink").trim() || style.color;
+    this.rule = style.getPropertyValue("--rule").trim() || "#8884";
+    this.limits = data.map ? data.map.limits : data.limits ?? this.ownLimits();
+    const { svg } = this;
+    svg.replaceChildren();
+    set(svg, { width: this.width, height, viewBox: `0 0 ${this.width} ${height}`, "font-family": "system-ui, sans-serif", "font-size": 12, "aria-label": data.alternative });
+    const clip = `clip${Math.random().toString(36).slice(2)}`;
+    const rect = { x: LEFT, y: this.top, width: this.plotWidth, height: this.plotHeight };
+    add(add(add(svg, "defs"), "clipPath", { id: clip }), "rect", rect);
+    this.drawAxes();
+    const inside = add(svg, "g", { "clip-path": `url(#${clip})` });
+    if (data.map) this.drawMap(inside);
+    for (const line of this.lines) this.drawLine(inside, line);
+    for (const [x, y] of data.marked)
+      add(inside, "circle", { cx: this.scale(x), cy: this.rise(y), r: 7, fill: "none", stroke: data.fault, "stroke-width": 2 });
+    this.drawCursors(inside, named);
+    this.drawOwn(inside);
+    if (data.map) this.drawScale();
+    this.selection = add(inside, "rect", { y: this.top, height: this.plotHeight, width: 0, fill: this.ink, opacity: 0.12 });
+    this.drawPeaks();
+  }
+
+  ownLimits() {
+    let low = Infinity, high = -Infinity;
+    for (const line of this.lines) {
+      const { x, y, low: floor } = line;
+      for (let i = lowerBound(x, this.view[0]); i < x.length && x[i] <= this.view[1]; i++) {
+        if (Number.isNaN(y[i])) continue;
+        low = Math.min(low, floor.length ? floor[i] : y[i]);
+        high = Math.max(high, floor.length ? line.high[i] : y[i]);
+      }
+    }
+    if (!(high > low)) [low, high] = Number.isFinite(low) ? [low - 1, low + 1] : [0, 1];
+    const margin = 0.06 * (high - low);
+    return [low - margin, high + margin];
+  }
+
+  drawAxes() {
+    const { svg, data, plotWidth, plotHeight, top } = this, [low, high] = this.limits, bottom = top + plotHeight;
+    const quiet = { fill: this.ink, opacity: 0.75 };
+    for (const value of data.log ? decades(low, high) : ticks(low, high, plotHeight / 45)) {
+      const y = this.rise(value);
+      add(svg, "line", { x1: LEFT, x2: LEFT + plotWidth, y1: y, y2: y, stroke: this.rule });
+      text(svg, LEFT - 7, y + 4, data.log ? short(value) : plain(value, low, high), { ...quiet, "text-anchor": "end" });
+    }
+    for (const value of ticks(...this.view, plotWidth / 95)) {
+      const x = this.scale(value);
+      add(svg, "line", { x1: x, x2: x, y1: bottom, y2: bottom + 5, stroke: this.ink, opacity: 0.5 });
+      text(svg, x, bottom + 18, plain(value, ...this.view), { ...quiet, "text-anchor": "middle" });
+    }
+    add(svg, "line", { x1: LEFT, x2: LEFT + plotWidth, y1: bottom, y2: bottom, stroke: this.ink, opacity: 0.5 });
+    text(svg, LEFT + plotWidth / 2, bottom + 37, data.x, { ...quiet, "text-anchor": "middle" });
+    const label = text(svg, 0, 0, data.y, { ...quiet, "text-anchor": "middle" });
+    label.setAttribute("transform", `translate(13,${top + plotHeight / 2}) rotate(-90)`);
+  }
+
+  drawLine(inside, line) {
+    const { x, y, low } = line, parts = [], from = Math.max(lowerBound(x, this.view[0]) - 1, 0);
+    const to = Math.min(lowerBound(x, this.view[1]) + 1, x.length), band = [];
+    let pen = "M";
+    for (let i = from; i < to; i++) {
+      if (Number.isNaN(y[i])) { pen = "M"; continue; }
+      parts.push(`${pen}${this.scale(x[i]).toFixed(1)},${this.rise(y[i]).toFixed(1)}`);
+      pen = "L";
+    }
+    if (low.length) {
+      for (let i = from; i < to; i++) band.push(`${this.scale(x[i]).toFixed(1)},${this.rise(line.high[i]).toFixed(1)}`);
+      for (let i = to - 1; i >= from; i--) band.push(`${this.scale(x[i]).toFixed(1)},${this.rise(low[i]).toFixed(1)}`);
+      add(inside, "polygon", { points: band.join(" "), fill: line.colour, opacity: 0.22 });
+    }
+    add(inside, "path", { d: parts.join(""), fill: "none", stroke: line.colour, "stroke-width": 1.2, "stroke-linejoin": "round", "stroke-dasharray": line.dotted ? "2 3" : null });
+  }
+
+  // Cursors that the machine implies, and the rows of their labels: the first of a family finds a place first.
+  placed() {
+    const rows = Array.from({ length: MAX_ROWS }, () => []), labels = [];
+    const seen = this.data.cursors.filter((cursor) => cursor.at >= this.view[0] && cursor.at <= this.view[1]);
+    for (const cursor of [...seen].sort((a, b) => a.number - b.number)) {
+      const x = this.scale(cursor.at), half = cursor.label.length * 3.4 + 4;
+      const row = rows.findIndex((taken) => taken.every(([low, high]) => x + half < low || x - half > high));
+      if (row < 0 || x + half > this.width || x - half < 0) continue;
+      rows[row].push([x - half, x + half]);
+      labels.push({ ...cursor, x, row });
+    }
+    return { seen, labels, rows: rows.filter((taken) => taken.length).length };
+  }
+
+  drawCursors(inside, { seen, labels }) {
+    for (const { at, colour, dash } of seen)
+      add(inside, "line", { x1: this.scale(at), x2: this.scale(at), y1: this.top, y2: this.top + this.plotHeight, stroke: colour, opacity: 0.6, "stroke-dasharray": dash });
+    for (const { x, row, label, colour } of labels)
+      text(this.svg, x, this.top - 5 - ROW * row, label, { fill: colour, "text-anchor": "middle" });
+  }
+
+  drawOwn(inside) {
+    const shown = this.own().filter(([at]) => at >= this.view[0] && at <= this.view[1]);
+    for (const [at, label] of shown) {
+      const x = this.scale(at);
+      add(inside, "line", { x1: x, x2: x, y1: this.top, y2: this.top + this.plotHeight, stroke: this.ink, "stroke-width": 1.5, class: "own" });
+      if (label) text(inside, x + 3, this.top + 12, label, { fill: this.ink });
+    }
+    this.words.replaceChildren();
+    if (this.at === null) return;
+    const near = 0.004 * (this.view[1] - this.view[0]), value = this.highest(this.at - near, this.at + near);
+    const say = [`${figure(this.at)} ${this.data.x_unit}`];
+    if (value) say.push(`${figure(value[1])} ${this.data.y_unit}`);
+    if (this.tool === "sidebands") say.push(`sidebands every ${figure(this.step)} ${this.data.x_unit}`);
+    if (this.data.per_unit) say.push(`${figure(this.at * this.data.per_unit[0])} ${this.data.per_unit[1]}`);
+    this.words.textContent = `${TOOLS[this.tool]}: ${say.join(" · ")}`;
+  }
+
+  drawMap(inside) {
+    const { map } = this.data, canvas = document.createElement("canvas"), lut = bytes(map.colours);
+    canvas.width = map.columns;
+    canvas.height = map.rows;
+    const context = canvas.getContext("2d"), image = context.createImageData(map.columns, map.rows);
+    for (let i = 0; i < this.levels.length; i++) {
+      const row = map.rows - 1 - Math.floor(i / map.columns), at = 4 * (row * map.columns + (i % map.columns));
+      image.data.set(lut.subarray(3 * this.levels[i], 3 * this.levels[i] + 3), at);
+      image.data[at + 3] = 255;
+    }
+    context.putImageData(image, 0, 0);
+    const [low, high] = map.span;
+    add(inside, "image", { href: canvas.toDataURL(), x: this.scale(low), width: this.scale(high) - this.scale(low), y: this.top, height: this.plotHeight, preserveAspectRatio: "none" });
+  }
+
+  drawScale() {
+    const { map } = this.data, lut = bytes(map.colours), x = LEFT + this.plotWidth + 14, n = 48, step = this.plotHeight / n;
+    for (let i = 0; i < n; i++) {
+      const k = 3 * Math.round((255 * (n - 1 - i)) / (n - 1));
+      add(this.svg, "rect", { x, y: this.top + i * step, width: 10, height: step + 0.5, fill: `rgb(${lut.slice(k, k + 3)})` });
+    }
+    for (const [share, value] of [[1, map.low], [0, map.high]])
+      text(this.svg, x + 14, this.top + share * this.plotHeight + (share ? 0 : 9), plain(value, map.low, map.high), { fill: this.ink, opacity: 0.75 });
+    text(this.svg, x + 14, this.top + this.plotHeight / 2, "dB", { fill: this.ink, opacity: 0.75 });
+  }
+
+  band(from, to) {
+    if (from === null) return set(this.selection, { width: 0 });
+    const [low, high] = [this.scale(from), this.scale(to)].sort((a, b) => a - b);
+    set(this.selection, { x: low, width: high - low });
+  }
+
+  // ---------- reading off
+
+  position(event) {
+    const x = event.offsetX;
+    return x < LEFT || x > LEFT + this.plotWidth ? null : this.unscale(x);
+  }
+
+  hover(event) {
+    const x = this.position(event), { data } = this;
+    if (x === null || event.offsetY < this.top || event.offsetY > this.top + this.plotHeight) return this.showTip(null);
+    this.svg.style.cursor = this.held(x) ? "ew-resize" : "crosshair";
+    const near = (4 / this.plotWidth) * (this.view[1] - this.view[0]), lines = [];
+    const cursors = data.cursors.filter(({ at }) => Math.abs(at - x) < near).slice(0, 6);
+    if (data.map) lines.push(this.levelAt(x, event.offsetY));
+    for (const line of this.lines) {
+      const value = this.highest(x - near, x + near, line);
+      if (value) lines.push(`${this.lines.length > 1 ? line.name + ": " : ""}${figure(value[0])} ${data.x_unit}, ${figure(value[1])} ${data.y_unit}`);
+    }
+    for (const { label, at } of cursors) lines.push(`${label}: ${figure(at)} ${data.x_unit}`);
+    this.showTip(lines, event);
+  }
+
+  levelAt(x, py) {
+    const { map } = this.data, [low, high] = map.span;
+    const column = Math.floor(((x - low) / (high - low)) * map.columns);
+    const share = 1 - (py - this.top) / this.plotHeight, row = Math.min(map.rows - 1, Math.floor(share * map.rows));
+    if (column < 0 || column >= map.columns) return "";
+    const level = map.low + (this.levels[row * map.columns + column] / 255) * (map.high - map.low);
+    const y = this.ofShare(share);
+    const also = map.also ? `, ${figure(map.also[row])} ${map.also_unit}` : "";
+    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}: ${level.toFixed(1)} ${map.unit}`;
+  }
+
+  showTip(lines, event) {
+    this.tip.replaceChildren(...(lines ?? []).filter(Boolean).map((line) => Object.assign(html("div"), { textContent: line })));
+    this.tip.hidden = !lines?.length;
+    if (!event) return;
+    const left = event.offsetX > this.width / 2;
+    Object.assign(this.tip.style, { left: left ? "" : `${event.offsetX + 14}px`, right: left ? `${this.width - event.offsetX + 14}px` : "", top: `${event.offsetY + 10}px` });
+  }
+
+  // The highest local maxima of what is shown, of the line in front.
+  found() {
+    const line = this.lines.at(-1), found = [];
+    if (!line) return found;
+    const { x, y } = line;
+    for (let i = Math.max(lowerBound(x, this.view[0]), 1); i < x.length - 1 && x[i] <= this.view[1]; i++)
+      if (y[i] > y[i - 1] && y[i] >= y[i + 1]) found.push([x[i], y[i]]);
+    const apart = (this.view[1] - this.view[0]) / 200, kept = [];
+    for (const peak of found.sort((a, b) => b[1] - a[1])) {
+      if (kept.every(([at]) => Math.abs(at - peak[0]) > apart)) kept.push(peak);
+      if (kept.length === N_PEAKS) break;
+    }
+    return kept;
+  }
+
+  drawPeaks() {
+    this.table.replaceChildren();
+    if (!this.peaks) return;
+    const { data } = this, table = html("table"), near = (this.view[1] - this.view[0]) * 0.004;
+    const row = (cells, kind = "td") => {
+      const line = html("tr");
+      line.append(...cells.map((cell) => Object.assign(html(kind), { textContent: cell })));
+      table.append(line);
+    };
+    row(["", data.x, data.y, "line"], "th");
+    this.found().forEach(([x, y], i) => {
+      const named = data.cursors.filter(({ at }) => Math.abs(at - x) <= near).sort((a, b) => Math.abs(a.at - x) - Math.abs(b.at - x));
+      row([i + 1, figure(x), figure(y), named.slice(0, 2).map(({ label }) => label).join(", ")]);
+    });
+    this.table.append(table);
+  }
+
+  // ---------- the bar of buttons, and files
+
+  drawBar() {
+    const button = (label, act, about, on = null) => {
+      const made = Object.assign(html("button"), { textContent: label, title: about, type: "button", onclick: act });
+      if (on !== null) made.setAttribute("aria-pressed", on);
+      return made;
+    };
+    const left = html("span"), right = html("span");
+    if (this.lines.length > 1 && this.data.legend)
+      for (const line of this.lines) {
+        const key = html("i");
+        key.style.background = line.colour;
+        const entry = html("span", "key");
+        entry.append(key, line.name);
+        left.append(entry);
+      }
+    if (this.data.has_tools) {
+      for (const [tool, label] of Object.entries(TOOLS))
+        right.append(button(label, () => this.choose(tool), `${label}: drag it along, or use the arrow keys`, this.tool === tool));
+      if (this.lines.length)
+        right.append(button("Peaks", () => { this.peaks = !this.peaks; this.drawBar(); this.draw(); }, "Table of the highest peaks shown", this.peaks));
+    }
+    right.append(button("Whole", () => this.look(this.whole), "Show all of it (double click, or key 0)"));
+    for (const kind of ["PNG", "SVG", "CSV"]) right.append(button(kind, () => this.save(kind), `Save what is shown as ${kind}`));
+    this.bar.replaceChildren(left, right);
+  }
+
+  async save(kind) {
+    if (kind === "CSV") return give(new Blob([this.csv()], { type: "text/csv" }), `${this.data.name}.csv`);
+    const copy = this.svg.cloneNode(true), paper = getComputedStyle(this.root).getPropertyValue("--paper").trim() || "#fff";
+    copy.setAttribute("xmlns", NS);
+    copy.prepend(element("rect", { width: "100%", height: "100%", fill: paper }));
+    const source = new XMLSerializer().serializeToString(copy);
+    const blob = new Blob([source], { type: "image/svg+xml" });
+    if (kind === "SVG") return give(blob, `${this.data.name}.svg`);
+    const image = new Image(), times = 2;
+    image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(source)}`;
+    await image.decode();
+    const canvas = Object.assign(document.createElement("canvas"), { width: times * this.width, height: times * this.svg.clientHeight });
+    canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height);
+    canvas.toBlob((png) => give(png, `${this.data.name}.png`));
+  }
+
+  csv() {
+    const { data } = this, quoted = (value) => `"${String(value).replaceAll('"', '""').replace(/^[=+\-@]/, "'$&")}"`;
+    if (data.map) {
+      const { map } = data, [low, high] = map.span, rows = [[data.x, data.y, map.unit].map(quoted)];
+      for (let i = 0; i < this.levels.length; i++) {
+        const x = low + ((i % map.columns) + 0.5) / map.columns * (high - low);
+        const y = this.ofShare((Math.floor(i / map.columns) + 0.5) / map.rows);
+        rows.push([figure(x), figure(y), (map.low + this.levels[i] / 255 * (map.high - map.low)).toFixed(2)]);
+      }
+      return rows.map((row) => row.join(",")).join("\n");
+    }
+    const rows = [["line", data.x, data.y].map(quoted).join(",")];
+    for (const { name, x, y } of this.lines)
+      for (let i = lowerBound(x, this.view[0]); i < x.length && x[i] <= this.view[1]; i++) rows.push(`${quoted(name)},${x[i]},${y[i]}`);
+    return rows.join("\n");
+  }
+}
+
+// ---------- small helpers
+
+const element = (name, looks = {}) => set(document.createElementNS(NS, name), looks);
+const add = (parent, name, looks) => parent.appendChild(element(name, looks));
+const html = (name, kind = "") => Object.assign(document.createElement(name), { className: kind });
+const range = (low, high) => Array.from({ length: high - low + 1 }, (_, i) => low + i);
+const same = (a, b) => Math.abs(a[0] - b[0]) + Math.abs(a[1] - b[1]) < 1e-9 * Math.abs(a[1] - a[0]) + 1e-15;
+const figure = (value) => String(Number(value.toPrecision(6)));
+const short = (value) => (value >= 0.001 && value < 10000 ? String(Number(value.toPrecision(2))) : value.toExponential(0).replace("e", "e"));
+
+function set(made, looks) {
+  for (const [name, value] of Object.entries(looks)) if (value !== null && value !== undefined) made.setAttribute(name, value);
+  return made;
+}
+
+function text(parent, x, y, words, looks) {
+  const made = add(parent, "text", { x, y, ...looks });
+  made.textContent = words;
+  return made;
+}
+
+function bytes(packed) {
+  return Uint8Array.from(atob(packed ?? ""), (letter) => letter.charCodeAt(0));
+}
+
+function numbers(packed) {
+  return new Float64Array(bytes(packed).buffer);
+}
+
+function lowerBound(x, value) {
+  let low = 0, high = x.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (x[middle] < value) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
+function ticks(low, high, n) {
+  const rough = (high - low) / Math.max(n, 1), power = 10 ** Math.floor(Math.log10(rough));
+  const step = power * [1, 2, 5, 10].find((times) => times * power >= rough * 0.999);
+  const first = Math.ceil(low / step - 1e-9), last = Math.floor(high / step + 1e-9);
+  return range(first, Math.min(last, first + 50)).map((k) => k * step);
+}
+
+function decades(low, high) {
+  const first = Math.ceil(Math.log10(low) - 1e-9), last = Math.floor(Math.log10(high) + 1e-9);
+  const every = Math.max(1, Math.ceil((last - first + 1) / 9));
+  const whole = range(first, last).filter((k) => (k - first) % every === 0).map((k) => 10 ** k);
+  return whole.length > 1 ? whole : ticks(low, high, 5).filter((value) => value > 0);
+}
+
+function plain(value, low, high) {
+  const span = Math.abs(high - low), digits = Math.min(Math.max(Math.ceil(1 - Math.log10(span)) + 1, 0), 9);
+  const largest = Math.max(Math.abs(low), Math.abs(high));
+  if (largest < 1e-3 || largest >= 1e6) return String(Number(value.toPrecision(4)).toExponential()).replace("e+0", "");
+  return String(Number(value.toFixed(digits))).replace("-", "−");
+}
+
+function give(blob, name) {
+  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}

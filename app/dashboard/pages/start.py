@@ -1,0 +1,148 @@
+"""What gearsig is, three things to try, one's own file, and the samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import streamlit as st
+
+from app.dashboard import state
+from app.dashboard.cached import recent_files
+from app.dashboard.theme import as_typed
+from app.dashboard.widgets.chooser import choose_file, open_file, open_sample
+from app.dashboard.widgets.messages import show_error
+from app.samples import samples
+from gearsig.checks import FloatArray
+from gearsig.errors import GearsigError
+from gearsig.recording import FORMAT_NAMES
+
+SVG = "http://www.w3.org/2000/svg"
+BLUE, ORANGE = "#2B86C5", "#D55E00"
+N_SHOWN = 8
+
+
+def path(x: FloatArray, y: FloatArray, colour: str, *, width: float = 2.0, closed: bool = False) -> str:
+    """Return an SVG path through points."""
+    points = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True))
+    end = "Z" if closed else ""
+    return f'<path d="M{points}{end}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-linejoin="round"/>'
+
+
+def ring_of_teeth() -> str:
+    """Return the ring of teeth with one that stands out."""
+    turn = np.linspace(0, 2 * np.pi, 900, endpoint=False)
+    noise = np.sin(29 * turn) * 2.0 + np.sin(58 * turn + 1) * 1.2 + np.sin(7 * turn) * 0.8
+    away = np.abs(turn - 2.46)
+    burst = 19 * np.exp(-((away / 0.09) ** 2)) * np.cos(110 * (turn - 2.46))
+    radius = 40 + noise + burst
+    x, y = 150 + radius * np.sin(turn), 62 - radius * np.cos(turn)
+    hurt = away < 0.16
+    return path(x, y, BLUE, width=1.6, closed=True) + path(x[hurt], y[hurt], ORANGE, width=2.6)
+
+
+def crack_dial() -> str:
+    """Return two teeth with a crack in a root, over a dial."""
+    teeth = "M60 84V62C68 58 72 46 76 22H104C108 46 112 58 120 62H136C144 58 148 46 152 22H180C184 46 188 58 196 62V84"
+    return (
+        f'<path d="{teeth}" fill="none" stroke="{BLUE}" stroke-width="2.2"/>'
+        f'<path d="M121 62L132 70L138 69L146 78" fill="none" stroke="{ORANGE}" stroke-width="3"/>'
+        f'<path d="M40 106H260" stroke="{BLUE}" stroke-opacity="0.35" stroke-width="4" stroke-linecap="round"/>'
+        f'<path d="M40 106H150" stroke="{ORANGE}" stroke-width="4" stroke-linecap="round"/>'
+        f'<circle cx="150" cy="106" r="8" fill="{ORANGE}"/>'
+    )
+
+
+def two_spectra() -> str:
+    """Return lines of a simulation beside those of a recording, which has sidebands."""
+    lines = [(60, 60, 0), (140, 78, 1), (220, 44, 2)]
+    made = ""
+    for at, height, n in lines:
+        made += f'<path d="M{at} 104V{104 - height}" stroke="{BLUE}" stroke-width="4"/>'
+        for k in (-2, -1, 1, 2):
+            tall = height * (0.5 - 0.17 * abs(k)) * (1 if n != 2 else 0.8)
+            made += f'<path d="M{at + 13 * k} 104V{104 - tall:.0f}" stroke="{ORANGE}" stroke-width="3"/>'
+    return made + f'<path d="M24 104H276" stroke="{BLUE}" stroke-opacity="0.4" stroke-width="1.5"/>'
+
+
+TO_TRY: tuple[tuple[str, str, str, Callable[[], str], str], ...] = (
+    (
+        "Find the damaged tooth",
+        "A recording beside one of the same gearbox when it was healthy: which tooth, how sure, on what evidence.",
+        "Open the recording",
+        ring_of_teeth,
+        "analysis",
+    ),
+    (
+        "Dial a crack into a gearbox",
+        "A simulated pair that follows its sliders: pull the crack from 0 to 4 mm and see what an accelerometer would.",
+        "Open the laboratory",
+        crack_dial,
+        "laboratory",
+    ),
+    (
+        "Why does my simulation differ?",
+        "Recordings against a simulation of their rig: where they differ, which effect is missing, how far it goes.",
+        "Open the gap diagnosis",
+        two_spectra,
+        "gap",
+    ),
+)
+
+
+def show() -> None:
+    """Show mark and purpose, three things to try, own and recent files, samples."""
+    st.html(
+        '<div class="hero"><h1>Gear vibration, from the recording to the reason</h1>'
+        "<p>gearsig reads a recording, names the damaged tooth or bearing with its evidence, and says why a simulation "
+        "differs from the machine.</p></div>"
+    )
+    with st.container(key="try"):
+        for column, (title, about, label, picture, page) in zip(st.columns(3), TO_TRY, strict=True):
+            with column.container(border=True, height="stretch"):
+                st.image(f'<svg xmlns="{SVG}" viewBox="0 0 300 124">{picture()}</svg>', width="stretch", alt="")
+                st.markdown(f"**{title}**")
+                st.caption(about)
+                if st.button(label, type="primary", width="stretch", key=f"try {page}"):
+                    if page == "analysis":
+                        open_sample("damaged_tooth")
+                    st.switch_page(state.ANALYSIS_PAGE.with_name(f"{page}.py"))
+    left, right = st.columns((5, 7), gap="large")
+    with left:
+        show_own()
+    with right:
+        show_samples()
+
+
+def show_own() -> None:
+    """Take a file of the user's, or one of those that were open last."""
+    st.markdown("##### Open your own file")
+    st.caption(f"{FORMAT_NAMES}. It stays on this machine; the machine is described in a form afterwards.")
+    file = choose_file("Recording", "start file", rig="Rig file (TOML), if you have one")
+    if file is not None:
+        open_file(file)
+        state.keep_files("start file", ())
+        st.switch_page(state.ANALYSIS_PAGE)
+    # Files of this server's memory are shown to whoever sits at it, not to others in the network.
+    for kept in recent_files()[:5] if st.context.ip_address is None else ():
+        name = as_typed(kept.name)
+        if st.button(f"{name}", key=f"recent {kept.sha256}", icon=":material/history:", type="tertiary"):
+            open_file(kept)
+            st.switch_page(state.ANALYSIS_PAGE)
+
+
+def show_samples() -> None:
+    """Show the samples that show most."""
+    st.markdown("##### Samples, each with what it shows")
+    for sample in samples()[:N_SHOWN]:
+        with st.container(horizontal=True, vertical_alignment="center"):
+            st.markdown(f"**{sample.title}** — :gray[{sample.about}]")
+            if st.button("Open", key=f"sample {sample.rig.stem}"):
+                open_sample(sample.rig.stem)
+                st.switch_page(state.ANALYSIS_PAGE)
+
+
+try:
+    show()
+except GearsigError as error:
+    show_error(error)

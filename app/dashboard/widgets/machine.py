@@ -1,0 +1,335 @@
+"""The machine as a form: tables of shafts, gears, bearings and sensors, with the orders that follow and a drawing."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import streamlit as st
+import tomli_w
+
+from app.dashboard import state
+from app.dashboard.state import ChosenFile
+from app.dashboard.theme import one_line, palette
+from app.dashboard.widgets.charts import download
+from app.dashboard.widgets.messages import show_error
+from gearsig.errors import GearsigError, InputError
+from gearsig.rig import QUANTITIES, Rig, bearing_catalogue, order_lines, rig_from_dict
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Table = dict[str, Any]
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "shaft": ("name", "direction"),
+    "pair": ("name", "driver", "driver_teeth", "driven", "driven_teeth", "module_mm", "face_width_mm"),
+    "bearing": ("name", "shaft", "bearing", "n_rolling_elements", "rolling_element_diameter_mm", "pitch_diameter_mm"),
+    "sensor": ("channel", "quantity", "unit", "position", "scale"),
+}
+TITLES = {"shaft": "Shafts", "pair": "Gear pairs", "bearing": "Bearings", "sensor": "Sensors"}
+SPEED_SOURCES: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "constant": ("speed_rpm",),
+    "tachometer": ("channel", "pulses_per_revolution"),
+    "encoder": ("channel", "units_per_revolution"),
+    "speed channel": ("channel", "rpm_per_unit"),
+}
+FIRST: Table = {"pulses_per_revolution": 1, "units_per_revolution": 360.0, "rpm_per_unit": 1.0, "speed_rpm": 1500.0}
+WORDS = {
+    "speed_rpm": "Speed (rpm)",
+    "pulses_per_revolution": "Pulses per revolution",
+    "units_per_revolution": "Units per revolution",
+    "rpm_per_unit": "rpm per unit",
+}
+
+
+def machine_text(file: ChosenFile) -> str:
+    """Return the rig file's text as it stands in this session: the form's, else the file's."""
+    return str(st.session_state.get(_key(file), file.rig_text))
+
+
+def stated(file: ChosenFile, name: str) -> float | None:
+    """Return a number that the user stated of a file, "rate" (Hz) or "speed" (rpm); None without one."""
+    value: float | None = st.session_state.get(state.source_key(f"stated {name}", file.sha256))
+    return value
+
+
+def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: bool = False) -> None:
+    """Show the form, what follows from it, and TOML to give and take.
+
+    Parameters
+    ----------
+    file : ChosenFile
+    channels : sequence of str
+        Of the recording, where it could be read.
+    is_told : bool
+        Whether the page already says what is wrong with the machine as it stands.
+    """
+    text = machine_text(file)
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        st.info("The rig file is no TOML yet: mend it as text.", icon=":material/edit:")
+        _show_text(file, text, is_open=True)
+        return
+    with st.container(key="machine"):
+        form, follows = st.columns((7, 5), gap="medium")
+        with form:
+            edited = _form(file, table, text, channels)
+        with follows:
+            _show_consequences(edited, is_told=is_told and edited == table)
+    if _rig_of(edited) != _rig_of(table):
+        changed = tomli_w.dumps(edited)
+        with st.container(horizontal=True):
+            look = ":material/check:"
+            st.button("Analyse with this machine", type="primary", icon=look, on_click=_take, args=(file, changed))
+            st.button("Discard", on_click=_take, args=(file, text))
+    show_stated(file)
+    _show_text(file, text)
+
+
+def _rig_of(table: Table) -> Rig | str:
+    """Return the rig of a table, or why there is none."""
+    try:
+        return rig_from_dict(table)
+    except GearsigError as error:
+        return f"{table}: {error}"
+
+
+def show_stated(file: ChosenFile) -> None:
+    """Ask for what the file does not state: sampling rate and a constant speed."""
+    left, right = st.columns(2)
+    for place, label, name, about in (
+        (left, "Sampling rate (Hz)", "rate", "Of files that do not state it; it overrides what the file says."),
+        (right, "Constant speed (rpm)", "speed", "Of the reference shaft, if it held still; refined by the signal."),
+    ):
+        place.number_input(
+            label,
+            value=stated(file, name),
+            placeholder="from the file or the machine",
+            help=about,
+            key=state.source_key(f"asked {name}", file.sha256),
+            on_change=_state,
+            args=(file, name),
+        )
+
+
+def _state(file: ChosenFile, name: str) -> None:
+    st.session_state[state.source_key(f"stated {name}", file.sha256)] = st.session_state[
+        state.source_key(f"asked {name}", file.sha256)
+    ]
+
+
+def _key(file: ChosenFile) -> str:
+    return state.source_key("machine", f"{file.sha256} {file.rig_name}")
+
+
+def _take(file: ChosenFile, text: str) -> None:
+    st.session_state[_key(file)] = text
+    # tables of the form begin anew from the text
+    version = state.source_key("machine version", file.sha256)
+    st.session_state[version] = st.session_state.get(version, 0) + 1
+
+
+def _form(file: ChosenFile, table: Table, text: str, channels: Sequence[str]) -> Table:
+    """Return the rig's table with what the form says; keys that the form does not show stay."""
+    version = st.session_state.get(state.source_key("machine version", file.sha256), 0)
+
+    def key(name: str) -> str:
+        return state.source_key(f"{name} {version}", f"{file.sha256} {len(text)}")
+
+    edited: Table = dict(table)
+    name = st.text_input("Machine", table.get("name", ""), key=key("machine name"))
+    edited |= {"name": name} if name else {}
+    for kind in COLUMNS:
+        st.markdown(f"**{TITLES[kind]}**")
+        edited[kind] = _edit(kind, list(table.get(kind, [])), edited, key(kind), channels)
+    speed = _edit_speed(dict(table.get("speed", {})), edited, key, channels)
+    edited = {name: value for name, value in edited.items() if value not in ([], {})}
+    edited.pop("speed", None)
+    return edited | ({"speed": speed} if speed else {})
+
+
+def _edit(kind: str, rows: list[Table], rig: Table, key: str, channels: Sequence[str]) -> list[Table]:
+    from pandas import DataFrame
+
+    columns = COLUMNS[kind]
+    frame = DataFrame([[row.get(name) for name in columns] for row in rows], columns=list(columns))
+    numbers = [c for c in columns if c.endswith(("_teeth", "_mm", "elements")) or c == "scale"]
+    frame = frame.astype(dict.fromkeys(numbers, "float64") | {c: "object" for c in columns if c not in numbers})
+    result = st.data_editor(
+        frame, key=key, num_rows="dynamic", hide_index=True, width="stretch", column_config=_config(kind, rig, channels)
+    )
+    return [row for row in _rows(result, rows) if row]
+
+
+def _rows(frame: DataFrame, before: list[Table]) -> list[Table]:
+    """Return the rows of an edited table as a rig file has them: what is empty is left out, whole numbers are whole."""
+    from pandas import isna
+
+    found = []
+    for index, values in frame.iterrows():
+        known = before[index] if isinstance(index, int) and index < len(before) else {}
+        row = {name: value for name, value in known.items() if name not in frame.columns}
+        for name, value in values.items():
+            if value == "" or isna(value):
+                continue
+            whole = isinstance(value, float) and value == int(value) and str(name).endswith(("_teeth", "elements"))
+            row[str(name)] = int(value) if whole else value
+        found.append(row)
+    return found
+
+
+def _config(kind: str, rig: Table, channels: Sequence[str]) -> dict[str, Any]:
+    column = st.column_config
+    shafts = [str(row["name"]) for row in rig.get("shaft", []) if row.get("name")]
+    number = column.NumberColumn
+    return {
+        "shaft": {"direction": column.SelectboxColumn("turns", options=["ccw", "cw"])},
+        "pair": {
+            "driver": column.SelectboxColumn("driver", options=shafts),
+            "driven": column.SelectboxColumn("driven", options=shafts),
+            "driver_teeth": number("teeth", step=1, format="%d"),
+            "driven_teeth": number("teeth ", step=1, format="%d"),
+            "module_mm": number("module (mm)"),
+            "face_width_mm": number("width (mm)"),
+        },
+        "bearing": {
+            "shaft": column.SelectboxColumn("shaft", options=shafts),
+            "bearing": column.SelectboxColumn("catalogue", options=sorted(bearing_catalogue()), help="Designation"),
+            "n_rolling_elements": number("elements", step=1, format="%d"),
+            "rolling_element_diameter_mm": number("Ø element (mm)"),
+            "pitch_diameter_mm": number("Ø pitch (mm)"),
+        },
+        "sensor": {
+            "channel": column.SelectboxColumn("channel", options=list(channels)) if channels else column.TextColumn(),
+            "quantity": column.SelectboxColumn("quantity", options=list(QUANTITIES)),
+        },
+    }[kind]
+
+
+def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: Sequence[str]) -> Table:
+    st.markdown("**Speed from**")
+    source = str(speed.get("source", "none"))
+    columns = st.columns(4)
+    known = list(SPEED_SOURCES)
+    chosen = columns[0].selectbox(
+        "Source", known, known.index(source) if source in known else 0, key=key("speed"), label_visibility="collapsed"
+    )
+    edited = dict(speed) if chosen == source else {}
+    edited["source"] = chosen
+    for place, name in zip(columns[1:], SPEED_SOURCES[chosen], strict=False):
+        if name == "channel":
+            offered = list(dict.fromkeys([*([speed["channel"]] if "channel" in speed else []), *channels])) or ["tacho"]
+            edited[name] = place.selectbox("Channel", offered, key=key("speed channel"))
+        else:
+            step = 1 if name == "pulses_per_revolution" else 0.1
+            value = type(step)(float(speed.get(name) or FIRST[name]))
+            edited[name] = place.number_input(WORDS[name], value=value, step=step, key=key(f"speed {name}"))
+    shafts = [str(row["name"]) for row in rig.get("shaft", []) if row.get("name")]
+    if chosen != "none" and shafts:
+        at = shafts.index(speed["shaft"]) if speed.get("shaft") in shafts else 0
+        edited["shaft"] = columns[3].selectbox("Of shaft", shafts, at, key=key("speed shaft"))
+    return {} if chosen == "none" and "source" not in speed else edited
+
+
+# --------------------
+# What follows: a drawing of the train, and its orders.
+# --------------------
+
+
+def _show_consequences(table: Table, *, is_told: bool) -> None:
+    try:
+        rig = rig_from_dict(table)
+    except GearsigError as error:
+        if not is_told:
+            show_error(error)
+        return
+    if not rig.shafts:
+        st.info("Name a shaft: its orders follow, and with teeth those of the mesh.", icon=":material/account_tree:")
+        return
+    st.image(train_svg(rig, palette().quiet), width="stretch", alt="Drawing of the gear train")
+    lines = [line for line in order_lines(rig, rig.reference_shaft, n_sidebands=0) if line.kind != "sideband"]
+    turns = (rig.nominal_speed_rpm() or 0.0) / 60.0
+    table = {"line": [line.label for line in lines], f"order of {rig.reference_shaft}": [line.order for line in lines]}
+    if turns:
+        table["Hz, nominal"] = [line.order * turns for line in lines]
+    number = st.column_config.NumberColumn(format="%.5g")
+    st.dataframe(table, hide_index=True, height=300, column_config=dict.fromkeys(list(table)[1:], number))
+
+
+def train_svg(rig: Rig, ink: str) -> str:
+    """Return a drawing of the shafts with their gears and bearings; names from files are escaped."""
+    width, gap, left = 420, 74, 96
+    radii = {
+        (pair.name, shaft): gap
+        * abs(order[pair.driven] - order[pair.driver])
+        * (own or 30)
+        / ((own or 30) + (mate or 30))
+        for order in [{name: i for i, name in enumerate(rig.shaft_names)}]
+        for pair in rig.pairs
+        for shaft, own, mate in (
+            (pair.driver, pair.driver_teeth, pair.driven_teeth),
+            (pair.driven, pair.driven_teeth, pair.driver_teeth),
+        )
+    }
+    margin = 12 + max(radii.values(), default=10.0)
+    rows = {name: margin + gap * i for i, name in enumerate(rig.shaft_names)}
+    height = 2 * margin + gap * max(len(rows) - 1, 0)
+    parts = [
+        f'<line x1="{left}" x2="{width - 20}" y1="{y}" y2="{y}" stroke="{ink}" stroke-width="4"/>'
+        f'<text x="{left - 8}" y="{y + 4}" text-anchor="end">{escape(one_line(name)[:14])}</text>'
+        for name, y in rows.items()
+    ]
+    for i, pair in enumerate(rig.pairs):
+        x = left + 60 + (width - left - 120) * (i + 0.5) / max(len(rig.pairs), 1)
+        teeth = {pair.driver: pair.driver_teeth, pair.driven: pair.driven_teeth}
+        for shaft, number in teeth.items():
+            radius = radii[pair.name, shaft]
+            parts.append(
+                f'<rect x="{x - 9:.1f}" y="{rows[shaft] - radius:.1f}" width="18" height="{2 * radius:.1f}" rx="2" '
+                f'fill="#0072B2" fill-opacity="0.25" stroke="#0072B2" stroke-width="1.5"/>'
+                f'<text x="{x + 14:.1f}" y="{rows[shaft] - 7:.1f}">{number or "?"}</text>'
+            )
+    for shaft, y in rows.items():
+        of_shaft = [bearing for bearing in rig.bearings if bearing.shaft == shaft]
+        for i in range(len(of_shaft)):
+            x = left + 14 + (width - left - 48) * i / max(len(of_shaft) - 1, 1)
+            parts += [
+                f'<rect x="{x - 6:.1f}" y="{y + side:.1f}" width="12" height="8" rx="1.5" fill="none" stroke="#A8447E" '
+                f'stroke-width="1.5"></rect>'
+                for side in (-11, 3)
+            ]
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:.0f}" font-size="12" '
+        f'font-family="sans-serif" fill="{ink}">{"".join(parts)}</svg>'
+    )
+
+
+def _show_text(file: ChosenFile, text: str, *, is_open: bool = False) -> None:
+    with st.expander("As a rig file (TOML)", icon=":material/code:", expanded=is_open):
+        given = st.file_uploader("Take over a rig file", type=["toml"], max_upload_size=1, key=f"take {_key(file)}")
+        if given is not None and st.button("Use this rig file"):
+            _take(file, text_of(given.name, given.getvalue()))
+            st.rerun()
+        key = f"text {_key(file)} {hash(text)}"
+        edited = st.text_area("Text", text, height=320, key=key, label_visibility="collapsed")
+        with st.container(horizontal=True):
+            st.button("Use this text", on_click=_take, args=(file, edited), disabled=edited == text)
+            download("Rig file", text.encode(), file.rig_name, "application/toml")
+
+
+def text_of(name: str, content: bytes) -> str:
+    """Return the text of a rig file.
+
+    Raises
+    ------
+    InputError
+        If it is no text.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("is not text in UTF-8", where=name, remedy="save the rig file as UTF-8") from None

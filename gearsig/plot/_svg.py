@@ -1,0 +1,363 @@
+"""Figures as small SVG without matplotlib: for pages that many recordings get one of, and for the dashboard.
+
+Text and axes take the colour of the text around them, so that one figure serves light and dark pages.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from io import BytesIO
+from itertools import pairwise
+from math import ceil, floor, log10
+
+import numpy as np
+
+from gearsig.checks import FloatArray
+from gearsig.orders import OrderMap, SynchronousAverage
+from gearsig.plot import _style as style
+from gearsig.plot._cursors import AngleMark, Cursor
+from gearsig.plot._style import decibels, unit_text
+
+LEFT, RIGHT, BOTTOM, ROW = 62, 12, 38, 14
+N_COLUMNS = 420
+MAX_ROWS = 4
+LETTER = 6.2
+"""Width of a letter in units of the drawing, for keeping labels apart."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line of an SVG figure.
+
+    Parameters
+    ----------
+    x, y : array, (n,)
+        Ascending `x`; thinned where there are more points than columns.
+    name : str
+        Named above the figure where there are several; empty: not named.
+    colour : str
+    peaks : bool
+        Join the highest point of each column, else lowest and highest.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    name: str = ""
+    colour: str = style.MEASURED
+    peaks: bool = False
+
+
+def svg_lines(
+    curves: Sequence[Curve],
+    *,
+    x: str,
+    y: str,
+    x_limits: tuple[float, float],
+    y_limits: tuple[float, float] | None = None,
+    logarithmic: bool = False,
+    cursors: Sequence[Cursor] = (),
+    marked: Sequence[tuple[float, float]] = (),
+    width: int = 760,
+    height: int = 170,
+) -> str:
+    """Draw lines over one axis.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+    x, y : str
+        Names of the axes with units.
+    x_limits, y_limits : (float, float)
+        None: about what is shown.
+    logarithmic : bool
+        The value axis.
+    cursors : sequence of Cursor
+        Lines that the machine implies; labels that find no room are left out, families keep their first.
+    marked : sequence of (x, y)
+        Points that findings name.
+    width, height : int
+        Of the drawing, and of its panel.
+
+    Returns
+    -------
+    str
+        An <svg> element.
+    """
+    shown = [_columns(curve, x_limits) for curve in curves]
+    low, high = y_limits or _about([y for _, y in shown], logarithmic=logarithmic)
+    labels, n_rows = _placed(cursors, x_limits, width)
+    top = 8 + ROW * n_rows + (16 if any(curve.name for curve in curves) else 0)
+    panel = _Panel(LEFT, top, width - LEFT - RIGHT, height, x_limits, (low, high), logarithmic)
+    parts = [panel.axes(x, y), panel.cursors(cursors, labels)]
+    for curve, (at, values) in zip(curves, shown, strict=True):
+        parts.append(f'<path d="{panel.path(at, values)}" fill="none" stroke="{curve.colour}" stroke-width="1.1"/>')
+    parts += [
+        f'<circle cx="{panel.across(at):.1f}" cy="{panel.up(value):.1f}" r="6" fill="none" stroke="{style.FAULT}" '
+        'stroke-width="1.8"/>'
+        for at, value in marked
+        if x_limits[0] <= at <= x_limits[1]
+    ]
+    parts += _names(curves)
+    return _svg(width, top + height + BOTTOM, parts)
+
+
+def svg_map(order_map: OrderMap, *, highest: float | None = None, width: int = 760, height: int = 230) -> str:
+    """Draw levels over order or frequency and time, 60 dB below the largest; the largest in each pixel.
+
+    Parameters
+    ----------
+    order_map : OrderMap
+    highest : float or None
+        Of the axis shown; None: all.
+    width, height : int
+        Of the drawing, and of its panel.
+    """
+    from PIL import Image
+
+    stop = len(order_map.positions)
+    if highest is not None:
+        stop = max(int(np.searchsorted(order_map.positions, highest, side="right")), min(2, stop))
+    levels = decibels(order_map.values[:, :stop], order_map.scaling)
+    time = order_map.time_s
+    rows = np.searchsorted(time, np.linspace(time[0], time[-1], min(160, 2 * len(time)))).clip(0, len(time) - 1)
+    borders = np.linspace(0, stop, min(stop, 440) + 1).astype(int)[:-1]
+    levels = np.maximum.reduceat(levels[rows], borders, axis=1)
+    shade = np.clip(255 * (levels - levels.max() + 60) / 60, 0, 255).astype(np.uint8)
+    buffer = BytesIO()
+    image = Image.fromarray(style.level_colours()[shade[::-1]]).quantize(48, dither=Image.Dither.NONE)
+    image.save(buffer, format="png", optimize=True)
+    uri = b64encode(buffer.getvalue()).decode("ascii")
+    limits = (float(order_map.positions[0]), float(order_map.positions[stop - 1]))
+    panel = _Panel(LEFT, 8, width - LEFT - RIGHT, height, limits, (float(time[0]), float(time[-1])), logarithmic=False)
+    picture = (
+        f'<image href="data:image/png;base64,{uri}" x="{LEFT}" y="8" width="{panel.width}" height="{height}" '
+        'preserveAspectRatio="none"/>'
+    )
+    name = f"order (of {order_map.shaft or 'the shaft'})" if order_map.axis == "order" else "frequency (Hz)"
+    return _svg(width, 8 + height + BOTTOM, [picture, panel.axes(name, "time (s)", grid=False)])
+
+
+def svg_ring(
+    average: SynchronousAverage, *, n_teeth: int | None = None, marks: Sequence[AngleMark] = (), ink: str = ""
+) -> str:
+    """Draw one mean revolution around the circle, with the gear's teeth; marked ones in the colour of faults.
+
+    Angle runs clockwise from the top, where the average starts; tooth 1 begins there. Outwards is positive.
+
+    Parameters
+    ----------
+    average : SynchronousAverage
+    n_teeth : int or None
+        Of the gear.
+    marks : sequence of AngleMark
+    ink : str
+        Colour of text and axes; empty: of the text around.
+    """
+    size, zero, swing, rim = 400, 92.0, 52.0, 154.0
+    full = float(np.max(np.abs(average.values), initial=0.0)) or 1.0
+    n = len(average.values)
+    turn = np.arange(n + 1) * (2 * np.pi / n)
+    at, values = _columns(Curve(turn, np.append(average.values, average.values[0])), (0.0, 2 * np.pi), n_columns=480)
+    round_value = 10 ** floor(log10(full)) * next(m for m in (5, 2, 1) if m * 10 ** floor(log10(full)) <= full)
+    parts = [
+        f'<circle r="{zero + swing * k * round_value / full:.1f}" fill="none" stroke="currentColor" '
+        f'stroke-opacity="{0.45 if k == 0 else 0.18}"/>'
+        for k in (-1, 0, 1)
+    ]
+    step = 2 * np.pi / n_teeth if n_teeth else 0.0
+    hurt = {int(mark.angle_deg / 360 * (n_teeth or 1)) for mark in marks}
+    for tooth in range(n_teeth or 0):
+        middle, fault = (tooth + 0.5) * step, tooth in hurt
+        shape = [(rim, 0.36), (rim + 5, 0.34), (rim + 13, 0.17), (rim + 13, -0.17), (rim + 5, -0.34), (rim, -0.36)]
+        points = "L".join("{:.1f} {:.1f}".format(*_round(r, middle + w * step)) for r, w in shape)
+        looks = f'fill="{style.FAULT}"' if fault else 'fill="currentColor" fill-opacity="0.28"'
+        parts.append(f'<path d="M{points}Z" {looks}/>')
+        if fault or tooth % ceil((n_teeth or 1) / 40) == 0:
+            x, y = _round(rim + 24, middle)
+            bold = (
+                f'fill="{style.FAULT}" font-weight="700" font-size="13"' if fault else 'font-size="9.5" opacity="0.7"'
+            )
+            parts.append(f'<text x="{x:.1f}" y="{y + 3.5:.1f}" text-anchor="middle" {bold}>{tooth + 1}</text>')
+    parts.append(f'<circle r="{rim}" fill="none" stroke="currentColor" stroke-opacity="0.45"/>')
+    for mark in marks:
+        half = step / 2 or 0.05
+        points = "L".join("{:.1f} {:.1f}".format(*_round(rim, np.radians(mark.angle_deg) + w)) for w in (-half, half))
+        parts.append(f'<path d="M0 0L{points}Z" fill="{style.FAULT}" fill-opacity="0.16"/>')
+    radius = zero + swing * values / full
+    d = _path(radius * np.sin(at), -radius * np.cos(at))
+    parts.append(f'<path d="{d}" fill="none" stroke="{style.MEASURED}" stroke-width="1.3" stroke-linejoin="round"/>')
+    note = f"{average.kind} of {average.shaft}, {average.channel}, {average.n_revolutions} revolutions"
+    scale = f"rings: ± {round_value:g} {unit_text(average.unit)}".rstrip()
+    parts += [
+        f'<text x="-198" y="-186" font-size="11" opacity="0.8">{escape(note)}</text>',
+        f'<text x="-198" y="196" font-size="11" opacity="0.8">{escape(scale)}</text>',
+    ]
+    for i, mark in enumerate(marks):
+        looks = f'font-size="14" font-weight="700" fill="{style.FAULT}"'
+        parts.append(f'<text x="198" y="{196 - 17 * i}" text-anchor="end" {looks}>{escape(mark.label)}</text>')
+    moved = f'<g transform="translate({size / 2} {size / 2})">{"".join(parts)}</g>'
+    return _svg(size, size, [moved], ink=ink)
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """A rectangle with its two axes."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+    x: tuple[float, float]
+    y: tuple[float, float]
+    logarithmic: bool
+
+    def across(self, values: float | FloatArray) -> FloatArray:
+        return np.asarray(self.left + (values - self.x[0]) / (self.x[1] - self.x[0]) * self.width)
+
+    def up(self, values: float | FloatArray) -> FloatArray:
+        low, high = self.y
+        if self.logarithmic:
+            share = np.log(np.maximum(values, low * 1e-3) / low) / np.log(high / low)
+        else:
+            share = (np.asarray(values) - low) / (high - low)
+        return np.asarray(self.top + (1 - np.clip(share, -0.02, 1.02)) * self.height)
+
+    def path(self, x: FloatArray, y: FloatArray) -> str:
+        return _path(self.across(x), self.up(y))
+
+    def axes(self, x: str, y: str, *, grid: bool = True) -> str:
+        bottom, right = self.top + self.height, self.left + self.width
+        values = _decades(*self.y) if self.logarithmic else _ticks(*self.y, max(2, round(self.height / 45)))
+        parts = []
+        for value in values:
+            at = float(self.up(value))
+            line = (
+                f'<path d="M{self.left} {at:.1f}H{right}" stroke="currentColor" stroke-opacity="0.13"/>' if grid else ""
+            )
+            parts.append(
+                f'{line}<text x="{self.left - 6}" y="{at + 3.5:.1f}" text-anchor="end">{_number(value)}</text>'
+            )
+        for value in _ticks(*self.x, 8):
+            at = float(self.across(value))
+            parts.append(
+                f'<path d="M{at:.1f} {bottom}v4" stroke="currentColor" stroke-opacity="0.5"/>'
+                f'<text x="{at:.1f}" y="{bottom + 15}" text-anchor="middle">{_number(value)}</text>'
+            )
+        middle = self.top + self.height / 2
+        return (
+            f'<path d="M{self.left} {bottom}H{right}" stroke="currentColor" stroke-opacity="0.5"/>{"".join(parts)}'
+            f'<text x="{(self.left + right) / 2}" y="{bottom + 32}" text-anchor="middle">{escape(x)}</text>'
+            f'<text transform="translate(11 {middle}) rotate(-90)" text-anchor="middle">{escape(y)}</text>'
+        )
+
+    def cursors(self, cursors: Sequence[Cursor], labels: Sequence[tuple[Cursor, int]]) -> str:
+        parts = []
+        for kind in dict.fromkeys(cursor.kind for cursor in cursors):
+            at = [
+                float(self.across(c.position))
+                for c in cursors
+                if c.kind == kind and self.x[0] <= c.position <= self.x[1]
+            ]
+            d = "".join(f"M{value:.1f} {self.top}v{self.height}" for value in at)
+            colour = style.CURSOR_COLOURS.get(kind, style.FAULT)
+            dash = "" if kind == "mesh" else ' stroke-dasharray="4 3"'
+            parts.append(f'<path d="{d}" stroke="{colour}" stroke-opacity="0.55"{dash}/>')
+        for cursor, row in labels:
+            colour = style.CURSOR_COLOURS.get(cursor.kind, style.FAULT)
+            x, y = float(self.across(cursor.position)), self.top - 4 - ROW * row
+            parts.append(
+                f'<text x="{x:.1f}" y="{y}" text-anchor="middle" fill="{colour}">{escape(cursor.label[:28])}</text>'
+            )
+        return "".join(parts)
+
+
+def _path(x: FloatArray, y: FloatArray) -> str:
+    """Return a path in steps of a tenth of a unit, each from the one before: half the letters of places."""
+    places = np.rint(10 * np.column_stack([x, y])).astype(int)
+    steps = " ".join(f"{across / 10:g} {up / 10:g}" for across, up in np.diff(places, axis=0))
+    return f"M{places[0, 0] / 10:g} {places[0, 1] / 10:g}" + (f"l{steps}" if steps else "")
+
+
+def _placed(cursors: Sequence[Cursor], limits: tuple[float, float], width: int) -> tuple[list[tuple[Cursor, int]], int]:
+    """Return labels with their rows, and the number of rows."""
+    rows: list[list[tuple[float, float]]] = [[] for _ in range(MAX_ROWS)]
+    placed = []
+    for cursor in sorted(cursors, key=lambda c: c.number):
+        x = LEFT + (cursor.position - limits[0]) / (limits[1] - limits[0]) * (width - LEFT - RIGHT)
+        half = LETTER * len(cursor.label[:28]) / 2 + 3
+        if not LEFT <= x <= width - RIGHT or x + half > width or x - half < 0:
+            continue
+        row = next((i for i, taken in enumerate(rows) if all(x + half < a or x - half > b for a, b in taken)), None)
+        if row is not None:
+            rows[row].append((x - half, x + half))
+            placed.append((cursor, row))
+    return placed, sum(bool(row) for row in rows)
+
+
+def _names(curves: Sequence[Curve]) -> list[str]:
+    parts, x = [], float(LEFT)
+    for curve in curves:
+        if curve.name:
+            parts.append(
+                f'<path d="M{x} 10h16" stroke="{curve.colour}" stroke-width="3"/>'
+                f'<text x="{x + 21}" y="14">{escape(curve.name)}</text>'
+            )
+            x += 21 + LETTER * len(curve.name) + 18
+    return parts
+
+
+def _columns(curve: Curve, limits: tuple[float, float], n_columns: int = N_COLUMNS) -> tuple[FloatArray, FloatArray]:
+    """Return what is shown of a curve, with the extremes of each column at their own places."""
+    start = max(int(np.searchsorted(curve.x, limits[0])), 0)
+    stop = max(int(np.searchsorted(curve.x, limits[1], side="right")), start + 1)
+    x, y = np.asarray(curve.x[start:stop]), np.asarray(curve.y[start:stop])
+    if len(x) <= 2 * n_columns:
+        return x, y
+    borders = list(pairwise(np.linspace(0, len(x), n_columns + 1).astype(int)))
+    chosen = [a + int(np.argmax(y[a:b])) for a, b in borders]
+    if not curve.peaks:
+        chosen += [a + int(np.argmin(y[a:b])) for a, b in borders]
+    at = np.unique(chosen)
+    return x[at], y[at]
+
+
+def _about(curves: Sequence[FloatArray], *, logarithmic: bool) -> tuple[float, float]:
+    values = np.concatenate([curve[np.isfinite(curve)] for curve in curves] or [np.zeros(1)])
+    if logarithmic and (values > 0).any():
+        high = float(values.max())
+        return max(float(np.percentile(values[values > 0], 5)), high * 1e-6) / 2, 2 * high
+    low, high = float(values.min()), float(values.max())
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _ticks(low: float, high: float, n: int) -> list[float]:
+    rough = (high - low) / n
+    power = 10.0 ** floor(log10(rough))
+    step = next(m * power for m in (1, 2, 5, 10) if m * power >= 0.999 * rough)
+    return [k * step for k in range(ceil(low / step - 1e-9), floor(high / step + 1e-9) + 1)]
+
+
+def _decades(low: float, high: float) -> list[float]:
+    powers = range(ceil(log10(low) - 1e-9), floor(log10(high) + 1e-9) + 1)
+    return [10.0**k for k in powers[:: max(1, len(powers) // 6)]]
+
+
+def _number(value: float) -> str:
+    text = f"{value:.6g}" if value == 0 or 1e-3 <= abs(value) < 1e6 else f"{value:.0e}".replace("e-0", "e-")
+    return text.replace("-", "−")
+
+
+def _round(radius: float, angle: float) -> tuple[float, float]:
+    return float(radius * np.sin(angle)), float(-radius * np.cos(angle))
+
+
+def _svg(width: float, height: float, parts: Sequence[str], *, ink: str = "") -> str:
+    colour = f' color="{ink}"' if ink else ""
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-size="11" '
+        f'font-family="system-ui, DejaVu Sans, sans-serif" fill="currentColor"{colour}>{"".join(parts)}</svg>'
+    )
