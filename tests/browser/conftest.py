@@ -69,6 +69,7 @@ def page(address: str) -> Iterator[playwright.Page]:
         view.on("console", lambda message: wrong.append(message.text) if is_error(message) else None)
         view.on("request", lambda request: None if is_local(request.url) else wrong.append(request.url))
         view.goto(address)
+        view.get_by_role("button", name="Open the recording").wait_for()
         yield view
         exceptions = view.get_by_test_id("stException").all_inner_texts()
         broken = view.evaluate("[...document.images].filter(i => i.complete && !i.naturalWidth).map(i => i.src)")
@@ -81,14 +82,24 @@ def page(address: str) -> Iterator[playwright.Page]:
 def is_error(message: playwright.ConsoleMessage) -> bool:
     """Say whether a message tells of an error; a picture that a rerun replaced before it was fetched is none.
 
-    Streamlit drops the old picture at once. Those that stay on the page are looked at in the end.
+    Streamlit drops the old picture at once. Those that stay on the page are looked at in the end. On an address with a
+    path, Streamlit first looks for its server below that path.
     """
-    replaced = "/media/" in message.text or "/media/" in message.location.get("url", "")
-    return bool(message.type == "error" and not replaced)
+    url = message.location.get("url", "")
+    replaced = "/media/" in message.text or "/media/" in url
+    return bool(message.type == "error" and not replaced and "/_stcore/" not in url)
 
 
 def is_local(url: str) -> bool:
     return url.startswith(("http://localhost:", "ws://localhost:", "data:", "blob:"))
+
+
+def open_view(page: playwright.Page, name: str) -> playwright.Locator:
+    """Open a view of the strip, and return what it shows."""
+    page.locator(".strip button").filter(has_text=name).first.click()
+    page.locator(".strip button[aria-pressed=true]").filter(has_text=name).wait_for()
+    settle(page)
+    return page.locator(".st-key-view")
 
 
 def settle(page: playwright.Page) -> None:

@@ -1,4 +1,4 @@
-"""*Simulation against recording* in a real browser: from two samples to a page to take away."""
+"""*Comparison* in a real browser: from two samples to a page to take away."""
 
 from __future__ import annotations
 
@@ -17,10 +17,8 @@ playwright = pytest.importorskip("playwright.sync_api")
 
 def test_two_samples_are_compared_and_the_page_is_downloaded(page: playwright.Page) -> None:
     page.set_default_timeout(120_000)
-    page.get_by_role("tab", name="Report").wait_for()
-    settle(page)
-    page.get_by_role("link", name="Simulation against recording").click()
-    page.get_by_role("heading", name="Simulation against recording").wait_for()
+    page.get_by_role("link", name="Comparison").click()
+    page.get_by_role("heading", name="Comparison of a simulation").wait_for()
     settle(page)
     page.get_by_role("radiogroup", name="Simulation").get_by_text("Sample", exact=True).click()
     page.get_by_role("tab", name="Lines").wait_for()

@@ -91,7 +91,7 @@ def test_own_files_stay_while_another_page_is_shown(gap: playwright.Page) -> Non
     inputs.nth(1).set_input_files([folder / "root_crack_3mm.toml", folder / "root_crack_1mm.toml"])
     settle(gap)
     gap.get_by_role("link", name="Analysis").click()
-    gap.get_by_role("tab", name="Report").wait_for()
+    gap.locator(".strip").wait_for()
     gap.get_by_role("link", name="Gap").click()
     gap.get_by_text("Still open: root_crack_1mm.h5, root_crack_3mm.h5").wait_for()
     settle(gap)

@@ -47,9 +47,9 @@ def test_from_the_slider_to_the_analysis_and_back(laboratory: playwright.Page) -
     for name in ("Spectrum", "Envelope", "Phase portrait", "Mesh"):
         laboratory.get_by_role("tab", name=name, exact=True).click()
         settle(laboratory)
-        laboratory.locator(".js-plotly-plot").first.wait_for()
+        laboratory.locator(".figure svg, .js-plotly-plot").first.wait_for()
     laboratory.get_by_role("button", name="Open in the analysis page").click()
-    laboratory.get_by_role("tab", name="Report").wait_for()
+    laboratory.locator(".strip").wait_for()
     settle(laboratory)
     assert laboratory.get_by_text("published_55_75_root_crack_2.h5").count() > 0
     assert laboratory.get_by_text("5 s at 20480 Hz").count() > 0
@@ -71,7 +71,7 @@ def test_the_finite_element_pair_follows_its_slider_to_the_end(laboratory: playw
     for name in ("Spectrum", "Mesh"):
         laboratory.get_by_role("tab", name=name, exact=True).click()
         settle(laboratory)
-        laboratory.locator(".js-plotly-plot").first.wait_for()
+        laboratory.locator(".figure svg, .js-plotly-plot").first.wait_for()
     assert laboratory.get_by_test_id("stAlert").count() == 0
 
 
@@ -89,11 +89,12 @@ def test_a_recording_is_saved_with_rig_and_truth(laboratory: playwright.Page) ->
 def test_an_own_file_stays_open_while_the_laboratory_is_looked_at(page: playwright.Page) -> None:
     rows = "\n".join(f"{i / 1000:g};{(i * 37) % 101}" for i in range(3000))
     content = f"time (s);a1\n{rows}\n".encode()
+    page.get_by_role("link", name="Analysis").click()
     page.get_by_text("Own file", exact=True).click()
-    page.get_by_text("Open a recording of your own").wait_for()
+    page.get_by_text("Give a recording on the left").wait_for()
     uploader = page.locator("[data-testid=stFileUploader] input[type=file]").first
     uploader.set_input_files({"name": "mine.csv", "mimeType": "text/csv", "buffer": content})
-    page.get_by_role("tab", name="Report").wait_for()
+    page.locator(".strip").wait_for()
     settle(page)
     page.set_default_timeout(120_000)
     page.get_by_role("link", name="Fault laboratory").click()
@@ -103,4 +104,4 @@ def test_an_own_file_stays_open_while_the_laboratory_is_looked_at(page: playwrig
     settle(page)
     assert page.get_by_test_id("stMain").get_by_text("mine.csv").count() > 0
     page.get_by_role("button", name="Close", exact=True).click()
-    page.get_by_text("Open a recording of your own").wait_for()
+    page.get_by_text("Give a recording on the left").wait_for()

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from app.dashboard.methods import METHODS
+from app.dashboard.widgets.views import OF_CHANNEL
 from gearsig.decompose import denoise
 from gearsig.recording import read_recording
 from tests.app.pages import SAMPLES
-from tests.browser.conftest import CHROMIUM, settle
+from tests.browser.conftest import CHROMIUM, open_view, settle
 
 pytestmark = [
     pytest.mark.browser,
@@ -20,18 +21,18 @@ pytestmark = [
 playwright = pytest.importorskip("playwright.sync_api")
 
 
-def open_methods(page: playwright.Page, sample: str = "") -> playwright.Locator:
-    """Return the panel of the methods, of the first sample or a named one."""
-    page.get_by_role("tab", name="Report").wait_for()
+def open_analysis(page: playwright.Page, sample: str = "damaged_tooth") -> None:
+    page.goto(f"{page.url.partition('?')[0]}analysis?sample={sample}")
+    page.locator(".strip").wait_for()
     settle(page)
-    if sample:
-        page.get_by_test_id("stSidebar").get_by_test_id("stSelectbox").locator("input").first.click()
-        page.get_by_role("option", name=sample, exact=True).click()
-        page.get_by_test_id("stMain").get_by_text(SAMPLES[sample.lower().replace(" ", "_")].recording.name).wait_for()
-        settle(page)
-    page.get_by_role("tab", name="More methods", exact=True).click()
-    settle(page)
-    return page.get_by_role("tabpanel").filter(visible=True)
+
+
+def open_method(page: playwright.Page, name: str) -> playwright.Locator:
+    """Go to a method within its view."""
+    name_of_view = next(view for view, methods in OF_CHANNEL.items() if name in methods)
+    view = open_view(page, name_of_view)
+    choose(page, view, name)
+    return view
 
 
 def choose(page: playwright.Page, panel: playwright.Locator, name: str) -> None:
@@ -40,18 +41,18 @@ def choose(page: playwright.Page, panel: playwright.Locator, name: str) -> None:
 
 
 def test_every_method_draws(page: playwright.Page) -> None:
-    panel = open_methods(page)
+    open_analysis(page)
     for method in METHODS:
-        choose(page, panel, method)
+        panel = open_method(page, method)
         panel.get_by_text("Analysed: 0 to ").wait_for()
         if method != "Crack severity":  # the sample's tooth is damaged otherwise
-            panel.locator(".js-plotly-plot, img").first.wait_for()
+            panel.locator(".figure svg, .js-plotly-plot, img").first.wait_for()
             assert panel.get_by_test_id("stAlert").count() == 0, method
 
 
 def test_suggested_modes_are_taken_over(page: playwright.Page) -> None:
-    panel = open_methods(page)
-    choose(page, panel, "Modes")
+    open_analysis(page)
+    panel = open_method(page, "Modes")
     panel.get_by_role("button", name="Suggest K and penalty").click()
     panel.get_by_role("button", name="Use it").click()
     settle(page)
@@ -61,8 +62,8 @@ def test_suggested_modes_are_taken_over(page: playwright.Page) -> None:
 
 
 def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page) -> None:
-    panel = open_methods(page)
-    choose(page, panel, "Denoising")
+    open_analysis(page)
+    panel = open_method(page, "Denoising")
     panel.get_by_test_id("stPopover").get_by_role("button").click()
     with page.expect_download() as download:
         page.get_by_role("button", name="Waveforms: 3 × 64000 samples").click()
@@ -75,8 +76,7 @@ def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page) -> 
 
 
 def test_the_depth_of_a_crack_against_the_healthy_sample(page: playwright.Page) -> None:
-    panel = open_methods(page, "Root crack 3mm")
-    choose(page, panel, "Crack severity")
-    choose(page, panel, "Sample")
+    open_analysis(page, "root_crack_3mm")
+    panel = open_method(page, "Crack severity")
     panel.locator("img").wait_for()
     assert "tooth 21" in panel.get_by_test_id("stAlert").inner_text().replace("\u2060", "")
