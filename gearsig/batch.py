@@ -63,6 +63,7 @@ class _Job:
     torque_nm: float | None = None
     is_reference: bool = False
     made_of: str = ""
+    pdf: bool = False
 
 
 def report_many(
@@ -78,6 +79,7 @@ def report_many(
     command: str = "",
     reference: str | Path | None = None,
     torque_nm: float | None = None,
+    pdf: bool = False,
 ) -> BatchResult:
     """Analyse recordings and write a page for each, and an index that compares them.
 
@@ -111,6 +113,8 @@ def report_many(
         Recording of the same machine when it was healthy; all are compared with it but itself.
     torque_nm : float or None
         For the depth of cracks, instead of the rig's operating point.
+    pdf : bool
+        Write each page and the index as PDF as well.
 
     Returns
     -------
@@ -123,12 +127,14 @@ def report_many(
     """
     from gearsig.checks import count
     from gearsig.fleet import find_recordings
-    from gearsig.report import Entry, Failure, made_folder, page_names, remove_parts, write_index
+    from gearsig.report import Entry, Failure, check_pdf, made_folder, page_names, remove_parts, write_index
 
     files = [path for path, _ in find_recordings(paths)]
     if not files:
         where = ", ".join(str(path) for path in paths)
         raise InputError("there are no recordings to report on", where=where, remedy="name at least one file")
+    if pdf:
+        check_pdf()
     workers = min(len(files), n_processors()) if n_processes is None else count(n_processes, "n_processes")
     folder = made_folder(Path(output_folder))
     healthy = Path(reference) if reference is not None else None
@@ -140,9 +146,8 @@ def report_many(
         is_healthy = healthy is not None and file.exists() and healthy.exists() and file.samefile(healthy)
         compared = None if is_healthy else healthy
         path = folder / f"{page}.html"
-        jobs.append(
-            _Job(file, name, path, rig, sampling_rate_hz, speed, command, compared, torque_nm, is_reference=is_healthy)
-        )
+        facts = (rig, sampling_rate_hz, speed, command)
+        jobs.append(_Job(file, name, path, *facts, compared, torque_nm, is_reference=is_healthy, pdf=pdf))
     made_of = _made_of()
     jobs = [replace(job, made_of=made_of(job)) for job in jobs]
     results: dict[int, Entry | Failure] = {n: kept for n, job in enumerate(jobs) if (kept := _kept(job)) is not None}
@@ -153,7 +158,8 @@ def report_many(
         entries = tuple(item for item in ordered if isinstance(item, Entry))
         failures = tuple(item for item in ordered if isinstance(item, Failure))
         n_missing = len(jobs) - len(results)
-        path = write_index(entries, folder / "index.html", failures=failures, command=command, n_missing=n_missing)
+        page = folder / "index.html"
+        path = write_index(entries, page, failures=failures, command=command, n_missing=n_missing, pdf=pdf)
         return BatchResult(entries, failures, path, n_found)
 
     if missing:
@@ -211,7 +217,8 @@ def _kept(job: _Job) -> Entry | None:
 
     try:
         data = json.loads(_result_path(job).read_text(encoding="utf-8"))
-        if not job.made_of or data["made_of"] != job.made_of or not job.page.is_file():
+        pages = [job.page, *([job.page.with_suffix(".pdf")] if job.pdf else [])]
+        if not job.made_of or data["made_of"] != job.made_of or not all(page.is_file() for page in pages):
             return None
         entry: Entry = from_plain(Entry, data["entry"], "entry")
     except (OSError, ValueError, KeyError, TypeError, RecursionError):  # damaged: made again
@@ -223,7 +230,7 @@ def _report_one(job: _Job) -> Entry | Failure:
     """Analyse one recording and write its page; every error becomes a reason."""
     from gearsig.diagnosis import analyze
     from gearsig.recording import read_recording
-    from gearsig.report import entry_of, plain, write_page, write_text
+    from gearsig.report import entry_of, page_pdf, plain, write_page, write_pdf, write_text
     from gearsig.rig import read_rig, rig_file_beside
 
     try:
@@ -235,6 +242,8 @@ def _report_one(job: _Job) -> Entry | Failure:
             torque_nm=job.torque_nm,
         )
         write_page(analysis, job.page, command=job.command, index="index.html")
+        if job.pdf:
+            write_pdf(job.page.with_suffix(".pdf"), page_pdf(analysis, command=job.command))
         entry = replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference)
         with suppress(GearsigError):  # a page that the next run makes again
             write_text(_result_path(job), json.dumps({"made_of": job.made_of, "entry": plain(entry)}) + "\n")

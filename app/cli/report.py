@@ -29,6 +29,7 @@ def report(
     torque: options.TorqueOption = None,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write each page and the index as PDF as well.")] = False,
 ) -> None:
     """Write one self-contained HTML page per recording, and an index page that compares them.
 
@@ -52,6 +53,7 @@ def report(
         reference=reference,
         torque_nm=options.torque_of(torque),
         cluster=cluster,
+        pdf=pdf,
     )
     if failed:
         raise typer.Exit(failed)
@@ -68,6 +70,8 @@ def make_report(
     reference: Path | None = None,
     torque_nm: float | None = None,
     cluster: str = "",
+    *,
+    pdf: bool = False,
 ) -> int:
     """Write the pages with their progress; return the exit code."""
     from gearsig.batch import report_many
@@ -94,6 +98,7 @@ def make_report(
                     command=command,
                     reference=reference,
                     torque_nm=torque_nm,
+                    pdf=pdf,
                 )
         except KeyboardInterrupt:
             typer.echo(f"gearsig: stopped after {n_done} files; {_kept(output, before)}", err=True)

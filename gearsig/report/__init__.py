@@ -62,6 +62,7 @@ from gearsig.report._page import (
     verdict_picture,
     write_page,
 )
+from gearsig.report._pdf import check_pdf, page_pdf, write_pdf
 from gearsig.report._sections import FindingCard, analysis_text, finding_card, reference_text
 
 __all__ = [
@@ -84,6 +85,7 @@ __all__ = [
     "cause_rows",
     "change_text",
     "channel_rows",
+    "check_pdf",
     "check_writable",
     "comparison_page",
     "comparison_text",
@@ -119,6 +121,7 @@ __all__ = [
     "others_text",
     "page_html",
     "page_names",
+    "page_pdf",
     "place_rows",
     "plain",
     "read_gap_json",
@@ -141,5 +144,6 @@ __all__ = [
     "write_index",
     "write_json",
     "write_page",
+    "write_pdf",
     "write_text",
 ]

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import csv
+import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from math import isfinite
+from io import StringIO
+from math import inf, isfinite
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from gearsig import __version__
 from gearsig.diagnosis import Analysis, Kind, Outcome
 from gearsig.formatting import readable
 from gearsig.indicators import Indicator
-from gearsig.plot import Picture, embed, unit_text, with_unit
+from gearsig.plot import unit_text, with_unit
 from gearsig.report._files import render, write_text
+from gearsig.report._pdf import compiled, write_pdf
 from gearsig.report._sections import css_class
 from gearsig.severity import CrackEstimate
 
@@ -41,6 +46,8 @@ class Entry:
         Depth of the crack, where the verdict is about one.
     is_reference : bool
         Whether the other recordings were compared with this one.
+    machine : str
+        Name of the rig.
     """
 
     name: str
@@ -52,6 +59,7 @@ class Entry:
     indicators: tuple[Indicator, ...] = ()
     crack_mm: float | None = None
     is_reference: bool = False
+    machine: str = ""
 
 
 @dataclass(frozen=True)
@@ -79,6 +87,7 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         top.strength.ratio_db if top is not None and top.strength is not None else None,
         analysis.indicators,
         crack_mm,
+        machine=analysis.rig.name if analysis.rig is not None else "",
     )
 
 
@@ -120,7 +129,7 @@ class IndexCell:
 
 @dataclass(frozen=True)
 class IndexRow:
-    """A recording in the table."""
+    """A recording in the table, with its place in each order that the table can be sorted by."""
 
     entry: Entry
     css_class: str
@@ -128,6 +137,69 @@ class IndexRow:
     confidence: str
     ratio: str
     cells: tuple[IndexCell, ...]
+    places: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Index:
+    """What the index says, in HTML as in PDF."""
+
+    rows: tuple[IndexRow, ...]
+    columns: tuple[str, ...]
+    orders: tuple[str, ...]
+    summary: str
+    outcomes: tuple[tuple[str, str, int], ...]
+    machines: tuple[str, ...]
+
+
+def index_of(entries: Sequence[Entry], failures: Sequence[Failure] = ()) -> Index:
+    """Sort entries, worst first, and compare their key indicators."""
+    ordered = sorted(entries, key=by_severity)
+    present = {i.name for entry in ordered for i in entry.indicators if isfinite(i.value)}
+    names = [name for name in KEY_INDICATORS if name in present][:3]
+    columns = [_column(ordered, name) for name in names]
+    places = [
+        list(range(len(ordered))),
+        _places([(entry.name.lower(), entry.name) for entry in ordered]),
+        _places([(entry.machine.lower(), i) for i, entry in enumerate(ordered)]),
+        *(_places([(-_largest(entry, name), i) for i, entry in enumerate(ordered)]) for name in names),
+    ]
+    rows = tuple(
+        IndexRow(
+            entry,
+            css_class(entry.outcome),
+            quote(entry.page),
+            f"{100 * entry.confidence:.0f} %" if entry.confidence is not None else "",
+            _size_text(entry),
+            tuple(cells[i] for _, cells in columns),
+            tuple(place[i] for place in places),
+        )
+        for i, entry in enumerate(ordered)
+    )
+    counts = Counter(entry.outcome for entry in ordered)
+    parts = [f"{n} {OUTCOME_WORDS[outcome]}" for outcome, n in counts.items()]
+    parts += [f"{len(failures)} not analysed"] if failures else []
+    n_files = len(ordered) + len(failures)
+    return Index(
+        rows,
+        tuple(heading for heading, _ in columns),
+        ("worst first", "name", "machine", *names),
+        f"{n_files} recording{'s' * (n_files != 1)}: {', '.join(parts)}" if parts else "No recordings",
+        tuple((css_class(outcome), outcome.value, n) for outcome, n in counts.items()),
+        tuple(dict.fromkeys(entry.machine for entry in ordered if entry.machine)),
+    )
+
+
+def _places(keys: Sequence[Any]) -> list[int]:
+    """Return the place of each key when they are sorted."""
+    result = [0] * len(keys)
+    for place, number in enumerate(sorted(range(len(keys)), key=keys.__getitem__)):
+        result[number] = place
+    return result
+
+
+def _largest(entry: Entry, name: str) -> float:
+    return max((i.value for i in entry.indicators if i.name == name and isfinite(i.value)), default=-inf)
 
 
 def write_index(
@@ -138,8 +210,12 @@ def write_index(
     command: str = "",
     date: datetime | None = None,
     n_missing: int = 0,
+    pdf: bool = False,
 ) -> Path:
-    """Write the index page: recordings by severity, key indicators side by side, and the files that failed.
+    """Write the index page: recordings in one table that sorts and filters, and the files that failed.
+
+    It holds no scripts: sorting and filtering are done by style alone. Beside it stand `batch.csv` and `batch.json`
+    with one row for each recording.
 
     Parameters
     ----------
@@ -153,44 +229,95 @@ def write_index(
     date : datetime or None
         Of the report; None: now.
     n_missing : int
-        Recordings that are still to be analysed: the page says so, and has no figure yet.
+        Recordings that are still to be analysed: the page says so, and stands alone.
+    pdf : bool
+        Write the index as PDF as well.
 
     Returns
     -------
     Path
         Of the page.
     """
-    ordered = sorted(entries, key=by_severity)
-    present = {i.name for entry in ordered for i in entry.indicators if isfinite(i.value)}
-    names = [name for name in KEY_INDICATORS if name in present]
-    columns = [_column(ordered, name) for name in names[:3]]
-    rows = [
-        IndexRow(
-            entry,
-            css_class(entry.outcome),
-            quote(entry.page),
-            f"{100 * entry.confidence:.0f} %" if entry.confidence is not None else "",
-            _size_text(entry),
-            tuple(cells[i] for _, cells in columns),
-        )
-        for i, entry in enumerate(ordered)
-    ]
-    counts = Counter(OUTCOME_WORDS[entry.outcome] for entry in ordered)
-    parts = [f"{n} {words}" for words, n in counts.items()] + ([f"{len(failures)} not analysed"] if failures else [])
-    n_files = len(ordered) + len(failures)
+    path = Path(path)
+    index = index_of(entries, failures)
+    made = (date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip()
     html = render(
         "index.html.j2",
-        rows=rows,
-        columns=[heading for heading, _ in columns],
-        summary=f"{n_files} recording{'s' * (n_files != 1)}: {', '.join(parts)}" if parts else "No recordings",
+        index=index,
         failures=failures,
-        picture=_picture(ordered, names[:6]) if not n_missing else None,
-        n_missing=n_missing,
         command=command,
         version=__version__,
-        date=(date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip(),
+        date=made,
+        n_missing=n_missing,
     )
-    return write_text(Path(path), html)
+    if not n_missing:
+        write_batch(index, path.parent, failures=failures)
+    if pdf and not n_missing:
+        write_pdf(path.with_suffix(".pdf"), _index_pdf(index, failures, made))
+    return write_text(path, html)
+
+
+def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ()) -> None:
+    """Write `batch.csv` and `batch.json`: one row for each recording, worst first; a failed one has a reason."""
+    names = list(dict.fromkeys(i.name for row in index.rows for i in row.entry.indicators))
+    records: list[dict[str, Any]] = []
+    for row in index.rows:
+        entry = row.entry
+        values = {name: _largest(entry, name) for name in names}
+        records.append(
+            {
+                "recording": entry.name,
+                "machine": entry.machine,
+                "outcome": entry.outcome.value,
+                "verdict": entry.verdict,
+                "confidence": entry.confidence,
+                "ratio_db": entry.ratio_db,
+                "crack_mm": entry.crack_mm,
+                "is_reference": entry.is_reference,
+                "page": entry.page,
+                "reason": "",
+                **{name: value if isfinite(value) else None for name, value in values.items()},
+            }
+        )
+    records += [{"recording": f.name, "outcome": "not analysed", "reason": f.reason} for f in failures]
+    write_text(
+        folder / "batch.json", json.dumps({"schema": "gearsig.batch", "version": 1, "recordings": records}, indent=1)
+    )
+    text = StringIO()
+    columns = list(records[0]) if index.rows else ["recording", "outcome", "reason"]
+    table = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
+    table.writeheader()
+    table.writerows({name: _in_cell(value) for name, value in record.items()} for record in records)
+    write_text(folder / "batch.csv", text.getvalue())
+
+
+def _in_cell(value: Any) -> Any:
+    """Return a value of a table; what a spreadsheet would run as a formula gets a quote before it."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+
+
+def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
+    rows = [
+        {
+            "name": row.entry.name,
+            "machine": row.entry.machine,
+            "outcome": row.entry.outcome.value,
+            "css_class": row.css_class,
+            "verdict": row.entry.verdict,
+            "confidence": row.confidence,
+            "ratio": row.ratio,
+            "cells": [cell.text for cell in row.cells],
+        }
+        for row in index.rows
+    ]
+    data = {
+        "summary": index.summary,
+        "columns": index.columns,
+        "rows": rows,
+        "failures": [[failure.name, failure.reason] for failure in failures],
+        "date": f"{date}, gearsig {__version__}",
+    }
+    return compiled("index.typ", data, {})
 
 
 def _column(entries: Sequence[Entry], name: str) -> tuple[str, list[IndexCell]]:
@@ -222,20 +349,3 @@ def _size_text(entry: Entry) -> str:
     if entry.crack_mm is not None:
         return f"{entry.crack_mm:.1f} mm"
     return f"{readable(entry.ratio_db, 3)} dB" if entry.ratio_db is not None else "–"
-
-
-def _picture(entries: Sequence[Entry], names: Sequence[str]) -> Picture | None:
-    """Return the dots of the key indicators, where there are recordings to compare."""
-    from gearsig.plot import trend_figure
-
-    if len(entries) < 2 or not names:
-        return None
-    shown = entries[:40]
-    rest = f" The {len(shown)} most severe of {len(entries)} recordings." if len(shown) < len(entries) else ""
-    faulty = [entry.name for entry in shown if entry.outcome is Outcome.FAULT]
-    return embed(
-        trend_figure({entry.name: entry.indicators for entry in shown}, names=names, highlighted=faulty),
-        f"A recording that stands apart deserves a look; orange ones have a fault. One dot per channel and gear.{rest}",
-        f"Dots of {', '.join(names)} for {len(shown)} recordings.",
-        vector=len(shown) * len(names) <= 60,
-    )

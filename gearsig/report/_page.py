@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -623,26 +623,34 @@ def write_page(
 
 def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: datetime | None = None) -> str:
     """Return the page that `write_page` writes."""
-    recording = analysis.recording
+    parts = page_parts(analysis, command=command, date=date or datetime.now().astimezone())
     return render(
         "page.html.j2",
-        title=recording.provenance.source or "recording made in memory",
-        machine_name=analysis.rig.name if analysis.rig is not None else "",
-        verdict=analysis.verdict,
-        verdict_picture=picture_of_verdict(analysis),
-        changes=change_rows(analysis),
-        outcome_class=css_class(analysis.outcome),
-        outcome=analysis.outcome.value,
-        findings=[finding_card(finding) for finding in analysis.findings if finding.kind in CLAIMED],
-        further=[finding_card(finding) for finding in analysis.findings if finding.kind not in CLAIMED],
-        machine=machine_rows(analysis.rig),
-        recording=recording,
-        warnings=[text for text in recording.warnings if text not in {f.title for f in analysis.findings}],
-        speed=speed_rows(analysis.shaft_angle),
-        gallery=gallery(analysis),
+        **parts,
+        recording=analysis.recording,
         tables=indicator_tables(analysis.indicators, changes(analysis)),
-        reference=reference_text(analysis.reference),
-        truth=truth_rows(recording.truth),
-        provenance=provenance_rows(analysis, command, date or datetime.now().astimezone()),
+        truth=truth_rows(analysis.recording.truth),
         index=index,
     )
+
+
+def page_parts(analysis: Analysis, *, command: str, date: datetime) -> dict[str, Any]:
+    """Return what the page says, in HTML as in PDF."""
+    recording = analysis.recording
+    return {
+        "title": recording.provenance.source or "recording made in memory",
+        "machine_name": analysis.rig.name if analysis.rig is not None else "",
+        "verdict": analysis.verdict,
+        "verdict_picture": picture_of_verdict(analysis),
+        "changes": change_rows(analysis),
+        "outcome_class": css_class(analysis.outcome),
+        "outcome": analysis.outcome.value,
+        "findings": [finding_card(finding) for finding in analysis.findings if finding.kind in CLAIMED],
+        "further": [finding_card(finding) for finding in analysis.findings if finding.kind not in CLAIMED],
+        "machine": machine_rows(analysis.rig),
+        "warnings": [text for text in recording.warnings if text not in {f.title for f in analysis.findings}],
+        "speed": speed_rows(analysis.shaft_angle),
+        "gallery": gallery(analysis),
+        "reference": reference_text(analysis.reference),
+        "provenance": provenance_rows(analysis, command, date),
+    }

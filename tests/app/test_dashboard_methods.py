@@ -141,6 +141,7 @@ def test_a_channel_that_is_no_motion_is_one_message_and_an_unknown_one_is_asked_
 
 def test_the_depth_of_a_crack_against_the_healthy_sample_at_the_torque_that_is_stated() -> None:
     page = opened_at("Crack severity", "root_crack_3mm")
+    next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("None").run()
     assert "give a reference" in shown_text(page)
     choose(page, "Reference", "Sample")
     assert len(page.error) == 1

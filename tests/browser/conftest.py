@@ -42,7 +42,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield f"http://localhost:{port}/"
     finally:
         server.terminate()
-        server.wait(10)
+        server.wait(60)
         log.close()
 
 
@@ -63,7 +63,7 @@ def page(address: str) -> Iterator[playwright.Page]:
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         view = browser.new_page(viewport={"width": 1280, "height": 1600})
-        view.set_default_timeout(30_000)
+        view.set_default_timeout(90_000)  # the first analysis compiles
         wrong: list[str] = []
         view.on("pageerror", lambda error: wrong.append(str(error)))
         view.on("console", lambda message: wrong.append(message.text) if is_error(message) else None)

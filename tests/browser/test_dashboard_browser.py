@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,15 @@ def test_one_click_from_the_start_to_the_damaged_tooth_and_through_all_views(pag
     assert "<script" not in html
 
 
+def soon(page: playwright.Page, is_so: Callable[[], bool]) -> bool:
+    """Wait up to a minute until something is so."""
+    for _ in range(300):
+        if is_so():
+            return True
+        page.wait_for_timeout(200)
+    return False
+
+
 def test_zooming_refines_and_cursors_are_dragged(page: playwright.Page) -> None:
     open_sample(page)
     view = open_view(page, "Order spectrum")
@@ -79,12 +89,9 @@ def test_zooming_refines_and_cursors_are_dragged(page: playwright.Page) -> None:
     page.mouse.down()
     page.mouse.move(box["x"] + 0.5 * box["width"], middle, steps=4)
     page.mouse.up()
-    page.wait_for_timeout(600)
-    settle(page)
-    after = svg.locator("path").last.get_attribute("d")
-    assert after != before
-    # a tenth of the axis, in as many points as the whole had: the server sent its detail
-    assert after.count("L") > 0.5 * before.count("L")
+    # a tenth of the axis, in as many points as the whole had: the server sends its detail
+    assert soon(page, lambda: path.get_attribute("d").count("L") > 0.5 * before.count("L"))
+    assert path.get_attribute("d") != before
     view.get_by_role("button", name="Harmonics").click()
     words = view.locator(".figure .words")
     first = words.inner_text()
@@ -100,9 +107,7 @@ def test_zooming_refines_and_cursors_are_dragged(page: playwright.Page) -> None:
         assert Path(download.value.path()).stat().st_size > 1000
     page.keyboard.press("Escape")
     svg.dblclick(position={"x": box["width"] / 2, "y": box["height"] / 2})
-    page.wait_for_timeout(600)
-    settle(page)
-    assert svg.locator("path").last.get_attribute("d") == before
+    assert soon(page, lambda: path.get_attribute("d") == before)
 
 
 def test_a_view_can_be_sent_as_its_address_and_an_own_file_survives_a_reload(page: playwright.Page) -> None:

@@ -62,7 +62,8 @@ def test_one_broken_file_does_not_stop_the_rest(recordings, broken, tmp_path):
     html = result.index_path.read_text(encoding="utf-8")
     assert "absent.csv" in html
     assert "<b>abc" not in html
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"one.html", "two.html", "index.html", ".results"}
+    made = {"one.html", "two.html", "index.html", "batch.csv", "batch.json", ".results"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == made
 
 
 def test_local_processes_give_the_same_as_one(recordings, broken, tmp_path):

@@ -1,3 +1,6 @@
+import csv
+import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -48,19 +51,53 @@ def test_bars_compare_the_recordings(write):
     )
     assert "width: 100.0%" in html
     assert "width: 25.0%" in html
-    assert html.count("data:image/") == 1
 
 
 def test_no_bars_across_units_or_signs(write):
     one = Entry("a", "", Outcome.NO_FAULT, "", indicators=(Indicator("rms", 2.0, "g", "a"),))
     other = Entry("b", "", Outcome.NO_FAULT, "", indicators=(Indicator("rms", 3.0, "m/s^2", "a"),))
     html = write([one, other])
-    assert "width:" not in html.partition("</style>")[2].replace("width=", "")
+    assert "width:" not in html.partition("</style>")[2]
     assert "3 m/s²" in html
 
 
-def test_a_single_recording_needs_no_comparison(write):
-    assert "data:image/" not in write([_entry("a", Outcome.FAULT)])
+def test_the_table_sorts_and_filters_without_scripts(write):
+    """Each row carries its place in every order; style alone sorts and filters by it."""
+    entries = [
+        _entry("b", Outcome.FAULT, 2.0, machine="pump"),
+        _entry("a", Outcome.NO_FAULT, 9.0, machine="fan"),
+        _entry("c", Outcome.FAULT, float("nan"), machine="pump"),
+    ]
+    html = write(entries)
+    rows = re.findall(r'<tr class="[^"]*" style="([^"]*)"', html)
+    places = [[int(place) for place in re.findall(r": (\d+);", row)] for row in rows]
+    worst, name, machine, fm4 = zip(*places, strict=True)  # of b, c, a: worst first
+    assert worst == (0, 1, 2)
+    assert name == (1, 2, 0)
+    assert machine == (1, 2, 0)
+    assert fm4 == (1, 2, 0)
+    for order in range(4):
+        assert f"main:has(#order{order}:checked) tbody tr {{ order: var(--place{order}); }}" in html
+    assert html.count("<script") == 0
+    assert "#outcome-no-fault:not(:checked)" in html
+
+
+def test_a_table_and_json_of_all_recordings_stand_beside_it(write, tmp_path):
+    write([_entry("=1+1", Outcome.FAULT, 8.0), _entry("b", Outcome.NO_FAULT)], failures=[Failure("c", "why")])
+    found = json.loads((tmp_path / "batch.json").read_text(encoding="utf-8"))["recordings"]
+    assert [row["recording"] for row in found] == ["=1+1", "b", "c"]
+    assert found[0]["FM4"] == 8.0
+    assert found[2]["reason"] == "why"
+    with (tmp_path / "batch.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["recording"] for row in rows] == ["'=1+1", "b", "c"]
+    assert float(rows[0]["FM4"]) == 8.0
+
+
+def test_the_index_as_pdf(write, tmp_path):
+    pytest.importorskip("typst")
+    write([_entry("#[*evil*] $x$", Outcome.FAULT)], failures=[Failure("c", "why")], pdf=True)
+    assert (tmp_path / "index.pdf").read_bytes().startswith(b"%PDF-")
 
 
 def test_index_is_strict_html5_and_loads_nothing(write):

@@ -9,7 +9,7 @@ import pytest
 
 from gearsig.diagnosis import Finding, Kind, Outcome, Where
 from gearsig.indicators import Indicator
-from gearsig.report import page_html, write_page
+from gearsig.report import page_html, page_pdf, write_page
 
 EVIL = "<script>alert(1)</script>"
 QUOTES = "\"rig\" onload='x' & <b>"
@@ -134,6 +134,17 @@ def test_texts_from_files_are_never_markup(evil_html):
     assert "script" not in {tag for tag, _ in structure.elements}
     assert not any(name.startswith("on") for _, attributes in structure.elements for name in attributes)
     assert QUOTES in " ".join(structure.text)
+
+
+@pytest.mark.parametrize("kind", ["gearbox", "cannot_tell"])
+def test_a_page_as_pdf(kind, request):
+    """Names from files are text there, too: nothing in them can break the page."""
+    pytest.importorskip("typst")
+    analysis = request.getfixturevalue(kind)
+    finding = Finding(EVIL, Kind.FAULT, "#panic() *x* $y$ \\", Where((EVIL,)), evidence=('#include "data.json"',))
+    pdf = page_pdf(replace(analysis, verdict="#[", findings=(finding,)), command=EVIL)
+    assert pdf.startswith(b"%PDF-")
+    assert len(pdf) < 400_000
 
 
 def test_a_recording_that_allows_no_answer_has_a_page(cannot_tell, tmp_path):

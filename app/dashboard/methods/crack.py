@@ -93,7 +93,7 @@ def _choose_reference(page: MethodPage) -> Recording | None:
 def _torque_text(analysis: Analysis, stated_nm: float | None) -> str:
     """Return the torque that the depth rests on, and where to change it."""
     known = analysis.rig.operating_point.torque_nm if analysis.rig is not None else None
-    place = "in the sidebar under “Reference (healthy machine)”"
+    place = "in the sidebar"
     if stated_nm is not None:
         return f"Torque {stated_nm:g} N·m, as stated {place}"
     return f"Torque {known:g} N·m, of the rig; another one is stated {place}" if known else f"State the torque {place}"

@@ -1,0 +1,138 @@
+"""Pages as PDF, set by typst: a program in a wheel, which loads nothing from the network."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from base64 import b64decode
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from datetime import datetime
+from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from gearsig import __version__
+from gearsig.diagnosis import Analysis
+from gearsig.errors import InputError
+from gearsig.plot import Picture
+from gearsig.report._files import PART_SUFFIX, made_folder
+from gearsig.report._page import page_parts
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
+
+
+def page_pdf(analysis: Analysis, *, command: str = "", date: datetime | None = None) -> bytes:
+    """Return the page of one recording as PDF, with the same content as `page_html` but the table of indicators.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    command : str
+        The command that makes the page again.
+    date : datetime or None
+        Of the report; None: now.
+
+    Raises
+    ------
+    InputError
+        If typst is not installed.
+    """
+    parts = page_parts(analysis, command=command, date=date or datetime.now().astimezone())
+    pictures: dict[str, bytes] = {}
+    verdict = parts["verdict_picture"]
+    data = {
+        "title": parts["title"],
+        "machine": parts["machine_name"],
+        "verdict": parts["verdict"],
+        "outcome": parts["outcome"],
+        "css_class": parts["outcome_class"],
+        "reference": parts["reference"],
+        "date": dict(parts["provenance"]).get("date", ""),
+        "made": f"gearsig {__version__}",
+        "changes": [
+            asdict(row) | {"change": f"{row.change_db:+.1f} dB", "repeatability": f"± {row.repeatability_db:.1f}"}
+            for row in parts["changes"]
+        ],
+        "verdict_picture": None if verdict is None else _put(verdict, pictures),
+        "findings": [asdict(card) for card in parts["findings"]],
+        "further": [asdict(card) for card in parts["further"]],
+        "groups": [
+            {
+                "title": group.title,
+                "wide": [_put(one, pictures) for one in group.wide],
+                "small": [_put(one, pictures) for one in group.small],
+            }
+            for group in parts["gallery"].groups
+        ],
+        "facts": [*parts["machine"], *parts["speed"], *(("remark", text) for text in parts["warnings"])],
+        "provenance": parts["provenance"],
+    }
+    return compiled("page.typ", data, pictures)
+
+
+def write_pdf(path: str | Path, content: bytes) -> Path:
+    """Write a PDF beside its place and move it there when it is complete.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    path = Path(path)
+    made_folder(path.parent)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror or error})", where=str(path)) from None
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+    return path
+
+
+def check_pdf() -> None:
+    """Check, before long work, that PDFs can be made.
+
+    Raises
+    ------
+    InputError
+        If typst is not installed.
+    """
+    try:
+        import typst  # noqa: F401
+    except ImportError:
+        raise InputError("PDF needs the package typst", remedy="pip install 'gearsig[pdf]'") from None
+
+
+def compiled(template: str, data: Mapping[str, Any], pictures: Mapping[str, bytes]) -> bytes:
+    """Return the PDF that a template makes of data; fonts are matplotlib's, so that every machine sets it alike."""
+    check_pdf()
+    import typst
+    from matplotlib import get_data_path
+
+    source = files("gearsig.report").joinpath("templates", template).read_bytes()
+    content = json.dumps(data, ensure_ascii=False, default=str).encode()
+    with TemporaryDirectory(prefix="gearsig-") as folder:
+        for name, part in {"main.typ": source, "data.json": content, **pictures}.items():
+            (Path(folder) / name).write_bytes(part)
+        fonts = Path(get_data_path()) / "fonts" / "ttf"
+        made = typst.compile(Path(folder) / "main.typ", root=Path(folder), font_paths=[fonts], ignore_system_fonts=True)
+    return bytes(made)
+
+
+def _put(picture: Picture, pictures: dict[str, bytes]) -> dict[str, object]:
+    """Add a picture to the files, and return what the template says of it."""
+    if picture.svg:
+        name = f"picture{len(pictures)}.svg"
+        pictures[name] = picture.svg.replace("<svg", SVG, 1).replace("system-ui, ", "").encode()
+    else:
+        kind, _, content = picture.uri.partition(";base64,")
+        name = f"picture{len(pictures)}.{'svg' if 'svg' in kind else 'png'}"
+        pictures[name] = b64decode(content)
+    square = picture.width_px == picture.height_px
+    return {"file": name, "caption": picture.caption, "alternative": picture.alternative, "square": square}
