@@ -16,7 +16,7 @@ from sims.registry import simulator
 from sims.simulator import SimulationSetup
 from tests.app.pages import FOLDER, figures, shown_text
 
-CHARTS = {"Time": 3, "Spectrum": 1, "Envelope": 1, "Phase portrait": 2, "Bifurcation": 0, "Mesh": 2}
+CHARTS = {"Gears": 0, "Time": 3, "Spectrum": 1, "Envelope": 1, "Phase portrait": 2, "Bifurcation": 0, "Mesh": 2}
 
 
 def opened(preset: str = "small_30_25") -> AppTest:
@@ -40,7 +40,8 @@ def test_at_the_start_the_machine_is_healthy() -> None:
     assert not page.exception
     assert page.subheader[0].value.startswith("Healthy")
     assert [tab.label for tab in page.tabs] == list(VIEWS)
-    assert len(figures(page)) == 1
+    assert [part.proto.component_name for part in page.get("bidi_component")] == ["gearsig.gears"]
+    assert len(page.get("audio")) == 1
     assert [metric.label for metric in page.metric] == list(NUMBERS)
     assert not any(metric.delta for metric in page.metric)
     assert "mesh 900 Hz" in shown_text(page)  # 30 teeth at 1800 rpm

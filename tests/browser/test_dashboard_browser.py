@@ -91,7 +91,8 @@ def test_zooming_refines_and_cursors_are_dragged(page: playwright.Page) -> None:
     page.mouse.up()
     # a tenth of the axis, in as many points as the whole had: the server sends its detail
     assert soon(page, lambda: path.get_attribute("d").count("L") > 0.5 * before.count("L"))
-    assert path.get_attribute("d") != before
+    near = path.get_attribute("d")
+    assert near != before
     view.get_by_role("button", name="Harmonics").click()
     words = view.locator(".figure .words")
     first = words.inner_text()
@@ -107,7 +108,7 @@ def test_zooming_refines_and_cursors_are_dragged(page: playwright.Page) -> None:
         assert Path(download.value.path()).stat().st_size > 1000
     page.keyboard.press("Escape")
     svg.dblclick(position={"x": box["width"] / 2, "y": box["height"] / 2})
-    assert soon(page, lambda: path.get_attribute("d") == before)
+    assert soon(page, lambda: near != path.get_attribute("d") and path.get_attribute("d").count("L") > 1000)
 
 
 def test_a_view_can_be_sent_as_its_address_and_an_own_file_survives_a_reload(page: playwright.Page) -> None:

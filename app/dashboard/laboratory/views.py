@@ -11,6 +11,7 @@ import streamlit as st
 
 from app.dashboard.laboratory import run as runs
 from app.dashboard.laboratory.bifurcation import show_bifurcation
+from app.dashboard.laboratory.gears import show_gears
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import Setup, effect_text
 from app.dashboard.theme import as_typed, capitalised, palette
@@ -337,6 +338,7 @@ def portrait_figure(shown: Portrait, limits: Limits, *, faulty: bool) -> Figure:
 
 View = Callable[[LaboratoryRun, LaboratoryRun | None, str], None]
 VIEWS: dict[str, View] = {
+    "Gears": show_gears,
     "Time": lambda healthy, faulty, _: show_time(healthy, faulty),
     "Spectrum": show_amplitude,
     "Envelope": show_envelope,

@@ -7,7 +7,7 @@ import streamlit as st
 from app.dashboard.laboratory import views
 from app.dashboard.laboratory.drive import show_drive
 from app.dashboard.laboratory.run import LaboratoryRun, faulty_of, show_saving, simulated
-from app.dashboard.laboratory.setup import DRIVE_MODEL, choose_preset, choose_setup
+from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup, choose_preset, choose_setup
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 from sims.presets import Preset
@@ -28,6 +28,13 @@ def show() -> None:
 def show_pair(preset: Preset) -> None:
     """Choose, simulate, show a pair that runs at a steady speed."""
     setup = choose_setup(preset)
+    # Its results fade at once while another machine is simulated: none is taken for the new one's.
+    with st.container(key="results"):
+        show_results(setup)
+
+
+def show_results(setup: Setup) -> None:
+    """Simulate and show healthy and faulty machine."""
     healthy, faulty = simulated(setup.healthy), faulty_of(setup, simulated)
     shown = faulty or healthy
     head, buttons = st.columns((3, 2), vertical_alignment="top")

@@ -267,11 +267,12 @@ def _sent(line: ChartLine, shown: tuple[float, float]) -> dict[str, object]:
     cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
     colour = colours.quiet if line.colour == QUIET else cycle[line.colour % len(cycle)]
     x, y, *band = _columns(line, shown)
-    curves = {name: _packed(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
+    curves = {name: packed(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
     return {"name": one_line(line.name), "colour": colour, "dotted": line.dotted, **curves}
 
 
-def _packed(values: FloatArray) -> str:
+def packed(values: FloatArray) -> str:
+    """Return numbers as a component takes them."""
     return b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode("ascii")
 
 
