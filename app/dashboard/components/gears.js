@@ -133,7 +133,7 @@ function wheel(context, x, radius, n, angleOf, cracked, colours, ink) {
     const middle = angleOf(k), isCracked = k + 1 === cracked;
     context.beginPath();
     for (const [r, share] of profile) context.lineTo(r * Math.cos(middle + share * step), -r * Math.sin(middle + share * step));
-    const inner = root - 14;
+    const inner = root - 60;
     context.lineTo(inner * Math.cos(middle + step / 2), -inner * Math.sin(middle + step / 2));
     context.lineTo(inner * Math.cos(middle - step / 2), -inner * Math.sin(middle - step / 2));
     context.closePath();
