@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -207,6 +208,13 @@ def colours() -> Colormap:
     return LinearSegmentedColormap.from_list(
         "level", ["#FFFFFF", "#C9DDF0", "#6FA8D6", "#1F6FB0", "#0B3A69", "#06172E"]
     )
+
+
+def font_folder() -> Path:
+    """Return the folder of the figures' fonts, which come with matplotlib."""
+    from matplotlib import get_data_path
+
+    return Path(get_data_path()) / "fonts" / "ttf"
 
 
 def level_colours(*, dark: bool = False) -> NDArray[np.uint8]:

@@ -17,7 +17,7 @@ from typing import Any
 from gearsig import __version__
 from gearsig.diagnosis import Analysis
 from gearsig.errors import InputError
-from gearsig.plot import Picture
+from gearsig.plot import Picture, font_folder
 from gearsig.report._files import PART_SUFFIX, made_folder
 from gearsig.report._page import page_parts
 
@@ -113,15 +113,14 @@ def compiled(template: str, data: Mapping[str, Any], pictures: Mapping[str, byte
     """Return the PDF that a template makes of data; fonts are matplotlib's, so that every machine sets it alike."""
     check_pdf()
     import typst
-    from matplotlib import get_data_path
 
     source = files("gearsig.report").joinpath("templates", template).read_bytes()
     content = json.dumps(data, ensure_ascii=False, default=str).encode()
     with TemporaryDirectory(prefix="gearsig-") as folder:
         for name, part in {"main.typ": source, "data.json": content, **pictures}.items():
             (Path(folder) / name).write_bytes(part)
-        fonts = Path(get_data_path()) / "fonts" / "ttf"
-        made = typst.compile(Path(folder) / "main.typ", root=Path(folder), font_paths=[fonts], ignore_system_fonts=True)
+        main, fonts = Path(folder) / "main.typ", [font_folder()]
+        made = typst.compile(main, root=Path(folder), font_paths=fonts, ignore_system_fonts=True)
     return bytes(made)
 
 

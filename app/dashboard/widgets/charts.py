@@ -368,13 +368,6 @@ def choose_range(
     return (low, high) if high > low else (max(start, high - step), min(end, high + step))
 
 
-def choose_end(label: str, analysis: Analysis, end: float, shown: float) -> float:
-    """Return the chosen end of what is shown from zero, `shown` at first."""
-    step = end / 1000
-    key = state.view_key(f"{label} to {end!r}", analysis)
-    return st.slider(label, step, end, value=min(shown, end), step=step, format="%.5g", key=key)
-
-
 def download(label: str, data: Any, name: str, mime: str, *, primary: bool = False) -> None:
     """Show a download button; the page is not run again for it.
 
