@@ -134,7 +134,7 @@ def status(
     json: options.JsonOption = False,
 ) -> None:
     """Show every measuring point, the worst first: diagnosis of the last recording, alarms, what rose most."""
-    from gearsig.report import trends_text
+    from gearsig.fleet import trends_text
 
     table = _open(store).status()
     if machine:
@@ -408,8 +408,7 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
 def _series_row(row: dict[Any, Any]) -> tuple[str, ...]:
     from pandas import isna
 
-    from gearsig.fleet import LEVEL_NAMES
-    from gearsig.report import change_text
+    from gearsig.fleet import LEVEL_NAMES, change_text
 
     unit = f" {row['unit']}" if row["unit"] else ""
     of = " ".join(part for part in (row["point"], row["place"], row["channel"], row["computed_on"]) if part)

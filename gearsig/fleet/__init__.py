@@ -5,9 +5,11 @@ from gearsig.fleet._changes import (
     AlarmChange,
     DiagnosisChange,
     FleetChanges,
+    change_text,
     fleet_changes,
     last_report,
     mark_reported,
+    trends_text,
 )
 from gearsig.fleet._fleet import LEVEL_NAMES, TABLES, Fleet, Trend, open_fleet
 from gearsig.fleet._origin import FilePattern, Origin, date_in_name, find_recordings, origin_rows, origins
@@ -51,6 +53,7 @@ __all__ = [
     "WatchEvent",
     "alarm_levels",
     "change_points",
+    "change_text",
     "cusum_threshold",
     "date_in_name",
     "events_of",
@@ -64,5 +67,6 @@ __all__ = [
     "prediction_limits",
     "regressors",
     "standardised_innovations",
+    "trends_text",
     "watch",
 ]

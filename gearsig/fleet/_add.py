@@ -19,7 +19,6 @@ from gearsig.errors import GearsigError, InputError
 from gearsig.fleet._origin import Origin
 from gearsig.fleet._store import Row, Store
 from gearsig.processes import n_processors, run_jobs
-from gearsig.recording import sha256_of
 from gearsig.rig import Rig, SpeedSource, read_rig, rig_file_beside, rig_to_dict
 
 if TYPE_CHECKING:
@@ -128,6 +127,7 @@ def add_recordings(
 ) -> AddResult:
     """Analyse what the store does not hold yet; see `Fleet.add`."""
     from gearsig import __version__
+    from gearsig.recording import sha256_of
 
     setups = _setups(options)
     known = _known(store, found, __version__)
@@ -163,7 +163,6 @@ def add_recordings(
                     yield _AnalysisJob(origin, options, sha256, setup, key)
 
     running = run_jobs(analyse_file, jobs(), n_workers=max(1, min(workers, 64)), executor=executor, if_killed=_killed)
-    n_since = 0
     try:
         with closing(running):
             for _, (row, indicators, origin) in running:
@@ -173,8 +172,7 @@ def add_recordings(
                 results.append(AddedRecording(origin, str(row["outcome"]), str(row["verdict"] or row["reason"])))
                 if on_progress is not None:
                     on_progress(len(results), len(missing), results[-1])
-                n_since += 1
-                if n_since % 64 == 0 and store.n_new() >= COMPACT_FROM:
+                if len(results) % 64 == 0 and store.n_new() >= COMPACT_FROM:
                     store.compact()
     finally:
         for claim in claims.values():
@@ -360,6 +358,8 @@ def _of_content(store: Store, files: Mapping[Origin, str]) -> dict[Origin, tuple
 
 def _setups(options: AnalysisOptions) -> Callable[[Path], str]:
     """Return a function that hashes what decides a file's result besides its content."""
+    from gearsig.recording import sha256_of
+
     reference = sha256_of(options.reference) if options.reference is not None else ""
     shared = [reference, options.sampling_rate_hz, options.torque_nm, repr(options.speed)]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gearsig.cache import write_whole
 from gearsig.fleet._fleet import LEVEL_NAMES, Fleet
 from gearsig.fleet._trends import events_of
+from gearsig.formatting import readable, signed
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -141,3 +143,27 @@ def _alarm(row: dict[Any, Any], level: str, raised: datetime, cleared: datetime 
 
 def _sorted(changes: list[AlarmChange]) -> tuple[AlarmChange, ...]:
     return tuple(sorted(changes, key=lambda c: (c.cleared is not None, c.level != "alarm", -abs(c.change), c.machine)))
+
+
+def trends_text(row: Mapping[Any, Any]) -> str:
+    """Say what the trends of a measuring point show: a row of `Fleet.status`."""
+    from pandas import isna
+
+    counts = [
+        f"{row[key]:.0f} {name}{'s' * (row[key] != 1)}"
+        for key, name in (("n_alarms", "alarm"), ("n_warnings", "warning"))
+        if not isna(row[key]) and row[key]
+    ]
+    if not counts:
+        n = row["n_baseline"]
+        return "" if isna(n) or n else "baseline not complete"
+    since = "" if isna(row["since"]) else f" since {row['since']:%Y-%m-%d}"
+    change = change_text(row["change"], in_db=bool(row["change_in_db"]))
+    return f"{', '.join(counts)}{since}; worst: {row['worst']}{f' {change}' if change else ''}"
+
+
+def change_text(change: float, *, in_db: bool) -> str:
+    """Write how far a value is from the expected one; empty where nothing is expected."""
+    if change != change:  # noqa: PLR0124 - nan: there is no baseline
+        return ""
+    return f"{signed(change)} dB" if in_db else f"{'+' if change > 0 else ''}{readable(change, 3)}"

@@ -10,7 +10,6 @@ from functools import cache
 from pathlib import Path
 
 from gearsig.errors import InputError
-from gearsig.recording import FORMAT_OF_EXTENSION
 from gearsig.rig import Rig, read_rig, rig_file_beside
 
 FIELDS = ("machine", "point", "date")
@@ -209,6 +208,8 @@ def _walk(root: Path) -> Iterable[Path]:
 
 
 def _is_recording(path: Path) -> bool:
+    from gearsig.recording import FORMAT_OF_EXTENSION
+
     name = path.name.lower()
     return any(name.endswith((ending, f"{ending}.gz")) for ending in FORMAT_OF_EXTENSION)
 
@@ -291,6 +292,8 @@ def origins(
             )
         )
     if not result:
+        from gearsig.recording import FORMAT_OF_EXTENSION
+
         raise InputError(
             "there are no recordings" + (f" that match {pattern!r}" if pattern else ""),
             where=", ".join(str(place) for place in places),

@@ -31,7 +31,6 @@ from gearsig.fleet._statistics import (
     standardised_innovations,
 )
 from gearsig.fleet._store import SERIES
-from gearsig.indicators import ZONE_LIMITS_MM_PER_S
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -360,6 +359,8 @@ def _natural(levels: FloatArray, in_db: BoolArray) -> FloatArray:
 
 def _zone_limits(recordings: DataFrame) -> tuple[float, float, float] | None:
     """Return the boundaries of the zones of ISO 20816-3, where the latest recording was judged by them."""
+    from gearsig.indicators import ZONE_LIMITS_MM_PER_S
+
     known = recordings[recordings["iso_group"].notna()]
     if known.empty:
         return None

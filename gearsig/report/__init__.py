@@ -12,7 +12,7 @@ from gearsig.report._comparison import (
     orders_csv,
 )
 from gearsig.report._files import check_writable, made_folder, page_names, remove_parts, write_text
-from gearsig.report._fleet import change_text, fleet_page_html, trends_text, write_fleet_page
+from gearsig.report._fleet import fleet_page_html, write_fleet_page
 from gearsig.report._gap_json import gap_from_dict, gap_schema, gap_to_dict, gap_to_json, read_gap_json, write_gap_json
 from gearsig.report._gap_page import (
     CHECK_FIRST,
@@ -83,7 +83,6 @@ __all__ = [
     "bearing_cursors",
     "benchmark_html",
     "cause_rows",
-    "change_text",
     "channel_rows",
     "check_pdf",
     "check_writable",
@@ -135,7 +134,6 @@ __all__ = [
     "start_stop_text",
     "step_rows",
     "teeth_of_shaft",
-    "trends_text",
     "verdict_picture",
     "verdict_rows",
     "write_fleet_page",

@@ -10,8 +10,8 @@ from typing import Any
 
 from gearsig import __version__
 from gearsig.errors import InputError
-from gearsig.fleet import AlarmChange, Fleet, FleetChanges, fleet_changes
-from gearsig.formatting import readable, signed
+from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, fleet_changes, trends_text
+from gearsig.formatting import readable
 from gearsig.plot import Picture, fleet_trend_picture, unit_text
 from gearsig.report._files import render, write_text
 
@@ -35,30 +35,6 @@ class AlarmRow:
     raised: str
     cleared: str
     basis: str
-
-
-def trends_text(row: Mapping[Any, Any]) -> str:
-    """Say what the trends of a measuring point show: a row of `Fleet.status`."""
-    from pandas import isna
-
-    counts = [
-        f"{row[key]:.0f} {name}{'s' * (row[key] != 1)}"
-        for key, name in (("n_alarms", "alarm"), ("n_warnings", "warning"))
-        if not isna(row[key]) and row[key]
-    ]
-    if not counts:
-        n = row["n_baseline"]
-        return "" if isna(n) or n else "baseline not complete"
-    since = "" if isna(row["since"]) else f" since {row['since']:%Y-%m-%d}"
-    change = change_text(row["change"], in_db=bool(row["change_in_db"]))
-    return f"{', '.join(counts)}{since}; worst: {row['worst']}{f' {change}' if change else ''}"
-
-
-def change_text(change: float, *, in_db: bool) -> str:
-    """Write how far a value is from the expected one; empty where nothing is expected."""
-    if change != change:  # noqa: PLR0124 - nan: there is no baseline
-        return ""
-    return f"{signed(change)} dB" if in_db else f"{'+' if change > 0 else ''}{readable(change, 3)}"
 
 
 def fleet_page_html(fleet: Fleet, since: datetime | None = None, *, date: datetime | None = None) -> str:
