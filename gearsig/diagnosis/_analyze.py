@@ -11,7 +11,8 @@ from gearsig import indicators
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._bearing import detect_bearings
 from gearsig.diagnosis._change import change_findings, family_change, level_changes
-from gearsig.diagnosis._crack import crack_depth, with_crack
+from gearsig.diagnosis._crack import Answer, crack_depth, with_crack
+from gearsig.diagnosis._doubts import lowered, speed_doubts, spoiled, withheld_crack, without_synchronous_hum
 from gearsig.diagnosis._lines import detect_lines, detect_mesh, speed_finding
 from gearsig.diagnosis._modulation import detect_sidebands
 from gearsig.diagnosis._overall import detect_vibration_zone
@@ -112,9 +113,9 @@ def _examined(
         return unsteady, None
     _check_vibration(recording)
     angle = _angle_of(prepared)
-    findings.append(speed_finding(angle))
-    names = [name for name in recording.vibration_names() if name not in dead]
-    if not names:
+    findings = without_synchronous_hum(findings, angle, known)
+    findings += [speed_finding(angle), *speed_doubts(angle, known)]
+    if not (names := [name for name in recording.vibration_names() if name not in dead]):
         order = ranked([*findings, cannot_tell("all-channels-dead", "Every vibration channel is dead.")])
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
 
@@ -150,7 +151,10 @@ def _examined(
             findings = beside_reference(findings, reference_analysis, lambda f: family_change(f, *beside))
             compared = level_changes(*beside)
             findings += change_findings(compared, signals, then[0], findings)
-    crack = crack_depth(prepared, known, healthy, torque_nm, dead)
+    findings, unfit = lowered(findings, names), dead | spoiled(findings, names)
+    crack: Answer | None = withheld_crack(findings, asked=healthy is not None)
+    if not unfit.issuperset(names):
+        crack = crack_depth(prepared, known, healthy, torque_nm, unfit)
     order = ranked(with_crack(findings, crack, known))
     analysis = Analysis(
         recording=recording,

@@ -49,7 +49,10 @@ MIN_CHANGE_DB = 6.0
 CHANGED, UNCHANGED = "changed-since-reference", "unchanged-since-reference"
 """Codes of the findings that levels have changed since the reference, or not."""
 
-HINDERING = ("channel-clipped", "channel-stuck", "channel-dead")
+HINDERING = (
+    *("channel-clipped", "channel-stuck", "channel-dead", "channel-wrapped", "channel-stepped", "channel-reversed"),
+    *("channel-hum", "speed-near-zero"),
+)
 """Codes of data problems behind which a fault may hide."""
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from gearsig.diagnosis._doubts import said_first
 from gearsig.diagnosis._overall import VIBRATION_ZONE
-from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import CHANGED, EXAMINED, HINDERING, UNCHANGED, Finding, Kind, Outcome, Where, outcome_of
 from gearsig.recording import Recording
 
@@ -32,7 +32,7 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
 
     Why a given reference did not help is always part of it.
     """
-    doubt = next((f.title for f in findings if f.code == SAMPLING_RATE), "")
+    doubt = said_first(findings, claims=outcome_of(findings) in (Outcome.FAULT, Outcome.SUSPICION))
     zone = next((f.title for f in findings if f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE), "")
     changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
     others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED))
@@ -79,6 +79,14 @@ def _remedy(gaps: list[Finding]) -> list[str]:
     return [f"Surer with: {surer}."]
 
 
+_TITLES = {
+    "wrapped": "Channel {} has overflowed: its values wrap around.",
+    "stepped": "The level of channel {} steps: gain, mounting or load changed.",
+    "reversed": "Channel {} seems to run backwards in time.",
+    "hum": "Mains hum rules channel {}.",
+}
+
+
 def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset[str]]:
     """Return findings about the data, and the names of dead channels, which are not analysed further."""
     from gearsig.recording import find_problems
@@ -88,7 +96,7 @@ def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset
         Finding(
             f"channel-{p.kind}",
             Kind.DATA_PROBLEM,
-            f"Channel {p.channel} is {p.kind}.",
+            _TITLES.get(p.kind, "Channel {} is {}.").format(p.channel, p.kind),
             Where((p.channel,)),
             confidence=0.95,
             confidence_basis="direct inspection of the samples",

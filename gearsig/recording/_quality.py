@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -147,7 +149,7 @@ def _n_in_cornered_runs(at_limit: NDArray[np.bool_], distance: FloatArray, width
     return int((stops - starts)[inside][drop > CORNER_DROP * width].sum())
 
 
-ProblemKind = Literal["dead", "clipped", "stuck", "offset", "quantised"]
+ProblemKind = Literal["dead", "clipped", "wrapped", "stuck", "stepped", "reversed", "hum", "offset", "quantised"]
 
 CORNER_DISTANCE = 8
 MIN_SAMPLES = 64
@@ -162,7 +164,7 @@ class ChannelProblem:
     ----------
     channel : str
     kind : str
-        "dead", "clipped", "stuck", "offset" or "quantised".
+        One of `ProblemKind`.
     share : float
         Share of the samples that are touched, 0 to 1.
     evidence : str
@@ -187,6 +189,12 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
     - *stuck*: runs of equal samples away from the extremes, at least 16 long, ten times longer than 99 % of the
       runs in the channel, and with a corner at both ends (eight samples further the signal is more than eight of the
       converter's steps away, which it is not at a smooth turning point): a dropout of the measurement chain.
+    - *wrapped*: five or more steps from one end of the range to the other that vanish when the range is added: an
+      integer that overflowed.
+    - *stepped*: the level changes by 4 dB or more from one moment to the next, and is steady before and after: gain,
+      mounting or load.
+    - *reversed*: impacts swell and end suddenly, where those of a machine begin suddenly and ring down.
+    - *hum*: more than half of the power stands in one line within 0.1 % of a multiple of 50 or 60 Hz.
     - *offset*: the mean is more than three times the standard deviation, for quantities without a static part.
     - *quantised*: fewer than 64 equidistant levels in use, less than 6 bits.
 
@@ -205,6 +213,9 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
         if channel.is_vibration:
             others = [spreads[c.name] for c in recording.channels if _is_comparable(c, channel)]
             found += _problems_of(channel, recording.values(channel.name), spreads[channel.name], others)
+            if found and found[-1].channel == channel.name and found[-1].kind == "dead":
+                continue
+            found += _doubts_of(channel, recording.values(channel.name), recording.sampling_rate_hz)
     return tuple(found)
 
 
@@ -301,3 +312,127 @@ def _quantised(channel: Channel, levels: SampleLevels) -> ChannelProblem | None:
     evidence = f"only {levels.n_spanned} levels of {levels.step:.3g} are in use ({np.log2(levels.n_spanned):.1f} bits)"
     remedy = "measure again with a smaller input range: weak sidebands drown in the rounding"
     return ChannelProblem(channel.name, "quantised", 1.0, evidence, remedy)
+
+
+# --------------------
+# What a record looks like that was scaled, cut, turned or disturbed on its way.
+# --------------------
+
+
+N_BLOCKS = 64
+STEP_DB = 4.0
+LEAST_SAMPLES = 4096
+MAINS_HZ = (50.0, 60.0)
+MAINS_WANDER = 1e-3
+"""How far a supply's frequency may be off; induction motors slip by more."""
+LONGEST_TURNED = 1 << 18
+"""Samples in which the direction of time is looked for."""
+
+
+def _doubts_of(channel: Channel, x: FloatArray, rate_hz: float) -> Iterator[ChannelProblem]:
+    if len(x) < LEAST_SAMPLES:
+        return
+    tests = (_wrapped(channel, x), _stepped(channel, x), _reversed(channel, x, rate_hz), _hum(channel, x, rate_hz))
+    yield from (problem for problem in tests if problem is not None)
+
+
+def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
+    low, high = float(x.min()), float(x.max())
+    span = high - low
+    jumps = np.abs(np.diff(x)) > 0.75 * span
+    n = int(np.count_nonzero(jumps))
+    # A square wave jumps as well, but rests in between; noise hardly ever goes from end to end.
+    if n < 5 or n > 0.2 * len(x):
+        return None
+    starts = np.flatnonzero(jumps)[1:-1]
+    starts = starts[(starts > 0) & (starts + 2 < len(x))]
+    if not len(starts):
+        return None
+    before, after = x[starts] - x[starts - 1], x[starts + 2] - x[starts + 1]
+    turned = np.sign(x[starts + 1] - x[starts])
+    goes_on = (np.sign(before) == -turned) & (np.sign(after) == -turned)
+    beside = np.maximum(np.abs(before), np.abs(after)) / span
+    # Values that wrap around fill the range up to both ends; those of a natural signal thin out towards them.
+    place = (x - low) / span
+    outer, next_to = (np.count_nonzero(np.abs(place - 0.5) > 0.5 - edge) for edge in (0.01, 0.05))
+    if np.mean(goes_on) < 0.6 or not 0.02 < np.median(beside) < 0.6 or outer < max(20, 0.08 * next_to):
+        return None
+    evidence = f"{n} steps from one end of the range, {low:.4g} to {high:.4g}, to the other, and the slope goes on"
+    remedy = "export again in a wider number format; nothing can be read from this channel"
+    return ChannelProblem(channel.name, "wrapped", n / len(x), evidence, remedy)
+
+
+def _stepped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
+    if channel.quantity not in _OFFSET_QUANTITIES:
+        return None
+    size = len(x) // N_BLOCKS
+    blocks = np.asarray(x[: size * N_BLOCKS]).reshape(N_BLOCKS, size)
+    power = np.var(blocks, axis=1, dtype=np.float64)
+    if not np.all(power > 0):
+        return None
+    level_db = 10.0 * np.log10(power)
+    cuts = range(8, N_BLOCKS - 7)
+    # One block may hold the step itself; what is left on both sides is steady.
+    sides = [(level_db[: k - 1], level_db[k + 1 :]) for k in cuts]
+    steps = np.array([after.mean() - before.mean() for before, after in sides])
+    best = int(np.argmax(np.abs(steps)))
+    step = float(steps[best])
+    scatter = float(np.hypot(*(np.std(side, ddof=1) for side in sides[best])))
+    near = level_db[cuts[best] + 1 : cuts[best] + 4].mean() - level_db[cuts[best] - 4 : cuts[best] - 1].mean()
+    if abs(step) < max(STEP_DB, 4.0 * scatter) or abs(near) < 0.8 * abs(step):
+        return None
+    place = 100 * cuts[best] / N_BLOCKS
+    evidence = f"the level changes by {step:+.1f} dB at {place:.0f} % of the record, and is steady"
+    remedy = "check gain, mounting and load, and analyse the parts before and after by themselves"
+    return ChannelProblem(channel.name, "stepped", 1.0, f"{evidence} before and after ({scatter:.1f} dB)", remedy)
+
+
+def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
+    r"""Look for envelopes that fall faster than they rise.
+
+    The skewness of the envelope's steps, :math:`E[d^3] / E[d^2]^{3/2}`, changes its sign with the direction of time. Of
+    resonances that are struck it is positive. It is taken in four bands above 300 Hz, and by what 32 parts scatter.
+    """
+    top_hz = 0.45 * rate_hz
+    if channel.quantity not in _OFFSET_QUANTITIES or top_hz < 1000.0:
+        return None
+    x = np.asarray(x[: 1 << int(np.log2(min(len(x), LONGEST_TURNED)))], dtype=np.float64)
+    spectrum, frequency = np.fft.fft(x - x.mean()), np.fft.fftfreq(len(x), 1.0 / rate_hz)
+    edges = [300.0 * (top_hz / 300.0) ** (i / 4) for i in range(5)]
+    skews, scores = [], []
+    for low, high in pairwise(edges):
+        envelope = np.abs(np.fft.ifft(np.where((frequency > low) & (frequency < high), 2.0 * spectrum, 0.0)))
+        steps = np.diff(envelope[:: max(1, int(rate_hz / (high - low)))])
+        parts = steps[: len(steps) // 32 * 32].reshape(32, -1)
+        scale = float(np.mean(parts**2)) ** 1.5
+        cubes = np.mean(parts**3, axis=1) / scale if scale > 0 else np.zeros(32)
+        skews.append(float(cubes.mean()))
+        scores.append(skews[-1] / max(float(np.std(cubes, ddof=1)) / 32**0.5, 1e-12))
+    turned = [i for i in range(4) if skews[i] < -0.5 and scores[i] < -4.0]
+    if not turned or any(skews[i] > 0.5 and scores[i] > 3.0 for i in range(4)):
+        return None
+    i = min(turned, key=lambda i: scores[i])
+    evidence = (
+        f"impacts between {edges[i]:.0f} and {edges[i + 1]:.0f} Hz swell and end suddenly: skewness of the envelope's "
+        f"steps {skews[i]:.2f}, {abs(scores[i]):.0f} standard errors below zero"
+    )
+    remedy = "check the order of the samples: turned round, teeth are counted backwards, and speeds fall that rose"
+    return ChannelProblem(channel.name, "reversed", 1.0, evidence, remedy)
+
+
+def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
+    n = 1 << int(np.log2(min(len(x), 4 * LONGEST_TURNED)))
+    window = np.hanning(n)
+    spectrum = np.abs(np.fft.rfft((x[:n] - np.mean(x[:n], dtype=np.float64)) * window))
+    i, step_hz = int(np.argmax(spectrum[1:-1])) + 1, rate_hz / n
+    left, peak, right = spectrum[i - 1 : i + 2]
+    line_hz = (i + 0.5 * (right - left) / max(2 * peak - left - right, 1e-300)) * step_hz
+    share = float(np.sum(spectrum[max(i - 2, 0) : i + 3] ** 2) / max(float(np.sum(spectrum**2)), 1e-300))
+    for mains_hz in MAINS_HZ:
+        multiple = round(line_hz / mains_hz)
+        beside = abs(line_hz / (max(multiple, 1) * mains_hz) - 1)
+        if 1 <= multiple <= 6 and beside < MAINS_WANDER and share > 0.5 and step_hz < 2.0:
+            evidence = f"{100 * share:.0f} % of the power stands at {line_hz:.5g} Hz, a multiple of {mains_hz:.0f} Hz"
+            remedy = "check shield and earthing, if no shaft or mesh turns there; what is weaker drowns in it"
+            return ChannelProblem(channel.name, "hum", share, evidence, remedy)
+    return None

@@ -42,11 +42,16 @@ def read_mf4(path: Path) -> RawTable:
         )
     check_memory(4 * path.stat().st_size, where)
     try:  # its compiled parts trust the file: a damaged one can end the process
+        call_apart(_load, longest_s=60.0)  # takes seconds, once
         return call_apart(_read, path, longest_s=4.0 + 1e-6 * path.stat().st_size)
     except BrokenProcessPool:
         raise InputError(
             "is damaged: its reader dies of it, or finds no end", where=where, allowed="a complete MF4 file"
         ) from None
+
+
+def _load() -> None:
+    import asammdf  # noqa: F401
 
 
 def _read(path: Path) -> RawTable:

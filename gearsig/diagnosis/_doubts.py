@@ -1,0 +1,133 @@
+"""What is wrong with the input lowers what rests on it: one place, for every problem and every finding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from gearsig.angle import ShaftAngle
+from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
+from gearsig.diagnosis._types import CannotTell, Finding, Kind, Strength, Where
+from gearsig.rig import Rig
+
+OFF_NOMINAL, NEAR_ZERO = "speed-off-nominal", "speed-near-zero"
+
+TRUST = {
+    SAMPLING_RATE: 0.5,
+    OFF_NOMINAL: 0.75,
+    NEAR_ZERO: 0.5,
+    "mesh-above-sampling": 0.5,
+    "mesh-absent": 0.75,
+    "channel-clipped": 0.7,
+    "channel-wrapped": 0.0,
+    "channel-stepped": 0.75,
+    "channel-reversed": 0.5,
+    "channel-hum": 0.75,
+}
+"""Problem → what a confidence is multiplied by: a judgement, and no probability. 0.5 where places or frequencies are
+probably wrong, 0.7 and 0.75 where they stand but sizes are not to be trusted, 0 where nothing is left."""
+
+SURE = 0.7
+"""Below it, what was a fault is a suspicion."""
+
+NEAR_ZERO_SHARE = 0.1
+"""Of the highest speed: a tachometer does not tell whether a shaft that slows down so far turns on or back."""
+
+
+def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
+    """Compare the speed with the rig's nominal speed and tolerance, and see whether it comes near standstill."""
+    if not isinstance(angle, ShaftAngle):
+        return []
+    found = []
+    low, high = angle.speed_range_rpm
+    nominal = rig.nominal_speed_rpm(angle.shaft if angle.shaft in rig.shaft_names else "")
+    tolerance = rig.operating_point.speed_tolerance_percent / 100
+    if nominal and not low * (1 - tolerance) <= nominal <= high * (1 + tolerance):
+        ratio = angle.mean_speed_rpm / nominal
+        near = min((f for n in range(2, 11) for f in (n, 1 / n)), key=lambda f: abs(ratio / f - 1))
+        pulses = f" {near:.3g} pulses per revolution would explain it." if abs(ratio / near - 1) < 0.03 else ""
+        title = f"The speed, {angle.mean_speed_rpm:.5g} rpm, is {ratio:.3g} times the rig's {nominal:.5g} rpm"
+        found.append(
+            Finding(
+                OFF_NOMINAL,
+                Kind.DATA_PROBLEM,
+                f"{title} ± {100 * tolerance:.3g} %.",
+                Where(shaft=angle.shaft),
+                Strength(angle.mean_speed_rpm, "rpm", nominal, "nominal speed", against="a nominal speed of"),
+                confidence_basis="comparison with the rig file",
+                evidence=(f"It was found by the method {angle.method!r}.{pulses}",),
+                surer="Check sampling rate, pulses per revolution and the speed in the rig file.",
+            )
+        )
+    if low < NEAR_ZERO_SHARE * high:
+        title = f"The speed falls to {low:.3g} rpm, near standstill: whether the shaft turns on or back is not told."
+        surer = "An encoder, which tells the direction; or analyse the parts before and after by themselves."
+        found.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, Where(shaft=angle.shaft), surer=surer))
+    return found
+
+
+def without_synchronous_hum(findings: Iterable[Finding], angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
+    """Leave out that hum rules a channel where a shaft turns at the supply's own frequency: it may be the shaft."""
+    turns_hz = []
+    if isinstance(angle, ShaftAngle):
+        ratios = [rig.ratio(name) for name in rig.shaft_names] or [1.0]
+        turns_hz = [angle.mean_speed_rpm / 60 * ratio for ratio in ratios if ratio is not None]
+    multiples = [h * hz / mains for hz in turns_hz for h in (1, 2, 3, 4) for mains in (50.0, 60.0)]
+    synchronous = any(round(m) >= 1 and abs(m / round(m) - 1) < 1e-3 for m in multiples)
+    return [f for f in findings if not (synchronous and f.code == "channel-hum")]
+
+
+def lowered(findings: Iterable[Finding], channels: Sequence[str]) -> list[Finding]:
+    """Return the findings with faults and suspicions lowered, or withheld, by the problems among them.
+
+    A problem of a channel touches what was seen in it; one of speed or sampling rate touches everything.
+    """
+    findings = list(findings)
+    problems = [f for f in findings if f.code in TRUST]
+    return [_lowered(f, problems, channels) if f.kind in (Kind.FAULT, Kind.SUSPICION) else f for f in findings]
+
+
+def _lowered(finding: Finding, problems: Sequence[Finding], channels: Sequence[str]) -> Finding:
+    seen_in = set(finding.where.channels or channels)
+    touching = [p for p in problems if p.code != finding.code and (not _of_channels(p) or seen_in & _of_channels(p))]
+    confidence, kind = finding.confidence, finding.kind
+    for problem in touching:
+        confidence *= TRUST[problem.code]
+    if not touching:
+        return finding
+    because = " ".join(p.title for p in touching)
+    if confidence == 0.0:
+        kind, confidence = Kind.CANNOT_TELL, 1.0
+        finding = replace(finding, code=f"withheld-{finding.code}", title=f"Withheld: {finding.title} {because}")
+    elif confidence < SURE:
+        kind = Kind.SUSPICION
+    evidence = (*finding.evidence, f"Its confidence is lowered: {because}")
+    return replace(finding, kind=kind, confidence=confidence, evidence=evidence)
+
+
+def _of_channels(problem: Finding) -> set[str]:
+    return set(problem.where.channels) if problem.code.startswith("channel-") else set()
+
+
+def spoiled(findings: Iterable[Finding], channels: Sequence[str]) -> frozenset[str]:
+    """Return the channels from which no depth of a crack is to be read."""
+    found: set[str] = set()
+    for finding in findings:
+        if finding.code in TRUST:
+            found |= _of_channels(finding) or set(channels)
+    return frozenset(found)
+
+
+def withheld_crack(findings: Iterable[Finding], *, asked: bool) -> CannotTell | None:
+    """Return why the depth of a crack is withheld where every channel is spoiled; None where nobody asked."""
+    reason = " ".join(f.title for f in findings if f.code in TRUST)
+    return CannotTell("How deep is a crack?", reason, "Correct what is doubtful, or measure again.") if asked else None
+
+
+def said_first(findings: Sequence[Finding], *, claims: bool) -> str:
+    """Return the problems that open the verdict: rate or speed always, those of channels where something is claimed."""
+    titles = {f.code: f.title for f in findings if f.code in TRUST and f.kind is Kind.DATA_PROBLEM}
+    if SAMPLING_RATE in titles:
+        titles.pop(OFF_NOMINAL, None)  # the same, seen from the other side
+    first = [title for code, title in titles.items() if not code.startswith("channel-") and code != NEAR_ZERO]
+    return " ".join([*first, *(t for t in titles.values() if claims and t not in first)])

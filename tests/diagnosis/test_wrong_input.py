@@ -1,0 +1,109 @@
+"""A sample machine with a damaged tooth whose recording was spoiled on its way: noticed, said, and never as sure."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.samples import sample_folder
+from gearsig import analyze
+from gearsig.diagnosis import Kind
+from gearsig.recording import Recording, find_problems, read_recording
+from gearsig.rig import ConstantSpeed, read_rig
+
+FOLDER = Path(sample_folder())
+RIG = read_rig(FOLDER / "damaged_tooth.toml")
+TRUE = read_recording(FOLDER / "damaged_tooth.csv.gz", rig=RIG)
+RATE = TRUE.sampling_rate_hz
+SHAKE, PULSES = (TRUE.values(name).astype(float) for name in ("a1", "tacho"))
+TURN = 60 / 1497 * RATE
+
+
+def spoiled(shake=SHAKE, pulses=PULSES, rate=RATE, speed=None):
+    return Recording(np.stack([shake, pulses]).astype(np.float32), rate, TRUE.channels, speed=speed, rig=RIG)
+
+
+def clipped(share):
+    limit = np.quantile(np.abs(SHAKE), 1 - share)
+    return np.clip(SHAKE, -limit, limit)
+
+
+def wrapped():
+    counts = np.round(SHAKE / np.quantile(np.abs(SHAKE), 0.97) * 32768).astype(np.int64)
+    return (counts + 32768) % 65536 - 32768
+
+
+def half_the_pulses():
+    kept, base = PULSES.copy(), np.median(PULSES)
+    high = (PULSES.max() + PULSES.min()) / 2 < PULSES
+    for start in (np.flatnonzero(high[1:] & ~high[:-1]) + 1)[1::2]:
+        kept[max(0, start - 20) : start + int(TURN / 3)] = base
+    return kept
+
+
+def with_hum():
+    time_s = np.arange(len(SHAKE)) / RATE
+    return SHAKE + 20 * np.sqrt(2) * SHAKE.std() * np.sin(2 * np.pi * 50 * time_s)
+
+
+def through_zero(x):
+    """The same with a speed that falls to zero and rises again."""
+    time = np.linspace(0, 1, len(x))
+    return np.interp(2 * (time - time**2) * len(x), np.arange(len(x)), x)
+
+
+CASES = {
+    "rate ten times too high": (spoiled(rate=10 * RATE), {"sampling-rate-doubtful", "speed-off-nominal"}),
+    "rate ten times too low": (spoiled(rate=RATE / 10), {"sampling-rate-doubtful", "speed-off-nominal"}),
+    "rate a fifth too high": (spoiled(rate=1.2 * RATE), {"speed-off-nominal"}),
+    "stated speed a tenth too high": (spoiled(speed=ConstantSpeed(1650.0, "input")), {"speed-off-nominal"}),
+    "rate too low for the stated speed": (
+        spoiled(rate=RATE / 10, speed=ConstantSpeed(1500.0, "input")),
+        {"mesh-above-sampling"},
+    ),
+    "two pulses": (spoiled(pulses=np.maximum(PULSES, np.roll(PULSES, round(TURN / 2)))), {"speed-off-nominal"}),
+    "half the pulses": (spoiled(pulses=half_the_pulses()), {"speed-off-nominal"}),
+    "reversed": (spoiled(SHAKE[::-1], PULSES[::-1]), {"channel-reversed"}),
+    "clipped at 30 %": (spoiled(clipped(0.3)), {"channel-clipped"}),
+    "clipped at 5 %": (spoiled(clipped(0.05)), {"channel-clipped"}),
+    "wrapped": (spoiled(wrapped()), {"channel-wrapped"}),
+    "gain step": (spoiled(np.where(np.arange(len(SHAKE)) < len(SHAKE) // 2, 1, 3) * SHAKE), {"channel-stepped"}),
+    "hum": (spoiled(with_hum()), {"channel-hum"}),
+    "through zero": (spoiled(through_zero(SHAKE), through_zero(PULSES)), {"speed-near-zero"}),
+}
+
+
+def test_the_true_recording_has_no_such_problem():
+    found = analyze(TRUE)
+    assert not find_problems(TRUE)
+    assert not [f for f in found.findings if f.kind is Kind.DATA_PROBLEM]
+    assert max(f.confidence for f in found.findings if f.kind is Kind.FAULT) > 0.8
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_spoiled_is_noticed_said_and_lowered(name):
+    recording, codes = CASES[name]
+    found = analyze(recording)
+    seen = {f.code: f for f in found.findings}
+    assert codes <= set(seen)
+    assert not [f for f in found.findings if f.kind is Kind.FAULT]
+    assert found.crack is None
+    problems = {f.code for f in found.findings if f.kind is Kind.DATA_PROBLEM}
+    assert problems <= codes | {"sampling-rate-doubtful", "channel-stuck"}
+    assert any(seen[code].title in found.verdict for code in problems) or not problems
+
+
+def test_noise_tones_and_pulse_trains_have_no_such_problem():
+    rng = np.random.default_rng(0)
+    n = 1 << 15
+    time_s = np.arange(n) / 12800
+    channel = TRUE.channels[0]
+    for x in (
+        rng.standard_normal(n),
+        np.sin(2 * np.pi * 6300 * time_s) + 0.01 * rng.standard_normal(n),
+        np.sign(np.sin(2 * np.pi * 110 * time_s)) + 0.01 * rng.standard_normal(n),
+        rng.standard_normal(n) * (1 + time_s),
+        rng.standard_normal(n) * np.exp(-0.5 * np.sin(2 * np.pi * 3 * time_s)),
+    ):
+        kinds = {p.kind for p in find_problems(Recording(x[None], 12800.0, (channel,)))}
+        assert not kinds & {"wrapped", "stepped", "reversed", "hum"}
