@@ -9,6 +9,15 @@ from gearsig.diagnosis._bearing_families import (
     stands_out_from_neighbours,
 )
 from gearsig.diagnosis._crack import crack_depth, with_crack
+from gearsig.diagnosis._long import (
+    MEMORY_BYTES,
+    AnalysedPart,
+    LongAnalysis,
+    LongOverview,
+    analysis_bytes,
+    analyze_file,
+    long_overview,
+)
 from gearsig.diagnosis._modulation import Modulation, modulation_of
 from gearsig.diagnosis._reference import (
     Earlier,
@@ -40,7 +49,9 @@ from gearsig.diagnosis._verdict import ranked, verdict_of
 
 __all__ = [
     "BEARING_PARTS",
+    "MEMORY_BYTES",
     "SAME_BEARING_ORDER",
+    "AnalysedPart",
     "Analysis",
     "AnalysisSettings",
     "BandEnvelope",
@@ -51,12 +62,16 @@ __all__ = [
     "IndicatorChange",
     "Kind",
     "LevelChange",
+    "LongAnalysis",
+    "LongOverview",
     "Modulation",
     "OrderLevel",
     "Outcome",
     "Strength",
     "Where",
+    "analysis_bytes",
     "analyze",
+    "analyze_file",
     "beside_reference",
     "changes",
     "crack_depth",
@@ -64,6 +79,7 @@ __all__ = [
     "from_p_value",
     "in_reference",
     "localise",
+    "long_overview",
     "modulation_of",
     "outcome_of",
     "ranked",

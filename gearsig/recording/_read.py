@@ -7,7 +7,9 @@ import os
 import re
 import stat
 import tempfile
+from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,7 @@ from gearsig.errors import InputError
 from gearsig.formatting import file_label
 from gearsig.recording._assemble import assemble
 from gearsig.recording._limits import CHUNK_BYTES, foreign_errors, read_text_bytes
-from gearsig.recording._table import SECONDS_PER_UNIT, one_condition
+from gearsig.recording._table import SECONDS_PER_UNIT, RawTable, one_condition
 from gearsig.recording._types import Recording, split_unit
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
@@ -30,6 +32,7 @@ def read_recording(
     rig: Rig | None = None,
     sampling_rate_hz: float | None = None,
     speed: SpeedSource | None = None,
+    part: slice | None = None,
 ) -> Recording:
     """Read a recording from CSV, MAT v5 or v7.3, WAV, HDF5, Parquet, TDMS, UFF58 or MF4.
 
@@ -48,6 +51,9 @@ def read_recording(
         Overrides the file's. A contradiction of more than 0.1 % is told in `Recording.warnings`.
     speed : SpeedSource, optional
         Overrides the file's and the rig's.
+    part : slice, optional
+        These samples of each channel alone, of HDF5, Parquet, TDMS or WAV: nothing else is decoded, and no hash is
+        taken. Pulse times that the file states are those within it, from its beginning.
 
     Returns
     -------
@@ -64,10 +70,51 @@ def read_recording(
     file, condition = _without_condition(Path(path))
     file_format, name = identify(file), file_label(file)
     with foreign_errors(name, file_format.name):
-        table = file_format.read(file)
+        table = file_format.read(file) if part is None else _part_reader(file_format, name)(file, part)
         if condition is not None:
             table, name = one_condition(table, condition, file.name), f"{name}#{condition}"
-        return assemble(table, name, sha256_of(file), rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+        sha256 = sha256_of(file) if part is None else ""
+        recording = assemble(table, name, sha256, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+        return recording if part is None else _with_pulses_within(recording, part.start or 0)
+
+
+def n_samples_of(path: str | Path) -> int | None:
+    """Return how many samples per channel a file holds, without decoding them; None where it is only read whole.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Raises
+    ------
+    InputError
+        As `read_recording`.
+    """
+    file, condition = _without_condition(Path(path))
+    file_format = identify(file)
+    if file_format.length is None or condition is not None:
+        return None
+    with foreign_errors(file_label(file), file_format.name):
+        try:
+            return file_format.length(file)
+        except ValueError:  # samples of 24 bits cannot be mapped
+            return None
+
+
+def _part_reader(file_format: FileFormat, where: str) -> Callable[[Path, slice], RawTable]:
+    if file_format.read_part is None:
+        parted = ", ".join(f.name for f in FORMATS if f.read_part is not None)
+        raise InputError(f"{file_format.name} is only read whole", where=where, allowed=parted, remedy="convert it")
+    return file_format.read_part
+
+
+def _with_pulses_within(recording: Recording, first: int) -> Recording:
+    """Shift pulse times of the whole record to a part of it."""
+    speed, start_s = recording.speed, first / recording.sampling_rate_hz
+    if not isinstance(speed, PulseTimes):
+        return recording
+    within = (speed.times_s >= start_s) & (speed.times_s <= start_s + recording.duration_s)
+    return replace(recording, speed=replace(speed, times_s=speed.times_s[within] - start_s))
 
 
 def _without_condition(path: Path) -> tuple[Path, int | None]:

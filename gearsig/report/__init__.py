@@ -40,6 +40,7 @@ from gearsig.report._gap_page import (
 )
 from gearsig.report._index import Entry, Failure, entry_of, write_index
 from gearsig.report._json import from_plain, plain
+from gearsig.report._long import long_analysis_text, long_analysis_to_json
 from gearsig.report._motion_text import (
     force_csv,
     force_json,
@@ -112,6 +113,8 @@ __all__ = [
     "identify_text",
     "inseparable_text",
     "line_cursors",
+    "long_analysis_text",
+    "long_analysis_to_json",
     "made_folder",
     "marked_positions",
     "n_conditions",

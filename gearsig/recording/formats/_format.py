@@ -29,6 +29,10 @@ class FileFormat:
         A file's first bytes → the kind of content, e.g. "MAT v5"; empty where it is of another format.
     read : callable
         Path → `RawTable`; raises `InputError` where the file is damaged.
+    read_part : callable, optional
+        Path and a slice of samples → `RawTable` of these alone; None: the format is only read whole.
+    length : callable, optional
+        Path → samples per channel, without decoding them; beside `read_part`.
     write : callable, optional
         Writes a recording as a whole file at a path, so that `read` returns the same.
     written_endings : tuple of str
@@ -41,3 +45,5 @@ class FileFormat:
     read: Callable[[Path], RawTable]
     write: Callable[[Recording, Path], None] | None = None
     written_endings: tuple[str, ...] = ()
+    read_part: Callable[[Path, slice], RawTable] | None = None
+    length: Callable[[Path], int] | None = None

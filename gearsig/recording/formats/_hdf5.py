@@ -23,12 +23,18 @@ MAX_DATASETS = 10_000
 UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "unit_string")
 
 
-def read_hdf5(path: Path) -> RawTable:
+def read_hdf5(path: Path, part: slice | None = None) -> RawTable:
     """Return the signals of an HDF5 file.
 
     One- and two-dimensional datasets of numbers become channels, single numbers and attributes named like a sampling
     rate give the rate, an attribute "unit" or "units" of a dataset its unit. Only what the file itself holds is read:
     external links, external storage and virtual datasets, which could name any file, are not followed.
+
+    Parameters
+    ----------
+    path : Path
+    part : slice or None
+        Samples of each signal, along its longer side.
 
     Raises
     ------
@@ -47,12 +53,13 @@ def read_hdf5(path: Path) -> RawTable:
         by_path = dict(datasets)
         is_own = OWN_NAME in by_path and OWN_SAMPLES in by_path and by_path[OWN_NAME].shape == ()
         datasets = [(p, d) for p, d in datasets if d.dtype.kind in "fiubc" and d.ndim <= 2 and d.size]
-        check_decoded(sum(decoded_bytes(d) for p, d in datasets if not is_own or p == OWN_SAMPLES), path)
+        if part is None:
+            check_decoded(sum(decoded_bytes(d) for p, d in datasets if not is_own or p == OWN_SAMPLES), path)
         if is_own:
-            samples = load_dataset(by_path[OWN_SAMPLES], where)
+            samples = load_dataset(by_path[OWN_SAMPLES], where, part)
             return table_from_metadata(_own_text(by_path[OWN_NAME], path), list(np.atleast_2d(samples)), READER, where)
         for dataset_path, dataset in datasets:
-            arrays[dataset_path] = np.atleast_1d(load_dataset(dataset, where))
+            arrays[dataset_path] = np.atleast_1d(load_dataset(dataset, where, part))
             units[dataset_path] = _unit_of(dataset.attrs)
             rates_hz |= _rates_of(dataset.attrs, dataset_path)
     notes = [f"not followed, because they lead out of the file: {', '.join(skipped[:8])}"] if skipped else []
@@ -115,7 +122,7 @@ def decoded_bytes(dataset: Any) -> int:
     return int(max(dataset.size, prod(dataset.chunks or (0,))) * dataset.dtype.itemsize)
 
 
-def load_dataset(dataset: Any, where: str) -> NumberArray:
+def load_dataset(dataset: Any, where: str, part: slice | None = None) -> NumberArray:
     """Return a dataset's values after checking that they were written."""
     if dataset.size > 1 and dataset.id.get_storage_size() == 0:
         raise InputError(
@@ -124,8 +131,21 @@ def load_dataset(dataset: Any, where: str) -> NumberArray:
             allowed="datasets with data",
             remedy="the file was not written completely: export it again",
         )
-    values: NumberArray = np.asarray(dataset[()])
+    chosen: Any = ()
+    if part is not None and dataset.size > 1:
+        longer = int(np.argmax(dataset.shape))
+        chosen = tuple(part if axis == longer else slice(None) for axis in range(dataset.ndim))
+    values: NumberArray = np.asarray(dataset[chosen])
     return values
+
+
+def hdf5_length(path: Path) -> int:
+    """Return the samples of the longest signal."""
+    import h5py
+
+    with h5py.File(path, "r", locking=False) as file:
+        signals = (d for _, d in own_datasets(file, []) if d.dtype.kind in "fiub" and 1 <= d.ndim <= 2)
+        return max((max(d.shape) for d in signals), default=0)
 
 
 def _rates_of(attributes: Any, path: str) -> dict[str, float]:
@@ -170,4 +190,6 @@ def _sniff(head: bytes) -> str:
     return "HDF5" if head.startswith(b"\x89HDF\r\n\x1a\n") else ""
 
 
-HDF5 = FileFormat("HDF5", (".h5", ".hdf5", ".hdf"), _sniff, read_hdf5, write_hdf5, (".h5", ".hdf5"))
+HDF5 = FileFormat(
+    "HDF5", (".h5", ".hdf5", ".hdf"), _sniff, read_hdf5, write_hdf5, (".h5", ".hdf5"), read_hdf5, hdf5_length
+)

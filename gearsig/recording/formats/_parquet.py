@@ -6,17 +6,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_decoded
 from gearsig.recording._metadata import metadata_json, table_from_metadata
-from gearsig.recording._table import RawColumn, RawTable
+from gearsig.recording._table import NumberArray, RawColumn, RawTable
 from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, Recording, plain_name, split_unit
 from gearsig.recording.formats._format import OWN_NAME, FileFormat
 
 READER = "gearsig Parquet reader"
 
 
-def read_parquet(path: Path) -> RawTable:
+def read_parquet(path: Path, part: slice | None = None) -> RawTable:
     """Return the columns of numbers of a Parquet file.
 
     Units stand in the column's metadata ("unit", "units") or in brackets in its name; a key of the file's metadata
@@ -38,10 +40,11 @@ def read_parquet(path: Path) -> RawTable:
         numeric = [f for f in schema if any(test(f.type) for test in is_number)]
         kept = [f for f in numeric if not f.name.startswith("__index_level_")]
         row_bytes = sum(max(1, int(f.type.bit_width) // 8) for f in kept)
-        check_decoded(max(parts.metadata.num_rows * row_bytes, _stated_bytes(parts, kept)), path)
+        if part is None:
+            check_decoded(max(parts.metadata.num_rows * row_bytes, _stated_bytes(parts, kept)), path)
         # Other columns are not even decoded: texts unpack to any size.
         single = [f.name for f in kept if schema.names.count(f.name) == 1]
-        values = {name: parts.read(columns=[name]).column(name).to_numpy() for name in single}
+        values = {name: _column_values(parts, name, part) for name in single}
     doubled = [f.name for f in kept if f.name not in values]
     if doubled:
         raise InputError(
@@ -65,6 +68,29 @@ def _column(field: Any, values: Any) -> RawColumn:
     for key in (b"unit", b"units"):
         unit = facts.get(key, unit.encode()).decode("utf-8", errors="replace")
     return RawColumn(name or field.name, values, unit)
+
+
+def parquet_length(path: Path) -> int:
+    """Return the rows that the file states."""
+    from pyarrow import parquet
+
+    return int(parquet.read_metadata(path).num_rows)
+
+
+def _column_values(parts: Any, name: str, part: slice | None) -> NumberArray:
+    """Return a column, or the part of it that some row groups hold."""
+    if part is None:
+        whole: NumberArray = parts.read(columns=[name]).column(name).to_numpy()
+        return whole
+    first, last, _ = part.indices(parts.metadata.num_rows)
+    pieces, at = [], 0
+    for i in range(parts.metadata.num_row_groups):
+        n = parts.metadata.row_group(i).num_rows
+        if first < at + n and last > at:
+            group = parts.read_row_group(i, columns=[name]).column(name).to_numpy()
+            pieces.append(group[max(first - at, 0) : max(last - at, 0)])
+        at += n
+    return np.concatenate(pieces) if pieces else np.empty(0, np.float32)
 
 
 def _stated_bytes(parts: Any, fields: Sequence[Any]) -> int:
@@ -107,4 +133,6 @@ def _sniff(head: bytes) -> str:
     return "Parquet" if head.startswith(b"PAR1") else ""
 
 
-PARQUET = FileFormat("Parquet", (".parquet", ".pq"), _sniff, read_parquet, write_parquet, (".parquet",))
+PARQUET = FileFormat(
+    "Parquet", (".parquet", ".pq"), _sniff, read_parquet, write_parquet, (".parquet",), read_parquet, parquet_length
+)

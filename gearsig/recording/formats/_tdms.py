@@ -19,7 +19,7 @@ from gearsig.recording.formats._format import FileFormat
 READER = "gearsig TDMS reader"
 
 
-def read_tdms(path: Path) -> RawTable:
+def read_tdms(path: Path, part: slice | None = None) -> RawTable:
     """Return the channels of a TDMS file, scaled as its properties say.
 
     The rate is one over the waveform property "wf_increment", or a property named like a sampling rate; the unit is
@@ -33,7 +33,8 @@ def read_tdms(path: Path) -> RawTable:
     from nptdms import TdmsFile
 
     where = path.name
-    check_memory(3 * path.stat().st_size, where)
+    if part is None:
+        check_memory(3 * path.stat().st_size, where)
     # The open file is given, not its name: the index file beside it, which may be of another recording, is not read.
     with _quiet(), path.open("rb") as stream, TdmsFile.open(stream) as file:
         _check_complete(file, where)
@@ -41,7 +42,8 @@ def read_tdms(path: Path) -> RawTable:
         units = {}
         rates_hz = _stated_rates(file.properties, "file")
         left_out = []
-        check_decoded(sum(8 * len(channel) for group in file.groups() for channel in group.channels()), path)
+        if part is None:
+            check_decoded(sum(8 * len(channel) for group in file.groups() for channel in group.channels()), path)
         for group in file.groups():
             rates_hz |= _stated_rates(group.properties, group.name)
             for channel in group.channels():
@@ -50,11 +52,20 @@ def read_tdms(path: Path) -> RawTable:
                 if channel.dtype.kind not in "fiub":
                     left_out.append(channel.name)
                     continue
-                channels[name] = np.asarray(channel[:])
+                channels[name] = np.asarray(channel[part or slice(None)])
                 units[name] = str(channel.properties.get("unit_string", ""))
                 rates_hz |= _waveform_rate(channel, name, where) or _stated_rates(channel.properties, name)
     notes = (f"channel(s) {', '.join(left_out[:8])} hold no numbers and were left out",) if left_out else ()
     return table_from_arrays(NamedArrays(channels, {}, units, rates_hz, notes), READER, where)
+
+
+def tdms_length(path: Path) -> int:
+    """Return the samples of the longest channel of numbers."""
+    from nptdms import TdmsFile
+
+    with _quiet(), path.open("rb") as stream, TdmsFile.open(stream) as file:
+        channels = (c for group in file.groups() for c in group.channels() if c.dtype.kind in "fiub")
+        return max((len(channel) for channel in channels), default=0)
 
 
 @contextmanager
@@ -107,4 +118,4 @@ def _sniff(head: bytes) -> str:
     return "TDMS" if head.startswith(b"TDSm") else ""
 
 
-TDMS = FileFormat("TDMS", (".tdms",), _sniff, read_tdms)
+TDMS = FileFormat("TDMS", (".tdms",), _sniff, read_tdms, read_part=read_tdms, length=tdms_length)

@@ -118,7 +118,7 @@ READER = "gearsig WAV reader"
 _SCALES = {"uint8": (128.0, 128.0), "int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "int64": (0.0, 2.0**63)}
 
 
-def read_wav(path: Path) -> RawTable:
+def read_wav(path: Path, part: slice | None = None) -> RawTable:
     """Return the channels of a WAV file, scaled to ±1 full scale.
 
     Integers of 8 to 32 bit are divided by their full scale, floats are kept. Channels are called "ch1", "ch2", … with
@@ -134,12 +134,17 @@ def read_wav(path: Path) -> RawTable:
     where = path.name
     chunks, end = find_chunks(path)
     n_bytes = path.stat().st_size
-    check_memory(6 * n_bytes, where)
+    if part is None:
+        check_memory(6 * n_bytes, where)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # a warning means a damaged file, and becomes an error
         # Chunks that scipy does not know are none of its business; find_chunks has checked the lengths.
         warnings.filterwarnings("ignore", message="Chunk .*not understood")
-        rate_hz, frames = wavfile.read(path if end == n_bytes else _up_to(path, end))
+        if part is None:
+            rate_hz, frames = wavfile.read(path if end == n_bytes else _up_to(path, end))
+        else:
+            rate_hz, frames = wavfile.read(path, mmap=True)
+            frames = np.array(frames[part])
     rows = [frames] if frames.ndim == 1 else list(frames.T)
     if OWN_CHUNK in chunks:
         return table_from_metadata(chunks[OWN_CHUNK].decode("utf-8", errors="replace"), rows, READER, where)
@@ -147,6 +152,16 @@ def read_wav(path: Path) -> RawTable:
     columns = [_column(i, row, described if len(described) == len(rows) else []) for i, row in enumerate(rows)]
     notes = (f"{n_bytes - end} bytes after the audio are no WAV chunk and were left out",) if end < n_bytes else ()
     return RawTable(tuple(columns), READER, sampling_rate_hz=float(rate_hz), warnings=notes)
+
+
+def wav_length(path: Path) -> int:
+    """Return the samples per channel; 24-bit samples, which cannot be mapped, are refused."""
+    from scipy.io import wavfile
+
+    find_chunks(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return len(wavfile.read(path, mmap=True)[1])
 
 
 def _up_to(path: Path, end: int) -> io.BytesIO:
@@ -216,4 +231,4 @@ def _sniff(head: bytes) -> str:
     return "WAV" if head[:4] in (b"RIFF", b"RIFX", b"RF64") and head[8:12] == b"WAVE" else ""
 
 
-WAV = FileFormat("WAV", (".wav", ".wave"), _sniff, read_wav, write_wav, (".wav",))
+WAV = FileFormat("WAV", (".wav", ".wave"), _sniff, read_wav, write_wav, (".wav",), read_wav, wav_length)

@@ -1,0 +1,291 @@
+"""Recordings that are longer than memory: cheap figures of all of it, the whole analysis of a few chosen parts.
+
+All of the record goes through in blocks: level, peak, crest factor and kurtosis over time, and the mean power density,
+which equals that of the whole record at once. What is expensive, the detectors, looks at up to three parts: the usual
+level, the highest, and the most impulsive. Why a part was chosen is said with its result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from gearsig.checks import FloatArray, freeze, positive
+from gearsig.diagnosis._analyze import analyze
+from gearsig.diagnosis._types import Analysis, Outcome
+from gearsig.errors import InputError
+from gearsig.recording import Recording, n_samples_of, read_recording
+from gearsig.rig import Rig, SpeedSource
+from gearsig.spectra import Spectrum, power_density
+
+MEMORY_BYTES = 2e9
+BYTES_PER_SAMPLE = 240.0
+"""What `analyze` takes at most for one sample of one channel: 23.8 GB for 10⁸ were measured."""
+
+PART_SAMPLES = 1 << 19
+"""Of a part, per channel: 400 revolutions at 25.6 kHz and 1200 rpm."""
+
+BLOCK_SAMPLES = 1 << 22
+"""Read at a time, over all channels together."""
+
+N_PER_SPECTRUM = 8192
+INTERVAL_S = 1.0
+
+
+@dataclass(frozen=True)
+class LongOverview:
+    """Figures of a whole record over time.
+
+    Parameters
+    ----------
+    channel_names, units : tuple of str
+        Vibration channels.
+    time_s : array, (n,)
+        Beginnings of intervals of one second; what is left at the end counts as an interval from half of one.
+    rms, peak, crest_factor, kurtosis : array, (n_channels, n)
+        About each interval's mean; in the channel's unit, and plain numbers.
+    densities : tuple of Spectrum
+        Mean power density of each channel over all of the record (Hann, 8192 samples, half overlapping).
+    """
+
+    channel_names: tuple[str, ...]
+    units: tuple[str, ...]
+    time_s: FloatArray
+    rms: FloatArray
+    peak: FloatArray
+    crest_factor: FloatArray
+    kurtosis: FloatArray
+    densities: tuple[Spectrum, ...]
+
+    def __post_init__(self) -> None:
+        freeze(self, "time_s")
+        freeze(self, "rms", "peak", "crest_factor", "kurtosis", ndim=2)
+
+
+@dataclass(frozen=True)
+class AnalysedPart:
+    """A part of a long record with its whole analysis.
+
+    Parameters
+    ----------
+    start_s, end_s : float
+    reason : str
+        Why it was chosen.
+    analysis : Analysis
+    """
+
+    start_s: float
+    end_s: float
+    reason: str
+    analysis: Analysis
+
+
+@dataclass(frozen=True)
+class LongAnalysis:
+    """What a record that is longer than memory shows.
+
+    Parameters
+    ----------
+    name : str
+    duration_s : float
+    overview : LongOverview
+    parts : tuple of AnalysedPart
+        In the order of time.
+    """
+
+    name: str
+    duration_s: float
+    overview: LongOverview
+    parts: tuple[AnalysedPart, ...]
+
+    @property
+    def outcome(self) -> Outcome:
+        """The most severe of the parts'."""
+        order = list(Outcome)
+        return min((part.analysis.outcome for part in self.parts), key=order.index)
+
+    @property
+    def verdict(self) -> str:
+        """What the most severe part comes to, and how much of the record was looked at so closely."""
+        part = next(p for p in self.parts if p.analysis.outcome is self.outcome)
+        looked_s = sum(p.end_s - p.start_s for p in self.parts)
+        return (
+            f"{part.analysis.verdict} Seen from {part.start_s:.4g} to {part.end_s:.4g} s ({part.reason}); "
+            f"the detectors looked at {looked_s:.4g} of {self.duration_s:.4g} s, levels and spectra at all of it."
+        )
+
+
+def analysis_bytes(n_samples: int, n_channels: int) -> float:
+    """Return the memory that `analyze` takes of a recording, as an upper estimate."""
+    return BYTES_PER_SAMPLE * n_samples * n_channels
+
+
+def analyze_file(
+    path: str | Path,
+    rig: Rig | None = None,
+    *,
+    memory_bytes: float = MEMORY_BYTES,
+    sampling_rate_hz: float | None = None,
+    speed: SpeedSource | None = None,
+    on_stage: Callable[[str], object] | None = None,
+) -> Analysis | LongAnalysis:
+    """Diagnose a recording in bounded memory: whole where it fits, else by an overview and the analysis of parts.
+
+    Parameters
+    ----------
+    path : str or Path
+    rig : Rig or None
+    memory_bytes : float
+        What may be taken, from 0.2 GB.
+    sampling_rate_hz, speed
+        As in `read_recording`.
+    on_stage : callable or None
+        Called with a few words as each stage begins.
+
+    Returns
+    -------
+    Analysis or LongAnalysis
+
+    Raises
+    ------
+    InputError
+        As `read_recording` and `analyze`; where the record does not fit and its format is only read whole.
+    """
+    positive(memory_bytes - 2e8, "memory less 0.2 GB", "bytes", remedy="allow more than 0.2 GB")
+    announce = on_stage or (lambda _: None)
+
+    def read(part: slice | None) -> Recording:
+        return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed, part=part)
+
+    n_samples = n_samples_of(path)
+    if n_samples is None:
+        recording = read(None)
+        needed = analysis_bytes(recording.n_samples, len(recording.vibration_names()))
+        if needed > memory_bytes:
+            raise InputError(
+                f"{recording.n_samples} samples × {len(recording.vibration_names())} channels take {needed / 1e9:.3g} "
+                "GB to analyse",
+                where=recording.name,
+                allowed=f"up to {memory_bytes / 1e9:.3g} GB",
+                remedy="give more with --memory, or convert it to HDF5, Parquet, TDMS or WAV, which are read in parts",
+            )
+        return analyze(recording, on_stage=on_stage)
+    head = read(slice(0, min(n_samples, N_PER_SPECTRUM)))
+    n_channels = len(head.channels)
+    if analysis_bytes(n_samples, n_channels) <= memory_bytes:
+        return analyze(read(None), on_stage=on_stage)
+    announce("levels over time")
+    overview = long_overview(head, n_samples, read)
+    n_part = int(min(PART_SAMPLES, memory_bytes / (BYTES_PER_SAMPLE * n_channels)))
+    parts = []
+    for first, reason in _chosen(overview, n_part, n_samples, head.sampling_rate_hz):
+        announce(reason)
+        recording = read(slice(first, first + n_part))
+        found = analyze(recording)
+        rate = recording.sampling_rate_hz
+        parts.append(AnalysedPart(first / rate, first / rate + recording.duration_s, reason, found))
+    return LongAnalysis(head.name, n_samples / head.sampling_rate_hz, overview, tuple(parts))
+
+
+def long_overview(head: Recording, n_samples: int, read: Callable[[slice], Recording]) -> LongOverview:
+    """Return figures of all of a record, read in blocks.
+
+    Parameters
+    ----------
+    head : Recording
+        Its beginning, for channels and rate.
+    n_samples : int
+        Of all of it.
+    read : callable
+        A slice of samples → Recording.
+    """
+    names = head.vibration_names()
+    interval = max(16, round(INTERVAL_S * head.sampling_rate_hz))
+    hop = N_PER_SPECTRUM // 2
+    figures: list[FloatArray] = []
+    sums: list[FloatArray] = []
+    n_spectra = 0
+    spectra: tuple[Spectrum, ...] = ()
+    for first, block in _blocks(head, n_samples, read, interval):
+        own = block.samples[[block.index(name) for name in names]]
+        figures += list(_figures(own[:, : _step(head, interval)], interval, last=first + own.shape[1] >= n_samples))
+        # Spectra begin at multiples of half their length in the whole record, as those of the whole record do.
+        skip = -first % hop
+        n_here = max(0, (min(own.shape[1], _step(head, interval) + hop) - skip - N_PER_SPECTRUM) // hop + 1)
+        if first + own.shape[1] < n_samples:
+            n_here = len(range(first + skip, first + _step(head, interval), hop))
+        if n_here:
+            end = skip + (n_here - 1) * hop + N_PER_SPECTRUM
+            spectra = tuple(
+                power_density(row[skip:end], head.sampling_rate_hz, n_per_block=N_PER_SPECTRUM, unit=unit, source=name)
+                for row, name, unit in zip(own, names, _units(head), strict=True)
+            )
+            new = [spectrum.values * n_here for spectrum in spectra]
+            sums = [a + b for a, b in zip(sums, new, strict=True)] if sums else new
+            n_spectra += n_here
+    rms, peak, crest_factor, kurtosis = np.stack(figures, axis=2)
+    return LongOverview(
+        names,
+        _units(head),
+        np.arange(len(figures)) * interval / head.sampling_rate_hz,
+        rms,
+        peak,
+        crest_factor,
+        kurtosis,
+        tuple(replace(spectrum, values=total / n_spectra) for spectrum, total in zip(spectra, sums, strict=True)),
+    )
+
+
+def _units(recording: Recording) -> tuple[str, ...]:
+    return tuple(channel.unit for channel in recording.channels if channel.is_vibration)
+
+
+def _step(head: Recording, interval: int) -> int:
+    """Return how far blocks are apart: whole intervals."""
+    return max(1, BLOCK_SAMPLES // len(head.channels) // interval) * interval
+
+
+def _blocks(
+    head: Recording, n_samples: int, read: Callable[[slice], Recording], interval: int
+) -> Iterator[tuple[int, Recording]]:
+    """Yield blocks with their first sample; each reaches a spectrum's length into the next."""
+    step = _step(head, interval)
+    for first in range(0, n_samples, step):
+        yield first, read(slice(first, min(first + step + N_PER_SPECTRUM, n_samples)))
+
+
+def _figures(x: FloatArray, interval: int, *, last: bool) -> Iterator[FloatArray]:
+    """Yield rms, peak, crest factor and kurtosis of each interval, (4, n_channels)."""
+    for first in range(0, x.shape[1], interval):
+        part = x[:, first : first + interval]
+        if part.shape[1] < interval and not (last and part.shape[1] >= interval // 2):
+            return
+        part = part - part.mean(axis=1, dtype=np.float64, keepdims=True).astype(part.dtype)
+        square = part * part
+        power = square.mean(axis=1, dtype=np.float64)
+        fourth = np.einsum("ij,ij->i", square, square, dtype=np.float64) / part.shape[1]
+        rms, peak = np.sqrt(power), np.sqrt(square.max(axis=1).astype(np.float64))
+        safe = np.maximum(power, 1e-300)
+        yield np.stack([rms, peak, peak / np.sqrt(safe), fourth / safe**2])
+
+
+def _chosen(overview: LongOverview, n_part: int, n_samples: int, rate_hz: float) -> list[tuple[int, str]]:
+    """Return first samples of the parts to look at closely, in the order of time, and why."""
+    level = np.log(np.maximum(overview.rms, 1e-300)).mean(axis=0)
+    impulsive = overview.kurtosis.max(axis=0)
+    usual = int(np.argmin(np.abs(level - np.median(level))))
+    wanted = [
+        (usual, "the usual level"),
+        (int(np.argmax(level)), "the highest level"),
+        (int(np.argmax(impulsive)), f"the most impulsive second, kurtosis {impulsive.max():.3g}"),
+    ]
+    found: list[tuple[int, str]] = []
+    for second, reason in wanted:
+        middle = round((overview.time_s[second] + INTERVAL_S / 2) * rate_hz)
+        first = min(max(0, middle - n_part // 2), max(0, n_samples - n_part))
+        if all(abs(first - other) >= n_part // 2 for other, _ in found):
+            found.append((first, reason))
+    return sorted(found)
