@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from gearsig.diagnosis._doubts import said_first
 from gearsig.diagnosis._overall import VIBRATION_ZONE
+from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import CHANGED, EXAMINED, HINDERING, UNCHANGED, Finding, Kind, Outcome, Where, outcome_of
 from gearsig.recording import Recording
 
