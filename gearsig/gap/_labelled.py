@@ -68,11 +68,14 @@ class LabelledChange:
     point : OperatingCondition
     changes : mapping
         Against a healthy reference (True), against the twin (False): the ways in which it can be compared.
+    key : str
+        By which it is kept on disk.
     """
 
     label: str
     point: OperatingCondition
     changes: Mapping[bool, Features]
+    key: str
 
 
 MAX_BYTES = 10_000_000
@@ -146,14 +149,7 @@ def _change(
     if not changes:
         reason = why or "it has no healthy reference, and the diagnosis compares with one"
         raise RefusalError(reason, remedy="name its reference in the table")
-    return KeptChange(one.effect, facts.point, changes, key)
-
-
-@dataclass(frozen=True)
-class KeptChange(LabelledChange):
-    """The same with the name that it is kept by."""
-
-    key: str = ""
+    return LabelledChange(one.effect, facts.point, changes, key)
 
 
 def _on(reduced: ReducedRecording, channels: Sequence[str]) -> ReducedRecording:
@@ -182,7 +178,6 @@ def _path(folder: Path, key: str) -> Path:
 
 
 def _keep(change: LabelledChange, folder: Path) -> None:
-    assert isinstance(change, KeptChange)  # noqa: S101 - made above, said to the type checker
     arrays = {"point": np.array([change.point.speed_rpm, change.point.torque_nm])}
     for way, features in change.changes.items():
         arrays |= {f"names{way:d}": np.array(features.names), f"values{way:d}": features.values}
@@ -200,7 +195,7 @@ def _kept(folder: Path, key: str, label: str) -> LabelledChange | None:
             for way in (False, True)
             if f"names{way:d}" in arrays
         }
-        return KeptChange(label, OperatingCondition(*map(float, arrays["point"])), changes, key)
+        return LabelledChange(label, OperatingCondition(*map(float, arrays["point"])), changes, key)
     except (KeyError, TypeError, ValueError, InputError):
         return None
 
