@@ -158,7 +158,7 @@ from gearsig.gap._tooth_error import (
     ToothErrorChange,
     ToothErrorEvidence,
     course_descriptors,
-    tooth_error_change,
+    tooth_error_changes,
     tooth_error_evidence,
 )
 from gearsig.gap._trials import (
@@ -392,7 +392,7 @@ __all__ = [
     "textbook_strengths",
     "told_apart",
     "told_options",
-    "tooth_error_change",
+    "tooth_error_changes",
     "tooth_error_evidence",
     "tooth_load_n_per_mm",
     "transplanted",

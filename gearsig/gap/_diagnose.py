@@ -412,9 +412,8 @@ def _of_the_encoders(courses: Sequence[ToothErrorEvidence], known: Mapping[str, 
     levels = ToothErrorEvidence(mean_log_likelihoods(courses), clearest.rms_um, clearest.gear).probabilities
     ranked = sorted(levels.items(), key=lambda item: -item[1])
     likely = ", ".join(f"{known[name].title} {p:.0%}" for name, p in ranked if p >= 0.05 and name in known)
-    return [
-        f"{changed}, on the {clearest.gear}'s side; its course alone, all faults of teeth as likely before: {likely}."
-    ]
+    where = {"driver": ", on the driver", "driven": ", on the driven gear"}.get(clearest.gear, "")
+    return [f"{changed}{where}; by its course alone, all faults of teeth as likely before: {likely}."]
 
 
 def _of_the_fit(named: GapCause | None) -> list[str]:

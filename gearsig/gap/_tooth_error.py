@@ -49,6 +49,9 @@ MIN_OVER_NOISE = 1.25
 """Of the event's rms over the standard error of one value: the loudest window of noise alone, of which the band keeps
 half, reaches 0.9."""
 
+ALIKE = 0.9
+"""Of the larger change, from which the other gear shows it as well."""
+
 FAR = 3.5
 """Distance in standard deviations, over all descriptors, at which one known course counts as much as none: of 2.5 to
 4.5, with simulators left out, what is said with 0.9 is right 93 to 97 times in 100."""
@@ -84,8 +87,8 @@ class ToothErrorChange:
         return self.rms_um >= MIN_OVER_NOISE * self.noise_um
 
 
-def tooth_error_change(now: TransmissionError, healthy: TransmissionError) -> ToothErrorChange:
-    """Return the change on the gear that shows more of it.
+def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> list[ToothErrorChange]:
+    """Return the change on the gear that shows more of it; on both where they show it alike, as those of equal teeth.
 
     The teeth meet as the encoders count, unless another turn leaves less than half of the difference: encoders that
     know no zero begin anywhere.
@@ -97,7 +100,8 @@ def tooth_error_change(now: TransmissionError, healthy: TransmissionError) -> To
         pattern = here - _turned(before, here)
         rms = sqrt(float(_window_energy(_banded(pattern, LOWEST_ORDER)).max()) / WINDOW)
         changes.append(ToothErrorChange(side, pattern, _resampled(healthy.mesh_um[None])[0], rms, hypot(*errors)))
-    return max(changes, key=lambda change: change.rms_um)
+    most = max(change.rms_um for change in changes)
+    return [change for change in changes if change.rms_um >= ALIKE * most]
 
 
 def _resampled(rows: FloatArray) -> FloatArray:
@@ -274,7 +278,7 @@ class ToothErrorEvidence:
     rms_um : float
         Of the change, while the teeth that show it mesh.
     gear : str
-        "driver" or "driven", which shows it.
+        "driver" or "driven", which shows it; empty: cannot be told.
     """
 
     log_likelihoods: Mapping[str, float]
@@ -317,10 +321,11 @@ def tooth_error_evidence(recording: Recording, reference: Recording) -> ToothErr
         now, healthy = (transmission_error(one, pair=_first_pair(one)) for one in (recording, reference))
     except GearsigError:
         return None
-    change = tooth_error_change(now, healthy)
-    if not change.is_clear:
+    changes = [change for change in tooth_error_changes(now, healthy) if change.is_clear]
+    if not changes:
         return None
     weight = 1.0 / (1.0 + now.mesh_hz / STATIC_MESH_HZ)
-    said = load_known_courses().log_likelihoods(course_descriptors(change))
-    told = {name: weight * value for name, value in said.items()}
-    return ToothErrorEvidence(told, change.rms_um, SIDES[change.side])
+    said = [load_known_courses().log_likelihoods(course_descriptors(change)) for change in changes]
+    told = {name: weight * log(float(np.mean([exp(one[name]) for one in said]))) for name in TOOTH_FAULTS}
+    gear = SIDES[changes[0].side] if len(changes) == 1 else ""
+    return ToothErrorEvidence(told, max(change.rms_um for change in changes), gear)
