@@ -88,7 +88,13 @@ def test_the_teeth_of_another_rig_are_noticed_and_the_right_number_is_told() -> 
     (doubt,) = wrong_teeth(reduce_recording(recording(0, 1), with_teeth(37, 53)), "now")
     assert "29 times a revolution" in doubt
     assert "37 teeth" in doubt
-    assert strange_teeth(reduce_recording(recording(0, 1), with_teeth(37, 53)), "now") == []  # it is said once
+
+
+def test_a_healthy_reference_that_fits_the_teeth_lifts_the_doubt_of_them() -> None:
+    unlike = reduce_recording(recording(0, 1), with_teeth(37, 53))
+    assert len(wrong_teeth(unlike, "now", unlike)) == 1
+    assert strange_teeth(unlike, "now") == []  # it is said once
+    assert wrong_teeth(unlike, "now", gathered(0, 1)) == []
 
 
 def test_without_a_mark_on_the_shaft_its_teeth_are_not_counted() -> None:

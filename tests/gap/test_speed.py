@@ -29,6 +29,12 @@ def test_hunting_is_seen() -> None:
     assert found["swing_frequency_hz"] == pytest.approx(0.7, abs=0.05)
 
 
+def test_a_swing_that_no_run_out_makes_stays_where_its_alias_is_another_shafts_order() -> None:
+    found = figures(0.0, 0.02)
+    assert found["swing"] > 2e-3
+    assert found["swing_frequency_hz"] == pytest.approx((1.0 - RATIO) * TURNS_HZ, abs=0.1)
+
+
 @pytest.mark.parametrize("ratio", [RATIO, 0.5, 46 / 23, 1.7])
 def test_what_another_shaft_does_every_revolution_is_no_hunting(ratio: float) -> None:
     assert figures(0.0, 1e-3, ratio)["swing"] < 1e-5
