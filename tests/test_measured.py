@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gearsig.comparison import compare
 from gearsig.diagnosis import Analysis, CannotTell, Finding, Kind, analyze
 from gearsig.prepared import refined_angle
 from gearsig.recording import Recording, read_recording
@@ -148,6 +149,7 @@ def test_a_rotor_with_more_unbalance_has_changed_first_of_all() -> None:
         assert analysis.shaft_angle.mean_speed_rpm == pytest.approx(3598.0, rel=1e-3)  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [one.name for one in RECORDINGS])
 def test_the_halves_of_a_recording_are_alike(name: str) -> None:
     first, second = halves(BY_NAME[name].read())
@@ -155,3 +157,19 @@ def test_the_halves_of_a_recording_are_alike(name: str) -> None:
     assert not any(c.is_change for c in analysis.level_changes)
     assert "changed-since-reference" not in {f.code for f in analysis.findings}
     assert not isinstance(analysis.crack, CrackEstimate)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [one.name for one in RECORDINGS])
+def test_the_halves_of_a_recording_compare_alike(name: str) -> None:
+    """No line that both halves show is 6 dB apart beyond its scatter; a run-up's halves run at other speeds."""
+    comparison = compare(*halves(BY_NAME[name].read()))
+    for channel in comparison.channels:
+        assert abs(channel.overall.difference_db) < 1.0
+        apart = [
+            line.label
+            for line in channel.lines
+            if line.simulated_is_seen and line.recorded_is_seen and line.level.is_beyond
+            if abs(line.level.difference_db) >= 6.0
+        ]
+        assert not apart

@@ -362,34 +362,12 @@ def _has_own_lines(comb: Comb) -> bool:
 def _train_of(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
     """Return the train of impacts that a candidate's lines are a part of, if it is one."""
     train = slower_train(candidate.envelope.excess, candidate.comb, tuple(signals.known_shaft_orders.values()))
-    if train is None or _is_modulated_by_cage(signals, candidate, train):
+    if train is None:
         return None
     if candidate.name == "BSF" and abs(2 * train.fundamental / candidate.comb.fundamental - 1) < SAME_FAMILY:
         return None  # an element that strikes one race harder than the other has lines at its spin, too
     free = replace(candidate, comb=train, bearing=None, name="", expected=0.0, rivals=(), share=1.0, in_train=True)
     return _as_cage(signals, free)
-
-
-def _is_modulated_by_cage(signals: AnalysisSignals, candidate: Candidate, train: Comb) -> bool:
-    """Whether the train is that of the candidate's own cage, and weak beside the candidate's lines.
-
-    An outer race is struck by each element in turn: where they differ, lines stand the cage's order apart, between
-    its harmonics.
-    """
-    if candidate.bearing is None or candidate.name != "BPFO":
-        return False
-    cage = next(
-        (o for b, name, o in expected_parts(signals) if b is candidate.bearing and name == "FTF"), candidate.expected
-    )
-    if abs(train.fundamental / cage - 1) > slip_of(signals):
-        return False
-    own = sorted(candidate.comb.ratios_db)[-MINIMUM_LINES]
-    between = [
-        ratio
-        for position, ratio in zip(train.positions, train.ratios_db, strict=True)
-        if abs(position / candidate.comb.fundamental - round(position / candidate.comb.fundamental)) > 0.02
-    ]
-    return len(between) < MINIMUM_LINES or own >= sorted(between)[-MINIMUM_LINES] + 6.0
 
 
 def _as_cage(signals: AnalysisSignals, train: Candidate) -> Candidate:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import streamlit as st
 
 from app.dashboard.methods.crack import show_crack
+from app.dashboard.methods.deconvolution import show_deconvolution
 from app.dashboard.methods.envelope import show_coherence, show_kurtogram
 from app.dashboard.methods.frame import MethodPage
 from app.dashboard.methods.modes import show_modes
@@ -38,6 +39,10 @@ METHODS: dict[str, tuple[Callable[[MethodPage], None], str]] = {
     "Cyclic coherence": (
         show_coherence,
         "Finds rhythms in noise and in which band they are, also where no band stands out: for bearings and wear.",
+    ),
+    "Deconvolution": (
+        show_deconvolution,
+        "Undoes the path between impacts and sensor, so that each is sharp again: for bearings that ring long.",
     ),
     "Orders (Vold–Kalman)": (
         show_order_tracking,
