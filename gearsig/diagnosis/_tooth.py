@@ -361,6 +361,12 @@ class _Examined:
         return event.rms >= smallest and event.place.repeatability >= 0.7
 
     @property
+    def is_withheld(self) -> bool:
+        """Whether the event is no chance, of some size, and yet no tooth's: it differs from turn to turn."""
+        is_large = self.event.rms >= SMALLEST_SHARE * self.event.average_rms
+        return self.reaches(CLEAR) and is_large and not self.is_steady
+
+    @property
     def smallest_visible(self) -> float:
         """Rms in a window from which an event stands out from teeth that merely differ.
 
@@ -533,6 +539,8 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
     """
     if signals.rig.assumed:
         return _undecided(examined, f"{', '.join(signals.rig.assumed)} are assumed: damage may not show")
+    withheld = [e for e in examined if e.is_withheld]
+    examined = [e for e in examined if e not in withheld]
     sharp = [e for e in examined if e.smallest_visible <= 0.5 * e.event.average_rms]
     # Of the others the median tooth's part of the difference signal may be mostly noise that the average has left.
     noisy = [e for e in examined if e not in sharp and e.event.median_rms <= SMALLEST_SIGNIFICANCE * e.event.error_rms]
@@ -552,8 +560,25 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
                 surer=_surer(signals),
             )
         )
+    findings += [_withheld(one) for one in withheld]
     findings += _undecided(noisy, "noise would hide an event of half the average's size")
     return findings + _undecided(uneven, "they differ so much from each other that damage may hide among them")
+
+
+def _withheld(examined: _Examined) -> Finding:
+    event, place = examined.event, examined.event.place
+    title = (
+        f"Whether a tooth of shaft {examined.shaft.shaft} is damaged cannot be told: one stands out by "
+        f"{place.ratio_db:.1f} dB, but not alike from turn to turn."
+    )
+    significance = event.rms / max(event.error_rms, 1e-300)
+    scatter = (
+        f"correlate there by {place.repeatability:.2f}; its rms is {significance:.1f} standard errors of the average"
+    )
+    evidence = (f"Odd and even revolutions {scatter}.", _visible_text(examined))
+    where = Where((event.channel,), shaft=examined.shaft.shaft, angle_deg=360 * place.angle_rev)
+    surer = "A longer recording, and a tachometer whose pulses the shaft's own torsion does not shift."
+    return cannot_tell("tooth-damage-undecided", title, where, evidence=evidence, surer=surer)
 
 
 def _undecided(examined: list[_Examined], reason: str) -> list[Finding]:

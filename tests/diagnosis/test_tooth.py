@@ -9,7 +9,7 @@ from gearsig.diagnosis import Kind, Outcome, analyze
 from gearsig.recording import Recording
 from gearsig.rig import SpeedChannel, TachometerChannel
 from sims.measure import ColouredNoise
-from tests.diagnosis.machines import GOOD, RIG, codes, finding, record, teeth
+from tests.diagnosis.machines import GOOD, RIG, SAMPLING_RATE_HZ, codes, finding, record, teeth
 from tests.kinematic.model import SensorChannel, ToothDamage, ToothVariation
 from tests.kinematic.speed import ConstantProfile
 
@@ -134,3 +134,18 @@ def test_a_wrong_tooth_count_is_contradicted_by_the_mesh() -> None:
     analysis = analyze(replace(recording, rig=wrong))
     assert "tooth-local-damage" not in codes(analysis)
     assert "teeth-disagree" in codes(analysis)
+
+
+def test_an_event_that_does_not_come_back_from_turn_to_turn_is_withheld_and_that_is_said() -> None:
+    """Bursts at one angle whose sign is drawn anew in each revolution: something is there, but it is no tooth's."""
+    recording = record(replace(GOOD, speed=ConstantProfile(1320.0)))
+    rng, samples = np.random.default_rng(3), np.array(recording.samples)
+    k = np.arange(60)
+    burst = np.exp(-k / 12) * np.sin(1.8 * k)
+    for start in (np.arange(0.3, 109.0) / 22.0 * SAMPLING_RATE_HZ).astype(int):
+        samples[0, start : start + 60] += 25.0 * rng.choice([-1.0, 1.0]) * burst
+    analysis = analyze(replace(recording, samples=samples))
+    assert "tooth-local-damage" not in codes(analysis, Kind.FAULT)
+    said = finding(analysis, "tooth-damage-undecided")
+    assert "turn to turn" in said.title
+    assert not said.title.startswith("Nothing shows")
