@@ -65,10 +65,10 @@ from sims.machine import nominal_of
 
 
 SEED, FIRST_RIG = 77_013, 400_000
-N_RUNS = 5
+N_RUNS = 6
 """Recordings of each effect, healthy ones, and ones with vibration from outside the catalogue, of each machine."""
 
-MODEL = PopulationModel(CRACKED.name, FIRST_RIG, 0, N_RUNS, 0, (0.3, 0.4, 0.5, 0.6, 0.7))
+MODEL = PopulationModel(CRACKED.name, FIRST_RIG, 0, N_RUNS, 0, (0.3, 0.35, 0.4, 0.5, 0.6, 0.7))
 
 
 def static_machine(index: int) -> list[PopulationSample]:
