@@ -64,7 +64,7 @@ from gearsig.report._page import (
     write_page,
 )
 from gearsig.report._pdf import check_pdf, page_pdf, write_pdf
-from gearsig.report._sections import FindingCard, analysis_text, finding_card, reference_text
+from gearsig.report._sections import FindingCard, analysis_text, change_rows, finding_card, reference_text
 
 __all__ = [
     "CHECK_FIRST",
@@ -84,6 +84,7 @@ __all__ = [
     "bearing_cursors",
     "benchmark_html",
     "cause_rows",
+    "change_rows",
     "channel_rows",
     "check_pdf",
     "check_writable",

@@ -4,6 +4,8 @@ const NS = "http://www.w3.org/2000/svg";
 
 export default function ({ data, parentElement, setStateValue }) {
   const strip = parentElement.querySelector(".strip");
+  strip.setAttribute("role", "group");
+  strip.setAttribute("aria-label", "Views");
   strip.replaceChildren(...data.items.map((item) => tile(item, item.name === data.chosen, () => setStateValue("view", item.name))));
   strip.onkeydown = (event) => {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];

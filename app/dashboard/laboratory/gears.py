@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import streamlit as st
-from streamlit.components.v2 import component
 
+from app.dashboard.components import component_of
 from app.dashboard.laboratory import run as runs
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.theme import palette
 from app.dashboard.widgets.charts import packed
 from gearsig.checks import FloatArray
 
-_FOLDER = Path(__file__).parent.parent / "components"
-_gears = component(
-    "gearsig.gears",
-    html='<div class="gears"></div>',
-    css=(_FOLDER / "gears.css").read_text("utf-8"),
-    js=(_FOLDER / "gears.js").read_text("utf-8"),
-)
+_gears = component_of("gears")
 N_POINTS = 3000
 LISTEN_HZ = 44100
 """Rate of what is listened to: slow machines are heard at their own pace."""

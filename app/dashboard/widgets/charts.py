@@ -8,14 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import streamlit as st
-from streamlit.components.v2 import component
 
 from app.dashboard import state
+from app.dashboard.components import component_of
 from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
@@ -81,13 +80,7 @@ def show_chart(figure: Figure, key: str, alternative: str) -> None:
     st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt=as_typed(alternative))
 
 
-_FOLDER = Path(__file__).parent.parent / "components"
-_figure = component(
-    "gearsig.figure",
-    html='<div class="figure"></div>',
-    css=(_FOLDER / "figure.css").read_text("utf-8"),
-    js=(_FOLDER / "figure.js").read_text("utf-8"),
-)
+_figure = component_of("figure")
 N_COLUMNS = 1600
 """Points of a line sent to the browser: more than a page has pixel columns."""
 MAP_COLUMNS, MAP_ROWS = 900, 360

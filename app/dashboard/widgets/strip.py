@@ -5,13 +5,12 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Sequence
 from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import streamlit as st
-from streamlit.components.v2 import component
 
 from app.dashboard import state
+from app.dashboard.components import component_of
 from app.dashboard.theme import is_dark
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis
@@ -19,13 +18,7 @@ from gearsig.plot import level_colours
 from gearsig.report import highest_order_of_interest, verdict_picture
 from gearsig.spectra import Spectrum
 
-_FOLDER = Path(__file__).parent.parent / "components"
-_strip = component(
-    "gearsig.strip",
-    html='<div class="strip" role="group" aria-label="Views"></div>',
-    css=(_FOLDER / "strip.css").read_text("utf-8"),
-    js=(_FOLDER / "strip.js").read_text("utf-8"),
-)
+_strip = component_of("strip")
 WIDTH, HEIGHT, N = 100.0, 44.0, 120
 N_LOOKED_AT = 1 << 16
 """Samples that are enough for a small picture."""

@@ -18,6 +18,7 @@ from gearsig.plot import marks_of, svg_ring, with_unit
 from gearsig.report import (
     FindingCard,
     bearing_cursors,
+    change_rows,
     finding_card,
     highest_order_of_interest,
     line_cursors,
@@ -55,7 +56,6 @@ ICONS: dict[Kind | Outcome, str] = {
 
 
 LONGEST_HEADLINE = 120
-N_CHANGES = 6
 
 
 def show_verdict(analysis: Analysis) -> None:
@@ -105,22 +105,18 @@ def _show_words(analysis: Analysis) -> None:
 
 def _show_changes(analysis: Analysis, reference: Analysis) -> None:
     """Show the levels that changed most since the reference, largest first."""
-    changed = sorted((c for c in analysis.level_changes if c.is_change), key=lambda c: -abs(c.change_db))
-    if not changed:
+    shown = change_rows(analysis)
+    if not shown:
         st.caption(as_typed(reference_text(reference)))
         return
     st.markdown(f"**Changed since the reference** :gray[{as_typed(reference.recording.provenance.source)}]")
-    shown = changed[:N_CHANGES]
-    widest = max(abs(change.change_db) for change in shown)
     rows = "".join(
-        f'<tr><td>{escape(one_line(c.label))}</td><td class="bar"><i class="{"up" if c.change_db > 0 else "down"}" '
-        f'style="width:{100 * abs(c.change_db) / widest:.0f}%"></i></td><td>{c.change_db:+.1f} dB</td>'
-        f"<td>± {c.repeatability_db:.1f}</td></tr>"
-        for c in shown
+        f'<tr><td>{escape(one_line(row.label))}</td><td class="bar"><i class="{"up" if row.change_db > 0 else "down"}" '
+        f'style="width:{row.percent:.0f}%"></i></td><td>{row.change_db:+.1f} dB</td>'
+        f"<td>± {row.repeatability_db:.1f}</td></tr>"
+        for row in shown
     )
     st.html(f'<table class="changes">{rows}</table>')
-    if len(changed) > len(shown):
-        st.caption(f"and {len(changed) - len(shown)} more. ±: how far halves of one recording differ.")
 
 
 def show_verdict_picture(analysis: Analysis) -> None:
