@@ -239,6 +239,7 @@ def build_mesh(values: ParameterValues) -> GearMesh:
         flank_1=_flank(values, pair.driver, 0),
         flank_2=_flank(values, pair.driven, 1),
         ramp=values.number("mesh_ramp"),
+        body=values.word("gear_body"),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sims.machine import MAX_DRY_FRICTION
+from sims.mesh import BODIES
 from sims.simulator import Parameter
 
 _SWITCH = ("on", "off")
@@ -40,6 +41,12 @@ _MESH = (
         "linear",
     ),
     Parameter("mesh_ramp", "", "base pitches over which a tooth pair takes up its load", 0, 0.1, 0.05),
+    Parameter.choice(
+        "gear_body",
+        "whether neighbouring teeth move each other through the body, as in finite elements: a quarter softer",
+        BODIES,
+        "separate",
+    ),
     Parameter("mesh_damping_ratio", "", "damping ratio of the mesh on its mean stiffness", 0, 1, 0.06),
     Parameter("half_backlash_um", "um", "half of the play along the line of action", 0, 2000, 20.0),
     Parameter("tip_relief_um", "um", "metal taken off at the tips of both gears", 0, 500, 0.0),

@@ -1,7 +1,9 @@
 """Shared gear physics: involute geometry and mesh stiffness of spur pairs."""
 
+from sims.mesh._body import BODIES, arc_compliance, body_compliance
 from sims.mesh._deviation import FlankDeviation, wear_profile
 from sims.mesh._faults import (
+    CRACK_LAWS,
     RootCrack,
     ToothChip,
     ToothSpall,
@@ -74,7 +76,9 @@ from sims.mesh._stiffness import (
 )
 
 __all__ = [
+    "BODIES",
     "COEFFICIENTS",
+    "CRACK_LAWS",
     "HEALTHY",
     "MAX_FRICTION",
     "STEEL",
@@ -97,8 +101,10 @@ __all__ = [
     "ToothRows",
     "ToothSpall",
     "advance",
+    "arc_compliance",
     "arc_length_mm",
     "back_stiffness_n_per_m",
+    "body_compliance",
     "check_crack",
     "check_spall",
     "contact_friction_n",

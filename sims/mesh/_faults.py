@@ -88,15 +88,26 @@ def crack_depth_mm(gear: GearGeometry, percent: float, angle_deg: float = 45.0) 
     return percent / 100.0 * 2.0 * crack_mouth_mm(gear)[1] / sin(_angle_rad(angle_deg))
 
 
+CRACK_LAWS = ("two lines", "limiting line", "parallel line")
+"""What of a tooth carries no load behind a crack; see `effective_flank_mm`."""
+
+
 def effective_flank_mm(
-    gear: GearGeometry, depth_mm: float, angle_deg: float, x_mm: FloatArray, y_mm: FloatArray
+    gear: GearGeometry,
+    depth_mm: float,
+    angle_deg: float,
+    x_mm: FloatArray,
+    y_mm: FloatArray,
+    law: str = "two lines",
 ) -> FloatArray:
     """Where the loaded side of each section ends, behind a crack: y less the part that carries no load.
 
-    Two lines run to the tooth tip, one from the crack's mouth and one from its tip. What lies between them carries no
-    load; between the crack's tip and its mouth, what lies outside the second line. Without depth nothing is lost, so
-    that the stiffness falls steadily from the healthy tooth's. (Cutting along the second line alone, as is common,
-    takes the bulge of the flank off a tooth whose crack has no depth yet.)
+    - two lines: they run to the tooth tip, one from the crack's mouth and one from its tip. What lies between them
+      carries no load; between the crack's tip and its mouth, what lies outside the second line. Without depth nothing
+      is lost, so that the stiffness falls steadily from the healthy tooth's.
+    - limiting line: what lies outside the second line carries no load, as is common. It takes the bulge of the flank
+      off a tooth whose crack has no depth yet.
+    - parallel line: what lies further from the tooth's centre line than the crack's tip carries no load.
 
     Parameters
     ----------
@@ -104,11 +115,20 @@ def effective_flank_mm(
     depth_mm, angle_deg : float
     x_mm, y_mm : arrays
         Outline of the loaded side.
+    law : str
+        One of `CRACK_LAWS`.
+
+    Source: Z. Chen, Y. Shao (2011), see `cracked_tooth_compliance`, for the limiting line; X. Tian (2004), see
+    `tooth_compliance`, for the parallel one.
     """
+    one_of(law, "law", CRACK_LAWS)
     x_mouth, y_mouth = crack_mouth_mm(gear)
     x_end, y_end = crack_tip_mm(gear, depth_mm, angle_deg)
     x_tip, y_tip = tip_point_mm(gear)
     behind = y_end + (y_tip - y_end) * (x_mm - x_end) / (x_tip - x_end)
+    if law != "two lines":
+        limit = behind if law == "limiting line" else np.full_like(x_mm, y_end)
+        return np.where(x_mm >= x_end, np.minimum(y_mm, limit), y_mm)
     before = y_mouth + (y_tip - y_mouth) * (x_mm - x_mouth) / (x_tip - x_mouth)
     lost = np.where(x_mm >= x_mouth, np.maximum(before - behind, 0.0), np.maximum(y_mm - behind, 0.0))
     result: FloatArray = np.where(x_mm >= x_end, y_mm - lost, y_mm)

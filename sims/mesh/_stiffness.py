@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
+from itertools import pairwise, product
 from math import floor, pi
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, one_of, within
 from gearsig.errors import InputError
+from sims.mesh._body import BODIES, body_compliance
 from sims.mesh._deviation import IDEAL_FLANK, FlankDeviation, check_deviation
 from sims.mesh._faults import (
     RootCrack,
@@ -34,7 +36,7 @@ from sims.mesh._geometry import (
     root_half_angle_rad,
     root_point_mm,
 )
-from sims.mesh._pair import WORKING_PRESSURE_PA, PairGeometry, contact_half_width_mm
+from sims.mesh._pair import WORKING_PRESSURE_PA, PairGeometry, contact_half_width_mm, smooth_step
 from sims.mesh._roughness import FlankRoughness
 
 # Compliance of one tooth as a cantilever: bending, shear and axial compression along its true outline.
@@ -69,7 +71,11 @@ class _Sections(NamedTuple):
 
 
 def tooth_compliance(
-    gear: GearGeometry, material: Material, roll_rad: FloatArray, crack: tuple[float, float] | None = None
+    gear: GearGeometry,
+    material: Material,
+    roll_rad: FloatArray,
+    crack: tuple[float, float] | None = None,
+    law: str = "two lines",
 ) -> ToothCompliance:
     """Deflection of a tooth loaded on its flank, relative to its root, from the strain energy of a beam.
 
@@ -86,6 +92,8 @@ def tooth_compliance(
         τ = tan α at the contact, from the form roll to the tip roll.
     crack : (depth_mm, angle_deg) or None
         The same over the whole width considered.
+    law : str
+        What of the tooth carries no load behind the crack; see `effective_flank_mm`.
 
     Returns
     -------
@@ -96,7 +104,7 @@ def tooth_compliance(
     Alberta (2004), for the energies; the outline with its trochoid fillet and the moment about r_b are derived.
     """
     tau = np.atleast_1d(np.asarray(roll_rad, dtype=np.float64))
-    sections = _sections(gear, tau, crack)
+    sections = _sections(gear, tau, crack, law)
     load_angle = (tau - gear.base_half_angle_rad)[:, None]
     sine, cosine = np.sin(load_angle), np.cos(load_angle)
     height = sections.front + sections.back
@@ -152,7 +160,7 @@ def cracked_tooth_compliance(
     return result
 
 
-def _sections(gear: GearGeometry, tau: FloatArray, crack: tuple[float, float] | None) -> _Sections:
+def _sections(gear: GearGeometry, tau: FloatArray, crack: tuple[float, float] | None, law: str) -> _Sections:
     node, weight = _gauss(N_NODES)
     pieces = []
     cuts = _fillet_cuts(gear, crack)
@@ -163,7 +171,7 @@ def _sections(gear: GearGeometry, tau: FloatArray, crack: tuple[float, float] | 
     flank = involute_outline(gear, gear.form_roll_rad + span * node)
     pieces.append((flank.x_mm, flank.y_mm, flank.dx_mm * weight * span))
     x, y, dx = (np.concatenate(part, axis=1) for part in zip(*pieces, strict=True))
-    front = y if crack is None else effective_flank_mm(gear, *crack, x, y)
+    front = y if crack is None else effective_flank_mm(gear, *crack, x, y, law)
     return _Sections(x * 1e-3, front * 1e-3, y * 1e-3, dx * 1e-3)
 
 
@@ -276,8 +284,8 @@ def foundation_compliance(gear: GearGeometry, material: Material, load_angle_rad
 
     Notes
     -----
-    Teeth of one gear share the body, so that neighbours in contact also move each other; that coupling is left out. It
-    makes the mesh in double contact appear stiffer than it is. A crack does not change the body's compliance here.
+    Teeth of one gear share the body, so that neighbours in contact also move each other: see `body_compliance`. A crack
+    does not change the body's compliance here.
     """
     l_star, m_star, p_star, q_star = foundation_factors(gear.root_radius_mm / gear.bore_mm, root_half_angle_rad(gear))
     cosine, tangent = np.cos(load_angle_rad), np.tan(load_angle_rad)
@@ -358,11 +366,15 @@ class GearMesh:
         At most one per tooth.
     chips_1, chips_2 : tuple of ToothChip
         At most one per tooth.
+    body : str
+        "separate": no tooth moves another one, as published models have it; double contact then appears stiffer than it
+        is. "coupled": teeth that carry at once move each other through the body.
 
     Notes
     -----
-    Every pair has its own compliance and separation; pairs act in parallel. Neglected: coupling of neighbouring teeth
-    through the body, misalignment along the face, heating. Only the driving flanks are described.
+    Every pair has its own compliance and separation; pairs act in parallel. Where the body is coupled, the compliance
+    of a pair holds what its neighbours' forces add at the load sharing of healthy teeth. Neglected: misalignment along
+    the face, heating. Only the driving flanks are described.
     """
 
     pair: PairGeometry
@@ -380,8 +392,10 @@ class GearMesh:
     spalls_2: tuple[ToothSpall, ...] = ()
     chips_1: tuple[ToothChip, ...] = ()
     chips_2: tuple[ToothChip, ...] = ()
+    body: str = "separate"
 
     def __post_init__(self) -> None:
+        one_of(self.body, "body", BODIES)
         one_of(self.contact_law, "contact_law", CONTACT_LAWS)
         within(self.ramp, "ramp", 0.0, 0.1, "base pitches")
         for number in (1, 2):
@@ -437,9 +451,10 @@ class GearMesh:
     def gear_compliance(self, side: int, progress: FloatArray, faults: ToothFaults = HEALTHY) -> FloatArray:
         """Tooth and foundation of one gear, and what a spall or chip adds to tooth and contact, in m/N.
 
-        c = c_tooth/(1 − λ_chip) + c_foundation + c_h [λ_spall/(1 − λ_spall) + λ_chip/(1 − λ_chip)]
+        c = c_tooth/(1 − λ_chip) + c_foundation + Σ_j c_ij N_j/N_i + c_h [λ_spall/(1 − λ_spall) + λ_chip/(1 − λ_chip)]
 
-        with the part λ of the width that the fault takes away. The contact of healthy flanks, c_h, is not in it.
+        with the part λ of the width that the fault takes away, and the neighbours j where the body is coupled. The
+        contact of healthy flanks, c_h, is not in it.
 
         Parameters
         ----------
@@ -459,6 +474,41 @@ class GearMesh:
             tooth = cracked_tooth_compliance(gear, material, roll, faults.crack, width)
         foundation = foundation_compliance(gear, material, roll - gear.base_half_angle_rad) / width
         result: FloatArray = tooth + foundation + self._lost_width_compliance(side, rho, faults, tooth)
+        return result + self._neighbour_compliance(side, progress) if self.body == "coupled" else result
+
+    def _neighbour_compliance(self, side: int, progress: FloatArray) -> FloatArray:
+        """Return Σ_j c_ij N_j/N_i over the neighbours of a healthy pair, in m/N.
+
+        N_i = w_i (δ − Σ_j c_ij N_j)/c_i, with the compliances c_i of the pairs, the couplings c_ij of both gears, and
+        the weights w_i by which pairs enter and leave; per weight, so that it holds for a pair that just enters.
+        """
+        zeta = np.atleast_1d(np.asarray(progress, dtype=np.float64))
+        places = np.arange(1 - self.n_slots, self.n_slots)
+        middle = self.n_slots - 1
+        last = self.pair.contact_ratio
+        at = np.clip(zeta[:, None] + places, -self.ramp / 2.0, last + self.ramp / 2.0)
+        weight = smooth_step((zeta[:, None] + places) / self.ramp + 0.5) if self.ramp else 1.0 * (at >= 0.0)
+        leaving = (last - zeta[:, None] - places) / self.ramp + 0.5 if self.ramp else 1.0 * (at <= last)
+        weight = weight * (smooth_step(leaving) if self.ramp else leaving)
+        alone = replace(self, body="separate")
+        own = self.contact_compliance + sum(alone.gear_compliance(n, at.ravel()).reshape(at.shape) for n in (1, 2))
+        coupling = [self._coupling(number, at, places) for number in (1, 2)]
+        both = weight[:, :, None] * (coupling[0] + coupling[1])
+        forces = np.linalg.solve(both + own[:, :, None] * np.eye(len(places)), weight[:, :, None])[:, :, 0]
+        moved = [np.einsum("nj,nj->n", c[:, middle], forces) for c in coupling]  # by the neighbours, for δ = 1
+        result: FloatArray = own[:, middle] * moved[side - 1] / (1.0 - moved[0] - moved[1])
+        return result
+
+    def _coupling(self, side: int, at: FloatArray, places: NDArray[np.int64]) -> FloatArray:
+        """C_ij of one gear through its body, (n, n_pairs, n_pairs), 0 on the diagonal, in m/N."""
+        gear, material = self.side(side)[:2]
+        angle = self.roll_length_mm(side, at) / gear.base_radius_mm - gear.base_half_angle_rad
+        result = np.zeros((*at.shape, at.shape[1]))
+        for i, j in product(range(len(places)), repeat=2):
+            if i != j:
+                # A pair that entered earlier lies ahead; the driver is pushed back by its mate, the driven gear on.
+                ahead = int(places[i] - places[j]) * (1 if side == 2 else -1)
+                result[:, i, j] = body_compliance(gear, material, angle[:, i], angle[:, j], ahead) / self.face_width_m
         return result
 
     def _lost_width_compliance(self, side: int, rho: FloatArray, faults: ToothFaults, tooth: FloatArray) -> FloatArray:

@@ -28,6 +28,8 @@ from sims.reduced_fe._contact import (
     static_table,
 )
 from sims.reduced_fe._crack import (
+    CrackLaws,
+    compare_crack_laws,
     crack_added_m_per_n,
     crack_meshes,
     crack_size,
@@ -142,6 +144,7 @@ __all__ = [
     "STEP_S",
     "TRANSMISSION_ERROR",
     "TWIN_STEP_S",
+    "CrackLaws",
     "CraigBamptonGear",
     "CraigBamptonPlan",
     "CyclicGear",
@@ -172,6 +175,7 @@ __all__ = [
     "check_depth",
     "check_memory",
     "check_reducible",
+    "compare_crack_laws",
     "constants",
     "corner_separation_m",
     "crack_added_m_per_n",

@@ -17,7 +17,15 @@ from scipy import sparse
 from gearsig.cache import FRESH, OtherVersionError, cache_folder, keep, modules_digest, read_arrays, write_whole
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.mesh import RootCrack, check_crack, crack_mouth_mm, crack_tip_mm, deepest_crack_mm
+from sims.mesh import (
+    CRACK_LAWS,
+    RootCrack,
+    check_crack,
+    crack_mouth_mm,
+    crack_tip_mm,
+    deepest_crack_mm,
+    tooth_compliance,
+)
 from sims.reduced_fe._blank import GearBlank, MeshSize, one_thread
 from sims.reduced_fe._cyclic import factorised
 from sims.reduced_fe._mesh import CrackLine, IntArray, SectorMesh, sector_matrices, sector_mesh
@@ -278,6 +286,56 @@ def crack_added_m_per_n(gear: ReducedGear, crack: RootCrack) -> FloatArray:
     narrower = added[k - 2] if k > 1 else np.zeros_like(added[0])
     between: FloatArray = (1.0 - part) * narrower + part * added[k - 1]
     return between
+
+
+class CrackLaws(NamedTuple):
+    """What a crack through the whole face adds to the compliance of a tooth, by several laws.
+
+    Attributes
+    ----------
+    depth_mm : array, (n_depths,)
+    roll_rad : array, (n_heights,)
+        Where on the flank the tooth is loaded.
+    healthy_m_per_n : array, (n_heights,)
+        Compliance of the healthy tooth and its body by finite elements, bore held.
+    added_m_per_n : mapping
+        Law → (n_depths, n_heights), "finite elements" first.
+    """
+
+    depth_mm: FloatArray
+    roll_rad: FloatArray
+    healthy_m_per_n: FloatArray
+    added_m_per_n: dict[str, FloatArray]
+
+
+def compare_crack_laws(gear: ReducedGear, depth_mm: FloatArray, angle_deg: float = READY_ANGLE_DEG) -> CrackLaws:
+    """Compare the lines behind a crack, by which models of the literature cut its tooth, with finite elements.
+
+    Parameters
+    ----------
+    gear : ReducedGear
+    depth_mm : array, (n_depths,)
+        Above 0.
+    angle_deg : float
+
+    Notes
+    -----
+    Halfway up the flank of 55 teeth of 2 mm finite elements add twice what any of the lines does; near the tip, where
+    teeth enter and leave, they agree to 10 to 30 %. Cells of 0.06 and 0.1 mm taken out of a plane grid along the crack,
+    an independent solution, add 10 to 20 % more than these finite elements.
+    """
+    g, material = gear.blank.geometry, gear.blank.material
+    roll, width = gear.grid.roll_rad, g.face_width_mm * 1e-3
+    cracks = [RootCrack(float(q), angle_deg) for q in np.atleast_1d(depth_mm)]
+    _, n_heights, n_slices = gear.grid.shape
+    own = gear.clamped_compliance_m_per_n[0].reshape(2, n_heights, n_slices, 2, n_heights, n_slices)
+    healthy = own[0, :, :, 0].mean(axis=(1, 3)).diagonal()
+    added = {"finite elements": np.array([crack_added_m_per_n(gear, crack).mean(axis=(1, 2)) for crack in cracks])}
+    whole = tooth_compliance(g, material, roll).total
+    for law in CRACK_LAWS:
+        lines = [tooth_compliance(g, material, roll, (c.depth_mm, angle_deg), law).total - whole for c in cracks]
+        added[law] = np.array(lines) / width
+    return CrackLaws(np.atleast_1d(depth_mm), roll, healthy, added)
 
 
 @lru_cache(maxsize=64)

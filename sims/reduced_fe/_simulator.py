@@ -47,6 +47,7 @@ from sims.simulator import Parameter, ParameterValue, ParameterValues, Values
 MEANINGLESS: dict[str, ParameterValue | None] = {
     "contact_law": "linear",
     "mesh_ramp": 0.05,
+    "gear_body": "separate",
     "mass_driver_kg": None,
     "mass_driven_kg": None,
     "inertia_driver_kg_m2": None,
