@@ -491,7 +491,8 @@ class GearMesh:
         leaving = (last - zeta[:, None] - places) / self.ramp + 0.5 if self.ramp else 1.0 * (at <= last)
         weight = weight * (smooth_step(leaving) if self.ramp else leaving)
         alone = replace(self, body="separate")
-        own = self.contact_compliance + sum(alone.gear_compliance(n, at.ravel()).reshape(at.shape) for n in (1, 2))
+        bodies = [alone.gear_compliance(number, at.ravel()).reshape(at.shape) for number in (1, 2)]
+        own = self.contact_compliance + bodies[0] + bodies[1]
         coupling = [self._coupling(number, at, places) for number in (1, 2)]
         both = weight[:, :, None] * (coupling[0] + coupling[1])
         forces = np.linalg.solve(both + own[:, :, None] * np.eye(len(places)), weight[:, :, None])[:, :, 0]
