@@ -20,6 +20,7 @@ from app.cli.gap import gap
 from app.cli.motion import force, identify, start_stop
 from app.cli.report import report
 from app.cli.rig import rig_app
+from app.cli.show import modes, show
 from app.cli.simulate import simulate
 from app.cli.sweep import bifurcation, sweep
 from gearsig import __version__
@@ -36,7 +37,7 @@ app = typer.Typer(
     A rig file says what is known of the machine: **gearsig rig example** prints one to start from.""",
 )
 COMMANDS: tuple[Callable[..., None] | typer.Typer, ...] = (
-    *(analyze, crack, force, start_stop, identify, compare, report, fleet_app, rig_app),
+    *(analyze, show, modes, crack, force, start_stop, identify, compare, report, fleet_app, rig_app),
     *(simulate, sweep, bifurcation, flexible, gear_body, gap, benchmark_app, demo, dashboard),
 )
 for command in COMMANDS:

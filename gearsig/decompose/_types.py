@@ -8,9 +8,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, freeze, not_negative, one_of, positive
+from gearsig.checks import FloatArray, count, freeze, not_negative, one_of, positive, within
 from gearsig.errors import InputError
 from gearsig.results import Result
+from gearsig.timefreq import UniformSignal
 
 StartName = Literal["uniform", "zero", "random", "peaks"]
 STARTS = get_args(StartName)
@@ -177,6 +178,27 @@ class Modes(Result, columns=("centres", "bandwidths", "rms")):
     def by_centre(self) -> tuple[int, ...]:
         """Return the modes' indices by rising centre."""
         return tuple(int(i) for i in np.argsort(self.centres, kind="stable"))
+
+    def signal(self, mode: int, *, start: float = 0.0) -> UniformSignal:
+        """Return one mode as a signal that every transform takes, e.g. `squeezed_cwt_map(modes.signal(2))`.
+
+        Parameters
+        ----------
+        mode : int
+            From 0, in the order of `waveforms`.
+        start : float
+            Time or angle of the first sample.
+        """
+        place = int(within(mode, "mode", 0, self.n_modes - 1))
+        return UniformSignal(
+            self.waveforms[place],
+            self.sampling_rate,
+            axis=self.axis,
+            start=start,
+            unit=self.unit,
+            source=f"mode at {self.centres[place]:.5g} of {self.source or 'the signal'}",
+            shaft=self.shaft,
+        )
 
 
 def _root_mean_square(x: FloatArray) -> float:

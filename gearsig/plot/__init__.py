@@ -4,6 +4,7 @@ from gearsig.plot._average import average_figure, polar_figure
 from gearsig.plot._benchmark import calibration_figure, confusion_figure
 from gearsig.plot._comparison import average_overlay_figure, band_levels_figure, order_overlay_figure
 from gearsig.plot._cursors import LONGEST, PRIORITY, AngleMark, Cursor, marks_of, n_rows, order_cursors, place
+from gearsig.plot._curves import CurvePanel, curves_figure
 from gearsig.plot._embed import Captioned, Picture, embed
 from gearsig.plot._fe_gear import draw_shaded, gear_mesh_figure, gear_modes_figure, gear_stress_figure
 from gearsig.plot._fleet import fleet_trend_picture
@@ -109,6 +110,7 @@ __all__ = [
     "Captioned",
     "Cursor",
     "Curve",
+    "CurvePanel",
     "Picture",
     "ResponseCase",
     "Scale",
@@ -127,6 +129,7 @@ __all__ = [
     "contact_spreading_figure",
     "course_figure",
     "crack_comparison_figure",
+    "curves_figure",
     "cwt",
     "decibels",
     "delay_embedding",

@@ -41,6 +41,17 @@ from gearsig.report._gap_page import (
 from gearsig.report._index import Entry, Failure, entry_of, write_index
 from gearsig.report._json import from_plain, plain
 from gearsig.report._long import long_analysis_text, long_analysis_to_json
+from gearsig.report._methods import (
+    METHODS,
+    TRANSFORMS,
+    Method,
+    MethodAnswer,
+    MethodOptions,
+    answer_json,
+    apply_method,
+    fitting_methods,
+    write_answer,
+)
 from gearsig.report._motion_text import (
     force_csv,
     force_json,
@@ -69,11 +80,16 @@ from gearsig.report._sections import FindingCard, analysis_text, change_rows, fi
 __all__ = [
     "CHECK_FIRST",
     "FIGURES",
+    "METHODS",
+    "TRANSFORMS",
     "CauseRow",
     "Entry",
     "Failure",
     "FindingCard",
     "GapFigure",
+    "Method",
+    "MethodAnswer",
+    "MethodOptions",
     "Question",
     "Section",
     "VerdictPicture",
@@ -81,6 +97,8 @@ __all__ = [
     "analysis_text",
     "analysis_to_dict",
     "analysis_to_json",
+    "answer_json",
+    "apply_method",
     "bearing_cursors",
     "benchmark_html",
     "cause_rows",
@@ -96,6 +114,7 @@ __all__ = [
     "entry_of",
     "finding_card",
     "fleet_page_html",
+    "fitting_methods",
     "floors_text",
     "force_csv",
     "force_json",
@@ -141,6 +160,7 @@ __all__ = [
     "verdict_picture",
     "verdict_rows",
     "write_fleet_page",
+    "write_answer",
     "write_gap_json",
     "write_gap_page",
     "write_index",
