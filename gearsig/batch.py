@@ -64,6 +64,7 @@ class _Job:
     is_reference: bool = False
     made_of: str = ""
     pdf: bool = False
+    methods: tuple[str, ...] | None = None
 
 
 def report_many(
@@ -80,6 +81,7 @@ def report_many(
     reference: str | Path | None = None,
     torque_nm: float | None = None,
     pdf: bool = False,
+    methods: Sequence[str] | None = None,
 ) -> BatchResult:
     """Analyse recordings and write a page for each, and an index that compares them.
 
@@ -115,6 +117,8 @@ def report_many(
         For the depth of cracks, instead of the rig's operating point.
     pdf : bool
         Write each page and the index as PDF as well.
+    methods : sequence of str or None
+        Further methods that the pages show; None: those that each recording calls for.
 
     Returns
     -------
@@ -127,7 +131,16 @@ def report_many(
     """
     from gearsig.checks import count
     from gearsig.fleet import find_recordings
-    from gearsig.report import Entry, Failure, check_pdf, made_folder, page_names, remove_parts, write_index
+    from gearsig.report import (
+        Entry,
+        Failure,
+        check_pdf,
+        made_folder,
+        named_method,
+        page_names,
+        remove_parts,
+        write_index,
+    )
 
     files = [path for path, _ in find_recordings(paths)]
     if not files:
@@ -139,6 +152,9 @@ def report_many(
     folder = made_folder(Path(output_folder))
     healthy = Path(reference) if reference is not None else None
     names = [file.name for file in files]
+    chosen = None if methods is None else tuple(methods)
+    for method in chosen or ():
+        named_method(method)  # a wrong name stops the report before its first page
     jobs = []
     for file, page in zip(files, page_names(files), strict=True):
         # Files of the same name are told apart by their folders.
@@ -147,7 +163,9 @@ def report_many(
         compared = None if is_healthy else healthy
         path = folder / f"{page}.html"
         facts = (rig, sampling_rate_hz, speed, command)
-        jobs.append(_Job(file, name, path, *facts, compared, torque_nm, is_reference=is_healthy, pdf=pdf))
+        jobs.append(
+            _Job(file, name, path, *facts, compared, torque_nm, is_reference=is_healthy, pdf=pdf, methods=chosen)
+        )
     made_of = _made_of()
     jobs = [replace(job, made_of=made_of(job)) for job in jobs]
     results: dict[int, Entry | Failure] = {n: kept for n, job in enumerate(jobs) if (kept := _kept(job)) is not None}
@@ -202,7 +220,9 @@ def _made_of() -> Callable[[_Job], str]:
         except OSError:
             return ""
         parts = [__version__, files, job.name, repr(job.rig), repr(job.speed), job.sampling_rate_hz, job.torque_nm]
-        return hashlib.sha256(json.dumps([*parts, job.is_reference]).encode("utf-8", "surrogateescape")).hexdigest()
+        return hashlib.sha256(
+            json.dumps([*parts, job.is_reference, job.methods]).encode("utf-8", "surrogateescape")
+        ).hexdigest()
 
     return made_of
 
@@ -241,9 +261,9 @@ def _report_one(job: _Job) -> Entry | Failure:
             reference=_reference_of(job, rig),
             torque_nm=job.torque_nm,
         )
-        write_page(analysis, job.page, command=job.command, index="index.html")
+        write_page(analysis, job.page, command=job.command, index="index.html", methods=job.methods)
         if job.pdf:
-            write_pdf(job.page.with_suffix(".pdf"), page_pdf(analysis, command=job.command))
+            write_pdf(job.page.with_suffix(".pdf"), page_pdf(analysis, command=job.command, methods=job.methods))
         entry = replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference)
         with suppress(GearsigError):  # a page that the next run makes again
             write_text(_result_path(job), json.dumps({"made_of": job.made_of, "entry": plain(entry)}) + "\n")

@@ -27,6 +27,15 @@ def report(
     pulses_per_revolution: options.PulsesOption = 1,
     reference: options.ReferenceOption = None,
     torque: options.TorqueOption = None,
+    methods: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            metavar="METHOD",
+            help="Further methods on the pages, e.g. order-map or modes+squeezed-cwt; see gearsig show --list. "
+            "Repeatable. Default: those that each recording calls for; none: none.",
+        ),
+    ] = None,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
     pdf: Annotated[bool, typer.Option("--pdf", help="Write each page and the index as PDF as well.")] = False,
@@ -54,6 +63,7 @@ def report(
         torque_nm=options.torque_of(torque),
         cluster=cluster,
         pdf=pdf,
+        methods=[] if methods == ["none"] else methods,
     )
     if failed:
         raise typer.Exit(failed)
@@ -72,6 +82,7 @@ def make_report(
     cluster: str = "",
     *,
     pdf: bool = False,
+    methods: list[str] | None = None,
 ) -> int:
     """Write the pages with their progress; return the exit code."""
     from gearsig.batch import report_many
@@ -99,6 +110,7 @@ def make_report(
                     reference=reference,
                     torque_nm=torque_nm,
                     pdf=pdf,
+                    methods=methods,
                 )
         except KeyboardInterrupt:
             typer.echo(f"gearsig: stopped after {n_done} files; {_kept(output, before)}", err=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -650,22 +650,66 @@ METHODS: dict[str, Method] = {
 """The methods by the names that command line and reports know them by."""
 
 
+_REVOLUTIONS_SHOWN = 12.0
+"""Of a map on a page: single impacts of a damaged tooth must show."""
+
+
+def named_method(text: str) -> tuple[str, MethodOptions]:
+    """Return method and options of "order-map", "time-frequency+squeezed-cwt" or "modes+squeezed-cwt"."""
+    name, plus, transform = text.partition("+")
+    if name not in METHODS:
+        raise InputError(f"there is no method {name!r}", allowed=", ".join(METHODS), remedy=_hint(name))
+    option = "then" if name == "modes" else "transform"
+    if plus and option not in METHODS[name].options:
+        raise InputError(f"{name} goes on to no transform", remedy="modes+squeezed-cwt does")
+    if not plus:
+        return name, MethodOptions()
+    one_of(transform, "transform", TRANSFORMS)
+    return name, MethodOptions(then=transform) if name == "modes" else MethodOptions(transform=transform)
+
+
 def fitting_methods(prepared: PreparedRecording, *, suspects_crack: bool = False) -> tuple[str, ...]:
     """Return the methods that a recording calls for, besides those that every page has.
 
-    A run-up or coast-down: order map, frequency map and tracked orders. A suspected crack or chip: modes and the
-    squeezed transform of one of them. A simulated motion at a steady speed: phase plane and Poincaré section.
+    A run-up or coast-down: order map, frequency map and tracked orders. A suspected crack or other damage of a tooth:
+    the squeezed transform of its most impulsive mode. A simulated motion at a steady speed: its Poincaré section in the
+    phase plane.
     """
     found: list[str] = []
     try:
         angle = prepared.shaft_angle
     except (InputError, RefusalError):
         angle = None
-    sweeps = angle is not None and np.ptp(angle.speed_range_rpm) > 0.1 * angle.mean_speed_rpm
+    sweeps = angle is not None and bool(np.ptp(angle.speed_range_rpm) > 0.1 * angle.mean_speed_rpm)
     if sweeps:
         found += ["order-map", "frequency-map", "tracking"]
     if suspects_crack:
-        found.append("modes")
+        found.append("modes+squeezed-cwt")
     if prepared.recording.truth is not None and angle is not None and not sweeps:
         found.append("poincare")
     return tuple(found)
+
+
+def method_pictures(
+    names: Sequence[str], prepared: PreparedRecording, channel: str = ""
+) -> tuple[tuple[Captioned, ...], tuple[str, ...]]:
+    """Return the figures of several methods of one channel, and why others have none.
+
+    Maps over time show the first twelve revolutions, or what is there.
+    """
+    found: list[Captioned] = []
+    reasons: list[str] = []
+    for text in names:
+        name, options = named_method(text)
+        wanted = replace(options, channel=channel)
+        try:
+            if "transform" in METHODS[name].options or options.then:
+                turns = prepared.shaft_angle.mean_speed_rpm / 60.0
+                wanted = replace(wanted, end_s=min(prepared.recording.duration_s, _REVOLUTIONS_SHOWN / turns))
+            answer = apply_method(name, prepared, wanted)
+        except RefusalError as refusal:
+            reasons.append(f"{text}: {refusal}")
+            continue
+        caption = answer.picture.caption
+        found.append(replace(answer.picture, caption=f"{caption[0].upper()}{caption[1:]}, {answer.channel}."))
+    return tuple(found), tuple(reasons)

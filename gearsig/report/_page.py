@@ -20,8 +20,10 @@ from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.plot import Captioned, Cursor, Picture, embed, order_cursors, unit_text
 from gearsig.plot import _style as style
+from gearsig.prepared import prepare
 from gearsig.recording import SI_FACTORS
 from gearsig.report._files import render, write_text
+from gearsig.report._methods import fitting_methods, method_pictures
 from gearsig.report._sections import (
     change_rows,
     css_class,
@@ -326,8 +328,15 @@ N_DETAILED, N_CHANNELS = 2, 8
 """Channels with all their figures, and with a figure at all: a page is read in a minute."""
 
 
-def gallery(analysis: Analysis) -> Gallery:
-    """Make the pictures of a page: the recording, then each channel, those with findings first and in most detail."""
+def gallery(analysis: Analysis, methods: Sequence[str] | None = None) -> Gallery:
+    """Make the pictures of a page: the recording, then each channel, those with findings first and in most detail.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    methods : sequence of str or None
+        Further methods, as `named_method` reads them; None: those that the recording calls for.
+    """
     groups = []
     if analysis.motion is not None:
         drawn = (embed(f.figure, f.caption, f.alternative) for f in start_stop_figures(analysis.motion))
@@ -340,6 +349,8 @@ def gallery(analysis: Analysis) -> Gallery:
     detailed = list(named)[:N_DETAILED] or list(channels)[:1]  # the first one where no finding names any
     ordered = sorted(channels, key=lambda channel: channel not in detailed)
     groups += [_channel_group(analysis, channels[name], detailed=name in detailed) for name in ordered[:N_CHANNELS]]
+    further, reasons = _further_methods(analysis, claims, methods)
+    groups.append(PictureGroup("Further methods", further))
     groups.append(PictureGroup("Recording", tuple(_recording_pictures(analysis))))
     left_out, others = ordered[N_CHANNELS:], ordered[len(detailed) : N_CHANNELS]
     remarks = []
@@ -347,7 +358,22 @@ def gallery(analysis: Analysis) -> Gallery:
         remarks.append(f"{', '.join(others)}: main picture only; {', '.join(detailed)} in detail.")
     if left_out:
         remarks.append(f"There are no pictures of {', '.join(left_out)}; their numbers are in the table.")
+    remarks += [f"{reason}." for reason in reasons]
     return Gallery(tuple(group for group in groups if group.wide or group.small), " ".join(remarks))
+
+
+def _further_methods(
+    analysis: Analysis, claims: Sequence[Finding], methods: Sequence[str] | None
+) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
+    """Return the pictures of further methods, of the channel that the first finding of a tooth names, and refusals."""
+    teeth = [finding for finding in claims if finding.where.tooth is not None or finding.where.angle_deg is not None]
+    channel = next((name for finding in teeth for name in finding.where.channels), "")
+    prepared = prepare(analysis.recording, analysis.rig)
+    chosen = fitting_methods(prepared, suspects_crack=bool(teeth)) if methods is None else methods
+    found, reasons = method_pictures(chosen, prepared, channel)
+    if methods is None:  # nobody asked for what cannot be had
+        reasons = ()
+    return tuple(embed(f.figure, f.caption, f.alternative) for f in found), reasons
 
 
 def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
@@ -596,6 +622,7 @@ def write_page(
     command: str = "",
     index: str = "",
     date: datetime | None = None,
+    methods: Sequence[str] | None = None,
 ) -> Path:
     """Write the report of one recording: verdict, findings, machine, figures, indicators, provenance.
 
@@ -612,18 +639,27 @@ def write_page(
         Address of the index page, relative to this one; empty: no link.
     date : datetime or None
         Of the report; None: now.
+    methods : sequence of str or None
+        Further methods that the page shows; None: those that the recording calls for.
 
     Returns
     -------
     Path
         Of the page.
     """
-    return write_text(Path(path), page_html(analysis, command=command, index=index, date=date))
+    return write_text(Path(path), page_html(analysis, command=command, index=index, date=date, methods=methods))
 
 
-def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: datetime | None = None) -> str:
+def page_html(
+    analysis: Analysis,
+    *,
+    command: str = "",
+    index: str = "",
+    date: datetime | None = None,
+    methods: Sequence[str] | None = None,
+) -> str:
     """Return the page that `write_page` writes."""
-    parts = page_parts(analysis, command=command, date=date or datetime.now().astimezone())
+    parts = page_parts(analysis, command=command, date=date or datetime.now().astimezone(), methods=methods)
     return render(
         "page.html.j2",
         **parts,
@@ -634,7 +670,9 @@ def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: d
     )
 
 
-def page_parts(analysis: Analysis, *, command: str, date: datetime) -> dict[str, Any]:
+def page_parts(
+    analysis: Analysis, *, command: str, date: datetime, methods: Sequence[str] | None = None
+) -> dict[str, Any]:
     """Return what the page says, in HTML as in PDF."""
     recording = analysis.recording
     return {
@@ -650,7 +688,7 @@ def page_parts(analysis: Analysis, *, command: str, date: datetime) -> dict[str,
         "machine": machine_rows(analysis.rig),
         "warnings": [text for text in recording.warnings if text not in {f.title for f in analysis.findings}],
         "speed": speed_rows(analysis.shaft_angle),
-        "gallery": gallery(analysis),
+        "gallery": gallery(analysis, methods),
         "reference": reference_text(analysis.reference),
         "provenance": provenance_rows(analysis, command, date),
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import secrets
 from base64 import b64decode
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from datetime import datetime
@@ -24,7 +24,13 @@ from gearsig.report._page import page_parts
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
 
 
-def page_pdf(analysis: Analysis, *, command: str = "", date: datetime | None = None) -> bytes:
+def page_pdf(
+    analysis: Analysis,
+    *,
+    command: str = "",
+    date: datetime | None = None,
+    methods: Sequence[str] | None = None,
+) -> bytes:
     """Return the page of one recording as PDF, with the same content as `page_html` but the table of indicators.
 
     Parameters
@@ -34,13 +40,15 @@ def page_pdf(analysis: Analysis, *, command: str = "", date: datetime | None = N
         The command that makes the page again.
     date : datetime or None
         Of the report; None: now.
+    methods : sequence of str or None
+        Further methods that the page shows; None: those that the recording calls for.
 
     Raises
     ------
     InputError
         If typst is not installed.
     """
-    parts = page_parts(analysis, command=command, date=date or datetime.now().astimezone())
+    parts = page_parts(analysis, command=command, date=date or datetime.now().astimezone(), methods=methods)
     pictures: dict[str, bytes] = {}
     verdict = parts["verdict_picture"]
     data = {

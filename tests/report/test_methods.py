@@ -1,0 +1,123 @@
+"""Methods by name: figure, table and arrays of one channel, and which of them a recording calls for."""
+
+import json
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+
+from app.cli.main import main
+from gearsig.errors import InputError, RefusalError
+from gearsig.prepared import prepare
+from gearsig.recording import Channel, Recording, write_recording
+from gearsig.report import METHODS, MethodOptions, apply_method, fitting_methods, named_method, write_answer
+from gearsig.rig import ConstantSpeed, GearPair, Rig, Shaft
+
+RATE_HZ, N = 8192.0, 16384
+T = np.arange(N) / RATE_HZ
+RIG = Rig(
+    "pair",
+    shafts=(Shaft("input"), Shaft("output")),
+    pairs=(GearPair("stage 1", "input", "output", 20, 40),),
+    speed=ConstantSpeed(1500.0),
+)
+
+
+def recording(seed: int = 0) -> Recording:
+    """A tone of 3 at the mesh, 500 Hz, and bursts at 2 kHz ten times a second, in noise of 0.1."""
+    noise = np.random.default_rng(seed).normal(size=N)
+    bursts = 8.0 * np.exp(-((T % 0.1) * 600.0)) * np.sin(2 * np.pi * 2000.0 * (T % 0.1))
+    x = 3.0 * np.cos(2 * np.pi * 500.0 * T) + bursts + 0.1 * noise
+    return Recording(x[None], RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),), speed=ConstantSpeed(1500.0), rig=RIG)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> None:
+    answer = apply_method(name, recording(), MethodOptions(n_modes=3) if name == "modes" else None)
+    png, svg, csv, h5, numbers = write_answer(answer, tmp_path)
+    assert png.stat().st_size > 5_000
+    assert svg.read_text(encoding="utf-8").lstrip().startswith("<?xml")
+    frame = pd.read_csv(csv)
+    assert len(frame) > 0
+    with h5py.File(h5) as file:
+        for title, column in answer.table.items():
+            kept = file["table"][title.replace("/", "∕")][()]
+            assert len(kept) == len(frame)
+            if np.asarray(column).dtype.kind == "f":
+                assert frame[title].to_numpy() == pytest.approx(kept, rel=1e-8, nan_ok=True)
+        for matrix in answer.matrices:
+            assert file["matrices"][matrix].ndim == 2
+    about = json.loads(numbers.read_text(encoding="utf-8"))
+    assert (about["method"], about["channel"]) == (name, "a1")
+
+
+def test_the_spectrum_reads_the_tone_and_the_map_its_order() -> None:
+    spectrum = pd.DataFrame(apply_method("spectrum", recording()).table)
+    top = spectrum.loc[spectrum.iloc[:, 1].idxmax()]
+    assert tuple(top) == pytest.approx((500.0, 3.0), rel=0.01)
+    levels = apply_method("order-map", recording())
+    orders, mean = levels.axes["order"], levels.matrices["levels"].mean(axis=0)
+    assert orders[np.argmax(mean)] == pytest.approx(20.0, abs=0.1)  # 20 teeth
+    tracked = apply_method("tracking", recording(), MethodOptions(orders=(20.0,))).table
+    amplitude = next(v for k, v in tracked.items() if "amplitude" in k)
+    assert np.median(amplitude) == pytest.approx(3.0, rel=0.02)
+
+
+def test_the_envelope_of_a_band_shows_the_rhythm_of_bursts() -> None:
+    answer = apply_method("envelope", recording(), MethodOptions(band_hz=(1500.0, 2500.0), highest=100.0))
+    hz, level = answer.table.values()
+    assert hz[1:][np.argmax(level[1:])] % 10.0 == pytest.approx(0.0, abs=0.6)
+
+
+def test_the_most_impulsive_mode_goes_on_to_the_squeezed_transform() -> None:
+    answer = apply_method("modes", recording(), MethodOptions(n_modes=3, then="squeezed-cwt"))
+    centre = answer.numbers["centres"][answer.numbers["chosen_mode"] - 1]
+    assert centre == pytest.approx(2000.0, rel=0.06)
+    assert max(answer.numbers["kurtosis"]) == answer.numbers["kurtosis"][answer.numbers["chosen_mode"] - 1]
+    lines = next(v for k, v in answer.axes.items() if k.startswith("frequency"))
+    power = np.square(answer.matrices["levels"]).sum(axis=0)
+    assert np.sum(lines * power) / np.sum(power) == pytest.approx(2000.0, rel=0.1)
+    tone = apply_method("modes", recording(), MethodOptions(n_modes=3, then="squeezed-cwt", mode=1))
+    levels, at = tone.matrices["levels"], next(v for k, v in tone.axes.items() if k.startswith("frequency"))
+    assert at[np.argmax(np.square(levels).sum(axis=0))] == pytest.approx(500.0, rel=0.03)
+
+
+def test_options_of_other_methods_wrong_names_and_missing_speeds_are_refused() -> None:
+    with pytest.raises(InputError, match="envelope"):
+        apply_method("spectrum", recording(), MethodOptions(band_hz=(1.0, 2.0)))
+    with pytest.raises(InputError, match="order-map"):
+        apply_method("ordermap", recording())
+    with pytest.raises(InputError, match="1 to 3"):
+        apply_method("modes", recording(), MethodOptions(n_modes=3, mode=4))
+    with pytest.raises(InputError, match="goes on to no transform"):
+        named_method("kurtogram+cwt")
+    still = Recording(recording().samples, RATE_HZ, recording().channels)
+    with pytest.raises((InputError, RefusalError)):
+        apply_method("poincare", still)
+
+
+def test_a_run_up_calls_for_maps_a_suspected_tooth_for_modes() -> None:
+    assert fitting_methods(prepare(recording()), suspects_crack=True) == ("modes+squeezed-cwt",)
+    assert fitting_methods(prepare(recording())) == ()
+    sample = "sample_data/run_up.h5"
+    from gearsig.recording import read_recording
+    from gearsig.rig import read_rig
+
+    run_up = read_recording(sample, rig=read_rig("sample_data/run_up.toml"))
+    assert fitting_methods(prepare(run_up)) == ("order-map", "frequency-map", "tracking")
+
+
+def test_the_command_writes_what_the_method_finds(tmp_path, capsys) -> None:
+    path = tmp_path / "a.h5"
+    write_recording(recording(), path)
+    with pytest.raises(SystemExit) as ended:
+        main(["show", "spectrum", str(path), "--highest", "1000", "-o", str(tmp_path / "out")])
+    assert not ended.value.code
+    frame = pd.read_csv(tmp_path / "out" / "spectrum.csv")
+    assert frame.iloc[:, 0].max() <= 1000.0
+    with pytest.raises(SystemExit) as ended:
+        main(["modes", str(path), "--n-modes", "3", "--then", "squeezed-cwt", "--json"])
+    assert not ended.value.code
+    printed = capsys.readouterr().out
+    assert json.loads(printed[printed.index("{") :])["method"] == "modes"
