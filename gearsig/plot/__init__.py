@@ -6,7 +6,13 @@ from gearsig.plot._comparison import average_overlay_figure, band_levels_figure,
 from gearsig.plot._cursors import LONGEST, PRIORITY, AngleMark, Cursor, marks_of, n_rows, order_cursors, place
 from gearsig.plot._curves import CurvePanel, curves_figure
 from gearsig.plot._embed import Captioned, Picture, embed
-from gearsig.plot._fe_gear import draw_shaded, gear_mesh_figure, gear_modes_figure, gear_stress_figure
+from gearsig.plot._fe_gear import (
+    draw_shaded,
+    gear_mesh_figure,
+    gear_modes_figure,
+    gear_stress_figure,
+    stress_maps_figure,
+)
 from gearsig.plot._fleet import fleet_trend_picture
 from gearsig.plot._flexible import (
     contact_spreading_figure,
@@ -191,6 +197,7 @@ __all__ = [
     "start_stop_figure",
     "start_stop_pair_figure",
     "stft",
+    "stress_maps_figure",
     "svg_lines",
     "svg_map",
     "svg_ring",

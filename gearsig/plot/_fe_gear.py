@@ -260,6 +260,65 @@ def gear_stress_figure(
     return figure
 
 
+def stress_maps_figure(
+    points_mm: FloatArray,
+    triangles: IntArray,
+    stress_pa: Mapping[str, FloatArray],
+    *,
+    near_mm: tuple[float, float, float, float],
+    part: float = 0.995,
+    title: str = "",
+) -> Figure:
+    """Draw several stresses on the end face side by side, those that change sign with white at 0.
+
+    Parameters
+    ----------
+    points_mm : array, (n, 2)
+    triangles : array of int, (m, 3)
+    stress_pa : mapping
+        Name → (n,).
+    near_mm : tuple
+        Low and high x, low and high y.
+    part : float
+        Part of the points shown that the colours hold; the peak at the force goes beyond.
+    title : str
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InputError
+        If there is no stress, or an array has another length than the points.
+    """
+    if not stress_pa:
+        raise InputError("stress_pa is empty", remedy="give at least one stress")
+    points = np.asarray(points_mm, dtype=np.float64)
+    n_rows = -(-len(stress_pa) // 2)
+    figure, panels = style.panels(
+        (3.4,) * n_rows, (1.0, 1.0), right_in=0.9, top_in=0.62, column_gap_in=1.5, row_gap_in=0.85
+    )
+    inside = (points[:, 0] > near_mm[0]) & (points[:, 0] < near_mm[1])
+    inside &= (points[:, 1] > near_mm[2]) & (points[:, 1] < near_mm[3])
+    for axes, (name, values) in zip(panels, stress_pa.items(), strict=False):
+        stress = series.checked_values(values, len(points), name) * 1e-6
+        _frame(axes)
+        signed = bool(stress[inside].min() < -0.05 * stress[inside].max())
+        top = max(float(np.quantile(np.abs(stress[inside]), part)), 1e-12)
+        low, colours = (-top, "RdBu_r") if signed else (0.0, "viridis")
+        drawn = draw_shaded(axes, points, triangles, stress, window=near_mm, limits=(low, top), cmap=colours)
+        _draw_border(axes, points, points, triangles)
+        axes.set_xlim(*near_mm[:2])
+        axes.set_ylim(*near_mm[2:])
+        style.label_axes(axes, "x (mm)", "y (mm)", name)
+        style.colour_bar(axes, drawn, "MPa", extend="both" if signed else "max")
+    for axes in panels[len(stress_pa) :]:
+        axes.remove()
+    series.headline(figure, title)
+    return figure
+
+
 def _draw_shape(axes: Axes, points: FloatArray, triangles: IntArray, motion: FloatArray) -> Any:
     reach = float(np.abs(points).max())
     moved = points + 0.12 * reach * motion[:, :2]

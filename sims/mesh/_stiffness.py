@@ -117,6 +117,40 @@ def tooth_compliance(
     return ToothCompliance(bending / e, shear / e, axial / e)
 
 
+def friction_compliance(gear: GearGeometry, material: Material, roll_rad: FloatArray) -> FloatArray:
+    """Deflection of a tooth along the contact's normal for 1 N of friction on 1 m of face width, towards its tip.
+
+    c_nt = (1/E) Σ [12 M_n M_t/h³ + 2.4 (1 + ν) sin α_m cos α_m/h − sin α_m cos α_m/h] dx,
+    M_n = r_b − x cos α_m,  M_t = (x_c − x) sin α_m + y_c cos α_m
+
+    Friction μN turns a contact's compliance into c_nn ± μ c_nt: towards the root in approach (stiffer), towards the tip
+    in recess (softer). Squaring M_n ± μ M_t, as is common, doubles that: the work of the friction force, which the
+    normal deflection does not hold, is then in it.
+
+    Parameters
+    ----------
+    gear, material, roll_rad
+        As for `tooth_compliance`; the gear's body is left out.
+
+    Returns
+    -------
+    array, (n,)
+        m²/N; divide by the face width in m.
+    """
+    tau = np.atleast_1d(np.asarray(roll_rad, dtype=np.float64))
+    sections = _sections(gear, tau, None, "two lines")
+    angle = (tau - gear.base_half_angle_rad)[:, None]
+    sine, cosine = np.sin(angle), np.cos(angle)
+    place = involute_outline(gear, tau[:, None])
+    base, height = gear.base_radius_mm * 1e-3, sections.front + sections.back
+    normal = base - sections.x * cosine
+    along = (place.x_mm * 1e-3 - sections.x) * sine + place.y_mm * 1e-3 * cosine
+    bending = np.sum(12.0 * normal * along / height**3 * sections.dx, axis=1)
+    shear = (2.0 * SHEAR_FACTOR * (1.0 + material.poisson_ratio) - 1.0) * (sine * cosine)[:, 0]
+    result: FloatArray = (bending + shear * np.sum(sections.dx / height, axis=1)) / material.youngs_modulus_pa
+    return result
+
+
 def cracked_tooth_compliance(
     gear: GearGeometry,
     material: Material,

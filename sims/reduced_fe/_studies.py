@@ -14,7 +14,7 @@ from gearsig.checks import FloatArray, count, positive, within
 from gearsig.errors import InputError
 from sims.machine import Operation
 from sims.reduced_fe._blank import MeshSize, mesh_size_for, one_thread
-from sims.reduced_fe._cyclic import ComplexArray, CyclicGear, CyclicModes, Held, cyclic_modes
+from sims.reduced_fe._cyclic import ComplexArray, CyclicGear, CyclicModes, Held, cyclic_modes, mode_field
 from sims.reduced_fe._mesh import IntArray, SectorMesh, cell_gradients_at_nodes, lame_pa, sector_mesh
 from sims.reduced_fe._pair import FlexiblePair, torsional_curve_hz
 from sims.reduced_fe._reduced_gear import FlankGrid, ReductionPlan, Spread, flank_rows, reduce_gear
@@ -141,8 +141,8 @@ def load_tooth(
     return ToothLoad(mesh, force, float(roll), gear.sector_fields(own), float(own[0] @ row))
 
 
-def von_mises_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
-    """Von Mises stress at the nodes, √(3/2 s:s), s the deviator of λ tr(ε) 1 + 2μ ε.
+def stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
+    """Stress tensor at the nodes, σ = λ tr(ε) 1 + 2μ ε, mean over the cells that meet there.
 
     Parameters
     ----------
@@ -152,21 +152,68 @@ def von_mises_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
 
     Returns
     -------
-    array, (n_nodes,)
-        Pa. Stresses are taken at the nodes of each cell and averaged there; those of eight-node cells leave out what
-        their incompatible modes add.
+    array, (n_nodes, 3, 3)
+        Pa, in the axes of the sector. Stresses are taken at the nodes of each cell and averaged there; those of
+        eight-node cells leave out what their incompatible modes add.
     """
-    _, mu = lame_pa(mesh.blank.material)
+    lam, mu = lame_pa(mesh.blank.material)
     nodes = mesh.cells.reshape(len(mesh.cells), -1)
     gradient = np.einsum("cqia,caj->cqij", cell_gradients_at_nodes(mesh.points_m, mesh.cells), displacement_m[nodes])
     strain = (gradient + gradient.transpose(0, 1, 3, 2)) / 2.0
-    deviator = strain - np.trace(strain, axis1=2, axis2=3)[..., None, None] * np.eye(3) / 3.0
+    stress = 2.0 * mu * strain + lam * np.trace(strain, axis1=2, axis2=3)[..., None, None] * np.eye(3)
     total, shared = np.zeros((mesh.n_nodes, 3, 3)), np.zeros(mesh.n_nodes)
-    np.add.at(total, nodes, deviator)
+    np.add.at(total, nodes, stress)
     np.add.at(shared, nodes, 1.0)
-    mean = 2.0 * mu * total / shared[:, None, None]
-    stress: FloatArray = np.sqrt(1.5 * np.sum(mean**2, axis=(1, 2)))
-    return stress
+    mean: FloatArray = total / shared[:, None, None]
+    return mean
+
+
+def von_mises_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
+    """Von Mises stress at the nodes, √(3/2 s:s), s the deviator of `stress_pa`; (n_nodes,), Pa."""
+    return _von_mises(stress_pa(mesh, displacement_m))
+
+
+def _von_mises(stress: FloatArray) -> FloatArray:
+    deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3.0
+    result: FloatArray = np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2)))
+    return result
+
+
+def polar_stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> dict[str, FloatArray]:
+    """Radial, tangential and shear stress about the gear's axis, and von Mises stress, each (n_nodes,), Pa."""
+    stress = stress_pa(mesh, displacement_m)
+    angle = np.arctan2(mesh.points_m[:, 1], mesh.points_m[:, 0])
+    out = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
+    around = np.stack((-np.sin(angle), np.cos(angle), np.zeros_like(angle)), axis=1)
+    components = {"radial": (out, out), "tangential": (around, around), "shear": (out, around)}
+    found = {name: np.einsum("ni,nij,nj->n", a, stress, b) for name, (a, b) in components.items()}
+    return {**found, "von Mises": _von_mises(stress)}
+
+
+def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad, spread: Spread = "patch") -> FloatArray:
+    """Answer to a force on a tooth by modes alone, u = Σ φ (φᵀ f)/ω², at all nodes, (n_teeth, n_nodes, 3).
+
+    What a reduction by its lowest modes without the static rest would give, to be compared with `load_tooth`.
+
+    Parameters
+    ----------
+    gear : CyclicGear
+    modes : CyclicModes
+        With the bore held, as `load` is.
+    load : ToothLoad
+    spread : str
+        As the load's.
+    """
+    grid = FlankGrid(np.array([load.roll_rad]), np.array([0.0]))
+    row = flank_rows(gear.mesh, grid, spread, gear.own_places, 3 * len(gear.own_nodes))[0]
+    total = np.zeros((gear.n_sectors, gear.mesh.n_nodes, 3))
+    pairs = modes.multiplicity(gear.n_sectors)
+    for which, hertz in enumerate(modes.frequencies_hz):
+        for sine in (False, True)[: int(pairs[which])]:
+            own = modes.shapes[:, which].imag if sine else modes.shapes[:, which].real
+            share = load.force_n * float(row @ own) / (2.0 * np.pi * hertz) ** 2
+            total += share * mode_field(gear, modes, which, sine=sine)
+    return total
 
 
 def _static_field(gear: CyclicGear, load: FloatArray) -> FloatArray:

@@ -35,7 +35,8 @@ def test_force_errors_are_said_under_the_picture(examined: Analysis) -> None:
     assert motion is not None
     caption = list(start_stop_figures(motion))[-1].caption
     assert "Hunt–Crossley" in caption
-    assert "6." in caption or "7." in caption  # per cent rms of the piecewise model on this record
+    percent = float(caption.partition(" % rms")[0].split()[-1])  # of the piecewise model on this record
+    assert 3.0 < percent < 6.0
 
 
 @pytest.mark.parametrize("is_steady", [True, False])
