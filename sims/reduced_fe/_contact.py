@@ -643,6 +643,12 @@ class MeshMaps:
         return total
 
     @property
+    def pair_numbers(self) -> FloatArray:
+        """Number k of the pair in each slot, (n_c, n_slots): it entered at c = k."""
+        newest = np.floor(self.mesh_cycles + MARGIN)
+        return newest[:, None] - np.arange(self.force_n.shape[2])
+
+    @property
     def load_sharing(self) -> FloatArray:
         """Part of the load that each pair carries, (n_c, n_t, n_slots)."""
         pairs = self.pair_forces_n
