@@ -646,7 +646,8 @@ class MeshMaps:
     def pair_numbers(self) -> FloatArray:
         """Number k of the pair in each slot, (n_c, n_slots): it entered at c = k."""
         newest = np.floor(self.mesh_cycles + MARGIN)
-        return newest[:, None] - np.arange(self.force_n.shape[2])
+        numbers: FloatArray = newest[:, None] - np.arange(self.force_n.shape[2])
+        return numbers
 
     @property
     def load_sharing(self) -> FloatArray:
