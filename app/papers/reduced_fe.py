@@ -229,13 +229,14 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
         for slot, force in enumerate(slots):
             if force <= 0.0:
                 continue
-            zeta = float(np.floor(maps.mesh_cycles[row]) - maps.mesh_cycles[row]) * -1.0 + slot
+            number = int(maps.pair_numbers[row, slot])
+            zeta = float(maps.mesh_cycles[row]) - number
             roll = (
                 float(pair_geometry.contact_radii_mm(np.clip(zeta, 0.0, pair_geometry.contact_ratio))[0])
                 / g.base_radius_mm
             )
             load = reduced_fe.load_tooth(mesh, force, min(max(roll, g.form_roll_rad), g.tip_roll_rad))
-            field += np.roll(load.displacement_m, slot - 1, axis=0)  # the tooth ahead entered earlier
+            field += np.roll(load.displacement_m, -1 - number, axis=0)  # the tooth ahead entered earlier
             forces.append(force)
         return field, forces
 
