@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
-from gearsig.prepared import Comb, LineExcess, best_comb, comb_at
+from gearsig.prepared import MAINS_HZ, MAINS_TOLERANCE, Comb, LineExcess, best_comb, comb_at
 from gearsig.rig import Bearing
 
 AS_STRONG_DB = 9.0
@@ -163,7 +163,7 @@ class Candidate:
     """One family found, and what it may be.
 
     `twins` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is the
-    part's, twins included, among all that would show at that order.
+    part's, twins included, among all that would show at that order. `loudest` is the channel with the largest line.
     """
 
     comb: Comb
@@ -176,6 +176,7 @@ class Candidate:
     twins: tuple[Bearing, ...] = ()
     share: float = 1.0
     in_train: bool = False
+    loudest: str = ""
 
     @property
     def strength_db(self) -> float:
@@ -326,7 +327,20 @@ def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> C
     combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
     families = [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
     best = min(families, key=lambda family: (max(family.p_value, 1e-9), -family.strength_db), default=None)
-    return None if best is None else replace(best, p_value=min(1.0, best.p_value * len(envelopes)))
+    if best is None:
+        return None
+    return replace(best, p_value=min(1.0, best.p_value * len(envelopes)), loudest=_loudest(envelopes, best))
+
+
+def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:
+    """Return the channel whose envelopes have the largest line at a family's fundamental: the nearest to its source.
+
+    The clearest need not be it: impacts raise the floor of their own channel by what they scatter.
+    """
+    spectrum = family.envelope.excess.spectrum
+    comparable = [e for e in envelopes if e.excess.spectrum.unit == spectrum.unit]
+    near, reach = family.comb.fundamental, 2 * spectrum.resolution
+    return max(comparable, key=lambda e: e.excess.spectrum.largest_near(near, reach)[1]).channel
 
 
 def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> list[Candidate]:
@@ -398,12 +412,13 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
     """Note what else would show at the same lines.
 
     Other parts whose order is so near, or half or twice, that slip alone could make it this one; a multiple of the
-    shaft beside it; and of an outer race, elements that differ, where lines a cage's turn apart are as strong.
+    shaft, of half of it or of twice the mains beside it; and of an outer race, elements that differ, where lines a
+    cage's turn apart are as strong.
     """
     own = _weight(signals, candidate.name, candidate.comb.fundamental / candidate.expected - 1)
     parts = expected_parts(signals)
     order_of_part = next(o for b, name, o in parts if (b, name) == (candidate.bearing, candidate.name))
-    near = nearest_bearing(signals, candidate.envelope.channel)
+    near = nearest_bearing(signals, candidate.loudest or candidate.envelope.channel)
     own *= 1.0 if near in (None, candidate.bearing) else 0.5
     others, rivals, twins = 0.0, [], []
     for bearing, name, order in parts:
@@ -416,10 +431,10 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         if abs(slip) <= slip_of(signals):
             others += _weight(signals, name, slip) * (1.0 if near in (None, bearing) else 0.5)
             rivals.append(f"the {part_text(name, bearing.name)}")
-    shaft = _shaft_beside(signals, candidate)
-    if shaft:
+    beside = _shaft_beside(signals, candidate) or _half_beside(signals, candidate) or _mains_beside(signals, candidate)
+    if beside:
         others += 1.0
-        rivals.append(shaft)
+        rivals.append(beside)
     if candidate.name == "BPFO":
         shallow = min(1.0, (SHALLOW / max(candidate.modulation, 1e-9)) ** 2)
         differ = _elements_differ(signals, candidate)
@@ -448,6 +463,34 @@ def _shaft_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
         is_beside = k >= 1 and 0 < abs(own / (k * order) - 1) <= BESIDE_SHAFT
         if is_beside and spectrum.largest_near(k * order, 2 * spectrum.resolution)[1] >= 0.5 * amplitude:
             return f"the {k}-fold order of shaft {shaft or 'of reference'}"
+    return ""
+
+
+def _half_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
+    """Name the multiple and a half of a shaft that the family's fundamental is on or beside.
+
+    Loose parts strike every other turn: half the shaft's order is then there, too, half as strong or stronger. A race's
+    sidebands are on all halves as well if it is on one, so that no slower train is told from it.
+    """
+    spectrum, own = candidate.envelope.excess.spectrum, candidate.comb.fundamental
+    reach = 2 * spectrum.resolution
+    needed = 0.5 * spectrum.largest_near(own, reach)[1]
+    for shaft, order in signals.known_shaft_orders.items():
+        k = int(own / order) + 0.5
+        is_beside = abs(own / (k * order) - 1) <= BESIDE_SHAFT
+        if is_beside and all(spectrum.largest_near(half * order, reach)[1] >= needed for half in (0.5, k)):
+            return f"the {k:g}-fold order of shaft {shaft or 'of reference'}, of loose parts,"
+    return ""
+
+
+def _mains_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
+    """Name the multiple of twice the mains' frequency that the family's fundamental is on: magnetic forces modulate."""
+    own_hz = candidate.comb.fundamental * signals.frequency_per_order_hz
+    for mains_hz in MAINS_HZ:
+        pull_hz = 2 * mains_hz
+        k = round(own_hz / pull_hz)
+        if k and abs(own_hz / (k * pull_hz) - 1) <= MAINS_TOLERANCE:
+            return f"the magnetic pull of a {mains_hz:g} Hz supply ({k * pull_hz:g} Hz)"
     return ""
 
 

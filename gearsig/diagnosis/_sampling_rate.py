@@ -160,14 +160,14 @@ def _near(lines: StrongLines, places: FloatArray) -> NDArray[np.bool_]:
     return beside
 
 
-def _log_p(lines: StrongLines, factor: float, shafts: Sequence[float], races: Sequence[tuple[float, float]]) -> float:
+def _log_p(lines: StrongLines, factor: float, shafts: Sequence[float], parts: Sequence[tuple[float, float]]) -> float:
     r"""Return lg of the probability that chance puts so many of n lines on the places of shafts and races.
 
     .. math:: p = T \sum_{k \ge m} \binom{n}{k} c^k (1 - c)^{n - k}
 
     c is the share of the range that the places cover, T the number of speeds and slips tried: the stated speed may be
-    3 % beside the true one, a race 1.5 % beside its kinematic order. Each multiple of a race has two
-    sidebands of its shaft to either side.
+    3 % beside the true one, a part 1.5 % beside its kinematic order. Each multiple of a part has two sidebands to
+    either side: of a race at its shaft's order, of a rolling element at the cage's.
     """
     highest = max(lines.highest, 1.0)
     n_speeds = min(4001, int(2 * STATED_SPEED_TOLERANCE * highest / (lines.half_width / 1.5)) + 2)
@@ -176,18 +176,20 @@ def _log_p(lines: StrongLines, factor: float, shafts: Sequence[float], races: Se
     beside = np.abs(ratio - np.maximum(np.rint(ratio), 1)) * speeds
     # The speed that puts most lines on the shaft's multiples, or the stated one where those are weak.
     best = float(speeds[int(np.argmax((beside < lines.half_width).sum(axis=0)))])
-    return min(_log_p_at(lines, speed, n_speeds, shafts, races) for speed in (best, 1 / factor))
+    return min(_log_p_at(lines, speed, n_speeds, shafts, parts) for speed in (best, 1 / factor))
 
 
 def _log_p_at(
-    lines: StrongLines, speed: float, n_speeds: int, shafts: Sequence[float], races: Sequence[tuple[float, float]]
+    lines: StrongLines, speed: float, n_speeds: int, shafts: Sequence[float], parts: Sequence[tuple[float, float]]
 ) -> float:
     from scipy.stats import binom
 
     places = [np.arange(1, int(lines.highest / (shaft * speed)) + 2) * shaft * speed for shaft in shafts]
     seen, tries = _near(lines, np.concatenate(places)), float(n_speeds)
-    for race, shaft in races:
-        slips = [_family(race * slip, shaft, lines.highest / speed) * speed for slip in np.linspace(0.985, 1.015, 61)]
+    for part, sideband in parts:
+        slips = [
+            _family(part * slip, sideband, lines.highest / speed) * speed for slip in np.linspace(0.985, 1.015, 61)
+        ]
         new = [int((_near(lines, family) & ~seen).sum()) for family in slips]
         best = int(np.argmax(new))
         tries *= 3.0
@@ -205,26 +207,26 @@ def _log_p_at(
     return min(0.0, log10(max(p_value, 1e-30)))
 
 
-def _family(race: float, shaft: float, highest: float) -> FloatArray:
-    """Orders of a race's multiples with their sidebands."""
-    multiples = race * np.arange(1, int(highest / race) + 2)
-    return (multiples[:, None] + shaft * np.arange(-2, 3)).ravel()
+def _family(part: float, sideband: float, highest: float) -> FloatArray:
+    """Orders of a part's multiples with their sidebands."""
+    multiples = part * np.arange(1, int(highest / part) + 2)
+    return (multiples[:, None] + sideband * np.arange(-2, 3)).ravel()
 
 
 def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Finding | None:
     spectra = [*signals.order_excess.values(), *(e.excess for e in envelopes)]
     shafts = sorted(signals.known_shaft_orders.values())
-    races = list(_races(signals))
+    parts = list(_parts(signals))
 
     def evidence(factor: float, highest: float) -> float:
         """Sum over the spectra, of lg of the chance that lines up to an order lie as well."""
         found = (_strong_lines(excess, highest) for excess in spectra)
-        return sum(_log_p(lines, factor, shafts, races) for lines in found if lines is not None)
+        return sum(_log_p(lines, factor, shafts, parts) for lines in found if lines is not None)
 
-    if evidence(1.0, HIGHEST_ORDER) <= 2 * ENOUGH_EVIDENCE:
-        return None  # no other rate will explain four times as much
+    if evidence(1.0, HIGHEST_ORDER) <= ENOUGH_EVIDENCE:
+        return None
     # Halves of the shaft's order are looseness, and multiples blades or poles: races must tell these rates apart.
-    factors = [f for usual in USUAL_FACTORS for f in (usual, 1 / usual) if (f > 2 or races)]
+    factors = [f for usual in USUAL_FACTORS for f in (usual, 1 / usual) if (f > 2 or parts)]
     # A rate that is too high moves everything up, and more of the spectrum counts.
     ranges = {factor: HIGHEST_ORDER * max(1.0, 1 / factor) for factor in factors}
     sums = {factor: evidence(factor, ranges[factor]) for factor in factors}
@@ -243,10 +245,13 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     )
 
 
-def _races(signals: AnalysisSignals) -> Iterator[tuple[float, float]]:
-    """Yield the order of each race and that of its shaft."""
+def _parts(signals: AnalysisSignals) -> Iterator[tuple[float, float]]:
+    """Yield the order of each part of a bearing, and that of what modulates its impacts: the shaft, or the cage."""
     for bearing in signals.rig.bearings:
         ratio = signals.rig.ratio(bearing.shaft)
-        orders = bearing.orders()
-        if ratio is not None:
-            yield from ((ratio * orders[part], ratio) for part in ("BPFO", "BPFI") if part in orders)
+        if ratio is None:
+            continue
+        orders = {part: ratio * order for part, order in bearing.orders().items()}
+        yield from ((orders[part], ratio) for part in ("BPFO", "BPFI") if part in orders)
+        if "BSF" in orders and "FTF" in orders:  # an element passes the load once a turn of the cage
+            yield from ((orders["BSF"], orders["FTF"]), (orders["FTF"], 0.0))

@@ -8,6 +8,7 @@
 
 from gearsig.prepared._angle import (
     MAINS_HZ,
+    MAINS_TOLERANCE,
     STATED_SPEED_TOLERANCE,
     envelope_bands,
     phase_followed_angle,
@@ -36,6 +37,7 @@ __all__ = [
     "INNER_LINES",
     "LOG_RATIO_LIMIT",
     "MAINS_HZ",
+    "MAINS_TOLERANCE",
     "RUN_UP_FOOT_ORDERS",
     "STATED_SPEED_TOLERANCE",
     "Comb",

@@ -168,7 +168,12 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     comb = best_comb(lines, low, high, harmonics)
     mains = [hz for hz in MAINS_HZ if comb and abs(comb.fundamental / hz - 1) <= MAINS_TOLERANCE]
     for mains_hz in mains:
-        comb = best_comb(lines.without_multiples(mains_hz, skirt=MAINS_TOLERANCE), low, high, harmonics)
+        lines = lines.without_multiples(mains_hz, skirt=MAINS_TOLERANCE)
+        comb = best_comb(lines, low, high, harmonics)
+    telling = None if comb is None else _telling_harmonic(own, comb.fundamental, hertz)
+    if comb is not None and telling is not None:
+        nearer, harmonics = abs(comb.fundamental - hertz) / 2, harmonics[:telling]
+        comb = best_comb(lines, hertz - nearer, hertz + nearer, harmonics)
     if comb is None or comb.p_value > 1e-3:
         return _from_first_harmonic(own, stated)
     found = comb.fundamental
@@ -176,7 +181,20 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
         first_db, stated_db = (max(_line_db(excess, place) for excess in own) for place in (found, hertz))
         if _line_db(lines, found) <= CLEAR_LINE_DB or first_db < stated_db:
             return None
-    return _at(stated, found, resolution / (3 * N_SHAFT_HARMONICS), min(0.95, 1 - comb.p_value))
+    return _at(stated, found, resolution / (3 * len(harmonics)), min(0.95, 1 - comb.p_value))
+
+
+def _telling_harmonic(own: list[LineExcess], found_hz: float, stated_hz: float) -> int | None:
+    """Return the lowest harmonic that tells two speeds apart if it is clearly at the stated one, else None.
+
+    Higher harmonics of a speed that is off by a line or two may be a race's lines, with the shaft's sidebands about.
+    """
+    apart = max(abs(found_hz - stated_hz), 1e-12)
+    h = 1 + int(2 * own[0].spectrum.resolution / apart)
+    if not 1 < h <= N_SHAFT_HARMONICS:
+        return None  # the first harmonic is asked anyway, or they are one speed
+    found_db, stated_db = (max(_line_db(excess, h * hz) for excess in own) for hz in (found_hz, stated_hz))
+    return h if stated_db > max(found_db, CLEAR_LINE_DB) else None
 
 
 def _at(stated: ShaftAngle, hertz: float, uncertainty_hz: float, quality: float) -> ShaftAngle:

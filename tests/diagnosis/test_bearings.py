@@ -291,6 +291,54 @@ def test_impacts_at_twice_a_parts_order_are_not_the_parts() -> None:
     assert all(f.confidence < 0.5 for f in analysis.findings if f.code in NAMED)
 
 
+def outer_race_at(order: float, n: int, name: str) -> Bearing:
+    """Return a bearing of n balls whose outer race strikes at an order."""
+    return Bearing(name, "motor", n, 40.0 * (1 - 2 * order / n), 40.0)
+
+
+def with_bearings(recording: Recording, *bearings: Bearing) -> Recording:
+    assert recording.rig is not None
+    return replace(recording, rig=replace(recording.rig, bearings=bearings))
+
+
+def test_loose_parts_that_strike_every_other_turn_are_no_race() -> None:
+    loose = with_bearings(at_sensors(0.5, (20.0, 6.0)), outer_race_at(2.51, 7, "drive end"))
+    assert all(f.confidence < 0.5 for f in analyze(loose).findings if f.code in NAMED)
+
+
+def test_noise_that_the_supplys_pull_modulates_is_no_race() -> None:
+    quiet = at_sensors(1.003, (0.0, 0.0))
+    t = np.arange(quiet.n_samples) / quiet.sampling_rate_hz
+    pull = np.prod([1 + 0.3 / k * np.cos(2 * np.pi * 120.0 * k * t + k) for k in (1, 2, 3)], axis=0)
+    hum = with_bearings(replace(quiet, samples=quiet.samples * pull), outer_race_at(1.003 * 120 / 29, 10, "drive end"))
+    found = finding(analyze(hum), "bearing-outer-race")
+    assert found.confidence < 0.5
+    assert found.kind is not Kind.FAULT
+
+
+def test_of_two_like_bearings_the_one_at_the_loudest_sensor_is_named() -> None:
+    recording = at_sensors(3.5848, (2.0, 6.0))
+    samples = np.array(recording.samples)
+    samples[1] += 8.0 * np.random.default_rng(4).standard_normal(samples.shape[1])  # and it is not the clearest
+    like = (outer_race_at(3.596, 9, "drive end"), outer_race_at(3.5848, 9, "fan end"))
+    analysis = analyze(with_bearings(replace(recording, samples=samples), *like))
+    assert finding(analysis, "bearing-outer-race").where.bearing == "fan end"
+    assert finding(analysis, "bearing-outer-race").confidence > 0.5
+
+
+def test_a_stated_speed_that_is_right_is_not_moved_to_a_races_sidebands() -> None:
+    rng, shaft_hz, fs_hz = np.random.default_rng(3), 30.857, 12_000.0
+    turns = shaft_hz * np.arange(int(SECONDS * fs_hz)) / fs_hz
+    angles = np.cumsum((1 + 0.003 * rng.standard_normal(int(turns[-1] * 5.977) - 20)) / 5.977)
+    impacts, k = np.zeros(len(turns)), np.arange(200)
+    impacts[np.searchsorted(turns, angles)] = 1 + 0.9 * np.cos(2 * np.pi * angles)
+    x = 30 * np.convolve(impacts, np.exp(-k / 25) * np.sin(1.6 * k))[: len(turns)] + rng.standard_normal(len(turns))
+    x += sum(a * np.cos(2 * np.pi * h * turns + h) for h, a in ((1, 0.7), (2, 0.5), (3, 0.5)))
+    rig = Rig(shafts=(Shaft("motor"),), speed=ConstantSpeed(60 * shaft_hz, "motor"))
+    recording = Recording(x[None, :], fs_hz, (Channel("a1", "acceleration", "g"),), rig=rig)
+    assert refined_angle(recording, rig).mean_speed_rpm == pytest.approx(60 * shaft_hz, rel=5e-4)
+
+
 def test_a_family_among_others_as_clear_does_not_stand_out() -> None:
     rng = np.random.default_rng(7)
     excess = lines([1.3 * k for k in range(1, 250)], rng)  # any order has a multiple of 1.3 Hz near it

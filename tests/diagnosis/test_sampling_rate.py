@@ -25,17 +25,18 @@ MOTOR = Rig(
 
 @cache
 def motor(race: str, seed: int) -> Recording:
-    """A motor with its shaft's lines in noise, and a damaged race whose impacts ring at 2.8 kHz."""
+    """A motor with its shaft's lines in noise, and a damaged race or element whose impacts ring at 2.8 kHz."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(6.0 * FS_HZ)) / FS_HZ
     x = rng.standard_normal(len(t))
     for k in range(1, 7):
         x += rng.uniform(0.1, 0.5) * np.cos(2 * np.pi * k * SHAFT_HZ * t + rng.uniform(0, 6))
     if race:
-        rate_hz = {"BPFO": 3.585, "BPFI": 5.415}[race] * 0.997 * SHAFT_HZ
+        rate_hz = {"BPFO": 3.585, "BPFI": 5.415, "BSF": 2 * 2.357}[race] * 0.997 * SHAFT_HZ
         hits = np.arange(0.01, t[-1], 1 / rate_hz)
         impacts = np.zeros_like(t)
-        load = 1 + 0.8 * np.cos(2 * np.pi * SHAFT_HZ * hits) if race == "BPFI" else 1.0
+        modulation_hz = {"BPFO": 0.0, "BPFI": SHAFT_HZ, "BSF": 0.3983 * SHAFT_HZ}[race]
+        load = 1 + 0.8 * np.cos(2 * np.pi * modulation_hz * hits) if modulation_hz else 1.0
         impacts[np.round(hits * FS_HZ).astype(int)] = 8.0 * load
         x += np.convolve(impacts, np.exp(-900 * t[:400]) * np.sin(2 * np.pi * 2800 * t[:400]))[: len(t)]
     return Recording(x[None, :], FS_HZ, (Channel("a1", "acceleration", "m/s^2"),), rig=MOTOR)
@@ -49,7 +50,7 @@ def test_of_a_motor(race: str, times: float) -> None:
     assert not any(code.startswith("bearing") for code in codes(analysis))
 
 
-@pytest.mark.parametrize("race", ["", "BPFO", "BPFI"])
+@pytest.mark.parametrize("race", ["", "BPFO", "BPFI", "BSF"])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_that_is_right(race: str, seed: int) -> None:
     assert CODE not in codes(analyze(motor(race, seed)))
