@@ -358,7 +358,7 @@ def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> lis
         is_near = abs(best.comb.fundamental - order) <= near
         if is_near and p_value <= signals.settings.false_alarm_probability and _has_own_lines(best.comb):
             candidates.append(replace(best, p_value=p_value, bearing=bearing, name=name, expected=order))
-    candidates.sort(key=lambda c: -_weight(signals, c.name, c.comb.fundamental / c.expected - 1))
+    candidates.sort(key=lambda c: -_own_weight(signals, c))
     kept: list[Candidate] = []
     for candidate in candidates:
         if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
@@ -408,6 +408,13 @@ def _weight(signals: AnalysisSignals, name: str, slip: float) -> float:
     return exp(-0.5 * (slip / typical) ** 2) * (0.3 if name in ("BSF", "FTF") else 1.0)
 
 
+def _own_weight(signals: AnalysisSignals, candidate: Candidate) -> float:
+    """Return how likely the candidate's part is, by its slip and by whether its bearing is the nearest."""
+    near = nearest_bearing(signals, candidate.loudest or candidate.envelope.channel)
+    slip = candidate.comb.fundamental / candidate.expected - 1
+    return _weight(signals, candidate.name, slip) * (1.0 if near in (None, candidate.bearing) else 0.5)
+
+
 def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
     """Note what else would show at the same lines.
 
@@ -415,11 +422,10 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
     shaft, of half of it or of twice the mains beside it; and of an outer race, elements that differ, where lines a
     cage's turn apart are as strong.
     """
-    own = _weight(signals, candidate.name, candidate.comb.fundamental / candidate.expected - 1)
+    own = _own_weight(signals, candidate)
     parts = expected_parts(signals)
     order_of_part = next(o for b, name, o in parts if (b, name) == (candidate.bearing, candidate.name))
     near = nearest_bearing(signals, candidate.loudest or candidate.envelope.channel)
-    own *= 1.0 if near in (None, candidate.bearing) else 0.5
     others, rivals, twins = 0.0, [], []
     for bearing, name, order in parts:
         if (bearing, name) == (candidate.bearing, candidate.name):
