@@ -87,11 +87,11 @@ def make_report(
     """Write the pages with their progress; return the exit code."""
     from gearsig.batch import report_many
 
-    before, n_done = output.exists(), 0
+    before, so_far = output.exists(), "0"
 
     def advance(done: int, total: int, _result: object) -> None:
-        nonlocal n_done
-        n_done = done
+        nonlocal so_far
+        so_far = f"{done} of {total}"
         show(done, total=total)
 
     with options.open_cluster(cluster) as workers:
@@ -113,7 +113,7 @@ def make_report(
                     methods=methods,
                 )
         except KeyboardInterrupt:
-            typer.echo(f"gearsig: stopped after {n_done} files; {_kept(output, before)}", err=True)
+            typer.echo(f"gearsig: stopped after {so_far} files; {_kept(output, before)}", err=True)
             raise typer.Exit(EXIT_INTERRUPTED) from None
         ran = workers.text() if workers else ""
     for entry in result.entries:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import config, njit
 
 from gearsig.angle._types import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray, count, positive
@@ -548,7 +548,7 @@ def _fill(
             else:
                 interpolate(signal, positions, half_band, table, out[start:stop])
 
-    starts, n_threads = range(0, n, _CHUNK), min(4, get_num_threads())
+    starts, n_threads = range(0, n, _CHUNK), min(4, config.NUMBA_NUM_THREADS)
     if len(starts) == 1 or n_threads == 1:
         for start in starts:
             fill_chunk(start)

@@ -266,16 +266,16 @@ def test_an_interrupted_report_says_what_was_kept(
 ) -> None:
     def interrupted(_files: list[Path], output: Path, *, on_progress: Callable[..., None], **_: object) -> None:
         output.mkdir()
-        for _number in range(n_done):
+        for number in range(n_done):
             (output / "page.html").touch()
-            on_progress()
+            on_progress(number + 1, 2, None)
         raise KeyboardInterrupt
 
     monkeypatch.setattr("gearsig.batch.report_many", interrupted)
     code, _, err = run(capsys, "report", sample("healthy"), sample("run_up"), "-o", tmp_path / "pages")
     assert code == 130
     assert len(err.strip().splitlines()) == 1
-    assert f"stopped after {n_done} of 2 files; {'pages in' if n_done else 'nothing was kept'}" in err
+    assert ("stopped after 1 of 2 files; pages in" if n_done else "stopped after 0 files; nothing was kept") in err
     assert (tmp_path / "pages").exists() == bool(n_done)
 
 

@@ -126,7 +126,7 @@ class Gears {
 // One gear, of which only the teeth near the mesh are seen; the cracked tooth in the colour of faults.
 function wheel(context, x, radius, n, angleOf, cracked, colours, ink) {
   const step = (2 * Math.PI) / n, root = radius - 1.25 * MODULE, tip = radius + MODULE;
-  const profile = [[root, -0.33], [radius - 0.4 * MODULE, -0.28], [radius, -0.24], [tip, -0.13], [tip, 0.13], [radius, 0.24], [radius - 0.4 * MODULE, 0.28], [root, 0.33]];
+  const profile = [[root, -0.5], [root, -0.33], [radius - 0.4 * MODULE, -0.28], [radius, -0.24], [tip, -0.13], [tip, 0.13], [radius, 0.24], [radius - 0.4 * MODULE, 0.28], [root, 0.33], [root, 0.5]];
   context.save();
   context.translate(x, 0);
   for (let k = 0; k < n; k++) {
