@@ -216,12 +216,13 @@ def _family(part: float, sideband: float, highest: float) -> FloatArray:
 def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Finding | None:
     spectra = [*signals.order_excess.values(), *(e.excess for e in envelopes)]
     shafts = sorted(signals.known_shaft_orders.values())
-    parts = list(_parts(signals))
+    races, parts = (list(_parts(signals, with_elements=so)) for so in (False, True))
 
     def evidence(factor: float, highest: float) -> float:
         """Sum over the spectra, of lg of the chance that lines up to an order lie as well."""
         found = (_strong_lines(excess, highest) for excess in spectra)
-        return sum(_log_p(lines, factor, shafts, parts) for lines in found if lines is not None)
+        at = parts if factor == 1.0 else races
+        return sum(_log_p(lines, factor, shafts, at) for lines in found if lines is not None)
 
     if evidence(1.0, HIGHEST_ORDER) <= ENOUGH_EVIDENCE:
         return None
@@ -245,13 +246,17 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     )
 
 
-def _parts(signals: AnalysisSignals) -> Iterator[tuple[float, float]]:
-    """Yield the order of each part of a bearing, and that of what modulates its impacts: the shaft, or the cage."""
+def _parts(signals: AnalysisSignals, *, with_elements: bool) -> Iterator[tuple[float, float]]:
+    """Yield the order of each part of a bearing, and that of what modulates its impacts: the shaft, or the cage.
+
+    An element passes the load once a turn of the cage. Elements and cage speak for the stated rate only: n elements
+    pass an outer race, so that all lines of one would be the cage's at 1/n of the rate.
+    """
     for bearing in signals.rig.bearings:
         ratio = signals.rig.ratio(bearing.shaft)
         if ratio is None:
             continue
         orders = {part: ratio * order for part, order in bearing.orders().items()}
         yield from ((orders[part], ratio) for part in ("BPFO", "BPFI") if part in orders)
-        if "BSF" in orders and "FTF" in orders:  # an element passes the load once a turn of the cage
+        if with_elements and "BSF" in orders and "FTF" in orders:
             yield from ((orders["BSF"], orders["FTF"]), (orders["FTF"], 0.0))

@@ -172,7 +172,7 @@ def multipoint_deconvolution(
     >>> x[::125] = 1.0
     >>> x = np.convolve(x, np.exp(-np.arange(60) / 8) * np.sin(np.arange(60)))[:5000] + 0.2 * rng.normal(size=5000)
     >>> y = multipoint_deconvolution(x, 1000.0, 0.125)
-    >>> y.score > 3 * multipoint_deconvolution(x, 1000.0, 0.1037).score
+    >>> y.score > 2 * multipoint_deconvolution(x, 1000.0, 0.1037).score
     True
     """
     x, fs, unit, source = _checked(signal, channel_or_rate_hz, unit, source, n_taps)

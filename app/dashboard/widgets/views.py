@@ -386,7 +386,7 @@ OF_CHANNEL: dict[str, dict[str, Of]] = {
     "Order spectrum": {"Order spectrum": show_order_spectrum},
     "Map": {"Map": show_map_over_time, **_methods("Orders (Vold–Kalman)")},
     "Average": {"Synchronous average": show_average, **_methods("Crack severity")},
-    "Envelope": {"Envelope spectrum": show_envelope, **_methods("Kurtogram", "Cyclic coherence")},
+    "Envelope": {"Envelope spectrum": show_envelope, **_methods("Kurtogram", "Cyclic coherence", "Deconvolution")},
     "Time–frequency": _methods("Time–frequency", "Ridges", "Wavelet packets"),
     "Modes": _methods("Modes", "Denoising"),
     "Phase": _methods("Phase plane", "Embedding and chaos"),

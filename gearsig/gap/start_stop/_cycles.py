@@ -404,10 +404,13 @@ def contact_features(m: motions.PairMotion, flanks: Flanks, rows: Mask) -> dict[
     x, keep = robust_least_squares(design, q, keep, (drive, ~drive))
     residual = q - design @ x
     of = dict(zip(others, x[len(places) : len(places) + len(others)], strict=True))
-    middle = float(np.mean(x[: len(places)]))
+    # A place whose samples all lay far off has a level that nothing rests on.
+    rests = np.bincount(flanks.place[keep & drive], minlength=N_PLACES)[places] > 0
+    at_places = np.where(rests, x[: len(places)], NAN)
+    middle = float(np.nanmean(at_places))
     play = middle - float(x[-1]) if has_back else NAN
     curve = np.full(N_PLACES, NAN)
-    curve[places] = x[: len(places)] - middle
+    curve[places] = at_places - middle
     alone = flanks.alone & known & rows & (np.abs(residual) < PARTED_M)
     ordinary = float(np.median(np.abs(flanks.design[alone, 1]))) if np.any(alone) else NAN
     deflection = 1e6 * of.get(1, NAN) * ordinary
