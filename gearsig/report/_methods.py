@@ -668,12 +668,14 @@ def named_method(text: str) -> tuple[str, MethodOptions]:
     return name, MethodOptions(then=transform) if name == "modes" else MethodOptions(transform=transform)
 
 
-def fitting_methods(prepared: PreparedRecording, *, suspects_crack: bool = False) -> tuple[str, ...]:
+def fitting_methods(
+    prepared: PreparedRecording, *, suspects_crack: bool = False, suspects_bearing: bool = False
+) -> tuple[str, ...]:
     """Return the methods that a recording calls for, besides those that every page has.
 
     A run-up or coast-down: order map, frequency map and tracked orders. A suspected crack or other damage of a tooth:
-    the squeezed transform of its most impulsive mode. A simulated motion at a steady speed: its Poincaré section in the
-    phase plane.
+    the squeezed transform of its most impulsive mode. Else a suspected bearing: the kurtogram. A simulated motion at a
+    steady speed: its Poincaré section in the phase plane.
     """
     found: list[str] = []
     try:
@@ -685,6 +687,8 @@ def fitting_methods(prepared: PreparedRecording, *, suspects_crack: bool = False
         found += ["order-map", "frequency-map", "tracking"]
     if suspects_crack:
         found.append("modes+squeezed-cwt")
+    elif suspects_bearing:
+        found.append("kurtogram")
     if prepared.recording.truth is not None and angle is not None and not sweeps:
         found.append("poincare")
     return tuple(found)

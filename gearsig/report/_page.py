@@ -365,11 +365,13 @@ def gallery(analysis: Analysis, methods: Sequence[str] | None = None) -> Gallery
 def _further_methods(
     analysis: Analysis, claims: Sequence[Finding], methods: Sequence[str] | None
 ) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
-    """Return the pictures of further methods, of the channel that the first finding of a tooth names, and refusals."""
+    """Return the pictures of further methods, of the channel that a tooth's or race's finding names, and refusals."""
     teeth = [finding for finding in claims if finding.where.tooth is not None or finding.where.angle_deg is not None]
-    channel = next((name for finding in teeth for name in finding.where.channels), "")
+    bearings = [finding for finding in claims if finding.where.bearing]
+    channel = next((name for finding in (*teeth, *bearings) for name in finding.where.channels), "")
     prepared = prepare(analysis.recording, analysis.rig)
-    chosen = fitting_methods(prepared, suspects_crack=bool(teeth)) if methods is None else methods
+    fitting = fitting_methods(prepared, suspects_crack=bool(teeth), suspects_bearing=bool(bearings))
+    chosen = fitting if methods is None else methods
     found, reasons = method_pictures(chosen, prepared, channel)
     if methods is None:  # nobody asked for what cannot be had
         reasons = ()

@@ -29,10 +29,15 @@ def test_double_endings_go():
     assert page_names(["run.csv.gz", "run.csv", "RUN.mat"]) == ("run", "run-2", "RUN-3")
 
 
-def test_a_failed_write_leaves_what_was_there(tmp_path):
+def test_a_failed_write_leaves_what_was_there(tmp_path, monkeypatch):
     path = write_text(tmp_path / "page.html", "old")
-    with pytest.raises(UnicodeEncodeError):
-        write_text(path, "x" * 1_000_000 + "\ud800")
+
+    def full(_part, _target):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(type(path), "replace", full)
+    with pytest.raises(InputError, match="No space left"):
+        write_text(path, "x" * 1_000_000)
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -99,6 +99,7 @@ def test_options_of_other_methods_wrong_names_and_missing_speeds_are_refused() -
 
 def test_a_run_up_calls_for_maps_a_suspected_tooth_for_modes() -> None:
     assert fitting_methods(prepare(recording()), suspects_crack=True) == ("modes+squeezed-cwt",)
+    assert fitting_methods(prepare(recording()), suspects_bearing=True) == ("kurtogram",)
     assert fitting_methods(prepare(recording())) == ()
     sample = "sample_data/run_up.h5"
     from gearsig.recording import read_recording
