@@ -11,7 +11,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from contextvars import ContextVar
 from itertools import islice
-from multiprocessing import parent_process
+from multiprocessing import connection, parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
 from threading import Lock, Thread
 from typing import Any, TypeVar
@@ -135,6 +135,10 @@ def _start_worker() -> None:
         fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
         flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
         fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
+        if connection.wait(
+            [parent.sentinel], 0
+        ):  # it went while this process started: there is nothing left to signal that
+            os._exit(1)
     Thread(target=_end_with_parent, daemon=True).start()
 
 
