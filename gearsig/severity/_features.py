@@ -207,6 +207,19 @@ FEATURES = (
 )
 """Order of the entries of a feature vector; see `feature_vector`."""
 
+DB_OF_LOG_ENERGY = 10.0 / np.log(10.0)
+IN_WORDS = {
+    "band_excess": ("the event over the mesh", "dB", DB_OF_LOG_ENERGY),
+    "line_excess": ("the event's spectrum over that of the mesh", "dB", DB_OF_LOG_ENERGY),
+    "prominence": ("the event over the other teeth", "dB", DB_OF_LOG_ENERGY),
+    "pattern_excess": ("the event over the differences between teeth", "dB", DB_OF_LOG_ENERGY),
+    "event_slope": ("the event's change from one mesh harmonic to the next", "dB", DB_OF_LOG_ENERGY),
+    "mesh_slope": ("the mesh's change from one harmonic to the next", "dB", DB_OF_LOG_ENERGY),
+    "event_spread": ("the event's scatter about that change", "dB", DB_OF_LOG_ENERGY),
+    "mesh_spread": ("the mesh's scatter about that change", "dB", DB_OF_LOG_ENERGY),
+}
+"""Phrase, unit, units in one of the feature; the others are given by the rig and compared before."""
+
 SHAPED = ("band_excess", "line_excess", "prominence")
 """Features that the depth is read from, by curves that never fall."""
 

@@ -14,7 +14,7 @@ import numpy as np
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
-from gearsig.severity._features import FEATURES, RELIEF, RISING, SHAPE, SHAPED
+from gearsig.severity._features import FEATURES, IN_WORDS, RELIEF, RISING, SHAPE, SHAPED
 
 MIN_SPREAD = 0.1
 """Of ln percent: no machine is known better than to ten percent."""
@@ -149,8 +149,11 @@ class DepthModel:
         beyond[np.diag(self.precision) == 0] = 0.0  # a clearer event than any in the calibration is no harm
         i = int(np.argmax(beyond))
         if beyond[i] > 0:
-            allowed = f"{self.lowest[i]:.2f} to {self.highest[i]:.2f}"
-            return f"its {FEATURES[i]} is {features[i]:.2f}, the calibration has {allowed}"
+            phrase, unit, scale = IN_WORDS.get(FEATURES[i], (FEATURES[i].replace("_", " "), "", 1.0))
+            value, lowest, highest = scale * features[i], scale * self.lowest[i], scale * self.highest[i]
+            return (
+                f"{phrase} is {value:.1f} {unit}".rstrip() + f"; theirs {lowest:.1f} to {highest:.1f} {unit}".rstrip()
+            )
         z = self.standardised(features)
         distance = float(np.sqrt(z @ self.precision @ z))  # Mahalanobis
         if distance > self.largest_distance:
