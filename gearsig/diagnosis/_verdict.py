@@ -50,11 +50,10 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     if outcome in (Outcome.FAULT, Outcome.SUSPICION):
         kind = Kind.FAULT if outcome is Outcome.FAULT else Kind.SUSPICION
         first, *more = (f for f in findings if f.kind is kind)
-        claim = first.title + (f" (at most {100 * first.confidence:.0f} % sure)" if kind is Kind.FAULT else "")
-        claim += f", and {len(more)} more." if more else ""
-        if unused and not claim.endswith("."):
-            claim += "."
-        return " ".join([f"{kind.value.capitalize()}: {claim}", *(f.title for f in unused)])
+        claim = first.title.removesuffix(".")
+        claim += f" (at most {100 * first.confidence:.0f} % sure)" if kind is Kind.FAULT else ""
+        claim += f", and {len(more)} more" if more else ""
+        return " ".join([f"{kind.value.capitalize()}: {claim}.", *(f.title for f in unused)])
     said = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.NO_FAULT:
         return " ".join(["No fault shows.", *said, *([] if has_reference else [WITHOUT_REFERENCE])])

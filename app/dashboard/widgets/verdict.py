@@ -173,12 +173,12 @@ def headline_of(verdict: str) -> tuple[str, str]:
     --------
     >>> headline_of("No fault shows. " + "No damage shows on any tooth or bearing that could be examined. " * 2)[0]
     'No fault shows.'
-    >>> headline_of("Fault: Damage at a tooth. (at most 86 % sure). " + "Its depth cannot be told. " * 5)[0]
-    'Fault: Damage at a tooth. (at most 86 % sure)'
+    >>> headline_of("Fault: Damage at a tooth (at most 86 % sure). " + "Its depth cannot be told. " * 5)[0]
+    'Fault: Damage at a tooth (at most 86 % sure).'
     """
     if len(verdict) <= LONGEST_HEADLINE:
         return verdict, ""
-    found = re.match(r"(.+?\.(?: \([^)]*\))?)\.? +(.+)", verdict)
+    found = re.match(r"(.+?\.) +(.+)", verdict)
     return (found[1], found[2].strip()) if found else (verdict, "")
 
 
