@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from io import StringIO
 from itertools import groupby
@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearsig import phase
-from gearsig.cache import read_arrays
+from gearsig.cache import read_arrays, remove_parts, write_text, write_whole
 from gearsig.checks import FloatArray, count, one_of, within
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.processes import active_cluster, n_processors, run_jobs
 from sims.cracked import DECAYS, SIGNALS, TRANSMISSION_ERROR, Branch, End, PairState, SteadyRun
 from sims.gear_pair import COORDINATES
-from sims.sweep import claimed, written
+from sims.sweep import claimed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -175,10 +175,7 @@ def save(kept: KeptValue, path: Path) -> None:
             "v": end.state.v,
             "end": np.array([end.state.set_angle_rad, end.speed_rpm, end.torque_nm]),
         }
-    part = path.with_name(f".{path.name}.part")
-    with part.open("wb") as file:
-        np.savez(file, **fields)  # type: ignore[arg-type]  # its stubs take names of options for keys
-    part.replace(path)
+    write_whole(path, lambda file: np.savez(file, allow_pickle=False, **fields))
 
 
 def load(path: Path) -> KeptValue | None:
@@ -296,9 +293,7 @@ def run_folder(
                 for _ in running:
                     show()
     finally:
-        for part in (folder / VALUES).glob(".*.part"):
-            with suppress(OSError):
-                part.unlink()
+        remove_parts(folder / VALUES)
     return complete(request, folder)
 
 
@@ -382,11 +377,11 @@ def write_results(request: BifurcationRequest, values: Values, folder: Path) -> 
         If no value gave points.
     """
     figure = figure_of(request.branch, values)
-    table = written(folder / POINTS, points_csv(request.branch, values))
+    table = write_text(folder / POINTS, points_csv(request.branch, values))
     text = json.dumps(summary(request, values), indent=2, ensure_ascii=False) + "\n"
     picture = folder / FIGURE
     figure.savefig(picture, dpi=DOTS_PER_INCH)
-    return picture, table, written(folder / SUMMARY, text)
+    return picture, table, write_text(folder / SUMMARY, text)
 
 
 def diagrams(branch: Branch, values: Values) -> dict[str, phase.BifurcationDiagram]:

@@ -12,13 +12,13 @@ import numpy as np
 
 from gearsig import plot
 from gearsig.angle import find_shaft_angle, resample_to_angle
+from gearsig.cache import write_text
 from gearsig.checks import FloatArray, positive
 from gearsig.orders import OrderMap, order_map
 from sims import reduced_fe
 from sims.gear_pair import build_rig
 from sims.machine import Operation, Profile
 from sims.reduced_fe import FlexiblePair, MeshMaps, SpeedSweep, SpreadingCheck
-from sims.sweep import written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -201,9 +201,9 @@ def write_study(study: Study, folder: Path, title: str) -> tuple[Path, ...]:
     for name, figure in figures(study, title).items():
         paths.append(folder / f"{name}.png")
         figure.savefig(paths[-1], dpi=160)
-    paths.append(written(folder / "sweeps.csv", sweeps_csv(study)))
-    paths.append(written(folder / "maps.csv", maps_csv(study.maps)))
-    paths.append(written(folder / "study.json", json.dumps(summary(study), indent=2, ensure_ascii=False) + "\n"))
+    paths.append(write_text(folder / "sweeps.csv", sweeps_csv(study)))
+    paths.append(write_text(folder / "maps.csv", maps_csv(study.maps)))
+    paths.append(write_text(folder / "study.json", json.dumps(summary(study), indent=2, ensure_ascii=False) + "\n"))
     return tuple(paths)
 
 

@@ -129,6 +129,7 @@ def report_many(
     InputError
         If there are no paths, `n_processes` is below 1, or the folder cannot be made.
     """
+    from gearsig.cache import remove_parts
     from gearsig.checks import count
     from gearsig.fleet import find_recordings
     from gearsig.report import (
@@ -138,7 +139,6 @@ def report_many(
         made_folder,
         named_method,
         page_names,
-        remove_parts,
         write_index,
     )
 
@@ -196,7 +196,7 @@ def report_many(
                 if on_progress is not None:
                     on_progress(len(results), len(jobs), result)
     finally:
-        remove_parts(folder, [job.page.name for job in jobs])
+        remove_parts(folder)
         made = index()
     return made
 
@@ -248,9 +248,10 @@ def _kept(job: _Job) -> Entry | None:
 
 def _report_one(job: _Job) -> Entry | Failure:
     """Analyse one recording and write its page; every error becomes a reason."""
+    from gearsig.cache import write_text
     from gearsig.diagnosis import analyze
     from gearsig.recording import read_recording
-    from gearsig.report import entry_of, page_pdf, plain, write_page, write_pdf, write_text
+    from gearsig.report import Entry, entry_of, from_plain, page_pdf, plain, write_page, write_pdf
     from gearsig.rig import read_rig, rig_file_beside
 
     try:
@@ -264,10 +265,11 @@ def _report_one(job: _Job) -> Entry | Failure:
         write_page(analysis, job.page, command=job.command, index="index.html", methods=job.methods)
         if job.pdf:
             write_pdf(job.page.with_suffix(".pdf"), page_pdf(analysis, command=job.command, methods=job.methods))
-        entry = replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference)
+        entry = plain(replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference))
         with suppress(GearsigError):  # a page that the next run makes again
-            write_text(_result_path(job), json.dumps({"made_of": job.made_of, "entry": plain(entry)}) + "\n")
-        return entry  # noqa: TRY300
+            write_text(_result_path(job), json.dumps({"made_of": job.made_of, "entry": entry}) + "\n")
+        kept: Entry = from_plain(Entry, entry, "entry")  # rounded as for a later run, which must say the same
+        return kept  # noqa: TRY300
     except GearsigError as error:
         return _failure(job, str(error))
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import os
+import platform
+import secrets
+import shutil
 import sys
-import tempfile
+import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 from zipfile import ZipFile
+from zlib import crc32
 
 import numpy as np
 
@@ -44,7 +49,44 @@ def cache_folder(room: str) -> Path:
     return base / "gearsig" / room
 
 
-def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+def part_beside(path: Path) -> Path:
+    """Return a hidden name beside a file's place for what is not complete; it says which process of which machine."""
+    return path.with_name(f".{path.name[:60]}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.part")
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove what processes have left that were killed: of this machine what runs no more, of others after an hour."""
+    for part in folder.glob(".*.part"):
+        machine, _, process = part.name.split(".")[-2].rpartition("-")[0].partition("-")
+        with suppress(OSError):
+            if machine == _machine() and process.isdigit():
+                is_left = int(process) == os.getpid() or not _runs(int(process))
+            else:
+                is_left = time.time() - part.stat().st_mtime > 3600.0
+            if is_left and part.is_dir():
+                shutil.rmtree(part)
+            elif is_left:
+                part.unlink()
+
+
+def _machine() -> str:
+    return f"{crc32(platform.node().encode()):08x}"
+
+
+def _runs(process: int) -> bool:
+    """Return whether a process runs; where the system cannot be asked without harm, it may."""
+    if sys.platform == "win32":
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it is another user's
+        return True
+    return True
+
+
+def write_whole(path: Path, write: Callable[[IO[bytes]], object], *, remedy: str = "choose another folder") -> Path:
     """Write a file beside its place and move it there: whole or not at all; its folder is made where there is none.
 
     Raises
@@ -52,21 +94,30 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     InputError
         If the folder cannot be written.
     """
-    part = ""
+    part = part_beside(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem[:32]}-", suffix=".part")
-        with os.fdopen(handle, "wb") as file:
+        with part.open("xb") as file:
             write(file)
-        Path(part).chmod(0o644)  # temporary files are for their owner only
-        Path(part).replace(path)
+        part.replace(path)
     except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})", where=str(path), remedy="choose another folder"
-        ) from None
-    finally:
-        if part:
-            Path(part).unlink(missing_ok=True)
+        raise InputError(f"cannot be written ({error.strerror or error})", where=str(path), remedy=remedy) from None
+    finally:  # also on Ctrl-C
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+    return path
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a result as a text, whole or not at all; a failure leaves what was there before.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    content = text.encode("utf-8", "replace")
+    return write_whole(path, lambda file: file.write(content), remedy="choose another folder with -o")
 
 
 def keep(path: Path, write: Callable[[IO[bytes]], object]) -> bool:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import shutil
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from gearsig.cache import part_beside
 from gearsig.errors import InputError
 from gearsig.recording import WRITERS, Recording, write_recording
 from gearsig.rig import write_rig
@@ -63,9 +63,9 @@ def write_set(recording: Recording, names: FileSet) -> None:
     """
     if recording.rig is None or recording.truth is None:
         raise InputError("the recording has no rig or no truth", where=names.recording.name)
-    folder = names.recording.parent
+    unfinished = part_beside(names.recording)
     try:
-        unfinished = Path(tempfile.mkdtemp(dir=folder, prefix=f".{names.recording.stem[:32]}-"))
+        unfinished.mkdir()
     except OSError as error:
         raise InputError(
             f"cannot be written ({error.strerror})", where=str(names.recording), remedy="choose another folder"

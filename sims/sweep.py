@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from io import StringIO
 from itertools import product
@@ -13,6 +13,7 @@ from math import isfinite, prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gearsig.cache import remove_parts, write_text
 from gearsig.checks import count, one_of, positive, within
 from gearsig.errors import GearsigError, InputError
 from gearsig.processes import n_processors, run_jobs
@@ -296,7 +297,7 @@ def run_sweep(
                 if on_progress is not None:
                     on_progress(n_found + len(done), len(points), outcome)
     finally:
-        _remove_unfinished(target)
+        remove_parts(target)
         index = _write_index(sweep, target, points, done)
     return SweepResult(len(points), n_found, tuple(done[i] for i in sorted(done)), index)
 
@@ -335,12 +336,12 @@ def claimed(folder: Path, definition: Mapping[str, Any], name: str = DEFINITION,
         folder.mkdir(parents=True, exist_ok=True)
         if (folder / name).exists():
             _check_same(folder / name, text, kind)
-        elif any(folder.iterdir()):
+        elif any(path.suffix != ".part" for path in folder.iterdir()):  # such a run that was killed at once
             raise InputError(
                 f"holds files that belong to no {kind}", where=str(folder), remedy="choose another with -o"
             )
         else:
-            written(folder / name, text)
+            write_text(folder / name, text)
     except OSError as error:
         raise InputError(
             f"cannot be written ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
@@ -396,20 +397,4 @@ def _write_index(sweep: Sweep, folder: Path, points: Sequence[SweepPoint], done:
         table.writerow(
             [point.index, *(f"{v:.12g}" for v in point.values), point.seed, path.name if path.exists() else "", reason]
         )
-    return written(folder / INDEX, text.getvalue())
-
-
-def written(path: Path, text: str) -> Path:
-    """Write a text whole or not at all."""
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(text, encoding="utf-8")
-    return part.replace(path)
-
-
-def _remove_unfinished(folder: Path) -> None:
-    """Remove what workers that were stopped in the middle left."""
-    import shutil
-
-    for part in folder.glob(".point_*-*"):
-        with suppress(OSError):
-            shutil.rmtree(part)
+    return write_text(folder / INDEX, text.getvalue())

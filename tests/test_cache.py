@@ -1,12 +1,15 @@
 """Kept files: what comes back is what was written, or nothing, whatever became of the bytes."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gearsig.cache import keep, read_arrays
+from gearsig.cache import keep, part_beside, read_arrays, remove_parts
 
 ARRAYS = {"about": np.array('{"key": 1}'), "values": np.random.default_rng(0).normal(size=(12, 9))}
 ENOUGH = 1_000_000
@@ -48,3 +51,17 @@ def test_a_place_that_cannot_be_written_costs_no_result(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert not keep(tmp_path / "file" / "kept.npz", lambda file: file.write(b"x"))
     assert keep(tmp_path / "kept.npz", lambda file: file.write(b"x"))
+
+
+def test_only_what_a_dead_process_left_is_removed(tmp_path: Path) -> None:
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    own = part_beside(tmp_path / "a[1].html")
+    left, running = (own.with_name(own.name.replace(f"-{os.getpid()}-", f"-{n}-")) for n in (ended.pid, os.getppid()))
+    elsewhere = own.with_name(f".a.h5.00000000-{ended.pid}-0f.part")
+    for path in (own, running, elsewhere, tmp_path / "a[1].html"):
+        path.touch()
+    left.mkdir()
+    (left / "a.h5").touch()
+    remove_parts(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {running.name, elsewhere.name, "a[1].html"}

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from app.benchmark.answer import Answer, answer_of, to_text
 from app.benchmark.diagnosers import VisibleCase, diagnoser, read_seen
+from gearsig.cache import write_text
 from gearsig.errors import GearsigError
 
 ANSWERS = "answers.json"
@@ -35,9 +36,7 @@ def main(names: Sequence[str]) -> None:
     """Answer with each diagnoser in turn and write the answers, whole or not at all."""
     seen = read_seen(Path.cwd())
     answers = {name: answered(name, seen) for name in names}
-    part = Path(f".{ANSWERS}.part")
-    part.write_text(to_text(answers), encoding="utf-8")
-    part.replace(ANSWERS)
+    write_text(Path(ANSWERS), to_text(answers))
 
 
 def _cpu_s() -> float:

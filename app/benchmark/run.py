@@ -21,10 +21,10 @@ from app.benchmark.diagnose_one import ANSWERS
 from app.benchmark.diagnosers import diagnoser, folders_of
 from app.stopping import Running, stop
 from gearsig import __version__
-from gearsig.cache import FOLDERS
+from gearsig.cache import FOLDERS, write_text
 from gearsig.checks import count
 from gearsig.processes import process_pool
-from sims.sweep import claimed, written
+from sims.sweep import claimed
 
 # --------------------
 # Makes cases and has them answered: each by a fresh process in a folder of its own, which is then forgotten.
@@ -137,7 +137,7 @@ def _one(request: BenchmarkRequest, planned: PlannedCase, folder: Path, makers: 
         place = Path(name)
         truth = makers.submit(request.plan.make, planned, place).result()
         answers = diagnosed(place, request.diagnosers, running)
-    written(kept, to_text(answers))
+    write_text(kept, to_text(answers))
     return Done(planned, truth, answers)
 
 

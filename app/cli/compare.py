@@ -131,7 +131,8 @@ def read_pair(text: str, simulated: Recording, recorded: Recording) -> tuple[str
 
 def write_comparison(comparison: Comparison, folder: Path, command: str) -> None:
     """Write page, data and table; all are made before the first is written, and each appears when it is complete."""
-    from gearsig.report import comparison_page, comparison_to_json, orders_csv, write_text
+    from gearsig.cache import write_text
+    from gearsig.report import comparison_page, comparison_to_json, orders_csv
 
     texts = {
         TABLE: orders_csv(comparison),

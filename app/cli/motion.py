@@ -44,8 +44,9 @@ def start_stop(
 
     Example: gearsig start-stop drive.h5 --rig drive.toml -o drive
     """
+    from gearsig.cache import write_text
     from gearsig.motion import examine_start_stop
-    from gearsig.report import check_writable, start_stop_json, start_stop_text, write_text
+    from gearsig.report import check_writable, start_stop_json, start_stop_text
 
     if output is not None:
         check_writable(output)
@@ -159,8 +160,9 @@ def read_datum(text: str) -> str | float:
 
 def write_force(estimate: ForceEstimate, study: NoiseStudy | None, folder: Path) -> tuple[str, ...]:
     """Write data, table and pictures; return the files' names. Without a reference there is no picture."""
+    from gearsig.cache import write_text
     from gearsig.plot import force_figure, noise_figure
-    from gearsig.report import force_csv, force_json, write_text
+    from gearsig.report import force_csv, force_json
 
     write_text(folder / FORCE_DATA, force_json(estimate, study))
     write_text(folder / TABLE, force_csv(estimate))

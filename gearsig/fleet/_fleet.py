@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearsig.cache import part_beside
 from gearsig.checks import closest_match_hint, count, one_of
 from gearsig.errors import InputError
 from gearsig.fleet._add import FAILED, AddResult, AnalysisOptions, Progress, add_recordings
@@ -368,7 +368,7 @@ class Fleet:
             frame = self.series(machine, point)
             frame = frame[(frame["name"] == name) | (not name)]
         where, values = _where(machine, point, {"name": name if table == "indicators" else ""}, start, end)
-        part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+        part = part_beside(target)
 
         def write(connection: DuckDBPyConnection) -> int:
             if dated:
@@ -466,7 +466,7 @@ class Fleet:
         new = pd.DataFrame(rows, columns=list(_STATE))
         connection.register("judged_anew", new)
         connection.register("stale", pd.DataFrame([place[:2] for place in stale], columns=["machine", "point"]))
-        part = self.folder / f".{TRENDS}.{secrets.token_hex(4)}.part"
+        part = part_beside(self.folder / TRENDS)
         columns = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
         text = str(part).replace("'", "''")
         try:

@@ -24,7 +24,7 @@ from math import log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from gearsig.cache import write_whole
+from gearsig.cache import remove_parts, write_whole
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -410,10 +410,8 @@ class Store:
         for path in (self.folder / SEGMENTS).iterdir():
             if path.name not in counting:
                 shutil.rmtree(path, ignore_errors=True)
-        for path in (self.folder / NEW).glob(".*.part"):
-            with suppress(OSError):
-                if time.time() - path.stat().st_mtime > 3600.0:  # of a process that was killed
-                    path.unlink()
+        for folder in (self.folder, self.folder / NEW):
+            remove_parts(folder)
 
 
 def _alike(sizes: dict[str, int]) -> list[str]:

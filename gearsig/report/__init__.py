@@ -11,7 +11,7 @@ from gearsig.report._comparison import (
     comparison_to_json,
     orders_csv,
 )
-from gearsig.report._files import check_writable, made_folder, page_names, remove_parts, write_text
+from gearsig.report._files import check_writable, made_folder, page_names
 from gearsig.report._fleet import fleet_page_html, write_fleet_page
 from gearsig.report._gap_json import gap_from_dict, gap_schema, gap_to_dict, gap_to_json, read_gap_json, write_gap_json
 from gearsig.report._gap_page import (
@@ -153,7 +153,6 @@ __all__ = [
     "read_gap_json",
     "reference_text",
     "references_text",
-    "remove_parts",
     "size_text",
     "speed_is_constant",
     "start_stop_figures",
@@ -171,5 +170,4 @@ __all__ = [
     "write_json",
     "write_page",
     "write_pdf",
-    "write_text",
 ]

@@ -36,10 +36,10 @@ from pathlib import Path
 
 from gearsig import __version__
 from gearsig.angle import ShaftAngle
+from gearsig.cache import write_text
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, changes
 from gearsig.formatting import rounded
 from gearsig.recording import Recording
-from gearsig.report._files import write_text
 from gearsig.report._json import Json, plain
 from gearsig.rig import SpeedSource
 from gearsig.severity import CrackEstimate, NoCrackSeen

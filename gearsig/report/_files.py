@@ -1,13 +1,11 @@
-"""Names of report files, and writing them so that none is ever half there."""
+"""Names of report files, and what is checked before they are written."""
 
 from __future__ import annotations
 
 import re
 import secrets
 from collections.abc import Iterable
-from contextlib import suppress
 from functools import cache
-from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +15,6 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-PART_SUFFIX = ".part"
 LONGEST_NAME = 50  # a letter may take four bytes, and file systems stop at 255
 _RESERVED = {"index", "con", "prn", "aux", "nul"} | {f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10)}
 
@@ -71,35 +68,6 @@ def made_folder(folder: Path) -> Path:
             f"the folder cannot be made ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
         ) from error
     return folder
-
-
-def write_text(path: Path, text: str) -> Path:
-    """Write a file beside its place and move it there when it is complete; a failure leaves what was there before.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
-    made_folder(path.parent)
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
-    try:
-        with part.open("x", encoding="utf-8", errors="replace", newline="\n") as file:
-            file.write(text)
-        part.replace(path)
-    except OSError as error:
-        raise _unwritable(path, error) from None
-    finally:  # also on Ctrl-C
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-    return path
-
-
-def remove_parts(folder: Path, file_names: Iterable[str]) -> None:
-    """Remove what an interrupted process left of the named files."""
-    for name in file_names:
-        for part in folder.glob(f".{escape(name)}.*{PART_SUFFIX}"):
-            part.unlink(missing_ok=True)
 
 
 def _unwritable(path: Path, error: OSError) -> InputError:

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from gearsig import __version__
+from gearsig.cache import write_text
 from gearsig.errors import InputError
 from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, fleet_changes, trends_text
 from gearsig.formatting import readable
 from gearsig.plot import Picture, fleet_trend_picture, unit_text
-from gearsig.report._files import render, write_text
+from gearsig.report._files import render
 
 LEVEL_CLASSES = {"alarm": "fault", "warning": "suspicion", "ok": "no-fault"}
 MAX_ROWS, MAX_POINTS, MAX_PICTURES = 60, 200, 8

@@ -12,6 +12,7 @@ from math import inf, isnan
 from pathlib import Path
 
 from gearsig import __version__
+from gearsig.cache import write_text
 from gearsig.errors import InputError
 from gearsig.gap import (
     Added,
@@ -25,7 +26,6 @@ from gearsig.gap import (
     Shrinkage,
     SpectrumCurves,
 )
-from gearsig.report._files import write_text
 from gearsig.report._json import Json, Layout, from_plain, plain
 
 SCHEMA, SCHEMA_VERSION = "gearsig.gap", 2

@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from gearsig import __version__, plot
+from gearsig.cache import write_text
 from gearsig.formatting import named, readable, signed
 from gearsig.gap import (
     NONE,
@@ -39,7 +40,7 @@ from gearsig.gap import (
     severity_unit,
     stance_words,
 )
-from gearsig.report._files import render, write_text
+from gearsig.report._files import render
 from gearsig.report._sections import Rows
 
 N_DETAILED = 3

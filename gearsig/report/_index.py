@@ -15,11 +15,12 @@ from typing import Any
 from urllib.parse import quote
 
 from gearsig import __version__
+from gearsig.cache import write_text
 from gearsig.diagnosis import Analysis, Kind, Outcome
 from gearsig.formatting import readable
 from gearsig.indicators import Indicator
 from gearsig.plot import unit_text, with_unit
-from gearsig.report._files import render, write_text
+from gearsig.report._files import render
 from gearsig.report._pdf import compiled, write_pdf
 from gearsig.report._sections import css_class
 from gearsig.severity import CrackEstimate

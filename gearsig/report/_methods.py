@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from gearsig import plot
 from gearsig.angle import ShaftAngle
+from gearsig.cache import write_text
 from gearsig.checks import FloatArray, closest_match_hint, count, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import OrderMap
 from gearsig.plot import Captioned, Cursor, order_cursors, with_unit
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
-from gearsig.report._files import made_folder, write_text
+from gearsig.report._files import made_folder
 from gearsig.report._json import plain
 from gearsig.rig import order_lines
 from gearsig.spectra import Spectrum

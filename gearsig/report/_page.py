@@ -12,6 +12,7 @@ import numpy as np
 
 from gearsig import plot
 from gearsig.angle import ShaftAngle
+from gearsig.cache import write_text
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis, Finding, Kind, Where, changes
 from gearsig.errors import RefusalError
@@ -22,7 +23,7 @@ from gearsig.plot import Captioned, Cursor, Picture, embed, order_cursors, unit_
 from gearsig.plot import _style as style
 from gearsig.prepared import prepare
 from gearsig.recording import SI_FACTORS
-from gearsig.report._files import render, write_text
+from gearsig.report._files import render
 from gearsig.report._methods import fitting_methods, method_pictures
 from gearsig.report._sections import (
     change_rows,

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import secrets
 from base64 import b64decode
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict
 from datetime import datetime
 from importlib.resources import files
@@ -15,10 +13,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from gearsig import __version__
+from gearsig.cache import write_whole
 from gearsig.diagnosis import Analysis
 from gearsig.errors import InputError
 from gearsig.plot import Picture, font_folder
-from gearsig.report._files import PART_SUFFIX, made_folder
 from gearsig.report._page import page_parts
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
@@ -89,18 +87,7 @@ def write_pdf(path: str | Path, content: bytes) -> Path:
     InputError
         If it cannot be written.
     """
-    path = Path(path)
-    made_folder(path.parent)
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}{PART_SUFFIX}")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror or error})", where=str(path)) from None
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-    return path
+    return write_whole(Path(path), lambda file: file.write(content))
 
 
 def check_pdf() -> None:

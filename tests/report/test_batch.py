@@ -13,6 +13,7 @@ import pytest
 
 from gearsig import batch
 from gearsig.batch import report_many
+from gearsig.cache import part_beside
 from gearsig.diagnosis import Outcome
 from gearsig.errors import InputError
 from gearsig.report import Entry, Failure
@@ -103,7 +104,7 @@ def test_files_of_one_name_are_told_apart(tmp_path, monkeypatch):
 def test_an_interruption_leaves_whole_pages_only(recordings, tmp_path, monkeypatch):
     def interrupted(job):
         if job.path.name == "two.csv":
-            (job.page.parent / f".{job.page.name}.0f.part").write_text("half a pa")
+            part_beside(job.page).write_text("half a pa")
             raise KeyboardInterrupt
         return _page_for(job)
 
@@ -115,6 +116,7 @@ def test_an_interruption_leaves_whole_pages_only(recordings, tmp_path, monkeypat
 
 WORK = """
 import os, signal, time
+from gearsig.cache import part_beside
 from gearsig.diagnosis import Outcome
 from gearsig.report import Entry
 
@@ -123,7 +125,7 @@ def work(job):
         time.sleep(0.5)
         os.kill(os.getpid(), signal.SIGKILL)
     if job.name == "slow.csv":
-        (job.page.parent / ".slow.html.0f.part").write_text("half")
+        part_beside(job.page).write_text("half")
         time.sleep(60)
     job.page.write_text("page")
     return Entry(job.name, job.page.name, Outcome.NO_FAULT, "fine")
@@ -161,7 +163,7 @@ def test_ctrl_c_ends_the_workers_and_tidies_up(script, tmp_path):
     command = [sys.executable, script, out, "a.csv", "slow.csv"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as running:
         limit = time.monotonic() + 30
-        while not ((out / ".slow.html.0f.part").exists() and (out / "a.html").exists()):
+        while not (list(out.glob(".slow.html.*.part")) and (out / "a.html").exists()):
             assert time.monotonic() < limit
             time.sleep(0.05)
         os.killpg(running.pid, signal.SIGINT)

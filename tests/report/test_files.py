@@ -4,8 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gearsig.cache import write_text
 from gearsig.errors import InputError
-from gearsig.report import check_writable, page_names, remove_parts, write_text
+from gearsig.report import check_writable, page_names
 
 
 @given(st.lists(st.text(max_size=300), max_size=20))
@@ -73,10 +74,3 @@ def test_an_interrupted_write_is_tidied_up(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         write_text(tmp_path / "page.html", "new")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_only_parts_of_the_named_files_are_removed(tmp_path):
-    for name in (".a[1].html.0f.part", ".b.html.0f.part", "a[1].html"):
-        (tmp_path / name).write_text("")
-    remove_parts(tmp_path, ["a[1].html"])
-    assert {path.name for path in tmp_path.iterdir()} == {".b.html.0f.part", "a[1].html"}

@@ -33,12 +33,12 @@ from app.benchmark.scoring.scores import (
     share,
 )
 from gearsig import __version__
+from gearsig.cache import write_text
 from gearsig.formatting import rounded
 from gearsig.gap import NONE, UNKNOWN
 from gearsig.plot import Picture, embed
 from gearsig.report import Section, benchmark_html
 from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE
-from sims.sweep import written
 
 # --------------------
 # Result tables: the README's in Markdown, the same cells for the page.
@@ -326,7 +326,7 @@ def write_results(
     """Write everything; return the page's path. Nothing may be left to diagnose when this is called."""
     now = date or datetime.now().astimezone()
     write_files(result, cases, folder, command, markdown(result, command, now), now)
-    return written(folder / REPORT, page(result, command, now))
+    return write_text(folder / REPORT, page(result, command, now))
 
 
 def write_files(
@@ -336,10 +336,10 @@ def write_files(
     (folder / LABELS).mkdir(exist_ok=True)
     for done in cases:
         text = json.dumps({"source": done.planned.source, **done.truth.labels}, indent=1, ensure_ascii=False)
-        written(folder / LABELS / f"case_{done.planned.number:04d}.json", text + "\n")
-    written(folder / CASES, cases_csv(result, cases))
-    written(folder / SCORES, scores_json(result, command, date or datetime.now().astimezone()))
-    written(folder / TABLE, table)
+        write_text(folder / LABELS / f"case_{done.planned.number:04d}.json", text + "\n")
+    write_text(folder / CASES, cases_csv(result, cases))
+    write_text(folder / SCORES, scores_json(result, command, date or datetime.now().astimezone()))
+    write_text(folder / TABLE, table)
 
 
 def scores_json(result: BenchmarkResult, command: str, date: datetime) -> str:
