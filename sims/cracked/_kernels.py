@@ -27,6 +27,9 @@ from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, 
 # contact ratio and phase once per revolution. The forces −∂U/∂(Δx, Δy) are left out: they would follow from the width
 # that is assumed for the ramp, where the geometry of a corner contact gives a tenth of it, and they work over the
 # run-out alone.
+#
+# Along the face the flanks are cut into slices: slice s of a pair touches `slice_late` base pitches after the end that
+# enters first and lies `slice_gap` apart (`sims.mesh.Lead`); a straight, even face is one slice.
 
 MAX_CYCLES = 1e12
 """Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
@@ -56,9 +59,10 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
     newest = np.floor(cycles + 0.5 * k.ramp + MAX_LATE)
     z1, z2 = float(k.teeth[0]), float(k.teeth[1])
     columns = curves.shape[1]
-    for slot in range(k.n_slots):
+    for place_of_slice in range(k.n_slots * k.n_slices):
+        slot, s = place_of_slice // k.n_slices, place_of_slice % k.n_slices
         pair = newest - slot
-        progress = cycles - pair
+        progress = cycles - pair - k.slice_late[s]
         weight, weight_slope = engagement_and_slope(progress, late, k.contact_ratio, k.ramp)
         if weight <= 0.0:
             continue
@@ -80,8 +84,8 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
             curves[row_1, i + 1] + curves[row_2, i + 1],
             curves[row_1, i + 2] + curves[row_2, i + 2],
         )
-        compliance = wa * a + wb * b + wc * c + wd * d
-        compliance_slope = sa * a + sb * b + sc * c + sd * d
+        compliance = k.n_slices * (wa * a + wb * b + wc * c + wd * d)
+        compliance_slope = k.n_slices * (sa * a + sb * b + sc * c + sd * d)
         row_1, row_2 = rows[2, tooth_1], rows[3, tooth_2]
         a, b = curves[row_1, i - 1] + curves[row_2, i - 1], curves[row_1, i] + curves[row_2, i]
         c, d = (
@@ -89,6 +93,7 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
             curves[row_1, i + 2] + curves[row_2, i + 2],
         )
         depth = delta - rough - (wa * a + wb * b + wc * c + wd * d) - pitch[0, tooth_1] - pitch[1, tooth_2]
+        depth -= k.slice_gap[s]
         if depth <= 0.0:
             continue
         shape_slope = sa * a + sb * b + sc * c + sd * d
@@ -113,7 +118,7 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
                 omega_2 * rho_2,
                 slip_x,
                 rho_1 * rho_2 / k.action_length,
-                k.width,
+                k.width / k.n_slices,
                 k.reduced_modulus,
                 k.log10_oil,
                 k.oil_constant,
@@ -140,14 +145,15 @@ def stored_energy(k, curves, rows, pitch, delta, late, cycles, rough):
     """ΣU of the driving flanks, in J; for checks."""
     total = 0.0
     newest = int(np.floor(cycles + 0.5 * k.ramp + MAX_LATE))
-    for slot in range(k.n_slots):
-        pair = newest - slot
-        progress = cycles - pair
+    for place_of_slice in range(k.n_slots * k.n_slices):
+        pair, s = newest - place_of_slice // k.n_slices, place_of_slice % k.n_slices
+        progress = cycles - pair - k.slice_late[s]
         weight = engagement_and_slope(progress, late, k.contact_ratio, k.ramp)[0]
         one, two = pair % k.teeth[0], pair % k.teeth[1]
         compliance = cubic(curves[rows[0, one]], k.table_start, k.table_step, progress)
         compliance += cubic(curves[rows[1, two]], k.table_start, k.table_step, progress)
-        shape = cubic(curves[rows[2, one]], k.table_start, k.table_step, progress) + pitch[0, one]
+        compliance *= k.n_slices
+        shape = cubic(curves[rows[2, one]], k.table_start, k.table_step, progress) + pitch[0, one] + k.slice_gap[s]
         shape += cubic(curves[rows[3, two]], k.table_start, k.table_step, progress) + pitch[1, two]
         depth = delta - rough - shape
         if weight > 0.0 and depth > 0.0:
@@ -181,6 +187,13 @@ def back_flank_force(k, depth, rate):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def tilted(k, q):
+    """Compression of helical flanks as the shafts tilt between their bearings: r_w φ tan β_b of both, from q or v."""
+    first = k.tilt_x[0] * (q[8] - q[10]) + k.tilt_y[0] * (q[9] - q[11])
+    return -first - k.tilt_x[1] * (q[12] - q[14]) - k.tilt_y[1] * (q[13] - q[15])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
     k, curves, rows, pitch, q, v, torque, set_angle, speed, speed_rate, rough, rough_rate, a, extra
 ):
@@ -201,7 +214,9 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
     arm1, arm2 = rb1 + cx1, rb2 - cx2  # ∂δ/∂θ1 and −∂δ/∂θ2
     delta_rate = arm1 * v[1] - arm2 * v[2] + v[5] - v[7]
     dx, dy = q[4] + cx1 - q[6] - cx2, q[5] + cy1 - q[7] - cy2
-    delta, late = error + dy, late_entry(k, dx, dy)
+    tilt, tilt_rate = tilted(k, q), tilted(k, v)
+    delta, late = error + dy + tilt, late_entry(k, dx, dy)
+    delta_rate += tilt_rate
     normal, along, friction, moment_1, moment_2 = contact_forces(
         k,
         curves,
@@ -219,12 +234,12 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         rough_rate,
     )
     back = 0.0
-    depth = -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough
+    depth = -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough - tilt
     if depth > 0.0:  # also while the driving flanks touch: run-out may take up all play
         # Velocities of the pitch circles' centres: θ̇ times their places turned by a quarter.
         vx = v[4] - cy1 * v[1] - v[6] - cy2 * v[2]
         vy = v[5] + cx1 * v[1] - v[7] + cx2 * v[2]
-        rate = -rb1 * v[1] + rb2 * v[2] - k.cos_back * vy + k.sin_back * vx - rough_rate
+        rate = -rb1 * v[1] + rb2 * v[2] - k.cos_back * vy + k.sin_back * vx - rough_rate - tilt_rate
         back, _ = back_flank_force(k, depth, rate)
     fx1, fy1 = -friction - k.sin_back * back, -normal + k.cos_back * back
     fx2, fy2 = friction + k.sin_back * back, normal - k.cos_back * back
@@ -257,6 +272,9 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
             bent = k.coupling_bending[side]
             push_x = k.hooke_force[side] * (carried * (1.0 + c2) - bent * s2)
             push_y = k.hooke_force[side] * up * (carried * s2 + bent * (1.0 + c2))
+        # The axial force acts at the pitch circle: its moment presses the two bearings apart along the line of centres.
+        push_x += k.tilt_x[side] * (normal - back)
+        push_y += k.tilt_y[side] * (normal - back)
         for row, b, sign in ((2 * side, b1, 1.0), (2 * side + 1, b2, -1.0)):
             x, y = q[b], q[b + 1]
             part = 1.0
@@ -302,8 +320,9 @@ def potential_energy(k, curves, rows, pitch, q, late, turned, rough):
     cx2, cy2 = k.runout[1] * cos(q[2] + k.runout_angle[1]), -k.runout[1] * sin(q[2] + k.runout_angle[1])
     error = k.base_radius[0] * q[1] - k.base_radius[1] * q[2]
     dx, dy = q[4] + cx1 - q[6] - cx2, q[5] + cy1 - q[7] - cy2
-    total = stored_energy(k, curves, rows, pitch, error + dy, late, k.cycles_per_rad * q[1] - turned, rough)
-    total += back_flank_force(k, -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough, 0.0)[1]
+    tilt = tilted(k, q)
+    total = stored_energy(k, curves, rows, pitch, error + dy + tilt, late, k.cycles_per_rad * q[1] - turned, rough)
+    total += back_flank_force(k, -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough - tilt, 0.0)[1]
     for side in range(2):
         g, b1, b2 = 4 + 2 * side, 8 + 4 * side, 10 + 4 * side
         theta, rotor = q[1 + side], q[3 * side]

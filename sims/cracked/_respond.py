@@ -28,10 +28,11 @@ from sims.gear_pair import (
     governor_nm_s_per_rad,
     machine_fields,
     profile_points,
+    tilting_shares,
     total_inertia_kg_m2,
 )
 from sims.machine import Machine, Operation
-from sims.mesh import TimeLockedRoughness, back_stiffness_n_per_m, mesh_stiffness, mesh_table, share_torque
+from sims.mesh import MAX_SLICES, TimeLockedRoughness, back_stiffness_n_per_m, mesh_stiffness, mesh_table, share_torque
 
 # Numbers of the sixteen coordinates and of the signals that a run can give.
 
@@ -84,6 +85,8 @@ PER_SIDE = (
     "bending_stiffness",
     "bending_damping",
     "rotor_inertia",
+    "tilt_x",
+    "tilt_y",
 )
 RECORD = np.dtype(
     [(name, np.float64) for name in SCALARS]
@@ -92,6 +95,9 @@ RECORD = np.dtype(
         ("load_dependent", np.bool_),
         ("turns", np.bool_),
         ("n_slots", np.int64),
+        ("n_slices", np.int64),
+        ("slice_late", np.float64, (MAX_SLICES,)),
+        ("slice_gap", np.float64, (MAX_SLICES,)),
         ("teeth", np.int64, (2,)),
     ]
     + MACHINE_FIELDS
@@ -142,13 +148,17 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
     mass = np.array([w.mass_kg for w in machine.wheels])
     alpha = pair.working_pressure_angle_rad
     rotors = np.array([s.rotor_inertia_kg_m2 for s in machine.shafts])
+    tilt = tilting_shares(machine)
     values: dict[str, Any] = {
         "table_start": table.start,
         "table_step": table.step,
-        "contact_coefficient": table.contact_coefficient,
+        "contact_coefficient": table.slice_contact,
         "load_dependent": table.load_dependent,
         "ramp": table.ramp,
-        "n_slots": floor(table.contact_ratio + table.ramp + 2.0 * MAX_LATE) + 1,
+        "n_slots": floor(table.contact_ratio + mesh.overlap_ratio + table.ramp + 2.0 * MAX_LATE) + 1,
+        "n_slices": len(table.late),
+        "slice_late": _filled(table.late),
+        "slice_gap": _filled(table.gap_m),
         "teeth": (pair.driver.teeth, pair.driven.teeth),
         "base_radius": base_radius,
         "damping_time": 2.0 * machine.mesh_damping_ratio * sqrt(mesh_mass_kg(machine) / mean_stiffness),
@@ -169,6 +179,8 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "bending_stiffness": np.array([s.bending_stiffness_n_per_m for s in machine.shafts]),
         "bending_damping": np.array([s.bending_damping_n_s_per_m for s in machine.shafts]),
         "rotor_inertia": rotors,
+        "tilt_x": cos(alpha) * tilt,
+        "tilt_y": sin(alpha) * tilt,
     }
     record = np.zeros((), RECORD)
     values |= machine_fields(machine) | friction_fields(machine, operation, force) | bearing_fields(machine, force, rng)
@@ -177,6 +189,10 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
     curves = np.vstack((table.compliance.rows, table.separation.rows))
     rows = np.vstack((table.compliance.of, table.separation.of + len(table.compliance.rows)))
     return PairConstants(record[()], curves, rows, table.pitch_m)
+
+
+def _filled(values: FloatArray) -> FloatArray:
+    return np.pad(values, (0, MAX_SLICES - len(values)))
 
 
 def mesh_mass_kg(machine: Machine) -> float:
@@ -283,7 +299,10 @@ def _assembled(
         line[places] = signs
         total[:] += size * np.outer(line, line)
 
-    join([1, 2, 5, 7], [pair.driver.base_radius_mm * 1e-3, -pair.driven.base_radius_mm * 1e-3, 1.0, -1.0], mesh)
+    alpha, tilt = pair.working_pressure_angle_rad, tilting_shares(machine)
+    tilted = [float(s * t * c) for t in tilt for s in (-1.0, 1.0) for c in (cos(alpha), sin(alpha))]
+    turned = [pair.driver.base_radius_mm * 1e-3, -pair.driven.base_radius_mm * 1e-3, 1.0, -1.0]
+    join([1, 2, 5, 7, *range(8, 16)], [*turned, *tilted], mesh)
     for side in range(2):
         join([3 * side, 1 + side], [1.0, -1.0], torsion[side])
         for axis in range(2):

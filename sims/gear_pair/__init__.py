@@ -1,6 +1,14 @@
 """What both models of a gear pair share: parameters, bearings, drive, measurement, and the twin of a rig."""
 
-from sims.gear_pair._bearing import BEARING_FIELDS, bearing_fields, bearing_loads_n, carried_part, foot
+from sims.gear_pair._bearing import (
+    BEARING_FIELDS,
+    axial_loads_n,
+    bearing_fields,
+    bearing_loads_n,
+    carried_part,
+    foot,
+    tilting_shares,
+)
 from sims.gear_pair._build import build_machine, build_rig, gear_geometry
 from sims.gear_pair._drive import (
     FRICTION_FIELDS,
@@ -43,6 +51,7 @@ __all__ = [
     "RunPlan",
     "SimulationRequest",
     "StepConvergence",
+    "axial_loads_n",
     "bearing_fields",
     "bearing_loads_n",
     "body_gain",
@@ -58,5 +67,6 @@ __all__ = [
     "governor_nm_s_per_rad",
     "machine_fields",
     "profile_points",
+    "tilting_shares",
     "total_inertia_kg_m2",
 ]

@@ -94,7 +94,33 @@ def bearing_loads_n(machine: Machine, mesh_force_n: float) -> FloatArray:
         side = row // 2
         mesh = np.array([0.0, -mesh_force_n if side == 0 else mesh_force_n])
         loads[row] = 0.5 * (mesh + machine.wheels[side].mass_kg * down) + support.mass_kg * down
+    pair, tilt = machine.mesh.pair, tilting_shares(machine) * mesh_force_n
+    centres = np.array([cos(pair.working_pressure_angle_rad), sin(pair.working_pressure_angle_rad)])
+    loads += np.repeat(tilt, 2)[:, None] * np.array([1.0, -1.0, 1.0, -1.0])[:, None] * centres
     return loads
+
+
+def tilting_shares(machine: Machine) -> FloatArray:
+    """Force on the first bearing of each shaft along the line of centres, over the mesh force, (2,).
+
+    F_a = N tan β_b acts on the driver along z and on the driven gear against it, at the pitch radius r_w on either side
+    of the mesh: its moment F_a r_w is taken by ±F_a r_w/L on the two bearings, L apart. The first bearing stands at −z.
+    """
+    pair = machine.mesh.pair
+    radii = np.array([gear.base_radius_mm for gear in (pair.driver, pair.driven)]) * 1e-3
+    radii /= cos(pair.working_pressure_angle_rad)
+    apart = np.array([shaft.bearing_distance_m for shaft in machine.shafts])
+    result: FloatArray = machine.mesh.axial_share * radii / apart
+    return result
+
+
+def axial_loads_n(machine: Machine, torque_nm: float) -> FloatArray:
+    """Axial force on driver and driven gear, along +z, that each shaft's locating bearing takes, (2,).
+
+    F_a = (T1/r_b1) tan β_b = F_t tan β; shafts are stiff along their axis.
+    """
+    force = torque_nm / (machine.mesh.pair.driver.base_radius_mm * 1e-3) * machine.mesh.axial_share
+    return np.array([force, -force])
 
 
 def _defect(support: BearingSupport) -> tuple[int, float, float, float]:

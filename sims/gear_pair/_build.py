@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import cos, degrees, radians, sin
 
 import numpy as np
@@ -39,11 +40,13 @@ from sims.mesh import (
     FlankDeviation,
     GearGeometry,
     GearMesh,
+    Lead,
     Material,
     PairGeometry,
     RootCrack,
     disc_inertia_kg_m2,
     disc_mass_kg,
+    transverse_section,
 )
 from sims.simulator import ParameterValues, Values
 
@@ -240,7 +243,15 @@ def build_mesh(values: ParameterValues) -> GearMesh:
         flank_2=_flank(values, pair.driven, 1),
         ramp=values.number("mesh_ramp"),
         body=values.word("gear_body"),
+        lead=_lead(values),
     )
+
+
+def _lead(values: ParameterValues) -> Lead:
+    lead = Lead(
+        values.number("helix_angle_deg"), values.number("crowning_um"), values.number("lead_error_um"), n_slices=1
+    )
+    return lead if lead.even else replace(lead, n_slices=values.whole("face_slices"))
 
 
 def build_rig(machine: Machine, operation: Operation, *, name: str = "", sources: Sequence[str] = ()) -> Rig:
@@ -294,16 +305,17 @@ def _first_pulse_rev(pair: PairGeometry) -> tuple[float, float]:
 def gear_geometry(values: ParameterValues, side: int) -> GearGeometry:
     """Return the driver's (0) or the driven gear's (1) geometry."""
     name = _SIDES[side]
-    return GearGeometry(
+    return transverse_section(
         values.whole(f"teeth_{name}"),
         values.number("module_mm"),
         values.number("pressure_angle_deg"),
-        values.number(f"profile_shift_{name}"),
-        values.number("face_width_mm"),
-        values.number("addendum"),
-        values.number("dedendum"),
-        values.number("tool_tip_radius"),
-        values.optional(f"bore_radius_{name}_mm"),
+        values.number("helix_angle_deg"),
+        profile_shift=values.number(f"profile_shift_{name}"),
+        face_width_mm=values.number("face_width_mm"),
+        addendum=values.number("addendum"),
+        dedendum=values.number("dedendum"),
+        tool_tip_radius=values.number("tool_tip_radius"),
+        bore_radius_mm=values.optional(f"bore_radius_{name}_mm"),
     )
 
 

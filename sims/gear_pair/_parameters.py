@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sims.machine import MAX_DRY_FRICTION
-from sims.mesh import BODIES
+from sims.mesh import BODIES, MAX_SLICES
 from sims.simulator import Parameter
 
 _SWITCH = ("on", "off")
@@ -16,6 +16,14 @@ _GEARS = (
     Parameter("module_mm", "mm", "module of both gears", 0.3, 30, 2.0),
     Parameter("pressure_angle_deg", "deg", "pressure angle of the rack", 10, 30, 20.0),
     Parameter("face_width_mm", "mm", "face width of both gears", 1, 500, 20.0),
+    Parameter(
+        "helix_angle_deg",
+        "deg",
+        "helix angle, above 0: the driver is right-handed; module, pressure angle and tool are of the normal section",
+        -45,
+        45,
+        0.0,
+    ),
     Parameter("profile_shift_driver", "", "profile shift of the driver, in modules", -1, 1, 0.0),
     Parameter("profile_shift_driven", "", "profile shift of the driven gear, in modules", -1, 1, 0.0),
     Parameter("addendum", "", "addendum of both gears, in modules", 0.2, 2, 1.0),
@@ -51,6 +59,17 @@ _MESH = (
     Parameter("half_backlash_um", "um", "half of the play along the line of action", 0, 2000, 20.0),
     Parameter("tip_relief_um", "um", "metal taken off at the tips of both gears", 0, 500, 0.0),
     Parameter("tip_relief_length_mm", "mm", "length of the relief along the line of action", 0.01, 100, 1.0),
+    Parameter("crowning_um", "um", "metal taken off at both ends of the face, a parabola from its middle", 0, 500, 0.0),
+    Parameter("lead_error_um", "um", "misalignment of the flanks over the face width", -500, 500, 0.0),
+    Parameter(
+        "face_slices",
+        "",
+        "slices of the face width where it is helical, crowned or misaligned",
+        2,
+        MAX_SLICES,
+        16,
+        whole=True,
+    ),
     Parameter(
         "pitch_deviation_um", "um", "rms deviation of the teeth from their places, an ordinary tolerance", 0, 50, 0.0
     ),

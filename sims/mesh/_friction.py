@@ -330,7 +330,8 @@ def friction_over_mesh(
 
     Notes
     -----
-    Friction does not act back on the load sharing here. The pressure is that of smooth flanks of full width.
+    Friction does not act back on the load sharing here. The pressure is that of smooth flanks of full width. A pair of
+    helical teeth counts as in contact where the middle of its face is.
     """
     shared = share_torque(mesh, torque_nm, mesh_cycles, table=table)
     u_1, u_2, radius_m = _speeds_and_radius(mesh, shared.mesh_cycles, positive(speed_rpm, "speed_rpm", "rpm"))
@@ -366,7 +367,9 @@ def _speeds_and_radius(
     """Rolling speeds of both flanks in m/s and the radius of relative curvature in m, (n, n_slots)."""
     pair, least = mesh.pair, MIN_RADIUS * mesh.pair.driver.module_mm
     newest = np.floor(mesh_cycles + mesh.ramp / 2.0)
-    progress = (mesh_cycles - newest)[:, None] + np.arange(mesh.n_slots)
+    progress = (mesh_cycles - newest)[:, None] + np.arange(mesh.n_slots) - mesh.overlap_ratio / 2.0
+    if mesh.overlap_ratio:
+        progress = np.clip(progress, 0.0, pair.contact_ratio)
     rho_1, rho_2 = (np.maximum(rho, least) * 1e-3 for rho in pair.contact_radii_mm(progress))
     omega_1 = speed_rpm * pi / 30.0
     omega_2 = omega_1 * pair.driver.teeth / pair.driven.teeth

@@ -141,6 +141,9 @@ class MeshTable(Result):
     n_slots : int
         Most pairs that carry load at once.
     teeth : (int, int)
+    late, gap_m : array, (n_slices,)
+        Of each slice of the face: base pitches by which it enters late, and its separation; see `Lead`. A slice has
+        `n_slices` times the compliance of the whole face.
     """
 
     start: float
@@ -154,6 +157,13 @@ class MeshTable(Result):
     ramp: float
     n_slots: int
     teeth: tuple[int, int]
+    late: FloatArray
+    gap_m: FloatArray
+
+    @property
+    def slice_contact(self) -> float:
+        """Compliance of the contact of one slice, so that all of them, evenly loaded, yield as the whole face does."""
+        return float(self.contact_coefficient * len(self.late) ** (0.9 if self.load_dependent else 1.0))
 
 
 def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
@@ -184,6 +194,8 @@ def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
         ramp=mesh.ramp,
         n_slots=mesh.n_slots,
         teeth=(mesh.pair.driver.teeth, mesh.pair.driven.teeth),
+        late=mesh.lead.late(mesh.pair, mesh.lead.places),
+        gap_m=mesh.lead.gap_m(mesh.lead.places),
     )
 
 
@@ -235,12 +247,24 @@ class LoadSharing(Result):
         N_i ≥ 0, columns as in `MeshStiffness`.
     stiffness_n_per_m : array, (n,)
         dF/dδ at this load.
+    slice_forces_n : array, (n, n_slots, n_slices)
+        What each slice of the face carries.
     """
 
     mesh_cycles: FloatArray
     transmission_error_m: FloatArray
     pair_forces_n: FloatArray
     stiffness_n_per_m: FloatArray
+    slice_forces_n: FloatArray
+
+    @property
+    def face_load_factor(self) -> float:
+        """Greatest over mean force of the slices at the angle where it is greatest, K_Hβ of ISO 6336-1 for spur gears.
+
+        Of what all pairs together carry at a place of the face.
+        """
+        along = self.slice_forces_n.sum(axis=1)
+        return float(np.max(along.max(axis=1) / along.mean(axis=1)))
 
 
 def one_mesh_cycle(n_points: int = 200) -> FloatArray:
@@ -292,10 +316,10 @@ def mesh_stiffness(
                 allowed="a force above 0 N",
                 remedy="give force_n or take contact_law='linear'",
             )
-        pairs = weight / (compliance + table.contact_coefficient)
+        pairs = _by_pair(table, weight / (compliance + table.slice_contact)).sum(axis=2)
         return MeshStiffness(cycles, pairs.sum(axis=1), pairs)
     _, _, forces = _equilibrium(table, positive(force_n, "force_n", "N"), compliance, separation, weight)
-    pairs = _tangents(table, compliance, weight, forces)
+    pairs = _by_pair(table, _tangents(table, compliance, weight, forces)).sum(axis=2)
     return MeshStiffness(cycles, pairs.sum(axis=1), pairs)
 
 
@@ -321,7 +345,8 @@ def share_torque(
     force = positive(torque_nm, "torque_nm", "N m") / (mesh.pair.driver.base_radius_mm * 1e-3)
     table = mesh_table(mesh) if table is None else table
     delta, slope, forces = _equilibrium(table, force, *pair_states(table, cycles))
-    return LoadSharing(cycles, delta, forces, slope)
+    slices = _by_pair(table, forces)
+    return LoadSharing(cycles, delta, slices.sum(axis=2), slope, slices)
 
 
 def back_stiffness_n_per_m(mesh: GearMesh) -> float:
@@ -340,8 +365,11 @@ def back_stiffness_n_per_m(mesh: GearMesh) -> float:
 
 
 def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Compliance without contact (m/N), separation (m) and engagement (0 to 1) of the pairs at each c, (n, n_slots)."""
-    shape = (len(mesh_cycles), table.n_slots)
+    """Compliance without contact (m/N), separation (m) and engagement (0 to 1) at each c, (n, n_slots × n_slices).
+
+    The slices of a pair stand one after the other.
+    """
+    shape = (len(mesh_cycles), table.n_slots * len(table.late))
     compliance, separation, weight = np.empty(shape), np.empty(shape), np.empty(shape)
     fill_pairs(
         np.array(mesh_cycles, dtype=np.float64),  # a copy: the kernel would be compiled again for a read-only array
@@ -355,6 +383,8 @@ def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, 
         table.pitch_m,
         table.contact_ratio,
         table.ramp,
+        np.array(table.late),
+        np.array(table.gap_m),
         compliance,
         separation,
         weight,
@@ -362,12 +392,17 @@ def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, 
     return compliance, separation, weight
 
 
+def _by_pair(table: MeshTable, values: FloatArray) -> FloatArray:
+    """Values of slices, (n, n_slots, n_slices)."""
+    return values.reshape(len(values), table.n_slots, len(table.late))
+
+
 def _equilibrium(
     table: MeshTable, force: float, compliance: FloatArray, separation: FloatArray, weight: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
 
     delta, slope, forces = np.empty(len(weight)), np.empty(len(weight)), np.empty(weight.shape)
-    contact, law = table.contact_coefficient, table.load_dependent
+    contact, law = table.slice_contact, table.load_dependent
     share_loads(force, compliance, separation, weight, contact, law, delta, slope, forces)
     return delta, slope, forces
 
@@ -376,7 +411,7 @@ def _tangents(table: MeshTable, compliance: FloatArray, weight: FloatArray, forc
     """dN/dδ of each pair that carries a force."""
     carrying = forces > 0.0
     own = np.where(carrying, forces / np.where(weight > 0.0, weight, 1.0), 1.0)
-    contact = table.contact_coefficient * (0.9 * own**-0.1 if table.load_dependent else 1.0)
+    contact = table.slice_contact * (0.9 * own**-0.1 if table.load_dependent else 1.0)
     return np.where(carrying, weight / (compliance + contact), 0.0)
 
 
@@ -515,22 +550,28 @@ def fill_pairs(
     pitch: FloatArray,
     contact_ratio: float,
     ramp: float,
+    late: FloatArray,
+    gap: FloatArray,
     compliance: FloatArray,
     separation: FloatArray,
     weight: FloatArray,
 ) -> None:
-    """Look up compliance, separation and weight of the pairs at each c; column j is pair ⌊c + ramp/2⌋ − j."""
+    """Look up compliance, separation and weight of the slices of each pair ⌊c + ramp/2⌋ − j at each c."""
+    n_slices = late.size
     for row in range(mesh_cycles.size):
         newest = int((mesh_cycles[row] + ramp / 2.0) // 1.0)
         for j in range(compliance.shape[1]):
-            k = newest - j
-            progress = mesh_cycles[row] - k
+            k, s = newest - j // n_slices, j % n_slices
+            progress = mesh_cycles[row] - k - late[s]
             one, two = k % teeth[0], k % teeth[1]
-            compliance[row, j] = cubic(curves[of[0, one]], start, step, progress) + cubic(
-                curves[of[1, two]], start, step, progress
+            weight[row, j] = engagement(progress, contact_ratio, ramp)
+            if weight[row, j] == 0.0 and n_slices > 1:  # far beyond the table, too
+                compliance[row, j], separation[row, j] = n_slices * curves[of[0, one], 1], 0.0
+                continue
+            compliance[row, j] = n_slices * (
+                cubic(curves[of[0, one]], start, step, progress) + cubic(curves[of[1, two]], start, step, progress)
             )
             missing = cubic(flanks[flank_of[0, one]], start, step, progress) + cubic(
                 flanks[flank_of[1, two]], start, step, progress
             )
-            separation[row, j] = missing + pitch[0, one] + pitch[1, two]
-            weight[row, j] = engagement(progress, contact_ratio, ramp)
+            separation[row, j] = missing + pitch[0, one] + pitch[1, two] + gap[s]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise, product
-from math import floor, pi
+from math import cos, floor, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +36,7 @@ from sims.mesh._geometry import (
     root_half_angle_rad,
     root_point_mm,
 )
+from sims.mesh._lead import STRAIGHT, Lead, normal_roll_rad, normal_section
 from sims.mesh._pair import WORKING_PRESSURE_PA, PairGeometry, contact_half_width_mm, smooth_step
 from sims.mesh._roughness import FlankRoughness
 
@@ -403,12 +404,15 @@ class GearMesh:
     body : str
         "separate": no tooth moves another one, as published models have it; double contact then appears stiffer than it
         is. "coupled": teeth that carry at once move each other through the body.
+    lead : Lead
+        Helix, crowning and misalignment along the face. With a helix the gears of the pair are transverse sections;
+        teeth and body are as compliant as those of the normal section, on contact lines 1/cos β_b longer.
 
     Notes
     -----
     Every pair has its own compliance and separation; pairs act in parallel. Where the body is coupled, the compliance
-    of a pair holds what its neighbours' forces add at the load sharing of healthy teeth. Neglected: misalignment along
-    the face, heating. Only the driving flanks are described.
+    of a pair holds what its neighbours' forces add at the load sharing of healthy teeth. Faults and roughness are
+    alike in every slice of the face. Neglected: heating. Only the driving flanks are described.
     """
 
     pair: PairGeometry
@@ -427,6 +431,7 @@ class GearMesh:
     chips_1: tuple[ToothChip, ...] = ()
     chips_2: tuple[ToothChip, ...] = ()
     body: str = "separate"
+    lead: Lead = STRAIGHT
 
     def __post_init__(self) -> None:
         one_of(self.body, "body", BODIES)
@@ -447,13 +452,26 @@ class GearMesh:
     @property
     def n_slots(self) -> int:
         """Most pairs that carry load at once, ramps included."""
-        return floor(self.pair.contact_ratio + self.ramp) + 1
+        return floor(self.pair.contact_ratio + self.overlap_ratio + self.ramp) + 1
+
+    @property
+    def overlap_ratio(self) -> float:
+        """ε_β, 0 of a spur pair."""
+        return self.lead.overlap_ratio(self.pair)
+
+    @property
+    def axial_share(self) -> float:
+        """Axial force over the force along the line of action, tan β_b; the driver's, along +z if above 0."""
+        return self.lead.axial_share(self.pair)
 
     @cached_property
     def contact_coefficient(self) -> float:
         """Compliance of the contact in m/N (linear), or B in m/N^0.9 (load-dependent)."""
-        law = linear_contact_compliance if self.contact_law == "linear" else load_dependent_contact_coefficient
-        return law(self.material_1, self.material_2, self.face_width_m)
+        linear = self.contact_law == "linear"
+        law = linear_contact_compliance if linear else load_dependent_contact_coefficient
+        # Normal force and approach are 1/cos β_b greater, the contact lines 1/cos β_b longer.
+        steep = cos(self.lead.base_helix_rad(self.pair)) ** (-1.0 if linear else -1.1)
+        return float(law(self.material_1, self.material_2, self.face_width_m) * steep)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
@@ -499,9 +517,8 @@ class GearMesh:
         faults : ToothFaults
             Of the tooth.
         """
-        gear, material = self.side(side)[:2]
-        width, rho = self.face_width_m, self.roll_length_mm(side, progress)
-        roll = rho / gear.base_radius_mm
+        material, rho = self.side(side).material, self.roll_length_mm(side, progress)
+        gear, roll, width = self._yielding(side, rho)
         if faults.crack is None:
             tooth = tooth_compliance(gear, material, roll).total / width
         else:
@@ -510,6 +527,17 @@ class GearMesh:
         result: FloatArray = tooth + foundation + self._lost_width_compliance(side, rho, faults, tooth)
         return result + self._neighbour_compliance(side, progress) if self.body == "coupled" else result
 
+    def _yielding(self, side: int, rho: FloatArray) -> tuple[GearGeometry, FloatArray, float]:
+        """Gear whose teeth yield, roll angles on it, and width in m: the normal section's where there is a helix.
+
+        Along the line of action a tooth of width b yields c_n/(b cos β_b): contact lines are 1/cos β_b longer, the
+        force and the approach normal to the flank 1/cos β_b greater and smaller.
+        """
+        gear = self.side(side).gear
+        virtual = normal_section(gear, self.lead.helix_angle_deg)
+        width = self.face_width_m * cos(self.lead.base_helix_rad(self.pair))
+        return virtual, normal_roll_rad(gear, virtual, rho / gear.base_radius_mm), width
+
     def _neighbour_compliance(self, side: int, progress: FloatArray) -> FloatArray:
         """Return Σ_j c_ij N_j/N_i over the neighbours of a healthy pair, in m/N.
 
@@ -517,8 +545,8 @@ class GearMesh:
         the weights w_i by which pairs enter and leave; per weight, so that it holds for a pair that just enters.
         """
         zeta = np.atleast_1d(np.asarray(progress, dtype=np.float64))
-        places = np.arange(1 - self.n_slots, self.n_slots)
-        middle = self.n_slots - 1
+        middle = floor(self.pair.contact_ratio + self.ramp)
+        places = np.arange(-middle, middle + 1)
         last = self.pair.contact_ratio
         at = np.clip(zeta[:, None] + places, -self.ramp / 2.0, last + self.ramp / 2.0)
         weight = smooth_step((zeta[:, None] + places) / self.ramp + 0.5) if self.ramp else 1.0 * (at >= 0.0)
@@ -536,14 +564,15 @@ class GearMesh:
 
     def _coupling(self, side: int, at: FloatArray, places: NDArray[np.int64]) -> FloatArray:
         """C_ij of one gear through its body, (n, n_pairs, n_pairs), 0 on the diagonal, in m/N."""
-        gear, material = self.side(side)[:2]
-        angle = self.roll_length_mm(side, at) / gear.base_radius_mm - gear.base_half_angle_rad
+        material = self.side(side).material
+        gear, roll, width = self._yielding(side, self.roll_length_mm(side, at))
+        angle = roll - gear.base_half_angle_rad
         result = np.zeros((*at.shape, at.shape[1]))
         for i, j in product(range(len(places)), repeat=2):
             if i != j:
                 # A pair that entered earlier lies ahead; the driver is pushed back by its mate, the driven gear on.
                 ahead = int(places[i] - places[j]) * (1 if side == 2 else -1)
-                result[:, i, j] = body_compliance(gear, material, angle[:, i], angle[:, j], ahead) / self.face_width_m
+                result[:, i, j] = body_compliance(gear, material, angle[:, i], angle[:, j], ahead) / width
         return result
 
     def _lost_width_compliance(self, side: int, rho: FloatArray, faults: ToothFaults, tooth: FloatArray) -> FloatArray:

@@ -13,12 +13,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, frozen_array, within
+from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError, RefusalError
 from sims.compiled import UNCOUNTED
 from sims.mesh import (
     HEALTHY,
     GearMesh,
+    Lead,
     PairGeometry,
     ToothRows,
     load_dependent_contact_coefficient,
@@ -89,10 +90,21 @@ def _corner_mm(rb_flank: float, rb_tip: float, length: float, start: float, befo
     return result
 
 
+def slice_progress(pair: PairGeometry, lead: Lead, z_m: FloatArray, progress: FloatArray) -> FloatArray:
+    """ζ of each slice of a pair at ζ of its first end, (n, n_slices)."""
+    return progress[:, None] - lead.late(pair, z_m * 1e3 / pair.face_width_mm)
+
+
 def over_height(roll: FloatArray, values: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Values at the heights of a grid (first axis) between them, by a cubic spline; held beyond the grid's ends."""
+    """Values at the heights of a grid (first axis) between them, by a cubic spline; held beyond the grid's ends.
+
+    Where `wanted` is (n, n_slices), each slice (second axis) has heights of its own.
+    """
     from scipy.interpolate import CubicSpline
 
+    if wanted.ndim == 2:
+        slices = [over_height(roll, values[:, s], wanted[:, s]) for s in range(wanted.shape[1])]
+        return np.stack(slices, axis=1)
     spline = CubicSpline(roll, values, axis=0)
     result: FloatArray = spline(np.clip(wanted, roll[0], roll[-1]))
     return result
@@ -115,6 +127,12 @@ def fault_compliance_rows(
     A crack leaves the gear's modes as they are: one tooth in fifty hardly changes them.
     """
     own, n_slices = mesh.side(side), len(gear.grid.z_m)
+    if own.faulty_teeth and mesh.overlap_ratio:
+        raise InputError(
+            "a faulty tooth in a helical pair of finite-element gears",
+            allowed="healthy teeth, or no helix",
+            remedy="take the model 'cracked'",
+        )
     variant = np.zeros(own.gear.teeth, dtype=np.int64)
     rows = [np.zeros((len(progress), n_slices, n_slices))]
     healthy = mesh.gear_compliance(side, progress)
@@ -134,7 +152,6 @@ POINTS_PER_PITCH = 64
 """Columns per base pitch; a whole number, so that the columns of the next pair lie on those of this one."""
 MARGIN = 20 / POINTS_PER_PITCH
 """Base pitches before the ideal entry and after the ideal end within which a loaded pair may touch by a corner."""
-MAX_LEAD_UM = 500.0
 FLANK = 0
 """Of a `FlankGrid`: the flank that both gears drive with, each seen from its own side."""
 SIGNS = (-1, 1)
@@ -160,15 +177,13 @@ class ContactTable:
         Compliance between the slices of a pair, both gears together, m/N.
     cross : array, (n_offsets, n, n_slices, n_slices)
         Between a pair at ζ (first slice) and the pair that entered o + 1 pitches earlier (second), m/N.
-    corner_m : array, (n,)
-        Separation of unloaded perfect flanks.
+    corner_m : array, (n, n_slices)
+        Separation of unloaded perfect flanks, with crowning and misalignment.
     extra : ToothRows, (n_rows, n, n_slices, n_slices)
         What faulty teeth add to the compliance between their slices; row 0, of healthy teeth of both gears, is 0.
-    separation : ToothRows
+    separation : ToothRows, (n_rows, n, n_slices)
     pitch_m : array, (2, z)
         See `sims.mesh.separation_table`.
-    lead_m : array, (n_slices,)
-        Separation of each slice by misaligned axes, its least being 0.
     hertz : array, (n_slices,)
         B of a slice, h = B N^0.9, m/N^0.9.
     """
@@ -182,7 +197,6 @@ class ContactTable:
     extra: ToothRows
     separation: ToothRows
     pitch_m: FloatArray
-    lead_m: FloatArray
     hertz: FloatArray
 
     @property
@@ -210,12 +224,10 @@ class ContactTable:
         """In the order in which kernels take them; one of each kind for both gears, the driver's rows first."""
         of = np.vstack((self.extra.of, self.separation.of))
         extra, separation = self.extra.rows, self.separation.rows
-        return self.own, self.cross, self.corner_m, extra, separation, of, self.pitch_m, self.lead_m, self.hertz
+        return self.own, self.cross, self.corner_m, extra, separation, of, self.pitch_m, self.hertz
 
 
-def contact_table(
-    gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, compliance: ToothCompliance, *, lead_um: float = 0.0
-) -> ContactTable:
+def contact_table(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, compliance: ToothCompliance) -> ContactTable:
     """Tabulate the contact of two reduced gears.
 
     Parameters
@@ -223,11 +235,10 @@ def contact_table(
     gears : (ReducedGear, ReducedGear)
         Driver and driven gear, with the same slices.
     mesh : GearMesh
-        Geometry of the pair, its faults and deviations. The compliance of healthy teeth is the gears'.
+        Geometry of the pair, its faults and deviations. The compliance of healthy teeth is the gears'. With a helix
+        they are straight gears of the transverse section, of which each slice touches in its turn.
     compliance : callable
         Which part of each gear's compliance: all of it for statics, the rest beside the modes for dynamics.
-    lead_um : float
-        How much further apart the flanks are at one end of the face than at the other; above 0: open towards +z.
 
     Raises
     ------
@@ -235,43 +246,41 @@ def contact_table(
         If the gears are not those of the mesh, or their slices differ.
     """
     check_gears(gears, mesh)
-    within(lead_um, "lead_error_um", -MAX_LEAD_UM, MAX_LEAD_UM, "um")
+    pair, z_m = mesh.pair, gears[0].grid.z_m
     n_before = round(MARGIN * POINTS_PER_PITCH)
-    n = n_before + ceil((mesh.pair.contact_ratio + MARGIN) * POINTS_PER_PITCH) + 3
+    n = n_before + ceil((pair.contact_ratio + mesh.overlap_ratio + MARGIN) * POINTS_PER_PITCH) + 3
     step = 1.0 / POINTS_PER_PITCH
     progress = -MARGIN + step * np.arange(-1, n - 1)
-    inside = np.clip(progress, 0.0, mesh.pair.contact_ratio)
+    own_progress = slice_progress(pair, mesh.lead, z_m, progress)
+    inside = np.clip(own_progress, 0.0, pair.contact_ratio)
     own, cross = _compliances(gears, mesh, progress, compliance)
-    places = np.linspace(0.0, 1.0, len(gears[0].grid.z_m))
-    lead = 1e-6 * abs(lead_um) * (places if lead_um >= 0.0 else 1.0 - places)
-    faults = [fault_compliance_rows(gears[side - 1], mesh, side, inside) for side in (1, 2)]
-    separation, pitch_m = separation_table(mesh, inside)
+    faults = [fault_compliance_rows(gears[side - 1], mesh, side, inside[:, 0]) for side in (1, 2)]
+    tables = [separation_table(mesh, inside[:, s]) for s in (range(len(z_m)) if mesh.overlap_ratio else (0,))]
+    separation, pitch_m = tables[0]
+    rows = np.stack([table.rows for table, _ in tables], axis=-1)
     whole = load_dependent_contact_coefficient(mesh.material_1, mesh.material_2, mesh.face_width_m)
     return ContactTable(
         start=-MARGIN,
         step=step,
-        contact_ratio=mesh.pair.contact_ratio,
+        contact_ratio=pair.contact_ratio,
         own=own,
         cross=cross,
-        corner_m=corner_separation_m(mesh.pair, progress),
+        corner_m=corner_separation_m(pair, own_progress) + mesh.lead.gap_m(z_m * 1e3 / pair.face_width_mm),
         extra=tooth_rows(*faults, share_first=True),
-        separation=separation,
+        separation=separation._replace(rows=np.ascontiguousarray(np.broadcast_to(rows, (*rows.shape[:2], len(z_m))))),
         pitch_m=pitch_m,
-        lead_m=lead,
         # An evenly loaded pair yields as the whole width does: h(N_s) = B (n N_s)^0.9.
-        hertz=np.full(len(lead), whole * len(lead) ** 0.9),
+        hertz=np.full(len(z_m), whole * len(z_m) ** 0.9),
     )
 
 
-def static_table(
-    gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, *, lead_um: float = 0.0, support: str = "hub_held"
-) -> ContactTable:
+def static_table(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, *, support: str = "hub_held") -> ContactTable:
     """Return the table for statics: all of the elastic compliance, held at the hubs whose motion is measured."""
 
     def whole(gear: ReducedGear, teeth: list[int]) -> FloatArray:
         return gear.compliance_m_per_n(teeth, support)  # type: ignore[arg-type]  # refused there if not one of its words
 
-    return contact_table(gears, mesh, whole, lead_um=lead_um)
+    return contact_table(gears, mesh, whole)
 
 
 def check_gears(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh) -> None:
@@ -292,12 +301,19 @@ def _compliances(
     n_offsets = floor((n - 1) / POINTS_PER_PITCH)
     own = np.zeros((n, n_slices, n_slices))
     cross = np.zeros((n_offsets, n, n_slices, n_slices))
-    here = rolls_rad(mesh.pair, progress)
+    own_progress = slice_progress(mesh.pair, mesh.lead, gears[0].grid.z_m, progress)
+    here = rolls_rad(mesh.pair, own_progress)
     for gear, sign, roll, side in zip(gears, SIGNS, here, (0, 1), strict=True):
         block = _between(gear, [0], compliance)
-        own += _along_diagonal(gear.grid.roll_rad, block, roll)
+        if mesh.overlap_ratio:
+            each = _over_both(gear.grid.roll_rad, block, roll, roll)
+            itself = np.einsum("hshs->hs", block)  # a slice is at one height, whatever the others'
+            each[:, range(each.shape[1]), range(each.shape[1])] = over_height(gear.grid.roll_rad, itself, roll)
+            own += each
+        else:
+            own += _along_diagonal(gear.grid.roll_rad, block, roll[:, 0])
         for o in range(min(n_offsets, gear.n_offsets - 1)):
-            older = rolls_rad(mesh.pair, progress + o + 1.0)[side]
+            older = rolls_rad(mesh.pair, own_progress + o + 1.0)[side]
             block = _between(gear, [0, -sign * (o + 1)], compliance)
             cross[o] += _over_both(gear.grid.roll_rad, block, roll, older)
     return own, cross
@@ -318,15 +334,15 @@ def _along_diagonal(roll: FloatArray, block: FloatArray, wanted: FloatArray) -> 
 
 
 def _over_both(roll: FloatArray, block: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
-    """Compliance between slices at two heights, (n, n_slices, n_slices)."""
+    """Compliance between slices at two heights each, (n, n_slices, n_slices)."""
     from scipy.interpolate import RectBivariateSpline
 
     n_slices, order = block.shape[1], min(3, len(roll) - 1)
     x, y = (np.clip(place, roll[0], roll[-1]) for place in (first, second))
-    found = np.empty((len(first), n_slices, n_slices))
+    found = np.empty((*first.shape, n_slices))
     for s in range(n_slices):
         for t in range(n_slices):
-            found[:, s, t] = RectBivariateSpline(roll, roll, block[:, s, :, t], kx=order, ky=order).ev(x, y)
+            found[:, s, t] = RectBivariateSpline(roll, roll, block[:, s, :, t], kx=order, ky=order).ev(x[:, s], y[:, t])
     return found
 
 
@@ -352,8 +368,8 @@ def mirror_groups(n_slices: int) -> FloatArray:
 
 
 def mirrors(table: ContactTable) -> bool:
-    """Whether both halves of the face are alike: compliance, faults, and no misalignment."""
-    if np.any(table.lead_m != 0.0) or table.n_slices < 2:
+    """Whether both halves of the face are alike: compliance, faults, and neither helix nor misalignment."""
+    if not np.allclose(table.corner_m, table.corner_m[:, ::-1], rtol=1e-9, atol=1e-16) or table.n_slices < 2:
         return False
     return all(
         bool(np.max(np.abs(c - c[..., ::-1, ::-1])) <= ALIKE * np.max(np.abs(table.own)))
@@ -378,7 +394,8 @@ def folded(table: ContactTable) -> ContactTable:
         own=grouped(table.own),
         cross=grouped(table.cross),
         extra=table.extra._replace(rows=grouped(table.extra.rows)),
-        lead_m=np.zeros(len(size)),
+        corner_m=table.corner_m @ mean,
+        separation=table.separation._replace(rows=np.ascontiguousarray(table.separation.rows @ mean)),
         hertz=table.hertz @ mean * size**-0.9,
     )
 
@@ -513,7 +530,7 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
     pairs : (n_slots,) filled with the pairs' numbers k, the newest first.
     start, step : see `ContactTable`.
     columns, parts : column i of the table and part t of a step beyond it.
-    apart, slope : separation in m, and its change per base pitch.
+    apart, slope : (n_slots, n_slices) separation of the slices in m, and its change per base pitch.
     """
     if not abs(cycles) < MAX_CYCLES:
         return -1
@@ -528,16 +545,19 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
         t = place - int(place)
         one, two = int(pair - teeth[0] * np.floor(pair / teeth[0])), int(pair - teeth[1] * np.floor(pair / teeth[1]))
         a, b = rows[2, one], rows[3, two]
-        e0 = corner[i - 1] + separation[a, i - 1] + separation[b, i - 1]
-        e1 = corner[i] + separation[a, i] + separation[b, i]
-        e2 = corner[i + 1] + separation[a, i + 1] + separation[b, i + 1]
-        e3 = corner[i + 2] + separation[a, i + 2] + separation[b, i + 2]
-        # The cubic with the slopes (e2 − e0)/2 and (e3 − e1)/2: continuous slopes, as the contact's damping needs.
-        c1, c2, c3 = 0.5 * (e2 - e0), e0 - 2.5 * e1 + 2.0 * e2 - 0.5 * e3, 1.5 * (e1 - e2) + 0.5 * (e3 - e0)
-        here = e1 + t * (c1 + t * (c2 + t * c3)) + pitch[0, one] + pitch[1, two]
-        if here < reach:
+        nearest = reach
+        for s in range(corner.shape[1]):
+            e0 = corner[i - 1, s] + separation[a, i - 1, s] + separation[b, i - 1, s]
+            e1 = corner[i, s] + separation[a, i, s] + separation[b, i, s]
+            e2 = corner[i + 1, s] + separation[a, i + 1, s] + separation[b, i + 1, s]
+            e3 = corner[i + 2, s] + separation[a, i + 2, s] + separation[b, i + 2, s]
+            # The cubic with the slopes (e2 − e0)/2 and (e3 − e1)/2: continuous slopes, as the contact's damping needs.
+            c1, c2, c3 = 0.5 * (e2 - e0), e0 - 2.5 * e1 + 2.0 * e2 - 0.5 * e3, 1.5 * (e1 - e2) + 0.5 * (e3 - e0)
+            here = e1 + t * (c1 + t * (c2 + t * c3)) + pitch[0, one] + pitch[1, two]
+            apart[n, s], slope[n, s] = here, (c1 + t * (2.0 * c2 + t * 3.0 * c3)) / step
+            nearest = min(nearest, here)
+        if nearest < reach:
             pairs[n], columns[n], parts[n] = pair, i, t
-            apart[n], slope[n] = here, (c1 + t * (2.0 * c2 + t * 3.0 * c3)) / step
             n += 1
     return n
 
@@ -620,7 +640,7 @@ class MeshMaps:
     tangent_n_per_m : array, (n_c, n_t, n_slots, n_slices)
         dN/dδ of each slice as the hubs turn on.
     separation_m : array, (n_c, n_slots)
-        Of unloaded flanks, without the lead of the slices.
+        Of unloaded flanks, where they are nearest along the face.
 
     Notes
     -----
@@ -707,7 +727,6 @@ def mesh_maps(
     mesh_cycles: FloatArray | None = None,
     *,
     support: str = "hub_held",
-    lead_um: float = 0.0,
     table: ContactTable | None = None,
 ) -> MeshMaps:
     """Solve the loaded contact over mesh angle and torque.
@@ -726,8 +745,6 @@ def mesh_maps(
         None: 200 points of one cycle. With faulty teeth or pitch deviations give a revolution.
     support : str
         How the bodies are held, see `ReducedGear.compliance_m_per_n`.
-    lead_um : float
-        Misalignment over the face.
     table : ContactTable or None
         Where it is at hand.
 
@@ -744,7 +761,7 @@ def mesh_maps(
     if len(torques) == 0 or torques[0] <= 0.0 or np.any(np.diff(torques) <= 0.0):
         raise InputError("torques that do not ascend from above 0", where="torque_nm", allowed="ascending, above 0 N m")
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
-    table = static_table(gears, mesh, lead_um=lead_um, support=support) if table is None else table
+    table = static_table(gears, mesh, support=support) if table is None else table
     loads = torques / (mesh.pair.driver.base_radius_mm * 1e-3)
     delta, force, tangent = _solved(table, mesh, cycles, loads, by_force=True)
     return MeshMaps(cycles, torques, delta, force, tangent, _separations(table, mesh, cycles))
@@ -814,7 +831,7 @@ def _separations(table: ContactTable, mesh: GearMesh, cycles: FloatArray) -> Flo
         one, two = (np.mod(pair[inside], z).astype(int) for z in teeth_of(mesh))
         total = table.pitch_m[0, one] + table.pitch_m[1, two]
         for i, (a, b) in enumerate(zip(table.separation.of[0, one], table.separation.of[1, two], strict=True)):
-            whole = table.corner_m + table.separation.rows[a] + table.separation.rows[b]
+            whole = (table.corner_m + table.separation.rows[a] + table.separation.rows[b]).min(axis=1)
             total[i] += np.interp(progress[inside][i], table.progress, whole)
         apart[inside, slot] = total
     return apart
@@ -841,9 +858,10 @@ class ContactState(NamedTuple):
 
 def contact_state(table: ContactTable, mesh: GearMesh, force_n: float, mesh_cycles: float) -> ContactState:
     """Solve the contact at one mesh angle and return what a linear model about it needs."""
-    own, cross, corner, extra, separation, rows, pitch, _, hertz = table.arrays
+    own, cross, corner, extra, separation, rows, pitch, hertz = table.arrays
     slots, n_s = table.n_slots, table.n_slices
-    pairs, parts, apart, slope = (np.zeros(slots) for _ in range(4))
+    pairs, parts = np.zeros(slots), np.zeros(slots)
+    apart, slope = np.zeros((slots, n_s)), np.zeros((slots, n_s))
     columns = np.zeros(slots, dtype=np.int64)
     at, teeth = float(mesh_cycles), teeth_of(mesh)
     near = (at, table.start, table.step, corner, separation, rows, pitch, teeth, 1e9)
@@ -879,11 +897,11 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
     delta : (n_c, n_loads) δ in m, or the total force.
     force, tangent : (n_c, n_loads, n_slots, n_slices) N, and dN/dδ; slot j is pair ⌊c − start⌋ − j.
     """
-    own, cross, corner, extra, separation, rows, pitch, lead, hertz = arrays
+    own, cross, corner, extra, separation, rows, pitch, hertz = arrays
     n_s = own.shape[1]
     most = n_slots * n_s
     pairs, parts = np.empty(n_slots), np.empty(n_slots)
-    apart, slope = np.empty(n_slots), np.empty(n_slots)
+    apart, slope = np.empty((n_slots, n_s)), np.empty((n_slots, n_s))
     columns = np.empty(n_slots, dtype=np.int64)
     r, a = np.empty((most, most)), np.empty((most, most))
     approach, n_at, w, x, unit = np.empty(most), np.empty(most), np.empty(most), np.empty(most), np.empty(most)
@@ -899,7 +917,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
         # The first load starts from no force, where the nearest flanks touch; each further one from the one before.
         nearest = 1e9
         for p in range(n):
-            nearest = min(nearest, apart[p])
+            nearest = min(nearest, apart[p].min())
         n_at[:] = 0.0
         w[:] = small**-0.1
         at = nearest
@@ -912,7 +930,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
             for _ in range(100):
                 for p in range(n):
                     for s in range(n_s):
-                        approach[p * n_s + s] = at - apart[p] - lead[s]
+                        approach[p * n_s + s] = at - apart[p, s]
                 done, m = solve_contacts(r, n * n_s, approach, hertz, small, n_at, w, enough, order, a, x)
                 if done < 0:
                     return False

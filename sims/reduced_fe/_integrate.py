@@ -221,7 +221,7 @@ N_EXTRAS = 6
 def room(shape: tuple[int, ...], n_modes: int, n_rows: int) -> tuple[Any, ...]:
     """Return what `march` writes to besides its results, nothing of which is kept; shape: (n_slots, n_slices)."""
     n_slots, most = shape[0], shape[0] * shape[1]
-    places = tuple(np.empty(n_slots) for _ in range(4))
+    places = np.empty(n_slots), np.empty(n_slots), np.empty(shape), np.empty(shape)
     integers = np.empty(n_slots, dtype=np.int64), np.empty(most, dtype=np.int64)
     squares = np.empty((most, most)), np.empty((most, most))
     points = (*(np.empty(most) for _ in range(4)), np.empty(most), np.zeros(most), np.empty(most), np.empty(most))
@@ -258,7 +258,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
     Returns the number of rows filled, fewer where the solution burst.
     """
     q, v, f, f_before, held, held_root, held_pair, rest = state
-    own, cross, corner, extra, separation, table_rows, pitch, lead, hertz = arrays
+    own, cross, corner, extra, separation, table_rows, pitch, hertz = arrays
     kinds, factors, set_factors = lines
     n_slots, n_s = held.shape
     n_modes = q.shape[1]
@@ -299,7 +299,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
                 _taken_up(k, n, pairs, held, held_root, held_pair, force, root)
             # Approach of every slice, elastic law plus damping; then the contact's forces, N ≥ 0.
             deepest = _approaches(
-                k, n, rows, turn, q1, v1, pairs, columns, parts, apart, slope, lead, off, seen, moving, approach,
+                k, n, rows, turn, q1, v1, pairs, columns, parts, apart, slope, off, seen, moving, approach,
                 viscous, along,
             )  # fmt: skip
             fill_compliance(n, pairs, columns, parts, k.teeth, own, cross, extra, table_rows, r)
@@ -422,14 +422,14 @@ def _taken_up(k, n, pairs, held, held_root, held_pair, force, root):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def _approaches(
-    k, n, rows, turn, q1, v1, pairs, columns, parts, apart, slope, lead, off, seen, moving, approach, viscous, along
+    k, n, rows, turn, q1, v1, pairs, columns, parts, apart, slope, off, seen, moving, approach, viscous, along
 ):  # fmt: skip
     """Fill the approach of each slice, damping's part in it and its change per mesh cycle; return the deepest."""
-    n_s, deepest = lead.shape[0], -1.0
+    n_s, deepest = apart.shape[1], -1.0
     for p in range(n):
         for s in range(n_s):
             i = p * n_s + s
-            approach[i], viscous[i], along[i] = off - apart[p] - lead[s], 0.0, -slope[p]
+            approach[i], viscous[i], along[i] = off - apart[p, s], 0.0, -slope[p, s]
         for side in range(2):
             z = k.teeth[side]
             tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
@@ -443,7 +443,7 @@ def _approaches(
                 along[i] += (high - low) / k.column_step
         for s in range(n_s):
             approach[p * n_s + s] += viscous[p * n_s + s]
-            deepest = max(deepest, approach[p * n_s + s] + apart[p])
+            deepest = max(deepest, approach[p * n_s + s] + apart[p, s])
     return deepest
 
 

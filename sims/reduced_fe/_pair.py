@@ -22,7 +22,7 @@ from sims.gear_pair import (
     machine_fields,
 )
 from sims.machine import BearingSupport, Machine, Operation
-from sims.mesh import PairGeometry, one_mesh_cycle
+from sims.mesh import GearMesh, one_mesh_cycle
 from sims.reduced_fe._contact import (
     FLANK,
     SIGNS,
@@ -36,6 +36,7 @@ from sims.reduced_fe._contact import (
     mirrors,
     over_height,
     rolls_rad,
+    slice_progress,
     static_table,
     teeth_of,
 )
@@ -149,7 +150,7 @@ class HubSprings:
         return cls(own, gear.hub_flank_compliance[list(PLANE)] - soft.T @ gear.flank_modes[kept])
 
     def seen_from_the_line_of_action(
-        self, gear: ReducedGear, pair: PairGeometry, index: int, progress: FloatArray
+        self, gear: ReducedGear, mesh: GearMesh, index: int, progress: FloatArray
     ) -> FloatArray:
         """S over ζ in the frame of the shafts, (n, n_slices, 3): along x, along the line of action, in its own sense.
 
@@ -163,19 +164,24 @@ class HubSprings:
         at = self.flank.reshape(3, *gear.grid.shape)[:, FLANK]
         axes = [np.einsum("ch,chs->hs", axis, at[:2]) for axis in (x, y)]
         turned = np.stack([*axes, -up * at[2]], axis=-1)
-        return over_height(tau, turned, rolls_rad(pair, progress)[index])
+        return over_height(tau, turned, slice_rolls_rad(gear, mesh, index, progress))
+
+
+def slice_rolls_rad(gear: ReducedGear, mesh: GearMesh, index: int, progress: FloatArray) -> FloatArray:
+    """Roll angles of the slices on one gear, (n, n_slices)."""
+    return rolls_rad(mesh.pair, slice_progress(mesh.pair, mesh.lead, gear.grid.z_m, progress))[index]
 
 
 def without_hub(
-    table: ContactTable, pair: PairGeometry, gears: tuple[ReducedGear, ReducedGear], hubs: tuple[HubSprings, HubSprings]
+    table: ContactTable, mesh: GearMesh, gears: tuple[ReducedGear, ReducedGear], hubs: tuple[HubSprings, HubSprings]
 ) -> ContactTable:
     """Return the table with the hubs' places given: less what flanks move by the springs of their hubs."""
     own, cross = table.own.copy(), table.cross.copy()
     for index, (gear, hub) in enumerate(zip(gears, hubs, strict=True)):
-        here = hub.seen_from_the_line_of_action(gear, pair, index, table.progress)
+        here = hub.seen_from_the_line_of_action(gear, mesh, index, table.progress)
         own -= np.einsum("nsc,ntc,c->nst", here, here, 1.0 / hub.compliance)
         for o in range(len(cross)):
-            older = hub.seen_from_the_line_of_action(gear, pair, index, table.progress + o + 1.0)
+            older = hub.seen_from_the_line_of_action(gear, mesh, index, table.progress + o + 1.0)
             cross[o] -= np.einsum("nsc,ntc,c->nst", here, older, 1.0 / hub.compliance)
     return replace(table, own=own, cross=cross)
 
@@ -349,7 +355,7 @@ def build_side(
     rate = np.einsum("ij,ik,kj->j", shapes, damping, shapes)
     mean = groups / groups.sum(axis=0)
     elastic = _elastic_rows(machine, index, gear, table, mean)
-    at_hub = springs.seen_from_the_line_of_action(gear, machine.mesh.pair, index, table.progress)
+    at_hub = springs.seen_from_the_line_of_action(gear, machine.mesh, index, table.progress)
     up = 1.0 if index == 0 else -1.0
     rigid = up * (base_m * shapes[GEAR] + shapes[Y])
     stretched = shapes[HUB_X : HUB + 1] - shapes[[X, Y, GEAR]]
@@ -385,9 +391,11 @@ def build_side(
 
 def _elastic_rows(machine: Machine, index: int, gear: ReducedGear, table: ContactTable, mean: FloatArray) -> FloatArray:
     """∂D/∂q of all elastic modes at tooth 0, (n, n_groups, n_modes): minus the push displacement."""
-    roll = rolls_rad(machine.mesh.pair, table.progress)[index]
-    flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK] @ mean
-    return -over_height(gear.grid.roll_rad, np.moveaxis(flank, 0, -1), roll)
+    roll = slice_rolls_rad(gear, machine.mesh, index, table.progress)
+    flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK]
+    each = over_height(gear.grid.roll_rad, np.moveaxis(flank, 0, -1), roll)
+    result: FloatArray = -np.einsum("nsm,sg->ngm", each, mean)
+    return result
 
 
 def hub_inertia(machine: Machine, index: int, gear: ReducedGear) -> tuple[float, float]:
@@ -525,8 +533,6 @@ class FlexiblePair:
         None: contact by its compliance alone. A number e: at first contact after a loss the closing speed of the gears
         becomes −e times itself, on top of the compliance. That counts an impact twice; it is here for comparison with
         models that do.
-    lead_error_um : float
-        Misalignment of the flanks over the face width.
     mode_limit_hz : float
     """
 
@@ -534,17 +540,23 @@ class FlexiblePair:
     gears: tuple[ReducedGear, ReducedGear]
     body_damping_ratio: float = 0.08
     restitution: float | None = None
-    lead_error_um: float = 0.0
     mode_limit_hz: float = MODE_LIMIT_HZ
 
     def __post_init__(self) -> None:
         within(self.body_damping_ratio, "body_damping_ratio", 0.0, 1.0)
         if self.restitution is not None:
             within(self.restitution, "restitution", 0.0, 1.0)
+        if self.machine.mesh.overlap_ratio and self.machine.lubrication.friction:
+            raise InputError(
+                "a helical pair of finite-element gears has no friction",
+                where="friction",
+                allowed="friction = off, or no helix",
+                remedy="take the model 'cracked'",
+            )
 
     def maps(self, torque_nm: FloatArray | None = None, mesh_cycles: FloatArray | None = None) -> MeshMaps:
         """Return the static maps of this pair."""
-        return mesh_maps(self.gears, self.machine.mesh, torque_nm, mesh_cycles, lead_um=self.lead_error_um)
+        return mesh_maps(self.gears, self.machine.mesh, torque_nm, mesh_cycles)
 
 
 @dataclass(frozen=True)
@@ -655,9 +667,9 @@ def _contact(pair: FlexiblePair) -> tuple[ContactTable, list[RetainedModes], Flo
         def rest(gear: ReducedGear, teeth: list[int]) -> FloatArray:
             return residual_compliance(gear, teeth, kept[0] if gear is pair.gears[0] else kept[1])
 
-        table = contact_table(pair.gears, pair.machine.mesh, rest, lead_um=pair.lead_error_um)
+        table = contact_table(pair.gears, pair.machine.mesh, rest)
         hubs = HubSprings.of(pair.gears[0], kept[0].all), HubSprings.of(pair.gears[1], kept[1].all)
-        return without_hub(table, pair.machine.mesh.pair, pair.gears, hubs), kept
+        return without_hub(table, pair.machine.mesh, pair.gears, hubs), kept
 
     groups = mirror_groups(n_slices)
     table, kept = made(groups)

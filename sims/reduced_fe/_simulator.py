@@ -48,6 +48,7 @@ MEANINGLESS: dict[str, ParameterValue | None] = {
     "contact_law": "linear",
     "mesh_ramp": 0.05,
     "gear_body": "separate",
+    "face_slices": 16,
     "mass_driver_kg": None,
     "mass_driven_kg": None,
     "inertia_driver_kg_m2": None,
@@ -94,7 +95,6 @@ _DYNAMICS = (
         1,
         None,
     ),
-    Parameter("lead_error_um", "um", "misalignment of the flanks over the face width", -500, 500, 0.0),
     Parameter(
         "step_us",
         "us",
@@ -359,7 +359,6 @@ def flexible_pair(values: Values, machine: Machine, gears: Gears) -> FlexiblePai
         gears,
         body_damping_ratio=parameters.number("body_damping_ratio"),
         restitution=parameters.optional("restitution"),
-        lead_error_um=parameters.number("lead_error_um"),
         mode_limit_hz=parameters.number("mode_limit_hz"),
     )
 

@@ -69,7 +69,7 @@ def spreading_check(pair: FlexiblePair, operation: Operation, mesh_cycles: Float
         plan = ReductionPlan(SIZE, n_heights=N_HEIGHTS, n_slices=1, spread=spread)
         one = reduce_gear(first, plan)
         gears = (one, one if second == first else reduce_gear(second, plan))
-        own = replace(pair, gears=gears, lead_error_um=0.0)
+        own = replace(pair, gears=gears)
         frequency[spread] = torsional_curve_hz(own, operation, mesh_cycles)
         inner = slice(2, N_HEIGHTS - 2)  # the ends of the involute have neighbours on one side only
         compliance = np.log(np.diag(one.clamped_compliance_m_per_n[0])[:N_HEIGHTS][inner])

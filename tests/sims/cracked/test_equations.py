@@ -8,6 +8,7 @@ import pytest
 from sims.cracked import SIGNALS, PairConstants, derivative, integrate, place_of_entry, potential_energy, prepare
 from sims.gear_pair import bearing_loads_n
 from sims.machine import Machine, Operation, Roughness
+from sims.mesh import STRAIGHT, Lead
 from tests.sims.cracked.machines import (
     FIXED_CENTRES,
     conservative,
@@ -49,10 +50,11 @@ def mass_matrix(machine: Machine, q: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("contact_law", ["linear", "load-dependent"])
 @pytest.mark.parametrize("delta_m", [2e-5, -6e-5])
-def test_forces_are_the_slope_of_the_energy(contact_law: str, delta_m: float) -> None:
-    """M a = −∂U/∂q at rest, on the driving flanks and on those behind, with cracks, run-out and unbalance."""
+@pytest.mark.parametrize("lead", [STRAIGHT, Lead(20.0, 5.0, 3.0, 4)])
+def test_forces_are_the_slope_of_the_energy(contact_law: str, delta_m: float, lead: Lead) -> None:
+    """M a = −∂U/∂q at rest, on both flanks, with cracks, run-out and unbalance, spur and helical."""
     base = cracked(spur_pair_machine(), 2.0)
-    base = replace(base, mesh=replace(base.mesh, contact_law=contact_law))
+    base = replace(base, mesh=replace(base.mesh, contact_law=contact_law, lead=lead))
     machine = conservative(base, runout_um=25.0, runout_angle_deg=30.0, unbalance_g_mm=3000.0, unbalance_angle_deg=70.0)
     machine = replace(machine, line_of_action_deg=35.0)
     ready = prepare(machine, FREE, np.random.default_rng(0))
