@@ -9,7 +9,7 @@ from math import cos, sin
 import numpy as np
 from numba import njit
 
-from sims.gear_pair import carried_part, foot
+from sims.gear_pair import carried_part, element_forces, foot
 from sims.machine import profile_value, set_speed, torque_ripple
 from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, height_now, pair_force
 
@@ -281,10 +281,15 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
             if k.special[row] > 0:
                 foot_x, foot_y = foot(k, row, theta, x, y)
                 x, y = x - foot_x, y - foot_y
-                part = carried_part(k, row, x, y)
-            kb, cb, per_mass = part * k.bearing_stiffness[row], k.bearing_damping[row], k.per_bearing_mass[row]
-            a[b] = (0.5 * bend_x - kb * x - cb * v[b] + sign * push_x) * per_mass + k.gravity_x
-            a[b + 1] = (0.5 * bend_y - kb * y - cb * v[b + 1] + sign * push_y) * per_mass + k.gravity_y
+                if k.balls[row] == 0:
+                    part = carried_part(k, row, x, y)
+            if k.balls[row] > 0:
+                held_x, held_y = element_forces(k, row, theta, x, y)
+            else:
+                held_x, held_y = -part * k.bearing_stiffness[row] * x, -part * k.bearing_stiffness[row] * y
+            cb, per_mass = k.bearing_damping[row], k.per_bearing_mass[row]
+            a[b] = (0.5 * bend_x + held_x - cb * v[b] + sign * push_x) * per_mass + k.gravity_x
+            a[b + 1] = (0.5 * bend_y + held_y - cb * v[b + 1] + sign * push_y) * per_mass + k.gravity_y
         if side == 0:
             fx, fy, t = fx1 - bend_x, fy1 - bend_y, t1 + carried
         else:

@@ -28,6 +28,8 @@ from sims.gear_pair import (
     governor_nm_s_per_rad,
     machine_fields,
     profile_points,
+    shaft_place_m,
+    stiffness_under_load_n_per_m,
     tilting_shares,
     total_inertia_kg_m2,
 )
@@ -232,9 +234,12 @@ def start_state(machine: Machine, operation: Operation, start_s: float) -> tuple
     loads = bearing_loads_n(machine, force)
     for row, support in enumerate(machine.bearings):
         size = float(np.hypot(*loads[row]))
-        foot = loads[row] / support.stiffness_n_per_m
-        if size > 0.0:
-            foot = foot + 1e-6 * support.clearance_um * loads[row] / size
+        if support.law == "hertzian":
+            foot = shaft_place_m(support, loads[row])
+        else:
+            foot = loads[row] / support.stiffness_n_per_m
+            if size > 0.0:
+                foot = foot + 1e-6 * support.clearance_um * loads[row] / size
         q[8 + 2 * row : 10 + 2 * row] = foot
     beta = np.radians(machine.line_of_action_deg)
     down = -machine.gravity_mps2 * np.array([np.sin(beta), np.cos(beta)])
@@ -275,7 +280,10 @@ def matrices(machine: Machine, force_n: float) -> tuple[FloatArray, FloatArray, 
         mesh,
         [s.torsional_stiffness_nm_per_rad for s in shafts],
         [s.bending_stiffness_n_per_m for s in shafts],
-        [b.stiffness_n_per_m for b in bearings],
+        [
+            stiffness_under_load_n_per_m(b, load)
+            for b, load in zip(bearings, bearing_loads_n(machine, force_n), strict=True)
+        ],
     )
     damping = _assembled(
         machine,

@@ -22,6 +22,13 @@ from sims.gear_pair._drive import (
 from sims.gear_pair._installed import Installed, completed
 from sims.gear_pair._measurement import COORDINATES, MIN_MOTION_HZ, Measurement
 from sims.gear_pair._parameters import PARAMETERS
+from sims.gear_pair._rolling import (
+    contact_n_per_m15,
+    element_forces,
+    element_loads_n,
+    shaft_place_m,
+    stiffness_under_load_n_per_m,
+)
 from sims.gear_pair._run import PairResponse, RunPlan, StepConvergence, profile_points
 from sims.gear_pair._simulator import PairModel, ReadyPair, SimulationRequest, check_load
 from sims.gear_pair._twin import (
@@ -60,13 +67,18 @@ __all__ = [
     "carried_part",
     "check_load",
     "completed",
+    "contact_n_per_m15",
     "draw_roughness",
+    "element_forces",
+    "element_loads_n",
     "foot",
     "friction_fields",
     "gear_geometry",
     "governor_nm_s_per_rad",
     "machine_fields",
     "profile_points",
+    "shaft_place_m",
+    "stiffness_under_load_n_per_m",
     "tilting_shares",
     "total_inertia_kg_m2",
 ]

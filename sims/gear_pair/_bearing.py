@@ -8,7 +8,8 @@ cos^1.5 ψ (Stribeck's distribution for a bearing without clearance). The sinkin
 (x_b − d).
 
 With clearance, fewer elements share the load, and the shaft falls and rises as they pass: the difference from the
-bearing without clearance is found from the static balance of all elements (F = K δ^1.5) at 32 places of the cage.
+bearing without clearance is found from the static balance of all elements (F = K δ^1.5) at 32 places of the cage. A
+bearing of law "hertzian" has no spring at all: the contacts of its elements carry one by one, see `_rolling`.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls
@@ -22,13 +23,12 @@ import numpy as np
 from numba import njit
 
 from gearsig.checks import FloatArray
-from gearsig.errors import InputError, RefusalError
+from gearsig.errors import InputError
+from sims.gear_pair._rolling import balanced, contact_n_per_m15
 from sims.machine import RACE_EDGE_MM, BearingSupport, Machine
 
 N_HARMONICS = 4
 """Of the motion at the rolling elements' passing."""
-LEFT_OVER = 1e-7
-"""Part of the load that may be out of balance; the rounding of the energy leaves up to 3e-8."""
 N_PLACES = 1024
 """Rolling elements whose place in the cage is drawn; then they repeat (the cage's own ones, spread by skidding)."""
 
@@ -50,6 +50,8 @@ BEARING_FIELDS: list[tuple[str, type, tuple[int, ...]]] = [
     ("load_angle", np.float64, (4,)),  # from +x counter-clockwise
     ("places", np.float64, (4, N_PLACES)),  # of the elements in the cage, off their even spacing
     ("pass_order", np.float64, (4,)),  # of the elements past a standing point
+    ("balls", np.int64, (4,)),  # whose contacts carry one by one; 0 where a spring stands for all
+    ("ball_contact", np.float64, (4,)),  # K of Q = K δ^1.5, N/m^1.5
     ("sway", np.float64, (4, 2, N_HARMONICS, 2)),  # cosine and sine parts in m of x and y at the passing
 ]
 """Of the kernel's record, one entry per bearing; angles in rad."""
@@ -70,7 +72,9 @@ def bearing_fields(machine: Machine, mesh_force_n: float, rng: np.random.Generat
         "bearing_stiffness": np.array([b.stiffness_n_per_m for b in supports]),
         "bearing_damping": np.array([b.damping_n_s_per_m for b in supports]),
         "clearance": np.array([b.clearance_um * 1e-6 for b in supports]),
-        "special": np.array([b.clearance_um > 0 or b.defect is not None for b in supports]),
+        "special": np.array([b.clearance_um > 0 or b.defect is not None or b.law == "hertzian" for b in supports]),
+        "balls": np.array([b.bearing.n_rolling_elements if b.law == "hertzian" else 0 for b in supports]),
+        "ball_contact": np.array([contact_n_per_m15(b.bearing) if b.law == "hertzian" else 0.0 for b in supports]),
         "race": np.array([d[0] for d in defects], dtype=np.int64),
         "race_order": np.array([d[1] for d in defects]),
         "race_length": np.array([d[2] for d in defects]),
@@ -147,7 +151,7 @@ def _defect(support: BearingSupport) -> tuple[int, float, float, float]:
 
 def _sway(support: BearingSupport, load_n: FloatArray) -> FloatArray:
     """Fourier parts of the shaft's motion that clearance adds at the rolling elements' passing, (2, N_HARMONICS, 2)."""
-    if support.clearance_um == 0 or np.hypot(*load_n) == 0:
+    if support.law == "hertzian" or support.clearance_um == 0 or np.hypot(*load_n) == 0:
         return np.zeros((2, N_HARMONICS, 2))
     motion = _carried_place(support, load_n, support.clearance_um * 1e-6) - _carried_place(support, load_n, 0.0)
     lines = np.fft.rfft(motion, axis=0)[1 : N_HARMONICS + 1] * 2.0 / len(motion)
@@ -167,42 +171,9 @@ def _carried_place(support: BearingSupport, load_n: FloatArray, clearance_m: flo
     for i in range(n_angles):
         angles = 2 * pi * (np.arange(n) + i / n_angles) / n
         radial = np.column_stack((np.cos(angles), np.sin(angles)))
-        places[i] = guess = _balanced(radial, contact, clearance_m, load_n, guess)
+        places[i] = guess = balanced(radial, contact, clearance_m, load_n, guess)
     swing: FloatArray = places - places.mean(axis=0)
     return swing
-
-
-def _balanced(
-    radial: FloatArray, contact: float, clearance_m: float, load_n: FloatArray, guess: FloatArray
-) -> FloatArray:
-    """Least of the energy Σ K δ^2.5/2.5 − W·p, which is convex: Newton's method, its steps halved until it falls.
-
-    radial : (n, 2) directions of the elements. Lengths are scaled so that the curvature is about 1.
-    """
-    load = float(np.hypot(*load_n))
-    unit = (load / contact) ** (2.0 / 3.0)
-    toward, gap, p = load_n / load, clearance_m / unit, guess / unit
-
-    def energy(place: FloatArray) -> float:
-        return float(np.sum(np.maximum(radial @ place - gap, 0.0) ** 2.5) / 2.5 - toward @ place)
-
-    for _ in range(200):
-        depth = np.maximum(radial @ p - gap, 0.0)
-        slope = (depth**1.5) @ radial - toward
-        if np.hypot(*slope) < LEFT_OVER:
-            place: FloatArray = p * unit
-            return place
-        curvature = (radial.T * (1.5 * np.sqrt(depth))) @ radial + 1e-9 * np.eye(2)
-        step = np.linalg.solve(curvature, slope)
-        step *= min(1.0, (1.0 + gap) / float(np.hypot(*step)))
-        part, now = 1.0, energy(p)
-        while energy(p - part * step) > now - 1e-4 * part * float(slope @ step) and part > 1e-12:
-            part /= 2.0
-        p = p - part * step
-    raise RefusalError(
-        f"the static balance of a bearing's rolling elements was not found (out of balance by {np.hypot(*slope):.1g})",
-        remedy="take another clearance or load",
-    )
 
 
 # Compiled: where the foot of a bearing's spring stands, and the spring's force with clearance.
@@ -244,7 +215,7 @@ def foot(k, row, theta, x, y):
                 sink = share * (1.0 - exp(-depth / share)) * facing * sqrt(facing)
                 dx += sink * cos(direction)
                 dy += sink * sin(direction)
-    if k.clearance[row] > 0.0:
+    if k.clearance[row] > 0.0 and k.balls[row] == 0:
         phase = k.pass_order[row] * theta
         for n in range(k.sway.shape[2]):
             c, s = cos((n + 1) * phase), sin((n + 1) * phase)

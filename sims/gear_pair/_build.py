@@ -382,6 +382,7 @@ def _bearing(values: ParameterValues, number: int, installed: Installed | None) 
         values.number("bearing_stiffness_n_per_m"),
         values.number("bearing_damping_n_s_per_m"),
         values.number("bearing_clearance_um"),
+        law=values.word("bearing_law"),
     )
 
 

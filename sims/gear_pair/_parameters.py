@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sims.machine import MAX_DRY_FRICTION
+from sims.machine import BEARING_LAWS, MAX_DRY_FRICTION
 from sims.mesh import BODIES, MAX_SLICES
 from sims.simulator import Parameter
 
@@ -138,6 +138,12 @@ _BEARINGS = (
     Parameter("bearing_stiffness_n_per_m", "N/m", "of each bearing, to the ground", 1e5, 1e12, 2e8),
     Parameter("bearing_damping_n_s_per_m", "N s/m", "of each bearing, to the ground", 0, 1e6, 1500.0),
     Parameter("bearing_mass_kg", "kg", "moving with each bearing", 1e-3, 1e4, 0.3),
+    Parameter.choice(
+        "bearing_law",
+        "one spring for each bearing, or Hertzian contacts of its balls one by one, as stiff as their size makes them",
+        BEARING_LAWS,
+        "linear",
+    ),
     Parameter("bearing_clearance_um", "um", "radial clearance of each bearing, half of the play", 0, 500, 0.0),
     Parameter("n_balls", "", "rolling elements of each bearing", 3, 100, 9, whole=True),
     Parameter("ball_diameter_mm", "mm", "diameter of the rolling elements", 0.5, 300, 7.94),

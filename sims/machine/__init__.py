@@ -1,6 +1,7 @@
 """What a geared drive is made of, for the simulators and the effects; see `sims.machine`."""
 
 from sims.machine._machine import (
+    BEARING_LAWS,
     MAX_DRY_FRICTION,
     RACE_EDGE_MM,
     RECOVERY_S,
@@ -29,6 +30,7 @@ from sims.machine._nominal import (
 from sims.machine._operation import Operation, Profile, profile_value, set_speed, torque_ripple
 
 __all__ = [
+    "BEARING_LAWS",
     "MAX_DRY_FRICTION",
     "RACE_EDGE_MM",
     "RECOVERY_S",

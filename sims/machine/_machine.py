@@ -156,6 +156,10 @@ class RaceDefect:
         within(self.slip, "slip of the race defect", 0.0, 0.05)
 
 
+BEARING_LAWS = ("linear", "hertzian")
+"""Of what a bearing carries by."""
+
+
 @dataclass(frozen=True)
 class BearingSupport:
     """A bearing with its housing.
@@ -171,6 +175,9 @@ class BearingSupport:
     clearance_um : float
         Radial distance that the shaft can move from the middle until the bearing carries.
     defect : RaceDefect or None
+    law : str
+        "linear": one spring. "hertzian": the elements' contacts carry one by one, with ball passage; the stiffness
+        then follows from the balls (Palmgren) and `stiffness_n_per_m` is not used.
     """
 
     bearing: Bearing
@@ -179,15 +186,18 @@ class BearingSupport:
     damping_n_s_per_m: float
     clearance_um: float = 0.0
     defect: RaceDefect | None = None
+    law: str = "linear"
 
     def __post_init__(self) -> None:
+        one_of(self.law, "bearing_law", BEARING_LAWS)
         positive(self.mass_kg, "mass_kg of a bearing", "kg")
         positive(self.stiffness_n_per_m, "stiffness_n_per_m of a bearing", "N/m")
         not_negative(self.damping_n_s_per_m, "damping_n_s_per_m of a bearing", "N s/m")
         not_negative(self.clearance_um, "clearance_um of a bearing", "µm")
-        if (self.defect is not None or self.clearance_um > 0) and self.bearing.n_rolling_elements is None:
+        special = self.defect is not None or self.clearance_um > 0 or self.law == "hertzian"
+        if special and self.bearing.n_rolling_elements is None:
             raise InputError(
-                f"bearing {self.bearing.name!r} has a defect or clearance, and its geometry is not given",
+                f"{self.bearing.name!r} has a defect, clearance or contacts of its own, and no geometry",
                 allowed="n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm",
                 remedy="give the bearing's geometry",
             )

@@ -104,6 +104,13 @@ def rolling_fields(
 
 def _check_load(machine: Machine, operation: Operation) -> None:
     least = float(np.min(operation.torque_nm.values))
+    if any(b.law == "hertzian" for b in machine.bearings):
+        raise InputError(
+            "bearings of flexible gears are springs about their load",
+            where="bearing_law",
+            allowed="linear",
+            remedy="take the model 'cracked'",
+        )
     loose = next((b for b in machine.bearings if b.clearance_um > 0.0), None)
     if loose is not None and least <= 0.0:
         raise InputError(
