@@ -24,6 +24,18 @@ SAMPLING_RATE = "sampling-rate-doubtful"
 USUAL_FACTORS = (2.0, 2.56, 4.0, 5.0, 8.0, 10.0)
 """By which rates are mistaken, up or down: decimation, a prefix or a digit, bandwidth for rate (2.56)."""
 
+COMMON_RATES_HZ = (
+    *(1000.0 * rate for rate in (1, 2, 2.5, 4, 5, 6.25, 8, 10, 12, 12.5, 16, 20, 24, 25, 32, 40, 48, 50, 64, 96, 100)),
+    *(2560.0 * 2**power for power in range(7)),  # 2.56 times an analyser's bandwidth
+    *(6400.0 * 2**power for power in range(6)),
+    *(4096.0 * 2**power for power in range(6)),
+    11025.0, 22050.0, 44100.0,
+)  # fmt: skip
+"""Of acquisition systems; where one recording of a set was taken at another of them, the factor is their ratio."""
+
+CLOSE_TOLERANCE = 0.005
+"""Of the speed, by which rates are told apart that differ by less than a stated speed is to be trusted."""
+
 N_LINES = 12
 HIGHEST_ORDER = 12.0
 CLEAR_DB = 12.0
@@ -160,18 +172,24 @@ def _near(lines: StrongLines, places: FloatArray) -> NDArray[np.bool_]:
     return beside
 
 
-def _log_p(lines: StrongLines, factor: float, shafts: Sequence[float], parts: Sequence[tuple[float, float]]) -> float:
+def _log_p(
+    lines: StrongLines,
+    factor: float,
+    shafts: Sequence[float],
+    parts: Sequence[tuple[float, float]],
+    tolerance: float = STATED_SPEED_TOLERANCE,
+) -> float:
     r"""Return lg of the probability that chance puts so many of n lines on the places of shafts and races.
 
     .. math:: p = T \sum_{k \ge m} \binom{n}{k} c^k (1 - c)^{n - k}
 
-    c is the share of the range that the places cover, T the number of speeds and slips tried: the stated speed may be
-    3 % beside the true one, a part 1.5 % beside its kinematic order. Each multiple of a part has two sidebands to
-    either side: of a race at its shaft's order, of a rolling element at the cage's.
+    c is the share of the range that the places cover, T the number of speeds and slips tried: the true speed may be
+    that tolerance beside the stated one, a part 1.5 % beside its kinematic order. Each multiple of a part has two
+    sidebands to either side: of a race at its shaft's order, of a rolling element at the cage's.
     """
     highest = max(lines.highest, 1.0)
-    n_speeds = min(4001, int(2 * STATED_SPEED_TOLERANCE * highest / (lines.half_width / 1.5)) + 2)
-    speeds = np.linspace(1 - STATED_SPEED_TOLERANCE, 1 + STATED_SPEED_TOLERANCE, n_speeds) / factor
+    n_speeds = min(4001, int(2 * tolerance * highest / (lines.half_width / 1.5)) + 2)
+    speeds = np.linspace(1 - tolerance, 1 + tolerance, n_speeds) / factor
     ratio = lines.orders[:, None] / speeds
     beside = np.abs(ratio - np.maximum(np.rint(ratio), 1)) * speeds
     # The speed that puts most lines on the shaft's multiples, or the stated one where those are weak.
@@ -187,15 +205,13 @@ def _log_p_at(
     places = [np.arange(1, int(lines.highest / (shaft * speed)) + 2) * shaft * speed for shaft in shafts]
     seen, tries = _near(lines, np.concatenate(places)), float(n_speeds)
     for part, sideband in parts:
-        slips = [
-            _family(part * slip, sideband, lines.highest / speed) * speed for slip in np.linspace(0.985, 1.015, 61)
-        ]
-        new = [int((_near(lines, family) & ~seen).sum()) for family in slips]
+        slips = part * np.linspace(0.985, 1.015, 61)
+        new = (_near_family(lines, slips * speed, sideband * speed) & ~seen).sum(axis=1)
         best = int(np.argmax(new))
         tries *= 3.0
         if new[best] >= 2:
-            places.append(slips[best])
-            seen |= _near(lines, slips[best])
+            places.append(_family(slips[best], sideband, lines.highest / speed) * speed)
+            seen |= _near(lines, places[-1])
             tries *= len(slips) / 3
     inside = np.sort(np.concatenate(places))
     inside = inside[(inside > lines.lowest) & (inside < lines.highest)]
@@ -205,6 +221,15 @@ def _log_p_at(
     covered = min(1.0, width / (lines.highest - lines.lowest))
     p_value = tries * float(binom.sf(int(seen.sum()) - 1, len(lines.orders), covered))
     return min(0.0, log10(max(p_value, 1e-30)))
+
+
+def _near_family(lines: StrongLines, parts: FloatArray, sideband: float) -> NDArray[np.bool_]:
+    """Which of the lines lie at a multiple of a part's order or at one of its sidebands, (n_parts, n_lines)."""
+    carrier = lines.orders - sideband * np.arange(-2, 3)[:, None]  # (n_sidebands, n_lines)
+    parts = parts[:, None, None]
+    multiple = np.clip(np.rint(carrier / parts), 1, np.floor(lines.highest / parts) + 1)
+    near: NDArray[np.bool_] = (np.abs(carrier - multiple * parts) < lines.half_width).any(axis=1)
+    return near
 
 
 def _family(part: float, sideband: float, highest: float) -> FloatArray:
@@ -218,16 +243,16 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     shafts = sorted(signals.known_shaft_orders.values())
     races, parts = (list(_parts(signals, with_elements=so)) for so in (False, True))
 
-    def evidence(factor: float, highest: float) -> float:
+    def evidence(factor: float, highest: float, tolerance: float = STATED_SPEED_TOLERANCE) -> float:
         """Sum over the spectra, of lg of the chance that lines up to an order lie as well."""
         found = (_strong_lines(excess, highest) for excess in spectra)
         at = parts if factor == 1.0 else races
-        return sum(_log_p(lines, factor, shafts, at) for lines in found if lines is not None)
+        return sum(_log_p(lines, factor, shafts, at, tolerance) for lines in found if lines is not None)
 
     if evidence(1.0, HIGHEST_ORDER) <= ENOUGH_EVIDENCE:
         return None
-    # Halves of the shaft's order are looseness, and multiples blades or poles: races must tell these rates apart.
-    factors = [f for usual in USUAL_FACTORS for f in (usual, 1 / usual) if (f > 2 or parts)]
+    candidates = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
+    factors = _apart(candidates)
     # A rate that is too high moves everything up, and more of the spectrum counts.
     ranges = {factor: HIGHEST_ORDER * max(1.0, 1 / factor) for factor in factors}
     sums = {factor: evidence(factor, ranges[factor]) for factor in factors}
@@ -237,13 +262,35 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     stated = evidence(1.0, ranges[factor])
     if min(sums.values()) > ENOUGH_EVIDENCE or stated < SHARE_OF_STATED * sums[factor]:
         return None
+    explained, highest = sums[factor], ranges[factor]
+    close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
+    factor = min(close, key=lambda f: evidence(f, highest, CLOSE_TOLERANCE))
     return _finding(
         signals.recording,
         factor,
         f"The strongest lines of {len(spectra)} spectra then lie at orders of shafts and races (lg p "
-        f"{sums[factor]:.0f} in sum); at the stated rate they do not ({stated:.0f}).",
+        f"{explained:.0f} in sum); at the stated rate they do not ({stated:.0f}).",
         "Check the sampling rate, and whether another shaft turns that much slower or faster.",
     )
+
+
+def _factors(stated_hz: float, *, with_parts: bool) -> list[float]:
+    """Return the factors to try, the usual ones first.
+
+    Halves of the shaft's order are looseness, and multiples blades or poles: races must tell these rates apart.
+    """
+    usual = [f for factor in USUAL_FACTORS for f in (factor, 1 / factor)]
+    common = [rate / stated_hz for rate in COMMON_RATES_HZ if 0.2 <= rate / stated_hz <= 5.0]
+    return [f for f in [*usual, *common] if abs(f - 1) > STATED_SPEED_TOLERANCE and (with_parts or f > 2)]
+
+
+def _apart(factors: Sequence[float]) -> list[float]:
+    """Return the first of those factors that the speed's tolerance makes one."""
+    apart: list[float] = []
+    for factor in factors:
+        if all(abs(factor / other - 1) > STATED_SPEED_TOLERANCE for other in apart):
+            apart.append(factor)
+    return apart
 
 
 def _parts(signals: AnalysisSignals, *, with_elements: bool) -> Iterator[tuple[float, float]]:
