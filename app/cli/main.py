@@ -17,6 +17,7 @@ from app.cli.dashboard import dashboard
 from app.cli.fleet import fleet_app
 from app.cli.flexible import flexible, gear_body
 from app.cli.gap import gap
+from app.cli.growth import growth
 from app.cli.motion import force, identify, start_stop
 from app.cli.papers import papers
 from app.cli.report import report
@@ -39,7 +40,7 @@ app = typer.Typer(
 )
 COMMANDS: tuple[Callable[..., None] | typer.Typer, ...] = (
     *(analyze, show, modes, crack, force, start_stop, identify, compare, report, fleet_app, rig_app),
-    *(simulate, sweep, bifurcation, flexible, gear_body, papers, gap, benchmark_app, demo, dashboard),
+    *(simulate, sweep, bifurcation, flexible, gear_body, growth, papers, gap, benchmark_app, demo, dashboard),
 )
 for command in COMMANDS:
     if isinstance(command, typer.Typer):
