@@ -34,12 +34,14 @@ def dashboard(
     from streamlit.runtime.pages_manager import PagesManager
     from streamlit.web import cli as streamlit_cli
 
+    from app import compiled
     from app.dashboard.theme import THEME_OPTIONS
 
     # main.py lists the pages. Streamlit would take a folder called "pages" for a list of its own until main.py has run
     # once, and show that instead to who opens a page by its address first.
     PagesManager.uses_pages_directory = False
     _without_advertisement()
+    compiled.begin()
     own = (f"server.port={port}", f"server.headless={str(not browser).lower()}")
     sys.argv = ["streamlit", "run", str(MAIN_PAGE), *(f"--{option}" for option in (*OPTIONS, *THEME_OPTIONS, *own))]
     sys.exit(streamlit_cli.main())

@@ -14,6 +14,7 @@ import streamlit as st
 
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
 from app.dashboard.theme import one_line
+from app.dashboard.work import kept
 
 if TYPE_CHECKING:
     from gearsig.diagnosis import Analysis
@@ -92,6 +93,7 @@ def _read(request: AnalysisRequest, name: str, content: Content, rig: Rig | None
     return read_content(content, name, rig=rig, sampling_rate_hz=rate_hz, speed_rpm=speed_rpm)
 
 
+@kept(6, "Reading …", key=lambda request, _, rig=None: (request, repr(rig)))
 def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None) -> Recording:
     """Return a recording as requested; `rig` is for files without a rig file of their own.
 
@@ -100,14 +102,8 @@ def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None)
     InputError
         If the rig or the recording cannot be read.
     """
-    return _recorded(request, repr(rig), content, rig)
-
-
-@st.cache_resource(max_entries=6, show_spinner="Reading …")
-def _recorded(request: AnalysisRequest, rig_text: str, _content: Content, _rig: Rig | None) -> Recording:
-    del rig_text  # it stands for the rig
     own_rig = read_rig_text(request.rig_text, request.rig_name)
-    return _read(request, request.name, _content, own_rig if own_rig is not None else _rig)
+    return _read(request, request.name, content, own_rig if own_rig is not None else rig)
 
 
 def analysis_of(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
@@ -127,16 +123,6 @@ def _size(content: Content) -> int:
     return content.stat().st_size if isinstance(content, Path) else content.nbytes
 
 
-@st.cache_resource(max_entries=6, show_spinner=False)
-def _small(request: AnalysisRequest, _content: Content, _reference: Content | None) -> Analysis:
-    return read_and_analyze(request, _content, _reference)
-
-
-@st.cache_resource(max_entries=2, show_spinner=False)
-def _large(request: AnalysisRequest, _content: Content, _reference: Content | None) -> Analysis:
-    return read_and_analyze(request, _content, _reference)
-
-
 def read_and_analyze(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
     """Read rig, recording and reference, and analyse."""
     from gearsig.diagnosis import analyze
@@ -145,6 +131,9 @@ def read_and_analyze(request: AnalysisRequest, content: Content, reference: Cont
     recording = _read(request, request.name, content, rig)
     then = None if reference is None else _read(request, request.reference_name, reference, rig)
     return analyze(recording, reference=then, torque_nm=request.torque_nm)
+
+
+_small, _large = (kept(n, "Reading and analysing …", key=lambda request, *_: request)(read_and_analyze) for n in (6, 2))
 
 
 @st.cache_data(max_entries=4, show_spinner=False)

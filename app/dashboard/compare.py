@@ -15,6 +15,7 @@ from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import download, show_picture
 from app.dashboard.widgets.chooser import FILE, SAMPLE, choose_file, choose_number, choose_sample, simulated_file
 from app.dashboard.widgets.messages import show_warnings
+from app.dashboard.work import kept
 from gearsig.comparison import (
     ALIGN,
     ChannelComparison,
@@ -83,13 +84,13 @@ def simulated_of(
     return recorded(simulation, content, None if rig is None else for_simulation(rig))
 
 
-@st.cache_resource(max_entries=3, show_spinner=False)
-def _simulated(run: SimulationToCompare, request: AnalysisRequest, _recording: Recording) -> Recording:
-    """Simulate the recording's machine at its speed and sampling rate."""
-    del request  # it stands for the recording
-    rig = _recording.rig
-    speed_rpm = run.speed_rpm if run.speed_rpm is not None else speed_of(_recording)
-    rate_hz = min(max(_recording.sampling_rate_hz, 4096.0), 102400.0)
+@kept(3, "Simulating …", key=lambda *arguments: repr(arguments[:2]))
+def _simulated(run: SimulationToCompare, request: AnalysisRequest, recording: Recording) -> Recording:
+    """Simulate the recording's machine at its speed and sampling rate; `request` stands for the recording."""
+    del request
+    rig = recording.rig
+    speed_rpm = run.speed_rpm if run.speed_rpm is not None else speed_of(recording)
+    rate_hz = min(max(recording.sampling_rate_hz, 4096.0), 102400.0)
     if run.machine == TWIN:
         if rig is None:
             raise InputError(
@@ -111,18 +112,18 @@ def _simulated(run: SimulationToCompare, request: AnalysisRequest, _recording: R
     return setup.record()
 
 
-@st.cache_resource(max_entries=4, show_spinner=False)
+@kept(4, "Comparing …", key=lambda *arguments: repr(arguments[:4]))
 def compared(
     request: AnalysisRequest,
     simulation: Simulation,
     pairs: Pairs,
     align_by: str,
-    _recorded: Recording,
-    _simulated: Recording,
+    recording: Recording,
+    simulated: Recording,
 ) -> Comparison:
-    """Return the comparison; it is frozen, so that sessions may share it."""
-    del request, simulation  # they stand for the records
-    return compare(_simulated, _recorded, channels=pairs, align_by=align_by)
+    """Return the comparison; `request` and `simulation` stand for the records."""
+    del request, simulation
+    return compare(simulated, recording, channels=pairs, align_by=align_by)
 
 
 def teeth_of(rig: Rig | None) -> dict[str, float]:

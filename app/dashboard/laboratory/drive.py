@@ -19,6 +19,7 @@ from app.dashboard.laboratory.setup import (
 from app.dashboard.laboratory.views import show_metrics, show_title
 from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import show_picture
+from app.dashboard.work import kept
 from gearsig import motion as motions
 from gearsig import plot
 from gearsig.checks import FloatArray
@@ -166,7 +167,7 @@ class DriveRun:
         return next((i.value for i in self.examined.indicators if i.name == name), float("nan"))
 
 
-@st.cache_resource(max_entries=12, show_spinner="Simulating …")
+@kept(12, "Simulating …", grace_s=0.0)
 def run_drive(setup: Setup) -> DriveRun:
     """Simulate, measure, examine.
 

@@ -16,9 +16,10 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.laboratory.setup import MODEL, Setup
+from app.dashboard.laboratory.setup import MODEL, Setup, preset_number
 from app.dashboard.state import AnalysisRequest, Chosen
 from app.dashboard.widgets.messages import show_error
+from app.dashboard.work import kept
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError
 from gearsig.plot import Cursor, order_cursors
@@ -28,6 +29,7 @@ from sims.cracked import Response, simulate_with_motion
 from sims.effects import completed, effect
 from sims.gear_pair import build_rig
 from sims.machine import Machine, Operation
+from sims.presets import preset
 from sims.reduced_fe import FlexiblePair, FlexResponse
 from sims.simulator import SimulationSetup
 
@@ -152,34 +154,39 @@ def times_of(run: LaboratoryRun, phase: FloatArray, values: FloatArray | Sequenc
     return result
 
 
-_ready: list[bool] = []
+# Each holds some MB: a recording and eight signals of the motion at 80 kHz. An older setting of a slider is of no use.
+simulated = kept(24, "Simulating …", grace_s=0.0)(run_setup)
+PREVIEW_REVOLUTIONS, PREVIEW_S = 3.0, 0.1
+"""Of the slower shaft, and seconds at least."""
 
 
-def simulated(setup: Setup) -> LaboratoryRun:
-    """Return the run of a setup, simulated once; it is frozen, so that sessions may share it.
-
-    Raises
-    ------
-    InputError
-        If a value is out of its range, or the machine allows less.
-    """
-    words = "Simulating …" if _ready else "Preparing the simulator; the first time takes half a minute …"
-    with st.spinner(words, show_time=True):
-        run = _cached(setup)
-    _ready.append(True)
-    return run
+def preview_of(setup: Setup) -> Setup | None:
+    """Return the setup with a recording that is short enough to follow a slider; None where it is already."""
+    teeth = [preset_number(preset(setup.model, setup.preset), name) for name in ("teeth_driver", "teeth_driven")]
+    slower_per_s = setup.revolutions_per_s * min(teeth[0] / teeth[1], 1.0)
+    if slower_per_s <= 0.0:
+        return None
+    length_s = round(max(PREVIEW_REVOLUTIONS / slower_per_s, PREVIEW_S), 3)
+    return replace(setup, duration_s=length_s) if length_s < 0.6 * setup.duration_s else None
 
 
-# Each holds some MB: a recording and eight signals of the motion at 80 kHz.
-@st.cache_resource(max_entries=12, show_spinner=False)
-def _cached(setup: Setup) -> LaboratoryRun:
-    return run_setup(setup)
+def all_simulated(setup: Setup) -> bool:
+    """Whether healthy and faulty machine are at hand at full length, or it is known why not."""
+    try:
+        return all(simulated.is_answered(s) for s in (setup.healthy, with_all_options(setup)))
+    except GearsigError:
+        return True
+
+
+def with_all_options(setup: Setup) -> Setup:
+    """Return the setup with every option of its effects stated."""
+    return setup.healthy if setup.is_healthy else replace(setup, effects=completed(setup.effects))
 
 
 def faulty_of(setup: Setup, simulate: Callable[[Setup], R]) -> R | None:
     """Return the run with every effect complete; None, with the reason on the page if there is one, without."""
     try:
-        return None if setup.is_healthy else simulate(replace(setup, effects=completed(setup.effects)))
+        return None if setup.is_healthy else simulate(with_all_options(setup))
     except GearsigError as error:
         show_error(error)
         return None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import partial, wraps
+from functools import partial
 from hashlib import blake2b
 from io import BytesIO
 from pathlib import Path
@@ -18,6 +18,7 @@ from app.dashboard import state
 from app.dashboard.cached import safe_file_name
 from app.dashboard.theme import capitalised
 from app.dashboard.widgets import charts
+from app.dashboard.work import Kept, kept
 from gearsig.angle import PASSBAND, ShaftAngle, resample_to_angle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
@@ -38,8 +39,8 @@ OVER_TIME, OVER_ANGLE = (".csv", ".h5", ".wav", ".parquet", ".mat"), (".csv",)
 """What waveforms are written to: recordings, which run over time; signals over angle are plain columns."""
 
 
-def cached(n_kept: int, spinner: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Keep the last answers of a function, told apart by the content of its arguments.
+def cached(n_kept: int, words: str) -> Callable[[Callable[P, R]], Kept[P, R]]:
+    """Compute a function beside the page and keep its last answers, told apart by the content of its arguments.
 
     Answers are frozen, so that sessions may share them. Streamlit's own hash samples large arrays, and two segments of
     one recording could be taken for each other: arguments are hashed whole here, about 1 GB/s.
@@ -48,30 +49,14 @@ def cached(n_kept: int, spinner: str) -> Callable[[Callable[P, R]], Callable[P, 
     ----------
     n_kept : int
         Answers kept; most are several times as long as the segment.
-    spinner : str
+    words : str
         Shown while it computes.
 
     Examples
     --------
     >>> separated = cached(4, "Separating the orders …")(track_vold_kalman)  # doctest: +SKIP
     """
-
-    def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        def compute(key: str, _arguments: tuple[tuple[Any, ...], dict[str, Any]]) -> R:
-            del key  # it stands for the arguments
-            return function(*_arguments[0], **_arguments[1])
-
-        # Streamlit tells caches apart by these names.
-        compute.__module__, compute.__qualname__ = function.__module__, function.__qualname__
-        kept = st.cache_resource(max_entries=n_kept, show_spinner=spinner, show_time=True)(compute)
-
-        @wraps(function)
-        def call(*arguments: P.args, **named: P.kwargs) -> R:
-            return kept(content_key((arguments, named)), (arguments, named))
-
-        return call
-
-    return decorate
+    return kept(n_kept, words, key=lambda *arguments, **named: content_key((arguments, named)))
 
 
 def content_key(value: object) -> str:

@@ -33,8 +33,7 @@ def show() -> None:
 def analysed(file: ChosenFile, chosen: Chosen) -> Analysis | None:
     """Return the analysis; where the file or the machine stands against it, say so and offer to mend the machine."""
     try:
-        with st.spinner("Reading and analysing …", show_time=True):
-            return analysis_of(chosen.request, chosen.content, chosen.reference)
+        return analysis_of(chosen.request, chosen.content, chosen.reference)
     except GearsigError as error:
         show_error(error)
         show_machine(file, is_told=True)

@@ -29,14 +29,11 @@ def show() -> None:
         return
     _, chosen = opened
     what, content = simulation
-    with st.spinner("Reading the recording …", show_time=True):
-        recording = recorded(chosen.request, chosen.content)
-    with st.spinner("Reading or simulating; a first simulation takes half a minute …", show_time=True):
-        simulated = compare.simulated_of(what, chosen.request, content, recording)
+    recording = recorded(chosen.request, chosen.content)
+    simulated = compare.simulated_of(what, chosen.request, content, recording)
     st.caption(as_typed(f"{simulated.provenance.source or 'simulation of this page'} beside {chosen.request.name}"))
     pairs = compare.choose_pairs(simulated, recording)
-    with st.spinner("Comparing …", show_time=True):
-        comparison = compare.compared(chosen.request, what, pairs, align_by, recording, simulated)
+    comparison = compare.compared(chosen.request, what, pairs, align_by, recording, simulated)
     command = compare.command_of(chosen.request, what, pairs, align_by)
     compare.show_downloads(comparison, command)
     compare.show_comparison(comparison)

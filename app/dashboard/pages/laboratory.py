@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from time import sleep
+
 import streamlit as st
 
+from app.compiled import is_being_made
 from app.dashboard.laboratory import views
 from app.dashboard.laboratory.drive import show_drive
-from app.dashboard.laboratory.run import LaboratoryRun, faulty_of, show_saving, simulated
+from app.dashboard.laboratory.run import (
+    LaboratoryRun,
+    all_simulated,
+    faulty_of,
+    preview_of,
+    show_saving,
+    simulated,
+    with_all_options,
+)
 from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup, choose_preset, choose_setup
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
@@ -34,13 +46,42 @@ def show_pair(preset: Preset) -> None:
 
 
 def show_results(setup: Setup) -> None:
-    """Simulate and show healthy and faulty machine."""
+    """Show healthy and faulty machine: at once by a short recording, which says so, until the whole one is there."""
+    wait_for_compiled_code()
+    preview = preview_of(setup)
+    if preview is None or all_simulated(setup):
+        show_machines(setup)
+        return
+    show_machines(preview, whole_s=setup.duration_s)
+    for whole in (with_all_options(setup), setup.healthy):
+        with suppress(GearsigError):  # the preview has said it
+            simulated(whole)
+    st.rerun()
+
+
+def wait_for_compiled_code() -> None:
+    """Say what goes on while the simulators are compiled; whatever the user does ends the waiting."""
+    if not is_being_made():
+        return
+    with st.spinner("Compiling the simulators, once after an installation …", show_time=True):
+        st.caption("About a minute. The other pages can be used meanwhile.")
+        beat = st.empty()
+        while is_being_made():
+            sleep(0.1)
+            beat.empty()  # Streamlit ends the run of a page when it has something to show
+    st.rerun()
+
+
+def show_machines(setup: Setup, *, whole_s: float | None = None) -> None:
+    """Simulate and show both machines; `whole_s` is the length that follows a preview."""
     healthy, faulty = simulated(setup.healthy), faulty_of(setup, simulated)
     shown = faulty or healthy
     head, buttons = st.columns((3, 2), vertical_alignment="top")
     with head:
         views.show_title(setup, is_shown=faulty is not None)
-        st.caption(" · ".join(views.frequencies(shown)))
+        about = " · ".join(views.frequencies(shown))
+        preview = f":orange-badge[Preview of {setup.duration_s:.2g} s; {whole_s:g} s follow] " if whole_s else ""
+        st.caption(preview + about)
     with buttons:
         show_saving(shown.setup, LENGTHS_S)
     views.show_expectation(healthy, faulty)

@@ -1,0 +1,223 @@
+"""What may take longer than a moment: computed in a thread beside the page, kept for equal requests, and cancelled."""
+
+from __future__ import annotations
+
+import ctypes
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from functools import update_wrapper
+from threading import Lock, Thread, Timer
+from time import monotonic
+from typing import Any, Generic, ParamSpec, TypeVar, cast
+
+import streamlit as st
+from streamlit.runtime.scriptrunner import get_script_run_ctx
+
+P = ParamSpec("P")
+R = TypeVar("R")
+LOOK_EVERY_S = 0.05
+"""A page that waits hears of clicks and sliders as often."""
+CANCEL_AFTER_S = 2.0
+GRACE_S = 2.0
+"""What no page waits for any more goes on for so long, in case that somebody comes back to it."""
+_CANCELLED = "cancelled work"
+
+
+class Cancelled(BaseException):
+    """Raised inside of work that is not wanted any more; like `KeyboardInterrupt`, no error."""
+
+
+class Work(Generic[R]):
+    """A computation in a thread of its own.
+
+    Parameters
+    ----------
+    compute : callable
+        Without arguments; may raise, and be stopped wherever a key press (Ctrl-C) could stop it.
+    """
+
+    def __init__(self, compute: Callable[[], R]) -> None:
+        self.begun_s, self.n_waiting = monotonic(), 0
+        self.is_cancelled, self._is_over, self._lock = False, False, Lock()
+        self._result: R | None = None
+        self._error: Exception | None = None
+        self._thread = Thread(target=self._run, args=(compute,), daemon=True, name="gearsig work")
+        self._thread.start()
+
+    def _run(self, compute: Callable[[], R]) -> None:
+        try:
+            try:
+                self._result = compute()
+            except Exception as error:  # noqa: BLE001 - it is raised on the page
+                self._error = error
+            with self._lock:
+                self._is_over = True
+        except Cancelled:
+            self._result = None
+
+    def wait(self, seconds: float | None = None) -> bool:
+        """Wait until it is complete, at most so long; whether it is."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
+
+    def cancel(self) -> None:
+        """Stop it at its next step in Python: compiled kernels end first."""
+        with self._lock:
+            if self._is_over or self.is_cancelled:
+                return
+            self.is_cancelled = True
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                ctypes.c_ulong(self._thread.ident or 0), ctypes.py_object(Cancelled)
+            )
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether it ended without a result."""
+        return not self._thread.is_alive() and (self._error is not None or self.is_cancelled)
+
+    def result(self) -> R:
+        """Return what came out, once it is complete; raise what it raised."""
+        if self._error is not None:
+            raise self._error
+        if self.is_cancelled:
+            raise Cancelled
+        return cast("R", self._result)
+
+
+class Kept(Generic[P, R]):
+    """A function whose last answers are kept and shared between sessions; each is computed beside the page.
+
+    Parameters
+    ----------
+    function : callable
+        Frozen answers, nothing of Streamlit in it.
+    n_kept : int
+    words : str
+        Shown while it computes.
+    key : callable
+        Arguments → what tells them apart.
+    grace_s : float
+        See `GRACE_S`; 0 where a newer request makes the older one worthless.
+    """
+
+    def __init__(
+        self, function: Callable[P, R], n_kept: int, words: str, key: Callable[..., Hashable], grace_s: float
+    ) -> None:
+        self._function, self._n_kept, self._words, self._key, self._grace_s = function, n_kept, words, key, grace_s
+        self._works: OrderedDict[Hashable, Work[R]] = OrderedDict()
+        self._lock = Lock()
+
+    def begin(self, *arguments: P.args, **named: P.kwargs) -> Work[R]:
+        """Return the work of a request: kept, going on, or begun now."""
+        return self._begin(self._key(*arguments, **named), lambda: self._function(*arguments, **named))
+
+    def _begin(self, key: Hashable, compute: Callable[[], R]) -> Work[R]:
+        with self._lock:
+            work = self._works.get(key)
+            if work is None or work.is_cancelled or work.has_failed:
+                work = self._works[key] = Work(compute)
+            self._works.move_to_end(key)
+            while len(self._works) > self._n_kept:
+                self._works.popitem(last=False)
+        return work
+
+    def __call__(self, *arguments: P.args, **named: P.kwargs) -> R:
+        """Return the answer; until it is there the page says what goes on, and offers to cancel."""
+        key = self._key(*arguments, **named)
+        name = f"{self._function.__qualname__} {hash(key):x}"
+        is_page = get_script_run_ctx(suppress_warning=True) is not None
+        if is_page and st.session_state.get(_CANCELLED) == name:
+            _offer_again(name)
+        while True:
+            work = self._begin(key, lambda: self._function(*arguments, **named))
+            work.n_waiting += 1
+            try:
+                self._wait(work, name, is_page=is_page)
+            finally:
+                work.n_waiting -= 1
+                if not work.wait(0.0):
+                    _cancel_unwatched(work, self._grace_s)
+            if not work.is_cancelled:  # else by another page that did not know of this one
+                return work.result()
+
+    def is_answered(self, *arguments: P.args, **named: P.kwargs) -> bool:
+        """Whether a request was computed already, or failed."""
+        with self._lock:
+            work = self._works.get(self._key(*arguments, **named))
+        return work is not None and work.wait(0.0) and not work.is_cancelled
+
+    def _wait(self, work: Work[R], name: str, *, is_page: bool) -> None:
+        """Wait; whatever the user does meanwhile ends this run of the page, and in time the work."""
+        if work.wait(LOOK_EVERY_S):
+            return
+        if not is_page:  # within other work
+            while not work.wait(LOOK_EVERY_S):
+                pass
+            return
+        with st.spinner(self._words, show_time=True):
+            beat, place, is_offered = st.empty(), st.empty(), False
+            while not work.wait(LOOK_EVERY_S):
+                beat.empty()  # Streamlit ends the run of a page when it has something to show
+                if not is_offered and monotonic() - work.begun_s > CANCEL_AFTER_S:
+                    place.button(
+                        "Cancel",
+                        key=f"cancel {name}",
+                        icon=":material/close:",
+                        on_click=_cancel,
+                        args=(name, work),
+                    )
+                    is_offered = True
+        place.empty()
+
+
+def _cancel(name: str, work: Work[Any]) -> None:
+    st.session_state[_CANCELLED] = name
+    work.cancel()
+
+
+def _cancel_unwatched(work: Work[Any], grace_s: float) -> None:
+    def look() -> None:
+        if work.n_waiting == 0:
+            work.cancel()
+
+    if grace_s <= 0.0:
+        look()
+        return
+    timer = Timer(grace_s, look)
+    timer.daemon = True
+    timer.start()
+
+
+def _offer_again(name: str) -> None:
+    """Say that it was cancelled; the rest of the page waits for the user."""
+    st.info("Cancelled. Change something, or start it again.", icon=":material/stop_circle:")
+    st.button("Start again", key=f"again {name}", icon=":material/play_arrow:", on_click=_again)
+    st.stop()
+
+
+def _again() -> None:
+    st.session_state.pop(_CANCELLED, None)
+
+
+def kept(
+    n_kept: int, words: str, *, key: Callable[..., Hashable] | None = None, grace_s: float = GRACE_S
+) -> Callable[[Callable[P, R]], Kept[P, R]]:
+    """Compute a function beside the page, with a way to cancel it, and keep its last answers; see `Kept`.
+
+    Examples
+    --------
+    >>> doubled = kept(2, "Doubling …")(lambda x: 2 * x)
+    >>> doubled.begin(4).wait(), doubled.is_answered(4), doubled.is_answered(5), doubled(4)
+    (True, True, False, 8)
+    """
+
+    def decorate(function: Callable[P, R]) -> Kept[P, R]:
+        made: Kept[P, R] = Kept(function, n_kept, words, key or _in_words, grace_s)
+        update_wrapper(made, function)
+        return made
+
+    return decorate
+
+
+def _in_words(*arguments: object, **named: object) -> str:
+    return repr((arguments, named))
