@@ -18,6 +18,7 @@ st.navigation(
         st.Page(PAGES / "laboratory.py", title="Fault laboratory", icon=":material/experiment:"),
         st.Page(PAGES / "compare.py", title="Comparison", icon=":material/stacked_line_chart:"),
         st.Page(PAGES / "gap.py", title="Gap", icon=":material/compare_arrows:"),
+        st.Page(PAGES / "fleet.py", title="Fleet", icon=":material/factory:"),
     ],
     position="top",
 ).run()

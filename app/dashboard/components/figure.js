@@ -223,15 +223,19 @@ class Figure {
       add(svg, "line", { x1: LEFT, x2: LEFT + plotWidth, y1: y, y2: y, stroke: this.rule });
       text(svg, LEFT - 7, y + 4, data.log ? short(value) : plain(value, low, high), { ...quiet, "text-anchor": "end" });
     }
-    for (const value of ticks(...this.view, plotWidth / 95)) {
+    for (const value of data.dates ? days(...this.view, plotWidth / 95) : ticks(...this.view, plotWidth / 95)) {
       const x = this.scale(value);
       add(svg, "line", { x1: x, x2: x, y1: bottom, y2: bottom + 5, stroke: this.ink, opacity: 0.5 });
-      text(svg, x, bottom + 18, plain(value, ...this.view), { ...quiet, "text-anchor": "middle" });
+      text(svg, x, bottom + 18, data.dates ? date(value) : plain(value, ...this.view), { ...quiet, "text-anchor": "middle" });
     }
     add(svg, "line", { x1: LEFT, x2: LEFT + plotWidth, y1: bottom, y2: bottom, stroke: this.ink, opacity: 0.5 });
     text(svg, LEFT + plotWidth / 2, bottom + 37, data.x, { ...quiet, "text-anchor": "middle" });
     const label = text(svg, 0, 0, data.y, { ...quiet, "text-anchor": "middle" });
     label.setAttribute("transform", `translate(13,${top + plotHeight / 2}) rotate(-90)`);
+  }
+
+  named(x) {
+    return this.data.dates ? date(x) : `${figure(x)} ${this.data.x_unit}`;
   }
 
   drawLine(inside, line) {
@@ -282,7 +286,7 @@ class Figure {
     this.words.replaceChildren();
     if (this.at === null) return;
     const near = 0.004 * (this.view[1] - this.view[0]), value = this.highest(this.at - near, this.at + near);
-    const say = [`${figure(this.at)} ${this.data.x_unit}`];
+    const say = [this.named(this.at)];
     if (value) say.push(`${figure(value[1])} ${this.data.y_unit}`);
     if (this.tool === "sidebands") say.push(`sidebands every ${figure(this.step)} ${this.data.x_unit}`);
     if (this.data.per_unit) say.push(`${figure(this.at * this.data.per_unit[0])} ${this.data.per_unit[1]}`);
@@ -337,9 +341,9 @@ class Figure {
     if (data.map) lines.push(this.levelAt(x, event.offsetY));
     for (const line of this.lines) {
       const value = this.highest(x - near, x + near, line);
-      if (value) lines.push(`${this.lines.length > 1 ? line.name + ": " : ""}${figure(value[0])} ${data.x_unit}, ${figure(value[1])} ${data.y_unit}`);
+      if (value) lines.push(`${this.lines.length > 1 ? line.name + ": " : ""}${this.named(value[0])}, ${figure(value[1])} ${data.y_unit}`);
     }
-    for (const { label, at } of cursors) lines.push(`${label}: ${figure(at)} ${data.x_unit}`);
+    for (const { label, at } of cursors) lines.push(`${label}: ${this.named(at)}`);
     this.showTip(lines, event);
   }
 
@@ -500,6 +504,17 @@ function ticks(low, high, n) {
   const step = power * [1, 2, 5, 10].find((times) => times * power >= rough * 0.999);
   const first = Math.ceil(low / step - 1e-9), last = Math.floor(high / step + 1e-9);
   return range(first, Math.min(last, first + 50)).map((k) => k * step);
+}
+
+// Days since 1970: steps of hours, days, weeks, months and years by their lengths.
+function days(low, high, n) {
+  const rough = (high - low) / Math.max(n, 1), step = [1 / 24, 1 / 4, 1, 2, 7, 14, 30, 91, 182, 365, 1826].find((length) => length >= rough) ?? 3652;
+  return range(Math.ceil(low / step - 1e-9), Math.floor(high / step + 1e-9)).map((k) => k * step);
+}
+
+function date(day) {
+  const words = new Date(Math.round(day * 1440) * 60000).toISOString();
+  return words.slice(11, 16) === "00:00" ? words.slice(0, 10) : `${words.slice(5, 10)} ${words.slice(11, 16)}`;
 }
 
 function decades(low, high) {

@@ -57,13 +57,14 @@ class ChartLine:
 
 @dataclass(frozen=True)
 class Axes:
-    """Names, limits and scale; texts may come from files."""
+    """Names, limits and scale; texts may come from files. Dates are days since 1970."""
 
     x: str
     y: str
     x_limits: tuple[float, float]
     y_limits: tuple[float, float] | None = None
     logarithmic: bool = False
+    dates: bool = False
 
 
 def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[float, float]:
@@ -244,6 +245,7 @@ def _described(
         "whole": list(whole),
         "height": height_px,
         "fault": palette().fault,
+        "dates": axes.dates,
         "alternative": one_line(f"{axes.y} over {axes.x}"),
         "name": re.sub(r"[^\w-]+", "-", key.split(" of ", maxsplit=1)[0]).strip("-") or "figure",
         "has_tools": height_px >= 200,

@@ -1,0 +1,263 @@
+"""A fleet's store on the page: machines as a tree, indicators over time with limits and alarms, their recordings."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import streamlit as st
+
+from app.dashboard import state
+from app.dashboard.state import ChosenFile
+from app.dashboard.theme import as_typed
+from app.dashboard.widgets.charts import QUIET, Axes, ChartLine, padded_limits, show_lines
+from app.dashboard.widgets.chooser import open_file
+from app.dashboard.widgets.verdict import COLOURS
+from gearsig.diagnosis import Outcome
+from gearsig.errors import InputError
+from gearsig.fleet import Fleet, Trend, change_text, open_fleet, trends_text
+from gearsig.recording import sha256_of
+from gearsig.rig import rig_file_beside
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+STORE, SEARCHED, MACHINE, POINT, SERIES = "fleet store", "fleet search", "fleet machine", "fleet point", "fleet indicator"
+N_MACHINES = 40
+Row = dict[Any, Any]
+"""Of a table of the store."""
+MARKS = {"alarm": "🔺", "warning": "🔶", "ok": "🔹"}
+"""Told apart by shape as well as by colour."""
+BADGES = {"alarm": "red", "warning": "orange", "ok": "green"}
+HOW_TO_FILL = """
+There are no results in this folder yet. Recordings are added from the command line, as often as you like; what is
+known already is passed over:
+
+```sh
+gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv' --dry-run
+gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv'
+gearsig fleet watch incoming --pattern '{machine}/{point}_{date:%Y%m%d-%H%M}.csv'
+```
+
+`--dry-run` shows which machine, point and date each file is taken for; `watch` takes new files as they appear.
+"""
+
+
+def show() -> None:
+    """Choose a store, a machine and an indicator, show it over time; worst first throughout."""
+    with st.sidebar:
+        folder = st.text_input(
+            "Folder of the fleet",
+            os.environ.get("GEARSIG_FLEET", "fleet"),
+            key=STORE,
+            persist_state="session",
+            help="Where `gearsig fleet add` keeps its results; `GEARSIG_FLEET` names another one.",
+        )
+    st.subheader("Fleet: machines over time", anchor=False)
+    path = Path(folder).expanduser()
+    try:
+        messages: list[str] = []
+        fleet = open_fleet(path, on_message=messages.append)
+        status = fleet.status()
+    except InputError as error:
+        if (path / "store.json").exists() or "gearsig[fleet]" in str(error):
+            raise
+        st.markdown(HOW_TO_FILL)
+        st.caption(as_typed(f"Looked for in {path.absolute()}."))
+        return
+    if status.empty:
+        st.markdown(HOW_TO_FILL)
+        return
+    _show_counts(status)
+    left, right = st.columns((3, 8), gap="medium")
+    with left:
+        machine, point = _choose_point(status)
+    with right:
+        _show_point(fleet, status[(status["machine"] == machine) & (status["point"] == point)].iloc[0].to_dict())
+    for text in messages:
+        st.caption(f":material/info: {as_typed(text)}")
+
+
+def _show_counts(status: DataFrame) -> None:
+    counts = status["level"].value_counts()
+    words = [f":{BADGES[name]}-badge[{counts[name]} {name}]" for name in BADGES if name in counts]
+    n_machines = status["machine"].nunique()
+    st.markdown(f"{n_machines} machines, {len(status)} measuring points, {' '.join(words)}")
+
+
+def _choose_point(status: DataFrame) -> tuple[str, str]:
+    """Show machines with their measuring points, the worst first; return the one that is looked at."""
+    searched = st.text_input("Machine", key=SEARCHED, placeholder="Part of a name", persist_state="session")
+    shown = status[status["machine"].str.contains(searched or "", case=False, regex=False)]
+    of_machine = {name: rows.to_dict("records") for name, rows in shown.groupby("machine", sort=False)}
+    known = [(row["machine"], row["point"]) for rows in of_machine.values() for row in rows]
+    everywhere = list(zip(status["machine"], status["point"], strict=True))
+    first = (known or everywhere)[0]
+    chosen = (state.addressed(MACHINE, "machine", first[0]), state.addressed(POINT, "point", first[1]))
+    if chosen not in everywhere:
+        chosen = first
+    with st.container(height=620, border=False):
+        for name, rows in list(of_machine.items())[:N_MACHINES]:
+            worst = rows[0]["level"]
+            is_open = name == chosen[0]
+            with st.expander(f"{MARKS[worst]} {as_typed(name)}", expanded=is_open or len(of_machine) <= 6):
+                for row in rows:
+                    _point_button(row, is_chosen=(name, row["point"]) == chosen)
+        if len(of_machine) > N_MACHINES:
+            st.caption(f"{len(of_machine) - N_MACHINES} more: search by name.")
+    return chosen
+
+
+def _point_button(row: Row, *, is_chosen: bool) -> None:
+    words = as_typed(row["point"] or "all channels")
+    st.button(
+        f"{MARKS[row['level']]} {words}",
+        key=f"point {row['machine']!r} {row['point']!r}",
+        type="primary" if is_chosen else "tertiary",
+        width="stretch",
+        help=as_typed(trends_text(row) or str(row["outcome"] or "no diagnosis")),
+        on_click=_look_at,
+        args=(row["machine"], row["point"]),
+    )
+
+
+def _look_at(machine: str, point: str) -> None:
+    st.session_state[MACHINE], st.session_state[POINT] = machine, point
+    st.query_params["machine"], st.query_params["point"] = machine, point
+
+
+def _show_point(fleet: Fleet, row: Row) -> None:
+    """Show one measuring point: state, an indicator over time, all indicators, recordings."""
+    machine, point = row["machine"], row["point"]
+    name = " · ".join(part for part in (machine, point) if part)
+    st.markdown(f"#### {as_typed(name)} :{BADGES[row['level']]}-badge[{row['level']}]")
+    outcome = str(row["outcome"] or "")
+    if outcome:
+        colour = COLOURS[Outcome(outcome)]
+        st.markdown(f":{colour}[{as_typed(row['verdict'] or outcome)}]")
+    trends = trends_text(row)
+    failed = f", {row['n_failed']} failed" if row["n_failed"] else ""
+    span = f"{row['n_recordings']} recordings{failed}, {row['first']:%Y-%m-%d} to {row['last']:%Y-%m-%d}"
+    st.caption(as_typed(f"{trends}; {span}" if trends else span))
+    series = fleet.series(machine, point)
+    if series.empty:
+        st.info("None of its recordings could be analysed.", icon=":material/help:")
+    else:
+        _show_trend(fleet, _choose_series(series, machine, point))
+        with st.expander(f"All {len(series)} indicators, the worst first", icon=":material/table:"):
+            st.dataframe(_series_table(series), hide_index=True)
+    _show_recordings(fleet.recordings(machine, point).iloc[::-1])
+
+
+def _choose_series(series: DataFrame, machine: str, point: str) -> Row:
+    rows = series.to_dict("records")
+    key = state.source_key(SERIES, f"{machine!r} {point!r}")
+    label = "Indicator, the worst first"
+    place = st.selectbox(label, range(len(rows)), format_func=lambda i: _series_words(rows[i]), key=key)
+    return rows[place or 0]
+
+
+def _series_words(row: Row) -> str:
+    of = ", ".join(part for part in (row["place"], row["channel"], row["computed_on"], row["band"]) if part)
+    change = change_text(row["change"], in_db=bool(row["in_db"]))
+    level = ("ok", "warning", "alarm")[int(row["level"])]
+    return f"{row['name']} ({of}): {level}{', ' + change if change else ''}"
+
+
+def _series_table(series: DataFrame) -> dict[str, list[Any]]:
+    rows = series.to_dict("records")
+    return {
+        "": [tuple(MARKS)[2 - int(row["level"])] for row in rows],
+        "indicator": [_series_words(row).partition(":")[0] for row in rows],
+        "last": [row["value"] for row in rows],
+        "expected": [row["expected"] for row in rows],
+        "limit": [row["upper_limit"] for row in rows],
+        "unit": [row["unit"] for row in rows],
+        "since": [row["since"] for row in rows],
+        "limits by": [row["basis"] for row in rows],
+    }
+
+
+def _show_trend(fleet: Fleet, row: Row) -> None:
+    """Show one indicator over time, in the band of its limits, with what lies beyond marked."""
+    only = {name: row[name] for name in ("point", "channel", "place", "computed_on")}
+    found = fleet.trend(row["machine"], row["name"], **only)
+    trend = next((one for one in found if one.band == row["band"]), found[0])
+    table = trend.table
+    days = table["date"].to_numpy("datetime64[s]").astype(float) / 86400.0
+    value, expected, low, high, alarm = (
+        table[name].to_numpy(float) for name in ("value", "expected", "low", "high", "alarm")
+    )
+    lines = [ChartLine(days, value, trend.name)]
+    if np.isfinite(high).any():
+        floor = np.where(np.isfinite(low), low, np.nanmin(value))
+        known = np.isfinite(high)
+        band = (np.where(known, floor, np.nan)[known], high[known])
+        lines.insert(0, ChartLine(days[known], expected[known], "expected, within its limits", QUIET, band=band))
+    if np.isfinite(alarm).any():
+        lines.append(ChartLine(days, alarm, "alarm", 1, dotted=True))
+    beyond = (table["level"] != "ok").to_numpy() & np.isfinite(value)
+    marked = list(zip(days[beyond], value[beyond], strict=True))
+    margin = max(0.02 * float(np.ptp(days)), 0.5)
+    unit = f" ({trend.unit})" if trend.unit else ""
+    limits = padded_limits([value, *([high] if np.isfinite(high).any() else [])])
+    span = (float(days[0]) - margin, float(days[-1]) + margin)
+    axes = Axes("date", f"{trend.name}{unit}", span, limits, dates=True)
+    show_lines(
+        lines, axes, f"trend of {row['machine']} {row['point']} {_series_words(row)}", marked=marked, legend=True
+    )
+    st.caption(as_typed(_about(trend)))
+
+
+def _about(trend: Trend) -> str:
+    n = int(trend.table["in_baseline"].sum())
+    words = {
+        "ISO 20816-3": "Limits are the zones of ISO 20816-3.",
+        "none": f"No limits yet: the baseline has {n} recordings.",
+    }.get(trend.basis, f"Limits from the {n} recordings of the baseline.")
+    rate = trend.false_alarm_rate
+    if trend.basis == "statistical" and rate > 0:
+        words += f" An unchanged machine leaves them in one of {1 / rate:,.0f} recordings.".replace(",", " ")
+    if trend.normalised:
+        words += f" What is expected follows {' and '.join(trend.normalised)}."
+    return words + (f" Another level since {trend.changed:%Y-%m-%d}." if trend.changed is not None else "")
+
+
+def _show_recordings(recordings: DataFrame) -> None:
+    """Offer the recordings, the latest first; open one in the analysis page."""
+    rows = recordings.to_dict("records")
+    with st.container(horizontal=True, vertical_alignment="bottom"):
+        place = st.selectbox(
+            "Recording", range(len(rows)), format_func=lambda i: _recording_words(rows[i]), key="fleet recording"
+        )
+        is_asked = st.button("Open its analysis", icon=":material/troubleshoot:", type="primary")
+    if is_asked:
+        open_file(_file_of(Path(rows[place or 0]["source"])))
+        st.switch_page(state.ANALYSIS_PAGE)
+
+
+def _recording_words(row: Row) -> str:
+    return f"{row['date']:%Y-%m-%d %H:%M}: {row['reason'] or row['verdict'] or row['outcome']}"
+
+
+def _file_of(path: Path) -> ChosenFile:
+    """Return a recording of the store as the analysis page takes a file, with the rig file that lies beside it.
+
+    Raises
+    ------
+    InputError
+        If it is not there any more.
+    """
+    try:
+        digest = sha256_of(path)
+        beside = rig_file_beside(path)
+        text = beside.read_text(encoding="utf-8") if beside is not None else ""
+    except (OSError, ValueError):
+        raise InputError(
+            "cannot be read: the store keeps results, not the recordings",
+            where=str(path),
+            remedy="bring the file back to its place",
+        ) from None
+    return ChosenFile(path.name, digest, path, beside.name if beside is not None else "rig.toml", text)

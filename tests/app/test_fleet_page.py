@@ -1,0 +1,65 @@
+"""The fleet's page, run without a browser on a small store."""
+
+from pathlib import Path
+
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from app.dashboard.fleet import STORE
+from gearsig.fleet import TrendSettings, open_fleet
+from tests.app.pages import FOLDER, figures, labelled, numbers, shown_text
+from tests.fleet.conftest import make_recordings  # noqa: F401 - a fixture
+from tests.fleet.recordings import PATTERN
+
+pytest.importorskip("duckdb", reason="the extra fleet is not installed")
+pytest.importorskip("filelock", reason="the extra fleet is not installed")
+
+
+def opened(folder: Path) -> AppTest:
+    page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=120)
+    page.session_state[STORE] = str(folder)
+    return page.switch_page("pages/fleet.py").run()
+
+
+def test_the_worst_is_first_its_trend_has_limits_and_its_recording_opens(make_recordings, tmp_path):  # noqa: F811
+    make_recordings("calm", [1.0])
+    data = make_recordings("loud [1]", [1.0] * 7 + [9.0] * 2)
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.set(TrendSettings(n_baseline=7))
+    fleet.add(data, pattern=PATTERN, n_processes=1)
+    page = opened(tmp_path / "store")
+    assert not page.exception
+    assert not page.error
+    assert "2 machines, 2 measuring points" in shown_text(page)
+    assert "loud" in page.expander[0].label
+    assert "loud [1] · DE" in shown_text(page)
+    names = labelled(page, "selectbox", "Indicator")
+    names.set_value(next(i for i, words in enumerate(names.options) if words.startswith("rms "))).run()
+    sent = figures(page)[0]
+    assert sent["dates"]
+    curves = {line["name"]: line for line in sent["lines"]}
+    assert len(numbers(curves["rms"]["y"])) == 9
+    assert numbers(curves["rms"]["x"])[-1] == 20462.0  # 9 January 2026
+    limit = numbers(curves["expected, within its limits"]["high"])[-1]
+    assert numbers(curves["rms"]["y"])[-1] > limit > numbers(curves["rms"]["y"])[0]
+    assert [at for at, _ in sent["marked"]] == [20461.0, 20462.0]
+    labelled(page, "button", "Open its analysis").click().run()
+    assert not page.exception
+    assert "DE_20260109.csv" in shown_text(page)
+
+
+def test_an_empty_store_says_how_to_fill_it(tmp_path):
+    page = opened(tmp_path / "nothing")
+    assert not page.exception
+    assert not page.error
+    assert "gearsig fleet add" in shown_text(page)
+    open_fleet(tmp_path / "empty", create=True)
+    assert "gearsig fleet add" in shown_text(opened(tmp_path / "empty"))
+
+
+def test_without_the_extra_the_page_says_what_to_install(tmp_path, monkeypatch):
+    open_fleet(tmp_path / "store", create=True)
+    monkeypatch.setitem(__import__("sys").modules, "duckdb", None)
+    page = opened(tmp_path / "store")
+    assert not page.exception
+    assert "gearsig[fleet]" in page.error[0].value.replace("\\", "")
