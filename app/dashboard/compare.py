@@ -5,17 +5,31 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 
+import numpy as np
 import streamlit as st
+from numpy.typing import NDArray
 
 from app.dashboard import state
 from app.dashboard.cached import recorded, stated_options
 from app.dashboard.laboratory.setup import MODEL, Setup, shown_name
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import download, show_picture
+from app.dashboard.widgets.charts import (
+    FAULT,
+    QUIET,
+    Axes,
+    ChartLine,
+    download,
+    looked_at,
+    padded_limits,
+    show_lines,
+    stems,
+)
 from app.dashboard.widgets.chooser import FILE, SAMPLE, choose_file, choose_number, choose_sample, simulated_file
 from app.dashboard.widgets.messages import show_warnings
+from app.dashboard.widgets.spectrum import show_spectrum
 from app.dashboard.work import kept
+from gearsig.checks import FloatArray
 from gearsig.comparison import (
     ALIGN,
     ChannelComparison,
@@ -26,10 +40,18 @@ from gearsig.comparison import (
 )
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import OperatingCondition
-from gearsig.plot import unit_text
+from gearsig.plot import unit_text, with_unit
 from gearsig.prepared import refined_angle
 from gearsig.recording import Recording
-from gearsig.report import FIGURES, alignment_texts, channel_rows, comparison_page, comparison_to_json, orders_csv
+from gearsig.report import (
+    alignment_texts,
+    channel_rows,
+    comparison_page,
+    comparison_to_json,
+    mesh_cursors,
+    orders_csv,
+    shown_orders,
+)
 from gearsig.rig import Rig
 from sims.cracked import cracked_gap_simulator
 from sims.machine import nominal_of
@@ -198,13 +220,15 @@ def choose_simulation() -> tuple[Simulation, Content | None] | None:
         return None if file is None else (file.request(), file.content)
 
 
-def choose_alignment() -> str:
-    """Return how the averages are aligned."""
+def choose_alignment(simulation: Simulation | None) -> str:
+    """Return how averages are aligned: by correlation where the simulation is made here, whose mark sits anywhere."""
+    source = "made here" if isinstance(simulation, SimulationToCompare) else "of files"
     with st.sidebar:
         chosen = st.selectbox(
             "Align by",
             ALIGN,
-            key="comparison alignment",
+            index=ALIGN.index("correlation" if source == "made here" else "auto"),
+            key=state.source_key("comparison alignment", source),
             persist_state="session",
             help="Marks: angle 0 is the same tooth in both. Correlation: the simulation is turned to where the "
             "averages fit best. Auto: marks for shafts that have one in both.",
@@ -263,21 +287,17 @@ def _choose_run() -> SimulationToCompare:
     return SimulationToCompare(str(machine), speed, torque, float(length or 5.0), int(seed))
 
 
-LINES = "Lines"
+VIEWS = ("Orders", "Angle", "Bands", "Lines")
+NAMES = ("recorded", "simulated")
 
 
-def show_comparison(comparison: Comparison) -> None:
-    """Show verdict, findings, and one channel's agreement, figures and lines."""
-    st.markdown(f"**{as_typed(comparison.verdict)}**")
+def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
+    """Show what was set alike, verdict, findings, then one channel in figures that zoom together, and in numbers."""
+    st.markdown(f"#### {as_typed(comparison.verdict)}")
+    with st.container(gap=None):
+        show_alike(comparison, rig)
     if comparison.findings:
         st.markdown("\n".join(f"- {as_typed(text)}" for text in comparison.findings))
-    show_warnings(comparison.notes)
-    sides = ("Recording", comparison.recorded), ("Simulation", comparison.simulated)
-    facts = " ".join(
-        f"{name}: {side.duration_s:.4g} s, {side.mean_speed_rpm:.6g} rpm, {side.n_revolutions:.4g} revolutions."
-        for name, side in sides
-    )
-    st.caption(as_typed(f"{facts} Aligned: {'; '.join(alignment_texts(comparison))}."))
     channels = {channel.name: channel for channel in comparison.channels}
     name: str | None = next(iter(channels))
     if len(channels) > 1:
@@ -285,24 +305,112 @@ def show_comparison(comparison: Comparison) -> None:
             "Channel", list(channels), default=name, key="comparison channel", label_visibility="collapsed"
         )
     channel = channels.get(name or "", comparison.channels[0])
-    rows = channel_rows(channel)
-    st.dataframe(
-        {"agreement": [name for name, _ in rows], "": [text for _, text in rows]},
-        hide_index=True,
-        width="stretch",
-        column_config={"": st.column_config.TextColumn(width="large")},
+    views = dict(zip(VIEWS, (_show_orders, _show_angle, _show_bands, _show_lines), strict=True))
+    for tab, view in zip(st.tabs(VIEWS, key="comparison tab", on_change="rerun"), views.values(), strict=True):
+        if tab.open:
+            with tab:
+                view(comparison, channel)
+    with st.expander("Agreement in numbers", icon=":material/table:"):
+        rows = channel_rows(channel)
+        st.dataframe(
+            {"agreement": [name for name, _ in rows], "": [text for _, text in rows]},
+            hide_index=True,
+            column_config={"": st.column_config.TextColumn(width="large")},
+        )
+    show_warnings(comparison.notes, quiet=True)
+
+
+def show_alike(comparison: Comparison, rig: Rig | None) -> None:
+    """Say on one line what both records have in common: teeth, speed, how their angles are aligned."""
+    recorded, simulated = comparison.recorded, comparison.simulated
+    ratio = simulated.mean_speed_rpm / recorded.mean_speed_rpm
+    speeds = f"{recorded.mean_speed_rpm:.6g} rpm recorded, {simulated.mean_speed_rpm:.6g} rpm simulated"
+    facts = [(abs(ratio - 1.0) < 0.01, f"Speed: {speeds}")]
+    if rig is not None and rig.pairs:
+        pairs = (f"{pair.driver_teeth}/{pair.driven_teeth}" for pair in rig.pairs)
+        facts.insert(0, (True, f"Teeth: {', '.join(pairs)} in both"))
+    aligned = zip(comparison.alignments, alignment_texts(comparison), strict=False)
+    facts += [(one.tooth_is_certain is not False, f"Aligned: {text}") for one, text in aligned]
+    for is_right, text in facts:
+        icon, colour = (":material/check:", "green") if is_right else (":material/priority_high:", "orange")
+        st.markdown(f":{colour}[{icon}] {as_typed(text)}")
+    lengths = ", ".join(
+        f"{name} {side.duration_s:.4g} s, {side.n_revolutions:.4g} revolutions"
+        for name, side in (("recording", recorded), ("simulation", simulated))
     )
-    tabs = st.tabs((*FIGURES, LINES), key="comparison tab", on_change="rerun")
-    for name, tab in zip((*FIGURES, LINES), tabs, strict=True):
-        if not tab.open:
+    st.caption(f"Compared: {lengths}.")
+
+
+def _show_orders(comparison: Comparison, channel: ChannelComparison) -> None:
+    """Show both order spectra, and below them how far each line is off over the same orders."""
+    spectra = channel.recorded_spectrum, channel.simulated_spectrum
+    shown = (0.0, shown_orders(comparison))
+    source = f"comparison {channel.name}"
+    shown = show_spectrum(source, spectra, mesh_cursors(comparison), "orders", names=NAMES, shown=shown)
+    lines = [line for line in (*channel.lines, *channel.other_lines) if line.is_seen]
+    at = np.array([line.order for line in lines])
+    off = np.array([line.level.difference_db for line in lines])
+    beyond = np.array([line.level.is_beyond for line in lines], dtype=bool)
+    name = f"order of {comparison.reference_shaft or 'the shaft'}"
+    _show_differences(at, off, beyond, name, f"lines of {source}", shown)
+    st.caption(
+        "Simulated less recorded, line by line; grey is within the records' own scatter. Zooming above zooms here."
+    )
+
+
+def _show_differences(
+    at: FloatArray, off: FloatArray, beyond: NDArray[np.bool_], name: str, key: str, shown: tuple[float, float]
+) -> None:
+    if not len(at):
+        return
+    lines = [
+        stems(at[chosen], off[chosen], words, colour)
+        for chosen, words, colour in ((~beyond, "within the scatter", QUIET), (beyond, "beyond it", FAULT))
+        if chosen.any()
+    ]
+    axes = Axes(name, "simulated − recorded (dB)", shown, padded_limits([off, np.zeros(1)]))
+    show_lines(lines, axes, f"{key} {shown[0]:.4g} {shown[1]:.4g}", height_px=180, legend=True)
+
+
+def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
+    """Show the averages of each shaft over one revolution, and below them the level tooth by tooth."""
+    for shaft in channel.shafts:
+        name = shaft.shaft or "the shaft"
+        st.markdown(
+            as_typed(f"{name}: correlation {shaft.correlation.value:.3f} of {shaft.best_correlation:.3f} possible")
+        )
+        lines = []
+        for place, (average, words) in enumerate(zip((shaft.recorded, shaft.simulated), NAMES, strict=True)):
+            angle = np.arange(len(average.values)) * 360.0 / len(average.values)
+            lines.append(ChartLine(angle, average.values, words, place))
+        unit = with_unit("acceleration" if channel.quantity == "acceleration" else "value", channel.unit)
+        key = f"average of {name} comparison {channel.name}"
+        whole = (0.0, 360.0)
+        axes = Axes(f"angle of {name} (deg)", unit, whole)
+        show_lines(lines, axes, key, height_px=260, legend=True)
+        if not shaft.tooth_levels:
             continue
-        with tab:
-            if name == LINES:
-                _show_lines(channel)
-                continue
-            for drawn in FIGURES[name](comparison, channel):
-                show_picture(drawn.figure, drawn.alternative)
-                st.caption(as_typed(drawn.caption))
+        middle = (np.arange(len(shaft.tooth_levels)) + 0.5) * 360.0 / len(shaft.tooth_levels)
+        off = np.array([level.difference_db for level in shaft.tooth_levels])
+        beyond = np.array([level.is_beyond for level in shaft.tooth_levels], dtype=bool)
+        _show_differences(middle, off, beyond, f"angle of {name} (deg)", f"teeth of {key}", looked_at(key, whole))
+        certain = next((one.tooth_is_certain for one in comparison.alignments if one.shaft == shaft.shaft), None)
+        unknown = " Which tooth of one is which of the other is not known here." if certain is False else ""
+        st.caption(f"Tooth by tooth, at the middle of each.{unknown}")
+
+
+def _show_bands(comparison: Comparison, channel: ChannelComparison) -> None:
+    """Show levels of bands, noise included, over order and over frequency."""
+    del comparison
+    unit = f"level (dB re 1 {unit_text(channel.unit)}".rstrip() + ")"
+    for bands, name in ((channel.order_bands, "order"), (channel.third_octaves, "third octave, frequency (Hz)")):
+        if not bands:
+            continue
+        edges = np.array([edge for band in bands for edge in (band.low, band.high)])
+        sides = [np.repeat([getattr(band.level, f"{side}_db") for band in bands], 2) for side in NAMES]
+        lines = [ChartLine(edges, levels, side, i) for i, (levels, side) in enumerate(zip(sides, NAMES, strict=True))]
+        axes = Axes(name, unit, (float(edges[0]), float(edges[-1])), padded_limits(sides))
+        show_lines(lines, axes, f"bands over {name} comparison {channel.name}", height_px=240, legend=True)
 
 
 def show_downloads(comparison: Comparison, command: str) -> None:
@@ -322,7 +430,8 @@ def show_downloads(comparison: Comparison, command: str) -> None:
             st.code(command, language="bash", wrap_lines=True)
 
 
-def _show_lines(channel: ChannelComparison) -> None:
+def _show_lines(comparison: Comparison, channel: ChannelComparison) -> None:
+    del comparison
     unit = f" re 1 {unit_text(channel.unit)}" if channel.unit else ""
     shown = [line for line in (*channel.lines, *channel.other_lines) if line.is_seen]
     st.dataframe(

@@ -24,7 +24,13 @@ from gearsig.rig import rig_file_beside
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-STORE, SEARCHED, MACHINE, POINT, SERIES = "fleet store", "fleet search", "fleet machine", "fleet point", "fleet indicator"
+STORE, SEARCHED, MACHINE, POINT, SERIES = (
+    "fleet store",
+    "fleet search",
+    "fleet machine",
+    "fleet point",
+    "fleet indicator",
+)
 N_MACHINES = 40
 Row = dict[Any, Any]
 """Of a table of the store."""

@@ -3,13 +3,14 @@
 from gearsig.report._analysis_json import analysis_to_dict, analysis_to_json, write_json
 from gearsig.report._benchmark import Section, benchmark_html
 from gearsig.report._comparison import (
-    FIGURES,
     alignment_texts,
     channel_rows,
     comparison_page,
     comparison_text,
     comparison_to_json,
+    mesh_cursors,
     orders_csv,
+    shown_orders,
 )
 from gearsig.report._files import check_writable, made_folder, page_names
 from gearsig.report._fleet import fleet_page_html, write_fleet_page
@@ -81,7 +82,6 @@ from gearsig.report._sections import FindingCard, analysis_text, change_rows, fi
 
 __all__ = [
     "CHECK_FIRST",
-    "FIGURES",
     "METHODS",
     "TRANSFORMS",
     "CauseRow",
@@ -139,6 +139,7 @@ __all__ = [
     "long_analysis_to_json",
     "made_folder",
     "marked_positions",
+    "mesh_cursors",
     "method_pictures",
     "n_conditions",
     "named_method",
@@ -153,6 +154,7 @@ __all__ = [
     "read_gap_json",
     "reference_text",
     "references_text",
+    "shown_orders",
     "size_text",
     "speed_is_constant",
     "start_stop_figures",

@@ -23,7 +23,7 @@ def show() -> None:
     st.subheader("Comparison of a simulation with a recording", anchor=False)
     opened = choose_recording(with_reference=False)
     simulation = compare.choose_simulation()
-    align_by = compare.choose_alignment()
+    align_by = compare.choose_alignment(simulation[0] if simulation is not None else None)
     if opened is None or simulation is None:
         st.markdown(WELCOME)
         return
@@ -35,8 +35,8 @@ def show() -> None:
     pairs = compare.choose_pairs(simulated, recording)
     comparison = compare.compared(chosen.request, what, pairs, align_by, recording, simulated)
     command = compare.command_of(chosen.request, what, pairs, align_by)
+    compare.show_comparison(comparison, recording.rig)
     compare.show_downloads(comparison, command)
-    compare.show_comparison(comparison)
 
 
 try:

@@ -67,6 +67,13 @@ class Axes:
     dates: bool = False
 
 
+def stems(x: FloatArray, y: FloatArray, name: str, colour: int) -> ChartLine:
+    """Return a line that rises from zero to each value, by ascending place."""
+    order = np.argsort(x)
+    bottom_top_gap = np.stack([np.zeros(len(x)), y[order], np.full(len(x), np.nan)], axis=1)
+    return ChartLine(np.repeat(x[order], 3), bottom_top_gap.ravel(), name, colour)
+
+
 def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[float, float]:
     """Return limits about all known values of several curves, `flat` to both sides where they do not change."""
     known = [curve for curve in curves if np.isfinite(curve).any()]
