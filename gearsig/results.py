@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from html import escape
 from operator import attrgetter
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -80,6 +81,17 @@ class Result:
         head = wrap(f"{type(self).__name__}: {facts}", _LINE, subsequent_indent="  ")
         width = max(map(len, arrays), default=0)
         return "\n".join([*head, *(f"  {name:<{width}}  {_array_text(a)}" for name, a in arrays.items())])
+
+    def _repr_html_(self) -> str:
+        """Return the same as a small table, for notebooks; texts may come from files."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.repr}  # type: ignore[arg-type]
+        rows = []
+        for name, value in values.items():
+            is_array = isinstance(value, np.ndarray) and value.ndim
+            text = _array_text(value) if is_array else _value_text(value)
+            if text:
+                rows.append(f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(text)}</td></tr>")
+        return f"<strong>{escape(type(self).__name__)}</strong><table>{''.join(rows)}</table>"
 
     def to_frame(self) -> DataFrame:
         """Return the result as a pandas table; names end in their unit where it is always the same."""

@@ -1,5 +1,6 @@
 """What README and docs show: their Python runs, their commands and options exist, their links lead somewhere."""
 
+import json
 import re
 import shlex
 from collections.abc import Iterator
@@ -14,18 +15,32 @@ from gearsig.recording import FORMAT_OF_EXTENSION
 from sims.effects import effects
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-RUN = [page for page in PAGES if "```python" in page.read_text(encoding="utf-8") and page.name != "gap.md"] + [
-    ROOT / "docs" / "tutorials" / "gap.md"
-]
+GAP = ROOT / "docs" / "tutorials" / "gap.ipynb"
 BLOCK = re.compile(
     r"^(?:<!-- (?P<mark>[a-z]+) -->\n)?```(?P<language>\w*)\n(?P<code>.*?)^```$", re.DOTALL | re.MULTILINE
 )
 
 
+def text_of(page: Path) -> str:
+    """Return a page, or a notebook as if it were one: its code in fences, marked by its tags."""
+    text = page.read_text(encoding="utf-8")
+    if page.suffix != ".ipynb":
+        return text
+    parts = []
+    for cell in json.loads(text)["cells"]:
+        source, tags = "".join(cell["source"]), cell["metadata"].get("tags", [])
+        marks = "".join(f"<!-- {tag} -->\n" for tag in tags)
+        parts.append(f"{marks}```python\n{source}\n```" if cell["cell_type"] == "code" else source)
+    return "\n\n".join(parts) + "\n"
+
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), *sorted((ROOT / "docs").rglob("*.ipynb"))]
+RUN = [page for page in PAGES if "```python" in text_of(page) and page != ROOT / "docs" / "gap.md"]
+
+
 def blocks(page: Path, language: str) -> Iterator[tuple[str, str]]:
     """Yield mark and code of a page's blocks of one language."""
-    for block in BLOCK.finditer(page.read_text(encoding="utf-8")):
+    for block in BLOCK.finditer(text_of(page)):
         if block["language"] == language:
             yield block["mark"] or "", block["code"]
 
@@ -36,7 +51,7 @@ def name_of(page: Path) -> str:
 
 @pytest.mark.parametrize("page", RUN, ids=name_of)
 def test_python_of_the_pages_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if "open_fleet" in page.read_text(encoding="utf-8"):
+    if "open_fleet" in text_of(page):
         pytest.importorskip("duckdb", reason="the extra fleet is not installed")
     (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
     monkeypatch.chdir(tmp_path)
@@ -52,9 +67,18 @@ def test_slow_python_of_the_gap_tutorial_runs(tmp_path: Path, monkeypatch: pytes
     (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    for _, code in blocks(ROOT / "docs" / "tutorials" / "gap.md", "python"):
-        exec(compile(code, "gap.md", "exec"), names)  # noqa: S102 - our own page
+    for _, code in blocks(GAP, "python"):
+        exec(compile(code, GAP.name, "exec"), names)  # noqa: S102 - our own page
     assert names["report"].causes[0].name in {"root_crack", "tooth_spall", "chipped_tooth"}  # type: ignore[attr-defined]
+
+
+def test_notebooks_are_small_and_without_outputs() -> None:
+    notebooks = [page for page in PAGES if page.suffix == ".ipynb"]
+    assert len(notebooks) == 4
+    for page in notebooks:
+        cells = json.loads(page.read_text(encoding="utf-8"))["cells"]
+        assert not any(cell.get("outputs") for cell in cells), page.name
+        assert len({cell["id"] for cell in cells}) == len(cells)
 
 
 def commands() -> Iterator[tuple[str, list[str]]]:
@@ -84,7 +108,7 @@ def test_links_lead_somewhere() -> None:
     lost = [
         (name_of(page), target)
         for page in PAGES
-        for target in re.findall(r"\]\(([^)#:]*)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+        for target in re.findall(r"\]\(([^)#:]*)(?:#[^)]*)?\)", text_of(page))
         if target and not (page.parent / target).exists()
     ]
     assert not lost

@@ -119,3 +119,15 @@ def test_an_average_is_a_table_over_its_revolution() -> None:
 def test_what_has_no_table_is_refused() -> None:
     with pytest.raises(InputError):
         to_frame(3.0)
+
+
+def test_notebooks_show_a_table_in_which_names_are_text():
+    @dataclass(frozen=True)
+    class Levels(Result):
+        values: np.ndarray
+        source: str
+
+    html = Levels(np.arange(3.0), "<script>")._repr_html_()
+    assert "<script>" not in html
+    assert "&lt;script&gt;" in html
+    assert html.count("<tr>") == 2

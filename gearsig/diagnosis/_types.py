@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from html import escape
 from math import e, exp, log
 
 from gearsig.angle import ShaftAngle
@@ -315,6 +316,16 @@ class Analysis(Result, rows="findings"):
     def outcome(self) -> Outcome:
         """What the findings come to, in one word."""
         return outcome_of(self.findings)
+
+    def _repr_html_(self) -> str:
+        """Return verdict and findings for notebooks; texts may come from files."""
+        rows = "".join(
+            f"<tr><td>{escape(f.kind.value)}</td><td style='text-align:left'>{escape(f.title)}</td>"
+            f"<td>{f.confidence:.2g}</td></tr>"
+            for f in self.findings
+        )
+        head = "<tr><th></th><th style='text-align:left'>finding</th><th>confidence</th></tr>"
+        return f"<p><strong>{escape(self.verdict)}</strong></p><table>{head}{rows}</table>"
 
 
 def outcome_of(findings: Sequence[Finding]) -> Outcome:

@@ -1,0 +1,77 @@
+"""Work beside a page: computed once for equal requests, cancelled where nobody waits for it."""
+
+from threading import Event
+
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from app.dashboard.work import Cancelled, Work, kept
+from gearsig.errors import InputError
+
+
+def test_equal_requests_are_computed_once_and_the_oldest_give_way() -> None:
+    asked = []
+    doubled = kept(2, "…")(lambda x: asked.append(x) or 2 * x)
+    assert [doubled(x) for x in (1, 1, 2, 1, 3, 1, 2)] == [2, 2, 4, 2, 6, 2, 4]
+    assert asked == [1, 2, 3, 2]
+
+
+def test_an_error_is_raised_to_who_asked_and_not_kept() -> None:
+    @kept(2, "…")
+    def fail(_: int) -> None:
+        raise InputError("no")
+
+    for _ in range(2):
+        with pytest.raises(InputError, match="no"):
+            fail(1)
+    assert fail.is_answered(1)
+
+
+def test_work_is_cancelled_at_its_next_step_and_begun_anew_when_asked_for() -> None:
+    begun = Event()
+
+    @kept(2, "…")
+    def forever(_: int) -> int:
+        begun.set()
+        n = 0
+        while True:
+            n += 1
+
+    work = forever.begin(1)
+    assert begun.wait(60.0)
+    work.cancel()
+    assert work.wait(60.0)
+    with pytest.raises(Cancelled):
+        work.result()
+    assert not forever.is_answered(1)
+    again = forever.begin(1)
+    assert again is not work
+    again.cancel()
+    assert again.wait(60.0)
+
+
+def test_cancelling_what_is_complete_changes_nothing() -> None:
+    work = Work(lambda: 3)
+    assert work.wait(60.0)
+    work.cancel()
+    assert work.result() == 3
+
+
+def _page() -> None:
+    import streamlit as st
+
+    from app.dashboard.work import _CANCELLED, kept
+
+    tripled = kept(2, "Tripling …")(lambda x: 3 * x)
+    if "begun" not in st.session_state:
+        st.session_state["begun"] = True
+        st.session_state[_CANCELLED] = f"{tripled.__qualname__} {hash(repr(((2,), {}))):x}"
+    st.title(str(tripled(2)))
+
+
+def test_what_was_cancelled_waits_until_it_is_started_again() -> None:
+    page = AppTest.from_function(_page).run()
+    assert page.info[0].value.startswith("Cancelled")
+    assert not page.title
+    page.button[0].click().run()
+    assert page.title[0].value == "6"
