@@ -17,6 +17,7 @@ from gearsig.diagnosis._bearing_families import (
     expected_parts,
     find_families,
     part_text,
+    parts_on_shaft,
     slip_of,
     slower_train,
     speed_is_only_stated,
@@ -273,6 +274,9 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
             parts = ", ".join(part_text(c.name, c.bearing.name) for c in seen if c.bearing)
             why = f"lines stand at the order of the {parts}, but {but}"
             return [_undecided(why, "A longer recording, or another sensor.", where)]
+    for k, races in parts_on_shaft(signals, envelopes).items():
+        why = f"impacts come {k} times a turn, which is the order of the {' or '.join(races)} within its slip"
+        return [_undecided(why, "A recording at another load: slip parts a bearing from the shaft.", where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
     expected = expected_parts(signals)
     probability = signals.settings.false_alarm_probability / max(1, len(expected) * len(envelopes))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import exp, gcd
 
@@ -470,6 +471,37 @@ def _shaft_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
         if is_beside and spectrum.largest_near(k * order, 2 * spectrum.resolution)[1] >= 0.5 * amplitude:
             return f"the {k}-fold order of shaft {shaft or 'of reference'}"
     return ""
+
+
+def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[int, list[str]]:
+    """Name the races that impacts so many times a turn may be of: within its slip, a race's order is a whole number.
+
+    The k-fold order of the shaft and its next two multiples stand out of the envelope, and twice as high as all other
+    multiples of the shaft between them, but for the first and for sidebands at one order beside: none exceeds its own.
+    """
+    parts: dict[int, list[str]] = {}
+    for bearing, name, order in expected_parts(signals):
+        shaft = signals.rig.ratio(bearing.shaft)
+        k = round(order / shaft) if shaft else 0
+        if k < 2 or not shaft or name not in ("BPFO", "BPFI") or abs(order / (k * shaft) - 1) > slip_of(signals):
+            continue
+        multiples = np.arange(2, 3 * k + 2)
+        own = multiples % k == 0
+        between = ~own & (multiples % k != 1) & (multiples % k != k - 1)
+        for envelope in envelopes:
+            spectrum = envelope.excess.spectrum
+            if multiples[-1] * shaft >= spectrum.positions[-1]:
+                continue
+            heights = np.array([spectrum.largest_near(m * shaft, 2 * spectrum.resolution)[1] for m in multiples])
+            over_floor_db = _over_floor_db(envelope.excess, _line_numbers(envelope.excess, multiples[own] * shaft))
+            highest_between = heights[between].max(initial=0.0)
+            carriers = np.flatnonzero(own)
+            beside = np.maximum(heights[np.maximum(carriers - 1, 0)], heights[carriers + 1])
+            is_alone = heights[own].min() >= 2 * highest_between and bool(np.all(heights[own] >= beside))
+            if over_floor_db.min() >= 12.0 and is_alone:
+                parts.setdefault(k, []).append(part_text(name, bearing.name))
+                break
+    return parts
 
 
 def _half_beside(signals: AnalysisSignals, candidate: Candidate) -> str:

@@ -203,7 +203,8 @@ def _log_p_at(
     from scipy.stats import binom
 
     places = [np.arange(1, int(lines.highest / (shaft * speed)) + 2) * shaft * speed for shaft in shafts]
-    seen, tries = _near(lines, np.concatenate(places)), float(n_speeds)
+    seen: NDArray[np.bool_] = _near(lines, np.concatenate(places))
+    tries = float(n_speeds)
     for part, sideband in parts:
         slips = part * np.linspace(0.985, 1.015, 61)
         new = (_near_family(lines, slips * speed, sideband * speed) & ~seen).sum(axis=1)
@@ -211,7 +212,7 @@ def _log_p_at(
         tries *= 3.0
         if new[best] >= 2:
             places.append(_family(slips[best], sideband, lines.highest / speed) * speed)
-            seen |= _near(lines, places[-1])
+            seen = np.logical_or(seen, _near(lines, places[-1]))
             tries *= len(slips) / 3
     inside = np.sort(np.concatenate(places))
     inside = inside[(inside > lines.lowest) & (inside < lines.highest)]
@@ -228,7 +229,7 @@ def _near_family(lines: StrongLines, parts: FloatArray, sideband: float) -> NDAr
     carrier = lines.orders - sideband * np.arange(-2, 3)[:, None]  # (n_sidebands, n_lines)
     parts = parts[:, None, None]
     multiple = np.clip(np.rint(carrier / parts), 1, np.floor(lines.highest / parts) + 1)
-    near: NDArray[np.bool_] = (np.abs(carrier - multiple * parts) < lines.half_width).any(axis=1)
+    near: NDArray[np.bool_] = np.any(np.abs(carrier - multiple * parts) < lines.half_width, axis=1)
     return near
 
 

@@ -97,6 +97,18 @@ def test_a_short_record_shows_no_good_bearing() -> None:
     assert "would not have stood out" in finding(analysis, "bearings-undecided").title
 
 
+def test_a_race_whose_order_is_a_multiple_of_the_shaft_within_slip_is_not_called_good() -> None:
+    rig = replace(ONE_SHAFT, bearings=(Bearing("front", "in", 9, 7.94, 67.7),), speed=ConstantSpeed(1320.0, "in"))
+    assert rig.bearings[0].orders()["BPFI"] == pytest.approx(5.03, abs=0.01)
+    quiet = replace(steady().select(["a1"]), speed=None, rig=rig)
+    noise = 0.5 * np.random.default_rng(3).normal(size=quiet.samples.shape)
+    t = np.arange(quiet.n_samples) / SAMPLING_RATE_HZ
+    turning = replace(quiet, samples=noise + np.cos(2 * np.pi * 22.0 * t))
+    assert "no-bearing-damage" in codes(analyze(turning))
+    struck = analyze(with_impacts(turning, 5 * 22.0))
+    assert "5 times a turn" in finding(struck, "bearings-undecided").title
+
+
 def test_a_bearing_that_cannot_be_examined_is_not_called_good() -> None:
     recording = record(seconds=SECONDS)
     bearings = (*RIG.bearings, Bearing("nameless", "out"))
