@@ -40,6 +40,10 @@ def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
     pool = ProcessPoolExecutor(n_processes, mp_context=_Context(), initializer=_start_worker)
     try:
         yield pool
+    except (KeyboardInterrupt, GeneratorExit):  # whoever told this process to end does not wait for jobs of minutes
+        for process in list((pool._processes or {}).values()):
+            process.terminate()
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
         for name, value in before.items():

@@ -3,12 +3,14 @@
 import json
 import re
 import shlex
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import typer.main
+from packaging.requirements import Requirement
 
 from app.cli.main import app
 from gearsig.recording import FORMAT_OF_EXTENSION
@@ -138,3 +140,16 @@ def test_pages_name_and_count_the_effects() -> None:
     simulators = (ROOT / "docs" / "simulators.md").read_text(encoding="utf-8")
     assert [name for name in effects() if f"`{name}`" not in simulators] == []
     assert len(effects()) == 19, "README, docs/gap.md and docs/simulators.md say nineteen"
+
+
+def test_constraints_pin_what_is_needed_and_name_no_place_to_get_it_from() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    needed = [
+        *project["dependencies"],
+        *(line for name in ("fleet", "pdf") for line in project["optional-dependencies"][name]),
+    ]
+    lines = (ROOT / "docs" / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = dict(line.lower().replace("_", "-").split("==") for line in lines if not line.startswith("#"))
+    for line in needed:
+        requirement = Requirement(line)
+        assert requirement.specifier.contains(pins[requirement.name.lower().replace("_", "-")]), line

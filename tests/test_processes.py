@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gearsig.processes import call_apart, can_be_sent
+from gearsig.processes import call_apart, can_be_sent, process_pool
 
 SCRIPT = """
 from gearsig.processes import can_be_sent, process_pool
@@ -72,6 +72,22 @@ def _runs(process: Path) -> bool:
         return process.joinpath("stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
     except OSError:
         return False
+
+
+def _leave_a_pool(error: type[BaseException]) -> None:
+    with process_pool(1) as pool:
+        pool.submit(time.sleep, 600)
+        pool.submit(abs, -1)
+        time.sleep(0.5)
+        raise error
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, GeneratorExit])
+def test_a_pool_that_is_left_early_waits_for_no_job(error: type[BaseException]) -> None:
+    start = time.monotonic()
+    with pytest.raises(error):
+        _leave_a_pool(error)
+    assert time.monotonic() - start < 300.0  # a job takes twice that
 
 
 def test_what_is_called_apart_may_die_or_never_end() -> None:

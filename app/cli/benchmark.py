@@ -1,4 +1,4 @@
-"""`gearsig benchmark gap`: how good the gap diagnosis is, on cases whose cause it cannot know."""
+"""`gearsig benchmark`: how good the gap diagnosis is on cases whose cause it cannot know, and how long methods take."""
 
 from __future__ import annotations
 
@@ -13,12 +13,9 @@ from gearsig.errors import InputError
 if TYPE_CHECKING:
     from app.benchmark.run import BenchmarkRequest, Done
 
-benchmark_app = typer.Typer(name="benchmark", no_args_is_help=True, help="Measure how good a diagnosis is.")
-
-
-@benchmark_app.callback()
-def _benchmarks() -> None:
-    """Hold the benchmarks, of which there is one so far."""
+benchmark_app = typer.Typer(
+    name="benchmark", no_args_is_help=True, help="Measure how good a diagnosis is, or how quick methods are."
+)
 
 
 @benchmark_app.command("gap")
@@ -93,6 +90,49 @@ def gap(
     page = write_results(judge(request, done), done, output, typed_command())
     typer.echo((output / TABLE).read_text(encoding="utf-8"))
     typer.echo(f"{page} (report), {TABLE}, scores.json, cases.csv, labels/.")
+
+
+@benchmark_app.command("speed")
+def speed(
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for speed.md and speed.csv as well.")
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="WORD", help="Methods with this in their name; repeatable.")
+    ] = None,
+    longest: Annotated[
+        float,
+        typer.Option("--longest", metavar="SECONDS", min=0.0, help="What takes longer is given no longer signal."),
+    ] = 20.0,
+) -> None:
+    """Time each method beside what a user would take instead, in one run: growth, agreement, distance to a limit.
+
+    PyWavelets, ssqueezepy, vmdpy and SciPy come with gearsig; pyfcwt and PySDKit are timed where they are installed.
+
+    Example: gearsig benchmark speed --only wavelet
+    """
+    import csv
+    from io import StringIO
+
+    from app.benchmark.speed import METHODS, measure, rows, table
+    from gearsig.cache import write_text
+
+    chosen = [m for m in METHODS if not only or any(word.lower() in m.name.lower() for word in only)]
+    if not chosen:
+        raise InputError(
+            f"no method is called {', '.join(only or ())}", allowed="; ".join(method.name for method in METHODS)
+        )
+    with progress_bar("timing", len(chosen)) as show:
+        results = measure(chosen, longest_s=longest, on_progress=show)
+    text = table(results)
+    typer.echo(text)
+    if output is not None:
+        records, file = list(rows(results)), StringIO()
+        writer = csv.DictWriter(file, list(records[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(records)
+        paths = write_text(output / "speed.md", text), write_text(output / "speed.csv", file.getvalue())
+        typer.echo(f"{paths[0]} (table), {paths[1].name} (its numbers).")
 
 
 def _refuse_others(**given: bool) -> None:

@@ -190,6 +190,10 @@ class Store:
             try:
                 with self._connection() as connection:
                     return work(connection)
+            except (RuntimeError, duckdb.InterruptException) as error:
+                if "interrupted" not in str(error).lower():
+                    raise
+                raise KeyboardInterrupt from error  # Ctrl-C during a query, which DuckDB turns into an error of its own
             except duckdb.Error as error:
                 problem = str(error)
                 self._check_files()

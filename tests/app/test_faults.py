@@ -30,7 +30,7 @@ SEED = int(os.environ.get("GEARSIG_FAULTS_SEED", "1"))
 ROOT = Path(__file__).parents[2]
 N_RECORDINGS = 4
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
-LONGEST_TIDYING_S = 10.0
+LONGEST_TIDYING_S = 30.0
 COMMANDS = {
     "report": "report data -j 2 -o out",
     "fleet": "fleet add data --store out -j 2",
@@ -46,8 +46,9 @@ LONG = {
 if N_FAULTS > 1:
     COMMANDS |= LONG
 RUN = """
-import resource, sys
+import resource, signal, sys
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may ignore Ctrl-C
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
 from app.cli.main import main
 

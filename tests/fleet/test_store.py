@@ -259,3 +259,16 @@ def test_a_table_is_exported_in_each_form(make_recordings, tmp_path):
     with pytest.raises(InputError, match="ending"):
         fleet.export(tmp_path / "a.xlsx")
     assert multiprocessing.active_children() == []
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="timers that send signals are POSIX")
+def test_a_query_that_is_interrupted_is_an_interruption(tmp_path):
+    store = open_fleet(tmp_path, create=True)._store
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.2)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            store.read(lambda connection: connection.execute("SELECT sum(sqrt(range)) FROM range(10**12)").fetchall())
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
