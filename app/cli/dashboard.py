@@ -19,6 +19,7 @@ OPTIONS = (
     "server.showEmailPrompt=false",
     "server.enableCORS=true",
     "server.enableXsrfProtection=true",
+    "global.developmentMode=false",  # would allow every origin
     "browser.gatherUsageStats=false",
     "client.toolbarMode=minimal",
     "client.showErrorLinks=false",
@@ -31,6 +32,7 @@ def dashboard(
     browser: Annotated[bool, typer.Option(help="Open a browser window.")] = True,
 ) -> None:
     """Open the dashboard in a browser. It listens on localhost only and sends nothing anywhere."""
+    from streamlit import net_util
     from streamlit.runtime.pages_manager import PagesManager
     from streamlit.web import cli as streamlit_cli
 
@@ -42,7 +44,12 @@ def dashboard(
     PagesManager.uses_pages_directory = False
     _without_advertisement()
     compiled.begin()
-    own = (f"server.port={port}", f"server.headless={str(not browser).lower()}")
+    net_util.get_external_ip = lambda: None  # it would ask a server elsewhere who we are, to judge a foreign origin
+    own = (
+        f"server.port={port}",
+        f"server.headless={str(not browser).lower()}",
+        f"server.corsAllowedOrigins=http://localhost:{port}",
+    )
     sys.argv = ["streamlit", "run", str(MAIN_PAGE), *(f"--{option}" for option in (*OPTIONS, *THEME_OPTIONS, *own))]
     sys.exit(streamlit_cli.main())
 

@@ -168,18 +168,21 @@ def _recent() -> dict[str, ChosenFile]:
     return {}
 
 
-def remember_file(file: ChosenFile) -> None:
-    """Keep a file for a reload of its page; the oldest give way where they are too many or too large."""
+def remember_file(token: str, file: ChosenFile) -> None:
+    """Keep a file for a reload of its page; the oldest give way where they are too many or too large.
+
+    All sessions share the place, so that it is bounded: a token that only one session knows opens its files alone.
+    """
     files = _recent()
-    files.pop(file.sha256, None)
-    files[file.sha256] = file
+    files.pop(token, None)
+    files[token] = file
     while len(files) > 1 and (len(files) > N_RECENT or sum(_size(f.content) for f in files.values()) > RECENT_BYTES):
         del files[next(iter(files))]
 
 
-def recent_files() -> tuple[ChosenFile, ...]:
-    """Return the files opened last on this server, the latest first."""
-    return tuple(reversed(_recent().values()))
+def kept_file(token: str) -> ChosenFile | None:
+    """Return the file of a token, None where it has given way to others or was never there."""
+    return _recent().get(token)
 
 
 def command_of(request: AnalysisRequest) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +16,7 @@ START_PAGE = Path(__file__).parent / "pages" / "start.py"
 ANALYSIS_PAGE = Path(__file__).parent / "pages" / "analysis.py"
 OF_LABORATORY = "Laboratory"
 """Origin of a recording that the laboratory made."""
-_CHOSEN, _SIMULATED, _FILES = "chosen", "simulated", "kept files"
+_CHOSEN, _SIMULATED, _FILES, _TOKENS = "chosen", "simulated", "kept files", "tokens"
 Content = Path | memoryview
 """Of a file: on this machine, or in memory."""
 
@@ -80,6 +81,29 @@ class ChosenFile:
     def request(self, *, sampling_rate_hz: float | None = None, speed_rpm: float | None = None) -> AnalysisRequest:
         """Return the request to read it, with what the file does not state."""
         return AnalysisRequest(self.name, self.sha256, self.rig_name, self.rig_text, sampling_rate_hz, speed_rpm)
+
+
+def token_of(sha256: str, known: str = "") -> str:
+    """Return what names an own file in the addresses of this session, and is guessed by nobody else.
+
+    Parameters
+    ----------
+    sha256 : str
+    known : str
+        The token that the page's address names the file by, where this session begins with it.
+    """
+    token: str = _tokens().setdefault(sha256, known or secrets.token_urlsafe(16))
+    return token
+
+
+def tokens() -> tuple[str, ...]:
+    """Return the tokens of this session's files, the latest first."""
+    return tuple(reversed(_tokens().values()))
+
+
+def _tokens() -> dict[str, str]:
+    found: dict[str, str] = st.session_state.setdefault(_TOKENS, {})
+    return found
 
 
 def remember(chosen: Chosen | None) -> None:

@@ -8,6 +8,7 @@ from gearsig.diagnosis._bearing_families import (
     slower_train,
     stands_out_from_neighbours,
 )
+from gearsig.diagnosis._blocks import RecordBlocks, record_blocks
 from gearsig.diagnosis._crack import crack_depth, with_crack
 from gearsig.diagnosis._long import (
     MEMORY_BYTES,
@@ -67,6 +68,7 @@ __all__ = [
     "Modulation",
     "OrderLevel",
     "Outcome",
+    "RecordBlocks",
     "Strength",
     "Where",
     "analysis_bytes",
@@ -83,6 +85,7 @@ __all__ = [
     "modulation_of",
     "outcome_of",
     "ranked",
+    "record_blocks",
     "rig_of_reference",
     "slower_train",
     "smallest_depth",

@@ -55,6 +55,7 @@ from gearsig.spectra._types import (
     plan_blocks,
     scaled,
     scaled_unit,
+    squared_unit,
     window_response,
 )
 
@@ -106,5 +107,6 @@ __all__ = [
     "spectral_coherence",
     "spectrum_of_blocks",
     "splitter",
+    "squared_unit",
     "window_response",
 ]

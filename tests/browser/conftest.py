@@ -27,13 +27,25 @@ FLAGS = [
 ]
 
 
+OPEN = """
+[server]
+address = "0.0.0.0"
+enableCORS = false
+enableXsrfProtection = false
+corsAllowedOrigins = ["http://evil.example"]
+allowedHosts = ["*"]
+"""
+
+
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Start `gearsig dashboard` on a free port, in a folder of its own."""
+    """Start `gearsig dashboard` on a free port, in a folder whose configuration would open it to everybody."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     folder = tmp_path_factory.mktemp("home")
+    (folder / ".streamlit").mkdir()
+    (folder / ".streamlit" / "config.toml").write_text(OPEN)
     command = [sys.executable, "-m", "app.cli.main", "dashboard", "--port", str(port), "--no-browser"]
     log = (folder / "log.txt").open("w+")
     server = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log)

@@ -123,6 +123,23 @@ def test_a_view_can_be_sent_as_its_address_and_an_own_file_survives_a_reload(pag
     assert verdict(page) == said
 
 
+def test_another_user_sees_nothing_of_the_first(page: playwright.Page, address: str) -> None:
+    name = "confidential.csv"
+    rows = "\n".join(f"{i / 1000:g},{(i * 37) % 101}" for i in range(3000))
+    open_files(page, {"name": name, "mimeType": "text/csv", "buffer": f"time (s),a\n{rows}\n".encode()})
+    page.locator(".strip").wait_for()
+    token = page.url.partition("file=")[2]
+    assert len(token) > 20
+    other = page.context.browser.new_context().new_page()
+    other.set_default_timeout(90_000)
+    for query in ("", "analysis?file=", f"analysis?file={token[:8]}", "analysis?file=%25", "compare", "gap"):
+        other.goto(f"{address}{query}")
+        other.get_by_test_id("stMain").wait_for()
+        settle(other)
+        assert name not in other.locator("body").inner_text()
+    other.close()
+
+
 def test_a_small_window_shows_the_verdict_above_its_picture(page: playwright.Page) -> None:
     page.set_viewport_size({"width": 800, "height": 900})
     open_sample(page)

@@ -1,12 +1,16 @@
 """Records in blocks: figures and spectra as of all at once; parts that are chosen for what they show."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from gearsig.diagnosis import Analysis, LongAnalysis, analyze_file, long_overview
+from gearsig.angle import find_shaft_angle, resample_to_angle
+from gearsig.diagnosis import Analysis, LongAnalysis, RecordBlocks, analyze_file, long_overview
 from gearsig.errors import InputError
+from gearsig.orders import synchronous_average
 from gearsig.recording import Channel, Recording, n_samples_of, read_recording, write_recording
-from gearsig.rig import ConstantSpeed, PulseTimes
+from gearsig.rig import ConstantSpeed, PulseTimes, TachometerChannel
 from gearsig.spectra import power_density
 
 RATE = 4096.0
@@ -99,3 +103,81 @@ def test_a_record_that_does_not_fit_and_cannot_be_parted_is_refused(tmp_path, mo
     path = write_recording(LONG.between(0, 5), tmp_path / "x.csv")
     with pytest.raises(InputError, match="--memory"):
         analyze_file(path)
+
+
+@pytest.fixture(params=[20_000, 1 << 20])
+def blocks(request, monkeypatch):
+    """Return what opens a recording in blocks: many, or one that holds all of it."""
+    monkeypatch.setattr("gearsig.diagnosis._blocks.BLOCK_SAMPLES", request.param)
+
+    def opened(recording):
+        def read(part):
+            start = (part.start or 0) / RATE
+            own = recording.speed
+            if isinstance(own, PulseTimes):
+                own = PulseTimes(own.times_s[own.times_s >= start] - start, own.pulses_per_revolution, own.shaft)
+            return replace(recording, samples=recording.samples[:, part], speed=own)
+
+        return RecordBlocks(read(slice(0, 64)), recording.n_samples, read)
+
+    return opened
+
+
+@pytest.mark.parametrize("n_columns", [7, 1000])
+def test_a_map_in_blocks_is_that_of_the_whole_record(blocks, n_columns):
+    found = blocks(LONG).frequency_map("a", n_per_block=1024, n_columns_max=n_columns)
+    n_spectra = (200_000 - 1024) // 512 + 1
+    k = -(-n_spectra // n_columns)
+    assert len(found.time_s) == -(-n_spectra // k) <= n_columns
+    for column in (0, 3, len(found.time_s) - 1):
+        first, last = column * k, min((column + 1) * k, n_spectra)
+        x = X[0, first * 512 : (last - 1) * 512 + 1024]
+        np.testing.assert_allclose(found.values[column], power_density(x, RATE, n_per_block=1024).values, rtol=1e-5)
+        assert found.time_s[column] == pytest.approx((first * 512 + len(x) / 2) / RATE)
+
+
+def test_an_envelope_in_blocks_is_that_of_the_whole_record(blocks):
+    found = blocks(LONG).envelope_density("a", (400.0, 700.0), n_per_block=512)
+    n = len(X[0])
+    frequency = np.arange(n // 2 + 1) * RATE / n
+    inside = np.clip(np.minimum(frequency - 400.0, 700.0 - frequency) / 30.0, 0.0, 1.0)
+    lines = np.zeros(n, complex)
+    lines[: n // 2 + 1] = 2.0 * np.fft.rfft(X[0].astype(float)) * np.sin(np.pi / 2 * inside) ** 2
+    squared = np.abs(np.fft.ifft(lines))[::3] ** 2
+    whole = power_density(squared, RATE / 3, n_per_block=512)
+    np.testing.assert_allclose(found.positions, whole.positions)
+    # The whole record's transform goes round its ends, where that of blocks sees nothing.
+    np.testing.assert_allclose(found.values, whole.values, rtol=2e-3, atol=1e-12)
+
+
+def _turning(speed):
+    t = np.arange(200_000) / RATE
+    turns = 20.0 * t + 0.05 * t**2
+    waves = np.cos(2 * np.pi * 7 * turns) + 0.3 * np.sin(2 * np.pi * 30 * turns)
+    tacho = (turns % 1.0 < 0.3).astype(np.float32)
+    x = np.stack([waves + X[1], tacho]).astype(np.float32)
+    channels = (Channel("a", "acceleration", "m/s^2"), Channel("tacho", "tachometer", "V"))
+    if isinstance(speed, PulseTimes):
+        speed = PulseTimes(np.interp(np.arange(1, int(turns[-1])), turns, t), 1, "")
+    return Recording(x, RATE, channels, speed=speed)
+
+
+@pytest.mark.parametrize(
+    "speed", [ConstantSpeed(1200.0), PulseTimes(np.arange(2.0), 1, ""), TachometerChannel("tacho")], ids=repr
+)
+def test_an_average_in_blocks_is_that_of_the_whole_record(blocks, speed):
+    recording = _turning(speed)
+    angle = find_shaft_angle(recording)
+    signal = resample_to_angle(recording, angle, channels=("a",), samples_per_revolution=256)
+    whole = synchronous_average(signal, "a")
+    found = blocks(recording).average("a", samples_per_revolution=256)
+    assert found.n_revolutions == whole.n_revolutions
+    np.testing.assert_allclose(found.values, whole.values, atol=2e-5)
+    np.testing.assert_allclose(found.standard_error, whole.standard_error, rtol=1e-3, atol=1e-6)
+    if not isinstance(speed, ConstantSpeed):
+        assert abs(found.lines()[7]) == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_speed_from_the_vibration_gives_no_average_in_blocks(blocks):
+    with pytest.raises(InputError, match="constant speed or tachometer"):
+        blocks(LONG).average("a")

@@ -8,7 +8,7 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.cached import recent_files
+from app.dashboard.cached import kept_file
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.chooser import choose_file, open_file, open_sample
 from app.dashboard.widgets.messages import show_error
@@ -123,8 +123,7 @@ def show_own() -> None:
         open_file(file)
         state.keep_files("start file", ())
         st.switch_page(state.ANALYSIS_PAGE)
-    # Files of this server's memory are shown to whoever sits at it, not to others in the network.
-    for kept in recent_files()[:5] if st.context.ip_address is None else ():
+    for kept in [file for token in state.tokens() if (file := kept_file(token)) is not None][:5]:
         name = as_typed(kept.name)
         if st.button(f"{name}", key=f"recent {kept.sha256}", icon=":material/history:", type="tertiary"):
             open_file(kept)

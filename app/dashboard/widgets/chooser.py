@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.cached import recent_files, remember_file, sha256_of_upload
+from app.dashboard.cached import kept_file, remember_file, sha256_of_upload
 from app.dashboard.state import Chosen, ChosenFile
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.machine import machine_text, stated, text_of
@@ -190,17 +190,20 @@ def _follow_address() -> None:
     named = {sample.rig.stem: sample for sample in samples()}.get(st.query_params.get("sample", ""))
     if named is not None:
         st.session_state[state.SAMPLE] = named
-    kept = next((f for f in recent_files() if f.sha256.startswith(st.query_params.get("file", "?"))), None)
+    token = st.query_params.get("file", "")
+    kept = kept_file(token)
     if kept is not None:
+        state.token_of(kept.sha256, token)
         state.keep_files(state.RECORDING_FILE, (kept,))
         st.session_state[state.ORIGIN] = FILE
 
 
 def _keep_address(file: ChosenFile, origin: str) -> None:
-    """Name what is open in the page's address; a file by the first digits of its hash."""
+    """Name what is open in the page's address; an own file by a token of this session."""
+    named = {"sample": file.rig_name.removesuffix(".toml")} if origin == SAMPLE else {}
     if origin == FILE:
-        remember_file(replace(file, rig_text=machine_text(file)))
-    named = {"sample": file.rig_name.removesuffix(".toml")} if origin == SAMPLE else {"file": file.sha256[:16]}
+        named = {"file": state.token_of(file.sha256)}
+        remember_file(named["file"], replace(file, rig_text=machine_text(file)))
     for name in ("sample", "file"):
         if named.get(name) is None and name in st.query_params:
             del st.query_params[name]

@@ -1,0 +1,307 @@
+"""Maps, averages and envelope spectra of records longer than memory, in overlapping blocks.
+
+Each equals what the whole record at once would give: spectra lie where those of the whole record do, a revolution
+counts in the block where it begins, and a band's filter is the same function of frequency whatever the block's length,
+with so much of the neighbours on either side that its response has died away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from math import ceil, floor
+from pathlib import Path
+
+import numpy as np
+
+from gearsig.angle import REACH, ShaftAngle, find_pulse_edges, find_shaft_angle, resample_to_angle
+from gearsig.checks import FloatArray, count, within
+from gearsig.errors import InputError, RefusalError
+from gearsig.orders import OrderMap, SynchronousAverage
+from gearsig.recording import Recording, n_samples_of, read_recording
+from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource, TachometerChannel
+from gearsig.spectra import Spectrum, power_density, squared_unit
+
+BLOCK_SAMPLES = 1 << 20
+"""Of a block, per channel: some 100 MB of work at a time."""
+EDGE_FRACTION = 0.1
+PERIODS_OF_EDGE = 50
+"""So many periods of the width of a filter's edge its response reaches: 1/n³ is 1e-5 then."""
+KERNEL_SAMPLES = 64
+"""More than the resampling reaches to either side."""
+
+
+@dataclass(frozen=True)
+class RecordBlocks:
+    """A record that is read block by block.
+
+    Parameters
+    ----------
+    head : Recording
+        Its beginning: channels, rate, rig and source of speed.
+    n_samples : int
+        Per channel.
+    read : callable
+        A slice of samples → Recording.
+    """
+
+    head: Recording
+    n_samples: int
+    read: Callable[[slice], Recording]
+
+    def frequency_map(
+        self,
+        channel: str,
+        *,
+        n_per_block: int = 8192,
+        n_columns_max: int = 1000,
+        shaft_angle: ShaftAngle | None = None,
+    ) -> OrderMap:
+        """Return power densities over time, the mean of all half overlapping spectra in each column.
+
+        Parameters
+        ----------
+        channel : str
+        n_per_block : int
+            Samples of a spectrum (Hann).
+        n_columns_max : int
+            Bounds the memory: spectra are averaged where there are more.
+        shaft_angle : ShaftAngle or None
+            For the speed of each column; None: said to be 0.
+
+        Returns
+        -------
+        OrderMap
+            Over frequency.
+        """
+        hop, rate = count(n_per_block, "n_per_block", minimum=16) // 2, self.head.sampling_rate_hz
+        n_spectra = (self.n_samples - n_per_block) // hop + 1
+        if n_spectra < 1:
+            raise RefusalError(f"{self.n_samples} samples are less than one spectrum of {n_per_block}")
+        per_column = ceil(n_spectra / count(n_columns_max, "n_columns_max"))
+        at_once = per_column * max(1, BLOCK_SAMPLES // (per_column * hop))
+        rows: list[FloatArray] = []
+        spectrum: Spectrum | None = None
+        for first in range(0, n_spectra, at_once):
+            last = min(first + at_once, n_spectra)
+            x = self.read(slice(first * hop, (last - 1) * hop + n_per_block)).values(channel)
+            for begin in range(0, last - first, per_column):
+                end = min(begin + per_column, last - first)
+                piece = x[begin * hop : (end - 1) * hop + n_per_block]
+                spectrum = power_density(piece, rate, n_per_block=n_per_block, unit=self._unit(channel), source=channel)
+                rows.append(spectrum.values)
+        assert spectrum is not None  # noqa: S101 - said to the type checker: there is at least one
+        begins = np.arange(len(rows)) * per_column
+        ends = np.minimum(begins + per_column, n_spectra)
+        time_s = ((begins + ends - 1) * hop + n_per_block) / 2.0 / rate
+        return OrderMap(
+            values=np.stack(rows),
+            positions=spectrum.positions,
+            time_s=time_s,
+            speed_rpm=np.zeros(len(rows)) if shaft_angle is None else shaft_angle.speed_rpm_at(time_s),
+            axis="frequency",
+            scaling="power density",
+            unit=spectrum.unit,
+            resolution=spectrum.resolution,
+            source=channel,
+            shaft="",
+        )
+
+    def envelope_density(self, channel: str, band_hz: tuple[float, float], *, n_per_block: int = 8192) -> Spectrum:
+        """Return the power density of a band's squared envelope |z|², averaged over the record.
+
+        The band's edges are raised cosines of a tenth of its width; |z|² is sampled at a whole fraction of the rate,
+        at least four times the bandwidth where the record allows it. Beyond the record's ends there is nothing.
+
+        Parameters
+        ----------
+        channel : str
+        band_hz : (float, float)
+        n_per_block : int
+            Samples of a spectrum of the envelope (Hann, half overlapping).
+        """
+        rate, hop = self.head.sampling_rate_hz, n_per_block // 2
+        total, n_spectra, held = np.zeros(n_per_block // 2 + 1), 0, np.zeros(0)
+        spectrum: Spectrum | None = None
+        for values, rate_hz in self._envelopes(channel, *band_hz):
+            held = np.concatenate([held, values])
+            n = (len(held) - n_per_block) // hop + 1
+            if n > 0:
+                piece = held[: (n - 1) * hop + n_per_block]
+                spectrum = power_density(
+                    piece, rate_hz, n_per_block=n_per_block, unit=squared_unit(self._unit(channel)), source=channel
+                )
+                total, n_spectra, held = total + n * spectrum.values, n_spectra + n, held[n * hop :]
+        if spectrum is None:
+            raise RefusalError(f"the envelope of {self.n_samples / rate:.4g} s is shorter than {n_per_block} samples")
+        return replace(spectrum, values=total / n_spectra)
+
+    def _envelopes(self, channel: str, low_hz: float, high_hz: float) -> Iterator[tuple[FloatArray, float]]:
+        """Yield the squared envelope piece by piece with its rate."""
+        from scipy.fft import ifft, next_fast_len, rfft
+
+        rate = self.head.sampling_rate_hz
+        within(high_hz, "upper end of the band", low_hz, rate / 2, "Hz")
+        edge_hz = EDGE_FRACTION * (high_hz - low_hz)
+        thinned = max(1, floor(rate / (4.0 * (high_hz - low_hz))))
+        side = ceil(PERIODS_OF_EDGE * rate / edge_hz / thinned) * thinned
+        n = thinned * next_fast_len(ceil(max(BLOCK_SAMPLES, 4 * side) / thinned))
+        frequency = np.arange(n // 2 + 1) * rate / n
+        inside = np.clip(np.minimum(frequency - low_hz, high_hz - frequency) / edge_hz, 0.0, 1.0)
+        lines = np.flatnonzero(inside)
+        response = 2.0 / thinned * np.sin(np.pi / 2 * inside[lines]) ** 2
+        step = n - 2 * side
+        for first in range(0, self.n_samples, step):
+            begin, end = max(0, first - side), min(self.n_samples, first + step + side)
+            x = np.zeros(n)
+            x[begin - first + side : end - first + side] = self.read(slice(begin, end)).values(channel)
+            folded = np.zeros(n // thinned, dtype=np.complex128)
+            folded[lines % len(folded)] = rfft(x)[lines] * response
+            z = ifft(folded, overwrite_x=True)
+            inner = z[side // thinned : (side + min(step, self.n_samples - first) - 1) // thinned + 1]
+            yield inner.real**2 + inner.imag**2, rate / thinned
+
+    def shaft_angle(self) -> ShaftAngle:
+        """Return the reference shaft's angle over the whole record, from a constant speed or tachometer pulses.
+
+        Raises
+        ------
+        InputError
+            If the speed comes from something else: an encoder, or the vibration itself.
+        """
+        speed, rate = self.head.speed, self.head.sampling_rate_hz
+        if isinstance(speed, ConstantSpeed):
+            # Knots at both ends of the whole record, of which only the length is asked.
+            still = np.broadcast_to(np.zeros((1, 1), np.float32), (len(self.head.channels), self.n_samples))
+            return find_shaft_angle(replace(self.head, samples=still))
+        if not isinstance(speed, PulseTimes | TachometerChannel):
+            raise InputError(
+                "the speed of a record longer than memory comes from a constant speed or tachometer pulses",
+                where=self.head.name,
+                remedy="give --speed-rpm or --tach-times, or a rig file with a tachometer channel",
+            )
+        times: list[FloatArray] = []
+        reach = KERNEL_SAMPLES
+        for first in range(0, self.n_samples, BLOCK_SAMPLES):
+            begin = max(0, first - reach)
+            part = self.read(slice(begin, min(self.n_samples, first + BLOCK_SAMPLES + reach)))
+            if isinstance(speed, TachometerChannel):
+                if speed.threshold is None or speed.hysteresis is None:  # once, by the levels of the first block
+                    low, high = np.percentile(part.values(speed.channel), (0.05, 99.95))
+                    speed = replace(
+                        speed,
+                        threshold=float((low + high) / 2) if speed.threshold is None else speed.threshold,
+                        hysteresis=float((high - low) / 4) if speed.hysteresis is None else speed.hysteresis,
+                    )
+                found = find_pulse_edges(
+                    part.values(speed.channel), rate, threshold=speed.threshold, hysteresis=speed.hysteresis,
+                    edge=speed.edge,
+                ).times_s  # fmt: skip
+            else:
+                assert isinstance(part.speed, PulseTimes)  # noqa: S101 - said to the type checker: of the same file
+                found = part.speed.times_s
+            at = found + begin / rate
+            times.append(at[(at >= first / rate) & (at < (first + BLOCK_SAMPLES) / rate)])
+        pulses = PulseTimes(np.concatenate(times), speed.pulses_per_revolution, speed.shaft)
+        return find_shaft_angle(replace(self.head, speed=pulses))
+
+    def average(
+        self,
+        channel: str,
+        shaft_angle: ShaftAngle | None = None,
+        *,
+        samples_per_revolution: int | None = None,
+        n_jackknife_blocks: int = 32,
+    ) -> SynchronousAverage:
+        """Return the mean revolution over all whole revolutions of the record.
+
+        Parameters
+        ----------
+        channel : str
+        shaft_angle : ShaftAngle or None
+            None: `shaft_angle()`.
+        samples_per_revolution : int or None
+            None: what the first block calls for, see `resample_to_angle`.
+        n_jackknife_blocks : int
+            For the standard error, as in `synchronous_average`.
+        """
+        angle, rate = shaft_angle or self.shaft_angle(), self.head.sampling_rate_hz
+        ends_s = np.array([REACH, self.n_samples - 1 - REACH]) / rate
+        begin, end = angle.revolutions_at(np.clip(ends_s, angle.start_s, angle.end_s))
+        n = samples_per_revolution or self._grid(channel, angle)
+        first, last = ceil(begin - 1e-9), floor(end + 1.0 / n + 1e-9)  # the last sample lies a step before its end
+        if last - first < 2:
+            raise RefusalError(f"{self.head.name} holds fewer than two whole revolutions")
+        edges = first + np.linspace(0, last - first, min(last - first, n_jackknife_blocks) + 1).round().astype(int)
+        # Nearly: they only say what is read, with a twentieth of a revolution to spare.
+        starts_s = np.interp(np.arange(first, last + 1), angle.revolutions, angle.time_s)
+        spare = KERNEL_SAMPLES + ceil(0.05 * rate * float(np.diff(starts_s).max()))
+        n_at_once = max(1, floor(BLOCK_SAMPLES / rate / float(np.median(np.diff(starts_s)))))
+        sums: FloatArray | None = None
+        highest = 0.0
+        for begin in range(first, last, n_at_once):
+            end = min(begin + n_at_once, last)
+            left = max(0, floor(starts_s[begin - first] * rate) - spare)
+            right = min(self.n_samples, ceil(starts_s[end - first] * rate) + spare)
+            signal = resample_to_angle(
+                self.read(slice(left, right)),
+                _moved(angle, left / rate, right / rate, begin),
+                channels=(channel,),
+                samples_per_revolution=n,
+            )
+            skip = round(-signal.start_revolution * n)
+            rows = signal.samples[0, skip : skip + (end - begin) * n].reshape(end - begin, n)
+            sums = np.zeros((len(edges) - 1, n)) if sums is None else sums
+            highest = min(highest or signal.highest_order, signal.highest_order)
+            for i in range(len(edges) - 1):
+                a, b = max(begin, edges[i]) - begin, min(end, edges[i + 1]) - begin
+                if b > a:
+                    sums[i] += rows[a:b].sum(axis=0, dtype=np.float64)
+        assert sums is not None  # noqa: S101 - said to the type checker: there are two revolutions
+        total, n_revolutions = sums.sum(axis=0), last - first
+        without = (total - sums) / (n_revolutions - np.diff(edges))[:, None]
+        error = np.sqrt((len(sums) - 1.0) * without.var(axis=0))
+        return SynchronousAverage(
+            total / n_revolutions, error, n_revolutions, angle.shaft, channel, self._unit(channel), "average", highest
+        )
+
+    def _grid(self, channel: str, angle: ShaftAngle) -> int:
+        """Return the samples per revolution that the first block calls for."""
+        n = min(BLOCK_SAMPLES, self.n_samples)
+        own = angle.between(0.0, n / self.head.sampling_rate_hz)
+        return resample_to_angle(self.read(slice(0, n)), own, channels=(channel,)).samples_per_revolution
+
+    def _unit(self, channel: str) -> str:
+        return self.head.channels[self.head.index(channel)].unit
+
+
+def record_blocks(
+    path: str | Path, rig: Rig | None = None, *, sampling_rate_hz: float | None = None, speed: SpeedSource | None = None
+) -> RecordBlocks:
+    """Open a recording that is read block by block: HDF5, TDMS, Parquet or WAV.
+
+    Parameters
+    ----------
+    path : str or Path
+    rig, sampling_rate_hz, speed
+        As in `read_recording`.
+
+    Raises
+    ------
+    InputError
+        As `read_recording`, and for a format that is only read whole.
+    """
+
+    def read(part: slice) -> Recording:
+        return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed, part=part)
+
+    head = read(slice(0, KERNEL_SAMPLES))
+    n_samples = n_samples_of(path)
+    assert n_samples is not None  # noqa: S101 - said to the type checker: what is read in parts has a length
+    return RecordBlocks(head, n_samples, read)
+
+
+def _moved(angle: ShaftAngle, start_s: float, end_s: float, revolution: int) -> ShaftAngle:
+    """Return the angle of a part of the record, on the part's own time, from a revolution that becomes 0."""
+    own = angle.between(start_s, end_s)
+    return replace(own, time_s=own.time_s - start_s, revolutions=own.revolutions - revolution)
