@@ -33,7 +33,7 @@ SHORTEST_RUNS_S = 1.0
 
 
 @dataclass(frozen=True)
-class Case:
+class TimedCase:
     """One method on a signal of one length.
 
     Parameters
@@ -56,12 +56,12 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Method:
+class TimedMethod:
     """A method, its lengths, and its cases."""
 
     name: str
     lengths: Sequence[int]
-    case: Callable[[int], Case]
+    case: Callable[[int], TimedCase]
     limit: str
 
 
@@ -95,21 +95,21 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class MethodResult:
+class TimedMethodResult:
     """All timings of a method; gearsig's first, the limit's last."""
 
-    method: Method
+    method: TimedMethod
     timings: tuple[Timing, ...]
 
 
 def measure(
-    methods: Sequence[Method], *, longest_s: float = 20.0, on_progress: Callable[[int], object] | None = None
-) -> list[MethodResult]:
+    methods: Sequence[TimedMethod], *, longest_s: float = 20.0, on_progress: Callable[[int], object] | None = None
+) -> list[TimedMethodResult]:
     """Time methods one after the other.
 
     Parameters
     ----------
-    methods : sequence of Method
+    methods : sequence of TimedMethod
     longest_s : float
         A program that takes longer than this for one run is not given a longer signal.
     on_progress : callable or None
@@ -123,14 +123,14 @@ def measure(
     set_num_threads(1)
     with threadpool_limits(1):
         for number, method in enumerate(methods):
-            results.append(MethodResult(method, _timed(method, longest_s)))
+            results.append(TimedMethodResult(method, _timed(method, longest_s)))
             if on_progress is not None:
                 on_progress(number + 1)
     set_num_threads(n_threads)
     return results
 
 
-def _timed(method: Method, longest_s: float) -> tuple[Timing, ...]:
+def _timed(method: TimedMethod, longest_s: float) -> tuple[Timing, ...]:
     own, limit, others = Timing("gearsig"), Timing(method.limit), dict[str, Timing]()
     for n in method.lengths:
         case = method.case(n)
@@ -221,21 +221,21 @@ def _transforms(n: int, n_inverse: float = 0) -> Run:
     return run
 
 
-def _power_density(n: int) -> Case:
+def _power_density(n: int) -> TimedCase:
     from scipy import fft, signal
 
     from gearsig.spectra import power_density
 
     x, n_block = trial_signal(n), 8192
     blocks = np.lib.stride_tricks.sliding_window_view(x, n_block)[:: n_block // 2]
-    return Case(
+    return TimedCase(
         lambda: power_density(x, RATE_HZ, n_per_block=n_block).values,
         {"scipy.signal.welch": lambda: signal.welch(x, RATE_HZ, "hann", n_block, detrend=False)[1]},
         lambda: fft.rfft(blocks, axis=1),
     )
 
 
-def _envelope(n: int) -> Case:
+def _envelope(n: int) -> TimedCase:
     from scipy import fft, signal
 
     from gearsig.spectra import band_envelope
@@ -250,7 +250,7 @@ def _envelope(n: int) -> Case:
     def alike(own: Any, other: FloatArray) -> tuple[FloatArray, FloatArray]:
         return own.values, signal.resample(other, len(own.values))
 
-    return Case(
+    return TimedCase(
         lambda: band_envelope(x, RATE_HZ, band),
         {"scipy.signal.sosfiltfilt and hilbert": filtered},
         lambda: fft.irfft(fft.rfft(x)),
@@ -258,7 +258,7 @@ def _envelope(n: int) -> Case:
     )
 
 
-def _resampling(n: int) -> Case:
+def _resampling(n: int) -> TimedCase:
     from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
     from gearsig.angle import ShaftAngle, resample_to_angle
@@ -277,14 +277,14 @@ def _resampling(n: int) -> Case:
         values: FloatArray = CubicSpline(times, recording.samples[0])(CubicSpline(theta, times)(at))
         return values
 
-    return Case(
+    return TimedCase(
         lambda: resample_to_angle(recording, angle).samples[0],
         {"scipy.interpolate.CubicSpline": splines},
         _copies(n + len(at)),
     )
 
 
-def _stft(n: int) -> Case:
+def _stft(n: int) -> TimedCase:
     from scipy import fft
     from scipy.signal import ShortTimeFFT
 
@@ -298,7 +298,7 @@ def _stft(n: int) -> Case:
         # Moduli: each counts its phase from elsewhere. Both have frames at whole steps.
         return np.abs(own.values), np.abs(theirs)[:, -other.p_min :]
 
-    return Case(
+    return TimedCase(
         lambda: stft(x, RATE_HZ, window_length=n_window / RATE_HZ, step=step),
         {"scipy.signal.ShortTimeFFT": lambda: other.stft(x)},
         lambda: fft.rfft(blocks, axis=1),
@@ -310,7 +310,7 @@ def _lines() -> FloatArray:
     return np.geomspace(0.005, 0.35, N_LINES)
 
 
-def _morlet(n: int) -> Case:
+def _morlet(n: int) -> TimedCase:
     from gearsig.timefreq import Morlet, cwt
 
     x, lines, omega0 = trial_signal(n), _lines(), 2 * pi * sqrt(0.75)
@@ -331,7 +331,7 @@ def _morlet(n: int) -> Case:
             kept.append(PyFCWT(wavelet, grid, threads=1, dtype="complex128"))
         return kept[0].cwt(x)[::-1]
 
-    return Case(
+    return TimedCase(
         lambda: cwt(x, 1.0, positions=lines, wavelet=Morlet(omega0)).values,
         {"pywt.cwt": by_pywavelets, "pyfcwt": by_pyfcwt},
         _copies(n * N_LINES, np.complex128),
@@ -345,7 +345,7 @@ def _moduli(own: Any, other: Any) -> tuple[Any, Any]:
     return a, b * (a.mean(axis=1) / b.mean(axis=1))[:, None]
 
 
-def _morse(n: int) -> Case:
+def _morse(n: int) -> TimedCase:
     from gearsig.timefreq import Morse, cwt
 
     x, lines = trial_signal(n), _lines()
@@ -357,7 +357,7 @@ def _morse(n: int) -> Case:
         wavelet = ssqueezepy.Wavelet(("gmw", {"beta": 60, "gamma": 3}))
         return ssqueezepy.cwt(x, wavelet, scales=scales.copy())[0][::-1]
 
-    return Case(
+    return TimedCase(
         lambda: cwt(x, 1.0, positions=lines, wavelet=Morse(60.0)).values,
         {"ssqueezepy.cwt": by_ssqueezepy},
         _copies(n * N_LINES, np.complex128),
@@ -365,7 +365,7 @@ def _morse(n: int) -> Case:
     )
 
 
-def _squeezed(n: int) -> Case:
+def _squeezed(n: int) -> TimedCase:
     from gearsig.timefreq import Morse, inverse, squeezed_cwt
 
     x, settings = trial_signal(n), {"lowest": 0.005, "highest": 0.35, "n_per_octave": 16}
@@ -373,7 +373,7 @@ def _squeezed(n: int) -> Case:
     def run(engine: Any) -> Any:
         return squeezed_cwt(x, 1.0, wavelet=Morse(60.0), engine=engine, **settings)  # type: ignore[arg-type]
 
-    return Case(
+    return TimedCase(
         lambda: run("gearsig"),
         {"ssqueezepy.ssq_cwt": lambda: run("ssqueezepy")},
         _copies(2 * n * 16 * np.log2(70), np.complex128),
@@ -381,7 +381,7 @@ def _squeezed(n: int) -> Case:
     )
 
 
-def _modes(n: int) -> Case:
+def _modes(n: int) -> TimedCase:
     from gearsig.decompose import VmdSettings, vmd
 
     x, settings = trial_signal(n), VmdSettings(3, tolerance=1e-4)
@@ -401,7 +401,7 @@ def _modes(n: int) -> Case:
         return modes[np.argsort(np.abs(np.diff(modes, axis=1)).sum(axis=1) / np.abs(modes).sum(axis=1))]
 
     n_iterations = vmd(x, RATE_HZ, settings).n_iterations
-    return Case(
+    return TimedCase(
         lambda: vmd(x, RATE_HZ, settings).waveforms,
         {"vmdpy": by_vmdpy, "pysdkit.VMD": by_pysdkit},
         _copies(n_iterations * 3 * n, np.complex128),
@@ -409,7 +409,7 @@ def _modes(n: int) -> Case:
     )
 
 
-def _packets(n: int) -> Case:
+def _packets(n: int) -> TimedCase:
     from gearsig.timefreq import wavelet_packets
 
     x = trial_signal(n)
@@ -420,14 +420,14 @@ def _packets(n: int) -> Case:
         tree = pywt.WaveletPacket(x, "sym12", "periodization", maxlevel=6)
         return np.array([node.data for node in tree.get_level(6, "freq")])
 
-    return Case(
+    return TimedCase(
         lambda: wavelet_packets(x, RATE_HZ, level=6).values,
         {"pywt.WaveletPacket": by_pywavelets},
         _copies(6 * n),
     )
 
 
-def _kurtogram(n: int) -> Case:
+def _kurtogram(n: int) -> TimedCase:
     from gearsig.spectra import kurtogram
 
     x = trial_signal(n)
@@ -438,10 +438,12 @@ def _kurtogram(n: int) -> Case:
 
         return fast_kurtogram(x, 6, 1.0)
 
-    return Case(lambda: kurtogram(x, 1.0, n_levels=6), {"pysdkit": by_pysdkit}, _copies(2 * 6 * n, np.complex128), None)
+    return TimedCase(
+        lambda: kurtogram(x, 1.0, n_levels=6), {"pysdkit": by_pysdkit}, _copies(2 * 6 * n, np.complex128), None
+    )
 
 
-def _vold_kalman(n: int) -> Case:
+def _vold_kalman(n: int) -> TimedCase:
     from scipy import sparse
     from scipy.sparse.linalg import spsolve
 
@@ -458,7 +460,7 @@ def _vold_kalman(n: int) -> Case:
         second = sparse.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(n - 2, n))
         return spsolve((sparse.eye(n) + weight**2 * (second.T @ second)).tocsc(), y * np.exp(-2j * pi * cycles))
 
-    return Case(
+    return TimedCase(
         lambda: track_vold_kalman(y, RATE_HZ, track, bandwidth_hz=20.0, mirror=False).orders[0].envelope,
         {"scipy.sparse.linalg.spsolve": by_sparse_solve},
         _copies(2 * n, np.complex128),
@@ -466,7 +468,7 @@ def _vold_kalman(n: int) -> Case:
     )
 
 
-def _motion(n: int) -> Case:
+def _motion(n: int) -> TimedCase:
     """N steps of the cracked pair; DOP853 solves the same compiled equations to the same error."""
     from scipy.integrate import solve_ivp
 
@@ -508,7 +510,7 @@ def _motion(n: int) -> Case:
         (10.0**-e for e in range(3, 12) if np.linalg.norm(adaptive(10.0**-e) - exact) <= error), 1e-12
     )  # the loosest that is as exact
     at = (ready.speed, ready.torque, first, rough, rate)
-    return Case(
+    return TimedCase(
         fixed,
         {"scipy.integrate.solve_ivp": lambda: adaptive(tolerance)},
         lambda: _slopes(4 * n, *ready.constants.arguments, state, *at),
@@ -524,18 +526,22 @@ def _slopes(n, k, curves, rows, pitch, state, speed, torque, first, rough, rate)
 MEMORY = "samples and results moved once through memory"
 TRANSFORMS = "the Fourier transforms alone"
 METHODS = (
-    Method("power density", [2**16, 2**18, 2**20, 2**22], _power_density, TRANSFORMS),
-    Method("envelope of a band", [2**16, 2**18, 2**20, 2**22], _envelope, "one Fourier transform forth and back"),
-    Method("resampling over angle", [2**16, 2**18, 2**20, 2**22], _resampling, MEMORY),
-    Method("kurtogram, 6 levels", [2**16, 2**18, 2**20], _kurtogram, "each level moved once through memory"),
-    Method("short-time transform", [2**16, 2**18, 2**20], _stft, TRANSFORMS),
-    Method(f"wavelet transform, {N_LINES} Morlets", [2**14, 2**16, 2**18], _morlet, "its matrix moved through memory"),
-    Method(f"wavelet transform, {N_LINES} Morses", [2**14, 2**16, 2**18], _morse, "its matrix moved through memory"),
-    Method("squeezed wavelet transform", [2**13, 2**15, 2**17], _squeezed, "two matrices moved through memory"),
-    Method("wavelet packets, level 6", [2**16, 2**18, 2**20], _packets, "each level moved once through memory"),
-    Method("variational modes, 3", [2**11, 2**13, 2**15], _modes, "each iteration's modes moved through memory"),
-    Method("Vold–Kalman, one order", [2**14, 2**16, 2**18, 2**20], _vold_kalman, MEMORY),
-    Method("cracked pair, steps", [2**13, 2**15, 2**17], _motion, "four evaluations of the equations a step"),
+    TimedMethod("power density", [2**16, 2**18, 2**20, 2**22], _power_density, TRANSFORMS),
+    TimedMethod("envelope of a band", [2**16, 2**18, 2**20, 2**22], _envelope, "one Fourier transform forth and back"),
+    TimedMethod("resampling over angle", [2**16, 2**18, 2**20, 2**22], _resampling, MEMORY),
+    TimedMethod("kurtogram, 6 levels", [2**16, 2**18, 2**20], _kurtogram, "each level moved once through memory"),
+    TimedMethod("short-time transform", [2**16, 2**18, 2**20], _stft, TRANSFORMS),
+    TimedMethod(
+        f"wavelet transform, {N_LINES} Morlets", [2**14, 2**16, 2**18], _morlet, "its matrix moved through memory"
+    ),
+    TimedMethod(
+        f"wavelet transform, {N_LINES} Morses", [2**14, 2**16, 2**18], _morse, "its matrix moved through memory"
+    ),
+    TimedMethod("squeezed wavelet transform", [2**13, 2**15, 2**17], _squeezed, "two matrices moved through memory"),
+    TimedMethod("wavelet packets, level 6", [2**16, 2**18, 2**20], _packets, "each level moved once through memory"),
+    TimedMethod("variational modes, 3", [2**11, 2**13, 2**15], _modes, "each iteration's modes moved through memory"),
+    TimedMethod("Vold–Kalman, one order", [2**14, 2**16, 2**18, 2**20], _vold_kalman, MEMORY),
+    TimedMethod("cracked pair, steps", [2**13, 2**15, 2**17], _motion, "four evaluations of the equations a step"),
 )
 """A rotor of ROSS has no teeth in contact: nothing here computes what it does."""
 
@@ -545,7 +551,7 @@ METHODS = (
 # --------------------
 
 
-def rows(results: Sequence[MethodResult]) -> Iterator[dict[str, str | float | int]]:
+def rows(results: Sequence[TimedMethodResult]) -> Iterator[dict[str, str | float | int]]:
     """Yield a row for each program beside gearsig, at the greatest length that both did."""
     for result in results:
         own, *others, limit = result.timings
@@ -568,7 +574,7 @@ def rows(results: Sequence[MethodResult]) -> Iterator[dict[str, str | float | in
             }
 
 
-def table(results: Sequence[MethodResult], date: datetime | None = None) -> str:
+def table(results: Sequence[TimedMethodResult], date: datetime | None = None) -> str:
     """Return the table in Markdown, with machine, programs and date above it."""
     day = f"{(date or datetime.now().astimezone()):%d %B %Y}"
     names = ("method", "samples N", "gearsig", "instead", "takes", "times as long", "results differ by")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.benchmark.speed import Case, Method, Timing, measure, rows, table
+from app.benchmark.speed import TimedCase, TimedMethod, Timing, measure, rows, table
 
 
 class Clock:
@@ -19,7 +19,7 @@ class Clock:
 
     def case(self, n):
         rivals = {"numpy.slow": lambda: 2.0 * self.busy(4e-6 * n), "no_such_package.method": lambda: None}
-        return Case(lambda: self.busy(1e-6 * n), rivals, lambda: self.busy(5e-7 * n))
+        return TimedCase(lambda: self.busy(1e-6 * n), rivals, lambda: self.busy(5e-7 * n))
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def clock(monkeypatch):
 
 
 def test_ratio_growth_limit_and_agreement(clock):
-    (result,) = measure([Method("busy", [1000, 4000, 16000], clock.case, "half of it")])
+    (result,) = measure([TimedMethod("busy", [1000, 4000, 16000], clock.case, "half of it")])
     slow, absent = rows([result])
     assert slow["ratio"] == pytest.approx(4.0)
     assert slow["over_limit"] == pytest.approx(2.0)
@@ -40,7 +40,7 @@ def test_ratio_growth_limit_and_agreement(clock):
 
 
 def test_what_takes_too_long_is_given_no_longer_signal(clock):
-    (result,) = measure([Method("busy", [1000, 4000], clock.case, "half of it")], longest_s=1e-3)
+    (result,) = measure([TimedMethod("busy", [1000, 4000], clock.case, "half of it")], longest_s=1e-3)
     assert [list(timing.seconds) for timing in result.timings[:2]] == [[1000, 4000], [1000]]
     assert next(rows([result]))["n"] == 1000
 
