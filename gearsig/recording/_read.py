@@ -19,7 +19,7 @@ from gearsig.errors import InputError
 from gearsig.formatting import file_label
 from gearsig.recording._assemble import assemble
 from gearsig.recording._limits import CHUNK_BYTES, foreign_errors, read_text_bytes
-from gearsig.recording._table import SECONDS_PER_UNIT, RawTable, one_condition
+from gearsig.recording._table import SECONDS_PER_UNIT, RawTable, one_condition, one_measurement
 from gearsig.recording._types import Recording, split_unit
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
@@ -43,7 +43,8 @@ def read_recording(
     ----------
     path : str or Path
         "runs.mat#2" is the second of several runs that stand side by side in one file: column 2 beside the time, as a
-        recording of one channel, "vibration". So one run can be the reference of another.
+        recording of one channel, "vibration". So one run can be the reference of another. Where names say by number
+        which measurement a channel is of ("X098_DE_time", "X099_DE_time"), "#98" is that one.
     rig : Rig, optional
         Its sensors give the channels quantity, unit, scale and position; its speed and sampling rate are used where
         the file has none.
@@ -73,6 +74,8 @@ def read_recording(
         table = file_format.read(file) if part is None else _part_reader(file_format, name)(file, part)
         if condition is not None:
             table, name = one_condition(table, condition, file.name), f"{name}#{condition}"
+        else:
+            table = one_measurement(table, None, file.name)
         sha256 = sha256_of(file) if part is None else ""
         recording = assemble(table, name, sha256, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
         return recording if part is None else _with_pulses_within(recording, part.start or 0)

@@ -60,6 +60,8 @@ class RawTable:
         Whether gearsig wrote the file: then nothing is guessed from names.
     warnings : tuple of str
     speed : SpeedSource or None
+    speeds_rpm : mapping
+        Speeds that the file states, by name; more than one where it holds several measurements.
     truth : mapping or None
     history : tuple of str
         Processing steps that were done before the file was written.
@@ -74,6 +76,7 @@ class RawTable:
     is_own_layout: bool = False
     warnings: tuple[str, ...] = ()
     speed: SpeedSource | None = None
+    speeds_rpm: Mapping[str, float] = field(default_factory=dict)
     truth: Mapping[str, Any] | None = None
     history: tuple[str, ...] = ()
     row_place: Callable[[int], str] = sample_place
@@ -182,6 +185,8 @@ def one_condition(table: RawTable, number: int, where: str) -> RawTable:
     InputError
         If there is no such column.
     """
+    if _measurements(table):
+        return one_measurement(table, number, where)
     columns = [c for c in table.columns if seconds_per_unit(c.name, c.unit) is None]
     times = [c for c in table.columns if c not in columns]
     if not 1 <= number <= len(columns):
@@ -194,6 +199,52 @@ def one_condition(table: RawTable, number: int, where: str) -> RawTable:
     chosen = replace(columns[number - 1], name=CONDITION_CHANNEL)
     kept = tuple(text for text in table.warnings if not text.startswith(SEPARATE_RUNS))
     return replace(table, columns=(*times, chosen), warnings=kept)
+
+
+def one_measurement(table: RawTable, number: int | None, where: str) -> RawTable:
+    """Return the table of one measurement, where the columns are those of several by the numbers in their names.
+
+    "X098_DE_time", "X099_DE_time", "X099RPM" are of two, 98 and 99. Without a number it is the one that the file is
+    called by, or the last: earlier ones were left over when it was saved. Its own speed goes with it.
+
+    Raises
+    ------
+    InputError
+        If there is no measurement of that number.
+    """
+    measurements = _measurements(table)
+    if not measurements:
+        return table
+    numbers = ", ".join(f"#{n}" for n in sorted(measurements))
+    warnings = table.warnings
+    if number is None:
+        named = [int(n) for n in re.findall(r"\d+", where) if int(n) in measurements]
+        number = named[0] if named else max(measurements)
+        others = ", ".join(f"{where}#{n}" for n in sorted(measurements) if n != number)
+        warnings = (*warnings, f"holds {len(measurements)} measurements: {number} was read; for another, give {others}")
+    if number not in measurements:
+        raise InputError(f"there is no measurement {number}", where=where, allowed=numbers, remedy="choose one of them")
+    speeds = {rpm for name, rpm in table.speeds_rpm.items() if number in map(int, re.findall(r"\d+", name))}
+    warnings = tuple(w for w in warnings if not any(f"{name} = " in w for name in table.speeds_rpm))
+    speed = ConstantSpeed(min(speeds)) if len(speeds) == 1 and 0 < min(speeds) < np.inf else None
+    return replace(table, columns=tuple(measurements[number]), warnings=warnings, speed=speed)
+
+
+def _measurements(table: RawTable) -> dict[int, list[RawColumn]]:
+    """Return the columns by the number that their names begin with; empty unless they are several measurements.
+
+    So they are if a speed bears such a number as well, or if their lengths differ: numbers of channels do neither.
+    """
+    measurements: dict[int, list[RawColumn]] = {}
+    for column in table.columns:
+        match = re.match(r"[A-Za-z]{0,3}(\d{2,})_[A-Za-z]", column.name)
+        if match is None or table.is_own_layout:
+            return {}
+        measurements.setdefault(int(match[1]), []).append(column)
+    lengths = {tuple({len(c.values) for c in columns}) for columns in measurements.values()}
+    of_speeds = {int(n) for name in table.speeds_rpm for n in re.findall(r"\d+", name)}
+    is_several = len(measurements) > 1 and (len(lengths) > 1 or not of_speeds.isdisjoint(measurements))
+    return measurements if is_several else {}
 
 
 CONDITION_CHANNEL = "vibration"
@@ -363,11 +414,19 @@ def table_from_arrays(found: NamedArrays, reader: str, where: str) -> RawTable:
     # A channel is called by the last part of its path where that is unique.
     leaves = [c.name.rpartition(".")[2] for c in columns]
     columns = [replace(c, name=leaf) if leaves.count(leaf) == 1 else c for c, leaf in zip(columns, leaves, strict=True)]
-    speed, hints = _stated_speed(scalars)
+    speeds_rpm, speed, hints = _stated_speed(scalars)
     warnings += hints
     if short:
         warnings.append(f"shorter than a tenth of the longest signal and left out: {', '.join(short[:8])}")
-    return RawTable(tuple(columns), reader, sampling_rate_hz=rate_hz, time=time, warnings=tuple(warnings), speed=speed)
+    return RawTable(
+        tuple(columns),
+        reader,
+        sampling_rate_hz=rate_hz,
+        time=time,
+        warnings=tuple(warnings),
+        speed=speed,
+        speeds_rpm=speeds_rpm,
+    )
 
 
 def _is_clock(path: str, array: NumberArray) -> bool:
@@ -428,15 +487,21 @@ def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: Mapping[str, float]
     return values[0] if values else None
 
 
-def _stated_speed(scalars: Mapping[str, NumberArray]) -> tuple[ConstantSpeed | None, list[str]]:
-    """Return the speed that the one scalar in rpm states; mention others that may be speeds, which were not used."""
+def _stated_speed(
+    scalars: Mapping[str, NumberArray],
+) -> tuple[dict[str, float], ConstantSpeed | None, list[str]]:
+    """Return all scalars in rpm, the speed where they state one; mention others that may be, which were not used."""
     values = {path: float(a.reshape(-1)[0]) for path, a in scalars.items() if a.dtype.kind in "fiu"}
     in_rpm = {path: value for path, value in values.items() if plain_name(path).endswith("rpm")}
     possible = {path: value for path, value in values.items() if plain_name(path) in SPEED_NAMES or path in in_rpm}
     stated = set(in_rpm.values())
     if len(stated) == 1 and 0 < min(stated) < np.inf:
-        return ConstantSpeed(min(stated)), []
-    return None, [
-        f"{path} = {value:g} may be a nominal shaft speed ({'rpm' if path in in_rpm else 'Hz or rpm'}); it was not used"
-        for path, value in possible.items()
-    ]
+        return in_rpm, ConstantSpeed(min(stated)), []
+    return (
+        in_rpm,
+        None,
+        [
+            f"{path} = {value:g} may be a nominal shaft speed ({'rpm' if path in in_rpm else 'Hz or rpm'}); it was not used"
+            for path, value in possible.items()
+        ],
+    )

@@ -98,6 +98,26 @@ class TestMat5:
         (tmp_path / "x.mat").rename(tmp_path / "x#2.mat")
         assert len(read_recording(tmp_path / "x#2.mat").channels) == 3
 
+    def test_of_several_measurements_one_is_read_with_its_own_speed(self, tmp_path):
+        rng = np.random.default_rng(1)
+        of = {number: rng.standard_normal(5000 + number) for number in (98, 99)}
+        speeds = {"X098RPM": 1797.0, "X099RPM": 1772.0}
+        savemat(tmp_path / "x.mat", {**{f"X0{n}_{p}_time": x for n, x in of.items() for p in ("DE", "FE")}, **speeds})
+        (tmp_path / "98.mat").write_bytes((tmp_path / "x.mat").read_bytes())
+        for name, number in (("x.mat", 99), ("98.mat", 98), ("x.mat#98", 98), ("98.mat#99", 99)):
+            r = read_recording(tmp_path / name, sampling_rate_hz=12_000)
+            assert r.channel_names == (f"X0{number}_DE_time", f"X0{number}_FE_time")
+            np.testing.assert_array_equal(r.samples[0], of[number])
+            assert r.speed == ConstantSpeed(speeds[f"X0{number}RPM"])
+            assert any("#" in w for w in r.warnings) is ("#" not in name)
+        with pytest.raises(InputError, match="#98, #99"):
+            read_recording(tmp_path / "x.mat#97", sampling_rate_hz=12_000)
+
+    def test_numbers_of_channels_are_no_measurements(self, tmp_path):
+        rng = np.random.default_rng(1)
+        savemat(tmp_path / "x.mat", {f"ch{i:02}_acc": rng.standard_normal(5000) for i in (1, 2)} | {"rpm": 1500.0})
+        assert len(read_recording(tmp_path / "x.mat", sampling_rate_hz=12_000).channels) == 2
+
     @pytest.mark.parametrize("zero_first", [True, False])
     def test_doubled_variables(self, tmp_path, zero_first):
         copies = [np.zeros_like(X), X] if zero_first else [X, np.zeros_like(X)]
