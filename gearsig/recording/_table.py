@@ -497,11 +497,8 @@ def _stated_speed(
     stated = set(in_rpm.values())
     if len(stated) == 1 and 0 < min(stated) < np.inf:
         return in_rpm, ConstantSpeed(min(stated)), []
-    return (
-        in_rpm,
-        None,
-        [
-            f"{path} = {value:g} may be a nominal shaft speed ({'rpm' if path in in_rpm else 'Hz or rpm'}); it was not used"
-            for path, value in possible.items()
-        ],
-    )
+    hints = [
+        f"{path} = {value:g} may be a nominal shaft speed ({'rpm' if path in in_rpm else 'Hz or rpm'}); it was not used"
+        for path, value in possible.items()
+    ]
+    return in_rpm, None, hints
