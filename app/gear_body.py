@@ -173,7 +173,7 @@ def figures(study: GearBodyStudy) -> dict[str, Figure]:
     near = (g.root_radius_mm - 3.0 * g.module_mm, g.tip_radius_mm + 0.5 * g.module_mm)
     across = 0.95 * np.pi * g.module_mm
     quality = study.quality.scaled_jacobian[view.cells]
-    shapes = {_label(study, k): _shape(study, view, k) for k in range(min(N_SHOWN, len(study.modes.frequencies_hz)))}
+    shapes = {label(study, k): _motion(study, view, k) for k in range(min(N_SHOWN, len(study.modes.frequencies_hz)))}
     found = {
         "mesh": gear_mesh_figure(
             view.outlines_mm,
@@ -199,7 +199,7 @@ def lines(study: GearBodyStudy) -> list[str]:
         f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², lowest scaled Jacobian {q.scaled_jacobian.min():.2f}",
         f"tooth compliance in mid-flank {study.load.push_m / study.load.force_n:.3g} m/N, bore held",
         f"modes, {HELD[study.held]}:",
-        *(_label(study, k) for k in range(len(study.modes.frequencies_hz))),
+        *(label(study, k) for k in range(len(study.modes.frequencies_hz))),
     ]
     if study.discretisation is not None:
         d, size = study.discretisation, study.mesh.size
@@ -227,20 +227,25 @@ def _cells(study: GearBodyStudy) -> str:
     return f"{kind}: {size.n_across} over a tooth's thickness, {size.n_up} up its flank, {size.n_along} along the face"
 
 
-def _label(study: GearBodyStudy, k: int) -> str:
+def label(study: GearBodyStudy, k: int) -> str:
+    """Frequency and kind of mode k."""
     n = int(study.modes.nodal_diameters[k])
     whole = reduced_fe.rigid_part(study.gear, study.modes, k)
     kind = whole or f"{n} nodal diameter{'s' if n != 1 else ''}"
     return f"{study.modes.frequencies_hz[k]:.1f} Hz, {kind}"
 
 
-def _shape(study: GearBodyStudy, view: FaceView, k: int) -> FloatArray:
-    """Motion of the view's points in the axes of the whole gear."""
-    field = reduced_fe.mode_field(study.gear, study.modes, k)[:, view.nodes]
-    angle = study.mesh.blank.pitch_angle_rad * np.arange(len(field))[:, None]
+def in_the_whole_gear(mesh: SectorMesh, vectors: FloatArray) -> FloatArray:
+    """Vectors in the axes of their sectors, (n_teeth, n, 3), in those of the gear, (n_teeth · n, 3)."""
+    angle = mesh.blank.pitch_angle_rad * np.arange(len(vectors))[:, None]
     c, s = np.cos(angle), np.sin(angle)
-    x, y, z = np.moveaxis(field, 2, 0)
+    x, y, z = np.moveaxis(vectors, 2, 0)
     return np.column_stack(((c * x - s * y).ravel(), (s * x + c * y).ravel(), z.ravel()))
+
+
+def _motion(study: GearBodyStudy, view: FaceView, k: int) -> FloatArray:
+    """Motion of the view's points in the axes of the whole gear."""
+    return in_the_whole_gear(study.mesh, reduced_fe.mode_field(study.gear, study.modes, k)[:, view.nodes])
 
 
 def _stress(study: GearBodyStudy, near: tuple[float, float, float, float], name: str) -> Figure:

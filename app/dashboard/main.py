@@ -16,6 +16,7 @@ st.navigation(
         st.Page(PAGES / "start.py", title="Start", icon=":material/home:", default=True),
         st.Page(PAGES / "analysis.py", title="Analysis", icon=":material/troubleshoot:"),
         st.Page(PAGES / "laboratory.py", title="Fault laboratory", icon=":material/experiment:"),
+        st.Page(PAGES / "flexible.py", title="Flexible gears", icon=":material/settings:"),
         st.Page(PAGES / "compare.py", title="Comparison", icon=":material/stacked_line_chart:"),
         st.Page(PAGES / "gap.py", title="Gap", icon=":material/compare_arrows:"),
         st.Page(PAGES / "fleet.py", title="Fleet", icon=":material/factory:"),
