@@ -235,6 +235,7 @@ def report(
         datetime | None, typer.Option("--since", help="UTC. Default: since the last report of this fleet.")
     ] = None,
     everything: Annotated[bool, typer.Option("--everything", help="Since the beginning.")] = False,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Write the page as PDF as well.")] = False,
 ) -> None:
     """Write what changed since last time as one HTML page: diagnoses, alarms raised and cleared, levels that moved.
 
@@ -243,11 +244,13 @@ def report(
     from datetime import UTC
 
     from gearsig.fleet import last_report, mark_reported
-    from gearsig.report import write_fleet_page
+    from gearsig.report import check_pdf, write_fleet_page
 
+    if pdf:
+        check_pdf()
     fleet = _open(store)
     now = datetime.now(UTC).replace(tzinfo=None)
-    write_fleet_page(fleet, output, None if everything else since or last_report(fleet))
+    write_fleet_page(fleet, output, None if everything else since or last_report(fleet), pdf=pdf)
     if since is None and not everything:
         mark_reported(fleet, now)
     typer.echo(f"Open {output} in a browser.")

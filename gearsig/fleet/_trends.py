@@ -399,12 +399,18 @@ def state_rows(trends: PointTrends, machine: str, point: str, fingerprint: str) 
                 "normalised": ", ".join(trends.normalised),
                 "changed": dates.iloc[began] if began >= 0 else None,
                 "changed_added": trends.recordings["added"].iloc[noticed] if noticed >= 0 else None,
-                "changed_by": float(np.nanmean(change[began:, column])) if began >= 0 else float("nan"),
+                "changed_by": _mean(change[began:, column]) if began >= 0 else float("nan"),
                 "events": json.dumps([asdict(event) for event in events], default=str),
                 "fingerprint": fingerprint,
             }
         )
     return rows
+
+
+def _mean(values: FloatArray) -> float:
+    """Return the mean of what is known, nan where nothing is."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
 
 
 def events_of(text: str) -> list[AlarmEvent]:

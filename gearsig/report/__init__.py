@@ -13,7 +13,7 @@ from gearsig.report._comparison import (
     shown_orders,
 )
 from gearsig.report._files import check_writable, made_folder, page_names
-from gearsig.report._fleet import fleet_page_html, write_fleet_page
+from gearsig.report._fleet import fleet_page_html, fleet_page_pdf, write_fleet_page
 from gearsig.report._gap_json import gap_from_dict, gap_schema, gap_to_dict, gap_to_json, read_gap_json, write_gap_json
 from gearsig.report._gap_page import (
     CHECK_FIRST,
@@ -117,6 +117,7 @@ __all__ = [
     "finding_card",
     "fitting_methods",
     "fleet_page_html",
+    "fleet_page_pdf",
     "floors_text",
     "force_csv",
     "force_json",

@@ -15,6 +15,7 @@ from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, fleet_c
 from gearsig.formatting import readable
 from gearsig.plot import Picture, fleet_trend_picture, unit_text
 from gearsig.report._files import render
+from gearsig.report._pdf import compiled, put_picture, write_pdf
 
 LEVEL_CLASSES = {"alarm": "fault", "warning": "suspicion", "ok": "no-fault"}
 MAX_ROWS, MAX_POINTS, MAX_PICTURES = 60, 200, 8
@@ -49,25 +50,40 @@ def fleet_page_html(fleet: Fleet, since: datetime | None = None, *, date: dateti
     date : datetime or None
         Of the page; None: now.
     """
+    return render("fleet.html.j2", **_page_values(fleet, since, date))
+
+
+def fleet_page_pdf(fleet: Fleet, since: datetime | None = None, *, date: datetime | None = None) -> bytes:
+    """Return the page that `fleet_page_html` makes as PDF.
+
+    Raises
+    ------
+    InputError
+        If typst is not installed.
+    """
+    return _pdf(_page_values(fleet, since, date))
+
+
+def _page_values(fleet: Fleet, since: datetime | None, date: datetime | None) -> dict[str, Any]:
+    """Return what the page shows, by the names of its template."""
     changes = fleet_changes(fleet, since)
     status = changes.status.head(MAX_POINTS).to_dict("records")
     n_points = len(changes.status)
     levels = changes.status["level"].value_counts()
     standing = ", ".join(f"{levels[name]} {name}" for name in ("alarm", "warning", "ok") if name in levels)
-    return render(
-        "fleet.html.j2",
-        since=f"since {since:%Y-%m-%d %H:%M} UTC" if since is not None else "since the beginning",
-        date=(date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip(),
-        version=__version__,
-        summary=_summary(changes),
-        counts=f"{n_points} measuring points: {standing}." if n_points else "",
-        diagnoses=changes.diagnoses[:MAX_ROWS],
-        raised=[_row(change) for change in changes.raised[:MAX_ROWS]],
-        cleared=[_row(change) for change in changes.cleared[:MAX_ROWS]],
-        pictures=_pictures(fleet, changes.raised),
-        shifted=[_shift(row) for row in changes.shifted.head(MAX_ROWS).to_dict("records")],
-        failures=changes.failures,
-        status=[
+    return {
+        "since": f"since {since:%Y-%m-%d %H:%M} UTC" if since is not None else "since the beginning",
+        "date": (date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip(),
+        "version": __version__,
+        "summary": _summary(changes),
+        "counts": f"{n_points} measuring points: {standing}." if n_points else "",
+        "diagnoses": changes.diagnoses[:MAX_ROWS],
+        "raised": [_row(change) for change in changes.raised[:MAX_ROWS]],
+        "cleared": [_row(change) for change in changes.cleared[:MAX_ROWS]],
+        "pictures": _pictures(fleet, changes.raised),
+        "shifted": [_shift(row) for row in changes.shifted.head(MAX_ROWS).to_dict("records")],
+        "failures": changes.failures,
+        "status": [
             {str(key): value for key, value in row.items()}
             | {
                 "css_class": LEVEL_CLASSES[row["level"]],
@@ -77,13 +93,69 @@ def fleet_page_html(fleet: Fleet, since: datetime | None = None, *, date: dateti
             }
             for row in status
         ],
-        n_more=n_points - len(status),
-    )
+        "n_more": n_points - len(status),
+    }
 
 
-def write_fleet_page(fleet: Fleet, path: str | Path, since: datetime | None = None) -> Path:
-    """Write the page that `fleet_page_html` makes."""
-    return write_text(Path(path), fleet_page_html(fleet, since))
+def write_fleet_page(fleet: Fleet, path: str | Path, since: datetime | None = None, *, pdf: bool = False) -> Path:
+    """Write the page that `fleet_page_html` makes, and beside it the same as PDF where that is asked for."""
+    values = _page_values(fleet, since, None)
+    if pdf:
+        write_pdf(Path(path).with_suffix(".pdf"), _pdf(values))
+    return write_text(Path(path), render("fleet.html.j2", **values))
+
+
+def _pdf(values: dict[str, Any]) -> bytes:
+    """Return the page's values as PDF."""
+    pictures: dict[str, bytes] = {}
+    alarm = ("", "machine", "indicator", "of", "now", "expected", "limit", "change", "raised", "cleared", "limits")
+    of_alarm = ("level", "machine", "name", "of", "value", "expected", "limit", "change", "raised", "cleared", "basis")
+    tables = [
+        (
+            "Other diagnoses than before",
+            ("now", "machine", "point", "before", "verdict"),
+            [
+                (row.now.replace(" ", "-"), [row.now, row.machine, row.point, row.before or "new", row.verdict])
+                for row in values["diagnoses"]
+            ],
+        ),
+        *(
+            (title, alarm, [(row.css_class, [getattr(row, name) for name in of_alarm]) for row in values[key]])
+            for title, key in (("Alarms raised", "raised"), ("Alarms cleared", "cleared"))
+        ),
+        (
+            "Levels that changed within their limits",
+            ("machine", "indicator", "of", "since", "by"),
+            [("", list(row.values())) for row in values["shifted"]],
+        ),
+        ("Not analysed", ("file", "reason"), [("", list(row)) for row in values["failures"]]),
+        (
+            "All measuring points, worst first",
+            ("", "machine", "point", "last", "recordings", "diagnosis", "trends"),
+            [
+                (
+                    row["css_class"],
+                    [row[k] for k in ("level", "machine", "point", "last", "n_recordings", "outcome", "trends")],
+                )
+                for row in values["status"]
+            ],
+        ),
+    ]
+    data = {
+        "title": f"Fleet: what changed {values['since']}",
+        "made": f"{values['date']}, gearsig {values['version']}",
+        "tables": [
+            {
+                "title": title,
+                "columns": columns,
+                "rows": [{"css_class": css_class, "cells": [str(cell) for cell in cells]} for css_class, cells in rows],
+            }
+            for title, columns, rows in tables
+            if rows
+        ],
+        "pictures": [(heading, put_picture(picture, pictures)) for heading, picture in values["pictures"]],
+    }
+    return compiled("fleet.typ", data | {name: values[name] for name in ("summary", "counts", "n_more")}, pictures)
 
 
 def _summary(changes: FleetChanges) -> str:

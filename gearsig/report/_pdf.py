@@ -62,14 +62,14 @@ def page_pdf(
             asdict(row) | {"change": f"{row.change_db:+.1f} dB", "repeatability": f"± {row.repeatability_db:.1f}"}
             for row in parts["changes"]
         ],
-        "verdict_picture": None if verdict is None else _put(verdict, pictures),
+        "verdict_picture": None if verdict is None else put_picture(verdict, pictures),
         "findings": [asdict(card) for card in parts["findings"]],
         "further": [asdict(card) for card in parts["further"]],
         "groups": [
             {
                 "title": group.title,
-                "wide": [_put(one, pictures) for one in group.wide],
-                "small": [_put(one, pictures) for one in group.small],
+                "wide": [put_picture(one, pictures) for one in group.wide],
+                "small": [put_picture(one, pictures) for one in group.small],
             }
             for group in parts["gallery"].groups
         ],
@@ -119,7 +119,7 @@ def compiled(template: str, data: Mapping[str, Any], pictures: Mapping[str, byte
     return bytes(made)
 
 
-def _put(picture: Picture, pictures: dict[str, bytes]) -> dict[str, object]:
+def put_picture(picture: Picture, pictures: dict[str, bytes]) -> dict[str, object]:
     """Add a picture to the files, and return what the template says of it."""
     if picture.svg:
         name = f"picture{len(pictures)}.svg"

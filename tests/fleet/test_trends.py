@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.fleet import Fleet, TrendSettings, fleet_changes, last_report, mark_reported, open_fleet
-from gearsig.report import fleet_page_html
+from gearsig.report import fleet_page_html, fleet_page_pdf
 from gearsig.rig import MachineSize, OperatingPoint, Rig, Sensor, Shaft
 from tests.fleet.recordings import PATTERN
 
@@ -96,6 +96,8 @@ def test_changes_are_those_since_the_last_report(fleet, make_recordings):
     page = fleet_page_html(fleet, since)
     assert "<b>nothing" not in page
     assert page.count("data:image/svg+xml") == 1
+    pytest.importorskip("typst", reason="the extra pdf is not installed")
+    assert fleet_page_pdf(fleet, since).startswith(b"%PDF")
 
 
 def test_limits_are_closer_where_speed_is_accounted_for():
