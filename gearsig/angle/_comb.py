@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -83,6 +84,7 @@ def comb_of_rig(rig: Rig) -> CombLines | None:
     return comb_of_stages(tuple(stages))
 
 
+@lru_cache(maxsize=64)
 def comb_of_stages(stages: Stages) -> CombLines:
     """Return the comb of (mesh order, shaft orders) per stage."""
     turning = {round(s, 9) for _, shafts in stages for s in shafts}
@@ -102,8 +104,11 @@ def comb_of_stages(stages: Stages) -> CombLines:
     is_mesh: list[bool] = []
     # Where two lines fall together, the likelier one counts: mesh before the rest, then by class.
     ranked = sorted(enumerate(lines), key=lambda item: (item[0] >= n_mesh, item[1][1], item[1][0]))
+    taken: list[float] = []  # sorted
     for place, (order, presence) in ranked:
-        if order > 0.05 and all(abs(order - other) > _SAME for other in orders):
+        at = bisect_left(taken, order)
+        if order > 0.05 and all(abs(order - other) > _SAME for other in taken[max(at - 1, 0) : at + 1]):
+            taken.insert(at, order)
             orders.append(order)
             classes.append(presence)
             is_mesh.append(place < n_mesh)
@@ -204,7 +209,8 @@ def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
     power = np.zeros(n_segment // 2 + 1)
     for start in range(0, len(x) - n_segment + 1, step):
         segment = x[start : start + n_segment]
-        power += np.square(np.abs(rfft((segment - segment.mean()) * window)))
+        lines = rfft((segment - segment.mean()) * window)
+        power += lines.real**2 + lines.imag**2
     return power
 
 
