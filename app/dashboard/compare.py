@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import streamlit as st
-from numpy.typing import NDArray
 
 from app.dashboard import state
 from app.dashboard.cached import recorded, stated_options
@@ -15,21 +14,18 @@ from app.dashboard.laboratory.setup import MODEL, Setup, shown_name
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import (
-    FAULT,
-    QUIET,
     Axes,
     ChartLine,
     download,
     looked_at,
     padded_limits,
+    show_differences,
     show_lines,
-    stems,
 )
 from app.dashboard.widgets.chooser import FILE, SAMPLE, choose_file, choose_number, choose_sample, simulated_file
 from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.spectrum import show_spectrum
 from app.dashboard.work import kept
-from gearsig.checks import FloatArray
 from gearsig.comparison import (
     ALIGN,
     ChannelComparison,
@@ -352,24 +348,10 @@ def _show_orders(comparison: Comparison, channel: ChannelComparison) -> None:
     off = np.array([line.level.difference_db for line in lines])
     beyond = np.array([line.level.is_beyond for line in lines], dtype=bool)
     name = f"order of {comparison.reference_shaft or 'the shaft'}"
-    _show_differences(at, off, beyond, name, f"lines of {source}", shown)
+    show_differences(at, off, beyond, name, f"lines of {source}", shown, "simulated − recorded")
     st.caption(
         "Simulated less recorded, line by line; grey is within the records' own scatter. Zooming above zooms here."
     )
-
-
-def _show_differences(
-    at: FloatArray, off: FloatArray, beyond: NDArray[np.bool_], name: str, key: str, shown: tuple[float, float]
-) -> None:
-    if not len(at):
-        return
-    lines = [
-        stems(at[chosen], off[chosen], words, colour)
-        for chosen, words, colour in ((~beyond, "within the scatter", QUIET), (beyond, "beyond it", FAULT))
-        if chosen.any()
-    ]
-    axes = Axes(name, "simulated − recorded (dB)", shown, padded_limits([off, np.zeros(1)]))
-    show_lines(lines, axes, f"{key} {shown[0]:.4g} {shown[1]:.4g}", height_px=180, legend=True)
 
 
 def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
@@ -393,7 +375,15 @@ def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
         middle = (np.arange(len(shaft.tooth_levels)) + 0.5) * 360.0 / len(shaft.tooth_levels)
         off = np.array([level.difference_db for level in shaft.tooth_levels])
         beyond = np.array([level.is_beyond for level in shaft.tooth_levels], dtype=bool)
-        _show_differences(middle, off, beyond, f"angle of {name} (deg)", f"teeth of {key}", looked_at(key, whole))
+        show_differences(
+            middle,
+            off,
+            beyond,
+            f"angle of {name} (deg)",
+            f"teeth of {key}",
+            looked_at(key, whole),
+            "simulated − recorded",
+        )
         certain = next((one.tooth_is_certain for one in comparison.alignments if one.shaft == shaft.shaft), None)
         unknown = " Which tooth of one is which of the other is not known here." if certain is False else ""
         st.caption(f"Tooth by tooth, at the middle of each.{unknown}")

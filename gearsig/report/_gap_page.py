@@ -403,13 +403,20 @@ def gap_galleries(report: GapReport) -> dict[str, GapGallery]:
     }
 
 
-def gap_figures(report: GapReport) -> Iterator[GapFigure]:
+def gap_figures(report: GapReport, *, curves: bool = True) -> Iterator[GapFigure]:
     """Draw every figure that the report has finite numbers for, in the order of the page.
 
     Shares of places and probabilities of causes are no figures: page and dashboard write them as lists with bars.
+
+    Parameters
+    ----------
+    report : GapReport
+    curves : bool
+        Spectra and averages as well.
     """
-    yield from _against_reference(report)
-    yield from _spectra(report)
+    if curves:
+        yield from _against_reference(report)
+        yield from _spectra(report)
     yield from _teeth(report)
     yield from _evidence(report)
     yield from _waterfall(report)

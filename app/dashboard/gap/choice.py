@@ -8,7 +8,7 @@ from pathlib import Path
 
 import streamlit as st
 
-from app.dashboard.cached import safe_file_name
+from app.dashboard.cached import read_rig_text, safe_file_name
 from app.dashboard.state import ChosenFile
 from app.dashboard.widgets.chooser import SIMULATED, choose_files, choose_number, sample_file, sample_name
 from app.samples import samples
@@ -75,6 +75,28 @@ def common_rig(choice: Choice) -> ChosenFile | None:
             allowed="one for all recordings, and one named as each recording",
         )
     return common[0] if common else None
+
+
+def set_alike(choice: Choice) -> tuple[str, ...]:
+    """Say what the simulator is set to, so that teeth, speeds and angles are the same on both sides.
+
+    Raises
+    ------
+    InputError
+        If a rig file cannot be read.
+    """
+    common = common_rig(choice)
+    text = (common or choice.recordings[0]).rig_text
+    rig = read_rig_text(text, (common or choice.recordings[0]).rig_name)
+    if rig is None:
+        return ()
+    pairs = ", ".join(f"{pair.driver_teeth}/{pair.driven_teeth}" for pair in rig.pairs)
+    said = [f"Teeth: {pairs}, as in the rig file"] if pairs else []
+    said.append("Speed: each recording's own, by its revolutions")
+    said.append("Angle: turned until the same teeth meet, by marks where there are any")
+    if choice.references:
+        said.append("Compared with the same machine when it was healthy: only what has changed since counts")
+    return tuple(said)
 
 
 def own_rig(source: ChosenFile, rigs: tuple[ChosenFile, ...]) -> ChosenFile | None:

@@ -5,20 +5,40 @@ from __future__ import annotations
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from math import isfinite
 from typing import Any
 
+import numpy as np
 import streamlit as st
 
 from app.dashboard.gap.choice import Choice, files_of
-from app.dashboard.theme import as_typed, is_dark
-from app.dashboard.widgets.charts import download, picture_bytes
+from app.dashboard.theme import as_typed, capitalised, is_dark, one_line
+from app.dashboard.widgets.charts import (
+    QUIET,
+    Axes,
+    ChartLine,
+    download,
+    looked_at,
+    picture_bytes,
+    show_differences,
+    show_lines,
+)
 from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.verdict import Colour
 from app.gap_job import JSON, PAGE, TWIN, Job, private_folder
 from gearsig.cache import cache_folder
 from gearsig.errors import GearsigError
-from gearsig.gap import GapOutcome, GapReport
+from gearsig.gap import (
+    AverageCurves,
+    GapOutcome,
+    GapReport,
+    SpectrumCurves,
+    against_reference,
+    gap_by_order,
+    is_beyond,
+)
+from gearsig.plot import with_unit
 from gearsig.report import (
     CHECK_FIRST,
     CauseRow,
@@ -159,7 +179,7 @@ def _take(running: _Running) -> None:
     try:
         report = job.report()
         page, found = job.result(PAGE) or b"", job.result(JSON) or b""
-        figures = tuple(gap_figures(report))
+        figures = tuple(gap_figures(report, curves=False))
         st.session_state[_FINISHED] = Finished(running.key, report, figures, page, found, job.result(TWIN))
     finally:
         job.close()
@@ -187,20 +207,86 @@ def show_finished(finished: Finished) -> None:
     """Show a result."""
     report = finished.report
     _show_verdict(report)
+    _show_panels(report)
+    _show_remarks(report)
     _show_downloads(finished)
-    titles = ("Where", "Which", "How far", "Next and facts")
     views = (_show_where, _show_which, _show_how_far, _show_next)
-    for tab, view in zip(st.tabs(titles, key="gap tab", on_change="rerun"), views, strict=True):
+    for tab, view in zip(st.tabs(TABS, key=TAB, on_change="rerun"), views, strict=True):
         if tab.open:
             with tab:
                 view(finished)
 
 
 def _show_verdict(report: GapReport) -> None:
+    """Say the kind of fault first, which is surer, then the effects of that kind that it may be."""
     colour, icon = LOOKS[report.outcome]
     st.badge(report.outcome.value, icon=icon, color=colour)
-    lines = (f"**{as_typed(word)}.** {as_typed(text)}" for word, text in verdict_rows(report))
-    st.markdown("  \n".join(lines))  # two spaces: a new line, not a new paragraph
+    kind = report.kind
+    if kind is None:
+        return
+    place = f", {kind.place}" if kind.place else ""
+    st.markdown(f"### {as_typed(capitalised(kind.title))}{as_typed(place)} :gray[{_percent(kind.probability)}]")
+    likely = [c for c in report.causes if c.group == kind.group and c.probability >= LIKELY]
+    words = (f":{colour}-badge[{as_typed(c.title)} {_percent(c.probability)}]" for c in likely)
+    st.markdown(f"{'It is' if len(likely) == 1 else 'It may be'} {' '.join(words)}")
+
+
+LIKELY = 0.05
+"""Effects of the kind that are named with it."""
+N_BARS = 5
+TABS = ("Where", "Which", "How far", "Next and facts")
+TAB = "gap tab"
+
+
+def _percent(share: float) -> str:
+    return "> 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
+
+
+def _show_panels(report: GapReport) -> None:
+    """Show where, which and how far side by side, each as bars with its sentence, and the way to all of it."""
+    said = dict(verdict_rows(report))
+    places = [(place.title, place.share, _percent(place.share)) for place in report.places if isfinite(place.share)]
+    causes = [(cause.title, cause.probability, _percent(cause.probability)) for cause in report.causes]
+    largest = max((step.left.value for step in report.steps), default=1.0) or 1.0
+    steps = [
+        (step.label if i == 0 else f"+ {step.label}", step.left.value / largest, f"{step.left.value:.2g}")
+        for i, step in enumerate(report.steps)
+    ]
+    about = {
+        "Where": "Share of the gap.",
+        "Which": "Probability.",
+        "How far": "Left, in structural floors. One is how far healthy machines differ from their simulation or from "
+        "their own reference.",
+    }
+    for column, title, rows in zip(st.columns(3), TABS, (places, causes, steps), strict=False):
+        with column.container(border=True, height="stretch"):
+            st.button(
+                title, key=f"gap panel {title}", type="tertiary", icon=":material/zoom_in:",
+                on_click=_open_tab, args=(title,),
+            )  # fmt: skip
+            if rows:
+                st.html(bars_html(rows[:N_BARS]))
+                st.caption(about[title])
+            st.markdown(as_typed(said.get(title, "")))
+    if said.get("Next"):
+        st.markdown(f"**Next.** {as_typed(said['Next'])}")
+
+
+def _open_tab(title: str) -> None:
+    st.session_state[TAB] = title
+
+
+def bars_html(rows: Sequence[tuple[str, float, str]]) -> str:
+    """Return a small table of bars: name, share from 0 to 1, what stands beside it; names may come from files."""
+    lines = (
+        f"<tr><td>{escape(one_line(name))}</td><td>{escape(text)}</td></tr>"
+        f'<tr class="bar"><td colspan="2"><i style="width:{100.0 * min(max(share, 0.0), 1.0):.1f}%"></i></td></tr>'
+        for name, share, text in rows
+    )
+    return f'<table class="bars">{"".join(lines)}</table>'
+
+
+def _show_remarks(report: GapReport) -> None:
     for warning in report.warnings:
         st.warning(f"**{CHECK_FIRST}.** {as_typed(warning)}", icon=":material/report:")
     advice = condition_advice(report)
@@ -243,7 +329,61 @@ def _show_where(finished: Finished) -> None:
         )
     else:
         st.markdown("No place stands out of the floor.")
+    for curves in report.spectra:
+        if len(curves.orders) and len(curves.reference):
+            _show_spectra(against_reference(curves), "reference", scored=report.is_beyond)
+    for average in report.averages:
+        _show_average(average)
+    for curves in report.spectra:
+        if len(curves.orders) and len(curves.before):
+            _show_spectra(curves, "simulated", scored=report.is_beyond and not len(curves.reference))
+        elif len(curves.orders) and not len(curves.reference):
+            _show_spectra(curves, "", scored=False)
     _show_figures(finished, "where")
+
+
+def _show_spectra(curves: SpectrumCurves, beside: str, *, scored: bool) -> None:
+    """Show the spectra of a recording and of what it is compared with, below them the gap over the same orders."""
+    x = curves.orders
+    named = (
+        (curves.measured, "measured", 0),
+        (curves.before, beside, 1),
+        (curves.after, f"{beside}, with the effect", 2),
+    )
+    known = [(values, name, colour) for values, name, colour in named if len(values)]
+    top = max(float(values.max()) for values, *_ in known) or 1.0
+    bottom = max(top / 10.0**4.5, 0.3 * float(np.median(curves.floor)))
+    lines = [ChartLine(x, np.maximum(curves.floor, bottom), "repeatability floor", QUIET, dotted=True)]
+    lines += [ChartLine(x, np.maximum(values, bottom), name, colour) for values, name, colour in known]
+    st.markdown(
+        f"**{as_typed(capitalised(curves.label))}**: {as_typed(' beside '.join(filter(None, ('measured', beside))))}"
+    )
+    whole = (float(x[0]), float(x[-1]))
+    key = f"gap spectrum {curves.label} {beside}"
+    order = "order of the driver's shaft"
+    axes = Axes(order, with_unit("peak amplitude", curves.unit), whole, (bottom, 2.0 * top), logarithmic=True)
+    show_lines(lines, axes, key, legend=True, height_px=280)
+    if not len(curves.before):
+        return
+    gap = gap_by_order(curves, curves.before)
+    seen = np.isfinite(gap)
+    beyond = is_beyond(curves, gap) if scored else np.zeros(len(gap), dtype=bool)
+    show_differences(
+        x[seen], gap[seen], beyond[seen], order, f"{key} gap", looked_at(key, whole), f"measured − {beside}"
+    )
+
+
+def _show_average(average: AverageCurves) -> None:
+    """Show one mean revolution of a recording and of its healthy reference, without what all teeth have in common."""
+    if not len(average.angle_deg):
+        return
+    st.markdown(
+        as_typed(f"One mean revolution of shaft {average.shaft} at {average.channel}, what tells its teeth apart")
+    )
+    both = (average.measured, "measured", 0), (average.reference, "reference", 1)
+    lines = [ChartLine(average.angle_deg, values, name, colour) for values, name, colour in both if len(values)]
+    axes = Axes(f"angle of {average.shaft} (deg)", with_unit("amplitude", average.unit), (0.0, 360.0))
+    show_lines(lines, axes, f"gap average {average.shaft} {average.channel}", legend=True, height_px=240)
 
 
 def _show_which(finished: Finished) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import streamlit as st
+from numpy.typing import NDArray
 
 from app.dashboard import state
 from app.dashboard.components import component_of
@@ -65,6 +66,39 @@ class Axes:
     y_limits: tuple[float, float] | None = None
     logarithmic: bool = False
     dates: bool = False
+
+
+def show_differences(
+    at: FloatArray,
+    off: FloatArray,
+    beyond: NDArray[np.bool_],
+    name: str,
+    key: str,
+    shown: tuple[float, float],
+    words: str,
+) -> None:
+    """Show differences in dB at places, grey where they are explained, over the range that another figure shows.
+
+    Parameters
+    ----------
+    at, off : array, (n,)
+    beyond : array of bool, (n,)
+        Which ones are not explained by scatter or floor.
+    name, words : str
+        Of the axes: what places are, and what less what.
+    key : str
+    shown : (float, float)
+    """
+    if not len(at):
+        return
+    lines = [
+        stems(at[chosen], off[chosen], said, colour)
+        for chosen, said, colour in ((~beyond, "within the floor", QUIET), (beyond, "beyond it", FAULT))
+        if chosen.any()
+    ]
+    axes = Axes(name, f"{words} (dB)", shown, padded_limits([off, np.zeros(1)]))
+    # its own zoom gives way to that of the figure above
+    show_lines(lines, axes, f"{key} {shown[0]:.4g} {shown[1]:.4g}", height_px=180, legend=True)
 
 
 def stems(x: FloatArray, y: FloatArray, name: str, colour: int) -> ChartLine:
