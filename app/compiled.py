@@ -3,41 +3,51 @@
 from __future__ import annotations
 
 import hashlib
+import os
+from contextlib import suppress
+from importlib.metadata import version
+from multiprocessing import get_context
 from pathlib import Path
 from threading import Thread
+from time import sleep
 
 from gearsig.cache import cache_folder, keep
+from gearsig.errors import GearsigError
 
-_going_on: list[Thread] = []
+SERVER_FIRST_S = 5.0
+"""Loading compiled code would hold up the server and the first page that it shows."""
+_compiling: list[Thread] = []
 
 
 def begin() -> None:
     """Compile what is not compiled yet in a process of its own, then load it into this one; returns at once."""
-    thread = Thread(target=_compile_and_load, daemon=True, name="gearsig compiled code")
-    _going_on.append(thread)
+    mark = cache_folder("compiled") / _fingerprint()
+    thread = Thread(target=_load if mark.exists() else _compile_and_load, args=(mark,), daemon=True)
+    if not mark.exists():
+        _compiling.append(thread)
     thread.start()
 
 
 def is_being_made() -> bool:
     """Whether compiling goes on; who needs the code now had better wait than compile it a second time."""
-    return any(thread.is_alive() for thread in _going_on)
+    return any(thread.is_alive() for thread in _compiling)
 
 
-def _compile_and_load() -> None:
-    from concurrent.futures.process import BrokenProcessPool
-
-    from gearsig.errors import GearsigError
-    from gearsig.processes import process_pool
-
-    mark = cache_folder("compiled") / _fingerprint()
-    try:
-        if not mark.exists():
-            with process_pool(1) as pool:
-                pool.submit(run_every_model).result()
-            keep(mark, lambda file: file.write(b"compiled\n"))
+def _compile_and_load(mark: Path) -> None:
+    # not a pool: the server would wait for that at its end
+    process = get_context("spawn").Process(target=run_every_model, daemon=True)
+    process.start()
+    process.join()
+    if process.exitcode == 0:
+        keep(mark, lambda file: file.write(b"compiled\n"))
         run_every_model()
-    except (GearsigError, BrokenProcessPool):
-        return  # the first simulation compiles it then, and says what stands against it
+    # else the first simulation compiles it, and says what is wrong
+
+
+def _load(_: Path) -> None:
+    sleep(SERVER_FIRST_S)
+    with suppress(GearsigError):
+        run_every_model()
 
 
 def run_every_model() -> None:
@@ -57,11 +67,9 @@ def run_every_model() -> None:
 
 def _fingerprint() -> str:
     """Changes with whatever makes numba compile anew: its own version, and the sources."""
-    import numba
-
     import gearsig
     import sims
 
     files = [p for room in (gearsig, sims) for p in Path(room.__path__[0]).rglob("*.py")]
     stamps = sorted((str(path), path.stat().st_mtime_ns) for path in files)
-    return hashlib.sha256(repr((numba.__version__, stamps)).encode()).hexdigest()[:16]
+    return hashlib.sha256(repr((version("numba"), os.environ.get("NUMBA_CACHE_DIR"), stamps)).encode()).hexdigest()[:16]

@@ -34,8 +34,13 @@ STORE, SEARCHED, MACHINE, POINT, SERIES = (
 N_MACHINES = 40
 Row = dict[Any, Any]
 """Of a table of the store."""
-MARKS = {"alarm": "🔺", "warning": "🔶", "ok": "🔹"}
+MARKS = {
+    "alarm": ":red[:material/error:]",
+    "warning": ":orange[:material/warning:]",
+    "ok": ":green[:material/check_circle:]",
+}
 """Told apart by shape as well as by colour."""
+LEVELS = ("ok", "warning", "alarm")
 BADGES = {"alarm": "red", "warning": "orange", "ok": "green"}
 HOW_TO_FILL = """
 There are no results in this folder yet. Recordings are added from the command line, as often as you like; what is
@@ -168,14 +173,14 @@ def _choose_series(series: DataFrame, machine: str, point: str) -> Row:
 def _series_words(row: Row) -> str:
     of = ", ".join(part for part in (row["place"], row["channel"], row["computed_on"], row["band"]) if part)
     change = change_text(row["change"], in_db=bool(row["in_db"]))
-    level = ("ok", "warning", "alarm")[int(row["level"])]
+    level = LEVELS[int(row["level"])]
     return f"{row['name']} ({of}): {level}{', ' + change if change else ''}"
 
 
 def _series_table(series: DataFrame) -> dict[str, list[Any]]:
     rows = series.to_dict("records")
     return {
-        "": [tuple(MARKS)[2 - int(row["level"])] for row in rows],
+        "": [LEVELS[int(row["level"])] for row in rows],
         "indicator": [_series_words(row).partition(":")[0] for row in rows],
         "last": [row["value"] for row in rows],
         "expected": [row["expected"] for row in rows],

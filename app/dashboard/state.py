@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import streamlit as st
@@ -155,6 +156,28 @@ def addressed(key: str, name: str, first: str) -> str:
     if st.query_params.get(name) != chosen:
         st.query_params[name] = chosen
     return chosen
+
+
+def address_number(name: str, value: float, default: float) -> None:
+    """Keep a number in the page's address while it differs from what the page starts with."""
+    address(name, "" if value == default else f"{value:g}")
+
+
+def addressed_number(name: str) -> float | None:
+    """Return the number of that name in the page's address, None where there is none."""
+    try:
+        value = float(st.query_params.get(name, ""))
+    except ValueError:
+        return None
+    return value if isfinite(value) else None
+
+
+def address(name: str, text: str) -> None:
+    """Keep a text in the page's address; an empty one takes it out."""
+    if text and st.query_params.get(name) != text:
+        st.query_params[name] = text
+    elif not text and name in st.query_params:
+        del st.query_params[name]
 
 
 def keep_files(kind: str, files: tuple[ChosenFile, ...]) -> None:

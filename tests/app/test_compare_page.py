@@ -46,6 +46,12 @@ def test_the_differences_follow_the_zoom_of_the_spectra() -> None:
     assert not page.exception
     assert channel["shown"] != [50.0, 60.0]
     assert [figure["shown"] for figure in figures(page)] == [[50.0, 60.0]] * 2
+    name, *ends = page.query_params["zoom"].split("_")
+    assert ends == ["50", "60"]
+    del page.session_state["orders chart of comparison a1"]
+    page.query_params["zoom"] = f"{name}_51_52"
+    page.run()
+    assert [figure["shown"] for figure in figures(page)] == [[51.0, 52.0]] * 2
 
 
 def test_records_of_other_gears_are_an_error_on_the_page() -> None:

@@ -134,7 +134,7 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
     stub(**{SECONDS: "1"})
     page = press(opened(), "Diagnose")
     assert [button.label for button in page.button if button.disabled] == ["Diagnose"]
-    assert "Give recordings of one rig" in text_of(page)
+    assert "which** effect that the simulator lacks" in text_of(page)
     page = wait_for_the_end(page)
     assert not page.exception
     text = text_of(page)

@@ -87,6 +87,20 @@ def test_two_effects_at_once() -> None:
         assert effects()[name].signature[:30] in shown_text(page)
 
 
+def test_the_address_keeps_the_machine_and_what_was_pulled() -> None:
+    page = AppTest.from_file(str(FOLDER / "pages" / "laboratory.py"), default_timeout=300)
+    page.query_params.update(machine="small_30_25", root_crack="1.5", effects="mains_hum,nonsense")
+    page.session_state["length of the laboratory"] = 0.5
+    page.run()
+    assert not page.exception
+    assert page.subheader[0].value.replace("\\", "") == "Crack in a tooth root, 1.5 mm + mains hum, 1 m/s²"
+    slider(page, "Crack").set_value(0.0).run()
+    assert "root_crack" not in page.query_params
+    assert page.query_params["machine"] == "small_30_25"
+    slider(page, "Mains hum").set_value(2.0).run()
+    assert page.query_params["mains_hum"] == "2"
+
+
 def test_a_crack_deeper_than_the_tooth_is_one_message() -> None:
     page = opened()
     page.sidebar.toggle(key="lab typed values").set_value(True).run()

@@ -233,7 +233,7 @@ def _show_verdict(report: GapReport) -> None:
 
 LIKELY = 0.05
 """Effects of the kind that are named with it."""
-N_BARS = 5
+N_BARS, LEAST = 5, 0.01
 TABS = ("Where", "Which", "How far", "Next and facts")
 TAB = "gap tab"
 
@@ -246,7 +246,11 @@ def _show_panels(report: GapReport) -> None:
     """Show where, which and how far side by side, each as bars with its sentence, and the way to all of it."""
     said = dict(verdict_rows(report))
     places = [(place.title, place.share, _percent(place.share)) for place in report.places if isfinite(place.share)]
-    causes = [(cause.title, cause.probability, _percent(cause.probability)) for cause in report.causes]
+    causes = [
+        (cause.title, cause.probability, _percent(cause.probability))
+        for cause in report.causes
+        if cause.probability >= LEAST
+    ]
     largest = max((step.left.value for step in report.steps), default=1.0) or 1.0
     steps = [
         (step.label if i == 0 else f"+ {step.label}", step.left.value / largest, f"{step.left.value:.2g}")

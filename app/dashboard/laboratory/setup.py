@@ -6,12 +6,13 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import floor, log10
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import streamlit as st
 
 import sims
+from app.dashboard import state
 from app.dashboard.theme import capitalised
 from gearsig.errors import InputError
 from gearsig.recording import Recording
@@ -146,19 +147,21 @@ def choose_number(label: str, name: str, default: float, high: float, *, low: fl
     about : str
         Shown on demand.
     """
-    key = PREFIX + name
+    key, in_address = PREFIX + name, name.replace("severity of ", "").replace(" ", "-")
     step = slider_step(low, high)
     typed = bool(st.session_state.get(TYPED, False))
     if typed:
         key += SUFFIX
-    value = float(st.session_state.setdefault(key, float(default)))
+    asked = state.addressed_number(in_address) if key not in st.session_state else None
+    value = float(st.session_state.setdefault(key, float(default) if asked is None else asked))
+    looks: dict[str, Any] = {"step": step, "format": "%g", "key": key, "help": about or None}
     if typed:
-        number: float = st.number_input(
-            label, step=step, format="%g", key=key, help=about or None, persist_state="session"
-        )
-        return float(number)
-    ends = min(low, value), max(high, value)
-    return float(st.slider(label, *ends, step=step, format="%g", key=key, help=about or None, persist_state="session"))
+        number = float(st.number_input(label, persist_state="session", **looks))
+    else:
+        ends = min(low, value), max(high, value)
+        number = float(st.slider(label, *ends, persist_state="session", **looks))
+    state.address_number(in_address, number, float(default))
+    return number
 
 
 def choose_parameter(
@@ -272,7 +275,7 @@ def _machine(model: str, preset_name: str) -> tuple[Machine, tuple[ReducedGear, 
     return pair.machine, pair.gears
 
 
-CRACK = "root_crack"
+CRACK, EFFECTS = "root_crack", "effects of the laboratory"
 WIDEST = 5.0
 """Sliders end at so many times the typical value: the catalogue's ranges reach far beyond it. Where the machine ends
 earlier, they do."""
@@ -293,15 +296,19 @@ def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSe
     """
     crack = _choose_severity(effect(CRACK), preset, start=0.0)
     others = {name: known for name, known in effects().items() if name in meaningful and name != CRACK}
+    asked = st.query_params.get("effects", "").split(",")
+    if EFFECTS not in st.session_state and any(name in asked for name in others):
+        st.session_state[EFFECTS] = [name for name in others if name in asked]
     names = st.multiselect(
         "More effects",
         list(others),
         format_func=lambda name: f"{GROUP_WORDS.get(others[name].group, others[name].group)}: {others[name].title}",
-        key="effects of the laboratory",
+        key=EFFECTS,
         placeholder="Choose what is wrong …",
         persist_state="session",
         help="Any number at once. Each gets a slider of its own.",
     )
+    state.address("effects", ",".join(names))
     chosen = [
         _choose_severity(other, preset, start=other.severity.typical)
         for other in others.values()
@@ -397,15 +404,17 @@ def choose_preset() -> Preset:
     """Return the machine: pairs that run at a steady speed, and the drive that starts and stops."""
     known = {name: preset for model in (*MODELS, DRIVE_MODEL) for name, preset in presets(model).items()}
     names = list(known)
+    asked = st.query_params.get("machine", FIRST)
     with st.sidebar:
         name = st.selectbox(
             "Machine",
             names,
-            index=names.index(FIRST) if FIRST in names else 0,
+            index=names.index(asked if asked in names else FIRST),
             format_func=shown_name,
             key="machine of the laboratory",
             persist_state="session",
         )
+        state.address("machine", "" if name == FIRST else name)
         st.caption(known[name].title)
     return known[name]
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from base64 import b64encode
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
+from zlib import crc32
 
 import numpy as np
 import streamlit as st
@@ -128,12 +130,25 @@ N_COLUMNS = 1600
 MAP_COLUMNS, MAP_ROWS = 900, 360
 
 
+ZOOM = "zoom"
+
+
 def looked_at(key: str, whole: tuple[float, float], first: tuple[float, float] | None = None) -> tuple[float, float]:
-    """Return the range of its axis that the figure of that key was zoomed to, `first` until then."""
+    """Return the range of its axis that the figure of that key was zoomed to, `first` until then.
+
+    The page's address keeps the last one, so that a view can be sent.
+    """
+    name = f"{crc32(key.encode()):x}"
     try:
         low, high = (float(end) for end in st.session_state[key]["range"])
+        is_whole = low <= whole[0] and high >= whole[1]
+        state.address(ZOOM, "" if is_whole else f"{name}_{low:.7g}_{high:.7g}")
     except (KeyError, TypeError, ValueError):
+        named, *ends = st.query_params.get(ZOOM, "").split("_")
         low, high = first or whole
+        if named == name and len(ends) == 2:
+            with suppress(ValueError):
+                low, high = map(float, ends)
     low, high = max(low, whole[0]), min(high, whole[1])
     return (low, high) if low < high else whole
 
