@@ -39,7 +39,7 @@ METHOD = "Denoising"
 WITHOUT_DOWNLOADS = ("Phase plane", "Embedding and chaos", "Crack severity")
 
 
-@pytest.mark.parametrize("sample", ["run_up", "two_stage", "no_tachometer"])
+@pytest.mark.parametrize("sample", ["run_up", pytest.param("two_stage", marks=pytest.mark.slow), "no_tachometer"])
 def test_every_method_answers_for_samples_of_every_kind_and_offers_what_it_shows(sample: str) -> None:
     page = opened_at("Time–frequency", sample)
     for method in METHODS:
@@ -100,7 +100,9 @@ def test_waveforms_open_with_five_mesh_cycles() -> None:
         assert (high - low) * 55 * 8.3128 == pytest.approx(5.0, rel=0.01), method
 
 
-@pytest.mark.parametrize(("method", "engine"), [("Modes", "vmdpy"), ("Ridges", "ssqueezepy")])
+@pytest.mark.parametrize(
+    ("method", "engine"), [("Modes", "vmdpy"), pytest.param("Ridges", "ssqueezepy", marks=pytest.mark.slow)]
+)
 def test_other_engines_answer_for_short_segments(method: str, engine: str) -> None:
     pytest.importorskip(engine)
     page = opened_machine("Denoising")

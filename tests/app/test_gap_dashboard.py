@@ -1,7 +1,6 @@
 """The gap page without a browser: what it is given becomes files, a run shows and stops, names are never markup."""
 
 import time
-from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from app.samples import sample_folder
 from gearsig.errors import InputError
 from gearsig.gap import read_gap_inputs
 from gearsig.report import gap_figures, gap_to_json
-from tests.gap.example_report import all_reports, effect_report
+from tests.gap.example_report import all_reports, effect_report, with_few_curves
 from tests.gap.stub_diagnosis import OUTCOME, SECONDS, environment
 
 MAIN = Path(app.dashboard.__file__).parent / "main.py"
@@ -185,7 +184,7 @@ def test_why_nothing_can_be_started_is_said() -> None:
 
 
 def finished(report) -> Finished:
-    report = replace(report, spectra=report.spectra[:1], angles=report.angles[:1])  # drawing takes the time
+    report = with_few_curves(report)
     data = gap_to_json(report).encode()
     return Finished("another choice", report, tuple(gap_figures(report)), b"<html>", data, None)
 

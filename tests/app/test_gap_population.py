@@ -40,6 +40,7 @@ def outer_race() -> list[PopulationSample]:
     return independent.one_case(list(CATALOGUE).index("bearing_outer_race"))
 
 
+@pytest.mark.slow
 def test_a_case_of_the_independent_rig_gives_its_effect_and_the_same_machine_without_it(
     outer_race: list[PopulationSample],
 ) -> None:
@@ -56,6 +57,7 @@ def test_a_case_of_the_independent_rig_gives_its_effect_and_the_same_machine_wit
     assert size(own) > 2.0 * size(healthy)
 
 
+@pytest.mark.slow
 def test_the_table_is_read_as_it_was_written(outer_race: list[PopulationSample], tmp_path) -> None:
     write(tmp_path / "raw.npz", outer_race)
     with np.load(tmp_path / "raw.npz", allow_pickle=False) as raw:

@@ -14,6 +14,7 @@ def courses() -> dict[str, KnownCourses]:
     return {name: courses_of(name, 40) for name in SIMULATORS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("left_out", [*SIMULATORS])
 def test_faults_of_a_simulator_left_out_are_named(courses: dict[str, KnownCourses], left_out: str) -> None:
     """By chance one in four; 0.87 and 0.82 with 150 of each."""

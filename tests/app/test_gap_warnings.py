@@ -14,6 +14,7 @@ from gearsig.gap import (
     Added,
     OperatingCondition,
     ReducedRecording,
+    Twin,
     conditions_of,
     exchanged,
     reduce_recording,
@@ -39,9 +40,15 @@ def rig() -> Rig:
     return found
 
 
-def recording(seed: int, noise: int, *added: Added, duration_s: float = 3.0) -> Recording:
-    twin = gap_simulator("cracked").twin_of(rig())
-    return twin.run(POINT, added, seed=seed, duration_s=duration_s, sampling_rate_hz=20480.0, noise=noise)
+@cache
+def twin() -> Twin:
+    return gap_simulator("cracked").twin_of(rig())
+
+
+@cache
+def recording(seed: int, noise: int, *, chipped: bool = False, duration_s: float = 3.0) -> Recording:
+    added = [CHIPPED] if chipped else []
+    return twin().run(POINT, added, seed=seed, duration_s=duration_s, sampling_rate_hz=20480.0, noise=noise)
 
 
 def prepared(*recordings: Recording) -> tuple[PreparedRecording, ...]:
@@ -50,7 +57,14 @@ def prepared(*recordings: Recording) -> tuple[PreparedRecording, ...]:
 
 @cache
 def gathered(seed: int, noise: int, *, chipped: bool = False) -> ReducedRecording:
-    return reduce_recording(recording(seed, noise, *([CHIPPED] if chipped else [])), rig())
+    return reduce_recording(recording(seed, noise, chipped=chipped), rig())
+
+
+@cache
+def with_wrong_teeth() -> ReducedRecording:
+    """Reduce a healthy recording by a rig that has 37 and 53 teeth for 29 and 47."""
+    pair = replace(rig().pairs[0], driver_teeth=37, driven_teeth=53)
+    return reduce_recording(recording(0, 1), replace(rig(), pairs=(pair,)))
 
 
 def test_another_specimen_is_noticed_and_a_damaged_gear_is_not_another_machine() -> None:
@@ -77,21 +91,17 @@ def _flawless(seed: int) -> Recording:
     return replace(bare, samples=samples)
 
 
-def with_teeth(driver: int, driven: int) -> Rig:
-    return replace(rig(), pairs=(replace(rig().pairs[0], driver_teeth=driver, driven_teeth=driven),))
-
-
 def test_the_teeth_of_another_rig_are_noticed_and_the_right_number_is_told() -> None:
     for right in (gathered(0, 1), gathered(0, 1, chipped=True)):
         assert strange_teeth(right, "now") == []
         assert wrong_teeth(right, "now") == []
-    (doubt,) = wrong_teeth(reduce_recording(recording(0, 1), with_teeth(37, 53)), "now")
+    (doubt,) = wrong_teeth(with_wrong_teeth(), "now")
     assert "29 times a revolution" in doubt
     assert "37 teeth" in doubt
 
 
 def test_a_healthy_reference_that_fits_the_teeth_lifts_the_doubt_of_them() -> None:
-    unlike = reduce_recording(recording(0, 1), with_teeth(37, 53))
+    unlike = with_wrong_teeth()
     assert len(wrong_teeth(unlike, "now", unlike)) == 1
     assert strange_teeth(unlike, "now") == []  # it is said once
     assert wrong_teeth(unlike, "now", gathered(0, 1)) == []
@@ -99,13 +109,11 @@ def test_a_healthy_reference_that_fits_the_teeth_lifts_the_doubt_of_them() -> No
 
 def test_without_a_mark_on_the_shaft_its_teeth_are_not_counted() -> None:
     """The average over a shaft whose angle was found by the teeth holds for those teeth only."""
-    assert (
-        wrong_teeth(replace(reduce_recording(recording(0, 1), with_teeth(37, 53)), marks=(False, False)), "now") == []
-    )
+    assert wrong_teeth(replace(with_wrong_teeth(), marks=(False, False)), "now") == []
 
 
 def test_teeth_that_explain_little_are_a_remark_where_no_other_number_explains_more() -> None:
-    strange = replace(reduce_recording(recording(0, 1), with_teeth(37, 53)), marks=(False, False))
+    strange = replace(with_wrong_teeth(), marks=(False, False))
     (remark,) = strange_teeth(strange, "now")
     assert "37/53" in remark
 
@@ -120,32 +128,31 @@ def test_recording_and_reference_exchanged_are_noticed_by_the_sign_of_the_change
 
 
 def test_a_reference_with_a_fault_is_told() -> None:
-    damaged = recording(0, 1, CHIPPED)
+    damaged = recording(0, 1, chipped=True)
     _, _, warnings = stood_out(*prepared(recording(0, 2)), prepared(recording(0, 3), damaged))
     assert not warnings  # at the same speed, the first is taken
     (doubt,) = stood_out(*prepared(recording(0, 2).with_name("now")), prepared(damaged))[2]
     assert doubt.startswith("The reference of now does not look healthy")
     assert "they may have been exchanged" in doubt
-    (doubt,) = stood_out(*prepared(recording(0, 2, CHIPPED)), prepared(damaged))[2]
+    (doubt,) = stood_out(*prepared(recording(0, 2, chipped=True)), prepared(damaged))[2]
     assert "exchanged" not in doubt
 
 
 def test_a_refusal_names_the_recording_that_is_too_short() -> None:
-    twin, short = gap_simulator("cracked").twin_of(rig()), recording(0, 1, duration_s=0.1)
+    short = recording(0, 1, duration_s=0.1)
     with pytest.raises(RefusalError, match=r"^the old one: shaft .* turns"):
-        conditions_of(prepared(short), prepared(short.with_name("the old one")), twin)
+        conditions_of(prepared(short), prepared(short.with_name("the old one")), twin())
     with pytest.raises(RefusalError, match=r"^today: "):
-        conditions_of(prepared(short.with_name("today")), (), twin)
+        conditions_of(prepared(short.with_name("today")), (), twin())
 
 
 def test_one_of_several_references_that_cannot_be_read_is_left_out() -> None:
     whole = recording(0, 1)
     short = replace(whole, samples=whole.samples[:, :4000]).with_name("the short one")
-    twin = gap_simulator("cracked").twin_of(rig())
     (condition,), notices = conditions_of(
         prepared(whole),
         prepared(short, whole),
-        twin,
+        twin(),
     )
     assert condition.reference is not None
     assert any(n.startswith("the short one") and n.endswith("this reference is left out.") for n in notices)
@@ -154,33 +161,32 @@ def test_one_of_several_references_that_cannot_be_read_is_left_out() -> None:
 def test_one_of_several_recordings_that_is_too_short_is_left_out_and_told() -> None:
     whole = recording(0, 1).with_name("now")
     short = replace(whole, samples=whole.samples[:, :2000]).with_name("the short one")
-    twin = gap_simulator("cracked").twin_of(rig())
     for given in ((short, whole), (whole, short)):
-        (condition,), notices = conditions_of(prepared(*given), (), twin)
+        (condition,), notices = conditions_of(prepared(*given), (), twin())
         assert condition.facts.name == "now"
         assert any(n.startswith("the short one: ") and n.endswith("this recording is left out.") for n in notices)
 
 
 def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> None:
-    twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1).with_name("now")
+    whole = recording(0, 1).with_name("now")
     first, *_ = whole.vibration_names()
     samples = whole.samples.copy()
     samples[whole.channel_names.index(first)] = 0.0
-    (condition,), notices = conditions_of(prepared(replace(whole, samples=samples)), (), twin)
+    (condition,), notices = conditions_of(prepared(replace(whole, samples=samples)), (), twin())
     assert first not in condition.now.channels
     assert any(f"channel {first} is dead" in notice for notice in notices)
     samples[: len(whole.vibration_names())] = 0.0
     with pytest.raises(RefusalError, match="now: no vibration channel is live"):
-        conditions_of(prepared(replace(whole, samples=samples)), (), twin)
+        conditions_of(prepared(replace(whole, samples=samples)), (), twin())
 
 
 def test_what_was_not_given_of_the_operating_point_is_told() -> None:
-    twin, whole = gap_simulator("cracked").twin_of(rig()), recording(0, 1).with_name("now")
-    _, notices = conditions_of(prepared(whole), (), twin)
+    whole = recording(0, 1).with_name("now")
+    _, notices = conditions_of(prepared(whole), (), twin())
     assert not any("not given" in notice or "tachometer" in notice for notice in notices)
     point = replace(rig().operating_point, torque_nm=None)
-    _, notices = conditions_of(prepared(whole.with_rig(replace(rig(), operating_point=point))), (), twin)
+    _, notices = conditions_of(prepared(whole.with_rig(replace(rig(), operating_point=point))), (), twin())
     assert any(notice.startswith("now: the torque is not given; ") for notice in notices)
     idle = replace(rig(), operating_point=replace(rig().operating_point, torque_nm=0.0))
     with pytest.raises(RefusalError, match="now: the rig file states a torque of 0"):
-        conditions_of(prepared(whole.with_rig(idle)), (), twin)
+        conditions_of(prepared(whole.with_rig(idle)), (), twin())

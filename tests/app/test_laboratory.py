@@ -205,6 +205,7 @@ def prepared(chosen: Preset, setting: EffectSetting) -> None:
         static_table(ready.pair.gears, ready.pair.machine.mesh)
 
 
+@pytest.mark.slow
 def test_a_steeper_crack_ends_the_slider_earlier_or_later() -> None:
     chosen = presets("reduced-fe")["flexible_50_50"]
     ends = [greatest_severity(chosen, "root_crack", 10.0, (("angle_deg", a),)) for a in (30.0, 45.0, 90.0)]

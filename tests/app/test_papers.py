@@ -84,6 +84,7 @@ def test_stress_of_a_uniform_strain_is_hookes_law() -> None:
     assert von_mises_pa(mesh, field) == pytest.approx(np.sqrt(1.5 * np.sum(deviator**2)), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_modes_alone_approach_the_static_answer_from_below() -> None:
     mesh = sector_mesh(SMALL, SIZE)
     gear = CyclicGear(mesh)

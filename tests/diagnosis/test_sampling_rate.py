@@ -79,7 +79,11 @@ def test_by_a_tachometer() -> None:
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")
 @pytest.mark.parametrize(
     ("name", "right_hz", "stated_hz"),
-    [("normal_0", 48_000, 12_000), ("IR021_0", 12_000, 48_000), ("OR007@6_0", 12_000, 25_600)],
+    [
+        pytest.param("normal_0", 48_000, 12_000, marks=pytest.mark.slow),
+        pytest.param("IR021_0", 12_000, 48_000, marks=pytest.mark.slow),
+        ("OR007@6_0", 12_000, 25_600),
+    ],
 )
 def test_of_a_measured_motor(name: str, right_hz: int, stated_hz: int) -> None:
     rig = replace(MOTOR, bearings=(*MOTOR.bearings, Bearing("fan end", "motor", 8, 6.746, 28.5)), speed=None)

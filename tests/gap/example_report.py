@@ -202,6 +202,11 @@ def all_reports() -> dict[str, GapReport]:
     return {**{report.outcome.value: report for report in reports}, "gearless": gearless_report()}
 
 
+def with_few_curves(report: GapReport) -> GapReport:
+    """Return the report with one spectrum and one shaft: drawing takes the time."""
+    return replace(report, spectra=report.spectra[:1], angles=report.angles[:1], averages=())
+
+
 def conditions(n: int) -> tuple[ConditionFacts, ...]:
     """Return facts of the first `n` recordings."""
     return tuple(

@@ -65,7 +65,13 @@ def next_file(start: str) -> str:
     return f"two_stage_gearbox/{found[0].name}"
 
 
-@pytest.mark.parametrize("name", RECORDINGS)
+# Two without damage and one with it; the others take as long again.
+QUICK = {"cracked sample", "healthy sample", "measured gearbox, healthy"}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in RECORDINGS]
+)
 def test_two_halves_of_one_recording_are_no_gap(name: str) -> None:
     first, second = halves(RECORDINGS[name]())
     assert first.rig is not None

@@ -1,5 +1,7 @@
 """The kind of motion, from a model's states and from one measured channel."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -11,6 +13,7 @@ from tests.phase.systems import DUFFING_PERIOD_S, duffing, quasi_periodic
 RATE = 64 / DUFFING_PERIOD_S
 
 
+@cache
 def _duffing(force, n_periods=1500, noise=0.0):
     states = duffing(force, n_periods)
     states += noise * states.std(axis=0) * np.random.default_rng(0).normal(size=states.shape)

@@ -48,6 +48,7 @@ def test_friction_shakes_the_gears_across_the_line_of_action_and_loses_power(rub
     assert abs(gain) < 0.03
 
 
+@pytest.mark.slow
 def test_more_friction_is_more_of_the_same():
     one, two = (
         settled(synthetic_pair(friction="on", friction_factor=f), ("friction_n",))["friction_n"] for f in (0.5, 1.0)
