@@ -397,7 +397,7 @@ def diagrams(branch: Branch, values: Values) -> dict[str, phase.BifurcationDiagr
 
 def measured_of(kept: Sequence[KeptValue]) -> list[Measured]:
     """Return the values that gave points."""
-    return [one.measured for one in kept if one.measured is not None]
+    return [value.measured for value in kept if value.measured is not None]
 
 
 def figure_of(branch: Branch, values: Values) -> Figure:
@@ -406,7 +406,7 @@ def figure_of(branch: Branch, values: Values) -> Figure:
 
     drawn = list(diagrams(branch, values).values())
     if not drawn:
-        reasons = [one.reason for kept in values.values() for one in kept if one.reason]
+        reasons = [value.reason for kept in values.values() for value in kept if value.reason]
         raise RefusalError(
             f"no value gave points: {reasons[0] if reasons else 'none was run'}", remedy="change the range or settings"
         )
@@ -419,13 +419,13 @@ def points_csv(branch: Branch, values: Values) -> str:
     """Return every point: branch, value of what is varied, coordinates of the path in SI units."""
     text = StringIO()
     table = csv.writer(text, lineterminator="\n")
-    first = next(one for kept in values.values() for one in measured_of(kept))
+    first = next(value for kept in values.values() for value in measured_of(kept))
     axes = zip(first.section.axis_names, first.section.units, strict=True)
     table.writerow(["branch", branch.sweep.axes[0].name, *(f"{name} ({unit})" for name, unit in axes)])
     for name, kept in values.items():
-        for one in measured_of(kept):
-            for point in one.section.points:
-                table.writerow([name, f"{one.value:.12g}", *(f"{x:.9g}" for x in point)])
+        for value in measured_of(kept):
+            for point in value.section.points:
+                table.writerow([name, f"{value.value:.12g}", *(f"{x:.9g}" for x in point)])
     return text.getvalue()
 
 
@@ -435,12 +435,12 @@ def summary(request: BifurcationRequest, values: Values) -> dict[str, Any]:
     result: dict[str, Any] = {
         "definition": request.definition(),
         "transient": TRANSIENT,
-        "branches": {name: [_row(one) for one in kept] for name, kept in values.items()},
+        "branches": {name: [_row(value) for value in kept] for name, kept in values.items()},
     }
     if {"up", "down"} <= drawn.keys():
         up, down = drawn["up"], drawn["down"]
         result["coexisting_at"] = phase.values_apart(up, down).tolist()
-        result["coexisting_ranges"] = [asdict(one) for one in phase.coexistence_ranges(up, down)]
+        result["coexisting_ranges"] = [asdict(apart) for apart in phase.coexistence_ranges(up, down)]
         result["coexisting_step"] = phase.step_of(up, down)
         result["coexisting_note"] = BOUNDED
     return result
@@ -451,7 +451,7 @@ def coexistence_lines(result: Mapping[str, Any], unit: str) -> list[str]:
     ranges = result.get("coexisting_ranges", [])
     if not ranges:
         return []
-    seen = ", ".join(_range_text(one["first"], one["last"]) for one in ranges)
+    seen = ", ".join(_range_text(apart["first"], apart["last"]) for apart in ranges)
     step = f"{result['coexisting_step']:g} {unit}".strip()
     return [f"Two motions coexist at {seen} {unit}".rstrip() + f"; values tried are {step} apart.", f"  ({BOUNDED})"]
 
@@ -459,11 +459,12 @@ def coexistence_lines(result: Mapping[str, Any], unit: str) -> list[str]:
 def motion_lines(kept: Sequence[KeptValue], unit: str) -> list[str]:
     """Return the kind of motion over ranges of neighbouring values; empty where it was not looked for."""
     lines: list[str] = []
-    for motion, group in groupby((one for one in measured_of(kept) if one.motion), key=lambda one: one.motion):
+    moving = (value for value in measured_of(kept) if value.motion)
+    for motion, group in groupby(moving, key=lambda value: value.motion):
         values = list(group)
         text = f"{_range_text(values[0].value, values[-1].value)} {unit}".rstrip() + f": {motion}"
-        exponents = [one.exponent_per_s for one in values if isfinite(one.exponent_per_s)]
-        tests = [one.k for one in values if isfinite(one.k)]
+        exponents = [value.exponent_per_s for value in values if isfinite(value.exponent_per_s)]
+        tests = [value.k for value in values if isfinite(value.k)]
         more = [
             *([f"K {_range_text(min(tests), max(tests), '.2f')}"] if tests else []),
             *([f"exponent {_range_text(min(exponents), max(exponents), '.3g')} 1/s"] if exponents else []),
@@ -478,21 +479,21 @@ def _range_text(low: float, high: float, form: str = "g") -> str:
 
 
 def _row(kept: KeptValue) -> dict[str, Any]:
-    one = kept.measured
-    if one is None:
+    measured = kept.measured
+    if measured is None:
         return {"value": kept.value, "reason": kept.reason}
     row: dict[str, Any] = {
-        "value": one.value,
-        "period_cycles": one.period,
-        "n_points": one.section.n_points,
-        "std": float(one.section.extent[0]),
-        "lowest": float(one.section.points[:, 0].min()),
-        "highest": float(one.section.points[:, 0].max()),
-        "separated_share": round(one.separated_share, 4),
-        "settled_s": one.settled_s,
+        "value": measured.value,
+        "period_cycles": measured.period,
+        "n_points": measured.section.n_points,
+        "std": float(measured.section.extent[0]),
+        "lowest": float(measured.section.points[:, 0].min()),
+        "highest": float(measured.section.points[:, 0].max()),
+        "separated_share": round(measured.separated_share, 4),
+        "settled_s": measured.settled_s,
     }
-    if one.motion:
-        row["motion"] = one.motion
-        row["lyapunov_exponent_per_s"] = one.exponent_per_s if isfinite(one.exponent_per_s) else None
-        row["zero_one_k"] = one.k if isfinite(one.k) else None
+    if measured.motion:
+        row["motion"] = measured.motion
+        row["lyapunov_exponent_per_s"] = measured.exponent_per_s if isfinite(measured.exponent_per_s) else None
+        row["zero_one_k"] = measured.k if isfinite(measured.k) else None
     return row

@@ -104,10 +104,10 @@ def open_simulation(
     """
     from gearsig.comparison import for_simulation
 
-    own = options.open_rig(rig, path)
+    opened_rig = options.open_rig(rig, path)
     speed = options.stated_speed(speed_rpm, None, 1)
-    if own is not None or machine is None:
-        return options.open_recording(path, own, sampling_rate_hz, speed)
+    if opened_rig is not None or machine is None:
+        return options.open_recording(path, opened_rig, sampling_rate_hz, speed)
     return options.open_recording(path, for_simulation(machine), sampling_rate_hz, speed)
 
 

@@ -50,7 +50,7 @@ def flexible(
 
     request = options.read_request(MODEL, preset, settings, effects, None, None, "1s", "20480Hz", seed)
     first, last = _range(speeds)
-    wanted = tuple(quantity(f"{t.strip().removesuffix('Nm')}Nm", "N m", "--torques") for t in torques.split(","))
+    torques_nm = tuple(quantity(f"{t.strip().removesuffix('Nm')}Nm", "N m", "--torques") for t in torques.split(","))
     if fresh:
         options.clear_other_versions(MODEL)
     setup = SimulationSetup(request.preset, request.parameters, request.effects)
@@ -60,7 +60,7 @@ def flexible(
         study = flexible_study(
             ready.pair,
             float(ready.operation.torque_nm.values[0]),
-            wanted,
+            torques_nm,
             sweep_s=quantity(duration, "s", "--duration"),
             first_rpm=first,
             last_rpm=last,
@@ -164,19 +164,19 @@ def gear_body(
     typer.echo(f"{output}: {', '.join(path.name for path in paths)}")
 
 
-def _springs(held: str, given: dict[str, str]) -> FloatArray | None:
+def _springs(held: str, texts: dict[str, str]) -> FloatArray | None:
     """Stiffness in the six directions of the hub; None where it is not on springs."""
     import numpy as np
 
     from gearsig.checks import positive
 
     if held != "springs":
-        for name, text in given.items():
+        for name, text in texts.items():
             if text != SPRINGS[name]:
                 raise InputError(f"--{name} is given, but --held is {held!r}", remedy="add --held springs")
         return None
     units = {"radial": "N/m", "axial": "N/m", "tilt": "Nm/rad", "twist": "Nm/rad"}
     radial, axial, tilt, twist = (
-        positive(quantity(given[name], unit, f"--{name}"), f"--{name}", unit) for name, unit in units.items()
+        positive(quantity(texts[name], unit, f"--{name}"), f"--{name}", unit) for name, unit in units.items()
     )
     return np.array([radial, radial, axial, tilt, tilt, twist])

@@ -101,7 +101,7 @@ def gap(
     from gearsig.gap import GapRequest
     from gearsig.report import check_writable
 
-    asked = GapRequest(
+    request = GapRequest(
         tuple(recordings or ()),
         tuple(reference or ()),
         rig,
@@ -117,7 +117,7 @@ def gap(
     if fresh and model == "reduced-fe":
         clear_other_versions(model)
     with open_cluster(cluster):
-        report = _diagnosed(asked, model, cache, fresh=fresh)
+        report = _diagnosed(request, model, cache, fresh=fresh)
     written = write_results(report, output, command=typed_command())
     _tell(report, written)
 
@@ -125,18 +125,18 @@ def gap(
 def _torques(texts: list[str] | None) -> tuple[float, ...]:
     from app.cli.options import torque_of
 
-    found = (torque_of(text) for text in texts or ())
-    return tuple(value for value in found if value is not None)
+    torques = (torque_of(text) for text in texts or ())
+    return tuple(value for value in torques if value is not None)
 
 
-def _diagnosed(asked: GapRequest, model: str, cache: Path | None, *, fresh: bool) -> GapReport:
+def _diagnosed(request: GapRequest, model: str, cache: Path | None, *, fresh: bool) -> GapReport:
     """Diagnose with a progress bar, which is shown on a terminal only."""
     from app.gap_job import run_gap
     from gearsig.cache import cache_folder
 
     with progress_bar("reading") as show:
         return run_gap(
-            asked,
+            request,
             model,
             cache=cache or cache_folder("gap"),
             fresh=fresh,
@@ -180,11 +180,11 @@ def _print_effects(model: str) -> None:
 
     table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
     simulator = gap_simulator(model)
-    found = simulator.gap_effects()
+    effects = simulator.gap_effects()
     # Starts and stops are compared by their equation of motion: nothing is learned, and nothing is unknown to it.
-    learned = found if isinstance(simulator, DriveSimulator) else load_learned().causes
+    learned = effects if isinstance(simulator, DriveSimulator) else load_learned().causes
     last = ""
-    for effect in found.values():
+    for effect in effects.values():
         where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)
         group = "" if effect.group == last else effect.group
         last = effect.group
@@ -194,4 +194,4 @@ def _print_effects(model: str) -> None:
         table.add_row(group, f"{effect.name}\n  {effect.title}{note}", severity_unit(effect.unit) or "–", where)
     width = None if sys.stdout.isatty() else TABLE_WIDTH
     Console(markup=False, highlight=False, width=width).print(table)
-    typer.echo(f"{len(found)} effects that have a meaning for the model {model}; also: none, unknown.")
+    typer.echo(f"{len(effects)} effects that have a meaning for the model {model}; also: none, unknown.")

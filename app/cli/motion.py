@@ -214,21 +214,24 @@ def identify(
     if output is not None and (output.suffix.lower() != ".toml" or not output.parent.is_dir()):
         raise InputError(f"cannot write {str(output)!r}", allowed="a .toml file in a folder that exists")
     opened, motion = options.open_motion(recording, machine, fs, use, bandwidth, unwrap)
-    found = fit(motion)
+    identification = fit(motion)
     known = machine or opened.rig
     if output is not None and known is not None:  # motion could not have been measured without a rig
-        write_rig(with_fitted(known, found), output)
-    typer.echo(identify_json(found) if json else identify_text(found))
+        write_rig(with_fitted(known, identification), output)
+    typer.echo(identify_json(identification) if json else identify_text(identification))
     if output is not None and not json:
         typer.echo(f"\n{output.name}: the rig with what could be identified.")
 
 
-def with_fitted(rig: Rig, found: Identification) -> Rig:
+def with_fitted(rig: Rig, identification: Identification) -> Rig:
     """Return the rig with the fitted values in its contact, as far as they could be identified."""
     assert rig.contact is not None  # noqa: S101  motion could not have been measured without it
-    values = {p.name: max(p.value, 0.0) for p in found.parameters if p.is_told and p.name in TAKEN}
+    values = {p.name: max(p.value, 0.0) for p in identification.parameters if p.is_told and p.name in TAKEN}
     return replace(
         rig,
         contact=replace(rig.contact, **values),  # type: ignore[arg-type]  # all of them are numbers
-        sources=(*rig.sources, f"contact fitted to {found.source or 'a recording'}: {', '.join(sorted(values))}"),
+        sources=(
+            *rig.sources,
+            f"contact fitted to {identification.source or 'a recording'}: {', '.join(sorted(values))}",
+        ),
     )

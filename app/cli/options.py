@@ -264,9 +264,9 @@ def read_parameter(chosen: Simulator, text: str) -> tuple[str, ParameterValue]:
     from sims.simulator import parameter
 
     name, value = _split(text, "--set", "crack_depth_mm=2mm")
-    wanted = parameter(chosen.parameters, name)
-    by_word = wanted.choices or (wanted.default is None and value == "none")
-    return name, (value if by_word else quantity(value, wanted.unit, name))
+    definition = parameter(chosen.parameters, name)
+    by_word = definition.choices or (definition.default is None and value == "none")
+    return name, (value if by_word else quantity(value, definition.unit, name))
 
 
 def read_effect(text: str) -> EffectSetting:
@@ -275,8 +275,8 @@ def read_effect(text: str) -> EffectSetting:
 
     first, *rest = text.split(",")
     name = first.partition("=")[0].strip()
-    wanted = effect(name)
-    s = wanted.severity
+    definition = effect(name)
+    s = definition.severity
     if "=" not in first:
         raise InputError(
             f"effect {name} has no severity",
@@ -284,21 +284,21 @@ def read_effect(text: str) -> EffectSetting:
             remedy=f"write for example {name}={s.typical:g}{s.unit.replace(' ', '')}",
         )
     severity = quantity(first.partition("=")[2], s.unit, f"{s.name} of {name}")
-    return EffectSetting(name, severity, read_effect_options(wanted, rest))
+    return EffectSetting(name, severity, read_effect_options(definition, rest))
 
 
-def read_effect_options(wanted: Effect, texts: Sequence[str]) -> dict[str, float | str]:
+def read_effect_options(effect: Effect, texts: Sequence[str]) -> dict[str, float | str]:
     """Return the options of ["gear=driven", "tooth=5"]."""
     from gearsig.checks import known_name
 
-    options = {option.name: option for option in wanted.options}
-    found: dict[str, float | str] = {}
+    options = {option.name: option for option in effect.options}
+    values: dict[str, float | str] = {}
     for text in texts:
-        name, value = _split(text, f"effect {wanted.name}", "gear=driven")
-        option = options[known_name(name, options, f"{wanted.name} has no option {name!r}")]
+        name, value = _split(text, f"effect {effect.name}", "gear=driven")
+        option = options[known_name(name, options, f"{effect.name} has no option {name!r}")]
         is_text = isinstance(option.default, str)
-        found[name] = value if is_text else quantity(value, option.unit, f"{name} of {wanted.name}")
-    return found
+        values[name] = value if is_text else quantity(value, option.unit, f"{name} of {effect.name}")
+    return values
 
 
 def _split(text: str, where: str, example: str) -> tuple[str, str]:
@@ -345,15 +345,15 @@ def open_motion(
 
 def read_uses(texts: Sequence[str] | None) -> dict[str, str]:
     """Return role → channel of "driven angle=enc2"; the channel may hold "=" itself."""
-    found = {}
+    values = {}
     for text in texts or ():
         role, sign, channel = text.partition("=")
         if not sign:
             raise InputError(
                 f"--use is {text!r}", allowed="ROLE=CHANNEL", remedy='write for example "driven angle=enc2"'
             )
-        found[role.strip()] = channel.strip()
-    return found
+        values[role.strip()] = channel.strip()
+    return values
 
 
 def read_bandwidth(text: str | None) -> float | None:

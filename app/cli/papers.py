@@ -31,10 +31,10 @@ def papers(
 
     check_writable(output)
     with progress_bar("preparing") as show:
-        found = paper(name, lambda stage, done: show(done, stage))
-        write_paper(found, output, command=typed_command())
-    for figure in found.figures:
+        publication = paper(name, lambda stage, done: show(done, stage))
+        write_paper(publication, output, command=typed_command())
+    for figure in publication.figures:
         typer.echo(f"{figure.answers}: {figure.title}")
         for claim in figure.claims:
             typer.echo(f"  {claim.verdict:<15} {claim.statement}: {claim.found}")
-    typer.echo(f"{found.summary} Open {output / 'index.html'} in a browser.")
+    typer.echo(f"{publication.summary} Open {output / 'index.html'} in a browser.")

@@ -66,8 +66,8 @@ def quantity(text: str, unit: str, name: str) -> float:
     >>> quantity("0.5mm", "um", "backlash"), quantity("50 rad/s", "rpm", "speed") > 477.4
     (500.0, True)
     """
-    value, given = split_quantity(text, unit, name)
-    return value if not given else value * _worth(given, unit, text, name)
+    value, stated = split_quantity(text, unit, name)
+    return value if not stated else value * _worth(stated, unit, text, name)
 
 
 def span(text: str, unit: str, name: str) -> tuple[float, float]:
@@ -77,34 +77,34 @@ def span(text: str, unit: str, name: str) -> tuple[float, float]:
         raise InputError(
             f"{name} is {text!r}", allowed=f"two numbers, as in {f'1..2 {unit}'.strip()}", remedy="give both ends"
         )
-    own = split_quantity(first, unit, name)[1]
+    first_unit = split_quantity(first, unit, name)[1]
     later = split_quantity(second, unit, name)[1]
-    return quantity(first if own or not later else f"{first}{later}", unit, name), quantity(second, unit, name)
+    return quantity(first if first_unit or not later else f"{first}{later}", unit, name), quantity(second, unit, name)
 
 
 def split_quantity(text: str, unit: str, name: str) -> tuple[float, str]:
     """Return the number and what stands behind it."""
-    found = _QUANTITY.fullmatch(text)
-    if found is None or not isfinite(float(found[1])):
+    match = _QUANTITY.fullmatch(text)
+    if match is None or not isfinite(float(match[1])):
         example = f"a number in {unit}, e.g. 2 {unit}" if unit else "a number"
         raise InputError(f"{name} is {text!r}", allowed=example)
-    return float(found[1]), found[2]
+    return float(match[1]), match[2]
 
 
-def _worth(given: str, unit: str, text: str, name: str) -> float:
+def _worth(stated: str, unit: str, text: str, name: str) -> float:
     """How many of `unit` the given unit is worth."""
-    own, wanted = _spelt(given), _spelt(unit)
-    if own == wanted:
+    stated_unit, target_unit = _spelt(stated), _spelt(unit)
+    if stated_unit == target_unit:
         return 1.0
-    fitting = [kind for kind in _KINDS if wanted in kind]
+    fitting = [kind for kind in _KINDS if target_unit in kind]
     for kind in fitting:
-        if own in kind:
-            return float(f"{kind[own] / kind[wanted]:.15g}")  # 1000 mm in a m, not 1000.0000000000001
+        if stated_unit in kind:
+            return float(f"{kind[stated_unit] / kind[target_unit]:.15g}")  # 1000 mm in a m, not 1000.0000000000001
     if not unit:
         raise InputError(f"{name} is {text!r}", allowed="a number without unit")
-    others = [u for kind in fitting for u in kind if u != wanted]
+    others = [u for kind in fitting for u in kind if u != target_unit]
     also = f" (or {', '.join(others)})" if others else ""
-    raise InputError(f"{name} is {text!r}, in {given!r}", remedy=f"give it in {unit}{also}")
+    raise InputError(f"{name} is {text!r}, in {stated!r}", remedy=f"give it in {unit}{also}")
 
 
 def _spelt(unit: str) -> str:

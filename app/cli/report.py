@@ -120,8 +120,8 @@ def make_report(
         typer.echo(f"{entry.name}: {entry.verdict}")
     for failure in result.failures:
         typer.echo(f"{failure.name}: not analysed: {failure.reason}", err=True)
-    found = f"{result.n_found} of {len(result.entries)} pages were there already. " if result.n_found else ""
-    typer.echo(f"{found}{f'It ran {ran}. ' if ran else ''}Open {result.index_path} in a browser.")
+    kept = f"{result.n_found} of {len(result.entries)} pages were there already. " if result.n_found else ""
+    typer.echo(f"{kept}{f'It ran {ran}. ' if ran else ''}Open {result.index_path} in a browser.")
     if not result.failures:
         return 0
     return EXIT_SOME_FAILED if result.entries else EXIT_INPUT_ERROR

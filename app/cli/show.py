@@ -107,7 +107,7 @@ def show(
         raise InputError("a method and a recording are needed", remedy="gearsig show --list prints the methods")
     from gearsig.report import MethodOptions
 
-    wanted = MethodOptions(
+    settings = MethodOptions(
         channel=channel,
         shaft=shaft,
         pair=pair,
@@ -125,7 +125,7 @@ def show(
     speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
     machine = options.open_rig(rig, recording)
     opened = options.open_recording(recording, machine, fs, speed)
-    _answer(method, opened, _in_part(wanted, start, end), output, json=json)
+    _answer(method, opened, _in_part(settings, start, end), output, json=json)
 
 
 def modes(
@@ -153,21 +153,21 @@ def modes(
     """
     from gearsig.report import MethodOptions
 
-    wanted = MethodOptions(
+    settings = MethodOptions(
         channel=channel, shaft=shaft, lowest=lowest, highest=highest, over_angle=over_angle, n_modes=n_modes,
         penalty=penalty, mode=mode, then=then,
     )  # fmt: skip
     machine = options.open_rig(rig, recording)
     opened = options.open_recording(recording, machine, fs, options.stated_speed(speed_rpm, None, 1))
-    _answer("modes", opened, _in_part(wanted, start, end), output, json=json)
+    _answer("modes", opened, _in_part(settings, start, end), output, json=json)
 
 
-def _in_part(wanted: MethodOptions, start: str | None, end: str | None) -> MethodOptions:
+def _in_part(settings: MethodOptions, start: str | None, end: str | None) -> MethodOptions:
     first = None if start is None else quantity(start, "s", "--from")
-    return replace(wanted, start_s=first, end_s=None if end is None else quantity(end, "s", "--to"))
+    return replace(settings, start_s=first, end_s=None if end is None else quantity(end, "s", "--to"))
 
 
-def _answer(method: str, opened: Recording, wanted: MethodOptions, output: Path | None, *, json: bool) -> None:
+def _answer(method: str, opened: Recording, settings: MethodOptions, output: Path | None, *, json: bool) -> None:
     from rich.console import Console
 
     from gearsig.report import answer_json, apply_method, check_writable, write_answer
@@ -175,7 +175,7 @@ def _answer(method: str, opened: Recording, wanted: MethodOptions, output: Path 
     if output is not None:
         check_writable(output)
     with Console(stderr=True).status(method):
-        answer = apply_method(method, opened, wanted)
+        answer = apply_method(method, opened, settings)
         paths = () if output is None else write_answer(answer, output)
     if json or output is None:
         typer.echo(answer_json(answer))

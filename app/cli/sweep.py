@@ -63,23 +63,23 @@ def sweep(
     Example: gearsig sweep cracked --vary speed=300..1500rpm:10 --vary root_crack=0..4mm:10 --duration 1s -o grid
     """
     request = options.read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
-    wanted = sweep_of(request, vary, common_seed, f".{extension.lstrip('.')}")
+    planned = sweep_of(request, vary, common_seed, f".{extension.lstrip('.')}")
     from sims.sweep import n_complete, run_sweep
 
-    n_points = wanted.n_points
+    n_points = planned.n_points
     try:
         with options.open_cluster(cluster) as workers, progress_bar("simulating", n_points) as show:
-            result = run_sweep(wanted, output, n_processes=jobs, on_progress=lambda n_done, _n, _outcome: show(n_done))
+            result = run_sweep(planned, output, n_processes=jobs, on_progress=lambda n_done, _n, _outcome: show(n_done))
             ran = f" It ran {workers.text()}." if workers else ""
     except KeyboardInterrupt:
-        raise stopped(f"{n_complete(wanted, output)} of {n_points} points are in {output}") from None
+        raise stopped(f"{n_complete(planned, output)} of {n_points} points are in {output}") from None
     for failure in result.failures[:MAX_REASONS]:
         typer.echo(f"point {failure.point.index}: {failure.reason}", err=True)
     if len(result.failures) > MAX_REASONS:
         typer.echo(f"… and {len(result.failures) - MAX_REASONS} more points: see the index", err=True)
     n_made = len(result.outcomes) - len(result.failures)
-    found = f"; {result.n_found} were there already" if result.n_found else ""
-    typer.echo(f"{result.n_points} points, {n_made} simulated{found}. They are listed in {result.index_path}.{ran}")
+    kept = f"; {result.n_found} were there already" if result.n_found else ""
+    typer.echo(f"{result.n_points} points, {n_made} simulated{kept}. They are listed in {result.index_path}.{ran}")
     if result.failures:
         raise typer.Exit(EXIT_SOME_FAILED if n_made + result.n_found else EXIT_INPUT_ERROR)
 
@@ -150,30 +150,30 @@ def bifurcation(
     request = options.read_request(model, preset, settings, effects, speed, torque, "1s", fs, seed)
     n_points = points if points is not None else study.MIN_FOR_KIND if kind else 100
     varied = sweep_of(request, [vary], common_seed=True, extension=".h5")
-    wanted = study.BifurcationRequest(Branch(varied, signal, section, n_points), direction, phase, kind)
-    wanted.branch.check_signal()
+    study_request = study.BifurcationRequest(Branch(varied, signal, section, n_points), direction, phase, kind)
+    study_request.branch.check_signal()
     try:
-        with options.open_cluster(cluster), progress_bar("simulating", wanted.n_values) as show:
-            values = study.run_folder(wanted, output, n_processes=jobs, on_progress=show)
+        with options.open_cluster(cluster), progress_bar("simulating", study_request.n_values) as show:
+            values = study.run_folder(study_request, output, n_processes=jobs, on_progress=show)
     except KeyboardInterrupt:
-        n = study.n_complete(wanted, output)
+        n = study.n_complete(study_request, output)
         if n:
-            _print_bifurcation(wanted, study.complete(wanted, output), output)
-        raise stopped(f"{n} of {wanted.n_values} values are in {output}") from None
-    _print_bifurcation(wanted, values, output)
+            _print_bifurcation(study_request, study.complete(study_request, output), output)
+        raise stopped(f"{n} of {study_request.n_values} values are in {output}") from None
+    _print_bifurcation(study_request, values, output)
 
 
-def _print_bifurcation(wanted: BifurcationRequest, values: Values, output: Path) -> None:
+def _print_bifurcation(request: BifurcationRequest, values: Values, output: Path) -> None:
     """Write the results and say what they show."""
     from app import bifurcation as study
 
-    paths = study.write_results(wanted, values, output)
+    paths = study.write_results(request, values, output)
     reasons = [(name, one) for name, kept in values.items() for one in kept if one.reason]
     for name, one in reasons[:MAX_REASONS]:
         typer.echo(f"{study.NAMES[name]}, {one.value:g}: {one.reason}", err=True)
     if len(reasons) > MAX_REASONS:
         typer.echo(f"… and {len(reasons) - MAX_REASONS} more: see {paths[2].name}", err=True)
-    unit = study.parameter_words(wanted.branch)[1]
+    unit = study.parameter_words(request.branch)[1]
     for name, kept in values.items():
         points = study.measured_of(kept)
         periods = sorted({one.period for one in points})
@@ -184,7 +184,7 @@ def _print_bifurcation(wanted: BifurcationRequest, values: Values, output: Path)
         )
         for line in study.motion_lines(kept, unit):
             typer.echo(f"  {line}")
-    for line in study.coexistence_lines(study.summary(wanted, values), unit):
+    for line in study.coexistence_lines(study.summary(request, values), unit):
         typer.echo(line)
     typer.echo(f"{paths[0]} (figure), {paths[1].name} (points), {paths[2].name} (values).")
 

@@ -50,13 +50,13 @@ class HalvedLines:
 
         |a - b|/2 of the halves' amplitudes, or its rms over neighbouring lines where that is larger.
         """
-        own = 0.25 * np.abs(self.first - self.second) ** 2
-        own[:, 0] = own[:, 1]  # a sensor's drift is no measure of what surrounds the shaft's lines
+        square = 0.25 * np.abs(self.first - self.second) ** 2
+        square[:, 0] = square[:, 1]  # a sensor's drift is no measure of what surrounds the shaft's lines
         reach = 4  # nine lines: one line's own scatter of two halves says little
-        padded = np.pad(own, ((0, 0), (reach, reach)), mode="reflect" if own.shape[1] > reach else "edge")
+        padded = np.pad(square, ((0, 0), (reach, reach)), mode="reflect" if square.shape[1] > reach else "edge")
         kernel = np.ones(9) / 9
         smooth = np.stack([np.convolve(row, kernel, mode="valid") for row in padded])
-        result: FloatArray = np.sqrt(np.maximum(own, smooth))
+        result: FloatArray = np.sqrt(np.maximum(square, smooth))
         return result
 
 

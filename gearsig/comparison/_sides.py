@@ -180,8 +180,8 @@ def pair_channels(
     """
     names = dict.fromkeys(channels) if channels else _by_name(simulated, recorded)
     return tuple(
-        _pair(simulated.channels[simulated.index(own)], recorded.channels[recorded.index(other)])
-        for own, other in names
+        _pair(simulated.channels[simulated.index(simulated_name)], recorded.channels[recorded.index(recorded_name)])
+        for simulated_name, recorded_name in names
     )
 
 

@@ -266,5 +266,5 @@ def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:
 
 
 def _of(alignments: Sequence[Alignment]) -> str:
-    names = [one.shaft for one in alignments if one.shaft]
+    names = [alignment.shaft for alignment in alignments if alignment.shaft]
     return f" of shaft {' or '.join(names)}" if names else ""

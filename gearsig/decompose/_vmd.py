@@ -72,15 +72,15 @@ def peak_centres(power: FloatArray, penalty: float, n_modes: int) -> FloatArray:
     energy = np.add.reduceat(power, edges)
     place = np.add.reduceat(power * frequency, edges) / np.where(energy > 0.0, energy, 1.0)
     middle = (np.arange(n_cells) + 0.5) * (0.5 / n_cells)
-    left = energy.copy()
+    remaining = energy.copy()
     centres = np.zeros(n_modes)
     for k in range(n_modes):
-        best = middle[int(np.argmax(_gain(middle[:, None] - middle, penalty) ** 2 @ left))]
+        best = middle[int(np.argmax(_gain(middle[:, None] - middle, penalty) ** 2 @ remaining))]
         for _ in range(3):  # the centroid moves the filter, which moves the centroid: a few steps settle it
-            taken = left * _gain(place - best, penalty) ** 2
+            taken = remaining * _gain(place - best, penalty) ** 2
             best = float(taken @ place / taken.sum()) if taken.sum() > 0.0 else best
         centres[k] = best
-        left *= (1.0 - _gain(place - best, penalty)) ** 2
+        remaining *= (1.0 - _gain(place - best, penalty)) ** 2
     return np.sort(centres)
 
 

@@ -49,8 +49,8 @@ def latched_damping(motion: PairMotion, compression_m: FloatArray) -> FloatArray
         (rate[last] - rate[earlier]) / np.where(flown, motion.time_s[last] - motion.time_s[earlier], 1.0),
         motion.compression_acceleration_mps2[last],
     )
-    left = np.where(side[last] == 0.0, play - side[begins] * compression_m[last], 0.0)
-    square = rate[last] ** 2 + 2.0 * side[begins] * gained * left
+    gap_m = np.where(side[last] == 0.0, play - side[begins] * compression_m[last], 0.0)
+    square = rate[last] ** 2 + 2.0 * side[begins] * gained * gap_m
     speed = np.maximum(np.sqrt(np.maximum(square, 0.0)), contact.impact_speed_floor_mps)
     latest = np.searchsorted(begins, np.arange(len(side)), side="right") - 1
     beta = contact.damping_ratio_at(1.0) * max(1.0, contact.impact_speed_floor_mps) / speed
@@ -102,13 +102,13 @@ def hand_over_force(motion: PairMotion, g: FloatArray) -> FloatArray:
 MIN_SAMPLES = 20
 
 
-def find_datum(motion: PairMotion, wanted: str | float = "auto") -> Datum:
+def find_datum(motion: PairMotion, choice: str | float = "auto") -> Datum:
     """Return the compression at which the teeth stand in the middle of the backlash.
 
     Parameters
     ----------
     motion : PairMotion
-    wanted : str or float
+    choice : str or float
         "auto": from the torque where there is one, else midway between the two flanks; "zero": the angles count from
         the middle of the backlash; a number: that compression in m.
 
@@ -117,13 +117,13 @@ def find_datum(motion: PairMotion, wanted: str | float = "auto") -> Datum:
     RefusalError
         If there is no torque and the teeth did not touch both flanks.
     """
-    if isinstance(wanted, str):
-        if wanted == "zero":
+    if isinstance(choice, str):
+        if choice == "zero":
             return Datum(0.0, float("nan"), "the angles' own zero")
-        if wanted != "auto":
-            raise InputError(f"datum is {wanted!r}", allowed="auto, zero, or a compression")
+        if choice != "auto":
+            raise InputError(f"datum is {choice!r}", allowed="auto, zero, or a compression")
         return _from_torque(motion) if motion.torque_nm is not None else _between_flanks(motion)
-    return Datum(float(wanted), float("nan"), "given")
+    return Datum(float(choice), float("nan"), "given")
 
 
 def elastic_depth(motion: PairMotion, force_n: FloatArray) -> FloatArray:
@@ -212,9 +212,9 @@ def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> Force
     and backlash, with sgn(g)|g|^λ for g^λ, base radii for reference radii, μ tan α_k for μ cot β, one mass also in
     double contact, and the speed of impact latched.
     """
-    found = find_datum(motion, datum)
+    zero = find_datum(motion, datum)
     contact = motion.contact
-    q = motion.compression_m - found.compression_m
+    q = motion.compression_m - zero.compression_m
     g = depth(q, contact.half_backlash_um * 1e-6)
     rate = motion.compression_rate_mps
     beta = latched_damping(motion, q)
@@ -235,7 +235,7 @@ def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> Force
     references = _references(motion)
     return ForceEstimate(
         motion,
-        found,
+        zero,
         g,
         n,
         forces,
@@ -275,12 +275,12 @@ def compare(model: str, force_n: FloatArray, reference: str, reference_n: FloatA
 
 
 def _references(motion: PairMotion) -> dict[str, FloatArray]:
-    found: dict[str, FloatArray] = {}
+    references: dict[str, FloatArray] = {}
     if motion.shaft_force_n is not None:
-        found[FROM_TORQUE] = motion.shaft_force_n
+        references[FROM_TORQUE] = motion.shaft_force_n
     if motion.force_n is not None:
-        found[TOOTH_FORCE] = motion.force_n
-    return found
+        references[TOOTH_FORCE] = motion.force_n
+    return references
 
 
 def _errors(forces: Mapping[str, FloatArray], references: Mapping[str, FloatArray]) -> tuple[ForceError, ...]:
@@ -368,10 +368,10 @@ def acceleration_limit_rad_s2(study: NoiseStudy, motion: PairMotion) -> float | 
     nothing turns between torque sensor and teeth, where the reference is the tooth force, or where it is never nearer.
     """
     inertia, r1 = motion.contact.driver_inertia_kg_m2, motion.path.base_radii_m[0]
-    own, other = float(study.rms_n[PIECEWISE][0]), float(study.rms_n[HUNT_CROSSLEY][0])
-    if inertia == 0.0 or study.reference != FROM_TORQUE or own >= other:
+    piecewise_n, hunt_crossley_n = float(study.rms_n[PIECEWISE][0]), float(study.rms_n[HUNT_CROSSLEY][0])
+    if inertia == 0.0 or study.reference != FROM_TORQUE or piecewise_n >= hunt_crossley_n:
         return None
-    return r1 / inertia * float(np.sqrt(other**2 - own**2))
+    return r1 / inertia * float(np.sqrt(hunt_crossley_n**2 - piecewise_n**2))
 
 
 def noise_study(
@@ -432,8 +432,8 @@ def noise_study(
                 raise RefusalError("neither torque nor tooth force was measured", remedy="record the driver's torque")
             reference = FROM_TORQUE if FROM_TORQUE in estimate.references_n else TOOTH_FORCE
             for model in (PIECEWISE, HUNT_CROSSLEY, KELVIN_VOIGT):
-                wanted = TEETH if model == PIECEWISE and reference == TOOTH_FORCE else model
-                draws.setdefault(model, []).append(estimate.error(wanted, reference).rms_n ** 2)
+                compared = TEETH if model == PIECEWISE and reference == TOOTH_FORCE else model
+                draws.setdefault(model, []).append(estimate.error(compared, reference).rms_n ** 2)
         for model, values in draws.items():
             squares.setdefault(model, []).append(values)
     rms = {model: np.array([np.sqrt(np.mean(v)) for v in values]) for model, values in squares.items()}
@@ -452,8 +452,8 @@ def _crossover(levels_um: FloatArray, ratio: FloatArray) -> float | None:
 
 def _unit_of(recording: Recording, rig: Rig, role: str, name: str) -> float:
     """Radians that one unit of the channel is worth."""
-    one = replace(recording, samples=np.ones((len(recording.channels), 1)))
-    return float(role_values(one, rig, role, name)[0])
+    single_sample = replace(recording, samples=np.ones((len(recording.channels), 1)))
+    return float(role_values(single_sample, rig, role, name)[0])
 
 
 def _with_added(recording: Recording, name: str, noise: FloatArray) -> Recording:

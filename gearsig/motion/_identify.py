@@ -513,7 +513,7 @@ def _contact_parameters(motion: PairMotion, fit: RobustFit, *, has_both_flanks: 
 
 def _load_parameters(motion: PairMotion, fit: RobustFit) -> list[FittedParameter]:
     inverse, half = fit.value("inverse inertia"), NORMAL_95 * fit.deviation("inverse inertia")
-    told = inverse > 0.0 and half < TOLD * inverse
+    is_told = inverse > 0.0 and half < TOLD * inverse
     highest = 1.0 / (inverse - half) if inverse > half else float("inf")
     lowest = 1.0 / (inverse + half) if inverse + half > 0.0 else float("inf")
     return [
@@ -522,8 +522,8 @@ def _load_parameters(motion: PairMotion, fit: RobustFit) -> list[FittedParameter
             "kg m^2",
             1.0 / inverse if inverse > 0.0 else float("nan"),
             (lowest, highest),
-            told,
-            "" if told else _why(fit, "inverse inertia"),
+            is_told,
+            "" if is_told else _why(fit, "inverse inertia"),
             motion.contact.driven_inertia_kg_m2,
             _alike(fit, "inverse inertia"),
         ),
@@ -533,48 +533,50 @@ def _load_parameters(motion: PairMotion, fit: RobustFit) -> list[FittedParameter
 
 
 def _plain(
-    fit: RobustFit, own: str, name: str, unit: str, rig_value: float | None, factor: float = 1.0
+    fit: RobustFit, parameter: str, name: str, unit: str, rig_value: float | None, factor: float = 1.0
 ) -> FittedParameter:
-    value, half = factor * fit.value(own), factor * NORMAL_95 * fit.deviation(own)
-    told = half < TOLD * abs(value)
-    why = "" if told else _why(fit, own)
-    return FittedParameter(name, unit, value, (value - half, value + half), told, why, rig_value, _alike(fit, own))
+    value, half = factor * fit.value(parameter), factor * NORMAL_95 * fit.deviation(parameter)
+    is_told = half < TOLD * abs(value)
+    why = "" if is_told else _why(fit, parameter)
+    return FittedParameter(
+        name, unit, value, (value - half, value + half), is_told, why, rig_value, _alike(fit, parameter)
+    )
 
 
 def _stiffness(fit: RobustFit, rig_value: float, *, has_both_flanks: bool) -> FittedParameter:
     """Return the stiffness; from one flank a filter ahead of the torque's samples feigns it, twenty times too high."""
-    own = "log stiffness"
-    log_k, half = fit.value(own), NORMAL_95 * fit.deviation(own)
-    told = half < TOLD and has_both_flanks
+    parameter = "log stiffness"
+    log_k, half = fit.value(parameter), NORMAL_95 * fit.deviation(parameter)
+    is_told = half < TOLD and has_both_flanks
     low, middle, high = (float(np.exp(min(v, 700.0))) for v in (log_k - half, log_k, log_k + half))
-    why = "" if told else _why(fit, own) if has_both_flanks else ONE_ZERO
+    why = "" if is_told else _why(fit, parameter) if has_both_flanks else ONE_ZERO
     return FittedParameter(
-        "stiffness_n_per_m_lambda", "N/m^λ", middle, (low, high), told, why, rig_value, _alike(fit, own)
+        "stiffness_n_per_m_lambda", "N/m^λ", middle, (low, high), is_told, why, rig_value, _alike(fit, parameter)
     )
 
 
 def _restitution(fit: RobustFit, law: str, rig_value: float) -> FittedParameter:
     """Turn c = β v into the restitution of the rig's law; it is told where c is."""
     c, half = fit.value("damping"), NORMAL_95 * fit.deviation("damping")
-    told = c > 0.0 and half < TOLD * c
+    is_told = c > 0.0 and half < TOLD * c
     grid = np.linspace(0.01, 1.0, 2_001)
     factors = np.array([damping_ratio_s_per_m(law, float(e), 1.0) for e in grid])
     low, middle, high = (float(np.interp(v, factors[::-1], grid[::-1])) for v in (c + half, c, c - half))
-    why = "" if told else _why(fit, "damping")
-    return FittedParameter("restitution", "", middle, (low, high), told, why, rig_value, _alike(fit, "damping"))
+    why = "" if is_told else _why(fit, "damping")
+    return FittedParameter("restitution", "", middle, (low, high), is_told, why, rig_value, _alike(fit, "damping"))
 
 
-def _alike(fit: RobustFit, own: str) -> str:
+def _alike(fit: RobustFit, parameter: str) -> str:
     """Return what could take a parameter's place, by the name that the result gives it; empty where nothing could."""
-    like, correlation = fit.most_like(own)
+    like, correlation = fit.most_like(parameter)
     if not like:
         return ""
-    sign = -1.0 if (own in FALLING) != (like in FALLING) else 1.0
+    sign = -1.0 if (parameter in FALLING) != (like in FALLING) else 1.0
     return f"{NAMES_OF_RESULT.get(like, like)} (correlation {sign * correlation:.2f})"
 
 
-def _why(fit: RobustFit, own: str) -> str:
-    like = _alike(fit, own)
+def _why(fit: RobustFit, parameter: str) -> str:
+    like = _alike(fit, parameter)
     return "the record hardly depends on it" + (f", and it is mistaken for {like}" if like else "")
 
 
@@ -687,9 +689,9 @@ def _at_equal_places(equation: ContactEquation, residual: FloatArray, single: ND
     place = np.clip(((u - edge) / (1.0 - edge) * N_PLACES).astype(np.int64), 0, N_PLACES - 1)
     result = residual.copy()
     for p in range(N_PLACES):
-        here = single & (place == p)
-        if np.any(here):
-            result[here] -= np.median(residual[here])
+        at_place = single & (place == p)
+        if np.any(at_place):
+            result[at_place] -= np.median(residual[at_place])
     return result
 
 

@@ -178,14 +178,14 @@ def find_impacts(
     slowest = 5.0 * scatter_of(rate) if min_speed_mps is None else min_speed_mps
     flights = _Flights(motion, q, a, (noise, scatter_of(rate)))
     runs = _runs(np.where(np.abs(g) > 0.0, np.sign(g), 0.0).astype(np.int64), g, NOISE_DEPTH * noise)
-    found = []
+    impacts = []
     for before, this, after in zip(runs[:-1], runs[1:], [*runs[2:], None][: len(runs) - 1], strict=True):
         if this[0] == 0 or before[0] != 0 or before[2] - before[1] < MIN_FLIGHT_SAMPLES:
             continue
         impact = _impact(motion, flights, g, before, this, after)
         if impact.speed_mps > slowest:
-            found.append(impact)
-    return tuple(found)
+            impacts.append(impact)
+    return tuple(impacts)
 
 
 def meeting_speeds(motion: PairMotion, datum_m: float, half_backlash_m: float) -> FloatArray:

@@ -33,7 +33,7 @@ _UNITS = {
 }  # fmt: skip
 
 
-def find_roles(recording: Recording, pair: GearPair, given: Mapping[str, str] | None = None) -> dict[str, str]:
+def find_roles(recording: Recording, pair: GearPair, assigned: Mapping[str, str] | None = None) -> dict[str, str]:
     """Return the channel of each role that the recording has.
 
     A channel belongs to a gear if its position is the name of that gear's shaft, or its own name holds it (or "driver",
@@ -43,7 +43,7 @@ def find_roles(recording: Recording, pair: GearPair, given: Mapping[str, str] | 
     ----------
     recording : Recording
     pair : GearPair
-    given : mapping or None
+    assigned : mapping or None
         Role → channel, taken as they stand; an empty channel leaves the role out.
 
     Raises
@@ -51,7 +51,7 @@ def find_roles(recording: Recording, pair: GearPair, given: Mapping[str, str] | 
     InputError
         If a role or channel does not exist, or several channels fit one role.
     """
-    chosen = dict(given or {})
+    chosen = dict(assigned or {})
     for role, name in chosen.items():
         known_name(role, ROLES, f"there is no role {role!r}")
         if name:
@@ -227,12 +227,12 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where
     # A thousandth of a revolution: no gear with its load gets there and stays within one sample; fifty times the
     # ordinary change of the increments, of which an impact reaches a tenth; four steps of a coarse encoder.
     limit = max(2e-3 * pi, 50.0 * 1.4826 * float(np.median(beyond)), 4.0 * quantum)
-    found = np.flatnonzero(beyond > limit)
-    if len(found):
-        i = int(found[0])
+    jumps = np.flatnonzero(beyond > limit)
+    if len(jumps):
+        i = int(jumps[0])
         raise InputError(
             f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {_when(i, sampling_rate_hz)} "
-            f"({len(found)} such jump(s))",
+            f"({len(jumps)} such jump(s))",
             where=where,
             allowed="an angle that runs on",
             remedy="cut the recording there; lost counts make all later forces wrong",
@@ -258,9 +258,9 @@ def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where:
         raise InputError(f"channel {name!r} has {len(angle_rad)} samples", where=where, allowed="at least 4")
     turns = _steps(angle_rad)[1] / (2.0 * pi)
     # An encoder's new beginning is a whole revolution, within a tenth.
-    found = np.flatnonzero(np.abs(turns - 1.0) < 0.1)
-    if len(found):
-        i = int(found[0])
+    jumps = np.flatnonzero(np.abs(turns - 1.0) < 0.1)
+    if len(jumps):
+        i = int(jumps[0])
         raise InputError(
             f"channel {name!r} steps by {turns[i]:.3g} revolutions {_when(i, sampling_rate_hz)}: the encoder starts "
             "again after each revolution",

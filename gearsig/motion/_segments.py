@@ -86,13 +86,13 @@ class MotionSegments(Result, rows="segments"):
     @property
     def summary(self) -> str:
         """Starts and stops in words; a record that begins or ends in motion holds one less of them."""
-        said = f"{_counted(len(self.starts_s), 'start')} and {_counted(len(self.stops_s), 'stop')}"
+        counts = f"{_counted(len(self.starts_s), 'start')} and {_counted(len(self.stops_s), 'stop')}"
         moves = {
             "begins": self.segments[0].direction and not self.starts_at_once,
             "ends": self.segments[-1].direction,
         }
         ends = [name for name, is_moving in moves.items() if is_moving]
-        return f"{said} in a record that {' and '.join(ends)} in motion" if ends else said
+        return f"{counts} in a record that {' and '.join(ends)} in motion" if ends else counts
 
     @property
     def n_reversals(self) -> int:
@@ -409,13 +409,13 @@ def steps_of_angle(
 def _samples_per_revolution(angle_rad: FloatArray, segments: list[MotionSegment]) -> int:
     """As many as the fastest passage has samples, no more."""
     step = max(float(np.quantile(np.abs(np.diff(angle_rad[s.first : s.last])), 0.99)) for s in segments)
-    found = floor(2.0 * np.pi / step)
-    if found < MIN_SAMPLES:
+    n_orders = floor(2.0 * np.pi / step)
+    if n_orders < MIN_SAMPLES:
         raise RefusalError(
-            f"the shaft turns by {step:.3g} rad between samples: {found} samples a revolution",
+            f"the shaft turns by {step:.3g} rad between samples: {n_orders} samples a revolution",
             remedy="record at a higher rate",
         )
-    return found
+    return n_orders
 
 
 def _mean(spectra: list[Spectrum], per_revolution: int, unit: str, source: str, shaft: str) -> Spectrum:
@@ -475,7 +475,7 @@ def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...
     ahead, behind = level[n:], level[:-n]
     # White noise does not reach 8 times the quiet level in an hour; a blow begins at once, ringing does not.
     rises = (ahead > 8.0 * quiet) & (ahead > 2.0 * behind)
-    found: list[Burst] = []
+    bursts: list[Burst] = []
     # A blow rings; the next one is looked for after 4 ms, where it stands out of the ringing.
     dead, next_free = round(4e-3 * sampling_rate_hz), 0
     for i in map(int, np.flatnonzero(rises)):
@@ -483,8 +483,8 @@ def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...
             continue
         segment = np.abs(centred[i + n : i + n + dead])
         begin = i + n + int(np.argmax(segment > 0.25 * segment.max()))
-        found.append(Burst(begin / sampling_rate_hz, float(segment.max())))
+        bursts.append(Burst(begin / sampling_rate_hz, float(segment.max())))
         next_free = i + dead
-    hardest = max((burst.peak for burst in found), default=0.0)
+    hardest = max((burst.peak for burst in bursts), default=0.0)
     # Below a third of the hardest blow, teeth that merely take up their load are counted as well.
-    return tuple(burst for burst in found if burst.peak >= 0.35 * hardest)
+    return tuple(burst for burst in bursts if burst.peak >= 0.35 * hardest)

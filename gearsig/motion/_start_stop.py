@@ -161,15 +161,15 @@ def start_stop_indicators(
 
 def run_down_rad_s2(motion: PairMotion, segments: MotionSegments) -> float:
     """Median over stops of the driver's mean deceleration from 80 to 20 % of its top speed; nan for none."""
-    found = []
+    slopes = []
     for segment in segments.moving:
         speed = np.abs(motion.driver_speed_rad_s[segment.first : segment.last])
         top = int(np.argmax(speed))
         falling = speed[top:]
         high, low = np.flatnonzero(falling < 0.8 * speed[top]), np.flatnonzero(falling < 0.2 * speed[top])
         if len(high) and len(low) and low[0] > high[0]:
-            found.append(0.6 * speed[top] * motion.sampling_rate_hz / (low[0] - high[0]))
-    return float(np.median(found)) if found else float("nan")
+            slopes.append(0.6 * speed[top] * motion.sampling_rate_hz / (low[0] - high[0]))
+    return float(np.median(slopes)) if slopes else float("nan")
 
 
 def _notes(impacts: tuple[Impact, ...], rate_hz: float) -> tuple[str, ...]:

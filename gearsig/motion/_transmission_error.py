@@ -307,19 +307,19 @@ def _both_angles(
     recording: Recording, rig: Rig, pair: GearPair, use: Mapping[str, str]
 ) -> tuple[Angle, Angle, list[str]]:
     roles, notes = find_roles(recording, pair, use), []
-    found: dict[str, Angle] = {}
+    angles: dict[str, Angle] = {}
     for side, shaft in zip(SIDES, (pair.driver, pair.driven), strict=True):
         if f"{side} angle" in roles:
             name = roles[f"{side} angle"]
-            found[side] = _from_encoder(role_values(recording, rig, f"{side} angle", name), recording, name)
+            angles[side] = _from_encoder(role_values(recording, rig, f"{side} angle", name), recording, name)
         elif (stated := _stated_pulses(recording, rig, shaft)) is not None:
-            found[side] = stated
+            angles[side] = stated
     for side, other in (SIDES, SIDES[::-1]):
-        channels = [] if side in found else _tachometers(recording, pair, side)
-        if len(channels) == 1 and other in found:
+        channels = [] if side in angles else _tachometers(recording, pair, side)
+        if len(channels) == 1 and other in angles:
             ratio = (pair.driven_teeth or 1) / (pair.driver_teeth or 1)
-            found[side] = _counted(recording, channels[0], found[other], ratio if side == "driver" else 1.0 / ratio)
-    missing = [side for side in SIDES if side not in found]
+            angles[side] = _counted(recording, channels[0], angles[other], ratio if side == "driver" else 1.0 / ratio)
+    missing = [side for side in SIDES if side not in angles]
     if missing:
         raise RefusalError(
             f"the angle of the {missing[0]} gear was not measured: a transmission error takes both",
@@ -328,11 +328,11 @@ def _both_angles(
         )
     if not pair.pressure_angle_deg:
         notes.append(f"the pressure angle is not stated: {USUAL_PRESSURE_ANGLE_DEG:g}° is assumed")
-    for side, (time_s, angle, source) in list(found.items()):
+    for side, (time_s, angle, source) in list(angles.items()):
         if angle[-1] < angle[0]:
-            found[side] = time_s, -angle, source
+            angles[side] = time_s, -angle, source
             notes.append(f"the {side} angle counts down; it is counted up")
-    return found["driver"], found["driven"], notes
+    return angles["driver"], angles["driven"], notes
 
 
 def _from_encoder(angle_rad: FloatArray, recording: Recording, name: str) -> Angle:
@@ -381,11 +381,11 @@ def _stated_pulses(recording: Recording, rig: Rig, shaft: str) -> Angle | None:
     return None
 
 
-def _counted(recording: Recording, channel: Channel, other: Angle, ratio: float) -> Angle:
+def _counted(recording: Recording, channel: Channel, counterpart: Angle, ratio: float) -> Angle:
     """Return the angle by a tachometer whose pulses per revolution follow from the other gear's turns and the teeth."""
     edges = find_pulse_edges(recording.values(channel.name), recording.sampling_rate_hz)
     ends = edges.times_s[[0, -1]] if len(edges.times_s) > 1 else np.zeros(2)
-    turned = abs(float(np.diff(np.interp(ends, other[0], other[1]))[0])) / (2.0 * pi) * ratio
+    turned = abs(float(np.diff(np.interp(ends, counterpart[0], counterpart[1]))[0])) / (2.0 * pi) * ratio
     pulses = (len(edges.times_s) - 1) / turned if turned > 0.0 else 0.0
     if pulses < 1.0 or abs(pulses - round(pulses)) > 0.1:
         raise RefusalError(
@@ -492,8 +492,8 @@ def _parts(
     np.add.at(sums, i, rows - mesh)
     np.add.at(sums, z1 + k, rows - mesh)
     inverse = np.linalg.pinv(normal, rcond=1e-9, hermitian=True)
-    found = inverse @ sums
-    driver, driven = found[:z1], found[z1:]
+    profiles = inverse @ sums
+    driver, driven = profiles[:z1], profiles[z1:]
     shift = driver.mean(axis=0) + driven.mean(axis=0)
     driver, driven, mesh = driver - driver.mean(axis=0), driven - driven.mean(axis=0), mesh + shift
     residual = rows - mesh - driver[i] - driven[k]

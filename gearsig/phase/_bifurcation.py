@@ -100,8 +100,8 @@ def values_apart(up: BifurcationDiagram, down: BifurcationDiagram, *, differs: f
         raise InputError(f"diagrams of {up.axis_name} and {down.axis_name}", allowed="two of the same quantity")
     if len(up.extents) != len(up.values) or len(down.extents) != len(down.values):
         raise InputError("a diagram without extents", remedy="make it with bifurcation_diagram")
-    values, one, other = np.intersect1d(up.values, down.values, return_indices=True)
-    a, b = up.extents[one], down.extents[other]
+    values, i_up, i_down = np.intersect1d(up.values, down.values, return_indices=True)
+    a, b = up.extents[i_up], down.extents[i_down]
     apart: FloatArray = values[np.abs(a - b) > differs * np.maximum(a, b)]
     return apart
 
@@ -145,14 +145,14 @@ def coexistence_ranges(
     apart = np.isin(values, values_apart(up, down, differs=differs))
     steps = np.diff(np.concatenate([[False], apart, [False]]).astype(int))
     half = 0.5 * step_of(up, down)
-    found = []
+    ranges = []
     for start, stop in zip(np.flatnonzero(steps == 1), np.flatnonzero(steps == -1) - 1, strict=True):
         first, last = float(values[start]), float(values[stop])
         at_start, at_end = bool(start == 0), bool(stop == len(values) - 1)
         low = first if at_start else first - min(half, 0.5 * (first - float(values[start - 1])))
         high = last if at_end else last + min(half, 0.5 * (float(values[stop + 1]) - last))
-        found.append(TwoMotions(first, last, low, high, at_start, at_end))
-    return tuple(found)
+        ranges.append(TwoMotions(first, last, low, high, at_start, at_end))
+    return tuple(ranges)
 
 
 def step_of(up: BifurcationDiagram, down: BifurcationDiagram) -> float:

@@ -103,14 +103,14 @@ def chosen_delay(x: FloatArray, rate: float) -> int:
 
 
 def _chosen_dimension(x: FloatArray, rate: float, tau: int) -> int:
-    found = embedding_dimension(x, rate, delay_samples=tau)
-    if found.dimension == 0:
+    embedding = embedding_dimension(x, rate, delay_samples=tau)
+    if embedding.dimension == 0:
         raise RefusalError(
-            f"no dimension up to {found.dimensions[-1]} unfolds the signal (false neighbours "
-            f"{100 * float(found.false_fraction.min()):.0f} % at best): it looks stochastic",
+            f"no dimension up to {embedding.dimensions[-1]} unfolds the signal (false neighbours "
+            f"{100 * float(embedding.false_fraction.min()):.0f} % at best): it looks stochastic",
             remedy="filter to the motion of interest, average synchronously, or give dimension= knowingly",
         )
-    return found.dimension
+    return embedding.dimension
 
 
 N_SAMPLES = 200_000
@@ -181,10 +181,10 @@ def equally_filled_bins(x: FloatArray) -> tuple[np.ndarray, int]:
     return np.searchsorted(inner, x, side="right").astype(np.int64), n_bins
 
 
-def _longest_delay(x: FloatArray, asked: int | None) -> int:
-    if asked is None:
+def _longest_delay(x: FloatArray, max_delay: int | None) -> int:
+    if max_delay is None:
         return int(np.clip(2.0 * mean_period_samples(x), 4, len(x) // 4))
-    longest = count(asked, "longest_delay_samples", minimum=2)
+    longest = count(max_delay, "longest_delay_samples", minimum=2)
     if longest > len(x) // 2:
         raise RefusalError(
             f"{len(x)} samples are too few for delays up to {longest}", remedy=f"ask for at most {len(x) // 2}"

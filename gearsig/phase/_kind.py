@@ -87,7 +87,7 @@ def zero_one_test(
         (np.arange(n_frequencies) + 0.5) * 0.6180339887498949 % 1.0
     )  # the golden ratio
     scale = float(phi.std())
-    k_of_c = np.array([_k(phi / scale, float(one), alpha) for one in c])
+    k_of_c = np.array([_k(phi / scale, float(frequency), alpha) for frequency in c])
     k = float(np.median(k_of_c))
     verdict, reason = _verdict(k, _oversampled(phi), step)
     return ChaosTest(
@@ -270,20 +270,20 @@ def kind_of_motion(
 def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExponent | None, bool]:
     """Return the exponent, and whether no dimension unfolds the path; say either in the evidence."""
     x, rate = np.ascontiguousarray(portrait.points[:, 0]), portrait.sampling_rate_hz
-    found = _answer(lambda: _dimension(x, rate), "embedding dimension", evidence)
-    if found is None:
+    dimension = _answer(lambda: _dimension(x, rate), "embedding dimension", evidence)
+    if dimension is None:
         return None, False
-    if found.dimension == 0:
+    if dimension.dimension == 0:
         evidence.append(
-            f"no dimension up to {found.dimensions[-1]} unfolds the {portrait.axis_names[0]}: noise does this; so does "
-            "clean chaos of a few dozen cycles"
+            f"no dimension up to {dimension.dimensions[-1]} unfolds the {portrait.axis_names[0]}: noise does this; so "
+            "does clean chaos of a few dozen cycles"
         )
         return None, True
-    path = delay_embedding(x, rate, delay_samples=found.delay_samples, dimension=found.dimension)
+    path = delay_embedding(x, rate, delay_samples=dimension.delay_samples, dimension=dimension.dimension)
     exponent = _answer(lambda: largest_lyapunov_exponent(path), "Lyapunov exponent", evidence)
     if exponent is not None:
         size = f"{exponent.exponent_per_s:.3g} ± {exponent.uncertainty_per_s:.2g} 1/s"
-        evidence.append(f"largest Lyapunov exponent {size} in {found.dimension} dimensions: {exponent.verdict}")
+        evidence.append(f"largest Lyapunov exponent {size} in {dimension.dimension} dimensions: {exponent.verdict}")
     return exponent, False
 
 

@@ -67,8 +67,8 @@ def kantz(points: FloatArray, theiler: int, n_steps: int) -> Divergence:
 
     library, references = _library(points, n_steps)
     k = min(4 * MAX_NEIGHBOURS, len(library))
-    _, found = cKDTree(np.ascontiguousarray(points[library])).query(np.ascontiguousarray(points[references]), k=k)
-    near = library[found]
+    _, neighbours = cKDTree(np.ascontiguousarray(points[library])).query(np.ascontiguousarray(points[references]), k=k)
+    near = library[neighbours]
     apart = np.abs(near - references[:, None]) > theiler
     apart &= np.cumsum(apart, axis=1) <= MAX_NEIGHBOURS
     per_reference = apart.sum(axis=1)
@@ -287,8 +287,10 @@ def _slope(k: FloatArray, s: FloatArray) -> float:
     return float(np.dot(centred, s) / np.dot(centred, centred))
 
 
-def _steps(asked: int | None, period: float, memory: int, n_points: int, window: int) -> int:
-    steps = int(min(PERIODS_FOLLOWED * period + memory, n_points // 4)) if asked is None else count(asked, "n_steps")
+def _steps(n_steps: int | None, period: float, memory: int, n_points: int, window: int) -> int:
+    steps = (
+        int(min(PERIODS_FOLLOWED * period + memory, n_points // 4)) if n_steps is None else count(n_steps, "n_steps")
+    )
     if n_points - steps < 4 * window + 100 or steps < memory + MIN_STEPS:
         raise RefusalError(
             f"{n_points} points are too few: {steps} steps are followed, and neighbours lie {window} samples apart",

@@ -213,7 +213,7 @@ def nearest(  # type: ignore[no-untyped-def]
     """
     waiting, ahead = np.empty(len(nodes), dtype=np.int64), np.empty(len(nodes))
     for r in range(here.shape[0]):
-        best, found, n_waiting = np.inf, -1, 1
+        best, nearest, n_waiting = np.inf, -1, 1
         waiting[0], ahead[0] = 0, 0.0
         while n_waiting > 0:
             n_waiting -= 1
@@ -222,12 +222,12 @@ def nearest(  # type: ignore[no-untyped-def]
                 continue
             start, end, lesser, greater = nodes[node]
             if lesser >= 0:
-                one = _to_box(here[r], low[lesser], high[lesser], largest)
-                other = _to_box(here[r], low[greater], high[greater], largest)
-                if one < other:
-                    lesser, greater, one, other = greater, lesser, other, one
-                waiting[n_waiting], ahead[n_waiting] = lesser, one
-                waiting[n_waiting + 1], ahead[n_waiting + 1] = greater, other
+                to_lesser = _to_box(here[r], low[lesser], high[lesser], largest)
+                to_greater = _to_box(here[r], low[greater], high[greater], largest)
+                if to_lesser < to_greater:
+                    lesser, greater, to_lesser, to_greater = greater, lesser, to_greater, to_lesser
+                waiting[n_waiting], ahead[n_waiting] = lesser, to_lesser
+                waiting[n_waiting + 1], ahead[n_waiting + 1] = greater, to_greater
                 n_waiting += 2
                 continue
             for i in range(start, end):
@@ -237,15 +237,15 @@ def nearest(  # type: ignore[no-untyped-def]
                 if size == 0.0 and not equal_counts:
                     equal[r] = True
                 elif size < best:
-                    best, found = size, i
+                    best, nearest = size, i
         if (
             (limited or equal[r])
-            and found >= 0
+            and nearest >= 0
             and _n_closer(points, nodes, low, high, here[r], largest, best, most, waiting) >= most
         ):
-            best, found = np.inf, -1
+            best, nearest = np.inf, -1
         distance[r] = best if largest else np.sqrt(best)
-        index[r] = found
+        index[r] = nearest
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]

@@ -161,9 +161,9 @@ def _taken(portrait: PhasePortrait, n_points: int, stride: int | None) -> tuple[
     return np.ascontiguousarray(points, dtype=np.float64), step
 
 
-def _theiler(portrait: PhasePortrait, asked: int | None, stride: int) -> int:
-    if asked is not None:
-        return -(-count(asked, "theiler_samples", minimum=0) // stride)
+def _theiler(portrait: PhasePortrait, n_samples: int | None, stride: int) -> int:
+    if n_samples is not None:
+        return -(-count(n_samples, "theiler_samples", minimum=0) // stride)
     return max(1, round(_period(portrait) / stride))
 
 

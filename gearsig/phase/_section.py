@@ -88,8 +88,8 @@ def find_lock(
             f"the recording has no rig, so {pair or shaft!r} is not known", remedy="give rig=, or lock to angle alone"
         )
     cycles, name = _cycles(rig, pair, shaft)
-    found = angle if angle is not None else find_shaft_angle(recording, rig)
-    return CycleLock(found, cycles, name)
+    shaft_angle = angle if angle is not None else find_shaft_angle(recording, rig)
+    return CycleLock(shaft_angle, cycles, name)
 
 
 def constant_period_lock(period_s: float, end_s: float, name: str = "period") -> CycleLock:
@@ -250,15 +250,15 @@ def _return_distance(x: FloatArray, lag: int) -> float:
 def _interpolated(points: FloatArray, positions: FloatArray) -> FloatArray:
     from gearsig.angle import delay_table, doubling_filter, interpolate
 
-    found = np.empty((len(positions), points.shape[1]))
+    points_at = np.empty((len(positions), points.shape[1]))
     for axis in range(points.shape[1]):
         x = np.ascontiguousarray(points[:, axis], dtype=np.float64)
         # The mean is kept apart: what is left is interpolated with an error relative to the motion, not to the mean.
         mean = float(x.mean())
         values = np.empty(len(positions))
         interpolate(x - mean, positions, doubling_filter(), delay_table(), values)
-        found[:, axis] = values + mean
-    return found
+        points_at[:, axis] = values + mean
+    return points_at
 
 
 def _cubic_roots(distance: FloatArray, before: np.ndarray) -> FloatArray:

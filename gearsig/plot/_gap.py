@@ -105,9 +105,9 @@ def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves, *, marked: bool
         here = chosen & np.isfinite(before)
         axes.vlines(x[here], 0.0, before[here], colors=colour, linewidth=1.0, alpha=alpha, zorder=2)
     if len(curves.after):
-        left = gap_by_order(curves, curves.after)
-        here = beyond & np.isfinite(left)
-        axes.plot(x[here], left[here], ".", color=style.MESH, markersize=3.5, zorder=3)
+        residual = gap_by_order(curves, curves.after)
+        here = beyond & np.isfinite(residual)
+        axes.plot(x[here], residual[here], ".", color=style.MESH, markersize=3.5, zorder=3)
     axes.axhline(0.0, color=style.QUIET, linewidth=0.8, zorder=1.5)
     axes.set_ylim(-largest, largest)
 
@@ -267,10 +267,10 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
             axes.axvline(mark.angle_deg, color=style.FAULT, linewidth=0.9, linestyle=":", zorder=1.5)
         style.no_offset(axes)
     if mark is not None:
-        left = mark.angle_deg > 270.0  # its name stays within the panel
+        is_left = mark.angle_deg > 270.0  # its name stays within the panel
         below.annotate(
             plain(mark.label, 24), (mark.angle_deg, 0.93), xycoords=("data", "axes fraction"), va="top",
-            xytext=(-4 if left else 4, 0), textcoords="offset points", ha="right" if left else "left",
+            xytext=(-4 if is_left else 4, 0), textcoords="offset points", ha="right" if is_left else "left",
             color=style.FAULT, fontsize=style.SMALL_PT, parse_math=False,
         )  # fmt: skip
     above.set_xlim(0.0, 360.0)
@@ -415,15 +415,17 @@ def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title:
     return figure
 
 
-def _draw_whole(axes: Axes, row: int, left: Interval, colour: str) -> None:
-    _draw_bar(axes, row, 0.0, left, colour)
-    _say(axes, row, f"{left.value:.2g}", f"{left.low:.2g} to {left.high:.2g}")
+def _draw_whole(axes: Axes, row: int, residual: Interval, colour: str) -> None:
+    _draw_bar(axes, row, 0.0, residual, colour)
+    _say(axes, row, f"{residual.value:.2g}", f"{residual.low:.2g} to {residual.high:.2g}")
     axes.get_yticklabels()[row].set_fontweight("bold")
 
 
-def _draw_bar(axes: Axes, row: int, start: float, left: Interval, colour: str) -> None:
+def _draw_bar(axes: Axes, row: int, start: float, residual: Interval, colour: str) -> None:
     """Draw a bar up to what is left, and its interval."""
-    low, high = sorted((start, left.value))
-    wide = [[max(left.value - left.low, 0.0)], [max(left.high - left.value, 0.0)]]
+    low, high = sorted((start, residual.value))
+    wide = [[max(residual.value - residual.low, 0.0)], [max(residual.high - residual.value, 0.0)]]
     axes.barh(row, high - low, left=low, height=BAR, color=colour, alpha=0.8, linewidth=0, zorder=2)
-    axes.errorbar([left.value], [row], xerr=wide, fmt="none", ecolor=style.INK, elinewidth=1.1, capsize=3.5, zorder=3)
+    axes.errorbar(
+        [residual.value], [row], xerr=wide, fmt="none", ecolor=style.INK, elinewidth=1.1, capsize=3.5, zorder=3
+    )

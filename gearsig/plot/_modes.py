@@ -94,14 +94,16 @@ def _digits(value: float, n: int) -> str:
     return np.format_float_positional(value, precision=n, unique=False, fractional=False, trim="-")
 
 
-def _limits(given: tuple[float, float] | None, low: float, high: float, least: float, name: str) -> tuple[float, float]:
+def _limits(
+    limits: tuple[float, float] | None, low: float, high: float, least: float, name: str
+) -> tuple[float, float]:
     """Return limits within the axis, wide enough for two points."""
-    if given is None:
+    if limits is None:
         return low, high
-    cut = max(low, float(given[0])), min(high, float(given[1]))
+    cut = max(low, float(limits[0])), min(high, float(limits[1]))
     if not cut[1] - cut[0] >= least:
         raise InputError(
-            f"{name} is {given[0]:g} to {given[1]:g}",
+            f"{name} is {limits[0]:g} to {limits[1]:g}",
             allowed=f"ascending, between {low:g} and {high:g}, {least:g} apart",
         )
     return cut

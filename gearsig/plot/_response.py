@@ -58,8 +58,8 @@ class ResponseCase:
                 object.__setattr__(self, field, frozen_array(getattr(self, field), f"{field} of {self.name!r}", ndim=1))
             lengths = {field: len(getattr(self, field)) for field in group}
             if len(set(lengths.values())) > 1:
-                found = ", ".join(f"{field} {n}" for field, n in lengths.items())
-                raise InputError(f"lengths of {self.name!r} differ: {found}", allowed="equal lengths")
+                field_lengths = ", ".join(f"{field} {n}" for field, n in lengths.items())
+                raise InputError(f"lengths of {self.name!r} differ: {field_lengths}", allowed="equal lengths")
         series.checked_axis(self.time_s, f"time_s of {self.name!r}")
         series.checked_axis(self.frequency_hz, f"frequency_hz of {self.name!r}")
 
@@ -245,8 +245,8 @@ def crack_comparison_figure(
             where="impacts_rev",
             remedy="give at least one revolution of signal with the cracked tooth in it",
         )
-    for parameter, given in (("change_mps2", change_mps2), ("reach_cycles", reach_cycles)):
-        if unknown := set(given or ()) - set(cases):
+    for parameter, value in (("change_mps2", change_mps2), ("reach_cycles", reach_cycles)):
+        if unknown := set(value or ()) - set(cases):
             raise InputError(f"{parameter} names {min(unknown)!r}", allowed=", ".join(cases))
     changes = series.checked_curves(change_mps2, len(x), "change_mps2") if change_mps2 else {}
     cycles = (x - marked[len(marked) // 2]) * z

@@ -110,15 +110,15 @@ def phase_followed_angle(recording: Recording, rig: Rig, estimated: ShaftAngle) 
 
 def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
     """Return the speed that mesh lines or shaft harmonics show near the stated one, else the stated one."""
-    found = _from_meshes(recording, rig, stated) if rig.pairs else _from_shaft_harmonics(recording, stated)
-    if found is None:
+    by_lines = _from_meshes(recording, rig, stated) if rig.pairs else _from_shaft_harmonics(recording, stated)
+    if by_lines is None:
         return replace(
             stated, quality=0.5, notes=(*stated.notes, "The stated speed could not be confirmed from the signal.")
         )
-    difference = 100 * (found.mean_speed_rpm / stated.mean_speed_rpm - 1)
-    lines_say = f"the signal's own lines say {found.mean_speed_rpm:.6g} rpm ({difference:+.2f} %)"
+    difference = 100 * (by_lines.mean_speed_rpm / stated.mean_speed_rpm - 1)
+    lines_say = f"the signal's own lines say {by_lines.mean_speed_rpm:.6g} rpm ({difference:+.2f} %)"
     note = f"Stated {stated.mean_speed_rpm:.6g} rpm; {lines_say}."
-    return replace(found, shaft=stated.shaft, notes=(*found.notes, note))
+    return replace(by_lines, shaft=stated.shaft, notes=(*by_lines.notes, note))
 
 
 def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngle:
@@ -129,15 +129,15 @@ def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngl
     low, high = measured.speed_range_rpm
     if not rig.pairs or high - low > STEADY * measured.mean_speed_rpm:
         return measured
-    found = _from_meshes(recording, rig, measured)
-    if found is None:
+    by_lines = _from_meshes(recording, rig, measured)
+    if by_lines is None:
         return measured
-    difference = found.mean_speed_rpm / measured.mean_speed_rpm - 1
+    difference = by_lines.mean_speed_rpm / measured.mean_speed_rpm - 1
     if abs(difference) * measured.n_revolutions < LARGEST_DRIFT_REV:
         return measured
-    lines_say = f"the signal's own lines say {found.mean_speed_rpm:.6g} rpm ({100 * difference:+.2f} %)"
+    lines_say = f"the signal's own lines say {by_lines.mean_speed_rpm:.6g} rpm ({100 * difference:+.2f} %)"
     note = f"The speed channel says {measured.mean_speed_rpm:.6g} rpm; {lines_say}."
-    return replace(found, shaft=measured.shaft, notes=(*found.notes, note))
+    return replace(by_lines, shaft=measured.shaft, notes=(*by_lines.notes, note))
 
 
 def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle | None:
@@ -160,8 +160,8 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     of little slip.
     """
     spectra = list(_spectra_of_shaft(recording))
-    own = spectra[: len(recording.vibration_names())]
-    lines = _common_lines(spectra, len(own))
+    channels = spectra[: len(recording.vibration_names())]
+    lines = _common_lines(spectra, len(channels))
     hertz, resolution = stated.mean_speed_rpm / 60, lines.spectrum.resolution
     low, high = hertz * (1 - STATED_SPEED_TOLERANCE), hertz * (1 + STATED_SPEED_TOLERANCE)
     harmonics = np.arange(1, N_SHAFT_HARMONICS + 1)
@@ -170,31 +170,33 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     for mains_hz in mains:
         lines = lines.without_multiples(mains_hz, skirt=MAINS_TOLERANCE)
         comb = best_comb(lines, low, high, harmonics)
-    telling = None if comb is None else _telling_harmonic(own, comb.fundamental, hertz)
+    telling = None if comb is None else _telling_harmonic(channels, comb.fundamental, hertz)
     if comb is not None and telling is not None:
         nearer, harmonics = abs(comb.fundamental - hertz) / 2, harmonics[:telling]
         comb = best_comb(lines, hertz - nearer, hertz + nearer, harmonics)
     if comb is None or comb.p_value > 1e-3:
-        return _from_first_harmonic(own, stated)
-    found = comb.fundamental
-    if abs(found - hertz) > resolution:
-        first_db, stated_db = (max(_line_db(excess, place) for excess in own) for place in (found, hertz))
-        if _line_db(lines, found) <= CLEAR_LINE_DB or first_db < stated_db:
+        return _from_first_harmonic(channels, stated)
+    fundamental_hz = comb.fundamental
+    if abs(fundamental_hz - hertz) > resolution:
+        first_db, stated_db = (max(_line_db(excess, place) for excess in channels) for place in (fundamental_hz, hertz))
+        if _line_db(lines, fundamental_hz) <= CLEAR_LINE_DB or first_db < stated_db:
             return None
-    return _at(stated, found, resolution / (3 * len(harmonics)), min(0.95, 1 - comb.p_value))
+    return _at(stated, fundamental_hz, resolution / (3 * len(harmonics)), min(0.95, 1 - comb.p_value))
 
 
-def _telling_harmonic(own: list[LineExcess], found_hz: float, stated_hz: float) -> int | None:
+def _telling_harmonic(channels: list[LineExcess], fundamental_hz: float, stated_hz: float) -> int | None:
     """Return the lowest harmonic that tells two speeds apart if it is clearly at the stated one, else None.
 
     Higher harmonics of a speed that is off by a line or two may be a race's lines, with the shaft's sidebands about.
     """
-    apart = max(abs(found_hz - stated_hz), 1e-12)
-    h = 1 + int(2 * own[0].spectrum.resolution / apart)
+    apart = max(abs(fundamental_hz - stated_hz), 1e-12)
+    h = 1 + int(2 * channels[0].spectrum.resolution / apart)
     if not 1 < h <= N_SHAFT_HARMONICS:
         return None  # the first harmonic is asked anyway, or they are one speed
-    found_db, stated_db = (max(_line_db(excess, h * hz) for excess in own) for hz in (found_hz, stated_hz))
-    return h if stated_db > max(found_db, CLEAR_LINE_DB) else None
+    fundamental_db, stated_db = (
+        max(_line_db(excess, h * hz) for excess in channels) for hz in (fundamental_hz, stated_hz)
+    )
+    return h if stated_db > max(fundamental_db, CLEAR_LINE_DB) else None
 
 
 def _at(stated: ShaftAngle, hertz: float, uncertainty_hz: float, quality: float) -> ShaftAngle:
@@ -212,13 +214,13 @@ RULES_DB = 20.0
 """By which a rotor's own line stands above all others within the tolerance of a stated speed."""
 
 
-def _from_first_harmonic(own: list[LineExcess], stated: ShaftAngle) -> ShaftAngle | None:
+def _from_first_harmonic(channels: list[LineExcess], stated: ShaftAngle) -> ShaftAngle | None:
     """Take the one line near the stated speed that rules a channel's spectrum there: that of a rotor without harmonics.
 
     A line where a supply's may be leaves the speed unconfirmed.
     """
     hertz = stated.mean_speed_rpm / 60
-    for excess in own:
+    for excess in channels:
         values, positions = excess.spectrum.values, excess.spectrum.positions
         near = np.flatnonzero(np.abs(positions / hertz - 1) <= STATED_SPEED_TOLERANCE)
         if len(near) < 2 * FOOT_LINES + 2:
@@ -226,13 +228,13 @@ def _from_first_harmonic(own: list[LineExcess], stated: ShaftAngle) -> ShaftAngl
         top = int(near[np.argmax(values[near])])
         beside = near[np.abs(near - top) > FOOT_LINES]
         rules = values[top] >= 10 ** (RULES_DB / 20) * max(values[beside].max(initial=0.0), excess.floor[top])
-        found = peak_position(excess.spectrum, top)
+        peak_hz = peak_position(excess.spectrum, top)
         if rules and near[0] < top < near[-1]:
-            is_supply = any(abs(found / hz - 1) <= MAINS_TOLERANCE for hz in MAINS_HZ)
+            is_supply = any(abs(peak_hz / hz - 1) <= MAINS_TOLERANCE for hz in MAINS_HZ)
             if not is_supply:
-                return _at(stated, found, excess.spectrum.resolution / 4, 0.9)
-            if abs(found / hertz - 1) <= MAINS_TOLERANCE:  # a shaft's or the supply's: it confirms nothing
-                return _at(stated, found, excess.spectrum.resolution / 4, 0.5)
+                return _at(stated, peak_hz, excess.spectrum.resolution / 4, 0.9)
+            if abs(peak_hz / hertz - 1) <= MAINS_TOLERANCE:  # a shaft's or the supply's: it confirms nothing
+                return _at(stated, peak_hz, excess.spectrum.resolution / 4, 0.5)
     return None
 
 

@@ -246,8 +246,8 @@ def _highest(
         highest = max(highest, float(total.max()))
         among = np.flatnonzero(total >= highest - 0.5)[:CHUNK]
         kept.append(np.stack([candidates[among], total[among]]))
-    found = np.concatenate([part[:, part[1] >= highest - 0.5] for part in kept], axis=1)[:, :CHUNK]
-    return found[0], found[1], int(inside_once.sum())
+    peaks = np.concatenate([part[:, part[1] >= highest - 0.5] for part in kept], axis=1)[:, :CHUNK]
+    return peaks[0], peaks[1], int(inside_once.sum())
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -295,19 +295,19 @@ def _described(
     """Fit the fundamental to the peaks, and gather the family's lines."""
     fitted = float(fundamental)
     for _ in range(N_FITS):
-        found = _lines_near(excess, origins, multiples, fitted)
+        lines = _lines_near(excess, origins, multiples, fitted)
         # Least squares of position - origin = multiple · fundamental, clearer lines counting more.
-        weights = sum(line.weight * line.multiple**2 for line in found)
+        weights = sum(line.weight * line.multiple**2 for line in lines)
         if not weights:
             break
-        fitted = sum(line.weight * line.multiple * line.distance for line in found) / weights
-    strongest = max(found, key=lambda line: line.ratio_db, default=None)
+        fitted = sum(line.weight * line.multiple * line.distance for line in lines) / weights
+    strongest = max(lines, key=lambda line: line.ratio_db, default=None)
     return Comb(
         fitted,
         score,
         p_value,
-        tuple(line.position for line in found),
-        tuple(line.ratio_db for line in found),
+        tuple(line.position for line in lines),
+        tuple(line.ratio_db for line in lines),
         strongest.amplitude if strongest else 0.0,
         strongest.floor if strongest else 0.0,
     )
@@ -333,7 +333,7 @@ def _lines_near(
 ) -> list[_Line]:
     """Return the family's lines that stand clearly above the floor; two lines off is still the same peak."""
     spectrum = excess.spectrum
-    found = []
+    lines = []
     for origin, multiple in zip(origins, multiples, strict=True):
         place = float(origin + multiple * fundamental)
         if not 0 < place <= spectrum.positions[-1]:
@@ -344,8 +344,8 @@ def _lines_near(
         ratio = over_floor_db(amplitude, floor)
         if ratio >= CLEAR_LINE_DB and not excess.masked[i]:
             position = peak_position(spectrum, i)
-            found.append(_Line(position, position - float(origin), int(multiple), amplitude, floor, ratio))
-    return found
+            lines.append(_Line(position, position - float(origin), int(multiple), amplitude, floor, ratio))
+    return lines
 
 
 def peak_position(spectrum: Spectrum, i: int) -> float:

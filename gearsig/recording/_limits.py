@@ -19,8 +19,8 @@ CGROUPS = Path("/sys/fs/cgroup")
 
 def free_memory_bytes() -> float | None:
     """Memory that programs can still take, of the system and of a container; None where neither tells."""
-    found = [free for free in (_system_free_bytes(), container_free_bytes()) if free is not None]
-    least = min(found, default=inf)
+    limits = [free for free in (_system_free_bytes(), container_free_bytes()) if free is not None]
+    least = min(limits, default=inf)
     return least if isfinite(least) else None
 
 
@@ -36,7 +36,7 @@ def container_free_bytes(own: Path = Path("/proc/self/cgroup"), mount: Path = CG
     mount : Path
         Where the groups are shown; those of version 1 in a folder "memory".
     """
-    found: list[float | None] = []
+    limits: list[float | None] = []
     try:
         lines = own.read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -53,8 +53,8 @@ def container_free_bytes(own: Path = Path("/proc/self/cgroup"), mount: Path = CG
         inner = root / path.strip("/")
         # A container may see its own group as the root, whatever its path is called outside.
         groups = (inner, *(parent for parent in inner.parents if parent == root or root in parent.parents))
-        found += [_group_free_bytes(group, *names) for group in groups]
-    return min((free for free in found if free is not None), default=None)
+        limits += [_group_free_bytes(group, *names) for group in groups]
+    return min((free for free in limits if free is not None), default=None)
 
 
 def _group_free_bytes(group: Path, limit_name: str, taken_name: str, cached_name: str) -> float | None:

@@ -207,16 +207,16 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
     tuple of ChannelProblem
         In the order of the channels; empty if nothing was found. Fewer than 64 samples are judged for "dead" only.
     """
-    found: list[ChannelProblem] = []
+    problems: list[ChannelProblem] = []
     spreads = {c.name: float(np.std(recording.values(c.name), dtype=np.float64)) for c in recording.channels}
     for channel in recording.channels:
         if channel.is_vibration:
             others = [spreads[c.name] for c in recording.channels if _is_comparable(c, channel)]
-            found += _problems_of(channel, recording.values(channel.name), spreads[channel.name], others)
-            if found and found[-1].channel == channel.name and found[-1].kind == "dead":
+            problems += _problems_of(channel, recording.values(channel.name), spreads[channel.name], others)
+            if problems and problems[-1].channel == channel.name and problems[-1].kind == "dead":
                 continue
-            found += _doubts_of(channel, recording.values(channel.name), recording.sampling_rate_hz)
-    return tuple(found)
+            problems += _doubts_of(channel, recording.values(channel.name), recording.sampling_rate_hz)
+    return tuple(problems)
 
 
 def _is_comparable(other: Channel, channel: Channel) -> bool:

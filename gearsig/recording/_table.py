@@ -367,7 +367,7 @@ class NamedArrays:
     warnings: tuple[str, ...] = ()
 
 
-def table_from_arrays(found: NamedArrays, reader: str, where: str) -> RawTable:
+def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
     """Return the table of a file of named arrays.
 
     Arrays with one element are settings; among them the sampling rate is known by its name. Vectors are channels, and
@@ -378,27 +378,27 @@ def table_from_arrays(found: NamedArrays, reader: str, where: str) -> RawTable:
     InputError
         If no array is a signal, or the file states two sampling rates.
     """
-    scalars = {path: a for path, a in found.arrays.items() if a.size == 1}
-    signals = {path: a for path, a in found.arrays.items() if a.size > 1 and a.ndim <= 2 and a.dtype.kind in "fiubc"}
+    scalars = {path: a for path, a in arrays.arrays.items() if a.size == 1}
+    signals = {path: a for path, a in arrays.arrays.items() if a.size > 1 and a.ndim <= 2 and a.dtype.kind in "fiubc"}
     if not signals:
-        names = ", ".join(list(found.arrays)[:8]) or "nothing"
+        names = ", ".join(list(arrays.arrays)[:8]) or "nothing"
         raise InputError(
             f"holds no signal, only {names}",
             where=where,
             allowed="vectors or matrices of numbers",
             remedy="save the signals as plain arrays (no tables or objects)",
         )
-    rate_hz = _one_rate(scalars, found.rates_hz, where)
+    rate_hz = _one_rate(scalars, arrays.rates_hz, where)
     longest = max(max(a.shape) for a in signals.values())
     short = [path for path, a in signals.items() if max(a.shape) < 0.1 * longest]  # a setting or a result
     clocks = [path for path, a in signals.items() if path not in short and _is_clock(path, a)]
     time: RawColumn | None = None
     columns: list[RawColumn] = []
-    warnings = list(found.warnings)
+    warnings = list(arrays.warnings)
     for path, array in signals.items():
         if path in short or path in clocks:
             continue
-        of_array = _columns(path, array, found, where)
+        of_array = _columns(path, array, arrays, where)
         if array.ndim == 2 and 1 not in array.shape and time is None and not clocks:
             of_array, time, notes = without_clock(of_array)
             warnings += notes
@@ -441,8 +441,8 @@ def _is_clock(path: str, array: NumberArray) -> bool:
     return named and bool(np.all(np.diff(array.reshape(-1)) > 0))
 
 
-def _columns(path: str, array: NumberArray, found: NamedArrays, where: str) -> list[RawColumn]:
-    unit = found.units.get(path, "") or found.texts.get(f"{path.rpartition('.')[0]}.unit".lstrip("."), "")
+def _columns(path: str, array: NumberArray, arrays: NamedArrays, where: str) -> list[RawColumn]:
+    unit = arrays.units.get(path, "") or arrays.texts.get(f"{path.rpartition('.')[0]}.unit".lstrip("."), "")
     if 1 in array.shape or array.ndim == 1:
         return [RawColumn(path, array.reshape(-1), unit)]
     over_time = array if array.shape[0] < array.shape[1] else array.T

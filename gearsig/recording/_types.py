@@ -117,7 +117,7 @@ def is_unit(text: str) -> bool:
     return word in _QUANTITY_OF_UNIT or (word != "" and word in SECONDS_PER_UNIT)
 
 
-def same_unit(one: str, other: str) -> bool:
+def same_unit(first: str, second: str) -> bool:
     """Whether two units are one, however they are spelled.
 
     Examples
@@ -125,7 +125,7 @@ def same_unit(one: str, other: str) -> bool:
     >>> same_unit("m/s²", "m/s^2"), same_unit("m/s2", "m/s**2"), same_unit("g", "m/s^2")
     (True, True, False)
     """
-    return _plain_unit(one) == _plain_unit(other)
+    return _plain_unit(first) == _plain_unit(second)
 
 
 def _plain_unit(unit: str) -> str:

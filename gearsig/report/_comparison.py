@@ -53,8 +53,8 @@ LOOK_AT_OCTAVES = "Everything in each band, noise included. At another speed, ot
 def channel_pictures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Picture]:
     """Yield the pictures of one channel: orders, averages of each shaft, bands."""
     for figures in FIGURES.values():
-        for one in figures(comparison, channel):
-            yield embed(one.figure, one.caption, one.alternative)
+        for picture in figures(comparison, channel):
+            yield embed(picture.figure, picture.caption, picture.alternative)
 
 
 def order_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
@@ -122,16 +122,16 @@ def _teeth_text(comparison: Comparison, shaft: ShaftComparison) -> str:
     """Say what the panel of teeth shows, and when it shows nothing."""
     if not shaft.tooth_levels:
         return ""
-    certain = next(one.tooth_is_certain for one in comparison.alignments if one.shaft == shaft.shaft)
+    certain = next(alignment.tooth_is_certain for alignment in comparison.alignments if alignment.shaft == shaft.shaft)
     unknown = " Which tooth of one is which of the other is not known here." if certain is False else ""
     return f" {LOOK_AT_TEETH}{unknown}"
 
 
 def mesh_cursors(comparison: Comparison) -> tuple[Cursor, ...]:
     """Return the mesh harmonics; numbered alone where there is one pair."""
-    one = len(comparison.mesh_orders) == 1
+    single_pair = len(comparison.mesh_orders) == 1
     return tuple(
-        Cursor(k * mesh, "mesh", f"{k}× mesh" if one else f"{k}× mesh {i}", k)
+        Cursor(k * mesh, "mesh", f"{k}× mesh" if single_pair else f"{k}× mesh {i}", k)
         for i, mesh in enumerate(comparison.mesh_orders, 1)
         for k in range(1, MAX_CURSORS + 1)
     )
@@ -183,14 +183,15 @@ def comparison_text(comparison: Comparison) -> str:
 def alignment_texts(comparison: Comparison) -> list[str]:
     """Return one text per shaft on how the records were aligned."""
     texts = []
-    for one in comparison.alignments:
-        name = f"shaft {one.shaft}: " if one.shaft else ""
-        if one.method == "marks":
+    for alignment in comparison.alignments:
+        name = f"shaft {alignment.shaft}: " if alignment.shaft else ""
+        if alignment.method == "marks":
             texts.append(f"{name}by the marks of both records")
             continue
-        sure = {None: "", True: ", the same tooth in both", False: ", good to whole teeth only"}[one.tooth_is_certain]
-        within = "" if one.tooth_is_certain is False else f" ± {one.repeatability_deg:.2g}°"
-        turned = f"{one.shift_deg:+.4g}°".replace("-", "−")
+        certain = alignment.tooth_is_certain
+        sure = {None: "", True: ", the same tooth in both", False: ", good to whole teeth only"}[certain]
+        within = "" if certain is False else f" ± {alignment.repeatability_deg:.2g}°"
+        turned = f"{alignment.shift_deg:+.4g}°".replace("-", "−")
         texts.append(f"{name}by correlation, simulation turned by {turned}{within}{sure}")
     return texts
 

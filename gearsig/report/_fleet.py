@@ -210,7 +210,7 @@ def _pictures(fleet: Fleet, raised: Sequence[AlarmChange]) -> list[tuple[str, Pi
     result = []
     for change in list(chosen.values())[:MAX_PICTURES]:
         try:
-            found = fleet.trend(
+            trends = fleet.trend(
                 change.machine,
                 change.name,
                 point=change.point,
@@ -221,5 +221,5 @@ def _pictures(fleet: Fleet, raised: Sequence[AlarmChange]) -> list[tuple[str, Pi
         except InputError:  # a file was set aside meanwhile
             continue
         heading = " · ".join(part for part in (change.machine, change.point) if part)
-        result.append((heading, fleet_trend_picture(found[0])))
+        result.append((heading, fleet_trend_picture(trends[0])))
     return result

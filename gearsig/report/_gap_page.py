@@ -113,7 +113,7 @@ def floors_text(report: GapReport) -> str:
     if not report.is_simulated:
         return ""
     structural, beside = "what healthy machines differ by from that", ""
-    alone = [one.name for one in report.conditions if not one.reference]
+    alone = [condition.name for condition in report.conditions if not condition.reference]
     if report.references:
         known = f"Compared with the same machine when it was healthy ({', '.join(report.references)}). "
         if 0 < len(alone) < len(report.conditions):
@@ -202,7 +202,7 @@ def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
         severity_text(cause),
         cause.place,
         (cause.remarks or _statements(cause.shrinkage)) if detailed else (),
-        tuple(_evidence_row(one) for one in cause.evidence) if detailed else (),
+        tuple(_evidence_row(evidence) for evidence in cause.evidence) if detailed else (),
     )
 
 
@@ -238,10 +238,11 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     )
 
 
-def _evidence_row(one: Evidence) -> EvidenceRow:
-    look = ("✓", "for") if one.speaks_for else ("↗", "further") if one.is_further else ("✗", "against")
-    predicted, observed, floor = signed(one.predicted_db), signed(one.observed_db), readable(one.floor_db, 2)
-    return EvidenceRow(one.feature, predicted, observed, floor, stance_words(one), *look)
+def _evidence_row(evidence: Evidence) -> EvidenceRow:
+    look = ("✓", "for") if evidence.speaks_for else ("↗", "further") if evidence.is_further else ("✗", "against")
+    predicted, observed = signed(evidence.predicted_db), signed(evidence.observed_db)
+    floor = readable(evidence.floor_db, 2)
+    return EvidenceRow(evidence.feature, predicted, observed, floor, stance_words(evidence), *look)
 
 
 def group_texts(report: GapReport) -> tuple[str, ...]:
@@ -278,12 +279,12 @@ def next_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
     titles = {cause.name: cause.title for cause in report.causes}
     return tuple(
         (
-            point_text(one.point) + (f", with a further sensor at {one.place}" if one.place else ""),
-            " / ".join(titles.get(name, name) for name in one.separates),
-            readable(one.standard_deviations, 2),
-            readable(one.now, 2),
+            point_text(advice.point) + (f", with a further sensor at {advice.place}" if advice.place else ""),
+            " / ".join(titles.get(name, name) for name in advice.separates),
+            readable(advice.standard_deviations, 2),
+            readable(advice.now, 2),
         )
-        for one in report.next_recordings
+        for advice in report.next_recordings
     )
 
 
@@ -291,14 +292,14 @@ def condition_rows(report: GapReport) -> tuple[tuple[str, ...], ...]:
     """Return name, speed, torque, revolutions, length and sampling rate of each recording."""
     return tuple(
         (
-            one.name,
-            readable(one.point.speed_rpm, 5),
-            readable(one.point.torque_nm, 3),
-            readable(one.n_revolutions, 4),
-            readable(one.duration_s, 3),
-            readable(one.sampling_rate_hz, 6),
+            condition.name,
+            readable(condition.point.speed_rpm, 5),
+            readable(condition.point.torque_nm, 3),
+            readable(condition.n_revolutions, 4),
+            readable(condition.duration_s, 3),
+            readable(condition.sampling_rate_hz, 6),
         )
-        for one in report.conditions
+        for condition in report.conditions
     )
 
 
@@ -392,12 +393,15 @@ class GapGallery:
 
 def gap_galleries(report: GapReport) -> dict[str, GapGallery]:
     """Return the pictures of a page by question."""
-    drawn = [(one, plot.embed(one.figure, one.look, one.shows, vector=one.vector)) for one in gap_figures(report)]
+    drawn = [
+        (figure, plot.embed(figure.figure, figure.look, figure.shows, vector=figure.vector))
+        for figure in gap_figures(report)
+    ]
     return {
         question: GapGallery(
-            tuple(p for one, p in drawn if one.question == question and not one.is_small and not one.of),
-            tuple(p for one, p in drawn if one.question == question and one.is_small),
-            {one.of: p for one, p in drawn if one.question == question and one.of},
+            tuple(p for figure, p in drawn if figure.question == question and not figure.is_small and not figure.of),
+            tuple(p for figure, p in drawn if figure.question == question and figure.is_small),
+            {figure.of: p for figure, p in drawn if figure.question == question and figure.of},
         )
         for question in QUESTIONS
     }
@@ -460,11 +464,11 @@ def _spectra(report: GapReport) -> Iterator[GapFigure]:
         scored = not len(curves.reference)
         title = curves.label if scored else f"{curves.label}: recording against simulation"
         beyond = _beyond_text(report, curves) if scored else NOT_SCORED
-        left = " Green dots: what is left with the likeliest effect." if len(curves.after) else ""
+        dots = " Green dots: what is left with the likeliest effect." if len(curves.after) else ""
         yield GapFigure(
             "where",
             plot.gap_orders_figure(curves, marked=scored and report.is_beyond, title=title),
-            f"Above, lines in the grey repeatability floor say nothing. Below, the gap line by line. {beyond}{left}",
+            f"Above, lines in the grey repeatability floor say nothing. Below, the gap line by line. {beyond}{dots}",
             f"Order spectrum, {curves.label}: measured, simulated, and their difference in dB.",
         )
 
@@ -533,7 +537,7 @@ def _mark(report: GapReport, curves: AngleCurves | AverageCurves) -> plot.AngleM
 
 def _evidence(report: GapReport) -> Iterator[GapFigure]:
     for cause in detailed_causes(report):
-        evidence = [one for one in cause.evidence if is_finite(one)]
+        evidence = [item for item in cause.evidence if is_finite(item)]
         if evidence:
             yield GapFigure(
                 "which",
@@ -586,8 +590,8 @@ def condition_advice(report: GapReport) -> str:
     held_out = next((c.shrinkage.held_out for c in report.causes if c.shrinkage), "other revolutions")
     where = held_out if "starts" in held_out else "other revolutions of the same recordings"
     checked = f"the result could be checked on {where} only. "
-    here = report.conditions[0].point
-    best = next((one for one in report.next_recordings if not same_condition(one.point, here)), None)
+    point = report.conditions[0].point
+    best = next((advice for advice in report.next_recordings if not same_condition(advice.point, point)), None)
     if best is None:
         return f"{start}{checked}A second one would check it at another speed or load."
     apart = f"{best.standard_deviations:.2g} structural floors apart, against {best.now:.2g} now"

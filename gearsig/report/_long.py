@@ -41,11 +41,11 @@ def long_analysis_to_json(analysis: LongAnalysis) -> str:
         {"start_s": p.start_s, "end_s": p.end_s, "reason": p.reason, "analysis": analysis_to_dict(p.analysis)}
         for p in analysis.parts
     ]
-    found = {
+    content = {
         "outcome": analysis.outcome.value,
         "verdict": analysis.verdict,
         "duration_s": analysis.duration_s,
         "overview": levels,
         "parts": parts,
     }
-    return json.dumps(found, ensure_ascii=False, allow_nan=False)
+    return json.dumps(content, ensure_ascii=False, allow_nan=False)

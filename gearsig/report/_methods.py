@@ -153,18 +153,18 @@ def apply_method(
     """
     if name not in METHODS:
         raise InputError(f"there is no method {name!r}", allowed=", ".join(METHODS), remedy=_hint(name))
-    method, wanted = METHODS[name], options or MethodOptions()
+    method, settings = METHODS[name], options or MethodOptions()
     taken = {"channel", "start_s", "end_s", *method.options}
-    for key, value in vars(wanted).items():
+    for key, value in vars(settings).items():
         if key not in taken and value != getattr(MethodOptions(), key):
             fitting = ", ".join(n for n, m in METHODS.items() if key in m.options)
             raise InputError(f"{name} takes no {key.replace('_', ' ')}", remedy=f"it is an option of {fitting}")
     prepared = prepare(recording)
-    if wanted.start_s is not None or wanted.end_s is not None:
+    if settings.start_s is not None or settings.end_s is not None:
         whole = prepared.recording
-        end = whole.duration_s if wanted.end_s is None else wanted.end_s
-        prepared = prepare(whole.between(wanted.start_s or 0.0, end))
-    return method.answer(prepared, replace(wanted, channel=_channel(prepared.recording, wanted.channel)))
+        end = whole.duration_s if settings.end_s is None else settings.end_s
+        prepared = prepare(whole.between(settings.start_s or 0.0, end))
+    return method.answer(prepared, replace(settings, channel=_channel(prepared.recording, settings.channel)))
 
 
 def _hint(name: str) -> str:
@@ -290,8 +290,8 @@ def _order_spectrum(prepared: PreparedRecording, options: MethodOptions) -> Meth
 
     signal = prepared.over_angle(options.shaft, [options.channel])
     spectrum = order_spectrum(signal, options.channel)
-    wanted = options if options.highest is not None else replace(options, highest=_highest_order(prepared, spectrum))
-    return _spectrum_answer("order-spectrum", prepared, wanted, spectrum, "order spectrum")
+    settings = options if options.highest is not None else replace(options, highest=_highest_order(prepared, spectrum))
+    return _spectrum_answer("order-spectrum", prepared, settings, spectrum, "order spectrum")
 
 
 def _highest_order(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> float:
@@ -384,29 +384,31 @@ def _tracking(prepared: PreparedRecording, options: MethodOptions) -> MethodAnsw
 def _envelope(prepared: PreparedRecording, options: MethodOptions) -> MethodAnswer:
     from gearsig.spectra import kurtogram_envelope
 
-    found = kurtogram_envelope(prepared.recording, options.channel, band_hz=options.band_hz)
-    low, high = found.envelope.band_hz
+    banded = kurtogram_envelope(prepared.recording, options.channel, band_hz=options.band_hz)
+    low, high = banded.envelope.band_hz
     text = f"spectrum of the envelope of {low:.4g} to {high:.4g} Hz"
-    top = options.highest if options.highest is not None else min(float(found.spectrum.positions[-1]), (high - low) / 2)
-    answer = _spectrum_answer("envelope", prepared, replace(options, highest=top), found.spectrum, text)
-    numbers = {"band_hz": [low, high], "reason": found.reason, "warnings": list(found.warnings)}
+    top = (
+        options.highest if options.highest is not None else min(float(banded.spectrum.positions[-1]), (high - low) / 2)
+    )
+    answer = _spectrum_answer("envelope", prepared, replace(options, highest=top), banded.spectrum, text)
+    numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}
     return replace(answer, numbers={**answer.numbers, **numbers})
 
 
 def _kurtogram(prepared: PreparedRecording, options: MethodOptions) -> MethodAnswer:
     from gearsig.spectra import kurtogram
 
-    found = kurtogram(prepared.recording, options.channel, source=options.channel)
-    best = found.best_band()
+    kurtosis_map = kurtogram(prepared.recording, options.channel, source=options.channel)
+    best = kurtosis_map.best_band()
     table = {
-        "from (Hz)": found.low_hz,
-        "to (Hz)": found.high_hz,
-        "level": found.level,
-        "kurtosis": found.kurtosis,
-        "standard error": found.standard_error,
+        "from (Hz)": kurtosis_map.low_hz,
+        "to (Hz)": kurtosis_map.high_hz,
+        "level": kurtosis_map.level,
+        "kurtosis": kurtosis_map.kurtosis,
+        "standard error": kurtosis_map.standard_error,
     }
     caption = "kurtogram: spectral kurtosis of bands; the outlined one is the most impulsive"
-    picture = Captioned(plot.kurtogram_figure(found), caption, f"{caption}, {options.channel}")
+    picture = Captioned(plot.kurtogram_figure(kurtosis_map), caption, f"{caption}, {options.channel}")
     return MethodAnswer("kurtogram", options.channel, picture, table, numbers={"best_band": plain(best)})
 
 
@@ -487,13 +489,13 @@ def _modes(prepared: PreparedRecording, options: MethodOptions) -> MethodAnswer:
     return MethodAnswer("modes", options.channel, picture, table, numbers=numbers)
 
 
-def _chosen_mode(modes: Modes, wanted: int | None) -> int:
+def _chosen_mode(modes: Modes, rank: int | None) -> int:
     """Return the mode that is asked for by its rank among the centres, or the most impulsive one."""
-    if wanted is None:
+    if rank is None:
         return int(np.argmax([_kurtosis(waveform) for waveform in modes.waveforms]))
-    if not 1 <= wanted <= modes.n_modes:
-        raise InputError(f"mode is {wanted}", allowed=f"1 to {modes.n_modes}, by rising centre")
-    return modes.by_centre()[wanted - 1]
+    if not 1 <= rank <= modes.n_modes:
+        raise InputError(f"mode is {rank}", allowed=f"1 to {modes.n_modes}, by rising centre")
+    return modes.by_centre()[rank - 1]
 
 
 def _near_the_mode(modes: Modes, chosen: int, options: MethodOptions) -> MethodOptions:
@@ -588,9 +590,9 @@ def _average(prepared: PreparedRecording, options: MethodOptions) -> MethodAnswe
 def _indicators(prepared: PreparedRecording, options: MethodOptions) -> MethodAnswer:
     from gearsig.diagnosis import analyze
 
-    found = [i for i in analyze(prepared.recording).indicators if i.channel in ("", options.channel)]
+    indicators = [i for i in analyze(prepared.recording).indicators if i.channel in ("", options.channel)]
     table = {
-        name: np.array([getattr(i, name) for i in found], dtype=None if name == "value" else object)
+        name: np.array([getattr(i, name) for i in indicators], dtype=None if name == "value" else object)
         for name in ("name", "value", "unit", "computed_on", "shaft", "gear", "bearing", "band", "note")
     }
     rms = prepared.recording.values(options.channel)
@@ -598,7 +600,7 @@ def _indicators(prepared: PreparedRecording, options: MethodOptions) -> MethodAn
     level = np.sqrt(np.add.reduceat(np.square(rms, dtype=np.float64), np.arange(0, len(rms), n)) / n)[:-1]
     time_s = (np.arange(len(level)) + 0.5) * n / prepared.recording.sampling_rate_hz
     unit = prepared.recording.channels[prepared.recording.index(options.channel)].unit
-    caption = f"{len(found)} condition indicators; drawn: rms over time"
+    caption = f"{len(indicators)} condition indicators; drawn: rms over time"
     panel = plot.CurvePanel(time_s, {"rms": level}, "time (s)", with_unit("rms", unit))
     figure = plot.curves_figure([panel], title=f"{options.channel}: {caption}")
     return MethodAnswer("indicators", options.channel, Captioned(figure, caption, caption), table)
@@ -678,21 +680,21 @@ def fitting_methods(
     the squeezed transform of its most impulsive mode. Else a suspected bearing: the kurtogram. A simulated motion at a
     steady speed: its Poincaré section in the phase plane.
     """
-    found: list[str] = []
+    names: list[str] = []
     try:
         angle = prepared.shaft_angle
     except (InputError, RefusalError):
         angle = None
     sweeps = angle is not None and bool(np.ptp(angle.speed_range_rpm) > 0.1 * angle.mean_speed_rpm)
     if sweeps:
-        found += ["order-map", "frequency-map", "tracking"]
+        names += ["order-map", "frequency-map", "tracking"]
     if suspects_crack:
-        found.append("modes+squeezed-cwt")
+        names.append("modes+squeezed-cwt")
     elif suspects_bearing:
-        found.append("kurtogram")
+        names.append("kurtogram")
     if prepared.recording.truth is not None and angle is not None and not sweeps:
-        found.append("poincare")
-    return tuple(found)
+        names.append("poincare")
+    return tuple(names)
 
 
 def method_pictures(
@@ -702,19 +704,19 @@ def method_pictures(
 
     Maps over time show the first twelve revolutions, or what is there.
     """
-    found: list[Captioned] = []
+    pictures: list[Captioned] = []
     reasons: list[str] = []
     for text in names:
         name, options = named_method(text)
-        wanted = replace(options, channel=channel)
+        settings = replace(options, channel=channel)
         try:
             if "transform" in METHODS[name].options or options.then:
                 turns = prepared.shaft_angle.mean_speed_rpm / 60.0
-                wanted = replace(wanted, end_s=min(prepared.recording.duration_s, _REVOLUTIONS_SHOWN / turns))
-            answer = apply_method(name, prepared, wanted)
+                settings = replace(settings, end_s=min(prepared.recording.duration_s, _REVOLUTIONS_SHOWN / turns))
+            answer = apply_method(name, prepared, settings)
         except RefusalError as refusal:
             reasons.append(f"{text}: {refusal}")
             continue
         caption = answer.picture.caption
-        found.append(replace(answer.picture, caption=f"{caption[0].upper()}{caption[1:]}, {answer.channel}."))
-    return tuple(found), tuple(reasons)
+        pictures.append(replace(answer.picture, caption=f"{caption[0].upper()}{caption[1:]}, {answer.channel}."))
+    return tuple(pictures), tuple(reasons)

@@ -125,35 +125,35 @@ def force_csv(estimate: ForceEstimate) -> str:
 # - ``equations``: each with ``name``, ``text``, ``condition``
 
 
-def identify_text(found: Identification) -> str:
+def identify_text(identification: Identification) -> str:
     """Return the parameters with their intervals, and what cannot be told, in plain text."""
-    lines = [f"{found.source or 'recording'}: parameters with 95 % intervals", ""]
-    lines += [f"{name} equation: {text}" for name, text in found.equations.items()]
+    lines = [f"{identification.source or 'recording'}: parameters with 95 % intervals", ""]
+    lines += [f"{name} equation: {text}" for name, text in identification.equations.items()]
     lines += ["", f"{'parameter':<26} {'value':>11} {'from':>11} {'to':>11} {'rig':>11}  unit"]
-    lines += [_row(p) for p in found.parameters if p.is_told]
-    untold = [p for p in found.parameters if not p.is_told]
+    lines += [_row(p) for p in identification.parameters if p.is_told]
+    untold = [p for p in identification.parameters if not p.is_told]
     if untold:
         lines += ["", "Cannot be told from this record"]
         lines += [fill(f"{p.name}: {p.why_not}", WIDTH, initial_indent="  ", subsequent_indent="    ") for p in untold]
-    alike = [f"{p.name} moves with {p.most_like}" for p in found.parameters if p.is_told and p.most_like]
+    alike = [f"{p.name} moves with {p.most_like}" for p in identification.parameters if p.is_told and p.most_like]
     if alike:
         lines += ["", fill(f"Told together rather than each by itself: {'; '.join(alike)}.", WIDTH)]
     return "\n".join(lines)
 
 
-def identify_json(found: Identification) -> str:
+def identify_json(identification: Identification) -> str:
     """Return the same as JSON, see the module's description."""
     parameters = [
         members(p, "name", "unit", "value")
         | {"low": p.interval[0], "high": p.interval[1]}
         | members(p, "is_told", "why_not", "rig_value", "most_like")
-        for p in found.parameters
+        for p in identification.parameters
     ]
     equations = [
-        {"name": name, "text": text, "condition": found.condition.get(name, float("nan"))}
-        for name, text in found.equations.items()
+        {"name": name, "text": text, "condition": identification.condition.get(name, float("nan"))}
+        for name, text in identification.equations.items()
     ]
-    content = {"source": found.source, "parameters": parameters, "equations": equations}
+    content = {"source": identification.source, "parameters": parameters, "equations": equations}
     return document("gearsig.identify", 1, content)
 
 

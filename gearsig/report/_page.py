@@ -211,8 +211,8 @@ def crack_picture(analysis: Analysis) -> Picture | None:
             continue
         now, then = average.values * factor, None
         size = float(np.std(now))
-        other = references.get(channel.channel)
-        reference = other.averages.get((crack.shaft, "average")) if other is not None else None
+        reference_channel = references.get(channel.channel)
+        reference = reference_channel.averages.get((crack.shaft, "average")) if reference_channel is not None else None
         if reference is not None and reference.unit == average.unit:
             then = factor * _on_angles_of(average.values, reference.values, turn=crack.tooth is None)
         change = float(np.std(now - then)) / size if then is not None and size > 0 else 0.0
@@ -373,10 +373,10 @@ def _further_methods(
     prepared = prepare(analysis.recording, analysis.rig)
     fitting = fitting_methods(prepared, suspects_crack=bool(teeth), suspects_bearing=bool(bearings))
     chosen = fitting if methods is None else methods
-    found, reasons = method_pictures(chosen, prepared, channel)
+    pictures, reasons = method_pictures(chosen, prepared, channel)
     if methods is None:  # nobody asked for what cannot be had
         reasons = ()
-    return tuple(embed(f.figure, f.caption, f.alternative) for f in found), reasons
+    return tuple(embed(f.figure, f.caption, f.alternative) for f in pictures), reasons
 
 
 def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:

@@ -68,8 +68,8 @@ def page_pdf(
         "groups": [
             {
                 "title": group.title,
-                "wide": [put_picture(one, pictures) for one in group.wide],
-                "small": [put_picture(one, pictures) for one in group.small],
+                "wide": [put_picture(picture, pictures) for picture in group.wide],
+                "small": [put_picture(picture, pictures) for picture in group.small],
             }
             for group in parts["gallery"].groups
         ],

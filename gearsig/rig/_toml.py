@@ -214,8 +214,8 @@ def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
 
 def _typed(value: Any, hint: Any, where: str) -> Any:
     """Return the value in the type of the field, or say which type is wanted. TOML has no null: None never occurs."""
-    wanted = [t for t in get_args(hint) if t is not NoneType] if isinstance(hint, UnionType) else [hint]
-    kind = wanted[0]
+    types = [t for t in get_args(hint) if t is not NoneType] if isinstance(hint, UnionType) else [hint]
+    kind = types[0]
     if kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
         with suppress(OverflowError):
             return float(value)

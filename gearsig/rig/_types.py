@@ -330,19 +330,19 @@ class Bearing:
 
         Source: T. A. Harris, *Rolling Bearing Analysis*, 4th ed., ch. 2 (kinematics without slip).
         """
-        found: dict[str, float] = {}
+        orders: dict[str, float] = {}
         if self.n_rolling_elements is not None:
             ball, pitch = self.rolling_element_diameter_mm or 0.0, self.pitch_diameter_mm or 0.0
             g = ball * cos(radians(self.contact_angle_deg)) / pitch
             n = self.n_rolling_elements
-            found = {
+            orders = {
                 "BPFO": n * (1 - g) / 2,
                 "BPFI": n * (1 + g) / 2,
                 "BSF": pitch / (2 * ball) * (1 - g * g),
                 "FTF": (1 - g) / 2,
             }
         stated = {"BPFO": self.bpfo_order, "BPFI": self.bpfi_order, "BSF": self.bsf_order, "FTF": self.ftf_order}
-        return found | {name: order for name, order in stated.items() if order is not None}
+        return orders | {name: order for name, order in stated.items() if order is not None}
 
 
 @dataclass(frozen=True)
@@ -519,10 +519,10 @@ class Rig:
         """Revolutions of `shaft` per revolution of `to` (default: the reference shaft); None if not known."""
         self._check_shaft(shaft, "ratio")
         ratios = shaft_ratios(self)
-        own, other = ratios.get(shaft), ratios.get(to or self.reference_shaft)
+        from_ratio, to_ratio = ratios.get(shaft), ratios.get(to or self.reference_shaft)
         if shaft == (to or self.reference_shaft):
             return 1.0
-        return None if own is None or other is None else own / other
+        return None if from_ratio is None or to_ratio is None else from_ratio / to_ratio
 
     def nominal_speed_rpm(self, shaft: str = "") -> float | None:
         """Nominal speed of `shaft` (default: the reference shaft), None if not known."""

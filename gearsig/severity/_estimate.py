@@ -119,8 +119,8 @@ def _one_gear(
     marked = any(a.has_mark and b.has_mark for a, b in zip(now, healthy, strict=True))
     _check_harmonics(healthy[i], "the reference's")
     difference, agreement = difference_lines(shaft, healthy[i], whole_teeth=marked)
-    left, largest = np.abs(without_regular_lines(difference)).max(axis=1), np.abs(shaft.lines).max(axis=1)
-    if not np.all(left > SMALLEST_DIFFERENCE * largest):
+    residual, largest = np.abs(without_regular_lines(difference)).max(axis=1), np.abs(shaft.lines).max(axis=1)
+    if not np.all(residual > SMALLEST_DIFFERENCE * largest):
         raise RefusalError(
             "the reference holds the same samples as the recording",
             remedy="give a recording that was taken before the crack",
@@ -333,12 +333,12 @@ def share_of_the_recording(now: ShaftLines, difference: ShaftLines, event: Tooth
         From the scatter over bands and channels.
     """
     recorded = now.lines[:, : difference.highest_order + 1]
-    (recording, usual), (reference, usual_then), (left, background) = (
+    (recording, usual), (reference, usual_then), (residual, background) = (
         event_windows(replace(difference, lines=lines), event)
         for lines in (recorded, recorded - difference.lines, difference.lines)
     )
     gain = np.sqrt(usual / usual_then)  # of the other teeth: a deep crack pulls at the gain that was fitted before
-    shares = (recording / gain - reference * gain) / background / np.mean(left / background)
+    shares = (recording / gain - reference * gain) / background / np.mean(residual / background)
     return float(shares.mean()), float(shares.std() / np.sqrt(shares.size))
 
 
@@ -586,7 +586,7 @@ def _seen(
         gear=f"{facts.pair.name}/{shaft}",
         tooth=int(place * teeth) % teeth + 1 if best.shaft.has_mark else None,
         angle_deg=360.0 * place,
-        gear_is_certain=all(log(best.event.prominence / other) >= CLEARLY_LARGER for other in others),
+        gear_is_certain=all(log(best.event.prominence / prominence) >= CLEARLY_LARGER for prominence in others),
         depth_mm=percent / per_mm,
         depth_percent=percent,
         interval_mm=(interval[0] / per_mm, interval[1] / per_mm),

@@ -368,8 +368,8 @@ def _energy_spectrum(signal: FloatArray) -> FloatArray:
 
 
 def _less_background(energy: FloatArray, background: FloatArray) -> FloatArray:
-    left: FloatArray = np.maximum(energy - background, _MIN_SHARE * energy)
-    return left
+    residual: FloatArray = np.maximum(energy - background, _MIN_SHARE * energy)
+    return residual
 
 
 LARGEST_SPEED_DIFFERENCE = 0.02

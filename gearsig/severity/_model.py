@@ -275,7 +275,7 @@ class Calibration:
             values["provenance"],
         )
 
-    def check_reach(self, given: Mapping[str, float]) -> None:
+    def check_reach(self, features: Mapping[str, float]) -> None:
         """Refuse a machine that is unlike the calibration's.
 
         Raises
@@ -285,7 +285,7 @@ class Calibration:
         """
         outside = [
             f"{name} is {value:.4g}, the calibration has {self.reach[name][0]:.4g} to {self.reach[name][1]:.4g}"
-            for name, value in given.items()
+            for name, value in features.items()
             if not self.reach[name][0] * (1 - 1e-9) <= value <= self.reach[name][1] * (1 + 1e-9)
         ]
         if outside:
@@ -389,14 +389,14 @@ class CrackEstimate(Result):
     @property
     def text(self) -> str:
         """The statement in one sentence, or two."""
-        other = f"{100.0 * (1.0 - self.kind_probabilities.get(CRACKED, 1.0)):.0f} %"
+        not_cracked = f"{100.0 * (1.0 - self.kind_probabilities.get(CRACKED, 1.0)):.0f} %"
         if self.kind == OTHER_DAMAGE:
-            rather = f"{OTHER_DAMAGE} rather than cracked ({other})"
+            rather = f"{OTHER_DAMAGE} rather than cracked ({not_cracked})"
             return f"Damage at {self.place}, {rather}; a crack would be {self.size}."
         if self.likelier_other:
-            return f"Damage at {self.place}: {OTHER_DAMAGE} ({other}), or a crack of {self.size}."
+            return f"Damage at {self.place}: {OTHER_DAMAGE} ({not_cracked}), or a crack of {self.size}."
         text = f"Crack of {self.size}, {self.depth_percent:.0f} % of the root, at {self.place}."
-        return text if self.kind == CRACKED else f"{text} Or it is {OTHER_DAMAGE} ({other})."
+        return text if self.kind == CRACKED else f"{text} Or it is {OTHER_DAMAGE} ({not_cracked})."
 
 
 @dataclass(frozen=True)

@@ -95,13 +95,13 @@ def meetings(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
     near = np.abs(a - b) <= gap
     steps = np.diff(near.astype(np.int8), prepend=0, append=0)
     starts, stops = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)
-    found: list[Meeting] = []
+    meetings: list[Meeting] = []
     for start, stop in zip(starts, stops, strict=True):
-        if found and start - found[-1].stop < _N_FIT // 2:
-            found[-1] = Meeting(found[-1].start, int(stop))
+        if meetings and start - meetings[-1].stop < _N_FIT // 2:
+            meetings[-1] = Meeting(meetings[-1].start, int(stop))
         else:
-            found.append(Meeting(int(start), int(stop)))
-    return found
+            meetings.append(Meeting(int(start), int(stop)))
+    return meetings
 
 
 def untangled(
@@ -342,8 +342,8 @@ def ridges(
             remedy="look between other lines (lowest, highest), take a longer wavelet or window, or average more",
         )
     shared = shared_columns(paths, 2.0 * grid.n_reach)
-    found = [_ridge(transform, grid, part, p, s) for p, s in zip(paths, shared, strict=True)]
-    return tuple(sorted(found, key=lambda r: -float(np.mean(r.amplitude**2))))
+    ridges = [_ridge(transform, grid, part, p, s) for p, s in zip(paths, shared, strict=True)]
+    return tuple(sorted(ridges, key=lambda r: -float(np.mean(r.amplitude**2))))
 
 
 def _lines_between(positions: FloatArray, lowest: float | None, highest: float | None) -> slice:
@@ -391,19 +391,19 @@ def _grid(transform: Coefficients | TimeFrequencyMap, part: slice) -> _Grid:
 def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> list[FloatArray]:
     power = ridge_power(grid.power, squeezed=grid.squeezed)
     scores = ridge_scores(power, grid.n_reach)
-    found: list[FloatArray] = []
+    parts: list[FloatArray] = []
     strengths: list[float] = []
     for _ in range(n_ridges + _SPARE):
-        hidden = _hidden(scores.shape, found, grid.n_reach)
+        hidden = _hidden(scores.shape, parts, grid.n_reach)
         path = _seen_path(scores, hidden, steepest, stiffness)
         seen = _along(hidden, path) == NOT_HIDDEN
         if not seen.any() or float(_along(scores, path)[seen].mean()) < _MIN_SCORE:
             break
-        found.append(path)
+        parts.append(path)
         strengths.append(float(_along(power, path)[seen].mean()))
-    strongest = sorted(range(len(found)), key=lambda i: -strengths[i])[:n_ridges]
-    paths = [found[i] for i in sorted(strongest)]
-    others = [found[i] for i in range(len(found)) if i not in strongest]
+    strongest = sorted(range(len(parts)), key=lambda i: -strengths[i])[:n_ridges]
+    paths = [parts[i] for i in sorted(strongest)]
+    others = [parts[i] for i in range(len(parts)) if i not in strongest]
     if len(paths) > 1:
         paths = _settled(paths, grid, power)
         for i in range(len(paths)):  # once more, now that each knows where the others go

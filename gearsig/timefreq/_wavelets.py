@@ -351,8 +351,10 @@ def plan_group(
     batches = []
     for size in np.unique(n_bins):
         chosen = n_bins == size
-        own = min(step, max(1, n_block // int(size) // 2)) if follow_band else step
-        batches.append(_batch(lines[chosen], cycles, wavelet, n_block, int(size), own, low[chosen], high[chosen]))
+        block_step = min(step, max(1, n_block // int(size) // 2)) if follow_band else step
+        batches.append(
+            _batch(lines[chosen], cycles, wavelet, n_block, int(size), block_step, low[chosen], high[chosen])
+        )
     return LineGroup(tuple(batches), n_block, margin)
 
 

@@ -697,10 +697,10 @@ def eliminate(
     for t in range(start, stop):
         first = (t - start) * n_orders
         for k in range(n_orders):
-            own = np.conj(data[k, t])
-            right[first + k] += own * observed[t]
+            conjugate = np.conj(data[k, t])
+            right[first + k] += conjugate * observed[t]
             for m in range(k, n_orders):
-                triangle[first + k, m - k] += own * data[m, t]
+                triangle[first + k, m - k] += conjugate * data[m, t]
         if t + p < n:
             for k in range(n_orders):
                 square = weights[k, t] * weights[k, t]

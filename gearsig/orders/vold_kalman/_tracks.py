@@ -327,15 +327,17 @@ def bandwidths_of(
         raise InputError("give either bandwidth_hz or bandwidth_orders", where="bandwidth", allowed="one of both")
     n_orders, over_angle = len(tracks.names), tracks.unit == "orders"
     name, unit = ("bandwidth_orders", "orders") if hz is None else ("bandwidth_hz", "Hz")
-    given = np.atleast_1d(np.asarray(in_orders if hz is None else hz, dtype=object))
-    if given.shape not in {(1,), (n_orders,)}:
-        raise InputError(f"{name} has shape {given.shape}", allowed=f"one number, or one for each of {n_orders} orders")
-    for width in given:
+    bandwidths = np.atleast_1d(np.asarray(in_orders if hz is None else hz, dtype=object))
+    if bandwidths.shape not in {(1,), (n_orders,)}:
+        raise InputError(
+            f"{name} has shape {bandwidths.shape}", allowed=f"one number, or one for each of {n_orders} orders"
+        )
+    for width in bandwidths:
         if isinstance(width, str):  # no number, even one that could be read as such
             raise InputError(
                 f"{name} is {width!r}", allowed=f"a number above 0, in {unit}", remedy="leave the unit out"
             )
-    widths = np.broadcast_to([positive(cast("float", width), name, unit) for width in given], (n_orders,))
+    widths = np.broadcast_to([positive(cast("float", width), name, unit) for width in bandwidths], (n_orders,))
     speed = tracks.speed_rev_per_s
     if hz is not None:
         if not over_angle:
@@ -353,14 +355,14 @@ def bandwidths_of(
         return widths[:, None].copy()
     rows = []
     for k, width in enumerate(widths):  # with the speed of the order's own shaft, or else of the angle's
-        own = tracks.frequency_hz[k] / tracks.orders[k] if np.isfinite(tracks.orders[k]) else speed
-        if own is None:
+        order_speed = tracks.frequency_hz[k] / tracks.orders[k] if np.isfinite(tracks.orders[k]) else speed
+        if order_speed is None:
             raise InputError(
                 f"track {tracks.names[k]!r} has no order, and there is no shaft angle",
                 where="bandwidth_orders",
                 remedy="give the track an order, a shaft angle, or bandwidth_hz",
             )
-        rows.append(width * own)
+        rows.append(width * order_speed)
     return np.stack(rows)
 
 

@@ -177,19 +177,19 @@ def _header(
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Return names, units and the remaining lines above the table."""
     filled = [text for text in above if text.strip()]
-    found: list[tuple[str, ...]] = []
+    rows: list[tuple[str, ...]] = []
     for text in reversed(filled[-2:]):
         fields = _header_fields(text, separator, n_columns)
         if fields is None:
             break
-        found.append(fields)
+        rows.append(fields)
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
-    if len(found) == 2 and _all_units(found[0]):
-        units, names = found[0], found[1]
+    if len(rows) == 2 and _all_units(rows[0]):
+        units, names = rows[0], rows[1]
         filled = filled[:-2]
-    elif found:
-        names = found[0]
+    elif rows:
+        names = rows[0]
         filled = filled[:-1]
     return names, units, tuple(filled)
 

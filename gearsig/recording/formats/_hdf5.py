@@ -77,14 +77,14 @@ def _own_text(dataset: Any, path: Path) -> str:
     at, n_bytes = dataset.id.get_offset(), path.stat().st_size
     with path.open("rb") as file:
         file.seek(at or 0)
-        length, place, wanted = struct.unpack("<IQI", file.read(16))
+        length, place, index = struct.unpack("<IQI", file.read(16))
         file.seek(min(place, n_bytes))
         mark, size = struct.unpack("<4s4xQ", file.read(16))
         heap = file.read(min(size, n_bytes)) if mark == b"GCOL" else b""
     place = 0
     while at is not None and place + 16 <= len(heap):
         number, size = struct.unpack_from("<H6xQ", heap, place)
-        if number == wanted and length <= size <= len(heap) - place - 16:
+        if number == index and length <= size <= len(heap) - place - 16:
             return heap[place + 16 : place + 16 + length].decode("utf-8", "replace")
         place += 16 + size + -size % 8
     raise InputError(
@@ -96,7 +96,7 @@ def own_datasets(group: Any, skipped: list[str], prefix: str = "", depth: int = 
     """Return the datasets under a group that lie in the file itself, by path with dots."""
     import h5py
 
-    found: list[tuple[str, Any]] = []
+    datasets: list[tuple[str, Any]] = []
     for name in group:
         path = f"{prefix}{name}"
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
@@ -104,17 +104,17 @@ def own_datasets(group: Any, skipped: list[str], prefix: str = "", depth: int = 
             continue
         item = group[name]
         if isinstance(item, h5py.Group) and depth > 1 and not name.startswith("#"):  # "#refs#" is MATLAB's own store
-            found += own_datasets(item, skipped, f"{path}.", depth - 1)
+            datasets += own_datasets(item, skipped, f"{path}.", depth - 1)
         elif isinstance(item, h5py.Dataset):
             if item.is_virtual or item.external:
                 skipped.append(path)
             else:
-                found.append((path, item))
-        if len(found) > MAX_DATASETS:
+                datasets.append((path, item))
+        if len(datasets) > MAX_DATASETS:
             raise InputError(
                 f"holds more than {MAX_DATASETS} datasets", allowed="one recording", remedy="split the file"
             )
-    return found
+    return datasets
 
 
 def decoded_bytes(dataset: Any) -> int:

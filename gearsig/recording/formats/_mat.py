@@ -209,10 +209,10 @@ def variables(path: Path) -> Iterator[tuple[str, Any]]:
 
 def _decoded(body: memoryview, order: str, where: str, at: int) -> tuple[str, Any]:
     try:
-        found = list(tags(body, order))
-        if len(found) != 1 or found[0][0] != MATRIX:
+        elements = list(tags(body, order))
+        if len(elements) != 1 or elements[0][0] != MATRIX:
             _fail(where, at, "no variable begins where one should")
-        return decode_variable(found[0][1], order)
+        return decode_variable(elements[0][1], order)
     except InputError as error:
         if error.where:
             raise
