@@ -124,7 +124,7 @@ def test_a_stop_leaves_nothing(capsys, stub, tmp_path, stop) -> None:
 
 def test_a_failure_while_writing_leaves_what_was_there(tmp_path, monkeypatch) -> None:
     folder = tmp_path / "gap"
-    write_results(effect_report(), folder)
+    write_results(with_few_curves(effect_report()), folder)
     before = {p.name: p.read_bytes() for p in folder.iterdir()}
 
     def fail(*_: object, **__: object) -> None:
@@ -132,7 +132,7 @@ def test_a_failure_while_writing_leaves_what_was_there(tmp_path, monkeypatch) ->
 
     monkeypatch.setattr("app.gap_job.write_gap_json", fail)
     with pytest.raises(KeyboardInterrupt):
-        write_results(no_gap_report(), folder)
+        write_results(with_few_curves(no_gap_report()), folder)
     assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
     assert [p.name for p in tmp_path.iterdir()] == ["gap"]
 
@@ -140,7 +140,7 @@ def test_a_failure_while_writing_leaves_what_was_there(tmp_path, monkeypatch) ->
 def test_the_folder_one_is_in_may_be_given(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     check_folder(Path())
-    write_results(effect_report(), Path())
+    write_results(with_few_curves(effect_report()), Path())
     assert sorted(p.name for p in Path.cwd().iterdir()) == NAMES
     check_folder(Path())
 
