@@ -245,8 +245,9 @@ def content_kind(head: bytes) -> str:
         return "RIFF but not WAVE"
     if _MARKUP.match(head):
         return "HTML or XML"
-    kinds = (*(kind for start, kind in _FOREIGN if head.startswith(start)), *(f.sniff(head) for f in reversed(FORMATS)))
-    kind = next(filter(None, kinds), "")
+    text, *binary = FORMATS
+    foreign = (kind for start, kind in _FOREIGN if head.startswith(start))  # after formats that are kept in archives
+    kind = next(filter(None, (*(f.sniff(head) for f in reversed(binary)), *foreign, text.sniff(head))), "")
     if not kind and b"\0" in head and b"\0" not in head.rstrip(b"\0"):
         return "text followed by zero bytes"
     return kind or "binary data of an unknown kind"
