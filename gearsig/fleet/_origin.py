@@ -198,11 +198,13 @@ def _walk(root: Path) -> Iterable[Path]:
     import os
 
     for folder, subfolders, names in os.walk(root):  # links to folders are not followed
+        # Tables of a report and of a sweep, which stand beside pages and recordings.
+        tables = {"batch.csv"} if ".results" in subfolders else {"index.csv"} if "sweep.json" in names else set()
         subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
         if "store.json" in names and "new" in subfolders:  # a fleet's own store
             subfolders.clear()
             continue
-        for name in sorted(names):
+        for name in sorted(set(names) - tables):
             if not name.startswith("."):
                 yield Path(folder) / name
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.fleet import FilePattern, TrendSettings, date_in_name, open_fleet, origins
+from gearsig.fleet import FilePattern, TrendSettings, date_in_name, find_recordings, open_fleet, origins
 from tests.fleet.recordings import PATTERN, write_recording_file
 
 pytest.importorskip("duckdb", reason="the extra fleet is not installed")
@@ -259,6 +259,13 @@ def test_a_table_is_exported_in_each_form(make_recordings, tmp_path):
     with pytest.raises(InputError, match="ending"):
         fleet.export(tmp_path / "a.xlsx")
     assert multiprocessing.active_children() == []
+
+
+def test_tables_of_reports_and_sweeps_are_no_recordings(tmp_path):
+    for name in ("report/.results/a.json", "report/batch.csv", "grid/sweep.json", "grid/index.csv", "data/index.csv"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    assert [path.relative_to(tmp_path).as_posix() for path, _ in find_recordings([tmp_path])] == ["data/index.csv"]
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="timers that send signals are POSIX")
