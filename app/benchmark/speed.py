@@ -483,8 +483,8 @@ def _motion(n: int) -> TimedCase:
     surface, first, rate = ready.roughness.surface, float(ready.q[0]), np.empty(32)
     rough = (surface.amplitudes_m, 2 * pi * ready.roughness.frequencies_hz, ready.roughness.phases_rad)
     state, times = np.concatenate((ready.q, ready.v)), np.arange(n // stride) * stride * step_s
+    # Displacements are of 1e-5 m where angles are of 1 rad: each coordinate has its own absolute tolerance.
     scale = np.r_[np.ones(4), np.full(12, 1e-5), np.full(4, 50.0), np.full(12, 1e-2)]
-    """Displacements are of 1e-5 m where angles are of 1 rad: each coordinate has its own absolute tolerance."""
 
     def fixed(refined: int = 1) -> FloatArray:
         options = {"step_s": step_s / refined, "stride": stride * refined, "signals": ("driver y",)}
