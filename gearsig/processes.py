@@ -32,11 +32,8 @@ _APART: ProcessPoolExecutor | None = None
 def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
     """Open a pool of fresh processes; more threads than one each would fight over the processors.
 
-    They do not know what the caller's own script defines, see `can_be_sent`. The libraries read the thread
-    settings when they load, hence the environment; it is restored afterwards.
+    They do not know what the caller's own script defines, see `can_be_sent`.
     """
-    before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
-    os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
     pool = ProcessPoolExecutor(n_processes, mp_context=_Context(), initializer=_start_worker)
     try:
         yield pool
@@ -46,11 +43,47 @@ def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+
+
+_KEPT: ContextVar[list[ProcessPoolExecutor]] = ContextVar("kept")
+
+
+@contextmanager
+def one_pool(n_processes: int) -> Iterator[None]:
+    """Let all jobs of a block that ask for so many local processes run in the same ones, also as a decorator.
+
+    The processes start with the first job, and stay what they are while the block lasts; where one is killed, the jobs
+    that follow get fresh ones.
+    """
+    with process_pool(n_processes) as pool:
+        before = _KEPT.set([pool])
+        try:
+            yield
+        finally:
+            _KEPT.reset(before)
+
+
+def start_early(function: Callable[..., object], *arguments: object) -> None:
+    """Start the processes of `one_pool` now, each by a call whose answer nobody waits for: it loads what jobs need."""
+    if active_cluster() is None and can_be_sent(arguments):
+        for pool in _KEPT.get([]):
+            for _ in range(pool._max_workers):  # type: ignore[attr-defined]  # nothing public tells it
+                pool.submit(function, *arguments)
+
+
+@contextmanager
+def _jobs_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Open a pool, or take the one that is kept; a kept one that broke is not taken again."""
+    kept = _KEPT.get([])
+    if not kept or kept[0]._max_workers != n_processes:  # type: ignore[attr-defined]  # nothing public tells it
+        with process_pool(n_processes) as pool:
+            yield pool
+        return
+    try:
+        yield kept[0]
+    except BrokenProcessPool:
+        kept.clear()
+        raise
 
 
 def call_apart(function: Callable[..., Result], *arguments: object, longest_s: float) -> Result:
@@ -105,12 +138,27 @@ class _Process(SpawnProcess):
     """
 
     def start(self) -> None:
-        with _STARTING, _script_out_of_sight():
+        with _STARTING, _script_out_of_sight(), _one_thread():
             super().start()
 
 
 class _Context(SpawnContext):
     Process = _Process
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Tell libraries to use one thread: they read the environment when they load; it is restored afterwards."""
+    before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
+    os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 @contextmanager
@@ -200,7 +248,7 @@ def run_jobs(
         return
     while True:
         try:
-            with process_pool(n_workers) as pool:
+            with _jobs_pool(n_workers) as pool:
                 yield from _collect(pool, function, waiting, running, 2 * n_workers, on_wait)
         except BrokenProcessPool:
             suspects = sorted(running.values(), key=lambda item: item[0])

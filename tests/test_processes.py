@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gearsig.processes import call_apart, can_be_sent, process_pool
+from gearsig.processes import call_apart, can_be_sent, one_pool, process_pool, run_jobs
 
 SCRIPT = """
 from gearsig.processes import can_be_sent, process_pool
@@ -97,3 +97,18 @@ def test_what_is_called_apart_may_die_or_never_end() -> None:
     with pytest.raises(BrokenProcessPool, match="no answer"):
         call_apart(time.sleep, 60, longest_s=0.2)
     assert call_apart(abs, -3, longest_s=30.0) == 3
+
+
+@pytest.mark.skipif(
+    not Path("/proc/self").is_symlink(), reason="the system does not tell a process its number as a link"
+)
+def test_jobs_of_a_block_share_processes_and_one_that_is_killed_is_replaced() -> None:
+    def numbers() -> set[str]:
+        jobs = run_jobs(os.readlink, ["/proc/self"] * 3, n_workers=2, if_killed=str)
+        return {number for _, number in jobs}
+
+    with one_pool(2):
+        first = numbers()
+        assert len(first | numbers()) <= 2
+        assert [*run_jobs(os._exit, [1], n_workers=2, if_killed=lambda _job: None)] == [(0, None)]
+        assert not first & numbers()

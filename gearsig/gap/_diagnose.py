@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -29,7 +30,15 @@ from gearsig.gap._population import load_learned
 from gearsig.gap._rigs import is_gearless, twin_rig, with_stage
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
 from gearsig.gap._tooth_error import ToothErrorEvidence, mean_log_likelihoods, tooth_error_evidence
-from gearsig.gap._trials import TriedEffect, at_its_tooth, cause_place, observed_changes, steps_of
+from gearsig.gap._trials import (
+    PROCESSES,
+    TriedEffect,
+    at_its_tooth,
+    cause_place,
+    observed_changes,
+    run_for_a_moment,
+    steps_of,
+)
 from gearsig.gap._types import (
     NAMING,
     GapCause,
@@ -45,6 +54,7 @@ from gearsig.gap._verdict import in_order, likeliest_two, named_cause, rivals, u
 from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
 from gearsig.prepared import PreparedRecording
+from gearsig.processes import one_pool, start_early
 from gearsig.recording import Recording, metres_per_second_squared
 from gearsig.rig import Rig
 from gearsig.severity import CrackEstimate, estimate_crack
@@ -82,6 +92,7 @@ NOT_NEARER = (
 )
 
 
+@one_pool(PROCESSES)
 def diagnose_gap(
     recordings: Sequence[Recording],
     simulator: GapSimulator | DriveSimulator,
@@ -158,6 +169,7 @@ def diagnose_gap(
     # 3. Each recording is reduced to features, beside the healthy twin at its point and the reference.
     alone, assumed = twin_rig(rig)
     twin, learned = simulator.twin_of(alone), load_learned()
+    start_early(run_for_a_moment, twin)
     _check_own(twin, set(allowed) - set(learned.causes))
     tell("reading the recordings", 0.02)
     conditions, notices = conditions_of(prepared, healthy, twin, tell=tell, learned=learned)
@@ -168,27 +180,28 @@ def diagnose_gap(
     tell("recognising", 0.2)
     labelled, left_out = labelled_changes(learn, healthy, conditions, twin, cache, fresh=fresh)
     courses = _courses(conditions, recordings, references)
-    attribution = attribute(
-        conditions,
-        known,
-        effects,
-        twin,
-        cache,
-        lambda what, done: tell(what, 0.25 + 0.55 * done),
-        fresh=fresh,
-        labelled=labelled,
-        courses=mean_log_likelihoods(courses),
-    )
+    with ThreadPoolExecutor(1) as beside:  # step 5 has time while other processes simulate
+        standing_out = beside.submit(stood_out, recording, healthy)
+        attribution = attribute(
+            conditions,
+            known,
+            effects,
+            twin,
+            cache,
+            lambda what, done: tell(what, 0.25 + 0.55 * done),
+            fresh=fresh,
+            labelled=labelled,
+            courses=mean_log_likelihoods(courses),
+        )
     tried, gap = attribution.tried, _places(clearest)
     probabilities = _weighed(attribution, clearest, known, gap)
 
     # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
-    standing, remarks, faults = stood_out(recording, healthy)
+    standing, remarks, faults = standing_out.result()
     groups = {name: effect.group for name, effect in known.items()}
     outcome, unseen = beside_standing(attribution.calibration.outcome(probabilities, groups), standing)
-    without = _weighed(replace(attribution, labelled=None), clearest, known, gap)
-    labels = _labelled_facts(attribution, without, groups)
+    labels = _labelled_facts(attribution, _weighed(replace(attribution, labelled=None), clearest, known, gap), groups)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
@@ -285,7 +298,7 @@ def _check_own(twin: Twin, names: Iterable[str]) -> None:
     """Run effects that are somebody's own for a moment, before the long work: their files may fail."""
     for name in sorted(names):
         for added in twin.candidates(name)[-1:]:
-            twin.run(twin.point, (added,), seed=0, duration_s=0.05, sampling_rate_hz=20480.0)
+            run_for_a_moment(twin, (added,))
 
 
 def _unit(recording: Recording) -> str:

@@ -120,7 +120,7 @@ def _added(row: list[Any]) -> Added:
 # --------------------
 
 
-SoundKey = tuple[OperatingCondition, float, float]
+SoundKey = tuple[str, OperatingCondition, float, float]
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class TwinRun:
     @property
     def healthy_key(self) -> SoundKey:
         """What the twin's healthy runs depend on; twins need not hash."""
-        return self.point, self.duration_s, self.sampling_rate_hz
+        return self.twin.key, self.point, self.duration_s, self.sampling_rate_hz
 
 
 @dataclass(frozen=True)
@@ -195,18 +195,23 @@ def _killed_batch(tasks: Sequence[Task]) -> list[Reduced | str]:
     return ["the process that simulated it was killed: perhaps it ran out of memory" for _ in tasks]
 
 
+def run_for_a_moment(twin: Twin, added: Sequence[Added] = ()) -> None:
+    """Run a twin for no longer than it takes to see that it can, and that what it needs is loaded."""
+    twin.run(twin.point, added, seed=SEED, duration_s=0.05, sampling_rate_hz=20480.0)
+
+
 Known = dict[tuple[SoundKey, int], ReducedRecording]
 _KNOWN: Known = {}
-"""Healthy first runs by point, length and seed, of the one twin that a worker works for."""
+"""Healthy first runs by twin, point, length and seed, of the one diagnosis that a worker works for."""
 
 
 def reduced_in_worker(tasks: Sequence[Task]) -> list[Reduced | str]:
-    """Return what tasks give, in a process that lives for one twin only."""
+    """Return what tasks give, in a process that lives for one diagnosis only."""
     return [_reduced(task, _KNOWN) for task in tasks]
 
 
 def reduced_apart(tasks: Sequence[Task]) -> list[Reduced | str]:
-    """Return what tasks give, in a process that works for several twins."""
+    """Return what tasks give, in a process that works for several diagnoses."""
     known: Known = {}
     return [_reduced(task, known) for task in tasks]
 
