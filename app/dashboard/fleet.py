@@ -82,7 +82,7 @@ def show() -> None:
         st.markdown(HOW_TO_FILL)
         return
     _show_counts(status)
-    left, right = st.columns((3, 8), gap="medium")
+    left, right = st.container(key="fleet").columns((3, 8), gap="medium")
     with left:
         machine, point = _choose_point(status)
     with right:
@@ -109,7 +109,7 @@ def _choose_point(status: DataFrame) -> tuple[str, str]:
     chosen = (state.addressed(MACHINE, "machine", first[0]), state.addressed(POINT, "point", first[1]))
     if chosen not in everywhere:
         chosen = first
-    with st.container(height=620, border=False):
+    with st.container(height=620 if len(of_machine) > 6 else "content", border=False):
         for name, rows in list(of_machine.items())[:N_MACHINES]:
             worst = rows[0]["level"]
             is_open = name == chosen[0]

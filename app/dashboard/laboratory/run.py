@@ -156,7 +156,7 @@ def times_of(run: LaboratoryRun, phase: FloatArray, values: FloatArray | Sequenc
 
 # Each holds some MB: a recording and eight signals of the motion at 80 kHz. An older setting of a slider is of no use.
 simulated = kept(24, "Simulating …", grace_s=0.0)(run_setup)
-PREVIEW_REVOLUTIONS, PREVIEW_S = 3.0, 0.1
+PREVIEW_REVOLUTIONS, PREVIEW_S = 2.0, 0.1
 """Of the slower shaft, and seconds at least."""
 
 
