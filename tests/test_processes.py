@@ -103,7 +103,7 @@ def test_what_is_called_apart_may_die_or_never_end() -> None:
     not Path("/proc/self").is_symlink(), reason="the system does not tell a process its number as a link"
 )
 def test_jobs_of_a_block_share_processes_and_one_that_is_killed_is_replaced() -> None:
-    def numbers() -> set[str]:
+    def numbers() -> set[object]:
         jobs = run_jobs(os.readlink, ["/proc/self"] * 3, n_workers=2, if_killed=str)
         return {number for _, number in jobs}
 

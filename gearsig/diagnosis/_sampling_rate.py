@@ -44,6 +44,9 @@ CLEAR_DB = 12.0
 ENOUGH_EVIDENCE = -20.0
 """Sum over all spectra of lg p from which a rate explains what is seen."""
 
+ENOUGH_OF_EACH = -5.0
+"""The same of the shafts' lines alone, and of what the races explain beside them."""
+
 SHARE_OF_STATED = 0.25
 """The stated rate explains nothing where its own sum is below that share of another rate's."""
 
@@ -244,19 +247,30 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     shafts = sorted(signals.known_shaft_orders.values())
     races, parts = (list(_parts(signals, with_elements=so)) for so in (False, True))
 
-    def evidence(factor: float, highest: float, tolerance: float = STATED_SPEED_TOLERANCE) -> float:
+    def evidence(
+        factor: float,
+        highest: float,
+        tolerance: float = STATED_SPEED_TOLERANCE,
+        at: Sequence[tuple[float, float]] | None = None,
+    ) -> float:
         """Sum over the spectra, of lg of the chance that lines up to an order lie as well."""
-        found = (_strong_lines(excess, highest) for excess in spectra)
-        at = parts if factor == 1.0 else races
-        return sum(_log_p(lines, factor, shafts, at, tolerance) for lines in found if lines is not None)
+        strong = (_strong_lines(excess, highest) for excess in spectra)
+        at = at if at is not None else parts if factor == 1.0 else races
+        return sum(_log_p(lines, factor, shafts, at, tolerance) for lines in strong if lines is not None)
 
     if evidence(1.0, HIGHEST_ORDER) <= ENOUGH_EVIDENCE:
         return None
-    candidates = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
+    usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
+    candidates = [*usual, *common]
     factors = _apart(candidates)
     # A rate that is too high moves everything up, and more of the spectrum counts.
     ranges = {factor: HIGHEST_ORDER * max(1.0, 1 / factor) for factor in factors}
     sums = {factor: evidence(factor, ranges[factor]) for factor in factors}
+    # Among so many rates one makes any family of lines the shaft's or a race's: both must speak for it.
+    for factor in set(factors).difference(usual):
+        of_shafts = evidence(factor, ranges[factor], at=())
+        if max(of_shafts, sums[factor] - of_shafts) > ENOUGH_OF_EACH:
+            sums[factor] = 0.0
     # The mildest factor that explains nearly as much as the best: its multiples do so, too, with more places.
     as_good = [f for f in factors if sums[f] <= AS_GOOD * min(sums.values())]
     factor = min(as_good, key=lambda f: (round(abs(log10(f)), 6), sums[f]))
@@ -275,14 +289,14 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     )
 
 
-def _factors(stated_hz: float, *, with_parts: bool) -> list[float]:
-    """Return the factors to try, the usual ones first.
+def _factors(stated_hz: float, *, with_parts: bool) -> tuple[list[float], list[float]]:
+    """Return the factors to try: the usual ones, and those to common rates.
 
     Halves of the shaft's order are looseness, and multiples blades or poles: races must tell these rates apart.
     """
-    usual = [f for factor in USUAL_FACTORS for f in (factor, 1 / factor)]
-    common = [rate / stated_hz for rate in COMMON_RATES_HZ if 0.2 <= rate / stated_hz <= 5.0]
-    return [f for f in [*usual, *common] if abs(f - 1) > STATED_SPEED_TOLERANCE and (with_parts or f > 2)]
+    usual = [f for factor in USUAL_FACTORS for f in (factor, 1 / factor) if with_parts or f > 2]
+    common = [rate / stated_hz for rate in COMMON_RATES_HZ if with_parts and 0.2 <= rate / stated_hz <= 5.0]
+    return usual, [f for f in common if abs(f - 1) > STATED_SPEED_TOLERANCE]
 
 
 def _apart(factors: Sequence[float]) -> list[float]:
