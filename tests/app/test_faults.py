@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -222,7 +223,7 @@ def test_two_share_a_folder_and_one_is_killed(name, tmp_path, undisturbed):
     for number in range((N_FAULTS + 9) // 10):
         place = _place(tmp_path / str(number), name)
         killed, other = place.start(), place.start()
-        with pytest.raises(subprocess.TimeoutExpired):
+        with suppress(subprocess.TimeoutExpired):  # it may be quicker than the one that was timed
             killed.communicate(timeout=draw.uniform(0.3, 0.7) * duration_s)
         killed.kill()
         killed.communicate()

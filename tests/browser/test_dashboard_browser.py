@@ -177,7 +177,7 @@ def test_names_from_a_file_are_text(page: playwright.Page) -> None:
 
 def test_a_broken_file_is_one_message(page: playwright.Page) -> None:
     open_files(page, {"name": "broken.mat", "mimeType": "", "buffer": b"\x80\x04\x95 pickle"})
-    message = page.get_by_test_id("stAlert")
-    message.filter(has_text="pickle").wait_for()
-    assert soon(page, lambda: message.count() == 1)  # the invitation of the run before is gone when this run has ended
+    message = page.get_by_test_id("stAlert").filter(has_text="pickle")
+    message.first.wait_for()
+    assert soon(page, lambda: message.count() == 1)
     assert "pickle" in message.inner_text()

@@ -95,6 +95,6 @@ def test_an_own_file_stays_open_while_the_laboratory_is_looked_at(page: playwrig
     page.get_by_role("link", name="Analysis").click()
     page.get_by_text("Still open: mine.csv").wait_for()
     settle(page)
-    assert page.get_by_test_id("stMain").get_by_text("mine.csv").count() > 0
+    page.get_by_test_id("stMain").get_by_text("mine.csv").first.wait_for()
     page.get_by_role("button", name="Close", exact=True).click()
     page.get_by_text("Give a recording on the left").wait_for()
