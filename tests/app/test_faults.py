@@ -11,8 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -196,6 +195,12 @@ def _place(folder: Path, name: str) -> Place:
     return Place(folder, name)
 
 
+def _places(folder: Path, name: str) -> Iterator[Place]:
+    """Yield a place for each ten interruptions asked for, and one at least."""
+    for number in range((N_FAULTS + 9) // 10):
+        yield _place(folder / str(number), name)
+
+
 def _draw(name: str) -> np.random.Generator:
     return np.random.default_rng([SEED, list(COMMANDS).index(name)])
 
@@ -222,10 +227,9 @@ def test_what_is_interrupted_goes_on(name, tmp_path, undisturbed):
 def test_two_share_a_folder_and_one_is_killed(name, tmp_path, undisturbed):
     expected, duration_s = undisturbed(name)
     draw = _draw(name)
-    for number in range((N_FAULTS + 9) // 10):
-        place = _place(tmp_path / str(number), name)
+    for place in _places(tmp_path, name):
         killed, other = place.start(), place.start()
-        with suppress(subprocess.TimeoutExpired):  # it may be quicker than the one that was timed
+        with pytest.raises(subprocess.TimeoutExpired):
             killed.communicate(timeout=draw.uniform(0.3, 0.7) * duration_s)
         killed.kill()
         killed.communicate()
@@ -238,8 +242,7 @@ def test_two_share_a_folder_and_one_is_killed(name, tmp_path, undisturbed):
 def test_a_full_disk_is_said_and_nothing_is_half_written(name, tmp_path, undisturbed):
     expected, _ = undisturbed(name)
     draw = _draw(name)
-    for number in range((N_FAULTS + 9) // 10):
-        place = _place(tmp_path / str(number), name)
+    for place in _places(tmp_path, name):
         process = place.start(most_bytes=int(10 ** draw.uniform(0.0, 5.3)))
         said = process.communicate()[1]
         assert process.returncode in (0, 1, 2), said
@@ -252,8 +255,7 @@ def test_a_full_disk_is_said_and_nothing_is_half_written(name, tmp_path, undistu
 def test_damaged_files_are_made_again(name, tmp_path, undisturbed):
     expected, _ = undisturbed(name)
     draw = _draw(name)
-    for number in range((N_FAULTS + 9) // 10):
-        place = _place(tmp_path / str(number), name)
+    for place in _places(tmp_path, name):
         place.finish()
         kept = [path for path in place.folder.rglob("*") if path.suffix in (".npz", ".parquet", ".json")]
         for path in draw.permutation(sorted(kept))[:3]:

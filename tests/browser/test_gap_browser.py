@@ -11,7 +11,7 @@ import pytest
 from app.samples import sample_folder
 from tests.browser.conftest import CHROMIUM, settle
 from tests.gap.example_report import effect_report
-from tests.gap.stub_diagnosis import SECONDS, environment
+from tests.gap.stub_diagnosis import ALL_CURVES, SECONDS, environment
 
 pytestmark = [
     pytest.mark.browser,
@@ -26,7 +26,7 @@ TABS = ("Where", "Which", "How far", "Next and facts")
 def stubbed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Let the processes of this module's server answer at once."""
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in environment(tmp_path_factory.mktemp("site"), **{SECONDS: "4"}).items():
+        for name, value in environment(tmp_path_factory.mktemp("site"), **{SECONDS: "4", ALL_CURVES: "1"}).items():
             patch.setenv(name, value)
         yield
 
@@ -60,8 +60,9 @@ def test_run_look_and_download(gap: playwright.Page, tmp_path: Path) -> None:
         settle(gap)
     gap.get_by_role("tab", name="Where").click()
     settle(gap)
-    gap.locator(".figure svg").first.wait_for()
-    gap.locator("[data-testid=stImage] img").first.wait_for()
+    # Two averages; two spectra against the reference and two against the simulation, each with its gap; two rings.
+    playwright.expect(gap.locator(".figure")).to_have_count(10, timeout=60_000)
+    playwright.expect(gap.locator("[data-testid=stImage] img")).to_have_count(2)
     with gap.expect_download() as waiting:
         button(gap, "Report (HTML)").click()
     waiting.value.save_as(tmp_path / "gap.html")

@@ -248,7 +248,7 @@ def _show_consequences(table: Table, *, is_told: bool) -> None:
             show_error(error)
         return
     if not rig.shafts:
-        st.info("Name a shaft: its orders follow, and with teeth those of the mesh.", icon=":material/account_tree:")
+        st.caption(":material/account_tree: Name a shaft: its orders follow, and with teeth those of the mesh.")
         return
     st.image(train_svg(rig, palette().quiet), width="stretch", alt="Drawing of the gear train")
     lines = [line for line in order_lines(rig, rig.reference_shaft, n_sidebands=0) if line.kind != "sideband"]
