@@ -186,17 +186,13 @@ class RecordBlocks:
             begin = max(0, first - reach)
             part = self.read(slice(begin, min(self.n_samples, first + BLOCK_SAMPLES + reach)))
             if isinstance(speed, TachometerChannel):
-                if speed.threshold is None or speed.hysteresis is None:  # once, by the levels of the first block
-                    low, high = np.percentile(part.values(speed.channel), (0.05, 99.95))
-                    speed = replace(
-                        speed,
-                        threshold=float((low + high) / 2) if speed.threshold is None else speed.threshold,
-                        hysteresis=float((high - low) / 4) if speed.hysteresis is None else speed.hysteresis,
-                    )
-                found = find_pulse_edges(
+                edges = find_pulse_edges(
                     part.values(speed.channel), rate, threshold=speed.threshold, hysteresis=speed.hysteresis,
                     edge=speed.edge,
-                ).times_s  # fmt: skip
+                )  # fmt: skip
+                found = edges.times_s
+                # By the levels of the first block, where they are not given.
+                speed = replace(speed, threshold=edges.threshold, hysteresis=edges.hysteresis)
             else:
                 assert isinstance(part.speed, PulseTimes)  # noqa: S101 - said to the type checker: of the same file
                 found = part.speed.times_s
