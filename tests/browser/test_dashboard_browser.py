@@ -30,7 +30,7 @@ playwright = pytest.importorskip("playwright.sync_api")
 def open_files(page: playwright.Page, recording: Path | dict[str, object], rig: Path | None = None) -> None:
     page.get_by_role("link", name="Analysis").click()
     page.get_by_text("Own file", exact=True).click()
-    page.get_by_text("Give a recording on the left").wait_for()
+    page.get_by_text("Give a recording on the left").first.wait_for()
     settle(page)
     inputs = page.locator("[data-testid=stFileUploader] input[type=file]")
     if rig is not None:
@@ -48,7 +48,7 @@ def verdict(page: playwright.Page) -> str:
 
 def open_sample(page: playwright.Page) -> None:
     page.get_by_role("button", name="Open the recording").click()
-    page.locator(".strip").wait_for()
+    page.locator(".strip").first.wait_for()
     settle(page)
 
 
@@ -113,12 +113,12 @@ def test_zooming_refines_and_cursors_are_dragged(page: playwright.Page) -> None:
 
 def test_a_view_can_be_sent_as_its_address_and_an_own_file_survives_a_reload(page: playwright.Page) -> None:
     open_files(page, SAMPLE.recording, SAMPLE.rig)
-    page.locator(".strip").wait_for()
+    page.locator(".strip").first.wait_for()
     open_view(page, "Speed")
     said = verdict(page)
     assert "file=" in page.url
     page.reload()
-    page.locator(".strip button[aria-pressed=true]").filter(has_text="Speed").wait_for()
+    page.locator(".strip button[aria-pressed=true]").filter(has_text="Speed").first.wait_for()
     settle(page)
     assert verdict(page) == said
 
@@ -127,17 +127,17 @@ def test_another_user_sees_nothing_of_the_first(page: playwright.Page, address: 
     name = "confidential.csv"
     rows = "\n".join(f"{i / 1000:g},{(i * 37) % 101}" for i in range(3000))
     open_files(page, {"name": name, "mimeType": "text/csv", "buffer": f"time (s),a\n{rows}\n".encode()})
-    page.locator(".strip").wait_for()
+    page.locator(".strip").first.wait_for()
     token = page.url.partition("file=")[2]
     assert len(token) > 20
     other = page.context.browser.new_context().new_page()
     other.set_default_timeout(90_000)
     other.goto(address)
-    other.get_by_role("button", name="Open the recording").wait_for()
+    other.get_by_role("button", name="Open the recording").first.wait_for()
     assert name not in other.locator("body").inner_text()
     for query in ("?file=", f"?file={token[:8]}"):
         other.goto(f"{address}analysis{query}")
-        other.locator(".strip").wait_for()  # a sample's, which is open where nothing else is
+        other.locator(".strip").first.wait_for()  # a sample's, which is open where nothing else is
         assert name not in other.locator("body").inner_text()
     other.close()
 
@@ -152,7 +152,7 @@ def test_a_small_window_shows_the_verdict_above_its_picture(page: playwright.Pag
 
 def test_own_files(page: playwright.Page) -> None:
     open_files(page, SAMPLE.recording, SAMPLE.rig)
-    page.locator(".strip").wait_for()
+    page.locator(".strip").first.wait_for()
     settle(page)
     recording = read_recording(SAMPLE.recording, rig=read_rig(SAMPLE.rig))
     words = page.get_by_test_id("stMain").inner_text().replace("\u2060", "").split()
@@ -166,7 +166,7 @@ def test_names_from_a_file_are_text(page: playwright.Page) -> None:
     content = f"time (s);{HOSTILE[0]};{HOSTILE[1]}\n{rows}\n".encode()
     name = "<b>n</b> :smile: **r**.csv"
     open_files(page, {"name": name, "mimeType": "text/csv", "buffer": content})
-    page.locator(".strip").wait_for()
+    page.locator(".strip").first.wait_for()
     open_view(page, "Waveform")
     text = page.locator("[data-testid=stMain]").inner_text().replace("\u2060", "")
     for shown in (name, *HOSTILE):
@@ -178,7 +178,8 @@ def test_names_from_a_file_are_text(page: playwright.Page) -> None:
 def test_a_broken_file_is_one_message(page: playwright.Page) -> None:
     open_files(page, {"name": "broken.mat", "mimeType": "", "buffer": b"\x80\x04\x95 pickle"})
     message = page.get_by_test_id("stAlert")
-    message.wait_for()
-    page.get_by_text("As a rig file (TOML)").wait_for()  # the page to its end
+    message.first.wait_for()
+    page.get_by_text("As a rig file (TOML)").first.wait_for()  # the page to its end
+    settle(page)
     assert message.count() == 1
     assert "pickle" in message.inner_text()

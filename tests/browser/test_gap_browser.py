@@ -42,7 +42,7 @@ def address(stubbed: None, address: str) -> str:
 def gap(page: playwright.Page) -> playwright.Page:
     page.set_default_timeout(60_000)
     page.get_by_role("link", name="Gap").click()
-    page.get_by_role("heading", name="Gap between simulation and recording").wait_for()
+    page.get_by_role("heading", name="Gap between simulation and recording").first.wait_for()
     settle(page)
     return page
 
@@ -54,7 +54,7 @@ def button(page: playwright.Page, name: str) -> playwright.Locator:
 def test_run_look_and_download(gap: playwright.Page, tmp_path: Path) -> None:
     button(gap, "Diagnose").click()
     gap.get_by_role("progressbar").first.wait_for()
-    gap.get_by_role("tab", name="Which").wait_for()
+    gap.get_by_role("tab", name="Which").first.wait_for()
     for tab in TABS:
         gap.get_by_role("tab", name=tab).click()
         settle(gap)
@@ -77,9 +77,9 @@ def test_stop_and_start_again(gap: playwright.Page) -> None:
     button(gap, "Diagnose").click()
     gap.get_by_role("progressbar").first.wait_for()
     button(gap, "Stop").click()
-    gap.get_by_text("Stopped.").wait_for()
+    gap.get_by_text("Stopped.").first.wait_for()
     button(gap, "Diagnose").click()
-    gap.get_by_role("tab", name="Which").wait_for()
+    gap.get_by_role("tab", name="Which").first.wait_for()
 
 
 def test_own_files_stay_while_another_page_is_shown(gap: playwright.Page) -> None:
@@ -92,9 +92,9 @@ def test_own_files_stay_while_another_page_is_shown(gap: playwright.Page) -> Non
     inputs.nth(1).set_input_files([folder / "root_crack_3mm.toml", folder / "root_crack_1mm.toml"])
     settle(gap)
     gap.get_by_role("link", name="Analysis").click()
-    gap.locator(".strip").wait_for()
+    gap.locator(".strip").first.wait_for()
     gap.get_by_role("link", name="Gap").click()
-    gap.get_by_text("Still open: root_crack_1mm.h5, root_crack_3mm.h5").wait_for()
+    gap.get_by_text("Still open: root_crack_1mm.h5, root_crack_3mm.h5").first.wait_for()
     settle(gap)
     button(gap, "Diagnose").click()
-    gap.get_by_role("tab", name="Which").wait_for()
+    gap.get_by_role("tab", name="Which").first.wait_for()

@@ -21,7 +21,7 @@ def laboratory(page: playwright.Page) -> playwright.Page:
     """Go from the analysis to the laboratory."""
     page.set_default_timeout(300_000)  # the simulator may have to be compiled first
     page.get_by_role("link", name="Fault laboratory").click()
-    page.get_by_role("tab", name="Phase portrait").wait_for()
+    page.get_by_role("tab", name="Phase portrait").first.wait_for()
     settle(page)
     return page
 
@@ -30,36 +30,36 @@ def pull_the_crack(page: playwright.Page, n_steps: int, reached: str) -> None:
     page.get_by_role("slider", name="Crack in a tooth root").focus()
     for _ in range(n_steps):
         page.keyboard.press("ArrowRight")
-    page.get_by_role("heading", name=f"Crack in a tooth root, {reached}", exact=True).wait_for()
+    page.get_by_role("heading", name=f"Crack in a tooth root, {reached}", exact=True).first.wait_for()
     page.get_by_text("Preview of").wait_for(state="hidden")
     settle(page)
 
 
 def test_from_the_slider_to_the_analysis_and_back(laboratory: playwright.Page) -> None:
-    laboratory.get_by_role("heading", name="Healthy").wait_for()
+    laboratory.get_by_role("heading", name="Healthy").first.wait_for()
     pull_the_crack(laboratory, 100, "2 mm")
     for name in ("Spectrum", "Envelope", "Phase portrait", "Mesh"):
         laboratory.get_by_role("tab", name=name, exact=True).click()
         settle(laboratory)
         laboratory.locator(".figure svg, .js-plotly-plot").first.wait_for()
     laboratory.get_by_role("button", name="Open in the analysis page").click()
-    laboratory.locator(".strip").wait_for()
+    laboratory.locator(".strip").first.wait_for()
     laboratory.get_by_text("published_55_75_root_crack_2.h5").first.wait_for()
     laboratory.get_by_text("5 s at 20480 Hz").first.wait_for()
     settle(laboratory)
     laboratory.get_by_role("link", name="Fault laboratory").click()
-    laboratory.get_by_role("tab", name="Phase portrait").wait_for()
-    laboratory.get_by_role("heading", name="Crack in a tooth root, 2 mm", exact=True).wait_for()
+    laboratory.get_by_role("tab", name="Phase portrait").first.wait_for()
+    laboratory.get_by_role("heading", name="Crack in a tooth root, 2 mm", exact=True).first.wait_for()
 
 
 def test_the_finite_element_pair_follows_its_slider_to_the_end(laboratory: playwright.Page) -> None:
     laboratory.get_by_role("combobox", name="Machine").click()
     laboratory.get_by_role("option", name="Flexible 50/50").click()
-    laboratory.get_by_text("Flexible spur pair 50/50").wait_for()
+    laboratory.get_by_text("Flexible spur pair 50/50").first.wait_for()
     settle(laboratory)
     laboratory.get_by_role("slider", name="Crack in a tooth root").focus()
     laboratory.keyboard.press("End")
-    laboratory.get_by_role("heading", name="Crack in a tooth root, 8.15 mm").wait_for()
+    laboratory.get_by_role("heading", name="Crack in a tooth root, 8.15 mm").first.wait_for()
     settle(laboratory)
     for name in ("Spectrum", "Mesh"):
         laboratory.get_by_role("tab", name=name, exact=True).click()
@@ -84,17 +84,17 @@ def test_an_own_file_stays_open_while_the_laboratory_is_looked_at(page: playwrig
     content = f"time (s);a1\n{rows}\n".encode()
     page.get_by_role("link", name="Analysis").click()
     page.get_by_text("Own file", exact=True).click()
-    page.get_by_text("Give a recording on the left").wait_for()
+    page.get_by_text("Give a recording on the left").first.wait_for()
     uploader = page.locator("[data-testid=stFileUploader] input[type=file]").first
     uploader.set_input_files({"name": "mine.csv", "mimeType": "text/csv", "buffer": content})
-    page.locator(".strip").wait_for()
+    page.locator(".strip").first.wait_for()
     settle(page)
     page.set_default_timeout(300_000)
     page.get_by_role("link", name="Fault laboratory").click()
-    page.get_by_role("tab", name="Phase portrait").wait_for()
+    page.get_by_role("tab", name="Phase portrait").first.wait_for()
     page.get_by_role("link", name="Analysis").click()
-    page.get_by_text("Still open: mine.csv").wait_for()
+    page.get_by_text("Still open: mine.csv").first.wait_for()
     settle(page)
     page.get_by_test_id("stMain").get_by_text("mine.csv").first.wait_for()
     page.get_by_role("button", name="Close", exact=True).click()
-    page.get_by_text("Give a recording on the left").wait_for()
+    page.get_by_text("Give a recording on the left").first.wait_for()

@@ -23,7 +23,7 @@ playwright = pytest.importorskip("playwright.sync_api")
 
 def open_analysis(page: playwright.Page, sample: str = "damaged_tooth") -> None:
     page.goto(f"{page.url.partition('?')[0]}analysis?sample={sample}")
-    page.locator(".strip").wait_for()
+    page.locator(".strip").first.wait_for()
     settle(page)
 
 
@@ -44,7 +44,7 @@ def test_every_method_draws(page: playwright.Page) -> None:
     open_analysis(page)
     for method in METHODS:
         panel = open_method(page, method)
-        panel.get_by_text("Analysed: 0 to ").wait_for()
+        panel.get_by_text("Analysed: 0 to ").first.wait_for()
         if method != "Crack severity":  # the sample's tooth is damaged otherwise
             panel.locator(".figure svg, .js-plotly-plot, img").first.wait_for()
             assert panel.get_by_test_id("stAlert").count() == 0, method
@@ -78,5 +78,5 @@ def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page) -> 
 def test_the_depth_of_a_crack_against_the_healthy_sample(page: playwright.Page) -> None:
     open_analysis(page, "root_crack_3mm")
     panel = open_method(page, "Crack severity")
-    panel.locator("img").wait_for()
+    panel.locator("img").first.wait_for()
     assert "tooth 21" in panel.get_by_test_id("stAlert").filter(has_text="tooth").inner_text().replace("\u2060", "")
