@@ -19,7 +19,10 @@ _SUFFIX = re.compile(
     r"C[1-5N]|CM|P[2456]3?|W\d+|HT|GJN|JEM))*"
 )
 _OTHER_NAMES = (
-    (re.compile(r"^619(\d\d)$"), r"69\1"),  # ISO 15 and the numbering of NSK and NTN
+    (re.compile(r"^61([89]\d\d)$"), r"6\1"),  # ISO 15 and the numbering of NSK and NTN
+    # Wider rings around the balls of the common series.
+    (re.compile(r"^62([23]\d\d)$"), r"6\1"),
+    (re.compile(r"^630(\d\d)$"), r"60\1"),
     # Inserts of pillow blocks share balls and outer raceway with the deep groove bearing of their size.
     (re.compile(r"^UC[PFTC]?[LC]?([23](?:0[4-9]|1\d|20))$"), r"6\1"),
 )
@@ -51,10 +54,11 @@ class CatalogueBearing:
 def bearing_catalogue() -> Mapping[str, CatalogueBearing]:
     """Return the bearings whose geometry is known, by name.
 
-    Deep groove ball bearings of the series 60, 62, 63, 64 and 69 (619), some miniatures, inserts and bearings of public
-    test rigs. Makers change numbers and sizes of balls: ball-pass orders of one designation usually agree within
-    2 %, and where the number of balls differs the name is listed by maker only. Orders that matter come from the maker
-    of the bearing that is in the machine.
+    Deep groove ball bearings of the series 60, 62, 63, 64, 160, 68 (618) and 69 (619), angular contact ball bearings
+    72 and 73 (A: 30°, B: 40°, C: 15°), 52 and 53, self-aligning ball bearings, inserts, and bearings of public test
+    rigs. Most geometry is computed from published ratings; makers change numbers and sizes of balls, and where ratings
+    differ the name is listed by maker only. Of roller bearings the ratings do not tell the number of rollers. Orders
+    that matter come from the maker of the bearing that is in the machine.
     """
     text = files("gearsig.rig").joinpath("bearings.csv").read_text(encoding="utf-8")
     rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
@@ -110,6 +114,7 @@ def catalogue_bearing(name: str) -> CatalogueBearing:
         )
     raise InputError(
         f"bearing {name!r} is not in the catalogue",
-        allowed="deep groove 60.., 62.., 63.., 64.., 69.. and some others: `gearsig rig bearings` lists them",
-        remedy="give n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm, or the orders",
+        allowed="ball bearings 60.., 62.., 63.., 69.., 72.., 73.. and others: `gearsig rig bearings` lists them",
+        remedy="give n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm, or the orders, which the "
+        "makers publish",
     )

@@ -1,8 +1,11 @@
 """The bearings that are known by name: against published frequency factors and load ratings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from app.studies.bearing_geometry import decided, read_ratings
 from gearsig.errors import InputError
 from gearsig.rig import Bearing, bearing_catalogue, catalogue_bearing, from_table, to_table
 
@@ -33,8 +36,8 @@ C0R_KN = {
     "6310": 38.5,
     "6314": 68.0,
     "6318": 107.0,
-    "6900": 1.27,
-    "6906": 5.0,
+    "NSK 6900": 1.27,
+    "NSK 6906": 5.0,
     "6910": 11.7,
     "NSK 6305": 11.2,
     "NTN 6305": 10.9,
@@ -42,6 +45,8 @@ C0R_KN = {
     "NTN 6217": 64.0,
     "6409": 45.0,
     "6915": 22.6,
+    "6324": 185.0,
+    "SKF 61912": 14.3,
 }
 
 # BPFO and BPFI as others publish them: SKF 6205 and 6203 of CWRU, Timken's table, test rigs.
@@ -77,6 +82,29 @@ def test_orders_are_the_published_ones(name: str) -> None:
     assert (orders["BPFO"], orders["BPFI"]) == pytest.approx(PUBLISHED[name], rel=5e-4)
 
 
+def test_ratings_tell_the_balls_that_are_published_by_others() -> None:
+    """Timken's own orders of 24 sizes: another number of balls in 6209 only, and larger balls in three."""
+    ratings = {of.name: of for of in read_ratings()}
+    off = []
+    for timken in (b for b in bearing_catalogue().values() if b.source == "Timken"):
+        of = ratings["6" + timken.name.split()[1].removesuffix("K")]
+        fit = decided(of)
+        if fit is not None and fit.n_balls == timken.n_rolling_elements:
+            theirs = 1 - timken.rolling_element_diameter_mm / timken.pitch_diameter_mm
+            off.append(abs((1 - fit.diameter_mm / of.pitch_mm) / theirs - 1))
+    assert len(off) == 23
+    assert np.median(off) < 1e-3
+    assert max(off) < 0.02
+
+
+def test_the_catalogue_has_what_ratings_decide() -> None:
+    ratings = [of for of in read_ratings() if of.name in bearing_catalogue()][::10]
+    for of in ratings:
+        fit, listed = decided(of), catalogue_bearing(of.name)
+        assert fit is None or listed.n_rolling_elements == fit.n_balls
+    assert decided(replace(ratings[0], cr_kn=1.05 * ratings[0].cr_kn)) is None  # ratings that no balls have
+
+
 def test_every_bearing_can_be_built() -> None:
     for b in bearing_catalogue().values():
         # Balls do not overlap, and leave room for a cage.
@@ -86,7 +114,17 @@ def test_every_bearing_can_be_built() -> None:
 
 @pytest.mark.parametrize(
     ("name", "same"),
-    [("skf 6205-2RS1/C3", "6205"), ("6205ZZ", "6205"), ("61904-2Z", "6904"), ("UCP 206", "6206"), ("UC310", "6310")],
+    [
+        ("skf 6205-2RS1/C3", "6205"),
+        ("6205ZZ", "6205"),
+        ("61904-2Z", "6904"),
+        ("UCP 206", "6206"),
+        ("UC310", "6310"),
+        ("62304-2RS", "6304"),
+        ("63006", "6006"),
+        ("NSK 7208B", "7208B"),
+        ("SKF 1210 ETN9", "SKF 1210E"),
+    ],
 )
 def test_names_of_one_bearing(name: str, same: str) -> None:
     assert catalogue_bearing(name).name == same
@@ -98,6 +136,8 @@ def test_names_of_one_bearing(name: str, same: str) -> None:
         ("6305", "SKF 6305"),
         ("UC305", "balls differ"),
         ("22220", "not in"),
+        ("61907", "NSK 6907"),
+        ("7208 BEP", "not in"),
         ("6205E", "not in"),
         ("NU 205", "not in"),
     ],
