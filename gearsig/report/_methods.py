@@ -672,7 +672,11 @@ def named_method(text: str) -> tuple[str, MethodOptions]:
 
 
 def fitting_methods(
-    prepared: PreparedRecording, *, suspects_crack: bool = False, suspects_bearing: bool = False
+    recording: Recording,
+    angle: ShaftAngle | None,
+    *,
+    suspects_crack: bool = False,
+    suspects_bearing: bool = False,
 ) -> tuple[str, ...]:
     """Return the methods that a recording calls for, besides those that every page has.
 
@@ -681,10 +685,6 @@ def fitting_methods(
     steady speed: its Poincaré section in the phase plane.
     """
     names: list[str] = []
-    try:
-        angle = prepared.shaft_angle
-    except (InputError, RefusalError):
-        angle = None
     sweeps = angle is not None and bool(np.ptp(angle.speed_range_rpm) > 0.1 * angle.mean_speed_rpm)
     if sweeps:
         names += ["order-map", "frequency-map", "tracking"]
@@ -692,7 +692,7 @@ def fitting_methods(
         names.append("modes+squeezed-cwt")
     elif suspects_bearing:
         names.append("kurtogram")
-    if prepared.recording.truth is not None and angle is not None and not sweeps:
+    if recording.truth is not None and angle is not None and not sweeps:
         names.append("poincare")
     return tuple(names)
 

@@ -370,10 +370,10 @@ def _further_methods(
     teeth = [finding for finding in claims if finding.where.tooth is not None or finding.where.angle_deg is not None]
     bearings = [finding for finding in claims if finding.where.bearing]
     channel = next((name for finding in (*teeth, *bearings) for name in finding.where.channels), "")
-    prepared = prepare(analysis.recording, analysis.rig)
-    fitting = fitting_methods(prepared, suspects_crack=bool(teeth), suspects_bearing=bool(bearings))
-    chosen = fitting if methods is None else methods
-    pictures, reasons = method_pictures(chosen, prepared, channel)
+    angle = analysis.shaft_angle if isinstance(analysis.shaft_angle, ShaftAngle) else None
+    suspects = {"suspects_crack": bool(teeth), "suspects_bearing": bool(bearings)}
+    chosen = fitting_methods(analysis.recording, angle, **suspects) if methods is None else methods
+    pictures, reasons = method_pictures(chosen, prepare(analysis.recording, analysis.rig), channel)
     if methods is None:  # nobody asked for what cannot be had
         reasons = ()
     return tuple(embed(f.figure, f.caption, f.alternative) for f in pictures), reasons

@@ -98,15 +98,15 @@ def test_options_of_other_methods_wrong_names_and_missing_speeds_are_refused() -
 
 
 def test_a_run_up_calls_for_maps_a_suspected_tooth_for_modes() -> None:
-    assert fitting_methods(prepare(recording()), suspects_crack=True) == ("modes+squeezed-cwt",)
-    assert fitting_methods(prepare(recording()), suspects_bearing=True) == ("kurtogram",)
-    assert fitting_methods(prepare(recording())) == ()
+    assert fitting_methods(recording(), None, suspects_crack=True) == ("modes+squeezed-cwt",)
+    assert fitting_methods(recording(), None, suspects_bearing=True) == ("kurtogram",)
+    assert fitting_methods(recording(), None) == ()
     sample = "sample_data/run_up.h5"
     from gearsig.recording import read_recording
     from gearsig.rig import read_rig
 
     run_up = read_recording(sample, rig=read_rig("sample_data/run_up.toml"))
-    assert fitting_methods(prepare(run_up)) == ("order-map", "frequency-map", "tracking")
+    assert fitting_methods(run_up, prepare(run_up).shaft_angle) == ("order-map", "frequency-map", "tracking")
 
 
 def test_the_command_writes_what_the_method_finds(tmp_path, capsys) -> None:
