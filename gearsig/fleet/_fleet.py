@@ -345,6 +345,8 @@ class Fleet:
     ) -> int:
         """Write a table as CSV, Parquet or JSON lines, by the file's ending; return how many rows it has.
 
+        The rows of the measurements' tables come in no particular order.
+
         Parameters
         ----------
         path : str or Path
@@ -356,7 +358,7 @@ class Fleet:
         """
         one_of(table, "table", TABLES)
         target = Path(path)
-        forms = {".csv": "csv, HEADER", ".parquet": "parquet, COMPRESSION zstd", ".jsonl": "json"}
+        forms = {".csv": "csv, HEADER", ".parquet": "parquet, COMPRESSION snappy", ".jsonl": "json"}
         form = forms[one_of(target.suffix.lower(), f"ending of {target.name}", forms)]
         self._check_place(machine, point)
         dated = table in ("indicators", "recordings")
@@ -377,6 +379,7 @@ class Fleet:
                 connection.register("chosen", frame)
                 source, values[:] = "(FROM chosen)", []
             text = str(part).replace("'", "''")
+            connection.execute("SET preserve_insertion_order = false")  # rows know their date; in half the time
             return int(connection.execute(f"COPY {source} TO '{text}' (FORMAT {form})", values).fetchall()[0][0])
 
         try:
