@@ -233,6 +233,8 @@ class Job:
         self._end()
 
     def _last_words(self) -> str:
+        if (self._process.returncode or 0) < 0:  # nobody but a signal from outside ends it so
+            return "its process was killed: perhaps the memory ran out; a shorter recording needs less"
         lines = (self.folder / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
         return lines[-1] if lines else f"exit code {self._process.returncode}"
 

@@ -103,6 +103,15 @@ def test_a_crash_is_said_with_its_last_words(job):
         job.report()
 
 
+@pytest.mark.parametrize("job", [{SECONDS: "60"}], indirect=True)
+def test_a_killed_process_is_told(job):
+    wait(lambda: job.progress[1] > 0)
+    job._process.kill()
+    wait(lambda: not job.is_running)
+    with pytest.raises(JobFailedError, match="was killed"):
+        job.report()
+
+
 @pytest.mark.parametrize(
     "error",
     [InputError("a", where="b", allowed="c", remedy="d"), RefusalError("a", remedy="b"), GearsigError("something")],
