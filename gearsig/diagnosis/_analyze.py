@@ -10,7 +10,7 @@ import numpy as np
 from gearsig import indicators
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._bearing import detect_bearings
-from gearsig.diagnosis._change import change_findings, family_change, level_changes
+from gearsig.diagnosis._change import change_findings, family_change, level_changes, with_clearest_band
 from gearsig.diagnosis._crack import Answer, crack_depth, with_crack
 from gearsig.diagnosis._doubts import lowered, speed_doubts, spoiled, withheld_crack, without_synchronous_hum
 from gearsig.diagnosis._lines import detect_lines, detect_mesh, speed_finding
@@ -26,6 +26,7 @@ from gearsig.diagnosis._signals import (
     band_envelopes,
     channel_analysis,
     compute_signals,
+    in_common_bands,
     kurtogram_bands,
 )
 from gearsig.diagnosis._start_stop import start_stop_analysis
@@ -147,8 +148,10 @@ def _examined(
         if then is None:
             findings = beside_reference(findings, reference_analysis)
         else:
-            beside = (signals, envelopes, *then)
+            now, before = in_common_bands(signals, envelopes, *then)
+            beside = (signals, now, then[0], before)
             findings = beside_reference(findings, reference_analysis, lambda f: family_change(f, *beside))
+            findings = with_clearest_band(findings, signals, then[0])
             compared = level_changes(*beside)
             findings += change_findings(compared, signals, then[0], findings)
     findings, unfit = lowered(findings, names), dead | spoiled(findings, names)

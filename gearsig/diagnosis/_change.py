@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from math import hypot, inf, sqrt
 
@@ -31,7 +32,7 @@ from gearsig.diagnosis._types import (
     Where,
     cannot_tell,
 )
-from gearsig.errors import RefusalError
+from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import signed
 from gearsig.orders import order_map
 from gearsig.prepared import envelope_bands
@@ -152,6 +153,36 @@ def family_change(
         return None
     quantity = _Quantity(finding.code, "bearing", finding.where, 0.0, "", now, then)
     return _compared(quantity, 1, signals.settings.false_alarm_probability)
+
+
+def with_clearest_band(
+    findings: Sequence[Finding], signals: AnalysisSignals, reference: AnalysisSignals
+) -> list[Finding]:
+    """Return the findings, each family of a bearing with the band that shows it best, beside the reference's best."""
+    return [
+        replace(f, evidence=(*f.evidence, text)) if (text := _clearest_text(f, signals, reference)) else f
+        for f in findings
+    ]
+
+
+def _clearest_text(finding: Finding, signals: AnalysisSignals, reference: AnalysisSignals) -> str:
+    from gearsig.spectra import compare_bands
+
+    order, channel = finding.where.order, next(iter(finding.where.channels), "")
+    is_claim = finding.where.bearing and finding.kind in (Kind.FAULT, Kind.SUSPICION)
+    if not is_claim or order is None or signals.speed_varies or reference.speed_varies:
+        return ""
+    try:
+        now, then = (
+            compare_bands(s.recording, channel, order * s.frequency_per_order_hz)[0] for s in (signals, reference)
+        )
+    except (InputError, RefusalError):
+        return ""
+    low, high = (f"{edge / 1000:.3g}" for edge in now.band_hz)
+    return (
+        f"Clearest in the band {low} to {high} kHz ({now.method}): {now.clarity_db:.0f} dB over its floor; the "
+        f"reference's clearest has {then.clarity_db:.0f} dB (noise alone reaches some 6)."
+    )
 
 
 def _speed_off(signals: AnalysisSignals, reference: AnalysisSignals) -> float:
@@ -417,9 +448,12 @@ def change_findings(
     headline = _changed(_largest(changed), off)
     if abs(off) > OTHER_SPEED or signals.speed_varies or reference.speed_varies:
         return [*findings, replace(headline, kind=Kind.NOTICE)]
-    meanings = _meanings(risen, rest, signals, named)
+    claimed = {f.where.bearing for f in named if f.kind in (Kind.FAULT, Kind.SUSPICION)}
+    meanings = _meanings(risen, rest, signals, claimed)
     if not meanings and risen:
         more = "It has no pattern of a known fault: load, temperature or a sensor moved would do it as well."
+        if any(c.kind == "bearing" and c.where.bearing in claimed for c in risen):
+            more = "Damage of the bearing that is named explains it: its shocks raise the noise as well."
         headline = replace(headline, evidence=(*headline.evidence, more))
     return [*findings, headline if risen else replace(headline, kind=Kind.NOTICE), *meanings]
 
@@ -490,6 +524,7 @@ def _unchanged(changes: Sequence[LevelChange]) -> Finding:
 
 
 def _changed(changes: Sequence[LevelChange], off: float) -> Finding:
+    changes = sorted(changes, key=lambda c: c.kind == "noise")  # lines say more
     risen, fallen = ([c for c in changes if sign * c.change_db > 0] for sign in (1, -1))
     texts = [", ".join(f"{c.label} {signed(c.change_db)} dB" for c in (risen or fallen)[:4])]
     rest = len(risen or fallen) - 4
@@ -531,20 +566,19 @@ OTHER_CAUSES = 0.3
 
 
 def _meanings(
-    risen: Sequence[LevelChange], changes: Sequence[LevelChange], signals: AnalysisSignals, named: Sequence[Finding]
+    risen: Sequence[LevelChange], changes: Sequence[LevelChange], signals: AnalysisSignals, claimed: AbstractSet[str]
 ) -> list[Finding]:
-    """Return what the changes may mean, likeliest first."""
+    """Return what the changes may mean, likeliest first; nothing of bearings that are named already."""
     findings: list[Finding] = []
     for shaft in signals.known_shaft_orders:
         findings += _of_shaft(shaft, risen, changes, signals)
     for pair in signals.rig.pairs:
         findings += _of_pair(pair.name, risen)
-    claimed = {f.where.bearing for f in named if f.kind in (Kind.FAULT, Kind.SUSPICION)}
     parts = [c for c in risen if c.kind == "bearing" and c.where.bearing not in claimed]
     if parts:
         findings.append(_of_bearing(max(parts, key=lambda c: c.change_db)))
-    if risen and all(c.kind == "noise" for c in risen):
-        findings.append(_of_noise(risen))
+    if risen and all(c.kind == "noise" for c in risen) and not any(claimed):
+        findings.append(_of_noise(risen, has_bearings=bool(signals.rig.bearings)))
     if signals.rig.assumed:
         findings = [replace(f, confidence=f.confidence * WITH_ASSUMED_DATA) for f in findings]
     return findings
@@ -655,9 +689,12 @@ def _of_bearing(change: LevelChange) -> Finding:
     return Finding("bearing-risen", Kind.SUSPICION, title, change.where, None, 0.5, _FIT, _told([change]), confirm)
 
 
-def _of_noise(risen: Sequence[LevelChange]) -> Finding:
+def _of_noise(risen: Sequence[LevelChange], *, has_bearings: bool) -> Finding:
     confirm = "Lubricant and temperature; flow, suction and leaks; the sensor's mounting; a look for rubbing parts."
-    title = "Perhaps poor lubrication, a rub, turbulence or cavitation: noise has risen, and no line."
+    causes = "poor lubrication, a rub, turbulence or cavitation"
+    if has_bearings:  # a rolling element that turns out of its track, and wear all around, give no steady rhythm
+        causes = "a worn bearing or a damaged rolling element, " + causes
+    title = f"Perhaps {causes}: noise has risen, and no line."
     return Finding("noise-risen", Kind.SUSPICION, title, risen[0].where, None, 0.4, _FIT, _told(risen), confirm)
 
 

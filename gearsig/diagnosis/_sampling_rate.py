@@ -47,7 +47,7 @@ ENOUGH_EVIDENCE = -20.0
 ENOUGH_OF_EACH = -5.0
 """The same of the shafts' lines alone, and of what the races explain beside them."""
 
-SHARE_OF_STATED = 0.25
+SHARE_OF_STATED = 1 / 3
 """The stated rate explains nothing where its own sum is below that share of another rate's."""
 
 AS_GOOD = 0.6
@@ -203,20 +203,39 @@ def _log_p(
 def _log_p_at(
     lines: StrongLines, speed: float, n_speeds: int, shafts: Sequence[float], parts: Sequence[tuple[float, float]]
 ) -> float:
-    from scipy.stats import binom
+    """Return it at one speed: of the shafts alone, or with the parts that explain most beside them.
 
+    With all parts of all bearings nearly every place is one, and nothing is said by lines that lie there.
+    """
     places = [np.arange(1, int(lines.highest / (shaft * speed)) + 2) * shaft * speed for shaft in shafts]
     seen: NDArray[np.bool_] = _near(lines, np.concatenate(places))
-    tries = float(n_speeds)
-    for part, sideband in parts:
-        slips = part * np.linspace(0.985, 1.015, 61)
-        new = (_near_family(lines, slips * speed, sideband * speed) & ~seen).sum(axis=1)
-        best = int(np.argmax(new))
-        tries *= 3.0
-        if new[best] >= 2:
-            places.append(_family(slips[best], sideband, lines.highest / speed) * speed)
-            seen = np.logical_or(seen, _near(lines, places[-1]))
-            tries *= len(slips) / 3
+    best, tries = _log_chance(lines, places, seen, n_speeds), float(n_speeds)
+    slips, remaining = np.linspace(0.985, 1.015, 61), list(parts)
+    for _ in range(min(MOST_PARTS, len(parts))):
+        new = [
+            (_near_family(lines, part * slips * speed, sideband * speed) & ~seen).sum(axis=1)
+            for part, sideband in remaining
+        ]
+        i = int(np.argmax([counts.max() for counts in new]))
+        j = int(np.argmax(new[i]))
+        if new[i][j] < 2:
+            break
+        tries *= len(slips) * len(remaining)
+        part, sideband = remaining.pop(i)
+        places.append(_family(part * slips[j], sideband, lines.highest / speed) * speed)
+        seen = np.logical_or(seen, _near(lines, places[-1]))
+        best = min(best, _log_chance(lines, places, seen, tries))
+    return best
+
+
+MOST_PARTS = 3
+"""Parts of bearings that explain lines beside the shafts' at once."""
+
+
+def _log_chance(lines: StrongLines, places: Sequence[FloatArray], seen: NDArray[np.bool_], tries: float) -> float:
+    """Return lg of the chance that so many lines lie at the places, after so many tries."""
+    from scipy.stats import binom
+
     inside = np.sort(np.concatenate(places))
     inside = inside[(inside > lines.lowest) & (inside < lines.highest)]
     if not len(inside):
@@ -258,7 +277,9 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         at = at if at is not None else parts if factor == 1.0 else races
         return sum(_log_p(lines, factor, shafts, at, tolerance) for lines in strong if lines is not None)
 
-    if evidence(1.0, HIGHEST_ORDER) <= ENOUGH_EVIDENCE:
+    # Multiples of a shaft are those of one that turns slower by a whole number, too; those of a race are no others'.
+    stated = evidence(1.0, HIGHEST_ORDER)
+    if stated <= ENOUGH_EVIDENCE and stated - evidence(1.0, HIGHEST_ORDER, at=()) <= ENOUGH_OF_EACH:
         return None
     usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
     candidates = [*usual, *common]

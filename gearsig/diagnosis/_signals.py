@@ -308,6 +308,25 @@ def envelopes_in(
         yield BandEnvelope(name, band, floor_of(spectrum), float(envelopes.values(name).mean()), over_angle)
 
 
+def in_common_bands(
+    signals: AnalysisSignals,
+    envelopes: Sequence[BandEnvelope],
+    reference: AnalysisSignals,
+    reference_envelopes: Sequence[BandEnvelope],
+) -> tuple[list[BandEnvelope], list[BandEnvelope]]:
+    """Return the envelopes of two recordings in the same bands: those of the one that is sampled more slowly."""
+    now, then = list(envelopes), list(reference_envelopes)
+    if signals.recording.sampling_rate_hz > reference.recording.sampling_rate_hz:
+        now = [e for band in _bands(then) for e in envelopes_in(signals, signals.recording, band)]
+    elif signals.recording.sampling_rate_hz < reference.recording.sampling_rate_hz:
+        then = [e for band in _bands(now) for e in envelopes_in(reference, reference.recording, band)]
+    return now, then
+
+
+def _bands(envelopes: Sequence[BandEnvelope]) -> tuple[tuple[float, float], ...]:
+    return tuple(dict.fromkeys(envelope.band_hz for envelope in envelopes))
+
+
 @dataclass(frozen=True)
 class KurtogramBand:
     """A channel's kurtogram, the band it chooses, and the envelope there.

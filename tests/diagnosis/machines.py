@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 
 from gearsig.diagnosis import Analysis, Finding, Kind, analyze
-from gearsig.recording import Recording
-from gearsig.rig import Bearing, GearPair, Rig, Shaft
+from gearsig.recording import Channel, Recording
+from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft
 from sims.measure import ColouredNoise, Tachometer
 from tests.kinematic.model import KinematicModel, MeshHarmonics, MeshModulation, SensorChannel, ToothVariation
 from tests.kinematic.simulate import simulate_kinematic
@@ -55,3 +55,30 @@ def codes(analysis: Analysis, *kinds: Kind) -> list[str]:
 def finding(analysis: Analysis, code: str) -> Finding:
     """Return the first finding of that code."""
     return next(f for f in analysis.findings if f.code == code)
+
+
+MOTOR_RATE_HZ, MOTOR_HZ = 12_000.0, 29.95
+MOTOR = Rig(
+    shafts=(Shaft("motor"),),
+    bearings=(Bearing("drive end", "motor", 9, 7.94, 39.04),),
+    speed=ConstantSpeed(60 * MOTOR_HZ, "motor"),
+)
+
+
+@cache
+def motor(race: str, seed: int) -> Recording:
+    """A motor with its shaft's lines in noise, and a damaged race or element whose impacts ring at 2.8 kHz."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(6.0 * MOTOR_RATE_HZ)) / MOTOR_RATE_HZ
+    x = rng.standard_normal(len(t))
+    for k in range(1, 7):
+        x += rng.uniform(0.1, 0.5) * np.cos(2 * np.pi * k * MOTOR_HZ * t + rng.uniform(0, 6))
+    if race:
+        rate_hz = {"BPFO": 3.585, "BPFI": 5.415, "BSF": 2 * 2.357}[race] * 0.997 * MOTOR_HZ
+        hits = np.arange(0.01, t[-1], 1 / rate_hz)
+        impacts = np.zeros_like(t)
+        modulation_hz = {"BPFO": 0.0, "BPFI": MOTOR_HZ, "BSF": 0.3983 * MOTOR_HZ}[race]
+        load = 1 + 0.8 * np.cos(2 * np.pi * modulation_hz * hits) if modulation_hz else 1.0
+        impacts[np.round(hits * MOTOR_RATE_HZ).astype(int)] = 8.0 * load
+        x += np.convolve(impacts, np.exp(-900 * t[:400]) * np.sin(2 * np.pi * 2800 * t[:400]))[: len(t)]
+    return Recording(x[None, :], MOTOR_RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),), rig=MOTOR)

@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import resample_poly
 
 from gearsig.diagnosis import Analysis, Kind, LevelChange, Outcome, analyze
 from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft
-from tests.diagnosis.machines import codes, finding
+from tests.diagnosis.machines import MOTOR_RATE_HZ, codes, finding, motor
 
 ROTOR = Rig(shafts=(Shaft("rotor"),), bearings=(Bearing("front", "rotor", 9, 7.94, 39.04),))
 HEALTHY = {1.0: 0.1, 2.0: 0.02, 3.0: 0.01}
@@ -104,3 +105,24 @@ def test_a_record_too_short_to_compare_says_so() -> None:
     short = rotor(HEALTHY, seed=1)
     short = replace(short, samples=short.samples[:, : int(0.5 * SAMPLING_RATE_HZ)])
     assert "change-not-examined" in codes(analyze(short, reference=rotor(HEALTHY, seed=2)))
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_damaged_race_is_what_changed_also_from_a_reference_at_another_rate(times: int) -> None:
+    """The healthy motor is recorded at the same rate or at twice: bands up to the lower one's are compared."""
+    healthy = motor("", 2)
+    if times == 2:
+        samples = resample_poly(healthy.samples, 2, 1, axis=-1)
+        healthy = replace(healthy, samples=samples, sampling_rate_hz=2 * MOTOR_RATE_HZ)
+    analysis = analyze(motor("BPFO", 1), reference=healthy)
+    assert [f.code for f in analysis.findings[:2]] == ["changed-since-reference", "bearing-outer-race"]
+    assert analysis.findings[0].title.startswith("Changed since the reference: outer race of drive end +")
+    assert finding(analysis, "bearing-outer-race").kind is Kind.FAULT
+
+
+def test_a_damaged_race_that_the_reference_shows_as_strong_is_not_new() -> None:
+    record = motor("BPFO", 1)
+    analysis = analyze(record.between(3.0, 6.0), reference=record.between(0.0, 3.0))
+    assert finding(analysis, "bearing-outer-race").kind is Kind.SUSPICION
+    assert analysis.outcome is Outcome.SUSPICION
+    assert "unchanged-since-reference" in codes(analysis)
