@@ -47,8 +47,11 @@ ENOUGH_EVIDENCE = -20.0
 ENOUGH_OF_EACH = -5.0
 """The same of the shafts' lines alone, and of what the races explain beside them."""
 
-SHARE_OF_STATED = 1 / 3
+SHARE_OF_STATED = 0.25
 """The stated rate explains nothing where its own sum is below that share of another rate's."""
+
+BY_ONE_RACE = 1 / 3
+"""Share of another rate's sum from which the shafts and one race at the stated rate are explanation enough."""
 
 AS_GOOD = 0.6
 """Share of the best factor's sum that makes a milder one preferred."""
@@ -203,39 +206,20 @@ def _log_p(
 def _log_p_at(
     lines: StrongLines, speed: float, n_speeds: int, shafts: Sequence[float], parts: Sequence[tuple[float, float]]
 ) -> float:
-    """Return it at one speed: of the shafts alone, or with the parts that explain most beside them.
-
-    With all parts of all bearings nearly every place is one, and nothing is said by lines that lie there.
-    """
-    places = [np.arange(1, int(lines.highest / (shaft * speed)) + 2) * shaft * speed for shaft in shafts]
-    seen: NDArray[np.bool_] = _near(lines, np.concatenate(places))
-    best, tries = _log_chance(lines, places, seen, n_speeds), float(n_speeds)
-    slips, remaining = np.linspace(0.985, 1.015, 61), list(parts)
-    for _ in range(min(MOST_PARTS, len(parts))):
-        new = [
-            (_near_family(lines, part * slips * speed, sideband * speed) & ~seen).sum(axis=1)
-            for part, sideband in remaining
-        ]
-        i = int(np.argmax([counts.max() for counts in new]))
-        j = int(np.argmax(new[i]))
-        if new[i][j] < 2:
-            break
-        tries *= len(slips) * len(remaining)
-        part, sideband = remaining.pop(i)
-        places.append(_family(part * slips[j], sideband, lines.highest / speed) * speed)
-        seen = np.logical_or(seen, _near(lines, places[-1]))
-        best = min(best, _log_chance(lines, places, seen, tries))
-    return best
-
-
-MOST_PARTS = 3
-"""Parts of bearings that explain lines beside the shafts' at once."""
-
-
-def _log_chance(lines: StrongLines, places: Sequence[FloatArray], seen: NDArray[np.bool_], tries: float) -> float:
-    """Return lg of the chance that so many lines lie at the places, after so many tries."""
     from scipy.stats import binom
 
+    places = [np.arange(1, int(lines.highest / (shaft * speed)) + 2) * shaft * speed for shaft in shafts]
+    seen: NDArray[np.bool_] = _near(lines, np.concatenate(places))
+    tries = float(n_speeds)
+    for part, sideband in parts:
+        slips = part * np.linspace(0.985, 1.015, 61)
+        new = (_near_family(lines, slips * speed, sideband * speed) & ~seen).sum(axis=1)
+        best = int(np.argmax(new))
+        tries *= 3.0
+        if new[best] >= 2:
+            places.append(_family(slips[best], sideband, lines.highest / speed) * speed)
+            seen = np.logical_or(seen, _near(lines, places[-1]))
+            tries *= len(slips) / 3
     inside = np.sort(np.concatenate(places))
     inside = inside[(inside > lines.lowest) & (inside < lines.highest)]
     if not len(inside):
@@ -277,9 +261,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         at = at if at is not None else parts if factor == 1.0 else races
         return sum(_log_p(lines, factor, shafts, at, tolerance) for lines in strong if lines is not None)
 
-    # Multiples of a shaft are those of one that turns slower by a whole number, too; those of a race are no others'.
-    stated = evidence(1.0, HIGHEST_ORDER)
-    if stated <= ENOUGH_EVIDENCE and stated - evidence(1.0, HIGHEST_ORDER, at=()) <= ENOUGH_OF_EACH:
+    if evidence(1.0, HIGHEST_ORDER) <= ENOUGH_EVIDENCE:
         return None
     usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
     candidates = [*usual, *common]
@@ -296,6 +278,13 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     as_good = [f for f in factors if sums[f] <= AS_GOOD * min(sums.values())]
     factor = min(as_good, key=lambda f: (round(abs(log10(f)), 6), sums[f]))
     stated = evidence(1.0, ranges[factor])
+    # With all parts of all bearings nearly every order is some part's, and lines there say nothing: one race at a time
+    # says more. In a short record q times its order is a whole number, and all of its lines are then those of a shaft
+    # that turns q times slower as well.
+    of_shafts = evidence(1.0, ranges[factor], at=())
+    by_one_race = min((evidence(1.0, ranges[factor], at=[race]) for race in races), default=0.0)
+    if by_one_race - of_shafts <= ENOUGH_OF_EACH and by_one_race <= BY_ONE_RACE * sums[factor]:
+        return None
     if min(sums.values()) > ENOUGH_EVIDENCE or stated < SHARE_OF_STATED * sums[factor]:
         return None
     explained, highest = sums[factor], ranges[factor]

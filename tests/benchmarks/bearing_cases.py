@@ -1,11 +1,13 @@
 """How often the bearing diagnosis names the right part: `python tests/benchmarks/bearing_cases.py [CASES] [SEED]`.
 
-Draws motors on two rolling bearings as they stand on test benches: shaft harmonics, mains, noise that the shaft
-modulates, resonances of their own for each of three sensors, and a damage on one part of one bearing or none. Sound
-machines come with what is mistaken for a bearing: a smooth tone near a ball-pass order, elements that pass through the
-load zone, knocks of another machine, looseness. Prints right, unsure, missed and wrong by part and by the damage's
-strength, and what is named on sound machines. The signal model is after Antoni and Randall (2003), and independent of
-the product's simulators.
+Draws motors on two rolling bearings as they stand on test benches: deep groove ball bearings of the catalogue, a load
+that slows the motor down and presses them, shaft harmonics, mains, noise that the shaft modulates, resonances of their
+own for each of up to three sensors, and a damage on one part of one bearing or none; of an outer race at one of three
+positions about the load zone. Sound machines come with what is mistaken for a bearing: a smooth tone near a ball-pass
+order, elements that pass through the load zone, knocks of another machine, looseness. Prints right, unsure, missed and
+wrong by part and by the damage's strength, and what is named on sound machines: of the recording alone, beside one of
+the same motor when it was sound, and of its halves against each other. The signal model is after Antoni and Randall
+(2003), and independent of the product's simulators.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, Finding, Kind, analyze
 from gearsig.recording import Channel, Recording
-from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft
+from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft, bearing_catalogue
 
 PARTS = {"outer": "BPFO", "inner": "BPFI", "ball": "BSF"}
 CODES = {"outer": "bearing-outer-race", "inner": "bearing-inner-race", "ball": "bearing-rolling-element"}
@@ -32,32 +34,42 @@ LIKELY = 0.5
 SECONDS = 8.0
 
 
+POSITIONS = {"6:00": (1.0, 0.2), "3:00": (0.6, 0.6), "12:00": (0.3, 1.0)}
+"""Of a damaged outer race, the load zone being at 6:00: force of its shocks, and how much an unbalance modulates it."""
+
+
 @dataclass(frozen=True)
 class Case:
-    """One drawn motor, and what is the matter with it."""
+    """One drawn motor, what is the matter with it, and its recording when it was sound."""
 
     recording: Recording
+    healthy: Recording
     part: str
     bearing: str
     strength: str
 
 
-def drawn_bearing(rng: np.random.Generator, name: str) -> Bearing:
-    """Return a deep-groove ball bearing of usual proportions."""
-    n = int(rng.integers(7, 12))
-    pitch = rng.uniform(25.0, 60.0)
-    return Bearing(name, "motor", n, round(pitch * rng.uniform(0.6, 0.78) * np.pi / n * 0.9, 3), round(pitch, 3))
+def drawn_bearings(rng: np.random.Generator) -> tuple[Bearing, Bearing]:
+    """Return those of a motor, of light or medium series, the fan end's up to two sizes smaller."""
+    sizes = [int(name[2:]) for name in bearing_catalogue() if len(name) == 4 and name.startswith("62")]
+    series, size = str(rng.choice(["62", "63"])), int(rng.choice([s for s in sizes if 4 <= s <= 14]))
+    drawn = []
+    for end, step in (("drive end", 0), ("fan end", int(rng.integers(0, 3)))):
+        number = f"{series}{max(size - step, 3):02d}"
+        drawn.append(Bearing(end, "motor", bearing=number if number in bearing_catalogue() else f"62{size:02d}"))
+    return drawn[0], drawn[1]
 
 
 def draw_case(rng: np.random.Generator, fs_hz: float = 12_000.0) -> Case:
-    """Draw a motor and its recording."""
-    bearings = (drawn_bearing(rng, "drive end"), drawn_bearing(rng, "fan end"))
-    rpm = rng.uniform(1500.0, 3500.0)
+    """Draw a motor and its recordings: as long when it was sound as with what is wrong."""
+    bearings = drawn_bearings(rng)
+    load = float(rng.choice([0.0, 1.0, 2.0, 3.0])) / 3
+    rpm = float(rng.choice([1797.0, 2980.0, 3560.0])) * (1 - 0.04 * load) * rng.uniform(0.99, 1.0)
     slip_of_stated = rng.choice([0.0, rng.uniform(-0.003, 0.003), rng.uniform(-0.012, 0.012)])
     n_channels = int(rng.choice([1, 2, 3], p=[0.25, 0.35, 0.4]))
     part = str(rng.choice([*PARTS, "sound"], p=[0.25, 0.25, 0.15, 0.35]))
     own = int(rng.integers(0, 2)) if n_channels > 1 else 0
-    n = int(SECONDS * fs_hz)
+    n = 2 * int(SECONDS * fs_hz)
     turns = rpm / 60 * np.arange(n) / fs_hz + rng.uniform()
     turns = turns + 1e-4 * np.cumsum(rng.standard_normal(n)) / np.sqrt(fs_hz) * rng.uniform(0, 3)  # wanders
     strength = "sound"
@@ -70,7 +82,9 @@ def draw_case(rng: np.random.Generator, fs_hz: float = 12_000.0) -> Case:
             hits = _train(rng, turns, float(rng.choice([0.5, 1.0, 2.0])), jitter=0.003)
     else:
         strength = str(rng.choice(list(STRENGTHS)))
-        hits = _strikes(rng, turns, bearings[own], part)
+        angles, heights = _strikes(rng, turns, bearings[own], part, load)
+        is_new = angles > turns[n // 2]
+        hits = angles[is_new], heights[is_new]
     samples = _sensors(rng, turns, fs_hz, n_channels, hits, own, strength, bearings[own])
     names = ("X1_DE_time", "X1_FE_time", "X1_BA_time")[:n_channels]
     rig = Rig(
@@ -80,7 +94,8 @@ def draw_case(rng: np.random.Generator, fs_hz: float = 12_000.0) -> Case:
         speed=ConstantSpeed(rpm * (1 + slip_of_stated), "motor"),
     )
     channels = tuple(Channel(name, "acceleration", "g") for name in names)
-    return Case(Recording(samples, fs_hz, channels, rig=rig), part, bearings[own].name, strength)
+    healthy, recording = (Recording(half, fs_hz, channels, rig=rig) for half in np.split(samples, 2, axis=1))
+    return Case(recording, healthy, part, bearings[own].name, strength)
 
 
 def _strange_order(rng: np.random.Generator, bearings: tuple[Bearing, ...]) -> float:
@@ -103,15 +118,18 @@ def _train(
     return angles, np.maximum(1 + spread * rng.standard_normal(len(angles)), 0.05)
 
 
-def _strikes(rng: np.random.Generator, turns: FloatArray, bearing: Bearing, part: str) -> tuple[FloatArray, FloatArray]:
+def _strikes(
+    rng: np.random.Generator, turns: FloatArray, bearing: Bearing, part: str, pressed: float
+) -> tuple[FloatArray, FloatArray]:
     orders = bearing.orders()
     order = orders[PARTS[part]] * (2 if part == "ball" else 1) * (1 + rng.normal(0, 0.005))
     angles, heights = _train(rng, turns, order, rng.uniform(0.001, 0.01), rng.uniform(0.05, 0.4))
     load = rng.uniform(0.0, 1.0)
     cage = orders["FTF"] * (1 + rng.normal(0, 0.003))
     if part == "outer":
-        depth = rng.uniform(0.0, 0.4)  # the shaft's unbalance and bow move the load zone
-        heights = heights * (1 + depth * np.cos(2 * np.pi * (angles + load)))
+        force, turned = POSITIONS[str(rng.choice(list(POSITIONS)))]
+        depth = rng.uniform(0.0, 1.0) * turned * (1 - 0.5 * pressed)  # unbalance and bow move the load zone
+        heights = force * heights * (1 + depth * np.cos(2 * np.pi * (angles + load)))
         heights = heights * (1 + rng.uniform(0, 0.3) * np.cos(2 * np.pi * (cage * angles + load)))
     elif part == "inner":
         depth = rng.uniform(0.5, 1.0)
@@ -170,7 +188,8 @@ def _sensors(
             impulses = np.zeros(n)
             np.add.at(impulses, np.minimum(at, n - 1), heights)
             ring = _ringing(impulses, modes * (1 + 0.03 * rng.standard_normal(3)), fs_hz, rng.uniform(0.02, 0.08))
-            x += away * loudness * ring / ring.std() * x.std() / 2
+            lasts = np.sqrt(np.mean(impulses != 0) / np.mean(impulses[n // 2 :] != 0))  # of both halves or the second
+            x += away * loudness * ring / ring.std() * lasts * x.std() / 2
         samples[i] = x
     return samples * rng.uniform(0.02, 0.2)
 
@@ -203,21 +222,49 @@ def outcome(case: Case, analysis: Analysis) -> str:
     return "unsure" if found else "missed"
 
 
+def what_changed(case: Case, analysis: Analysis) -> str:
+    """Return whether the headline beside the sound motor names the part: "first", "named" below it, or "silent"."""
+    expected = f"{BEARING_PARTS[case.part]} of {case.bearing}"
+    title = next((f.title for f in analysis.findings if f.code == "changed-since-reference"), "")
+    if expected in title:
+        return "first"
+    return "named" if outcome(case, analysis) == "right" else "silent"
+
+
+BEARING_PARTS = {"outer": "outer race", "inner": "inner race", "ball": "rolling element"}
+
+
 def main(n_cases: int, seed: int) -> None:
     """Draw, analyse, count and print."""
-    counts: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    counts: dict[str, dict[tuple[str, str], Counter[str]]] = defaultdict(lambda: defaultdict(Counter))
     for i in range(n_cases):
         case = draw_case(np.random.default_rng([seed, i]))
-        analysis = analyze(case.recording)
+        key = case.part, case.strength
+        analysis, beside = analyze(case.recording), analyze(case.recording, reference=case.healthy)
+        middle_s = case.recording.duration_s / 2
+        half, other = case.recording.between(0.0, middle_s), case.recording.between(middle_s, 2 * middle_s)
+        null = analyze(other, reference=half)
         result = outcome(case, analysis)
-        counts[case.part, case.strength][result] += 1
-        if result == "wrong" or (result != "right" and case.strength == "strong"):
+        counts["alone"][key][result] += 1
+        counts["beside it sound"][key][outcome(case, beside)] += 1
+        if case.part != "sound":
+            counts["what changed"][key][what_changed(case, beside)] += 1
+        is_new = any(
+            f.code in {"changed-since-reference", *CODES.values()} and f.kind is Kind.FAULT for f in null.findings
+        )
+        is_new |= any(c.is_change for c in null.level_changes)
+        counts["its halves"][key]["new" if is_new else "nothing new"] += 1
+        if result == "wrong" or (result != "right" and case.strength == "strong") or is_new:
             said = "; ".join(f"{f.code} {f.where.bearing} {f.confidence:.2f}" for f in claims(analysis))
-            print(f"{i}: {case.part} of {case.bearing}, {case.strength}: {result}: {said or analysis.verdict[:150]}")
-    for (part, strength), counter in sorted(counts.items()):
-        print(f"{part:6} {strength:14} {', '.join(f'{k} {v}' for k, v in sorted(counter.items()))}")
+            changed = [c.label for c in null.level_changes if c.is_change]
+            what = f"{i}: {case.part} of {case.bearing}, {case.strength}: {result}"
+            print(f"{what}: {said or analysis.verdict[:150]} {changed}")
+    for table, rows in counts.items():
+        print(table)
+        for (part, strength), counter in sorted(rows.items()):
+            print(f"  {part:6} {strength:14} {', '.join(f'{k} {v}' for k, v in sorted(counter.items()))}")
 
 
 if __name__ == "__main__":
     numbers = [int(a) for a in sys.argv[1:]]
-    main(*(numbers + [100, 29][len(numbers) :]))
+    main(*(numbers + [120, 29][len(numbers) :]))
