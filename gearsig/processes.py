@@ -33,8 +33,18 @@ def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
     """Open a pool of fresh processes; more threads than one each would fight over the processors.
 
     They do not know what the caller's own script defines, see `can_be_sent`.
+
+    Raises
+    ------
+    InputError
+        If the system has no room for the semaphores by which they are told.
     """
-    pool = ProcessPoolExecutor(n_processes, mp_context=_Context(), initializer=_start_worker)
+    try:
+        pool = ProcessPoolExecutor(n_processes, mp_context=_Context(), initializer=_start_worker)
+    except OSError as error:
+        raise InputError(
+            f"no processes can be started ({error})", remedy="make room in shared memory (/dev/shm)"
+        ) from None
     try:
         yield pool
     except (KeyboardInterrupt, GeneratorExit):  # whoever told this process to end does not wait for jobs of minutes
