@@ -260,6 +260,7 @@ def test_damaged_files_are_made_again(name, tmp_path, undisturbed):
     for place in _places(tmp_path, name):
         place.finish()
         kept = [path for path in place.folder.rglob("*") if path.suffix in (".npz", ".parquet", ".json")]
+        kept = [path for path in kept if path.name not in DEFINITIONS]
         for path in draw.permutation(sorted(kept))[:3]:
             content = bytearray(path.read_bytes())
             at = int(draw.integers(len(content)))
