@@ -323,15 +323,19 @@ def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float])
 
 
 def _not_examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float], where: Where) -> Iterator[Finding]:
-    hidden = [part_text(name, bearing) for (bearing, name), depth in depths.items() if depth > CLEAR_MODULATION]
+    hidden = [(bearing, name) for (bearing, name), depth in depths.items() if depth > CLEAR_MODULATION]
     if hidden:
-        yield cannot_tell(
+        finding = cannot_tell(
             "bearing-part-hidden",
-            f"Not examined: {', '.join(hidden)}. Their orders fall on multiples of a shaft within the resolution, "
-            f"or the floor there is too high for a modulation of {100 * CLEAR_MODULATION:.0f} % to show.",
+            f"Not examined: {', '.join(part_text(name, bearing) for bearing, name in hidden)}. Their orders fall on "
+            "multiples of a shaft within the resolution, or the floor there is too high for a modulation of "
+            f"{100 * CLEAR_MODULATION:.0f} % to show.",
             where,
             surer="A longer recording: orders that are close need many revolutions to be told apart.",
         )
+        # A cage seldom breaks before what it holds apart is damaged: that alone does not leave the bearing undecided.
+        only_cages = all(name == "FTF" for _, name in hidden)
+        yield replace(finding, kind=Kind.INFORMATION) if only_cages else finding
     unknown = [b.name for b in signals.rig.bearings if b.name not in {owner for owner, _ in depths}]
     if unknown:
         why = f"of {', '.join(unknown)} the geometry or the speed of the shaft is not known"

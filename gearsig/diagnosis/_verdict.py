@@ -15,6 +15,8 @@ DEPTH_UNKNOWN = "crack-depth-unknown"
 
 WITHOUT_REFERENCE = "Damage of many teeth would only show against an earlier recording."
 
+NO_FAULT = "No fault shows."
+
 _RANK = {kind: i for i, kind in enumerate(Kind)}
 
 
@@ -41,7 +43,11 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     # A change that no pattern explains is a suspicion by itself, and said already.
     if not claims and outcome_of(findings) is Outcome.SUSPICION:
         return " ".join(filter(None, (doubt, changed, zone)))
-    return " ".join(filter(None, (doubt, changed, _said(others, has_reference=has_reference), zone, unchanged)))
+    said = _said(others, has_reference=has_reference)
+    if zone and said.startswith(NO_FAULT):
+        said = f"{zone} What causes it does not show.{said.removeprefix(NO_FAULT)}"
+        zone = ""
+    return " ".join(filter(None, (doubt, changed, said, zone, unchanged)))
 
 
 def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
@@ -56,7 +62,8 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
         return " ".join([f"{kind.value.capitalize()}: {claim}.", *(f.title for f in unused)])
     said = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.NO_FAULT:
-        return " ".join(["No fault shows.", *said, *([] if has_reference else [WITHOUT_REFERENCE])])
+        has_teeth = any(f.code == "no-tooth-local-damage" for f in findings)
+        return " ".join([NO_FAULT, *said, *([WITHOUT_REFERENCE] if has_teeth and not has_reference else [])])
     others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
     gaps = [*unused, *others]
     nothing = "Nothing was examined that would show a fault."

@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.diagnosis import analyze
 from gearsig.recording import Channel, Recording
-from gearsig.rig import ConstantSpeed, MachineSize, Rig, Shaft
+from gearsig.rig import Bearing, ConstantSpeed, MachineSize, Rig, Shaft
 from tests.diagnosis.machines import codes, finding
 
 FS_HZ = 5120.0
@@ -61,3 +61,10 @@ def test_nothing_is_said_of_machines_that_are_not_described() -> None:
 )
 def test_groups(size: dict[str, float], group: int | None) -> None:
     assert MachineSize(**size).group == group
+
+
+def test_no_machine_in_zone_d_is_said_to_have_no_fault() -> None:
+    rig = replace(MOTOR, bearings=(Bearing("front", "motor", bearing="6205"),))
+    analysis = analyze(motor(6.0, rig))
+    assert analysis.verdict.startswith(finding(analysis, "vibration-zone").title)
+    assert "No fault" not in analysis.verdict
