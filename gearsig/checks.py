@@ -102,6 +102,11 @@ def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> F
             allowed="finite numbers",
             remedy="cut out the gap or interpolate it before the analysis, knowingly",
         )
+    return read_only(array)
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a read-only view: a kernel that is given no other arrays is compiled for one kind only."""
     view = array.view()
     view.flags.writeable = False
     return view
@@ -120,8 +125,7 @@ def freeze(result: object, *names: str, ndim: int | None = 1) -> None:
     """
     for name in names:
         value = getattr(result, name)
-        array = np.asarray(value).view() if ndim is None else frozen_array(value, name, ndim=ndim)
-        array.flags.writeable = False
+        array = read_only(np.asarray(value)) if ndim is None else frozen_array(value, name, ndim=ndim)
         object.__setattr__(result, name, array)
 
 

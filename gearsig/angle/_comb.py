@@ -245,7 +245,7 @@ def score_speeds(
 ) -> FloatArray:
     """Return the score of each speed, the sum of its lines' log likelihood ratios; `orders` replaces the comb's."""
     scores = np.empty(len(speeds))
-    orders = comb.orders if orders is None else orders
+    orders, speeds = comb.orders if orders is None else orders, np.ascontiguousarray(speeds)
     _score(evidence.ratios, 1.0 / evidence.bin_width, evidence.top, orders, comb.presence, comb.is_mesh, speeds, scores)
     return scores
 

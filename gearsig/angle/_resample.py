@@ -12,7 +12,7 @@ import numpy as np
 from numba import config, njit
 
 from gearsig.angle._types import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, count, positive
+from gearsig.checks import FloatArray, count, positive, read_only
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 
@@ -194,8 +194,11 @@ def _lowpassed(x, first, step, n, s, side):  # type: ignore[no-untyped-def]
     half = _taps(reach, 0.5, s, side)
     n_whole = (n + 1) // 2
     if first >= reach and first + n_whole + reach + 4 < x.shape[0]:
-        y[0::2] = _along(x, first - reach, n_whole, whole)
-        y[1::2] = _along(x, first - reach, n // 2, half)
+        even, odd = _along(x, first - reach, n_whole, whole), _along(x, first - reach, n // 2, half)
+        for m in range(n_whole):
+            y[2 * m] = even[m]
+        for m in range(n // 2):
+            y[2 * m + 1] = odd[m]
     else:
         for m in range(n_whole):
             y[2 * m] = _dot(x, first + m - reach, whole)
@@ -522,11 +525,11 @@ def _fill(
 ) -> None:
     """Fill `samples` chunk by chunk; the kernels release the interpreter, so plain threads share the work."""
     knots, revolutions, speeds = (
-        np.ascontiguousarray(a, dtype=np.float64) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
+        read_only(np.ascontiguousarray(a, np.float64)) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
     )
     rate, n = recording.sampling_rate_hz, samples.shape[1]
     half_band, table, side = doubling_filter(), delay_table(), kernel_side()
-    signals = [np.ascontiguousarray(recording.samples[i]) for i in rows]
+    signals = [read_only(np.ascontiguousarray(recording.samples[i])) for i in rows]
 
     def fill_chunk(start: int) -> None:
         stop = min(n, start + _CHUNK)

@@ -24,7 +24,7 @@ from gearsig.angle._comb import (
 )
 from gearsig.angle._resample import resample_to_angle, times_at
 from gearsig.angle._types import AngleSignal, ShaftAngle, monotone_slopes
-from gearsig.checks import FloatArray, positive
+from gearsig.checks import FloatArray, positive, read_only
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.rig import Rig
@@ -156,7 +156,7 @@ def _refined_once(
     revolutions = signal.start_revolution + np.arange(n) * (signal.samples.shape[1] / n_per_rev / n)
     times = np.empty(n)
     knots, values, slopes = (
-        np.ascontiguousarray(a, dtype=np.float64) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
+        read_only(np.ascontiguousarray(a, np.float64)) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
     )
     k = min(max(0, int(np.searchsorted(values, revolutions[0])) - 1), len(knots) - 2)
     times_at(knots, values, slopes, k, float(revolutions[0]), float(revolutions[1] - revolutions[0]), times)

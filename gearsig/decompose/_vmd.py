@@ -269,7 +269,8 @@ def iterate(C, grid, space, omega, alpha, tau, fixed_zero, tolerance, max_iterat
     while True:
         modes[:] = 0.0
         dual = np.zeros(len(C) if tau != 0.0 else 0)
-        history[0] = omega
+        for k in range(len(omega)):
+            history[0, k] = omega[k]
         n_done, change, kept = 0, np.inf, False
         while n_done < n_limit and (change > tolerance or n_done == 0):
             kept = change <= nearly or n_done + 1 == n_limit
@@ -295,8 +296,10 @@ def _update(C, grid, modes, before, keep, dual, alpha, tau, fixed_zero, omega, o
         start = b * _BLOCK
         m = min(_BLOCK, n - start)
         frequency = grid[start : start + m]
-        if keep:
-            before[b] = modes[b]
+        if keep:  # element by element: assigning arrays takes seconds to compile, for the text of its error
+            for k in range(K):
+                for i in range(m):
+                    before[b, k, i] = modes[b, k, i]
         _remainder(C[start : start + m], modes[b], dual[start : start + m], rest)
         for k in range(K):
             mode, centre = modes[b, k], omega[k]
@@ -346,7 +349,8 @@ def _rows(blocks, n, space):  # type: ignore[no-untyped-def]
         start = b * _BLOCK
         m = min(_BLOCK, n - start)
         for k in range(blocks.shape[1]):
-            rows[k, start : start + m] = blocks[b, k, :m]
+            for i in range(m):
+                rows[k, start + i] = blocks[b, k, i]
     return rows
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.angle import ShaftAngle
-from gearsig.checks import FloatArray, count, frozen_array, positive
+from gearsig.checks import FloatArray, count, frozen_array, positive, read_only
 from gearsig.errors import InputError, RefusalError
 from gearsig.phase._types import PhasePortrait, PoincareSection
 from gearsig.recording import Recording
@@ -51,7 +51,8 @@ class CycleLock:
         first, last = np.ceil(cycles[0]), np.floor(cycles[-1])
         times = np.empty(max(int(last - first) + 1, 0))
         if len(times):
-            times_at(part.time_s, cycles, part.speed_rev_per_s * self.cycles_per_revolution, 0, first, 1.0, times)
+            speed = part.speed_rev_per_s * self.cycles_per_revolution
+            times_at(part.time_s, read_only(cycles), read_only(speed), 0, first, 1.0, times)
         return times
 
 
@@ -256,7 +257,7 @@ def _interpolated(points: FloatArray, positions: FloatArray) -> FloatArray:
         # The mean is kept apart: what is left is interpolated with an error relative to the motion, not to the mean.
         mean = float(x.mean())
         values = np.empty(len(positions))
-        interpolate(x - mean, positions, doubling_filter(), delay_table(), values)
+        interpolate(read_only(x - mean), positions, doubling_filter(), delay_table(), values)
         points_at[:, axis] = values + mean
     return points_at
 

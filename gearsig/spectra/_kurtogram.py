@@ -525,8 +525,8 @@ def _take_phases(x, start, n, n_parts, turned):  # type: ignore[no-untyped-def]
     available = min(n, x.shape[1] - start)
     for component in range(2):
         for phase in range(n_parts):
-            source = x[component, start + phase : start + available : n_parts]
-            turned[phase, component, : len(source)] = source
+            for m in range((available - phase + n_parts - 1) // n_parts):
+                turned[phase, component, m] = x[component, start + phase + m * n_parts]
 
 
 @njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
@@ -605,7 +605,8 @@ def _store(z, n, alternating, starts_odd, part, start):  # type: ignore[no-untyp
     """Write z; where it alternates, times (-1)^m, which shifts the band by half the rate to 0."""
     for component in range(2):
         if not alternating:
-            part[component, start : start + n] = z[component, :n]
+            for m in range(n):
+                part[component, start + m] = z[component, m]
             continue
         sign = -1.0 if starts_odd else 1.0
         for m in range(n):

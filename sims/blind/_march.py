@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from sims.blind._rig import REACH
+from sims.compiled import copy
 
 # --------------------
 # Places in the vector of single values that the compiled march takes.
@@ -347,7 +348,7 @@ def keep(
 ) -> None:
     """Fill one row of the output."""
     _, shapes, seen, omega, zeta = modal
-    row[:4] = held
+    copy(held, row)
     row[4:10] = 0.0
     row[10] = force
     for m in range(q.shape[0]):
@@ -389,7 +390,7 @@ def march(
         u[2] += number[PHASE_2]
         u[8] += number[PHASE_2]
         theta_1, theta_2 = u[1], u[2]
-        push[:] = steady
+        copy(steady, push)
         behind += step_s * drive(push, number, u, v, step * step_s, behind, speed, torque)
         bearings(push, held, number, u, theta_1, theta_2, bearing_k, clearance, unbalance)
         sways(push, sway, theta_1, theta_2)

@@ -9,6 +9,7 @@ from math import cos, sin
 import numpy as np
 from numba import njit
 
+from sims.compiled import copy
 from sims.gear_pair import carried_part, element_forces, foot
 from sims.machine import profile_value, set_speed, torque_ripple
 from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, height_now, pair_force
@@ -482,5 +483,5 @@ def derivative(k, curves, rows, pitch, t, state, speed, torque, first_angle, rou
         rate[16:],
         extra,
     )
-    rate[:16] = state[16:]
+    copy(state[16:], rate)
     return extra

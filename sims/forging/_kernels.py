@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 from scipy.integrate import RK45
 
+from sims.compiled import copy
+
 # Compiled: which tooth pairs carry, where worn ones touch, and the force of the flanks that do.
 
 
@@ -327,7 +329,7 @@ def integrate(k, y, mode, t, t_end, first_step, profile, absolute, relative, int
         if counts[0] < found.shape[0] and counts[0] * interval <= t + h:
             _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, found, spare)
         t += h
-        y[:] = end
+        copy(end, y)
         if mode[0] != 0.0:
             contacts[counts[1] - 1, 7] = max(contacts[counts[1] - 1, 7], abs(out[7]))
         if changes:
@@ -339,7 +341,7 @@ def integrate(k, y, mode, t, t_end, first_step, profile, absolute, relative, int
         if mode[0] != 0.0 and _hand_over(k, y, mode):
             evaluate(k, y, t, mode, profile, stages[0], out)
         else:
-            stages[0] = stages[N_STAGES - 1]
+            copy(stages[N_STAGES - 1], stages[0])
         grown = h * min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
         h = max(grown, free) if h < free else grown
     return h, DONE
@@ -355,9 +357,9 @@ def _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, foun
         for i in range(y.shape[0]):
             at[i] = within_step(y, h, stages, x, i)
         evaluate(k, at, t + x * h, mode, profile, spare[1], extra)
-        row[:N_OUT] = extra
+        copy(extra, row)
         row[N_OUT] = energy(k, at, mode[0], mode[1])
-        row[N_OUT + 1 : N_SIGNALS] = at[8:11]
+        row[N_OUT + 1], row[N_OUT + 2], row[N_OUT + 3] = at[8], at[9], at[10]
         for i in range(select.shape[0]):
             found[counts[0], i] = row[select[i]]
         counts[0] += 1

@@ -8,28 +8,31 @@ import numpy as np
 import pytest
 
 from gearsig.motion import measure_motion
-from gearsig.recording import write_recording
+from gearsig.recording import Recording, write_recording
 from gearsig.rig import read_rig, write_rig
 from sims import simulate
 from tests.app.test_cli import run
 from tests.motion.recordings import changed, start_stop, without
 
-RECORDING = start_stop()
-JUMP = np.where(np.arange(RECORDING.n_samples) < 2700, 0.0, 0.5)
-WRAPPED = np.mod(RECORDING.values("wheel angle") + 6.2, 2.0 * np.pi)
+JUMP = np.where(np.arange(6000) < 2700, 0.0, 0.5)
 COMMANDS = ("force", "start-stop", "identify")
 OUTPUT = {"force": "out", "start-stop": "out", "identify": "out.toml"}
+
+
+def wrapped_angle() -> Recording:
+    return changed(start_stop(), "wheel angle", np.mod(start_stop().values("wheel angle") + 6.2, 2.0 * np.pi))
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """The rig, the angle that jumps, the encoder that wraps, and the torque without times."""
-    assert RECORDING.rig is not None
-    write_rig(RECORDING.rig, tmp_path / "rig.toml")
-    write_recording(changed(RECORDING, "wheel angle", RECORDING.values("wheel angle") + JUMP), tmp_path / "jump.h5")
-    write_recording(changed(RECORDING, "wheel angle", WRAPPED), tmp_path / "wrap.h5")
-    write_recording(RECORDING, tmp_path / "good.h5")
-    np.savetxt(tmp_path / "torque.csv", RECORDING.values("torque")[:500], header="torque", comments="")
+    good = start_stop()
+    assert good.rig is not None
+    write_rig(good.rig, tmp_path / "rig.toml")
+    write_recording(changed(good, "wheel angle", good.values("wheel angle") + JUMP), tmp_path / "jump.h5")
+    write_recording(wrapped_angle(), tmp_path / "wrap.h5")
+    write_recording(good, tmp_path / "good.h5")
+    np.savetxt(tmp_path / "torque.csv", good.values("torque")[:500], header="torque", comments="")
     return tmp_path
 
 
@@ -106,8 +109,8 @@ def test_the_remedy_for_an_encoder_that_wraps_works(capsys: pytest.CaptureFixtur
         code, out, _ = run(capsys, command, folder / "wrap.h5", "--rig", rig)
         assert code == 0
         assert "cannot be told" not in " ".join(out.split())
-    wrapped = replace(changed(RECORDING, "wheel angle", WRAPPED), rig=None)
-    plain = measure_motion(RECORDING).driven_angle_rad
+    wrapped = replace(wrapped_angle(), rig=None)
+    plain = measure_motion(start_stop()).driven_angle_rad
     assert measure_motion(wrapped, read_rig(rig)).driven_angle_rad - plain == pytest.approx(
         np.full(len(plain), 6.2), abs=1e-9
     )
@@ -115,7 +118,7 @@ def test_the_remedy_for_an_encoder_that_wraps_works(capsys: pytest.CaptureFixtur
 
 def test_motion_alone_is_examined_as_far_as_it_goes(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     """No vibration, no torque: starts, stops, impacts and lost motion still show."""
-    alone = without(RECORDING, *(n for n in RECORDING.channel_names if "angle" not in n))
+    alone = without(start_stop(), *(n for n in start_stop().channel_names if "angle" not in n))
     write_recording(alone, folder / "motion.h5")
     code, out, _ = run(capsys, "analyze", folder / "motion.h5", "--rig", folder / "rig.toml")
     assert code == 0
@@ -124,7 +127,7 @@ def test_motion_alone_is_examined_as_far_as_it_goes(capsys: pytest.CaptureFixtur
 
 
 def test_a_rig_whose_encoder_is_missing_has_a_remedy(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
-    write_recording(without(RECORDING, *(n for n in RECORDING.channel_names if n != "torque")), folder / "t.h5")
+    write_recording(without(start_stop(), *(n for n in start_stop().channel_names if n != "torque")), folder / "t.h5")
     err = refused(capsys, folder, "analyze", "t.h5")
     assert "there is no channel 'pinion angle'" in err
     assert "--speed-rpm" in err
@@ -136,7 +139,7 @@ def test_a_stop_longer_than_the_record_is_refused(
     capsys: pytest.CaptureFixture[str], folder: Path, command: str
 ) -> None:
     """Cut out between the stop and the press blow: the flanks lie in the play, and nothing can be told."""
-    write_recording(replace(RECORDING, samples=RECORDING.samples[:, 1200:1900]), folder / "rest.h5")
+    write_recording(replace(start_stop(), samples=start_stop().samples[:, 1200:1900]), folder / "rest.h5")
     err = refused(capsys, folder, command, "rest.h5")
     assert "its stop is longer than the record" in err
     assert "record a start and a braked stop" in err
