@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import gearsig
@@ -58,6 +59,7 @@ def sample_folder() -> Path:
     raise InputError("the sample recordings are missing", where=str(package), remedy="install gearsig again")
 
 
+@cache
 def samples() -> tuple[SampleRecording, ...]:
     """Return the samples, the most telling first; each recording stands beside a rig file of the same stem."""
     found = []

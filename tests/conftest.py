@@ -5,6 +5,10 @@ import os
 import pytest
 from hypothesis import HealthCheck, settings
 
+# Before numpy is loaded: workers share the processors, and threads of linear algebra that wait keep them busy.
+for library in ("OMP", "OPENBLAS", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
 # Compiled kernels are built on their first call: how long an example takes says nothing about the code.
 settings.register_profile("gearsig", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 # In continuous integration the examples are the same each time: a change fails by what it changes, not by chance.

@@ -24,7 +24,9 @@ def test_a_sample_is_open_at_the_start() -> None:
 @pytest.mark.parametrize("name", sorted(SAMPLES))
 def test_every_sample_opens_in_every_view(name: str) -> None:
     page = opened(name)
-    for tab in (tab for tab in VIEWS if tab not in SLOW):
+    assert not page.exception
+    as_another = name.startswith("root_crack") and name != "root_crack_3mm"  # the same machine and sensors
+    for tab in (tab for tab in VIEWS if tab not in SLOW and not as_another):
         page.session_state[state.TAB] = tab
         page.run()
         assert not page.exception, (name, tab)
