@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from gearsig.formatting import file_label
 from gearsig.processes import n_processors, run_jobs
 
 if TYPE_CHECKING:
-    from gearsig.recording import Recording
+    from gearsig.prepared import PreparedRecording
     from gearsig.report import Entry, Failure
     from gearsig.rig import Rig, SpeedSource
 
@@ -276,17 +277,29 @@ def _report_one(job: _Job) -> Entry | Failure:
         return _failure(job, f"unexpected error, please report: {type(error).__name__}: {' '.join(str(error).split())}")
 
 
-def _reference_of(job: _Job, rig: Rig | None) -> Recording | None:
-    """Read the recording of the healthy machine; pulse times would belong to the other one."""
+def _reference_of(job: _Job, rig: Rig | None) -> PreparedRecording | None:
+    """Return the recording of the healthy machine; pulse times would belong to the other one."""
     from gearsig.diagnosis import rig_of_reference
-    from gearsig.recording import read_recording
     from gearsig.rig import PulseTimes
 
     if job.reference is None:
         return None
     speed = None if isinstance(job.speed, PulseTimes) else job.speed
     own = rig_of_reference(job.reference, rig)
-    return read_recording(job.reference, rig=own, sampling_rate_hz=job.sampling_rate_hz, speed=speed)
+    modified_ns = job.reference.stat().st_mtime_ns if job.reference.is_file() else 0
+    return _read_reference(job.reference, own, job.sampling_rate_hz, speed, modified_ns)
+
+
+@lru_cache(maxsize=1)
+def _read_reference(
+    path: Path, rig: Rig | None, sampling_rate_hz: float | None, speed: SpeedSource | None, modified_ns: int
+) -> PreparedRecording:
+    """Read it once a process: what is found in it stays with it."""
+    from gearsig.prepared import prepare
+    from gearsig.recording import read_recording
+
+    del modified_ns  # tells the cache that the file is another one
+    return prepare(read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed))
 
 
 def _killed(job: _Job) -> Failure:

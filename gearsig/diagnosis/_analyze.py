@@ -144,7 +144,10 @@ def _examined(
     if healthy is not None:
         announce("the reference")
         _check_size(healthy.recording)
-        reference_analysis, then = _examined(healthy, settings, None, None, lambda _: None)
+        # Kept: a batch, a page and a comparison come with the same reference again and again.
+        reference_analysis, then = healthy.keep(
+            ("diagnosis", settings), lambda: _examined(healthy, settings, None, None, lambda _: None)
+        )
         if then is None:
             findings = beside_reference(findings, reference_analysis)
         else:
