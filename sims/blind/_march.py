@@ -8,7 +8,6 @@ import numpy as np
 from numba import njit
 
 from sims.blind._rig import REACH
-from sims.compiled import copy
 
 # --------------------
 # Places in the vector of single values that the compiled march takes.
@@ -348,7 +347,7 @@ def keep(
 ) -> None:
     """Fill one row of the output."""
     _, shapes, seen, omega, zeta = modal
-    copy(held, row)
+    row[0], row[1], row[2], row[3] = held[0], held[1], held[2], held[3]
     row[4:10] = 0.0
     row[10] = force
     for m in range(q.shape[0]):
@@ -390,7 +389,8 @@ def march(
         u[2] += number[PHASE_2]
         u[8] += number[PHASE_2]
         theta_1, theta_2 = u[1], u[2]
-        copy(steady, push)
+        for m in range(n):
+            push[m] = steady[m]
         behind += step_s * drive(push, number, u, v, step * step_s, behind, speed, torque)
         bearings(push, held, number, u, theta_1, theta_2, bearing_k, clearance, unbalance)
         sways(push, sway, theta_1, theta_2)
