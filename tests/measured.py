@@ -71,15 +71,15 @@ class Measured:
         return read_recording(DATA / self.name, rig=self.rig)
 
 
-def _motor(file: str, known: str) -> Measured:
-    return Measured(f"bearing_cwru/{file}", known, replace(MOTOR, sampling_rate_hz=CWRU_RATES_HZ[file]))
+def _motor(file: str, known: str, reference: str = "bearing_cwru/normal_0.mat") -> Measured:
+    return Measured(f"bearing_cwru/{file}", known, replace(MOTOR, sampling_rate_hz=CWRU_RATES_HZ[file]), reference)
 
 
 RECORDINGS = (
     _motor("OR007@6_0.mat", "outer race, drive end"),
     _motor("IR021_0.mat", "inner race, drive end"),
     _motor("B007_0.mat", "ball, drive end; not diagnosable by its envelope (Smith and Randall 2015)"),
-    _motor("normal_0.mat", "healthy"),
+    _motor("normal_0.mat", "healthy", ""),
     Measured("bearing_races/InnerRaceFault_vload_3.mat", "inner race, 118.875 Hz", BEARING),
     Measured("bearing_races/OuterRaceFault_vload_4.mat", "outer race, 81.125 Hz", BEARING),
     Measured("unbalance_rotor/unbalance.mat#1", "next to no unbalance added", ROTOR),
@@ -97,6 +97,19 @@ RECORDINGS = (
     Measured("car_run_up/accel_with_rpm.wav", "run-up from 974 to 4821 rpm; orders 2, 4, 4.5, 5.5, 6", None),
 )
 BY_NAME = {one.name: one for one in RECORDINGS}
+
+
+def with_assumed_gears(recording: Recording) -> Recording:
+    """Return a recording of the gear pair with what a crack's depth asks for and nobody has written down.
+
+    Wheel, module, width, torque, and that its channel is an acceleration: whether two parts of one recording differ
+    hangs on none of them.
+    """
+    assert recording.rig is not None
+    pair = GearPair("stage", "input", "output", 23, 46, module_mm=3.0, face_width_mm=25.0)
+    rig = replace(recording.rig, pairs=(pair,), operating_point=OperatingPoint("input", 2000.0, torque_nm=40.0))
+    channels = tuple(replace(c, quantity="acceleration", unit="g") for c in recording.channels)
+    return replace(recording, rig=rig, channels=channels)
 
 
 def halves(recording: Recording) -> tuple[Recording, Recording]:

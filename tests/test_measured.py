@@ -10,7 +10,7 @@ from gearsig.diagnosis import Analysis, CannotTell, Finding, Kind, analyze
 from gearsig.prepared import refined_angle
 from gearsig.recording import Recording, read_recording
 from gearsig.rig import ConstantSpeed, OperatingPoint
-from gearsig.severity import CrackEstimate
+from gearsig.severity import CrackEstimate, NoCrackSeen, estimate_crack
 from tests.measured import (
     BEARING,
     BY_NAME,
@@ -22,6 +22,7 @@ from tests.measured import (
     TWO_STAGES,
     halves,
     needs_data,
+    with_assumed_gears,
 )
 
 pytestmark = needs_data
@@ -138,6 +139,14 @@ def test_motor_bench_names_the_right_part_of_the_right_bearing_or_none(file: str
         assert not claims(analysis)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("file", "part"), [("OR007@6_0.mat", "outer race"), ("IR021_0.mat", "inner race")])
+def test_a_damaged_race_is_the_first_that_has_changed_since_the_motor_was_healthy(file: str, part: str) -> None:
+    analysis = analyze(BY_NAME[f"bearing_cwru/{file}"].read(), reference=BY_NAME["bearing_cwru/normal_0.mat"].read())
+    assert analysis.verdict.startswith(f"Changed since the reference: {part} of drive end +")
+    assert found(analysis, f"bearing-{part.replace(' ', '-')}").kind is Kind.FAULT
+
+
 def test_a_rotor_with_more_unbalance_has_changed_first_of_all() -> None:
     before = BY_NAME["unbalance_rotor/unbalance.mat#1"].read()
     # Speeds: the peak at 1× of a spectrum padded to 2²² values; that at 2× says the same to 0.5 rpm.
@@ -158,6 +167,17 @@ def test_the_halves_of_a_recording_are_alike(name: str) -> None:
     assert not any(c.is_change for c in analysis.level_changes)
     assert "changed-since-reference" not in {f.code for f in analysis.findings}
     assert not isinstance(analysis.crack, CrackEstimate)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("channel", [12, 14])
+def test_parts_of_a_recording_of_one_gear_pair_differ_by_no_crack(channel: int) -> None:
+    recording = with_assumed_gears(BY_NAME[f"gear_pair_23_46/3027_217_Data_Chan{channel}.mat"].read())
+    quarter_s = recording.duration_s / 4
+    quarters = [recording.between(i * quarter_s, (i + 1) * quarter_s) for i in range(4)]
+    first, second = halves(recording)
+    for reference, part in ((first, second), (second, first), (quarters[0], quarters[1]), (quarters[0], quarters[3])):
+        assert isinstance(estimate_crack(part, reference=reference), NoCrackSeen)
 
 
 @pytest.mark.slow

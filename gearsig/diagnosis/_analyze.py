@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -82,13 +83,15 @@ def analyze(
     Raises
     ------
     InputError
-        If there is no vibration channel, the record is shorter than 256 samples, or the reference has other channels or
-        is the recording itself.
+        If there is no vibration channel, the record is shorter than 256 samples, or the reference has none of its
+        channels or is the recording itself. Names that differ by a record's number only are one channel's.
     """
     prepared = prepare(recording, rig)
     _check_size(prepared.recording)
     healthy = None if reference is None else prepare(reference, prepared.recording.rig)
     if healthy is not None:
+        alike = _named_alike(prepared.recording, healthy.recording)
+        healthy = healthy if alike is healthy.recording else prepare(alike, prepared.recording.rig)
         _check_reference(prepared.recording, healthy.recording)
     return _examined(prepared, settings or AnalysisSettings(), healthy, torque_nm, on_stage or (lambda _: None))[0]
 
@@ -283,12 +286,31 @@ def _check_vibration(recording: Recording) -> None:
         )
 
 
+def _named_alike(recording: Recording, reference: Recording) -> Recording:
+    """Return the reference with the recording's names of channels that differ by a record's number only.
+
+    It has three digits or more: fewer tell sensors apart.
+    """
+
+    def without_number(name: str) -> str:
+        return re.sub(r"\d{3,}", "", name)
+
+    names = {without_number(name): name for name in recording.channel_names}
+    keys = [without_number(name) for name in reference.channel_names]
+    is_unique = len(names) == len(recording.channel_names) and len(set(keys)) == len(keys)
+    if not is_unique or set(recording.vibration_names()) <= set(reference.channel_names):
+        return reference
+    channels = tuple(replace(c, name=names.get(key, c.name)) for c, key in zip(reference.channels, keys, strict=True))
+    return replace(reference, channels=channels)
+
+
 def _check_reference(recording: Recording, reference: Recording) -> None:
     where = reference.provenance.source or "reference"
     if np.array_equal(recording.samples, reference.samples):
         remedy = "give one that was taken when the machine was healthy"
         raise InputError("the reference is the recording itself", where=where, remedy=remedy)
-    missing = [name for name in recording.vibration_names() if name not in reference.channel_names]
-    if missing:
+    names = recording.vibration_names()
+    missing = [name for name in names if name not in reference.channel_names]
+    if names and len(missing) == len(names):
         found = ", ".join(reference.channel_names)
         raise InputError(f"the reference has no channel {missing[0]!r}", where=where, allowed=f"same channels: {found}")

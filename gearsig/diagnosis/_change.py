@@ -291,7 +291,8 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
             hertz = signals.frequency_per_order_hz, reference.frequency_per_order_hz
             if high / min(hertz) > highest:
                 continue
-            label, where = f"noise {low:.3g} to {high:.3g} Hz", Where((name,), band_hz=(low, high))
+            edges = f"{low:.0f} to {high:.0f} Hz" if high < 1000 else f"{low / 1000:.2g} to {high / 1000:.2g} kHz"
+            label, where = f"noise {edges}", Where((name,), band_hz=(low, high))
             levels = (s.band(low / f, high / f) for s, f in zip((now, then), hertz, strict=True))
             yield _Quantity(label, "noise", where, 0.0, unit, *levels)
 

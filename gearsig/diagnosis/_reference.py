@@ -48,7 +48,7 @@ class Earlier:
 
 
 def rig_of_reference(path: str | Path, rig: Rig | None) -> Rig | None:
-    """Return the recording's rig for its reference, with the torque that the rig file beside the reference states.
+    """Return the recording's rig for its reference, with torque and sampling rate of the rig file beside the reference.
 
     Raises
     ------
@@ -59,7 +59,11 @@ def rig_of_reference(path: str | Path, rig: Rig | None) -> Rig | None:
 
     beside = rig_file_beside(path)
     rig_beside = read_rig(beside) if beside is not None else None
-    if rig_beside is None or rig is None or not rig_beside.pairs:
+    if rig_beside is None or rig is None:
+        return rig
+    if rig_beside.sampling_rate_hz is not None:
+        rig = replace(rig, sampling_rate_hz=rig_beside.sampling_rate_hz)
+    if not rig_beside.pairs:
         return rig
     teeth, others = (", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in r.pairs) for r in (rig, rig_beside))
     if teeth != others:

@@ -14,7 +14,7 @@ from gearsig.diagnosis import Analysis, analyze
 from gearsig.errors import RefusalError
 from gearsig.recording import Recording
 from gearsig.severity import CrackEstimate, estimate_crack
-from tests.measured import BY_NAME, RECORDINGS, Measured, halves
+from tests.measured import BY_NAME, PINION, RECORDINGS, Measured, halves, with_assumed_gears
 
 
 def rows(names: list[str]) -> Iterator[str]:
@@ -42,12 +42,16 @@ def null(recording: Recording) -> str:
     first, second = halves(recording)
     texts = [_changes(analyze(second, reference=first))]
     if recording.rig is not None and recording.rig.pairs:
+        assumed = ""
+        if recording.rig.pairs == PINION.pairs:
+            first, second = with_assumed_gears(first), with_assumed_gears(second)
+            assumed = " (wheel, module, width and torque assumed)"
         try:
             crack = estimate_crack(second, reference=first)
         except RefusalError as refusal:
             texts.append(f"crack: {refusal.reason}")
         else:
-            texts.append("a crack" if isinstance(crack, CrackEstimate) else "no crack")
+            texts.append(("a crack" if isinstance(crack, CrackEstimate) else "no crack") + assumed)
     return "; ".join(texts)
 
 

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gearsig.diagnosis import (
@@ -18,8 +19,9 @@ from gearsig.diagnosis import (
     rig_of_reference,
 )
 from gearsig.errors import InputError
+from gearsig.recording import Channel, Recording
 from gearsig.rig import write_rig
-from tests.diagnosis.machines import GOOD, RIG, codes, finding, good_analysis, record, teeth
+from tests.diagnosis.machines import GOOD, RIG, codes, finding, good_analysis, motor, record, teeth
 from tests.kinematic.model import BearingFault
 
 
@@ -161,3 +163,18 @@ def test_sidebands_are_a_ratio_of_all_channels() -> None:
 def test_another_part_or_order_is_another_finding() -> None:
     for other in ({"bearing": "rear"}, {"shaft": "out"}, {"order": 3.8}, {"order": None}):
         assert told(moved(RACE, **other), RACE) == NOT_THERE
+
+
+def test_channels_of_another_record_number_are_the_same_sensors() -> None:
+    """X097_DE_time is X130_DE_time of another record; a channel that the reference lacks is not compared."""
+
+    def named(recording: Recording, *names: str) -> Recording:
+        channels = tuple(Channel(name, "acceleration", "m/s^2") for name in names)
+        samples = np.vstack([recording.samples * (1 + i) for i in range(len(names))])
+        return replace(recording, samples=samples, channels=channels)
+
+    recording = named(motor("", 1), "X130_DE_time", "X130_BA_time")
+    analysis = analyze(recording, reference=named(motor("", 2), "X097_DE_time"))
+    assert {c.where.channels for c in analysis.level_changes} == {("X130_DE_time",)}
+    with pytest.raises(InputError, match="no channel"):
+        analyze(named(motor("", 1), "a1"), reference=named(motor("", 2), "a2"))
