@@ -66,18 +66,7 @@ def test_what_cannot_be_analysed_is_at_most_one_message_in_every_method(content:
         assert len(page.error) <= 1, method
 
 
-def test_a_segment_that_is_too_short_is_at_most_one_message() -> None:
-    page = opened_machine("Denoising")
-    for method in METHODS:
-        go(page, method)
-        sliders = [s for s in page.slider if s.label.startswith("Segment")]
-        for limits_s in ((2.0, 2.05), (0.0, 0.0)) if sliders else ():
-            next(s for s in page.slider if s.label.startswith("Segment")).set_value(limits_s).run()
-            assert not page.exception, method
-            assert len(page.error) <= 1, method
-
-
-def test_names_from_files_are_shown_as_typed_in_every_method() -> None:
+def test_names_are_shown_as_typed_and_a_segment_too_short_is_at_most_one_message_in_every_method() -> None:
     content, rig = machine()
     names = ("<script>alert(1)</script>", "**x** $y$ :smile:")
     rig = rig.replace('"input"', f'"{names[1]}"').replace('"a1"', f'"{names[0]}"')
@@ -89,6 +78,11 @@ def test_names_from_files_are_shown_as_typed_in_every_method() -> None:
         for markup in ("<script", "**x**", "$y$", ":smile:"):
             assert not re.search(r"(?<!\\)" + re.escape(markup), raw), (method, markup)
         assert all("<script" not in chart.proto.spec for chart in page.get("plotly_chart"))
+        sliders = [s for s in page.slider if s.label.startswith("Segment")]
+        for limits_s in ((2.0, 2.05), (0.0, 0.0)) if sliders else ():
+            next(s for s in page.slider if s.label.startswith("Segment")).set_value(limits_s).run()
+            assert not page.exception, method
+            assert len(page.error) <= 1, method
 
 
 def test_waveforms_open_with_five_mesh_cycles() -> None:
