@@ -219,7 +219,7 @@ def outcome(case: Case, analysis: Analysis) -> str:
         return "wrong"
     if right and right[0].confidence > LIKELY:
         return "right"
-    return "unsure" if found else "missed"
+    return "unsure" if found else "nothing said" if case.part == "sound" else "missed"
 
 
 def what_changed(case: Case, analysis: Analysis) -> str:
