@@ -343,7 +343,7 @@ def _with_modes(channel: MeasuredChannel, bearing: int, drawn: DrawnRig) -> Meas
             mode.frequency_hz,
             mode.damping_ratio,
             {
-                f"bearing {i + 1} {axis}": gain * mode.gain * mode.shape[bearing - 1] * mode.shape[i] * direction
+                f"bearing {i + 1} {axis} yield": gain * mode.gain * mode.shape[bearing - 1] * mode.shape[i] * direction
                 for i in range(4)
                 for axis, direction in zip("xy", _direction(mode, own), strict=True)
             },

@@ -195,7 +195,21 @@ def tilted(k, q):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
+def bearing_force(k, row, theta, x, y):
+    """(F_x, F_y) by which a bearing's spring or elements push back the shaft at (x, y); `theta`: the shaft's angle."""
+    part = 1.0
+    if k.special[row] > 0:
+        foot_x, foot_y = foot(k, row, theta, x, y)
+        x, y = x - foot_x, y - foot_y
+        if k.balls[row] > 0:
+            return element_forces(k, row, theta, x, y)
+        part = carried_part(k, row, x, y)
+    stiffness = part * k.bearing_stiffness[row]
+    return -stiffness * x, -stiffness * y
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def accelerations(  # noqa: PLR0915  one machine, one set of equations
     k, curves, rows, pitch, q, v, torque, set_angle, speed, speed_rate, rough, rough_rate, a, extra
 ):
     """Fill `a` (16) with the accelerations and `extra` (5) with the signals that follow.
@@ -277,17 +291,7 @@ def accelerations(  # noqa: PLR0912, PLR0915  one machine, one set of equations
         push_x += k.tilt_x[side] * (normal - back)
         push_y += k.tilt_y[side] * (normal - back)
         for row, b, sign in ((2 * side, b1, 1.0), (2 * side + 1, b2, -1.0)):
-            x, y = q[b], q[b + 1]
-            part = 1.0
-            if k.special[row] > 0:
-                foot_x, foot_y = foot(k, row, theta, x, y)
-                x, y = x - foot_x, y - foot_y
-                if k.balls[row] == 0:
-                    part = carried_part(k, row, x, y)
-            if k.balls[row] > 0:
-                held_x, held_y = element_forces(k, row, theta, x, y)
-            else:
-                held_x, held_y = -part * k.bearing_stiffness[row] * x, -part * k.bearing_stiffness[row] * y
+            held_x, held_y = bearing_force(k, row, theta, q[b], q[b + 1])
             cb, per_mass = k.bearing_damping[row], k.per_bearing_mass[row]
             a[b] = (0.5 * bend_x + held_x - cb * v[b] + sign * push_x) * per_mass + k.gravity_x
             a[b + 1] = (0.5 * bend_y + held_y - cb * v[b + 1] + sign * push_y) * per_mass + k.gravity_y
@@ -391,7 +395,7 @@ def integrate(  # noqa: PLR0915  four stages written out
     extra = np.empty(5)
     q1, v1 = np.empty(16), np.empty(16)
     sum_q, sum_v = np.empty(16), np.empty(16)
-    signals = np.empty(53)
+    signals = np.empty(61)
     n_rows = 0
     h0, r0 = height_now(re, im, omega)
     angle = set_angle[0]
@@ -416,6 +420,10 @@ def integrate(  # noqa: PLR0915  four stages written out
                 signals[i], signals[16 + i], signals[32 + i] = q[i], v[i], a[i]
             for i in range(5):
                 signals[48 + i] = extra[i]
+            for row in range(4):
+                held_x, held_y = bearing_force(k, row, q[1 + row // 2], q[8 + 2 * row], q[9 + 2 * row])
+                signals[53 + 2 * row] = -held_x / k.bearing_stiffness[row]
+                signals[54 + 2 * row] = -held_y / k.bearing_stiffness[row]
             for i in range(select.shape[0]):
                 found[n_rows, i] = signals[select[i]]
             if energies.shape[0] > 0:

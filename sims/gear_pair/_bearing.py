@@ -24,7 +24,7 @@ from numba import njit
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.gear_pair._rolling import balanced, contact_n_per_m15
+from sims.gear_pair._rolling import balanced, contact_n_per_m15, stiffness_under_load_n_per_m
 from sims.machine import RACE_EDGE_MM, BearingSupport, Machine
 
 N_HARMONICS = 4
@@ -69,7 +69,9 @@ def bearing_fields(machine: Machine, mesh_force_n: float, rng: np.random.Generat
     return {
         "bearing_mass": np.array([b.mass_kg for b in supports]),
         "per_bearing_mass": 1.0 / np.array([b.mass_kg for b in supports]),
-        "bearing_stiffness": np.array([b.stiffness_n_per_m for b in supports]),
+        "bearing_stiffness": np.array(
+            [stiffness_under_load_n_per_m(b, w) for b, w in zip(supports, loads, strict=True)]
+        ),
         "bearing_damping": np.array([b.damping_n_s_per_m for b in supports]),
         "clearance": np.array([b.clearance_um * 1e-6 for b in supports]),
         "special": np.array([b.clearance_um > 0 or b.defect is not None or b.law == "hertzian" for b in supports]),

@@ -142,7 +142,7 @@ def _channel(
 
 
 def _path(bearing: int, direction: tuple[float, float], factor: float, housing: tuple[HousingMode, ...]) -> ModalPath:
-    """Straight from the bearing under the sensor, and by the housing's modes from all four."""
+    """Straight from the bearing under the sensor, and by the housing's modes from the forces of all four."""
     modes = [
         PathMode(
             factor * mode.frequency_hz,
@@ -150,7 +150,9 @@ def _path(bearing: int, direction: tuple[float, float], factor: float, housing: 
             {
                 name: gain
                 for i, at_bearing in enumerate(mode.shape)
-                for name, gain in _along(i + 1, direction, mode.gain * mode.shape[bearing - 1] * at_bearing).items()
+                for name, gain in _along(
+                    i + 1, direction, mode.gain * mode.shape[bearing - 1] * at_bearing, " yield"
+                ).items()
             },
         )
         for mode in housing
@@ -158,8 +160,8 @@ def _path(bearing: int, direction: tuple[float, float], factor: float, housing: 
     return ModalPath(_along(bearing, direction, 1.0), tuple(modes))
 
 
-def _along(bearing: int, direction: tuple[float, float], gain: float) -> dict[str, float]:
-    return {f"bearing {bearing} x": gain * direction[0], f"bearing {bearing} y": gain * direction[1]}
+def _along(bearing: int, direction: tuple[float, float], gain: float, what: str = "") -> dict[str, float]:
+    return {f"bearing {bearing} {axis}{what}": gain * part for axis, part in zip("xy", direction, strict=True)}
 
 
 def _tachometer(

@@ -29,8 +29,12 @@ COORDINATES = (
 )
 """Places in rad and m; models give their velocities and accelerations, too."""
 ANGLES = COORDINATES[1:3]
-POSITIONS = COORDINATES[4:]
-"""Places whose acceleration a sensor can read, each with its direction."""
+YIELDS = tuple(f"{name} yield" for name in COORDINATES[8:])
+"""By how much each bearing's spring is pressed, in m: its force over its stiffness without clearance, or over that at
+the load where balls carry one by one. That force moves the housing; where rolling elements pass, the shaft follows,
+and little of its motion reaches the housing."""
+POSITIONS = (*COORDINATES[4:], *YIELDS)
+"""Places whose acceleration a path can start from, each with its direction."""
 POINTS_PER_CYCLE = 6
 """Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
 MIN_MOTION_HZ = 80_000.0
@@ -110,7 +114,28 @@ class Measurement:
 
     def signals(self, also: Sequence[str] = ()) -> tuple[str, ...]:
         """Return the signals that the model is to give, with those that are wanted besides."""
-        return tuple(dict.fromkeys((*ANGLES, *(f"{name} acceleration" for name in self.positions), *also)))
+        needed = [name for position in self.positions for name in self._signals_at(position)]
+        return tuple(dict.fromkeys((*ANGLES, *needed, *also)))
+
+    def _signals_at(self, position: str) -> tuple[str, ...]:
+        place = position.removesuffix(" yield")
+        return (f"{place} acceleration", *((place, position) if self._rolls(position) else ()))
+
+    def _rolls(self, position: str) -> bool:
+        """Whether a bearing's shaft moves by itself as its rolling elements pass, else as the spring yields."""
+        if position not in YIELDS:
+            return False
+        bearing = self.machine.bearings[YIELDS.index(position) // 2]
+        return bearing.defect is not None or bearing.clearance_um > 0.0 or bearing.law == "hertzian"
+
+    def _acceleration(self, response: PairSignals, position: str) -> FloatArray:
+        """Return a place's acceleration; of a yield by differences of what it is less than the shaft's motion."""
+        place = position.removesuffix(" yield")
+        acceleration = response[f"{place} acceleration"]
+        if not self._rolls(position):
+            return acceleration
+        less = np.pad(np.diff(response[position] - response[place], 2), 1)
+        return acceleration + less / response.interval_s**2
 
     def record(
         self,
@@ -126,7 +151,7 @@ class Measurement:
         motion = Motion(
             response.interval_s,
             self.positions,
-            np.column_stack([response[f"{name} acceleration"] for name in self.positions]),
+            np.column_stack([self._acceleration(response, name) for name in self.positions]),
             dict(zip(self.machine.shaft_names, (response[name] for name in ANGLES), strict=True)),
         )
         return self.chain.record(

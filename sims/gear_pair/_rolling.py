@@ -24,7 +24,8 @@ from gearsig.rig import Bearing
 from sims.machine import BearingSupport
 
 LEFT_OVER = 1e-7
-"""Part of the load that may be out of balance; the rounding of the energy leaves up to 3e-8."""
+"""Part of the load that may be out of balance, at a clearance of the size of what the load presses in; the rounding of
+the energy leaves up to 3e-8, and more as the place lies further out."""
 PALMGREN_MM = 4.36e-4
 """δ = 4.36e-4 (Q²/d)^⅓, mm, N: approach of both races to a steel ball in grooves of usual curvature."""
 
@@ -110,7 +111,7 @@ def balanced(
     for _ in range(200):
         depth = np.maximum(radial @ p - gap, 0.0)
         slope = (depth**1.5) @ radial - toward
-        if np.hypot(*slope) < LEFT_OVER:
+        if np.hypot(*slope) < LEFT_OVER * (1.0 + gap):
             place: FloatArray = p * unit
             return place
         curvature = (radial.T * (1.5 * np.sqrt(depth))) @ radial + 1e-9 * np.eye(2)

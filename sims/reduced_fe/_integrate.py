@@ -190,18 +190,42 @@ def _push(k, side, inputs, angle, omega, drive, out):
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def _roll(k, side, inputs, angle, load, out):
     """Add the forces of bearing springs whose feet move as rolling elements pass, under the load of this moment."""
-    theta = angle if side == 0 else angle / k.ratio
-    part = load / k.nominal_torque
     for bearing in range(2):
         row = 2 * side + bearing
         if k.special[row] > 0:
-            x = part * k.bearing_yield[row, 0] + k.bearing_play[row, 0]
-            y = part * k.bearing_yield[row, 1] + k.bearing_play[row, 1]
-            dx, dy = foot(k, row, theta, x, y)
-            fx = k.bearing_spring[row, 0, 0] * dx + k.bearing_spring[row, 0, 1] * dy
-            fy = k.bearing_spring[row, 1, 0] * dx + k.bearing_spring[row, 1, 1] * dy
+            dx, dy = _foot(k, row, angle, load)
+            fx, fy = _sprung(k, row, dx, dy)
             for j in range(out.shape[1]):
                 out[side, j] += fx * inputs[side, 4 + 2 * bearing, j] + fy * inputs[side, 5 + 2 * bearing, j]
+
+
+@njit(inline="always", error_model="numpy")
+def _foot(k, row, angle, load):
+    """Where a bearing spring's foot stands, under the load of this moment."""
+    part = load / k.nominal_torque
+    x = part * k.bearing_yield[row, 0] + k.bearing_play[row, 0]
+    y = part * k.bearing_yield[row, 1] + k.bearing_play[row, 1]
+    return foot(k, row, angle if row < 2 else angle / k.ratio, x, y)
+
+
+@njit(inline="always", error_model="numpy")
+def _sprung(k, row, x, y):
+    """Return the force of a bearing's spring pressed by x and y."""
+    spring = k.bearing_spring
+    return spring[row, 0, 0] * x + spring[row, 0, 1] * y, spring[row, 1, 0] * x + spring[row, 1, 1] * y
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
+def _yields(k, inputs, q, angle, load, extras):
+    """Fill the yields of the bearings, see `sims.gear_pair.YIELDS`."""
+    for row in range(4):
+        side, number = row // 2, 4 + 2 * (row % 2)
+        x, y = on_input(inputs, side, number, q), on_input(inputs, side, number + 1, q)
+        if k.special[row] > 0:
+            dx, dy = _foot(k, row, angle, load)
+            x, y = x - dx, y - dy
+        fx, fy = _sprung(k, row, x, y)
+        extras[6 + 2 * row], extras[7 + 2 * row] = fx / k.bearing_stiffness[row], fy / k.bearing_stiffness[row]
 
 
 START_REACH = 1e-4
@@ -212,7 +236,7 @@ FAST_PART = 0.05
 """Change of a contact force, over the nominal one, after which the fast way takes no second iteration."""
 PRECISE_PART = 1e-11
 MAX_PASSES = 50
-N_EXTRAS = 6
+N_EXTRAS = 14
 
 
 # Arrays are passed whole, with the places in them: a slice is a new object, whose references are counted at every use.
@@ -361,6 +385,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
         if number % stride == 0 and n_out < found.shape[0]:
             extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - margin, along_torque
             extras[5] = rubbing
+            _yields(k, inputs, q, angle, load, extras)
             _pair_extras(n, n_slots, n_s, pairs, np.floor(cycles - k.start), force, extras)
             _accelerations(q, v, f, modal, q1)  # scratch until the next step
             for line in range(kinds.shape[0]):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, closest_match_hint, count, positive
 from gearsig.errors import InputError
 from gearsig.results import Result
-from sims.gear_pair import COORDINATES, PairResponse, RunPlan, StepConvergence, profile_points
+from sims.gear_pair import COORDINATES, YIELDS, PairResponse, RunPlan, StepConvergence, profile_points
 from sims.machine import Operation, Profile
 from sims.mesh import one_mesh_cycle
 from sims.reduced_fe._integrate import Method, step_coefficients
@@ -134,9 +134,9 @@ STEPS_PER_CALL = 100_000
 """Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
 MOVING = COORDINATES
 """Places in rad and m, each also with " velocity" and " acceleration". Those of gears are of their hubs."""
-EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm", "friction_n")
+EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm", "friction_n", *YIELDS)
 """Sum of the contact forces, the force behind, c, the greatest approach of flanks, torque of moving stiffness, friction
-along x on the driven gear."""
+along x on the driven gear, and `sims.gear_pair.YIELDS`."""
 TRANSMISSION_ERROR = "transmission_error_m"
 """r_b1 θ1 − r_b2 θ2 of the hubs."""
 KINDS = ("", " velocity", " acceleration")

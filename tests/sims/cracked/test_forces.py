@@ -15,7 +15,7 @@ from sims.cracked import (
     prepare,
     respond,
 )
-from sims.gear_pair import bearing_fields, bearing_loads_n, foot
+from sims.gear_pair import COORDINATES, YIELDS, bearing_fields, bearing_loads_n, foot
 from sims.machine import Lubrication, Machine, Operation, RaceDefect, Roughness
 from tests.sims.cracked.machines import conservative, frictionless
 from tests.sims.machines import spur_pair_machine
@@ -258,3 +258,27 @@ def test_sway_with_clearance_is_in_balance() -> None:
 def test_lubrication_off_means_no_friction() -> None:
     machine = replace(spur_pair_machine(), lubrication=Lubrication(friction=False))
     np.testing.assert_array_equal(forces(machine, 0.3)[2:], 0.0)
+
+
+@pytest.mark.parametrize(
+    "rolling", [{"clearance_um": 30.0}, {"defect": RaceDefect("outer", 2.0)}, {"clearance_um": 5.0, "law": "hertzian"}]
+)
+def test_yields_are_the_forces_that_a_side_gives_to_its_housing(
+    rolling: dict[str, float | str | RaceDefect],
+) -> None:
+    """Σ m a of gear and bearings = mesh force − Σ (k yield + c v), but for a weight that stays."""
+    machine = frictionless(spur_pair_machine())
+    loose = replace(machine, bearings=(replace(machine.bearings[0], **rolling), *machine.bearings[1:]))
+    force = STEADY.torque_nm.at(0.0) / (1e-3 * machine.mesh.pair.driver.base_radius_mm)
+    stiffness = bearing_fields(loose, force, np.random.default_rng(0))["bearing_stiffness"]
+    moving = [name for name in COORDINATES if name.endswith(" y")]
+    names = ("mesh_force_n", *YIELDS, *(f"{name}{what}" for name in moving for what in (" velocity", " acceleration")))
+    run = respond(loose, STEADY, duration_s=0.3, rng=np.random.default_rng(0), signals=names, start_s=-0.2)
+    given = -run["mesh_force_n"]
+    shaken = loose.wheels[0].mass_kg * run["driver y acceleration"]
+    for i, bearing in enumerate(loose.bearings[:2], 1):
+        given = given - stiffness[i - 1] * run[f"bearing {i} y yield"]
+        given = given - bearing.damping_n_s_per_m * run[f"bearing {i} y velocity"]
+        shaken = shaken + bearing.mass_kg * run[f"bearing {i} y acceleration"]
+    left = given - shaken
+    assert np.ptp(left) < 1e-6 * np.ptp(run["mesh_force_n"])
