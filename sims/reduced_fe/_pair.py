@@ -23,6 +23,7 @@ from sims.gear_pair import (
 )
 from sims.machine import BearingSupport, Machine, Operation
 from sims.mesh import GearMesh, one_mesh_cycle
+from sims.reduced_fe._blank import one_thread
 from sims.reduced_fe._contact import (
     FLANK,
     SIGNS,
@@ -607,6 +608,7 @@ class FlexiblePairConstants:
         return found
 
 
+@one_thread()
 def constants(
     pair: FlexiblePair, operation: Operation, *, moving_force: bool = True, rng: np.random.Generator | None = None
 ) -> FlexiblePairConstants:

@@ -16,6 +16,7 @@ from gearsig.results import Result
 from sims.gear_pair import COORDINATES, YIELDS, PairResponse, RunPlan, StepConvergence, profile_points
 from sims.machine import Operation, Profile
 from sims.mesh import one_mesh_cycle
+from sims.reduced_fe._blank import one_thread
 from sims.reduced_fe._integrate import Method, step_coefficients
 from sims.reduced_fe._pair import (
     FlexiblePair,
@@ -166,6 +167,7 @@ FlexResponse = PairResponse[FlexState]
 """Of a run: signals of `signal_names`, and where it ended."""
 
 
+@one_thread()
 def respond(
     pair: FlexiblePair,
     operation: Operation,
