@@ -31,6 +31,7 @@ CHAIN = (
     "gap",
     "fleet",
     "plot",
+    "methods",
     "report",
 )
 """Rooms of gearsig; each may import from rooms to its left. Plot draws what the rooms before it compute."""

@@ -45,6 +45,10 @@ COMMANDS: tuple[Callable[..., None] | typer.Typer, ...] = (
 for command in COMMANDS:
     if isinstance(command, typer.Typer):
         app.add_typer(command)
+    elif command is modes:  # its options are those of the method
+        app.command(
+            context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
+        )(command)
     else:
         app.command()(command)
 

@@ -1,210 +1,227 @@
-"""`gearsig show` and `gearsig modes`: one method on one channel, as figure, table, arrays and numbers."""
+"""`gearsig show METHOD`: a command for each method of the table, as figure, table, arrays and numbers."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import inspect
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from app.cli import options
 from app.cli.quantities import quantity, span
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
-    from gearsig.recording import Recording
-    from gearsig.report import MethodOptions
+    from gearsig.methods import Method, MethodOption
 
 
-def _method_names(incomplete: str) -> list[str]:
-    from gearsig.report import METHODS
-
-    return [name for name in METHODS if name.startswith(incomplete)]
-
-
-def _transform_names(incomplete: str) -> list[str]:
-    from gearsig.report import TRANSFORMS
-
-    return [name for name in TRANSFORMS if name.startswith(incomplete)]
-
-
-OutputOption = Annotated[
-    Path | None,
-    typer.Option("--output", "-o", metavar="DIR", help="Folder for METHOD.png, .svg, .csv, .h5 and .json."),
-]
-ChannelOption = Annotated[str, typer.Option("--channel", metavar="NAME", help="Default: the first acceleration.")]
-ShaftOption = Annotated[str, typer.Option("--shaft", metavar="NAME", help="Default: the reference shaft.")]
-FromOption = Annotated[str | None, typer.Option("--from", metavar="TIME", help="Start of the part looked at.")]
-ToOption = Annotated[str | None, typer.Option("--to", metavar="TIME", help="End of the part looked at.")]
-LowestOption = Annotated[float | None, typer.Option("--lowest", help="Lowest line shown, in Hz or orders.")]
-HighestOption = Annotated[float | None, typer.Option("--highest", help="Highest line shown, in Hz or orders.")]
-OverAngleOption = Annotated[bool, typer.Option("--over-angle", help="Over shaft angle and order.")]
-CountOption = Annotated[int | None, typer.Option("--n-modes", min=1, help="Default: as the signal suggests.")]
-PenaltyOption = Annotated[float | None, typer.Option("--penalty", help="Of the modes' bandwidth; 2000 is usual.")]
-ModeOption = Annotated[
-    int | None, typer.Option("--mode", min=1, help="From 1 by rising frequency. Default: the most impulsive one.")
-]
-ThenOption = Annotated[
-    str,
-    typer.Option(
-        "--then",
-        metavar="TRANSFORM",
-        help="What the chosen mode goes on to: cwt, squeezed-cwt, stft or squeezed-stft.",
-        autocompletion=_transform_names,
-    ),
-]
-
-
-def show(
-    method: Annotated[
-        str | None, typer.Argument(help="See --list, e.g. order-map.", autocompletion=_method_names)
+def _common(
+    recording: Annotated[Path, typer.Argument(help="Recording to look at.")],
+    channel: Annotated[str, typer.Option(metavar="NAME", help="Default: the first acceleration.")] = "",
+    part_from: Annotated[
+        str | None, typer.Option("--from", metavar="TIME", help="Start of the part looked at.")
     ] = None,
-    recording: Annotated[Path | None, typer.Argument(help="Recording to look at.")] = None,
-    list_all: Annotated[bool, typer.Option("--list", help="Print every method and what it takes.")] = False,
-    channel: ChannelOption = "",
-    shaft: ShaftOption = "",
-    pair: Annotated[str, typer.Option("--pair", metavar="NAME", help="Pair whose mesh cycle gives a point.")] = "",
-    start: FromOption = None,
-    end: ToOption = None,
-    band: Annotated[
-        str | None, typer.Option("--band", metavar="HZ..HZ", help="Of the envelope or phase plane, e.g. 2kHz..4kHz.")
-    ] = None,
-    lowest: LowestOption = None,
-    highest: HighestOption = None,
-    orders: Annotated[
-        str, typer.Option("--orders", metavar="N,N", help="To track. Default: the meshes' first two harmonics.")
-    ] = "",
-    transform: Annotated[
-        str,
-        typer.Option(
-            "--transform",
-            help="Of time-frequency: cwt, squeezed-cwt, stft, squeezed-stft.",
-            autocompletion=_transform_names,
-        ),
-    ] = "cwt",
-    over_angle: OverAngleOption = False,
-    n_modes: CountOption = None,
-    penalty: PenaltyOption = None,
-    mode: ModeOption = None,
-    then: ThenOption = "",
+    part_to: Annotated[str | None, typer.Option("--to", metavar="TIME", help="End of the part looked at.")] = None,
     rig: options.RigOption = None,
     fs: options.SamplingRateOption = None,
     speed_rpm: options.SpeedOption = None,
     tach_times: options.TachometerTimesOption = None,
     pulses_per_revolution: options.PulsesOption = 1,
     json: options.JsonOption = False,
-    output: OutputOption = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder for METHOD.png, .svg, .csv, .h5 and .json."),
+    ] = None,
 ) -> None:
-    """Apply one method to one channel: figure as PNG and SVG, table as CSV, arrays as HDF5, numbers as JSON.
+    """Hold what every method takes."""
 
-    Examples: gearsig show order-map run_up.h5 -o out; gearsig show envelope a.csv --band 2kHz..4kHz -o out
-    """
+
+class MethodGroup(TyperGroup):
+    """The methods as commands, made when they are asked for: the table loads heavy libraries."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of the methods."""
+        del ctx
+        from gearsig.methods import METHODS
+
+        return list(METHODS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command of a method."""
+        del ctx
+        from gearsig.methods import METHODS
+
+        return _command(cmd_name, METHODS[cmd_name]) if cmd_name in METHODS else None
+
+
+show = typer.Typer(
+    name="show",
+    cls=MethodGroup,
+    invoke_without_command=True,
+    no_args_is_help=True,
+    help="""Apply one method to one channel: figure as PNG and SVG, table as CSV, arrays as HDF5, numbers as JSON.
+
+    Examples: gearsig show order-map run_up.h5 -o out; gearsig show envelope a.csv --band 2kHz..4kHz -o out;
+    gearsig show modes --help""",
+)
+
+
+@show.callback()
+def _list(
+    list_all: Annotated[bool, typer.Option("--list", help="Print every method and what it takes.")] = False,
+) -> None:
     if list_all:
         _print_methods()
-        return
-    if method is None or recording is None:
-        raise InputError("a method and a recording are needed", remedy="gearsig show --list prints the methods")
-    from gearsig.report import MethodOptions
-
-    settings = MethodOptions(
-        channel=channel,
-        shaft=shaft,
-        pair=pair,
-        band_hz=None if band is None else _range(band),
-        lowest=lowest,
-        highest=highest,
-        orders=_numbers(orders),
-        transform=transform,
-        over_angle=over_angle,
-        n_modes=n_modes,
-        penalty=penalty,
-        mode=mode,
-        then=then,
-    )
-    speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
-    machine = options.open_rig(rig, recording)
-    opened = options.open_recording(recording, machine, fs, speed)
-    _answer(method, opened, _in_part(settings, start, end), output, json=json)
 
 
-def modes(
-    recording: Annotated[Path, typer.Argument(help="Recording to take apart.")],
-    channel: ChannelOption = "",
-    start: FromOption = None,
-    end: ToOption = None,
-    n_modes: CountOption = None,
-    penalty: PenaltyOption = None,
-    mode: ModeOption = None,
-    then: ThenOption = "",
-    lowest: LowestOption = None,
-    highest: HighestOption = None,
-    over_angle: OverAngleOption = False,
-    shaft: ShaftOption = "",
-    rig: options.RigOption = None,
-    fs: options.SamplingRateOption = None,
-    speed_rpm: options.SpeedOption = None,
-    json: options.JsonOption = False,
-    output: OutputOption = None,
-) -> None:
+def modes(context: typer.Context) -> None:
     """Take a channel apart into variational modes; --then transforms the chosen one, as noisy records of cracks need.
+
+    The same as gearsig show modes.
 
     Example: gearsig modes crack.h5 --penalty 2000 --then squeezed-cwt -o out
     """
-    from gearsig.report import MethodOptions
+    from gearsig.methods import METHODS
 
-    settings = MethodOptions(
-        channel=channel, shaft=shaft, lowest=lowest, highest=highest, over_angle=over_angle, n_modes=n_modes,
-        penalty=penalty, mode=mode, then=then,
-    )  # fmt: skip
-    machine = options.open_rig(rig, recording)
-    opened = options.open_recording(recording, machine, fs, options.stated_speed(speed_rpm, None, 1))
-    _answer("modes", opened, _in_part(settings, start, end), output, json=json)
+    command = _command("modes", METHODS["modes"])
+    command.main(args=list(context.args), prog_name="gearsig modes", standalone_mode=False)
 
 
-def _in_part(settings: MethodOptions, start: str | None, end: str | None) -> MethodOptions:
-    first = None if start is None else quantity(start, "s", "--from")
-    return replace(settings, start_s=first, end_s=None if end is None else quantity(end, "s", "--to"))
+def flag(option: MethodOption) -> str:
+    """Return the option's name on the command line, without its unit."""
+    return "--" + option.name.removesuffix("_hz").removesuffix("_s").replace("_", "-")
 
 
-def _answer(method: str, opened: Recording, settings: MethodOptions, output: Path | None, *, json: bool) -> None:
+def _command(name: str, method: Method) -> Any:
+    """Return the command of a method: what every method takes, and its own options."""
+
+    def call(**given: Any) -> None:
+        _answer(name, method, **given)
+
+    parameters = [
+        *inspect.signature(_common).parameters.values(),
+        *(
+            inspect.Parameter(
+                option.name, inspect.Parameter.KEYWORD_ONLY, default=_default(option), annotation=_annotation(option)
+            )
+            for option in method.options
+        ),
+    ]
+    hints = inspect.get_annotations(_common, eval_str=True)
+    call.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [p.replace(annotation=hints.get(p.name, p.annotation), kind=inspect.Parameter.KEYWORD_ONLY) for p in parameters]
+    )
+    call.__annotations__ = {p.name: hints.get(p.name, p.annotation) for p in parameters}
+    app = typer.Typer(pretty_exceptions_enable=False)
+    app.command(name, help=method.about)(call)
+    command = typer.main.get_command(app)
+    command.name = name
+    return command
+
+
+def _default(option: MethodOption) -> Any:
+    return ("" if option.kind == "text" or option.default == () else None) if not option.default else option.default
+
+
+def _annotation(option: MethodOption) -> Any:
+    kind: Any = {"switch": bool, "count": int}.get(option.kind, str)
+    if option.kind == "number" and not option.unit:
+        kind = float
+    text = option.about
+    if option.kind == "choice":
+        text = f"{', '.join(filter(None, option.choices))}. {text}"
+    if option.default is None or option.default == ():
+        text = f"{text} Default: {option.empty}.".lstrip()
+    metavar = {"span": "FROM..TO", "numbers": "N,N", "name": "NAME"}.get(option.kind)
+    complete = _completion(option)
+    shown = typer.Option(flag(option), help=f"{option.label}: {text}", metavar=metavar, autocompletion=complete)
+    kind = kind if kind is bool else kind | None
+    return Annotated[kind, shown]
+
+
+def _completion(option: MethodOption) -> Callable[[str], list[str]] | None:
+    if option.kind != "choice":
+        return None
+    return lambda incomplete: [name for name in option.choices if name and name.startswith(incomplete)]
+
+
+def _value(option: MethodOption, given: Any) -> Any:
+    """Return what was typed, as the method takes it."""
+    if option.kind == "numbers":
+        return _numbers(given or "", flag(option))
+    if given is None:
+        return option.default
+    if option.kind == "span":
+        return _range(given, option.unit, flag(option))
+    if option.kind == "number" and isinstance(given, str):
+        return quantity(given, option.unit, flag(option))
+    return given
+
+
+def _answer(
+    name: str,
+    method: Method,
+    *,
+    recording: Path,
+    channel: str,
+    part_from: str | None,
+    part_to: str | None,
+    rig: Path | None,
+    fs: float | None,
+    speed_rpm: float | None,
+    tach_times: Path | None,
+    pulses_per_revolution: int,
+    json: bool,
+    output: Path | None,
+    **given: Any,
+) -> None:
     from rich.console import Console
 
-    from gearsig.report import answer_json, apply_method, check_writable, write_answer
+    from gearsig.methods import apply_method
+    from gearsig.report import answer_json, check_writable, write_answer
 
+    settings = {option.name: _value(option, given[option.name]) for option in method.options}
+    start_s = None if part_from is None else quantity(part_from, "s", "--from")
+    end_s = None if part_to is None else quantity(part_to, "s", "--to")
     if output is not None:
         check_writable(output)
-    with Console(stderr=True).status(method):
-        answer = apply_method(method, opened, settings)
+    speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
+    machine = options.open_rig(rig, recording)
+    opened = options.open_recording(recording, machine, fs, speed)
+    with Console(stderr=True).status(name):
+        answer = apply_method(name, opened, channel, start_s=start_s, end_s=end_s, **settings)
         paths = () if output is None else write_answer(answer, output)
     if json or output is None:
         typer.echo(answer_json(answer))
         return
-    typer.echo(f"{answer.channel}: {answer.picture.caption}")
+    typer.echo(f"{answer.channel}: {answer.caption}")
+    for text in (*answer.facts, *answer.warnings):
+        typer.echo(text.replace("**", ""))
     typer.echo(f"In {output}: {', '.join(path.name for path in paths)}.")
 
 
 def _print_methods() -> None:
-    from gearsig.report import METHODS
+    from gearsig.methods import METHODS
 
     width = max(map(len, METHODS))
     for name, method in METHODS.items():
-        takes = ", ".join(f"--{o.removesuffix('_hz').replace('_', '-')}" for o in method.options)
-        needs = "; needs the speed" if method.needs_angle else ""
-        typer.echo(f"{name:<{width}}  {method.about}{needs}")
-        if takes:
-            typer.echo(f"{'':<{width}}  {takes}")
-    typer.echo("Each takes --channel, --from and --to besides.")
+        typer.echo(f"{name:<{width}}  {method.about}")
+        if method.options:
+            typer.echo(f"{'':<{width}}  {', '.join(flag(option) for option in method.options)}")
+    typer.echo("Each takes --channel, --from and --to besides; gearsig show METHOD --help says what they mean.")
 
 
-def _range(text: str) -> tuple[float, float]:
+def _range(text: str, unit: str, name: str) -> tuple[float, float]:
     if ".." not in text:
-        raise InputError(f"--band is {text!r}", allowed="FROM..TO", remedy="write for example 2kHz..4kHz")
-    return span(text, "Hz", "--band")
+        raise InputError(f"{name} is {text!r}", allowed="FROM..TO", remedy=f"write for example 2..4{unit}")
+    return span(text, unit, name)
 
 
-def _numbers(text: str) -> tuple[float, ...]:
+def _numbers(text: str, name: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(",") if part.strip())
     except ValueError:
-        raise InputError(f"--orders is {text!r}", allowed="numbers, e.g. 55,110") from None
+        raise InputError(f"{name} is {text!r}", allowed="numbers, e.g. 55,110") from None

@@ -15,7 +15,6 @@ from app.dashboard.state import AnalysisRequest, ChosenFile, Content
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import (
     Axes,
-    ChartLine,
     download,
     looked_at,
     padded_limits,
@@ -36,7 +35,7 @@ from gearsig.comparison import (
 )
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import OperatingCondition
-from gearsig.plot import unit_text, with_unit
+from gearsig.plot import ChartLine, unit_text, with_unit
 from gearsig.prepared import refined_angle
 from gearsig.recording import Recording
 from gearsig.report import (

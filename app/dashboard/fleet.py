@@ -12,12 +12,13 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.state import ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import QUIET, Axes, ChartLine, padded_limits, show_lines
+from app.dashboard.widgets.charts import QUIET, Axes, padded_limits, show_lines
 from app.dashboard.widgets.chooser import open_file
 from app.dashboard.widgets.verdict import COLOURS
 from gearsig.diagnosis import Outcome
 from gearsig.errors import InputError
 from gearsig.fleet import Fleet, Trend, change_text, open_fleet, trends_text
+from gearsig.plot import ChartLine
 from gearsig.recording import sha256_of
 from gearsig.rig import rig_file_beside
 

@@ -3,7 +3,17 @@
 from gearsig.plot._average import average_figure, polar_figure
 from gearsig.plot._benchmark import calibration_figure, confusion_figure
 from gearsig.plot._comparison import average_overlay_figure, band_levels_figure, order_overlay_figure
-from gearsig.plot._cursors import LONGEST, PRIORITY, AngleMark, Cursor, marks_of, n_rows, order_cursors, place
+from gearsig.plot._cursors import (
+    LONGEST,
+    PRIORITY,
+    AngleMark,
+    Cursor,
+    marks_of,
+    n_rows,
+    order_cursors,
+    place,
+    rhythm_cursors,
+)
 from gearsig.plot._curves import CurvePanel, curves_figure
 from gearsig.plot._embed import Captioned, Picture, embed
 from gearsig.plot._fe_gear import (
@@ -59,6 +69,7 @@ from gearsig.plot._methods import (
     vmd,
 )
 from gearsig.plot._modes import modes_figure
+from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, panels_figure
 from gearsig.plot._phase import (
     bifurcation_figure,
     chaos_test_figure,
@@ -114,9 +125,12 @@ __all__ = [
     "PRIORITY",
     "AngleMark",
     "Captioned",
+    "ChartLine",
     "Cursor",
     "Curve",
     "CurvePanel",
+    "LevelPanel",
+    "LinePanel",
     "Picture",
     "ResponseCase",
     "Scale",
@@ -178,6 +192,7 @@ __all__ = [
     "order_map_figure",
     "order_overlay_figure",
     "order_spectrum",
+    "panels_figure",
     "phase_plane",
     "phase_portrait_figure",
     "place",
@@ -186,6 +201,7 @@ __all__ = [
     "power_density",
     "recurrence_figure",
     "response_figure",
+    "rhythm_cursors",
     "series_colours",
     "spectral_coherence",
     "spectrum_figure",

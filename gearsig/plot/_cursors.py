@@ -94,6 +94,18 @@ def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) ->
     return tuple(_cursor(line, revolutions_per_s, only_one=only.get(line.kind, False)) for line in lines)
 
 
+def rhythm_cursors(cursors: Iterable[Cursor]) -> tuple[Cursor, ...]:
+    """Return what an envelope may show: shaft lines, and three harmonics of each bearing line."""
+    result: list[Cursor] = []
+    for cursor in cursors:
+        if cursor.kind == "shaft":
+            result.append(cursor)
+        elif cursor.kind == "bearing":
+            labels = (cursor.label, f"2× {cursor.label}", f"3× {cursor.label}")
+            result += [Cursor(k * cursor.position, "bearing", label, k) for k, label in enumerate(labels, start=1)]
+    return tuple(result)
+
+
 def place(
     cursors: Iterable[Cursor], limits: tuple[float, float], width_in: float
 ) -> list[tuple[Cursor, LabelPlace | None]]:

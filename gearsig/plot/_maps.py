@@ -81,6 +81,17 @@ def _draw_levels(
     style.colour_bar(axes, mesh, f"dB re 1 {unit_text(unit)}".strip())
 
 
+def draw_level_map(axes: Axes, at: FloatArray, positions: FloatArray, level: FloatArray, unit: str) -> None:
+    """Draw levels in dB, (n_positions, n_at), the largest of the cells in a pixel, with their bar of colours."""
+    at, level = _fewer_cells(at, level, axis=1, n_max=N_COLUMNS)
+    positions, level = _fewer_cells(positions, level, axis=0, n_max=N_ROWS)
+    logarithmic = axes.get_yscale() == "log"
+    y = np.exp(_cell_borders(np.log(positions))) if logarithmic else np.maximum(_cell_borders(positions), 0.0)
+    _draw_levels(axes, _cell_borders(at), y, level, unit)
+    if logarithmic:
+        _plain_ticks(axes)
+
+
 def _spare_the_right_end(axes: Axes) -> None:
     """Leave out a number that would run into those of the panel on the right."""
     from matplotlib.ticker import MaxNLocator

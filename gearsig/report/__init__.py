@@ -43,13 +43,7 @@ from gearsig.report._index import Entry, Failure, entry_of, write_index
 from gearsig.report._json import from_plain, plain
 from gearsig.report._long import long_analysis_text, long_analysis_to_json
 from gearsig.report._methods import (
-    METHODS,
-    TRANSFORMS,
-    Method,
-    MethodAnswer,
-    MethodOptions,
     answer_json,
-    apply_method,
     fitting_methods,
     method_pictures,
     named_method,
@@ -82,16 +76,11 @@ from gearsig.report._sections import FindingCard, analysis_text, change_rows, fi
 
 __all__ = [
     "CHECK_FIRST",
-    "METHODS",
-    "TRANSFORMS",
     "CauseRow",
     "Entry",
     "Failure",
     "FindingCard",
     "GapFigure",
-    "Method",
-    "MethodAnswer",
-    "MethodOptions",
     "Question",
     "Section",
     "VerdictPicture",
@@ -100,7 +89,6 @@ __all__ = [
     "analysis_to_dict",
     "analysis_to_json",
     "answer_json",
-    "apply_method",
     "bearing_cursors",
     "benchmark_html",
     "cause_rows",

@@ -68,14 +68,7 @@ def line_cursors(analysis: Analysis, spectrum: Spectrum | OrderMap, *, n_sideban
 
 def bearing_cursors(analysis: Analysis, spectrum: Spectrum) -> tuple[Cursor, ...]:
     """Return shaft lines and three harmonics of each bearing line."""
-    result = []
-    for cursor in line_cursors(analysis, spectrum, n_sidebands=0):
-        if cursor.kind == "shaft":
-            result.append(cursor)
-        elif cursor.kind == "bearing":
-            labels = (cursor.label, f"2× {cursor.label}", f"3× {cursor.label}")
-            result += [Cursor(k * cursor.position, "bearing", label, k) for k, label in enumerate(labels, start=1)]
-    return tuple(result)
+    return plot.rhythm_cursors(line_cursors(analysis, spectrum, n_sidebands=0))
 
 
 def highest_order_of_interest(analysis: Analysis, spectrum: Spectrum | OrderMap) -> float:

@@ -4,37 +4,31 @@ import pytest
 
 from app.dashboard.laboratory import bifurcation as bifurcation_view
 from app.dashboard.laboratory.views import TAB
-from app.dashboard.methods.phase import VIEWS, two_numbers
+from app.dashboard.methods.form import two_numbers
 from gearsig.errors import InputError
-from tests.app.pages import choose, opened_at, pictures, shown_text
+from tests.app.pages import opened_at, pictures, shown_text
 from tests.app.test_laboratory import opened
-
-METHOD = "Embedding and chaos"
 
 
 def number(page, label):
     return next(w for w in page.number_input if w.label.startswith(label))
 
 
-def test_every_view_answers_or_says_why_not():
-    page = opened_at(METHOD)
-    for view in VIEWS:
-        choose(page, "View", view)
-        if view == "Lyapunov exponent":
-            assert "looks stochastic or too noisy" in page.error[0].value.replace("\\", "")
-        elif view == "Kind of motion":
-            assert "Kind of motion:" in shown_text(page)
-            assert "the signal as measured" in shown_text(page)
-        else:
-            assert len(pictures(page)) == 1, view
-            assert not page.error
+@pytest.mark.parametrize("method", ["Lyapunov exponent", "Kind of motion", "Recurrence", "0–1 test"])
+def test_every_question_is_answered_or_says_why_not(method):
+    page = opened_at(method)
+    if method == "Lyapunov exponent":
+        assert "looks stochastic or too noisy" in page.error[0].value.replace("\\", "")
+        return
+    assert len(pictures(page)) == 1
+    assert not page.error
+    assert method != "Kind of motion" or "the signal as measured" in shown_text(page)
 
 
 def test_the_path_is_shown_in_space_with_its_own_dimension():
-    page = opened_at(METHOD)
+    page = opened_at("Portrait and section")
     number(page, "Dimension").set_value(2)
-    choose(page, "View", "Portrait and section")
-    choose(page, "Drawn in", "space")
+    next(w for w in page.toggle if w.label == "Drawn in space").set_value(True).run()
     assert "give at least 3" in shown_text(page)
     number(page, "Dimension").set_value(4).run()
     assert len(page.get("plotly_chart")) == 1
@@ -52,11 +46,11 @@ def test_the_lowest_frequency_lies_below_the_mesh():
 
 
 def test_a_stretch_to_fit_is_taken_or_refused():
-    assert two_numbers("") is None
-    assert two_numbers("0.001; 2e-3") == (0.001, 0.002)
+    assert two_numbers("", "fit") is None
+    assert two_numbers("0.001; 2e-3", "fit") == (0.001, 0.002)
     for wrong in ("1", "a, b", "1, 2, 3"):
-        with pytest.raises(InputError, match="two numbers in s"):
-            two_numbers(wrong)
+        with pytest.raises(InputError, match="two numbers"):
+            two_numbers(wrong, "fit")
 
 
 def at_bifurcation():

@@ -9,9 +9,10 @@ import pytest
 
 from app.cli.main import main
 from gearsig.errors import InputError, RefusalError
+from gearsig.methods import METHODS, apply_method
 from gearsig.prepared import prepare
 from gearsig.recording import Channel, Recording, write_recording
-from gearsig.report import METHODS, MethodOptions, apply_method, fitting_methods, named_method, write_answer
+from gearsig.report import fitting_methods, named_method, write_answer
 from gearsig.rig import ConstantSpeed, GearPair, Rig, Shaft
 
 RATE_HZ, N = 8192.0, 16384
@@ -34,7 +35,7 @@ def recording(seed: int = 0) -> Recording:
 
 @pytest.mark.parametrize("name", METHODS)
 def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> None:
-    answer = apply_method(name, recording(), MethodOptions(n_modes=3) if name == "modes" else None)
+    answer = apply_method(name, recording(), **({"n_modes": 3} if name == "modes" else {}))
     png, svg, csv, h5, numbers = write_answer(answer, tmp_path)
     assert png.stat().st_size > 5_000
     assert svg.read_text(encoding="utf-8").lstrip().startswith("<?xml")
@@ -59,37 +60,37 @@ def test_the_spectrum_reads_the_tone_and_the_map_its_order() -> None:
     levels = apply_method("order-map", recording())
     orders, mean = levels.axes["order"], levels.matrices["levels"].mean(axis=0)
     assert orders[np.argmax(mean)] == pytest.approx(20.0, abs=0.1)  # 20 teeth
-    tracked = apply_method("tracking", recording(), MethodOptions(orders=(20.0,))).table
+    tracked = apply_method("tracking", recording(), orders=(20.0,)).table
     amplitude = next(v for k, v in tracked.items() if "amplitude" in k)
     assert np.median(amplitude) == pytest.approx(3.0, rel=0.02)
 
 
 def test_the_envelope_of_a_band_shows_the_rhythm_of_bursts() -> None:
-    answer = apply_method("envelope", recording(), MethodOptions(band_hz=(1500.0, 2500.0), highest=100.0))
+    answer = apply_method("envelope", recording(), band_hz=(1500.0, 2500.0), highest=100.0)
     hz, level = answer.table.values()
     assert hz[1:][np.argmax(level[1:])] % 10.0 == pytest.approx(0.0, abs=0.6)
 
 
 def test_the_most_impulsive_mode_goes_on_to_the_squeezed_transform() -> None:
-    answer = apply_method("modes", recording(), MethodOptions(n_modes=3, then="squeezed-cwt"))
+    answer = apply_method("modes", recording(), n_modes=3, then="squeezed-cwt")
     centre = answer.numbers["centres"][answer.numbers["chosen_mode"] - 1]
     assert centre == pytest.approx(2000.0, rel=0.06)
     assert max(answer.numbers["kurtosis"]) == answer.numbers["kurtosis"][answer.numbers["chosen_mode"] - 1]
     lines = next(v for k, v in answer.axes.items() if k.startswith("frequency"))
     power = np.square(answer.matrices["levels"]).sum(axis=0)
     assert np.sum(lines * power) / np.sum(power) == pytest.approx(2000.0, rel=0.1)
-    tone = apply_method("modes", recording(), MethodOptions(n_modes=3, then="squeezed-cwt", mode=1))
+    tone = apply_method("modes", recording(), n_modes=3, then="squeezed-cwt", mode=1)
     levels, at = tone.matrices["levels"], next(v for k, v in tone.axes.items() if k.startswith("frequency"))
     assert at[np.argmax(np.square(levels).sum(axis=0))] == pytest.approx(500.0, rel=0.03)
 
 
 def test_options_of_other_methods_wrong_names_and_missing_speeds_are_refused() -> None:
     with pytest.raises(InputError, match="envelope"):
-        apply_method("spectrum", recording(), MethodOptions(band_hz=(1.0, 2.0)))
+        apply_method("spectrum", recording(), band_hz=(1.0, 2.0))
     with pytest.raises(InputError, match="order-map"):
         apply_method("ordermap", recording())
     with pytest.raises(InputError, match="1 to 3"):
-        apply_method("modes", recording(), MethodOptions(n_modes=3, mode=4))
+        apply_method("modes", recording(), n_modes=3, mode=4)
     with pytest.raises(InputError, match="goes on to no transform"):
         named_method("kurtogram+cwt")
     still = Recording(recording().samples, RATE_HZ, recording().channels)

@@ -316,7 +316,7 @@ class Figure {
     }
     for (const [share, value] of [[1, map.low], [0, map.high]])
       text(this.svg, x + 14, this.top + share * this.plotHeight + (share ? 0 : 9), plain(value, map.low, map.high), { fill: this.ink, opacity: 0.75 });
-    text(this.svg, x + 14, this.top + this.plotHeight / 2, "dB", { fill: this.ink, opacity: 0.75 });
+    text(this.svg, x + 14, this.top + this.plotHeight / 2, map.unit.startsWith("dB") ? "dB" : map.unit, { fill: this.ink, opacity: 0.75 });
   }
 
   band(from, to) {

@@ -17,7 +17,6 @@ from app.dashboard.theme import as_typed, capitalised, is_dark, one_line
 from app.dashboard.widgets.charts import (
     QUIET,
     Axes,
-    ChartLine,
     download,
     looked_at,
     picture_bytes,
@@ -38,7 +37,7 @@ from gearsig.gap import (
     gap_by_order,
     is_beyond,
 )
-from gearsig.plot import with_unit
+from gearsig.plot import ChartLine, with_unit
 from gearsig.report import (
     CHECK_FIRST,
     CauseRow,

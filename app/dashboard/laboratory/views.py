@@ -15,12 +15,12 @@ from app.dashboard.laboratory.gears import show_gears
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import Setup, effect_text
 from app.dashboard.theme import as_typed, capitalised, palette
-from app.dashboard.widgets.charts import FAULT, MEASURED, Axes, ChartLine, padded_limits, show_chart, show_lines
+from app.dashboard.widgets.charts import FAULT, MEASURED, Axes, padded_limits, show_chart, show_lines
 from app.dashboard.widgets.spectrum import show_spectrum
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.indicators import crest_factor, kurtosis, rms
-from gearsig.plot import Cursor
+from gearsig.plot import ChartLine, Cursor
 from gearsig.recording import Recording
 from gearsig.spectra import Spectrum, amplitude_spectrum, band_envelope, envelope_spectrum
 from sims.effects import effect

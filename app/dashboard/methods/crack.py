@@ -9,7 +9,8 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import recorded
-from app.dashboard.methods.frame import MethodPage, cached, show_table
+from app.dashboard.methods.form import MethodPage
+from app.dashboard.methods.page import cached, show_table
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import show_picture
 from app.dashboard.widgets.chooser import choose_file, choose_sample
@@ -33,6 +34,9 @@ severity = cached(8, "Looking at every tooth …")(estimate_crack)
 
 def show_crack(page: MethodPage) -> None:
     """Show the depth of a crack, or how deep one may be that does not show, or why neither can be estimated."""
+    st.caption(
+        "How deep a crack in a tooth root is, in mm with an interval; best beside a recording of the healthy gears."
+    )
     reference = _choose_reference(page)
     recording = page.analysis.recording
     channels: tuple[str, ...] = ()

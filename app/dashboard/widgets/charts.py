@@ -21,7 +21,7 @@ from app.dashboard.components import component_of
 from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
-from gearsig.plot import LONGEST, Cursor, plain
+from gearsig.plot import LONGEST, ChartLine, Cursor, LevelPanel, LinePanel, plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as PictureFigure
@@ -30,32 +30,6 @@ if TYPE_CHECKING:
 CONFIG = {"displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"], "scrollZoom": False}
 MEASURED, FAULT, QUIET = 0, 1, -1
 """Colours of lines by meaning; further numbers are further colours."""
-
-
-@dataclass(frozen=True)
-class ChartLine:
-    """A line to draw; nan where it has a gap.
-
-    Parameters
-    ----------
-    x, y : array, (n,)
-    name : str
-    colour : int
-        See `MEASURED`.
-    band : (low, high) or None
-        A pale band behind it.
-    dotted : bool
-    peaks : bool
-        Where there are more points than pixels, join the highest, over a pale band down to the lowest: of spectra.
-    """
-
-    x: FloatArray
-    y: FloatArray
-    name: str
-    colour: int = MEASURED
-    band: tuple[FloatArray, FloatArray] | None = None
-    dotted: bool = False
-    peaks: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,6 +91,26 @@ def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[f
     high = max((float(np.nanmax(curve)) for curve in known), default=1.0)
     margin = 0.06 * (high - low) or flat
     return low - margin, high + margin
+
+
+def show_panel(panel: LinePanel | LevelPanel, key: str, span_db: float) -> None:
+    """Show a panel that a method gives, to be zoomed; of levels that range below the largest has colours."""
+    if isinstance(panel, LevelPanel):
+        show_map(
+            panel.levels,
+            panel.at,
+            panel.positions,
+            Axes(panel.x, panel.y, (float(panel.at[0]), float(panel.at[-1])), logarithmic=panel.logarithmic),
+            key,
+            unit=panel.unit,
+            dynamic_range_db=span_db if panel.span is None else panel.span,
+            cursors=panel.cursors,
+            lines=panel.lines,
+        )
+        return
+    ends = [float(end) for line in panel.lines for end in (line.x.min(), line.x.max())]
+    axes = Axes(panel.x, panel.y, (min(ends), max(ends)), panel.limits, logarithmic=panel.logarithmic)
+    show_lines(panel.lines, axes, key, cursors=panel.cursors, legend=len(panel.lines) > 1)
 
 
 def show_chart(figure: Figure, key: str, alternative: str) -> None:
@@ -193,7 +187,7 @@ def show_lines(
     colours, ends = palette(), whole or axes.x_limits
     shown = looked_at(key, ends, axes.x_limits)
     data = _described(axes, key, shown, ends, height_px) | {
-        "lines": [_sent(line, shown) for line in lines],
+        "lines": [_sent(line, shown, alone=len(lines) == 1) for line in lines],
         "cursors": _cursor_rows(cursors, colours),
         "marked": [[float(x), float(y)] for x, y in marked],
         "legend": legend,
@@ -313,11 +307,13 @@ def _unit_of(label: str) -> str:
     return one_line(unit.removesuffix(")") if bracket else "")
 
 
-def _sent(line: ChartLine, shown: tuple[float, float]) -> dict[str, object]:
+def _sent(line: ChartLine, shown: tuple[float, float], *, alone: bool = True) -> dict[str, object]:
+    """Return a line as the component takes it; of several spectra, pale bands would hide the others."""
     colours = palette()
     cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
     colour = colours.quiet if line.colour == QUIET else cycle[line.colour % len(cycle)]
     x, y, *band = _columns(line, shown)
+    band = band if alone or line.band is not None else []
     curves = {name: packed(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
     return {"name": one_line(line.name), "colour": colour, "dotted": line.dotted, **curves}
 

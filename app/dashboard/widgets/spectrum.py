@@ -10,12 +10,12 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.theme import as_typed, is_dark
-from app.dashboard.widgets.charts import N_COLUMNS, Axes, ChartLine, looked_at, picture_bytes, show_lines
+from app.dashboard.widgets.charts import N_COLUMNS, Axes, looked_at, picture_bytes, show_lines
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.formatting import readable
 from gearsig.orders import SynchronousAverage
-from gearsig.plot import AngleMark, Cursor, Scale, above_zero, decibels, unit_text, with_unit
+from gearsig.plot import AngleMark, ChartLine, Cursor, Scale, above_zero, decibels, unit_text, with_unit
 from gearsig.spectra import Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
@@ -209,7 +209,7 @@ def teeth_choice(analysis: Analysis, shaft: str) -> int | None:
 
 
 def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) -> None:
-    from app.dashboard.methods.frame import content_key
+    from app.dashboard.methods.page import content_key
     from gearsig.plot import marks_of
 
     marks = marks_of(analysis.findings, average.shaft, n_teeth)

@@ -10,11 +10,11 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.theme import as_typed, one_line, palette
-from app.dashboard.widgets.charts import Axes, ChartLine, show_lines
+from app.dashboard.widgets.charts import Axes, show_lines
 from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.spectrum import SLIP_SHARE, show_spectrum
 from gearsig.diagnosis import Analysis, Finding, Kind, Outcome
-from gearsig.plot import marks_of, svg_ring, with_unit
+from gearsig.plot import ChartLine, marks_of, svg_ring, with_unit
 from gearsig.report import (
     FindingCard,
     bearing_cursors,

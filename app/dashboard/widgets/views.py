@@ -12,20 +12,24 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import channel_problems, command_of, report_page, safe_file_name
-from app.dashboard.methods import show_method
-from app.dashboard.methods.frame import MethodPage, cached
+from app.dashboard.methods.crack import show_crack
+from app.dashboard.methods.form import MethodPage
+from app.dashboard.methods.page import cached, show_method
 from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import Axes, ChartLine, show_lines, show_map, show_picture
+from app.dashboard.widgets.charts import Axes, show_lines, show_map, show_picture
 from app.dashboard.widgets.machine import show_machine
-from app.dashboard.widgets.messages import show_facts, show_unknown_speed
+from app.dashboard.widgets.messages import show_error, show_facts, show_unknown_speed
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
 from app.dashboard.widgets.strip import choose_view
 from gearsig import plot
 from gearsig.angle import resample_to_angle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
+from gearsig.errors import GearsigError
 from gearsig.indicators import Indicator
+from gearsig.methods import METHODS
 from gearsig.orders import OrderMap, frequency_map, order_map
+from gearsig.plot import ChartLine
 from gearsig.report import bearing_cursors, highest_order_of_interest, line_cursors, marked_positions, speed_is_constant
 
 if TYPE_CHECKING:
@@ -369,8 +373,16 @@ Of = Callable[[Analysis, ChannelAnalysis], None]
 Whole = Callable[[Analysis], None]
 
 
-def _methods(*names: str) -> dict[str, Of]:
-    return {name: partial(show_method, name) for name in names}
+def _methods(view: str) -> dict[str, Of]:
+    """Return the methods of the table that belong to a view."""
+    return {method.title: partial(show_method, name) for name, method in METHODS.items() if method.view == view}
+
+
+def _show_severity(analysis: Analysis, channel: ChannelAnalysis) -> None:
+    try:
+        show_crack(MethodPage(analysis, channel, "crack severity"))
+    except GearsigError as error:
+        show_error(error)
 
 
 MOTION = "Starts and stops"
@@ -381,16 +393,17 @@ OF_RECORDING: dict[str, Whole] = {
     "Speed": show_speed,
     "Indicators": show_indicators,
 }
-OF_CHANNEL: dict[str, dict[str, Of]] = {
+_OWN: dict[str, dict[str, Of]] = {
     "Spectrum": {"Spectrum": show_frequency_spectrum},
     "Order spectrum": {"Order spectrum": show_order_spectrum},
-    "Map": {"Map": show_map_over_time, **_methods("Orders (Vold–Kalman)")},
-    "Average": {"Synchronous average": show_average, **_methods("Crack severity")},
-    "Envelope": {"Envelope spectrum": show_envelope, **_methods("Kurtogram", "Cyclic coherence", "Deconvolution")},
-    "Time–frequency": _methods("Time–frequency", "Ridges", "Wavelet packets"),
-    "Modes": _methods("Modes", "Denoising"),
-    "Phase": _methods("Phase plane", "Embedding and chaos"),
+    "Map": {"Map": show_map_over_time},
+    "Average": {"Synchronous average": show_average, "Crack severity": _show_severity},
+    "Envelope": {"Envelope spectrum": show_envelope},
+    "Time–frequency": {},
+    "Modes": {},
+    "Phase": {},
 }
+OF_CHANNEL = {view: own | _methods(view) for view, own in _OWN.items()}
 MACHINE, REPORT = "Machine", "Report"
 VIEWS = (MACHINE, "Waveform", "Speed", *OF_CHANNEL, "Indicators", REPORT)
 

@@ -1,0 +1,309 @@
+"""The page of a method of the table: its form, its answer as figures that zoom, its waveforms and tables to take."""
+
+from __future__ import annotations
+
+import re
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from functools import partial
+from hashlib import blake2b
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Lock
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+import numpy as np
+import streamlit as st
+
+from app.dashboard.cached import safe_file_name
+from app.dashboard.methods.form import MethodPage, ask_options
+from app.dashboard.theme import as_plot_text, as_typed, capitalised, one_line, palette
+from app.dashboard.widgets import charts
+from app.dashboard.widgets.messages import show_error, show_unknown_speed, show_warnings
+from app.dashboard.work import Kept, kept
+from gearsig.angle import ShaftAngle
+from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis
+from gearsig.errors import GearsigError, RefusalError
+from gearsig.methods import METHODS, MethodAnswer, Waveforms, angle_or_none, apply_method, part_of
+from gearsig.plot import ChartLine, LevelPanel, with_unit
+from gearsig.prepared import PreparedRecording
+from gearsig.recording import Recording, write_recording
+from gearsig.timefreq import at_label
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+P = ParamSpec("P")
+R = TypeVar("R")
+OVER_TIME, OVER_ANGLE = (".csv", ".h5", ".wav", ".parquet", ".mat"), (".csv",)
+"""What waveforms are written to: recordings, which run over time; signals over angle are plain columns."""
+_SPOKEN = re.compile(r"(?:(?!\*\*)\S)+")
+"""Words of a text in which ** makes bold."""
+MEMORY_LIMIT_MB, N_PREPARED = 256.0, 4
+"""What is kept of a segment between two looks at it, and of how many segments."""
+
+
+def cached(n_kept: int, words: str) -> Callable[[Callable[P, R]], Kept[P, R]]:
+    """Compute a function beside the page and keep its last answers, told apart by the content of its arguments.
+
+    Answers are frozen, so that sessions may share them. Streamlit's own hash samples large arrays, and two segments of
+    one recording could be taken for each other: arguments are hashed whole here, about 1 GB/s.
+
+    Parameters
+    ----------
+    n_kept : int
+        Answers kept; most are several times as long as the segment.
+    words : str
+        Shown while it computes.
+
+    Examples
+    --------
+    >>> separated = cached(4, "Separating the orders …")(track_vold_kalman)  # doctest: +SKIP
+    """
+    return kept(n_kept, words, key=lambda *arguments, **named: content_key((arguments, named)))
+
+
+def content_key(value: object) -> str:
+    """Return a text that stands for the content of settings, arrays and dataclasses of them."""
+    digest = blake2b(digest_size=16)
+    _feed(digest, value)
+    return digest.hexdigest()
+
+
+def _feed(digest: blake2b, value: object) -> None:
+    if isinstance(value, np.ndarray):
+        digest.update(repr((value.shape, value.dtype.str)).encode())
+        digest.update(np.ascontiguousarray(value).data)
+    elif is_dataclass(value) and not isinstance(value, type):
+        digest.update(type(value).__name__.encode())
+        for part in fields(value):
+            _feed(digest, getattr(value, part.name))
+    elif isinstance(value, tuple | list):
+        digest.update(f"{len(value)} of".encode())
+        for part in value:
+            _feed(digest, part)
+    elif isinstance(value, Mapping):
+        _feed(digest, list(value.items()))
+    else:
+        digest.update(f"{value!r};".encode())
+
+
+def prepared_of(recording: Recording, angle: ShaftAngle | CannotTell) -> PreparedRecording:
+    """Return a recording with the angle that is known of it, or why there is none."""
+    prepared = PreparedRecording(recording, memory_limit_mb=MEMORY_LIMIT_MB)
+
+    def known() -> ShaftAngle:
+        if isinstance(angle, CannotTell):
+            raise RefusalError(angle.reason, remedy=angle.remedy)
+        return angle
+
+    with suppress(RefusalError):  # kept: who asks for the angle hears of it
+        prepared.keep("angle", known)
+    return prepared
+
+
+_segments: OrderedDict[str, tuple[PreparedRecording, Lock]] = OrderedDict()
+
+
+@cached(8, "Computing …")
+def answer_of(
+    name: str, part: Recording, angle: ShaftAngle | CannotTell, channel: str, options: Mapping[str, Any]
+) -> MethodAnswer:
+    """Return a method's answer; what it computes of a segment on the way is kept for other options."""
+    key = content_key((part, angle))
+    if key not in _segments:
+        _segments[key] = prepared_of(part, angle), Lock()
+        while len(_segments) > N_PREPARED:
+            _segments.popitem(last=False)
+    prepared, lock = _segments[key]
+    with lock:
+        return apply_method(name, prepared, channel, **options)
+
+
+def show_method(name: str, analysis: Analysis, channel: ChannelAnalysis) -> None:
+    """Show a method's form and its answer for one channel."""
+    st.caption(METHODS[name].about)
+    try:
+        _show(name, MethodPage(analysis, channel, name))
+    except RefusalError as error:
+        angle = analysis.shaft_angle
+        if isinstance(angle, CannotTell) and error.reason == angle.reason:
+            show_unknown_speed(angle)
+        else:
+            show_error(error)
+    except GearsigError as error:
+        show_error(error)
+
+
+def _show(name: str, page: MethodPage) -> None:
+    method, analysis = METHODS[name], page.analysis
+    recording = analysis.recording if analysis.rig is None else analysis.recording.with_rig(analysis.rig)
+    whole, rate = prepared_of(recording, analysis.shaft_angle), recording.sampling_rate_hz
+    start, stop = page.segment(n_first=method.n_first)
+    said = st.empty()
+    options = ask_options(page, method, part_of(whole, start / rate, stop / rate))
+    # what takes longer than a few seconds is cut, which is said
+    end = min(stop, start + (method.n_max if method.limit is None else min(method.n_max, method.limit(options))))
+    text = f"Analysed: {start / rate:.4g} to {end / rate:.4g} s of {recording.duration_s:.4g} s, {end - start} samples"
+    said.caption(f"{text}{'; a longer one would take too long.' if end < stop else '.'}")
+    part = part_of(whole, start / rate, end / rate, page.channel.channel)
+    angle = angle_or_none(part) or (
+        analysis.shaft_angle
+        if isinstance(analysis.shaft_angle, CannotTell)
+        else CannotTell("speed", "the shaft's angle is not known in this segment", "choose another one")
+    )
+    answer = answer_of(name, part.recording, angle, page.channel.channel, options)
+    show_answer(page, answer, angle)
+
+
+def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | CannotTell) -> None:
+    """Show what was found: words, figures, waveforms, tables."""
+    for fact in answer.facts:
+        st.markdown(_SPOKEN.sub(lambda part: as_typed(part.group()), fact))
+    show_warnings([capitalised(text) for text in answer.warnings])
+    span = 60.0
+    if any(isinstance(panel, LevelPanel) and panel.span is None for panel in answer.panels):
+        span = float(page.ask(st.columns(3)[0].slider, "Colours span (dB)", 20, 120, 60, step=5))
+    for number, panel in enumerate(answer.panels):
+        charts.show_panel(panel, page.key(f"figure {number} {panel.x} {panel.y}"), span)
+    if answer.path is not None:
+        _show_space(page, answer.path)
+    elif not answer.panels and answer.waveforms is None:
+        charts.show_picture(answer.draw(), f"{answer.caption}, {answer.channel}")
+    for note in answer.notes:
+        st.caption(as_typed(note))
+    if answer.waveforms is not None and "signal" in answer.waveforms.columns:
+        _show_waveforms(page, answer.waveforms, angle)
+    for what, table in answer.tables.items():
+        if len(next(iter(table.values()))) <= 200:
+            with st.expander(f"{what.capitalize()} ({len(next(iter(table.values())))})"):
+                show_table(table)
+    _offer(page, answer)
+
+
+def show_table(columns: Mapping[str, Any]) -> None:
+    """Show a table whose first column is text and whose others are numbers."""
+    number = st.column_config.NumberColumn(format="%.4g")
+    config = dict.fromkeys(list(columns)[1:], number)
+    texts = {n for n, values in columns.items() if np.asarray(values).dtype.kind in "OU"}
+    shown = {name: column for name, column in config.items() if name not in texts}
+    st.dataframe(columns, hide_index=True, width="stretch", column_config=shown)
+
+
+def _show_space(page: MethodPage, path: np.ndarray) -> None:
+    from plotly.graph_objects import Figure
+
+    figure, (x, y, z) = Figure(), path.T
+    line = {"width": 1.5, "color": palette().measured}
+    figure.add_scatter3d(x=x, y=y, z=z, mode="lines", line=line, opacity=0.5, hoverinfo="skip")
+    titles = {f"{axis}axis": {"title": {"text": as_plot_text(f"x(t + {k}τ)")}} for k, axis in enumerate("xyz")}
+    figure.update_layout(
+        height=560, margin=dict.fromkeys("lrtb", 0), showlegend=False, scene={**titles, "aspectmode": "cube"}
+    )
+    charts.show_chart(figure, page.key("space"), "Path in space")
+    st.caption("The last points of the path. Drag to turn it.")
+
+
+# Waveforms.
+
+
+def first_length(page: MethodPage, waveforms: Waveforms, angle: ShaftAngle | CannotTell) -> float:
+    """Return the length of a waveform's first view in s or revolutions: five mesh cycles, so that their shape is seen.
+
+    Three revolutions where no mesh is known, 3000 samples where the speed is not.
+    """
+    if isinstance(angle, CannotTell):
+        return 3000.0 / waveforms.rate
+    rig = page.analysis.rig
+    orders = [rig.mesh_order(pair, angle.shaft) for pair in rig.pairs] if rig is not None and rig.shafts else []
+    revolutions = next((5.0 / order for order in orders if order), 3.0)
+    return revolutions if waveforms.axis == "order" else revolutions * 60.0 / max(angle.mean_speed_rpm, 1e-9)
+
+
+def _show_waveforms(page: MethodPage, waveforms: Waveforms, angle: ShaftAngle | CannotTell) -> None:
+    """Draw one waveform over the signal, and what remains of the signal below."""
+    names = [name for name in waveforms.columns if name not in ("signal", waveforms.residual)]
+    left, right = st.columns((1, 2))
+    chosen = names[0]
+    if len(names) > 1:
+        chosen = page.ask(left.selectbox, "Waveform of", names, key=f"waveform of {names}", format_func=one_line)
+    start, end = waveforms.start, waveforms.end
+    length = min(first_length(page, waveforms, angle), end - start)
+    first = (start + end - length) / 2.0
+    with right if len(names) > 1 else st.container():
+        label = f"Waveforms shown ({'s' if waveforms.axis == 'frequency' else 'revolutions'})"
+        limits = page.range(label, end, start=start, shown=(first, first + length))
+    low = min(max(0, int((limits[0] - start) * waveforms.rate)), max(0, waveforms.n_samples - 2))
+    part = slice(low, low + max(2, int(np.ceil((limits[1] - limits[0]) * waveforms.rate)) + 1))
+    at, axis = waveforms.at(part), at_label(waveforms.axis, waveforms.shaft)
+    rows = [("signal", {"signal": charts.QUIET, chosen: charts.MEASURED}, 240)]
+    if waveforms.residual:
+        rows.append(("residual", {waveforms.residual: charts.FAULT}, 180))
+    for label, colours, height_px in rows:
+        lines = [ChartLine(at, waveforms.columns[c][part], c, colours[c]) for c in colours]
+        axes = charts.Axes(axis if label == rows[-1][0] else "", with_unit(label, waveforms.unit), limits)
+        charts.show_lines(lines, axes, page.key(f"waveforms {label}"), height_px=height_px, legend=True)
+
+
+# What is taken along: whole, not thinned as on the page.
+
+
+def _offer(page: MethodPage, answer: MethodAnswer) -> None:
+    """Offer waveforms in a choice of formats, and tables as CSV."""
+    waveforms = answer.waveforms
+    with (
+        st.container(horizontal=True, horizontal_alignment="right"),
+        st.popover("Download", icon=":material/download:"),
+    ):
+        if waveforms is not None:
+            endings = OVER_TIME if waveforms.axis == "frequency" else OVER_ANGLE
+            ending = page.ask(st.selectbox, "Format", endings, key=f"format {endings[-1]}")
+            n = len(waveforms.columns) * waveforms.n_samples
+            label = f"Waveforms: {len(waveforms.columns)} × {waveforms.n_samples} samples"
+            _offer_file(page, label, partial(waveforms_file, waveforms, ending), "waveforms", ending)
+            if ending == ".csv" and n > 2_000_000:
+                st.caption(f"About {20e-6 * n:.0f} MB as CSV; .h5 is less than half of it.")
+        for what, table in {"table": answer.table, **answer.tables}.items():
+            _offer_file(page, f"{what.capitalize()} (CSV)", partial(table_csv, table), what, ".csv")
+
+
+def _offer_file(page: MethodPage, label: str, content: Callable[[], bytes], what: str, ending: str) -> None:
+    source = safe_file_name(page.analysis.recording.provenance.source).split(".")[0]
+    st.download_button(
+        label,
+        data=content,
+        file_name=f"{source}-{safe_file_name(f'{page.name}-{what}')}{ending}",
+        mime={".csv": "text/csv", ".wav": "audio/wav"}.get(ending, "application/octet-stream"),
+        on_click="ignore",
+        icon=":material/download:",
+        key=page.key(f"download {what}"),
+    )
+
+
+def waveforms_file(waveforms: Waveforms, ending: str) -> bytes:
+    """Return a recording of the waveforms in a file's format, or columns over angle.
+
+    Raises
+    ------
+    InputError
+        If the format cannot hold them.
+    """
+    if waveforms.axis == "order":
+        return table_csv(waveforms.table())
+    with TemporaryDirectory(prefix="gearsig-") as folder:
+        path = Path(folder) / f"waveforms{ending}"
+        write_recording(waveforms.recording(), path)
+        return path.read_bytes()
+
+
+def table_csv(columns: Mapping[str, ArrayLike]) -> bytes:
+    """Return columns of equal length as CSV, numbers with all their digits."""
+    import pyarrow as pa
+    from pyarrow import csv
+
+    buffer = BytesIO()
+    csv.write_csv(pa.table({name: pa.array(np.asarray(values)) for name, values in columns.items()}), buffer)
+    return buffer.getvalue()

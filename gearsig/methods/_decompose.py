@@ -1,0 +1,385 @@
+"""Methods that take a channel apart: variational modes, with the transform of one of them, and wavelet denoising."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, get_args
+
+import numpy as np
+
+from gearsig import plot
+from gearsig.checks import FloatArray
+from gearsig.decompose import (
+    DenoiseSettings,
+    Modes,
+    VmdEngine,
+    VmdSettings,
+    denoise,
+    mode_spectra,
+    suggest_modes,
+    vmd,
+)
+from gearsig.errors import InputError
+from gearsig.formatting import readable
+from gearsig.indicators import kurtosis
+from gearsig.methods._table import (
+    LINES,
+    OVER_ANGLE,
+    SHAFT,
+    Method,
+    MethodAnswer,
+    MethodOption,
+    signal_of,
+    top_hz,
+    unit_of,
+    waveforms_of,
+)
+from gearsig.methods._timefreq import NAMES, levels_answer, levels_of
+from gearsig.plot import ChartLine, Cursor, LinePanel, above_zero, unit_text, with_unit
+from gearsig.prepared import PreparedRecording
+from gearsig.spectra import band_envelope
+from gearsig.timefreq import UniformSignal
+
+PENALTIES = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000)
+"""A logarithmic scale that holds whatever is suggested."""
+
+
+def _modes(
+    prepared: PreparedRecording,
+    channel: str,
+    n_modes: int | None,
+    penalty: float | None,
+    mode: int | None,
+    then: str,
+    envelope_hz: tuple[float, float] | None,
+    over_angle: bool,
+    shaft: str,
+    lowest: float | None,
+    highest: float | None,
+    start: Any,
+    zero_mode: bool,
+    iterations: int,
+    dual_step: float,
+    engine: Any,
+) -> MethodAnswer:
+    signal, offset = _taken_apart(prepared, channel, envelope_hz, over_angle=over_angle, shaft=shaft)
+    reasons: tuple[str, ...] = ()
+    settings, trials = VmdSettings(n_modes or 4, penalty or 2000.0), dict[str, Any]()
+    place = ("methods", "modes", channel, envelope_hz, over_angle, shaft)
+    if n_modes is None:
+        suggested = prepared.keep((*place, "suggested"), lambda: suggest_modes(signal))
+        settings, reasons = suggested.settings, suggested.reasons
+        settings = settings if penalty is None else replace(settings, penalty=penalty)
+        trials = {"tried": _trials(suggested.trials)}
+    settings = replace(
+        settings,
+        start=settings.start if start == "automatic" else start,
+        zero_mode=zero_mode,
+        max_iterations=499 if engine == "vmdpy" else iterations,  # as it does
+        dual_step=dual_step,
+        engine=engine,
+    )
+    modes = prepared.keep((*place, settings), lambda: by_centre(vmd(signal, None, settings)))
+    modes = replace(modes, offset=offset)
+    impulses = [kurtosis(waveform) for waveform in modes.waveforms]
+    chosen = int(np.argmax(impulses)) if mode is None else mode - 1
+    if not 0 <= chosen < modes.n_modes:
+        raise InputError(f"mode is {mode}", allowed=f"1 to {modes.n_modes}, by rising centre")
+    unit = "Hz" if modes.axis == "frequency" else "orders"
+    numbers = {
+        "centres": list(modes.centres),
+        "bandwidths": list(modes.bandwidths),
+        "kurtosis": impulses,
+        "chosen_mode": chosen + 1,
+        "penalty": modes.settings.penalty,
+        "reasons": list(reasons),
+        "warnings": list(modes.notes),
+    }
+    names = [f"mode {k}, {centre:.5g} {unit}" for k, centre in enumerate(modes.centres, start=1)]
+    columns = dict(zip(names, modes.waveforms, strict=True)) | {"residual": modes.residual}
+    step = f"{modes.n_modes} variational modes, penalty {settings.penalty:g}, of {modes.source} less {offset:g}"
+    waveforms = waveforms_of(prepared, channel, signal, {"signal": signal.values, **columns}, step, residual="residual")
+    about = {
+        "mode": np.arange(1, modes.n_modes + 1),
+        f"centre ({unit})": modes.centres,
+        f"bandwidth ({unit})": modes.bandwidths,
+        with_unit("rms", modes.unit): modes.rms,
+        "kurtosis": np.array(impulses),
+    }
+    table = {
+        ("time (s)" if modes.axis == "frequency" else "angle (revolutions)"): signal.start + modes.positions,
+        **{with_unit(name, modes.unit): values for name, values in columns.items()},
+    }
+    end = "Converged" if modes.converged else "Stopped"
+    answer = MethodAnswer(
+        channel,
+        f"{modes.n_modes} variational modes and the residual",
+        lambda: plot.modes_figure(modes),
+        table,
+        tables={"modes": about, **trials},
+        numbers=numbers,
+        panels=(_spectra_panel(modes, names),),
+        facts=(
+            (
+                f"**{modes.n_modes} modes** at penalty **{settings.penalty:g}**, start **{settings.start}**. Mode "
+                f"**{chosen + 1}** is {'the most impulsive' if mode is None else 'chosen'}: kurtosis "
+                f"{impulses[chosen]:.3g}, centre {modes.centres[chosen]:.5g} {unit}."
+            ),
+        ),
+        notes=(
+            *reasons,
+            f"{end} after {modes.n_iterations} iterations. Upright lines: the modes' centres.",
+        ),
+        warnings=modes.notes,
+        waveforms=waveforms,
+    )
+    if not then:
+        return answer
+    centre, top = float(modes.centres[chosen]), 0.45 * modes.sampling_rate
+    # two octaves to either side of the mode's centre
+    low = centre / 4.0 if lowest is None else lowest
+    levels = levels_of(
+        modes.signal(chosen, start=signal.start), then, lowest=low,
+        highest=min(4.0 * centre, top) if highest is None else highest,
+    )  # fmt: skip
+    on = levels_answer(channel, levels, numbers)
+    return replace(
+        on,
+        caption=f"mode {chosen + 1} of {modes.n_modes}, centre {centre:.5g} {unit}: {on.caption}",
+        tables=answer.tables,
+        panels=(*on.panels, *answer.panels),
+        facts=answer.facts,
+        notes=(*on.notes, *answer.notes),
+        warnings=answer.warnings,
+        waveforms=waveforms,
+    )
+
+
+def _taken_apart(
+    prepared: PreparedRecording,
+    channel: str,
+    envelope_hz: tuple[float, float] | None,
+    *,
+    over_angle: bool,
+    shaft: str,
+) -> tuple[UniformSignal, float]:
+    """Return what is taken apart, and the constant that was subtracted from it."""
+    if envelope_hz is None:
+        return signal_of(prepared, channel, over_angle=over_angle, shaft=shaft), 0.0
+    if over_angle:
+        raise InputError("an envelope over the shaft's angle is asked for", allowed="one of both")
+    recording = prepared.recording
+    unit = unit_of(prepared, channel)
+    envelope = band_envelope(
+        recording.values(channel), recording.sampling_rate_hz, envelope_hz, kind="magnitude", unit=unit, source=channel
+    )
+    # its mean would be a mode of its own that outweighs the others
+    mean = float(envelope.values.mean())
+    rate = envelope.sampling_rate_hz
+    return UniformSignal(envelope.values - mean, rate, unit=envelope.unit, source=envelope.source), mean
+
+
+def by_centre(modes: Modes) -> Modes:
+    """Return the modes by rising centre: the first one shown is number 1."""
+    order = list(modes.by_centre())
+    return replace(
+        modes,
+        waveforms=modes.waveforms[order],
+        centres=modes.centres[order],
+        bandwidths=modes.bandwidths[order],
+        centre_history=modes.centre_history[:, order],
+    )
+
+
+def _spectra_panel(modes: Modes, names: list[str]) -> LinePanel:
+    """All modes' spectra on one logarithmic axis, so that their sizes compare."""
+    spectra = mode_spectra(modes)
+    lines = [
+        ChartLine(s.positions, above_zero(s.values), name, -1 if k == modes.n_modes else k, peaks=True)
+        for k, (name, s) in enumerate(zip((*names, "residual"), spectra, strict=True))
+    ]
+    highest = max(float(line.y[1:].max()) for line in lines)
+    cursors = [Cursor(float(c), "mode", str(k), k) for k, c in enumerate(modes.centres, start=1)]
+    label = with_unit("amplitude peak", modes.unit)
+    return LinePanel(lines[::-1], spectra[0].axis_label, label, (1e-5 * highest, 3.0 * highest), True, cursors)
+
+
+def _trials(trials: Any) -> dict[str, Any]:
+    columns: dict[str, list[Any]] = {
+        "penalty": [int(trial.penalty) for trial in trials],
+        "modes": [trial.n_modes for trial in trials],
+        "start": [str(trial.settings.start) for trial in trials],
+        "residual (% of rms)": [100.0 * trial.reconstruction_error for trial in trials],
+        "separation": [trial.separation if trial.n_modes > 1 else np.nan for trial in trials],
+        "widest": [trial.widest for trial in trials],
+        "weakest (% of energy)": [100.0 * trial.smallest_share for trial in trials],
+        "objection": [trial.objection or "none" for trial in trials],
+    }
+    texts = ("start", "objection")
+    return {name: np.array(values, dtype=object if name in texts else None) for name, values in columns.items()}
+
+
+# Denoising.
+
+
+def _denoising(
+    prepared: PreparedRecording,
+    channel: str,
+    threshold: Any,
+    rule: Any,
+    noise: Any,
+    wavelet: str,
+    shifts: int,
+    levels: int | None,
+) -> MethodAnswer:
+    recording = prepared.recording
+    settings = DenoiseSettings(threshold, rule, wavelet=wavelet, n_levels=levels, noise=noise, n_shifts=shifts)
+    denoised = denoise(recording, channel, settings)
+    columns: dict[str, FloatArray] = {
+        "signal": recording.values(channel),
+        "without noise": denoised.values,
+        "removed": denoised.removed,
+    }
+    step = f"{threshold} {rule} thresholds, {wavelet}"
+    waveforms = waveforms_of(prepared, channel, signal_of(prepared, channel), columns, step, residual="removed")
+    at, unit = waveforms.at(), unit_of(prepared, channel)
+    both = [ChartLine(at, columns[name], name, k - 1) for k, name in enumerate(("signal", "without noise"))]
+    panels = (
+        LinePanel(both, "time (s)", with_unit(channel, unit)),
+        LinePanel([ChartLine(at, denoised.removed, "removed", 1)], "time (s)", with_unit("removed", unit)),
+    )
+    table = {
+        "level": np.array([level.level for level in denoised.levels]),
+        "from (Hz)": np.array([level.band_hz[0] for level in denoised.levels]),
+        "to (Hz)": np.array([level.band_hz[1] for level in denoised.levels]),
+        with_unit("noise", unit): np.array([level.noise for level in denoised.levels]),
+        with_unit("threshold", unit): np.array([level.threshold for level in denoised.levels]),
+        "kept (%)": np.array([100.0 * level.kept_share for level in denoised.levels]),
+    }
+    return MethodAnswer(
+        channel,
+        "signal without its noise, by wavelet thresholds",
+        lambda: plot.panels_figure(panels, title=f"{channel}: {step}"),
+        waveforms.table(),
+        tables={"levels": table},
+        numbers={"removed_share": denoised.removed_share, "noise_rms": denoised.noise_rms},
+        facts=(
+            (
+                f"Removed: **{100.0 * denoised.removed_share:.3g} %** of the energy. Estimated noise on the finest "
+                f"level: **{readable(denoised.noise_rms)} {unit_text(unit)}** rms."
+            ),
+        ),
+        notes=(
+            (
+                "Look at what was removed: a rhythm in it is signal that should not have gone. Steady tones are better "
+                "extracted by a spectrum or a synchronous average."
+            ),
+        ),
+        waveforms=waveforms,
+    )
+
+
+def _samples_of_modes(options: Mapping[str, Any]) -> int:
+    return 2**13 if options["engine"] == "vmdpy" else 2**21  # vmdpy keeps all iterations, 16 kB per sample and mode
+
+
+def _same(*names: Any) -> dict[Any, str]:
+    return {name: str(name) for name in names}
+
+
+PARTS = {
+    "modes": Method(
+        "Modes",
+        "Takes the signal apart into a few narrow-band parts whose frequencies need not be known (VMD), and transforms "
+        "one of them: what noisy recordings of cracks need.",
+        _modes,
+        (
+            MethodOption(
+                "n_modes", "Modes K", "count", None, "", "as the signal suggests", _same(*range(1, 11)), maximum=40,
+            ),
+            MethodOption(
+                "penalty", "Penalty α", "number", None,
+                "Weight of the modes' bandwidth: large for narrow modes. 2000 is usual.", "as the signal suggests",
+                _same(*PENALTIES), minimum=1e-9,
+            ),
+            MethodOption(
+                "mode", "Chosen mode", "count", None, "From 1 by rising centre.", "the most impulsive one",
+                _same(*range(1, 11)),
+            ),
+            MethodOption(
+                "then", "The chosen mode goes on to", "choice", "",
+                "Squeezed wavelet: the momentary frequency of the mode, as noisy records of cracks need.",
+                choices={"": "nothing", **NAMES},
+            ),
+            MethodOption(
+                "envelope_hz", "Modes of the envelope of (Hz)", "span", None,
+                "The envelope of a band shows what modulates it.", "the signal itself", unit="Hz", known=top_hz,
+            ),
+            OVER_ANGLE,
+            *(replace(line, more=True) for line in LINES),
+            MethodOption(
+                "start", "Start", "choice", "automatic",
+                "First centre frequencies: evenly spread, at the peaks of the spectrum, or all at zero.",
+                choices=_same("automatic", "uniform", "peaks", "zero"), more=True,
+            ),
+            MethodOption(
+                "zero_mode", "Mode at zero", "switch", False,
+                "Keep the first mode's centre at zero, so that it takes mean and drift.", more=True,
+            ),
+            MethodOption("iterations", "Iterations", "count", 499, "", "", _same(499, 1000, 2000, 5000), more=True),
+            MethodOption(
+                "dual_step", "Dual step τ", "number", 0.0,
+                "Above 0 the modes must sum to the signal, noise included; 0 leaves noise in the residual.",
+                minimum=0.0, more=True,
+            ),
+            MethodOption(
+                "engine", "Engine", "choice", "gearsig",
+                "vmdpy: the reference program, for comparison; slow, and short parts only.",
+                choices=_same(*get_args(VmdEngine)), more=True,
+            ),
+            SHAFT,
+        ),
+        "Modes",
+        2**16,
+        2**21,
+        _samples_of_modes,
+    ),
+    "denoising": Method(
+        "Denoising",
+        "Takes out noise by thresholds on wavelet coefficients, and shows what was taken out.",
+        _denoising,
+        (
+            MethodOption(
+                "threshold", "Threshold", "choice", "universal",
+                "universal: next to no noise remains; sure: minimum estimated risk of each level; bayes: keeps most",
+                choices=_same("universal", "sure", "bayes"),
+            ),
+            MethodOption(
+                "rule", "Rule", "choice", "soft",
+                "What is above the threshold is shrunk by it (soft), kept as it is (hard), or in between (garrote).",
+                choices=_same("soft", "hard", "garrote"),
+            ),
+            MethodOption(
+                "noise", "Noise", "choice", "finest level",
+                "White: one size of noise for all levels, from the finest. Coloured: each level has its own.",
+                choices={"finest level": "White", "each level": "Coloured"},
+            ),
+            MethodOption(
+                "wavelet", "Wavelet", "choice", "sym8", choices=_same("sym8", "sym4", "db4", "db8", "coif3", "haar"),
+            ),
+            MethodOption(
+                "shifts", "Shifts", "count", 8,
+                "Cycle spinning: the mean over shifts of the signal against the wavelet's grid. 1 is none.",
+                choices=_same(1, 2, 4, 8, 16), maximum=64,
+            ),
+            MethodOption(
+                "levels", "Levels", "count", None,
+                "How often the signal is halved in frequency; what lies below the coarsest level is kept as it is.",
+                "automatic", _same(*range(1, 15)),
+            ),
+        ),
+        "Modes",
+        n_max=4_000_000,
+    ),
+}  # fmt: skip

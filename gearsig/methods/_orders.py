@@ -1,0 +1,278 @@
+"""Methods along a run: order and frequency map, tracked orders, orders taken out by a Vold–Kalman filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gearsig import plot
+from gearsig.errors import GearsigError
+from gearsig.formatting import readable
+from gearsig.methods._spectra import cursors_of, highest_order
+from gearsig.methods._table import (
+    HIGHEST,
+    SHAFT,
+    Method,
+    MethodAnswer,
+    MethodOption,
+    is_steady,
+    signal_of,
+    unit_of,
+    waveforms_of,
+)
+from gearsig.orders import OrderMap, TrackedOrder, frequency_map, order_map, track_orders, track_vold_kalman
+from gearsig.plot import ChartLine, LinePanel, with_unit
+from gearsig.prepared import PreparedRecording
+from gearsig.rig import order_lines
+
+KINDS = ("mesh", "shaft", "bearing", "sideband")
+MIN_LENGTH, MAX_EFFORT = 2**16, 1_600_000
+"""Coupled orders take time as their number squared: so many samples times orders squared, but not less than that."""
+HANN_BANDWIDTH = 1.5
+"""Noise bandwidth of a Hann window in lines: blocks of 1.5/B revolutions collect over B orders."""
+RESIDUAL = "residual without all chosen orders"
+
+
+def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, highest: float | None) -> MethodAnswer:
+    over = "order" if levels.axis == "order" else "frequency"
+    caption = f"{over} map: spectra of consecutive blocks"
+    unit = "Hz" if over == "frequency" else "order"
+    kept = levels.positions <= (np.inf if highest is None else highest)
+    values, positions = levels.values[:, kept], levels.positions[kept]
+    table = {"time (s)": levels.time_s, "speed (rpm)": levels.speed_rpm}
+    lines = {f"{p:.7g} {unit}": values[:, i] for i, p in enumerate(positions)}
+    numbers = {"resolution": levels.resolution, "scaling": levels.scaling, "unit": levels.unit, "shaft": levels.shaft}
+    return MethodAnswer(
+        channel,
+        caption,
+        lambda: plot.order_map_figure(levels, cursors_of(prepared, levels), highest=highest),
+        table | lines,
+        matrices={"levels": values},
+        axes={**table, over: positions},
+        numbers=numbers,
+    )
+
+
+def _order_map(prepared: PreparedRecording, channel: str, shaft: str, highest: float | None) -> MethodAnswer:
+    signal = prepared.over_angle(shaft, [channel])
+    levels = order_map(signal, channel, revolutions_per_block=max(1, min(10, int(signal.n_revolutions) // 8)))
+    return _map_answer(prepared, channel, levels, highest_order(prepared, levels) if highest is None else highest)
+
+
+def _frequency_map(prepared: PreparedRecording, channel: str, highest: float | None) -> MethodAnswer:
+    recording = prepared.recording
+    n = int(min(4096, 2 ** np.floor(np.log2(max(recording.n_samples / 8.0, 16.0)))))
+    levels = frequency_map(
+        recording.values(channel),
+        recording.sampling_rate_hz,
+        prepared.shaft_angle,
+        n_per_block=n,
+        unit=unit_of(prepared, channel),
+        source=channel,
+    )
+    return _map_answer(prepared, channel, levels, highest)
+
+
+def known_orders(prepared: PreparedRecording, channel: str = "") -> dict[float, str]:
+    """Return the orders that follow from the rig with their names, the most telling kinds first."""
+    del channel
+    if not prepared.rig.shafts:
+        return {float(k): f"{k}× shaft" for k in (1, 2, 3)}
+    lines = [line for line in order_lines(prepared.rig, n_sidebands=1) if line.kind in KINDS]
+    lines.sort(key=lambda line: KINDS.index(line.kind))
+    return {line.order: f"{line.label} ({line.order:.5g})" for line in lines}
+
+
+ORDERS = MethodOption(
+    "orders", "Orders", "numbers", (),
+    "Cycles per revolution of the reference shaft. Any number can be typed, such as 2 or 0.42.",
+    "those of the meshes, else the shaft's first three", known=known_orders,
+)  # fmt: skip
+
+
+def _tracking(prepared: PreparedRecording, channel: str, orders: Sequence[float], shaft: str) -> MethodAnswer:
+    rig = prepared.rig
+    meshes = [order for pair in rig.pairs if (order := rig.mesh_order(pair)) is not None]
+    chosen = tuple(orders) or tuple(float(k * m) for m in meshes for k in (1, 2))[:6] or (1.0, 2.0, 3.0)
+    signal = prepared.over_angle(shaft, [channel])
+    tracked = track_orders(
+        signal, channel, chosen, revolutions_per_block=max(1.0, min(10.0, signal.n_revolutions / 8.0))
+    )
+    unit, time_s, speed = tracked[0].unit, tracked[0].time_s, tracked[0].speed_rpm
+    sweeps = float(np.ptp(speed)) > 0.05 * float(np.mean(speed))
+    x, label = (speed, "speed (rpm)") if sweeps else (time_s, "time (s)")
+    rising = np.argsort(x, kind="stable")
+    curves = {f"order {t.order:.6g}": t.amplitude[rising] for t in tracked}
+    caption = f"levels of {len(tracked)} orders over {'speed' if sweeps else 'time'}"
+    amplitude = with_unit("amplitude peak", unit)
+    panel = plot.CurvePanel(x[rising], curves, label, amplitude)
+    table: dict[str, Any] = {"time (s)": time_s, "speed (rpm)": speed}
+    for t in tracked:
+        table[with_unit(f"order {t.order:.6g}, amplitude peak", unit)] = t.amplitude
+        table[f"order {t.order:.6g}, phase (rad)"] = t.phase_rad
+    lines = [ChartLine(x[rising], values, name, k) for k, (name, values) in enumerate(curves.items())]
+    return MethodAnswer(
+        channel,
+        caption,
+        lambda: plot.curves_figure([panel], title=f"{channel}: {caption}"),
+        table,
+        numbers={"bandwidth_orders": tracked[0].bandwidth_orders, "shaft": tracked[0].shaft},
+        panels=(LinePanel(lines, label, amplitude),),
+    )
+
+
+# Vold–Kalman.
+
+
+def _vold_kalman(
+    prepared: PreparedRecording,
+    channel: str,
+    orders: Sequence[float],
+    bandwidth: float,
+    bandwidth_in: str,
+    poles: int,
+    generation: Any,
+    coupling: str,
+    over: str,
+) -> MethodAnswer:
+    recording, angle = prepared.recording, prepared.shaft_angle
+    known = known_orders(prepared)
+    values = tuple(orders) or tuple(known)[:2]
+    names = [known.get(order, f"{order:g}") for order in values]
+    coupled: Any = {"all": True, "none": False}.get(coupling, "automatic")
+    filters: dict[str, Any] = {f"bandwidth_{bandwidth_in}": bandwidth, "n_poles": poles, "generation": generation}
+    separation = prepared.keep(
+        ("methods", "vold-kalman", channel, values, coupled, *filters.items()),
+        lambda: track_vold_kalman(recording, channel, values, shaft_angle=angle, coupled=coupled, **filters),
+    )
+    unit, time_s = unit_of(prepared, channel), separation.time_s()
+    over_speed = over == "speed" or (over == "automatic" and not is_steady(angle))
+    width = bandwidth if bandwidth_in == "orders" else 60.0 * bandwidth / max(angle.mean_speed_rpm, 1e-9)
+    tracks, reason = _tracks(prepared, channel, values, width)
+    step, lines, table = max(1, len(time_s) // 2000), [], {"time (s)": time_s}
+    table["speed of the reference shaft (rpm)"] = 60.0 * separation.orders[0].frequency_hz / values[0]
+    for k, (name, order) in enumerate(zip(names, separation.orders, strict=True)):
+        x = 60.0 * order.frequency_hz / order.order if over_speed else time_s
+        # where the filter has settled; where it nowhere has, all of it
+        y = np.where(order.settled, order.amplitude, np.nan) if order.settled.any() else order.amplitude
+        lines.append(ChartLine(x[::step], y[::step], name, k))
+        table[with_unit(f"{name}, amplitude peak", unit)] = order.amplitude
+    # An order that begins or ends in the part is not known well there: the highest few of the points are left out.
+    tops = [float(np.nanpercentile(line.y, 99.5)) for line in lines if np.isfinite(line.y).any()]
+    for k, (name, track) in enumerate(zip(names, tracks, strict=False)):
+        x = track.speed_rpm if over_speed else track.time_s
+        lines.append(ChartLine(x, track.amplitude, f"{name}, resampled", k, dotted=True))
+    label = "speed of the reference shaft (rpm)" if over_speed else "time (s)"
+    limits = (0.0, 1.15 * max(tops, default=0.0) or 1.0)
+    panel = LinePanel(lines, label, with_unit("amplitude peak", unit), limits)
+    columns = {"signal": recording.values(channel)}
+    columns |= {name: order.waveform for name, order in zip(names, separation.orders, strict=True)}
+    columns[RESIDUAL] = separation.residual
+    waveforms = waveforms_of(
+        prepared,
+        channel,
+        signal_of(prepared, channel),
+        columns,
+        f"Vold-Kalman orders {', '.join(names)}",
+        residual=RESIDUAL,
+    )
+    power, residual = float(np.var(columns["signal"].astype(np.float64))) or 1.0, float(np.std(separation.residual))
+    rms = np.array([np.sqrt(np.mean(np.square(order.waveform))) for order in separation.orders])
+    notes = ["Levels end where the filter has not settled yet: at the ends, and where an order begins or ends."]
+    if tracks:
+        b = tracks[0].bandwidth_orders
+        notes.append(
+            "Solid: Vold–Kalman. Dotted: resampled over the shaft's angle, in blocks of "
+            f"{HANN_BANDWIDTH / b:.3g} revolutions, about {b:.3g} orders wide."
+        )
+    if reason:
+        notes.append(f"No resampling-based track: {reason}")
+    return MethodAnswer(
+        channel,
+        f"{len(values)} orders taken out by a Vold–Kalman filter",
+        lambda: plot.panels_figure([panel], title=f"{channel}: orders by a Vold–Kalman filter"),
+        table,
+        tables={
+            "orders": {
+                "order": np.array(names, dtype=object),
+                with_unit("median amplitude", unit): np.array([np.nanmedian(o.amplitude) for o in separation.orders]),
+                with_unit("rms", unit): rms,
+                "share of the energy (%)": 100.0 * rms**2 / power,
+            }
+        },
+        numbers={"orders": list(values), "expected_error": separation.expected_error},
+        panels=(panel,),
+        facts=(
+            (
+                f"The residual has an rms of **{readable(residual)} {plot.unit_text(unit)}**: "
+                f"{100.0 * residual**2 / power:.3g} % of the energy. Expected error of the solution: "
+                f"{separation.expected_error:.1g} of the largest component."
+            ),
+        ),
+        notes=(*notes, *separation.notes),
+        waveforms=waveforms,
+    )
+
+
+def _tracks(
+    prepared: PreparedRecording, channel: str, orders: Sequence[float], width: float
+) -> tuple[Sequence[TrackedOrder], str]:
+    """Return resampling-based tracks, of the same bandwidth where the part allows it, or why there are none."""
+    n = min(max(HANN_BANDWIDTH / width, 1.0), 0.25 * prepared.shaft_angle.n_revolutions)
+    try:
+        signal = prepared.over_angle("", [channel])
+        return track_orders(signal, channel, orders, revolutions_per_block=round(n, 6)), ""
+    except GearsigError as error:
+        return (), str(error)
+
+
+def _samples_of_vold_kalman(options: Mapping[str, Any]) -> int:
+    return max(MIN_LENGTH, MAX_EFFORT // max(2, len(options["orders"])) ** 2)
+
+
+ALONG = {
+    "order-map": Method("Order map", "Orders over time and speed.", _order_map, (HIGHEST, SHAFT)),
+    "frequency-map": Method("Frequency map", "Frequencies over time and speed.", _frequency_map, (HIGHEST,)),
+    "tracking": Method(
+        "Tracked orders", "Level and phase of orders over speed.", _tracking, (ORDERS, SHAFT), "Map", 10_000_000, 10**7
+    ),
+    "vold-kalman": Method(
+        "Orders (Vold–Kalman)",
+        "Takes single orders out of the signal as waveforms, also where they cross or lie close together.",
+        _vold_kalman,
+        (
+            ORDERS,
+            MethodOption(
+                "bandwidth", "Bandwidth", "number", 0.5,
+                "Between the -3 dB points. Narrow bands tell close orders apart and smooth changes of level.",
+                minimum=0.0,
+            ),
+            MethodOption("bandwidth_in", "Bandwidth in", "choice", "orders", choices={"orders": "Orders", "hz": "Hz"}),
+            MethodOption(
+                "poles", "Poles", "count", 2,
+                "More poles: steeper skirts, longer settling. The first generation has two.",
+                choices={n: str(n) for n in (1, 2, 3)}, more=True,
+            ),
+            MethodOption(
+                "generation", "Generation", "choice", "second",
+                "The second generation has 1 to 3 poles; the first has two and a fixed shape.",
+                choices={"second": "Second", "first": "First"}, more=True,
+            ),
+            MethodOption(
+                "coupling", "Coupling", "choice", "automatic",
+                ("Orders solved for together share the signal where they cross or lie close: automatic where it "
+                "matters."),
+                choices={"automatic": "Automatic", "all": "All", "none": "None"}, more=True,
+            ),
+            MethodOption(
+                "over", "Levels over", "choice", "automatic",
+                choices={"automatic": "Automatic", "time": "Time", "speed": "Speed"},
+            ),
+        ),
+        "Map",
+        250_000,
+        limit=_samples_of_vold_kalman,
+    ),
+}  # fmt: skip

@@ -1,0 +1,566 @@
+"""Methods over frequency and order: spectra, envelope and kurtogram, coherence, deconvolution; waveform and speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gearsig import plot, spectra
+from gearsig.angle import resample_to_angle
+from gearsig.errors import InputError, RefusalError
+from gearsig.methods._table import (
+    LINES,
+    SHAFT,
+    Method,
+    MethodAnswer,
+    MethodOption,
+    angle_or_none,
+    is_steady,
+    signal_of,
+    top_hz,
+    unit_of,
+    waveforms_of,
+)
+from gearsig.orders import OrderMap, order_spectrum
+from gearsig.plot import ChartLine, Cursor, LevelPanel, LinePanel, order_cursors, rhythm_cursors, with_unit
+from gearsig.prepared import PreparedRecording
+from gearsig.recording import Channel, Recording
+from gearsig.rig import order_lines
+from gearsig.spectra import Spectrum
+
+SLIP_SHARE = 0.01
+"""Bearings slip by a percent or so."""
+
+
+def cursors_of(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> tuple[Cursor, ...]:
+    """Return the lines that the rig implies, where the speed is known and they are sharp."""
+    angle = angle_or_none(prepared)
+    if angle is None or (shown.axis == "frequency" and not is_steady(angle)):
+        return ()
+    scale = angle.mean_speed_rpm / 60.0 if shown.axis == "frequency" else 1.0
+    rig = prepared.rig
+    if not rig.shafts:
+        return tuple(Cursor(k * scale, "shaft", f"{k}× shaft", k) for k in (1, 2, 3))
+    base = shown.shaft if shown.shaft in rig.shaft_names else angle.shaft
+    return order_cursors(order_lines(rig, base, n_sidebands=1), scale)
+
+
+def highest_order(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> float:
+    """Return an order past the third harmonic of the fastest mesh; 50 orders where none is known."""
+    meshes = [cursor.position for cursor in cursors_of(prepared, shown) if cursor.kind == "mesh"]
+    return min(float(shown.positions[-1]), 1.12 * max(meshes) if meshes else 50.0)
+
+
+def columns_of(spectrum: Spectrum) -> dict[str, Any]:
+    """Return a spectrum as a table."""
+    axis = {"frequency": "frequency (Hz)", "order": f"order (of {spectrum.shaft or 'the shaft'})"}
+    title = axis.get(spectrum.axis, "quefrency (s)")
+    return {title: spectrum.positions, with_unit(spectrum.scaling, spectrum.unit): spectrum.values}
+
+
+def _panel(spectrum: Spectrum, cursors: Sequence[Cursor], *, linear: bool = False, name: str = "") -> LinePanel:
+    values = spectrum.values if linear else plot.above_zero(spectrum.values)
+    line = ChartLine(spectrum.positions, values, spectrum.source, peaks=True)
+    inside = values[min(3, len(values) - 1) :]
+    high, low = float(inside.max()), float(np.percentile(inside, 5))
+    limits = (min(0.0, float(inside.min())), 1.06 * high or 1.0) if linear else (max(low, high * 1e-8) / 2, 2 * high)
+    text = name or ("value" if spectrum.scaling == "dimensionless" else spectrum.scaling)
+    return LinePanel((line,), spectrum.axis_label, with_unit(text, spectrum.unit), limits, not linear, cursors)
+
+
+def _spectrum_answer(
+    prepared: PreparedRecording,
+    channel: str,
+    spectrum: Spectrum,
+    caption: str,
+    lowest: float | None,
+    highest: float | None,
+) -> MethodAnswer:
+    low = lowest or 0.0
+    high = float(spectrum.positions[-1]) if highest is None else highest
+    limits = (low, min(high, float(spectrum.positions[-1])))
+    is_quefrency = spectrum.axis == "quefrency"
+    cursors = () if is_quefrency else cursors_of(prepared, spectrum)
+    inside = (spectrum.positions >= low) & (spectrum.positions <= high)
+    numbers = {"resolution": spectrum.resolution, "scaling": spectrum.scaling, "unit": spectrum.unit}
+    part = {name: column[inside] for name, column in columns_of(spectrum).items()}
+    return MethodAnswer(
+        channel,
+        caption,
+        lambda: plot.spectrum_figure(spectrum, cursors, limits=limits, title=f"{channel}: {caption}"),
+        part,
+        numbers=numbers,
+        panels=(_panel(spectrum, cursors, linear=is_quefrency),),
+    )
+
+
+def _spectrum(prepared: PreparedRecording, channel: str, **lines: float | None) -> MethodAnswer:
+    return _spectrum_answer(prepared, channel, prepared.spectrum(channel), "amplitude spectrum", **lines)
+
+
+def _density(prepared: PreparedRecording, channel: str, **lines: float | None) -> MethodAnswer:
+    return _spectrum_answer(prepared, channel, prepared.power_density(channel), "power spectral density", **lines)
+
+
+def _cepstrum(prepared: PreparedRecording, channel: str, **lines: float | None) -> MethodAnswer:
+    spectrum = spectra.cepstrum(prepared.recording, channel)
+    return _spectrum_answer(prepared, channel, spectrum, "real cepstrum: families of lines as one peak", **lines)
+
+
+def _order_spectrum(
+    prepared: PreparedRecording, channel: str, shaft: str, lowest: float | None, highest: float | None
+) -> MethodAnswer:
+    spectrum = order_spectrum(prepared.over_angle(shaft, [channel]), channel)
+    top = highest_order(prepared, spectrum) if highest is None else highest
+    return _spectrum_answer(prepared, channel, spectrum, "order spectrum", lowest, top)
+
+
+# Rhythms in noise: envelope, kurtogram, cyclic coherence.
+
+BAND = MethodOption(
+    "band_hz", "Band (Hz)", "span", None, "Whose envelope it is.", "the most impulsive one", unit="Hz", known=top_hz,
+)  # fmt: skip
+PREPARATION = MethodOption(
+    "preparation", "Signal", "choice", "none",
+    ("Tones removed: steady lines, such as mesh harmonics, are cut down to the floor. Whitened: every line is "
+    "made equally strong, which takes out resonances as well."),
+    choices={"none": "As recorded", "tones removed": "Tones removed", "whitened": "Whitened"},
+)  # fmt: skip
+
+
+def _usual_modulation_hz(prepared: PreparedRecording, channel: str = "") -> float:
+    """Three harmonics of the fastest bearing line and what slip makes of the last; 12 orders where none is known."""
+    del channel
+    rate, rig, angle = prepared.recording.sampling_rate_hz, prepared.rig, angle_or_none(prepared)
+    if angle is None:
+        return float(f"{rate / 128.0:.3g}")
+    lines = order_lines(rig, n_sidebands=0) if rig.shafts else ()
+    order = max((3.3 * line.order for line in lines if line.kind == "bearing"), default=12.0)
+    return float(f"{min(order * angle.mean_speed_rpm / 60.0, rate / 16.0):.3g}")
+
+
+HIGHEST_MODULATION = MethodOption(
+    "highest_modulation_hz", "Highest modulation (Hz)", "number", None,
+    "The fastest rhythm sought. Bands must be three times as wide, and the envelope's spectrum ends there.",
+    unit="Hz", known=lambda prepared, channel: f"{_usual_modulation_hz(prepared, channel):.3g}",
+)  # fmt: skip
+
+
+def _over_orders(prepared: PreparedRecording, over: str) -> bool:
+    """Whether lines are orders: as asked, by default where the speed is known and changes."""
+    angle = angle_or_none(prepared)
+    return over == "order" or (over == "automatic" and angle is not None and not is_steady(angle))
+
+
+def _rhythm_over(default: str = "automatic") -> MethodOption:
+    return MethodOption(
+        "over", "Rhythm over", "choice", default,
+        "Over orders, a change of speed does not smear the lines that follow it.",
+        choices={"automatic": "Automatic", "frequency": "Frequency", "order": "Order"},
+    )  # fmt: skip
+
+
+def _envelope(
+    prepared: PreparedRecording,
+    channel: str,
+    band_hz: tuple[float, float] | None,
+    lowest: float | None,
+    highest: float | None,
+) -> MethodAnswer:
+    banded = spectra.kurtogram_envelope(prepared.recording, channel, band_hz=band_hz)
+    low, high = banded.envelope.band_hz
+    text = f"spectrum of the envelope of {low:.4g} to {high:.4g} Hz"
+    top = highest if highest is not None else min(float(banded.spectrum.positions[-1]), (high - low) / 2)
+    answer = _spectrum_answer(prepared, channel, banded.spectrum, text, lowest, top)
+    numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}
+    return replace(answer, numbers={**answer.numbers, **numbers}, warnings=banded.warnings)
+
+
+def _kurtogram(
+    prepared: PreparedRecording,
+    channel: str,
+    preparation: Any,
+    levels: int | None,
+    highest_modulation_hz: float | None,
+    band_hz: tuple[float, float] | None,
+    over: str,
+) -> MethodAnswer:
+    recording = prepared.recording
+    usual = highest_modulation_hz or _usual_modulation_hz(prepared)
+    most = max(1, int(np.log2(max(recording.n_samples / 512.0, 2.0))))
+    n_levels = levels or min(7, most)
+    asked = (preparation, n_levels, usual, band_hz)
+    chosen = prepared.keep(
+        ("methods", "kurtogram", channel, asked),
+        lambda: spectra.kurtogram_envelope(
+            recording,
+            channel,
+            preparation=preparation,
+            n_levels=n_levels,
+            highest_modulation_hz=usual,
+            band_hz=band_hz,
+        ),
+    )
+    grid, band, envelope, spectrum = chosen.kurtogram, chosen.band, chosen.envelope, chosen.spectrum
+    if _over_orders(prepared, over):
+        spectrum = _envelope_orders(prepared, chosen, usual)
+    bands = {
+        "from (Hz)": grid.low_hz,
+        "to (Hz)": grid.high_hz,
+        "level": grid.level,
+        "kurtosis": grid.kurtosis,
+        "standard error": grid.standard_error,
+        "noise's limit": grid.noise_limit,
+    }
+    warnings = list(chosen.warnings)
+    angle = angle_or_none(prepared)
+    if angle is not None and not is_steady(angle):
+        warnings.append(
+            "the speed changes: mesh harmonics that pass resonances raise the kurtosis too, without any impact. Trust "
+            "a rhythm of the envelope over order, or choose a part of even speed"
+        )
+    signal = replace(signal_of(prepared, channel), values=envelope.values, rate=envelope.sampling_rate_hz)
+    columns = {envelope.source: envelope.values}
+    return MethodAnswer(
+        channel,
+        "kurtogram: spectral kurtosis of bands; the outlined one is the most impulsive",
+        lambda: plot.kurtogram_figure(grid, band),
+        bands,
+        tables={"envelope spectrum": columns_of(spectrum)},
+        numbers={"band_hz": [band.low_hz, band.high_hz], "kurtosis": band.kurtosis, "reason": chosen.reason},
+        panels=(
+            _kurtosis_panel(grid, recording.sampling_rate_hz),
+            _panel(spectrum, rhythm_cursors(cursors_of(prepared, spectrum)), linear=True),
+        ),
+        facts=(
+            (
+                f"{'The kurtogram’s' if band_hz is None else 'Your'} band: **{band.low_hz:.5g} to {band.high_hz:.5g} "
+                f"Hz**, spectral kurtosis **{band.kurtosis:.3g}** (of noise alone: 0 ± {band.standard_error:.2g})"
+            ),
+        ),
+        notes=(chosen.reason,) if chosen.reason else (),
+        warnings=warnings,
+        waveforms=waveforms_of(
+            prepared, channel, replace(signal, unit=envelope.unit, source=envelope.source), columns, envelope.source
+        ),
+    )
+
+
+def _kurtosis_panel(grid: spectra.Kurtogram, rate_hz: float) -> LevelPanel:
+    """Spectral kurtosis over frequency, a row for each level of the tree."""
+    rows = np.unique(grid.level)
+    n = 3 * 2 ** int(np.ceil(rows.max()))
+    at = (np.arange(n) + 0.5) * rate_hz / 2.0 / n
+    values = np.zeros((len(rows), n))
+    for low, high, level, kurtosis in zip(grid.low_hz, grid.high_hz, grid.level, grid.kurtosis, strict=True):
+        values[np.searchsorted(rows, level), (at >= low) & (at < high)] = kurtosis
+    label, span = "level: 2 to the power of it bands", float(np.ptp(values)) or 1.0
+    return LevelPanel(values, at, rows.astype(np.float64), "frequency (Hz)", label, "kurtosis", span=span)
+
+
+def _envelope_orders(prepared: PreparedRecording, chosen: spectra.ChosenBand, highest_hz: float) -> Spectrum:
+    """Return the spectrum of an envelope over orders, up to what the highest modulation is at the mean speed."""
+    envelope, angle = chosen.envelope, prepared.shaft_angle
+    values = envelope.values - envelope.values.mean()
+    alone = Recording(values[None, :], envelope.sampling_rate_hz, (Channel(envelope.source, "unknown", envelope.unit),))
+    # A narrow band's envelope has a low sampling rate, and resampling needs some room below half of it.
+    highest_hz = min(highest_hz, 0.4 * envelope.sampling_rate_hz)
+    highest = 60.0 * highest_hz / max(angle.mean_speed_rpm, 1e-9)
+    signal = resample_to_angle(alone, angle, channels=[envelope.source], highest_order=highest)
+    return order_spectrum(signal, envelope.source)
+
+
+MAX_CELLS = 1 << 22
+"""Of a coherence: 100 MB."""
+
+
+def _coherence(
+    prepared: PreparedRecording,
+    channel: str,
+    over: str,
+    preparation: Any,
+    highest: float | None,
+    n_bands: int,
+    band_hz: tuple[float, float] | None,
+    odds: int,
+) -> MethodAnswer:
+    recording = prepared.recording
+    over_orders = _over_orders(prepared, over)
+    usual_hz = _usual_modulation_hz(prepared)
+    top = highest or (60.0 * usual_hz / max(prepared.shaft_angle.mean_speed_rpm, 1e-9) if over_orders else usual_hz)
+    n = top * (prepared.shaft_angle.n_revolutions if over_orders else recording.duration_s) * n_bands
+    if n > MAX_CELLS:
+        raise InputError(
+            f"highest is {top:g} at {n_bands} bands: {n:.3g} cells",
+            allowed=f"at most {MAX_CELLS} cells",
+            remedy="lower the highest rhythm, take fewer bands or a shorter part",
+        )
+
+    def compute() -> spectra.SpectralCoherence:
+        if over_orders:
+            return spectra.order_coherence(recording, channel, prepared.shaft_angle, highest_order=top, n_bands=n_bands)
+        return spectra.spectral_coherence(
+            recording, channel, highest_alpha_hz=top, n_bands=n_bands, preparation=preparation
+        )
+
+    coherence = prepared.keep(("methods", "coherence", channel, over_orders, preparation, top, n_bands), compute)
+    mean = spectra.enhanced_envelope(coherence, band_hz, probability=1.0 / odds)
+    spectrum = mean.spectrum
+    cursors = rhythm_cursors(cursors_of(prepared, spectrum))
+    peaks = _above_noise(mean, cursors)
+    where = list(peaks)
+    level = ChartLine(spectrum.positions[[0, -1]], np.full(2, mean.level), "noise", -1, dotted=True)
+    enhanced = _panel(spectrum, cursors, linear=True, name="mean squared coherence")
+    enhanced = replace(enhanced, lines=(*enhanced.lines, level))
+    floor = coherence.level(1e-3)
+    decibels = 10.0 * np.log10(np.maximum(coherence.coherence_squared.T, floor))
+    levels = LevelPanel(
+        decibels, coherence.alpha, coherence.frequency_hz, coherence.alpha_label, "carrier (Hz)", "dB of γ²",
+        cursors=where, span=max(float(decibels.max() - 10.0 * np.log10(floor)), 3.0),
+    )  # fmt: skip
+    return MethodAnswer(
+        channel,
+        "spectral coherence: which carriers are modulated at which rhythm",
+        lambda: plot.coherence_figure(coherence, mean, marked=[c.position for c in where]),
+        columns_of(spectrum),
+        matrices={"squared coherence": coherence.coherence_squared},
+        axes={coherence.alpha_label: coherence.alpha, "carrier (Hz)": coherence.frequency_hz},
+        numbers={"noise_level": mean.level, "probability": mean.probability, "band_hz": list(mean.band_hz)},
+        panels=(enhanced, levels),
+        facts=(
+            (
+                f"Mean squared coherence over the carriers from {mean.band_hz[0]:.5g} to {mean.band_hz[1]:.5g} Hz. "
+                f"Stationary noise exceeds **{mean.level:.3g}** in 1 line of {odds}."
+            ),
+        ),
+        notes=_words_about(peaks, cursors, spectrum.resolution),
+    )
+
+
+def _above_noise(mean: spectra.EnhancedEnvelope, cursors: Sequence[Cursor]) -> dict[Cursor, float]:
+    """Return the lines of shafts and bearings that stand above noise's level, and where each one's peak lies."""
+    spectrum, peaks = mean.spectrum, dict[Cursor, float]()
+    first, end = float(spectrum.positions[0]), float(spectrum.positions[-1])
+    for cursor in cursors:
+        if first <= cursor.position <= end:
+            slip = SLIP_SHARE * cursor.position if cursor.kind == "bearing" else 0.0
+            at, height = spectrum.largest_near(cursor.position, slip + spectrum.resolution)
+            if height > mean.level:
+                peaks[cursor] = at
+    return peaks
+
+
+def _words_about(peaks: dict[Cursor, float], cursors: Sequence[Cursor], resolution: float) -> tuple[str, ...]:
+    if not peaks:
+        return ("No line of a shaft or bearing stands above noise's level.",)
+    # A bearing line whose peak lies on a multiple of a shaft's speed may be a mesh or its sidebands.
+    speeds = [cursor.position / cursor.number for cursor in cursors if cursor.kind == "shaft"]
+
+    def on_multiple(cursor: Cursor) -> bool:
+        distances = (abs(peaks[cursor] - max(1, round(peaks[cursor] / f)) * f) for f in speeds)
+        return cursor.kind == "bearing" and any(distance <= resolution for distance in distances)
+
+    def names(chosen: Sequence[Cursor]) -> str:
+        return ", ".join(dict.fromkeys(f"{cursor.label} ({cursor.position:.5g})" for cursor in chosen))
+
+    apart = [cursor for cursor in peaks if on_multiple(cursor)]
+    others = [cursor for cursor in peaks if cursor not in apart]
+    text = ["Above noise's level means that there is modulation, not that there is damage: healthy gears modulate too."]
+    if others:
+        text.append(f"Lines that stand above noise's level, bearings' within 1 % for their slip: {names(others)}.")
+    if apart:
+        text.append(
+            "Bearing lines whose peak lies on a multiple of a shaft's speed, which meshes and shafts cause as well: "
+            f"{names(apart)}."
+        )
+    return tuple(text)
+
+
+def _deconvolution(
+    prepared: PreparedRecording, channel: str, by: str, taps: int, rate_hz: float | None
+) -> MethodAnswer:
+    recording = prepared.recording
+    x, fs = recording.values(channel), recording.sampling_rate_hz
+    if by == "multipoint" and not rate_hz:
+        raise RefusalError("no rate of the impacts is given", remedy="give how often they come, above 0 Hz")
+    if by == "multipoint":
+        result = spectra.multipoint_deconvolution(x, fs, 1.0 / float(rate_hz or 1.0), n_taps=taps)
+        chance = np.sqrt(taps / len(x))
+        fact = f"Likeness to a train of {rate_hz:.5g} Hz: **{result.score:.3g}** (white noise: {chance:.2g})."
+    else:
+        result = spectra.minimum_entropy_deconvolution(x, fs, n_taps=taps)
+        fact = f"Kurtosis **{result.score:.3g}** (3: Gaussian noise)."
+    y = result.values * float(np.std(x) / np.std(result.values))
+    columns = {"signal": x, "sharpened": np.concatenate([np.zeros(len(x) - len(y)), y])}
+    waveforms = waveforms_of(prepared, channel, signal_of(prepared, channel), columns, result.source)
+    time_s = waveforms.at()
+    panel = LinePanel(
+        [ChartLine(time_s, columns[name], name, k) for k, name in enumerate(columns)],
+        "time (s)",
+        with_unit(channel, unit_of(prepared, channel)),
+    )
+    return MethodAnswer(
+        channel,
+        "impacts sharpened by a filter that undoes their path",
+        lambda: plot.panels_figure([panel], title=f"{channel}: impacts sharpened"),
+        waveforms.table(),
+        numbers={"score": result.score},
+        facts=(fact,),
+        notes=("It makes something impulsive of any noise: other rates must be less alike. Levels are not kept.",),
+        waveforms=waveforms,
+    )
+
+
+# Averages, indicators, waveform, speed.
+
+
+def _average(prepared: PreparedRecording, channel: str, shaft: str) -> MethodAnswer:
+    shaft = shaft or prepared.shaft_angle.shaft
+    average = prepared.average(shaft, channel)
+    rig = prepared.rig
+    sides = [side for p in rig.pairs for side in ((p.driver, p.driver_teeth), (p.driven, p.driven_teeth))]
+    teeth = next((n for name, n in sides if name == shaft), None)
+    table = {
+        "angle (°)": 360.0 * np.arange(len(average.values)) / len(average.values),
+        with_unit("average", average.unit): average.values,
+        with_unit("standard error", average.unit): average.standard_error,
+    }
+    return MethodAnswer(
+        channel,
+        f"mean revolution of {shaft or 'the shaft'}, {average.n_revolutions} averaged",
+        lambda: plot.average_figure([average], n_teeth=teeth),
+        table,
+        numbers={"n_revolutions": average.n_revolutions},
+    )
+
+
+def _indicators(prepared: PreparedRecording, channel: str) -> MethodAnswer:
+    from gearsig.diagnosis import analyze
+
+    indicators = [i for i in analyze(prepared.recording).indicators if i.channel in ("", channel)]
+    table = {
+        name: np.array([getattr(i, name) for i in indicators], dtype=None if name == "value" else object)
+        for name in ("name", "value", "unit", "computed_on", "shaft", "gear", "bearing", "band", "note")
+    }
+    values = prepared.recording.values(channel)
+    n = max(1, len(values) // 200)
+    level = np.sqrt(np.add.reduceat(np.square(values, dtype=np.float64), np.arange(0, len(values), n)) / n)[:-1]
+    time_s = (np.arange(len(level)) + 0.5) * n / prepared.recording.sampling_rate_hz
+    caption = f"{len(indicators)} condition indicators; drawn: rms over time"
+    panel = plot.CurvePanel(time_s, {"rms": level}, "time (s)", with_unit("rms", unit_of(prepared, channel)))
+    return MethodAnswer(channel, caption, lambda: plot.curves_figure([panel], title=f"{channel}: {caption}"), table)
+
+
+def _waveform(prepared: PreparedRecording, channel: str) -> MethodAnswer:
+    recording = prepared.recording
+    time_s = np.arange(recording.n_samples) / recording.sampling_rate_hz
+    table = {"time (s)": time_s, with_unit(channel, unit_of(prepared, channel)): recording.values(channel)}
+    return MethodAnswer(channel, "signal over time", lambda: plot.time_figure(recording, [channel]), table)
+
+
+def _speed(prepared: PreparedRecording, channel: str) -> MethodAnswer:
+    angle = prepared.shaft_angle
+    table = {"time (s)": angle.time_s, "speed (rpm)": 60.0 * angle.speed_rev_per_s}
+    numbers = {"mean_speed_rpm": angle.mean_speed_rpm}
+    caption = f"speed of {angle.shaft or 'the reference shaft'}"
+    return MethodAnswer(channel, caption, lambda: plot.speed_figure(angle), table, numbers=numbers)
+
+
+WHOLE = {
+    "waveform": Method("Waveform", "The signal over time.", _waveform),
+    "speed": Method("Speed", "The speed that everything over angle rests on.", _speed),
+    "spectrum": Method("Spectrum", "Tones and their amplitudes.", _spectrum, LINES),
+    "density": Method("Density", "Noise over frequency.", _density, LINES, "Spectrum", 1_000_000, 20_000_000),
+    "cepstrum": Method(
+        "Cepstrum",
+        "Families of equally spaced lines, as one peak each.",
+        _cepstrum,
+        LINES,
+        "Spectrum",
+        1_000_000,
+        20_000_000,
+    ),
+    "order-spectrum": Method("Order spectrum", "Lines that turn with a shaft.", _order_spectrum, (*LINES, SHAFT)),
+    "average": Method("Synchronous average", "The mean revolution of a shaft.", _average, (SHAFT,)),
+    "indicators": Method("Indicators", "Every condition indicator of the channel.", _indicators),
+}
+RHYTHMS = {
+    "envelope": Method("Envelope spectrum", "The rhythm of impacts in a band.", _envelope, (BAND, *LINES)),
+    "kurtogram": Method(
+        "Kurtogram",
+        "Finds the band that carries impacts, and what rhythm they have: the spectrum of its envelope.",
+        _kurtogram,
+        (
+            PREPARATION,
+            BAND,
+            HIGHEST_MODULATION,
+            MethodOption(
+                "levels", "Levels", "count", None,
+                "The spectrum is cut into up to 2 to the power of it bands, and into thirds of these.", "up to 7",
+                more=True,
+            ),
+            _rhythm_over(),
+        ),
+        "Envelope",
+        1_000_000,
+        10_000_000,
+    ),
+    "coherence": Method(
+        "Cyclic coherence",
+        "Finds rhythms in noise and in which band they are, also where no band stands out: for bearings and wear.",
+        _coherence,
+        (
+            _rhythm_over(),
+            replace(
+                PREPARATION,
+                default="tones removed",
+                about="Steady tones are coherent with each other: remove them, or mesh harmonics fill the picture.",
+            ),
+            MethodOption(
+                "highest", "Highest rhythm (Hz or order)", "number", None,
+                "The fastest rhythm sought. Carriers below half of it are left out.",
+                "three harmonics of the fastest bearing line",
+            ),
+            MethodOption(
+                "n_bands", "Carrier bands", "count", 64,
+                "Fewer bands average more and find weaker modulation; more show better where its carrier is.",
+                choices={n: str(n) for n in (8, 16, 32, 64, 128, 256)},
+            ),
+            replace(BAND, label="Carriers averaged (Hz)", about="", empty="all"),
+            MethodOption(
+                "odds", "Noise passes the level in 1 line of", "count", 100,
+                "How often noise alone passes the dashed line.",
+                choices={n: str(n) for n in (20, 100, 1000, 10_000)}, minimum=2, more=True,
+            ),
+        ),
+        "Envelope",
+        262_144,
+        4_000_000,
+    ),
+    "deconvolution": Method(
+        "Deconvolution",
+        "Undoes the path between impacts and sensor, so that each is sharp again: for bearings that ring long.",
+        _deconvolution,
+        (
+            MethodOption(
+                "by", "Filter", "choice", "multipoint",
+                ("Multipoint: nearest to a train of impacts of a known rate. Minimum entropy: most impulsive, "
+                "whatever it is."),
+                choices={"multipoint": "Multipoint", "minimum-entropy": "Minimum entropy"},
+            ),
+            MethodOption(
+                "taps", "Filter length (samples)", "count", 100, "As long as an impact rings.", maximum=500,
+                minimum=10,
+            ),
+            MethodOption(
+                "rate_hz", "Impacts per second (Hz)", "number", 100.0,
+                "How often an impact comes, e.g. how often elements pass a race.", unit="Hz", minimum=0.0,
+            ),
+        ),
+        "Envelope",
+        100_000,
+    ),
+}  # fmt: skip

@@ -1,0 +1,365 @@
+"""What a method is: its options, its answer, how it is applied to a part of one channel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.angle import ShaftAngle
+from gearsig.checks import FloatArray, closest_match_hint, count, one_of, within
+from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.plot import Captioned, LevelPanel, LinePanel
+from gearsig.prepared import PreparedRecording, prepare
+from gearsig.recording import Channel, Provenance, Recording
+from gearsig.timefreq import Axis, UniformSignal, at_label
+
+Table = Mapping[str, NDArray[Any]]
+"""Title with unit → column; all of one length."""
+Kind = Literal["choice", "switch", "number", "count", "span", "numbers", "name", "text"]
+
+
+@dataclass(frozen=True)
+class MethodOption:
+    """Something that a method is asked for: an option of the command line, a widget of the dashboard.
+
+    Parameters
+    ----------
+    name : str
+        Keyword of the method.
+    label : str
+        Of the widget; not from a file.
+    kind : str
+        "choice" of few, "switch", "number", "count", a "span" of two numbers, several "numbers", the "name" of a shaft
+        or pair, or "text".
+    default : object
+        None: as the method decides, which `empty` says in words.
+    about, empty : str
+    choices : mapping
+        Value → text: of a choice all there are, of a number or count those of a slider.
+    unit : str
+        Of numbers.
+    minimum, maximum : float or None
+        Both included.
+    known : callable or None
+        Prepared recording and channel → what this recording offers: names, value → text of numbers, ends of a span;
+        or the text that stands for None in a number.
+    more : bool
+        Seldom needed.
+    """
+
+    name: str
+    label: str
+    kind: Kind
+    default: Any = None
+    about: str = ""
+    empty: str = ""
+    choices: Mapping[Any, str] = field(default_factory=dict)
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    known: Callable[[PreparedRecording, str], Any] | None = None
+    more: bool = False
+
+    def check(self, value: Any) -> None:
+        """Raise an `InputError` for a value that the option does not allow."""
+        if value is None:
+            return
+        if self.kind == "choice":
+            one_of(value, self.name, self.choices)
+        elif self.kind == "count":
+            count(value, self.name, minimum=int(1 if self.minimum is None else self.minimum))
+        if self.kind in ("number", "count"):
+            low, high = (
+                end if end is not None else far
+                for end, far in zip((self.minimum, self.maximum), (-np.inf, np.inf), strict=True)
+            )
+            within(value, self.name, low, high, self.unit)
+
+
+@dataclass(frozen=True)
+class Waveforms:
+    """Signals of equal length at equal steps of time or angle.
+
+    Parameters
+    ----------
+    columns : mapping
+        Name → samples, (n_samples,): the signal, and what was made of it.
+    rate : float
+        Samples per second, or per revolution of `shaft`.
+    start : float
+        Time or angle of the first sample.
+    unit, quantity : str
+    step : str
+        What was done to the signal, for the history of a file.
+    axis : str
+        "frequency" for signals over time, "order" for those over angle.
+    shaft, residual : str
+        Residual: the column that remains of the signal, if there is one.
+    """
+
+    columns: Mapping[str, FloatArray]
+    rate: float
+    start: float
+    unit: str
+    quantity: str
+    step: str
+    axis: Axis = "frequency"
+    shaft: str = ""
+    residual: str = ""
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of each."""
+        return len(next(iter(self.columns.values())))
+
+    @property
+    def end(self) -> float:
+        """Time or angle one step after the last sample."""
+        return self.start + self.n_samples / self.rate
+
+    def at(self, part: slice = slice(None)) -> FloatArray:
+        """Return time in s or angle in revolutions of some samples."""
+        result: FloatArray = self.start + np.arange(self.n_samples)[part] / self.rate
+        return result
+
+    def table(self) -> dict[str, FloatArray]:
+        """Return the columns with their time or angle before them."""
+        return {at_label(self.axis, self.shaft): self.at(), **self.columns}
+
+    def recording(self) -> Recording:
+        """Return waveforms over time as a recording, one channel each; its time begins at 0."""
+        return Recording(
+            np.stack(list(self.columns.values())),
+            self.rate,
+            tuple(Channel(name, self.quantity, self.unit) for name in self.columns),
+            provenance=Provenance(history=(self.step,)),
+        )
+
+
+@dataclass(frozen=True)
+class MethodAnswer:
+    """What a method found in one channel.
+
+    Parameters
+    ----------
+    channel, caption : str
+    draw : callable
+        Returns the figure.
+    table : mapping
+        Title with unit → column; all of one length.
+    tables : mapping
+        What it holds → another table.
+    matrices : mapping
+        Name → array of two dimensions, for maps: their rows and columns are named by `axes`.
+    axes : mapping
+        Title with unit → positions of the rows or columns of the matrices.
+    numbers : mapping
+        What else is known: settings, counts.
+    panels : sequence of LinePanel or LevelPanel
+        The figure, to be zoomed; empty: the figure is a picture.
+    path : array, (n, 3), or None
+        In space, to be turned.
+    facts, notes, warnings : sequence of str
+        What was found, how it is read, what to check.
+    waveforms : Waveforms or None
+    method : str
+        Set by `apply_method`.
+    """
+
+    channel: str
+    caption: str
+    draw: Callable[[], Any]
+    table: Table
+    tables: Mapping[str, Table] = field(default_factory=dict)
+    matrices: Mapping[str, FloatArray] = field(default_factory=dict)
+    axes: Mapping[str, FloatArray] = field(default_factory=dict)
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    panels: Sequence[LinePanel | LevelPanel] = ()
+    path: FloatArray | None = None
+    facts: Sequence[str] = ()
+    notes: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+    waveforms: Waveforms | None = None
+    method: str = ""
+
+    @property
+    def picture(self) -> Captioned:
+        """The figure with its caption."""
+        return Captioned(self.draw(), self.caption, f"{self.caption}, {self.channel}")
+
+
+@dataclass(frozen=True)
+class Method:
+    """One row of the table of methods.
+
+    Parameters
+    ----------
+    title, about : str
+        Its name on a page; what it shows, in a sentence.
+    answer : callable
+        Prepared recording, channel and the options by name → answer.
+    options : sequence of MethodOption
+    view : str
+        View of the chain that shows it; empty: a view of its own shows the same.
+    n_first, n_max : int
+        Samples that a page analyses at first, and at most: a few seconds.
+    limit : callable or None
+        Options → samples, where they decide how many a page can analyse.
+    """
+
+    title: str
+    about: str
+    answer: Callable[..., MethodAnswer]
+    options: Sequence[MethodOption] = ()
+    view: str = ""
+    n_first: int = 200_000
+    n_max: int = 1_000_000
+    limit: Callable[[Mapping[str, Any]], int] | None = None
+
+
+def apply_method(
+    methods: Mapping[str, Method],
+    name: str,
+    recording: Recording | PreparedRecording,
+    channel: str = "",
+    *,
+    start_s: float | None = None,
+    end_s: float | None = None,
+    **options: Any,
+) -> MethodAnswer:
+    """Apply a method of a table, see `gearsig.methods.apply_method`."""
+    if name not in methods:
+        raise InputError(
+            f"there is no method {name!r}", allowed=", ".join(methods), remedy=closest_match_hint(name, list(methods))
+        )
+    method = methods[name]
+    taken = {option.name: option for option in method.options}
+    for key, value in options.items():
+        if key not in taken:
+            fitting = [n for n, m in methods.items() if key in (o.name for o in m.options)]
+            remedy = f"it is an option of {', '.join(fitting)}" if fitting else f"it takes {', '.join(taken) or 'none'}"
+            raise InputError(f"{name} takes no {key.replace('_', ' ')}", remedy=remedy)
+        taken[key].check(value)
+    prepared = prepare(recording)
+    if start_s is not None or end_s is not None:
+        end = prepared.recording.duration_s if end_s is None else end_s
+        prepared = part_of(prepared, start_s or 0.0, end)
+    settings = {key: option.default for key, option in taken.items()} | options
+    answer = method.answer(prepared, usual_channel(prepared.recording, channel), **settings)
+    return replace(answer, method=name)
+
+
+def usual_channel(recording: Recording, name: str = "") -> str:
+    """Return the channel of that name; by default the first acceleration, else the first that is no tachometer's."""
+    if name:
+        return recording.channels[recording.index(name)].name
+    order = ("acceleration", "velocity", "displacement", "transmission_error", "sound_pressure")
+    for quantity in order:
+        for channel in recording.channels:
+            if channel.quantity == quantity:
+                return channel.name
+    others = [c.name for c in recording.channels if c.quantity != "tachometer"]
+    return others[0] if others else recording.channels[0].name
+
+
+def part_of(
+    prepared: PreparedRecording, start_s: float, end_s: float, channel: str = "", *, memory_limit_mb: float = 1024.0
+) -> PreparedRecording:
+    """Return a part of a recording, with the whole recording's angle of that time.
+
+    Parameters
+    ----------
+    prepared : PreparedRecording
+    start_s, end_s : float
+    channel : str
+        The only one that is kept; empty: all.
+    memory_limit_mb : float
+        See `PreparedRecording`.
+    """
+    whole = prepared.recording
+    part = whole.between(start_s, end_s)
+    if channel:
+        row = whole.index(channel)
+        part = replace(part, samples=part.samples[row : row + 1], channels=(whole.channels[row],), speed=None)
+    cut = PreparedRecording(part, memory_limit_mb=memory_limit_mb)
+
+    def angle() -> ShaftAngle:
+        inside = prepared.shaft_angle.between(start_s, min(end_s, start_s + part.duration_s))
+        return replace(inside, time_s=inside.time_s - start_s)
+
+    with suppress(GearsigError):  # kept: whoever asks for the angle hears of it
+        cut.keep("angle", angle)
+    return cut
+
+
+def angle_or_none(prepared: PreparedRecording) -> ShaftAngle | None:
+    """Return the shaft's angle; None where the speed is not known."""
+    try:
+        return prepared.shaft_angle
+    except (InputError, RefusalError):
+        return None
+
+
+def is_steady(angle: ShaftAngle | None, share: float = 0.01) -> bool:
+    """Whether the speed is known and varies by less than that share of its mean."""
+    if angle is None:
+        return False
+    low, high = angle.speed_range_rpm
+    return bool(high - low <= share * angle.mean_speed_rpm)
+
+
+def unit_of(prepared: PreparedRecording, channel: str) -> str:
+    """Return the unit of a channel."""
+    recording = prepared.recording
+    return recording.channels[recording.index(channel)].unit
+
+
+def signal_of(prepared: PreparedRecording, channel: str, *, over_angle: bool = False, shaft: str = "") -> UniformSignal:
+    """Return a channel over time, or over a shaft's angle."""
+    from gearsig.timefreq import uniform
+
+    if over_angle:
+        return uniform(prepared.over_angle(shaft, [channel]), channel)
+    return uniform(prepared.recording, channel)
+
+
+def waveforms_of(
+    prepared: PreparedRecording,
+    channel: str,
+    signal: UniformSignal,
+    columns: Mapping[str, FloatArray],
+    step: str,
+    *,
+    residual: str = "",
+) -> Waveforms:
+    """Return waveforms on the axis and in the unit of a signal that was made of a channel."""
+    measured = prepared.recording.channels[prepared.recording.index(channel)]
+    same = signal.unit == measured.unit and signal.source == channel
+    return Waveforms(
+        columns, signal.rate, signal.start, signal.unit, measured.quantity if same else "unknown",
+        f"{step}, of {channel}", signal.axis, signal.shaft, residual,
+    )  # fmt: skip
+
+
+OVER_ANGLE = MethodOption(
+    "over_angle", "Over", "switch", False,
+    "Over the shaft's angle lines are orders: a change of speed does not smear.",
+)  # fmt: skip
+SHAFT = MethodOption(
+    "shaft", "Shaft", "name", "", empty="the reference shaft", more=True,
+    known=lambda prepared, _: prepared.rig.shaft_names,
+)  # fmt: skip
+LOWEST = MethodOption("lowest", "Lowest line (Hz or order)", "number", None, empty="all", minimum=0.0)
+HIGHEST = MethodOption("highest", "Highest line (Hz or order)", "number", None, empty="all", minimum=0.0)
+LINES = (LOWEST, HIGHEST)
+
+
+def top_hz(prepared: PreparedRecording, channel: str) -> tuple[float, float]:
+    """Return the ends of a span over frequency."""
+    del channel
+    return 0.0, prepared.recording.sampling_rate_hz / 2.0
