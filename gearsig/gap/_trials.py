@@ -327,7 +327,7 @@ class Bank:
 
 def banks_of(
     runs: Sequence[TwinRun],
-    effects: Sequence[str],
+    candidates: Mapping[str, Sequence[Added]],
     *,
     seeds: Sequence[int],
     folder: Path | None,
@@ -343,8 +343,8 @@ def banks_of(
     runs : sequence of Run
         Twin, point, length of what is simulated; the point is rounded to `POINT_DIGITS` digits. Noise 0: candidates
         have the noise and start of the healthy run, so that only the effect differs.
-    effects : sequence of str
-        Whose candidates are simulated; each has a file of its own.
+    candidates : mapping
+        Effect → its settings that are simulated; each effect has a file of its own.
     seeds : sequence of int
         Specimens of the healthy machine.
     folder : Path or None
@@ -366,7 +366,9 @@ def banks_of(
         If the healthy machine cannot be simulated or its recording is too short for the features.
     """
     within = seeds[: min(count(n_change_seeds, "n_change_seeds"), len(seeds))]
-    wanted = [_BankRequest.of(run, name, seeds, within, folder) for run in runs for name in effects]
+    wanted = [
+        _BankRequest.of(run, tuple(added), seeds, within, folder) for run in runs for added in candidates.values()
+    ]
     found = {w: read_bank(w.path, w.key) if w.path is not None and not fresh else None for w in wanted}
     missing = [w for w in wanted if found[w] is None]
     healthy = {w.run.healthy_key: w.run for w in missing}
@@ -380,7 +382,7 @@ def banks_of(
         if w.path is not None:
             write_bank(w.path, w.key, bank)
     banks = iter(found[w] for w in wanted)
-    return [{name: bank for name, bank in zip(effects, banks, strict=False) if bank is not None} for _ in runs]
+    return [{name: bank for name, bank in zip(candidates, banks, strict=False) if bank is not None} for _ in runs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -394,12 +396,16 @@ class _BankRequest:
 
     @classmethod
     def of(
-        cls, run: TwinRun, effect: str, seeds: Sequence[int], within: Sequence[int], folder: Path | None
+        cls,
+        run: TwinRun,
+        candidates: tuple[Added, ...],
+        seeds: Sequence[int],
+        within: Sequence[int],
+        folder: Path | None,
     ) -> _BankRequest:
         """Return what is wanted, at the rounded point."""
         positive(run.duration_s, "duration_s", "s")
         at = replace(run, point=rounded(run.point))
-        candidates = tuple(run.twin.candidates(effect))
         key = bank_key(at, candidates, seeds, within)
         path = None if folder is None else _made(folder) / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
         return cls(at, candidates, key, path)
@@ -523,30 +529,43 @@ def try_effects(
     """
     if not effects:
         return {}
-    names = [effect.name for effect in effects]
+    changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
+    told = {effect.name: told_options(effect.name, changes, teeth) for effect in effects}
     folds = folds_of(conditions)
     where = " and ".join(c.facts.name for c in conditions)
     banks = banks_of(
         [_run(twin, condition) for condition in conditions],
-        names,
+        {name: worth_simulating(twin.candidates(name), told[name]) for name in told},
         seeds=[SEED],
         folder=cache,
         processes=PROCESSES,
         fresh=fresh,
-        on_progress=lambda done, of: on_progress(f"simulating {len(names)} effects at the point of {where}", done / of),
+        on_progress=lambda done, of: on_progress(f"simulating {len(told)} effects at the point of {where}", done / of),
     )
-    changes = [condition.over_floors for condition in conditions]
     found = {}
     for effect in effects:
         name = effect.name
         every = _paths([at[name] for at in banks], conditions, effect.shows_in)
         if every:
-            told = told_options(name, changes, conditions[0].now.frame.teeth)
-            paths, excluded = on_shaft(every, told)
+            paths, excluded = on_shaft(every, told[name])
             shrink = shrinkage(paths, folds, HELD_OUT, excluded)
             match = _match([at[name] for at in banks], conditions, effect.moves_pitches) if name in ONE_TOOTH else None
             found[name] = TriedEffect(name, paths, fit_effect(paths, observed_changes(conditions)), shrink, match)
     return found
+
+
+def worth_simulating(candidates: Sequence[Added], told: Mapping[str, str]) -> list[Added]:
+    """Return the candidates on the shaft that the recordings tell by themselves, and the strongest on the other one.
+
+    That one serves as a placebo. All where nothing is told, or no candidate is there.
+    """
+    placed = [added for added in candidates if told.items() <= added.options.items()]
+    if not placed:
+        return list(candidates)
+    elsewhere: dict[tuple[tuple[str, float | str], ...], Added] = {}
+    for added in sorted((one for one in candidates if one not in placed), key=lambda one: one.severity):
+        elsewhere[tuple(sorted(added.options.items()))] = added
+    return [*placed, *elsewhere.values()]
 
 
 def _match(banks: Sequence[Bank], conditions: Sequence[Condition], moves_pitches: float) -> WaveformMatch | None:

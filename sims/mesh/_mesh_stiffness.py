@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -177,7 +178,11 @@ def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
         and the height of roughness to 1e-4 of its rms. At the edges of spalls and chips and at the pitch point of worn
         flanks the interpolation rounds over one or two columns.
     """
-    n = count(n_points, "n_points", minimum=16)
+    return _tabulated(mesh, count(n_points, "n_points", minimum=16))
+
+
+@lru_cache(maxsize=4)  # a run asks for that of one mesh several times, healthy and not
+def _tabulated(mesh: GearMesh, n: int) -> MeshTable:
     low, high = -mesh.ramp / 2.0, mesh.pair.contact_ratio + mesh.ramp / 2.0
     step = (high - low) / (n - 1)
     progress = low + step * np.arange(-1, n + 1)

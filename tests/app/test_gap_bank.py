@@ -64,7 +64,7 @@ def bank(
 ) -> Bank:
     settings: Mapping[str, object] = {"seeds": (0, 1), "folder": folder, "processes": 1, **changed}
     run = TwinRun(twin or Sines(), POINT, duration_s, FS, noise)
-    return banks_of([run], ["louder"], **settings)[0]["louder"]  # type: ignore[arg-type]
+    return banks_of([run], {"louder": run.twin.candidates("louder")}, **settings)[0]["louder"]  # type: ignore[arg-type]
 
 
 def same(one: Bank, other: Bank) -> bool:
@@ -180,11 +180,10 @@ def test_processes_give_the_same_bank() -> None:
 
 def test_each_effect_at_each_point_has_a_file_and_what_is_there_is_not_made_again(tmp_path: Path) -> None:
     runs = [TwinRun(Sines(), OperatingCondition(speed, 40.0), DURATION_S, FS, 1) for speed in (1800.0, 1500.0)]
-    banks_of(runs[:1], ["louder"], seeds=[0], folder=tmp_path, processes=1)
+    banks_of(runs[:1], {"louder": Sines().candidates("louder")}, seeds=[0], folder=tmp_path, processes=1)
     made = []
-    both = banks_of(
-        runs, ["louder", "louder 2"], seeds=[0], folder=tmp_path, processes=1, on_progress=lambda *n: made.append(n)
-    )
+    candidates = {name: Sines().candidates(name) for name in ("louder", "louder 2")}
+    both = banks_of(runs, candidates, seeds=[0], folder=tmp_path, processes=1, on_progress=lambda *n: made.append(n))
     assert len(list(tmp_path.iterdir())) == 4
     assert len(made) == 2 + 1 + 4  # the healthy machine at both points; one candidate at the first, four at the other
     assert [set(at) for at in both] == [{"louder", "louder 2"}] * 2
