@@ -90,8 +90,7 @@ def analyze(
     _check_size(prepared.recording)
     healthy = None if reference is None else prepare(reference, prepared.recording.rig)
     if healthy is not None:
-        alike = _named_alike(prepared.recording, healthy.recording)
-        healthy = healthy if alike is healthy.recording else prepare(alike, prepared.recording.rig)
+        healthy = _named_alike(prepared.recording, healthy)
         _check_reference(prepared.recording, healthy.recording)
     return _examined(prepared, settings or AnalysisSettings(), healthy, torque_nm, on_stage or (lambda _: None))[0]
 
@@ -286,11 +285,13 @@ def _check_vibration(recording: Recording) -> None:
         )
 
 
-def _named_alike(recording: Recording, reference: Recording) -> Recording:
+def _named_alike(recording: Recording, healthy: PreparedRecording) -> PreparedRecording:
     """Return the reference with the recording's names of channels that differ by a record's number only.
 
-    It has three digits or more: fewer tell sensors apart.
+    It has three digits or more: fewer tell sensors apart. The renamed one is kept with the other, and what is found in
+    it as well.
     """
+    reference = healthy.recording
 
     def without_number(name: str) -> str:
         return re.sub(r"\d{3,}", "", name)
@@ -299,9 +300,9 @@ def _named_alike(recording: Recording, reference: Recording) -> Recording:
     keys = [without_number(name) for name in reference.channel_names]
     is_unique = len(names) == len(recording.channel_names) and len(set(keys)) == len(keys)
     if not is_unique or set(recording.vibration_names()) <= set(reference.channel_names):
-        return reference
+        return healthy
     channels = tuple(replace(c, name=names.get(key, c.name)) for c, key in zip(reference.channels, keys, strict=True))
-    return replace(reference, channels=channels)
+    return healthy.keep(("diagnosis", "renamed", channels), lambda: prepare(replace(reference, channels=channels)))
 
 
 def _check_reference(recording: Recording, reference: Recording) -> None:

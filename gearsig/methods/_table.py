@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -11,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.angle import ShaftAngle
-from gearsig.checks import FloatArray, closest_match_hint, count, one_of, within
-from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.checks import FloatArray, count, one_of, within
+from gearsig.errors import InputError, RefusalError
 from gearsig.plot import Captioned, LevelPanel, LinePanel
-from gearsig.prepared import PreparedRecording, prepare
+from gearsig.prepared import PreparedRecording
 from gearsig.recording import Channel, Provenance, Recording
 from gearsig.timefreq import Axis, UniformSignal, at_label
 
@@ -222,38 +221,6 @@ class Method:
     limit: Callable[[Mapping[str, Any]], int] | None = None
 
 
-def apply_method(
-    methods: Mapping[str, Method],
-    name: str,
-    recording: Recording | PreparedRecording,
-    channel: str = "",
-    *,
-    start_s: float | None = None,
-    end_s: float | None = None,
-    **options: Any,
-) -> MethodAnswer:
-    """Apply a method of a table, see `gearsig.methods.apply_method`."""
-    if name not in methods:
-        raise InputError(
-            f"there is no method {name!r}", allowed=", ".join(methods), remedy=closest_match_hint(name, list(methods))
-        )
-    method = methods[name]
-    taken = {option.name: option for option in method.options}
-    for key, value in options.items():
-        if key not in taken:
-            fitting = [n for n, m in methods.items() if key in (o.name for o in m.options)]
-            remedy = f"it is an option of {', '.join(fitting)}" if fitting else f"it takes {', '.join(taken) or 'none'}"
-            raise InputError(f"{name} takes no {key.replace('_', ' ')}", remedy=remedy)
-        taken[key].check(value)
-    prepared = prepare(recording)
-    if start_s is not None or end_s is not None:
-        end = prepared.recording.duration_s if end_s is None else end_s
-        prepared = part_of(prepared, start_s or 0.0, end)
-    settings = {key: option.default for key, option in taken.items()} | options
-    answer = method.answer(prepared, usual_channel(prepared.recording, channel), **settings)
-    return replace(answer, method=name)
-
-
 def usual_channel(recording: Recording, name: str = "") -> str:
     """Return the channel of that name; by default the first acceleration, else the first that is no tachometer's."""
     if name:
@@ -267,9 +234,7 @@ def usual_channel(recording: Recording, name: str = "") -> str:
     return others[0] if others else recording.channels[0].name
 
 
-def part_of(
-    prepared: PreparedRecording, start_s: float, end_s: float, channel: str = "", *, memory_limit_mb: float = 1024.0
-) -> PreparedRecording:
+def part_of(prepared: PreparedRecording, start_s: float, end_s: float, channel: str = "") -> PreparedRecording:
     """Return a part of a recording, with the whole recording's angle of that time.
 
     Parameters
@@ -278,22 +243,19 @@ def part_of(
     start_s, end_s : float
     channel : str
         The only one that is kept; empty: all.
-    memory_limit_mb : float
-        See `PreparedRecording`.
     """
     whole = prepared.recording
     part = whole.between(start_s, end_s)
     if channel:
         row = whole.index(channel)
         part = replace(part, samples=part.samples[row : row + 1], channels=(whole.channels[row],), speed=None)
-    cut = PreparedRecording(part, memory_limit_mb=memory_limit_mb)
+    cut = PreparedRecording(part)
 
     def angle() -> ShaftAngle:
         inside = prepared.shaft_angle.between(start_s, min(end_s, start_s + part.duration_s))
         return replace(inside, time_s=inside.time_s - start_s)
 
-    with suppress(GearsigError):  # kept: whoever asks for the angle hears of it
-        cut.keep("angle", angle)
+    cut.keep_angle(angle)
     return cut
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
@@ -109,6 +110,17 @@ class PreparedRecording:
         return kept  # type: ignore[no-any-return]  # of the type that `compute` returns
 
     # Angles: small, and asked for by everything.
+
+    def keep_angle(self, find: Callable[[], ShaftAngle]) -> None:
+        """Keep an angle that is known from elsewhere as `shaft_angle`; or why it is not, for whoever asks for it.
+
+        Parameters
+        ----------
+        find : callable
+            Without arguments; called now. Its `InputError` or `RefusalError` is kept.
+        """
+        with suppress(GearsigError):
+            self.keep("angle", find)
 
     @property
     def shaft_angle(self) -> ShaftAngle:

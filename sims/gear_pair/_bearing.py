@@ -39,7 +39,7 @@ BEARING_FIELDS: list[tuple[str, type, tuple[int, ...]]] = [
     ("bearing_stiffness", np.float64, (4,)),
     ("bearing_damping", np.float64, (4,)),
     ("clearance", np.float64, (4,)),
-    ("special", np.int64, (4,)),  # has a defect or clearance
+    ("special", np.int64, (4,)),  # `BearingSupport.elements_pass`
     ("race", np.int64, (4,)),  # 0 none, 1 outer, 2 inner
     ("race_order", np.float64, (4,)),  # passings per revolution of the shaft
     ("race_length", np.float64, (4,)),  # in element spacings
@@ -74,7 +74,7 @@ def bearing_fields(machine: Machine, mesh_force_n: float, rng: np.random.Generat
         ),
         "bearing_damping": np.array([b.damping_n_s_per_m for b in supports]),
         "clearance": np.array([b.clearance_um * 1e-6 for b in supports]),
-        "special": np.array([b.clearance_um > 0 or b.defect is not None or b.law == "hertzian" for b in supports]),
+        "special": np.array([b.elements_pass for b in supports]),
         "balls": np.array([b.bearing.n_rolling_elements if b.law == "hertzian" else 0 for b in supports]),
         "ball_contact": np.array([contact_n_per_m15(b.bearing) if b.law == "hertzian" else 0.0 for b in supports]),
         "race": np.array([d[0] for d in defects], dtype=np.int64),

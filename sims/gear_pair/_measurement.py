@@ -123,10 +123,7 @@ class Measurement:
 
     def _rolls(self, position: str) -> bool:
         """Whether a bearing's shaft moves by itself as its rolling elements pass, else as the spring yields."""
-        if position not in YIELDS:
-            return False
-        bearing = self.machine.bearings[YIELDS.index(position) // 2]
-        return bearing.defect is not None or bearing.clearance_um > 0.0 or bearing.law == "hertzian"
+        return position in YIELDS and self.machine.bearings[YIELDS.index(position) // 2].elements_pass
 
     def _acceleration(self, response: PairSignals, position: str) -> FloatArray:
         """Return a place's acceleration; of a yield by differences of what it is less than the shaft's motion."""

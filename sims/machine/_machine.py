@@ -194,13 +194,17 @@ class BearingSupport:
         positive(self.stiffness_n_per_m, "stiffness_n_per_m of a bearing", "N/m")
         not_negative(self.damping_n_s_per_m, "damping_n_s_per_m of a bearing", "N s/m")
         not_negative(self.clearance_um, "clearance_um of a bearing", "µm")
-        special = self.defect is not None or self.clearance_um > 0 or self.law == "hertzian"
-        if special and self.bearing.n_rolling_elements is None:
+        if self.elements_pass and self.bearing.n_rolling_elements is None:
             raise InputError(
                 f"{self.bearing.name!r} has a defect, clearance or contacts of its own, and no geometry",
                 allowed="n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm",
                 remedy="give the bearing's geometry",
             )
+
+    @property
+    def elements_pass(self) -> bool:
+        """Whether rolling elements that pass move the shaft: at a defect, in play, or where they carry one by one."""
+        return self.defect is not None or self.clearance_um > 0 or self.law == "hertzian"
 
     def element_spacing_mm(self, race: str) -> float | None:
         """Distance between rolling elements along a race, π (D ± d cos α)/n; a longer defect would hold two at once.

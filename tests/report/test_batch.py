@@ -132,13 +132,14 @@ def work(job):
 """
 
 SCRIPT = """
-import signal, sys
+import pathlib, signal, sys
 from gearsig import batch
 from work_of_a_test import work
 
 batch._report_one = work
 signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may ignore Ctrl-C
-result = batch.report_many(sys.argv[2:], sys.argv[1], n_processes=2)
+counted = pathlib.Path(sys.argv[1] + ".counted")
+result = batch.report_many(sys.argv[2:], sys.argv[1], n_processes=2, on_progress=lambda *_: counted.touch())
 print([e.name for e in result.entries], [(f.name, f.reason) for f in result.failures])
 """
 
@@ -163,7 +164,7 @@ def test_ctrl_c_ends_the_workers_and_tidies_up(script, tmp_path):
     command = [sys.executable, script, out, "a.csv", "slow.csv"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as running:
         limit = time.monotonic() + 30
-        while not (list(out.glob(".slow.html.*.part")) and (out / "a.html").exists()):
+        while not (list(out.glob(".slow.html.*.part")) and (tmp_path / "out.counted").exists()):
             assert time.monotonic() < limit
             time.sleep(0.05)
         os.killpg(running.pid, signal.SIGINT)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from functools import partial
 from hashlib import blake2b
@@ -100,12 +98,14 @@ def prepared_of(recording: Recording, angle: ShaftAngle | CannotTell) -> Prepare
             raise RefusalError(angle.reason, remedy=angle.remedy)
         return angle
 
-    with suppress(RefusalError):  # kept: who asks for the angle hears of it
-        prepared.keep("angle", known)
+    prepared.keep_angle(known)
     return prepared
 
 
-_segments: OrderedDict[str, tuple[PreparedRecording, Lock]] = OrderedDict()
+@cached(N_PREPARED, "Preparing …")
+def _segment(part: Recording, angle: ShaftAngle | CannotTell) -> tuple[PreparedRecording, Lock]:
+    """Return a segment that methods share, and the lock under which one at a time works with it."""
+    return prepared_of(part, angle), Lock()
 
 
 @cached(8, "Computing …")
@@ -113,12 +113,7 @@ def answer_of(
     name: str, part: Recording, angle: ShaftAngle | CannotTell, channel: str, options: Mapping[str, Any]
 ) -> MethodAnswer:
     """Return a method's answer; what it computes of a segment on the way is kept for other options."""
-    key = content_key((part, angle))
-    if key not in _segments:
-        _segments[key] = prepared_of(part, angle), Lock()
-        while len(_segments) > N_PREPARED:
-            _segments.popitem(last=False)
-    prepared, lock = _segments[key]
+    prepared, lock = _segment(part, angle)
     with lock:
         return apply_method(name, prepared, channel, **options)
 
