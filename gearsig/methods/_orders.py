@@ -23,7 +23,7 @@ from gearsig.methods._table import (
     waveforms_of,
 )
 from gearsig.orders import OrderMap, TrackedOrder, frequency_map, order_map, track_orders, track_vold_kalman
-from gearsig.plot import ChartLine, LinePanel, with_unit
+from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibels, unit_text, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.rig import order_lines
 
@@ -43,6 +43,15 @@ def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, hig
     values, positions = levels.values[:, kept], levels.positions[kept]
     table = {"time (s)": levels.time_s, "speed (rpm)": levels.speed_rpm}
     lines = {f"{p:.7g} {unit}": values[:, i] for i, p in enumerate(positions)}
+    panel = LevelPanel(
+        decibels(values, levels.scaling),
+        positions,
+        levels.time_s,
+        levels.axis_label,
+        "time (s)",
+        f"dB re 1 {unit_text(levels.unit)}".strip(),
+        cursors=[c for c in cursors_of(prepared, levels) if c.kind != "sideband"],
+    )
     numbers = {"resolution": levels.resolution, "scaling": levels.scaling, "unit": levels.unit, "shaft": levels.shaft}
     return MethodAnswer(
         channel,
@@ -52,6 +61,7 @@ def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, hig
         matrices={"levels": values},
         axes={**table, over: positions},
         numbers=numbers,
+        panels=(panel,),
     )
 
 

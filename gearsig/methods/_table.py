@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray, count, one_of, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.plot import Captioned, LevelPanel, LinePanel
+from gearsig.plot import LevelPanel, LinePanel
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Channel, Provenance, Recording
 from gearsig.timefreq import Axis, UniformSignal, at_label
@@ -185,11 +185,6 @@ class MethodAnswer:
     warnings: Sequence[str] = ()
     waveforms: Waveforms | None = None
     method: str = ""
-
-    @property
-    def picture(self) -> Captioned:
-        """The figure with its caption."""
-        return Captioned(self.draw(), self.caption, f"{self.caption}, {self.channel}")
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,11 @@ class OrderMap(Result, matrix=("values", "time_s", "positions")):
                 f"values of shape {self.values.shape} for {len(self.time_s)} blocks × {len(self.positions)} lines"
             )
 
+    @property
+    def axis_label(self) -> str:
+        """Name of the axis of lines, with its unit."""
+        return f"order (of {self.shaft or 'the shaft'})" if self.axis == "order" else "frequency (Hz)"
+
 
 @dataclass(frozen=True)
 class TrackedOrder(Result, columns=("time_s", "speed_rpm", "amplitude", "phase_rad")):

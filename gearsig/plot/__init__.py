@@ -69,7 +69,7 @@ from gearsig.plot._methods import (
     vmd,
 )
 from gearsig.plot._modes import modes_figure
-from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, panels_figure
+from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, panels_figure, pooled_levels
 from gearsig.plot._phase import (
     bifurcation_figure,
     chaos_test_figure,
@@ -111,7 +111,7 @@ from gearsig.plot._style import (
     unit_text,
     with_unit,
 )
-from gearsig.plot._svg import Curve, svg_lines, svg_map, svg_ring
+from gearsig.plot._svg import Curve, svg_lines, svg_panel, svg_ring
 
 __all__ = [
     "FAULT",
@@ -198,6 +198,7 @@ __all__ = [
     "place",
     "plain",
     "polar_figure",
+    "pooled_levels",
     "power_density",
     "recurrence_figure",
     "response_figure",
@@ -215,7 +216,7 @@ __all__ = [
     "stft",
     "stress_maps_figure",
     "svg_lines",
-    "svg_map",
+    "svg_panel",
     "svg_ring",
     "synchronous_average",
     "thin",

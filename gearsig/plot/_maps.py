@@ -62,8 +62,7 @@ def order_map_figure(
     _spare_the_right_end(speed)
     limits = (float(x[0]), float(x[-1]))
     draw(axes, place(cursors, limits, style.size_in(axes)[0]), through=False)
-    name = f"order (of {order_map.shaft or 'the shaft'})" if order_map.axis == "order" else "frequency (Hz)"
-    style.label_axes(axes, name)
+    style.label_axes(axes, order_map.axis_label)
     style.label_axes(speed, "speed (rpm)", "time (s)")
     series.headline(figure, order_map.source)
     style.no_offset(speed)

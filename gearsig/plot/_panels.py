@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
@@ -104,6 +105,29 @@ class LevelPanel:
     span: float | None = None
 
 
+def pooled_levels(
+    levels: FloatArray, positions: FloatArray, n_columns: int, n_rows: int, *, logarithmic: bool = False
+) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Return the largest level of each pixel, and the first row of `levels` in each row of pixels.
+
+    Parameters
+    ----------
+    levels : array, (n_y, n_x)
+    positions : array, (n_y,)
+        Ascending; rows of pixels lie at equal steps of it, or of its logarithm.
+    n_columns, n_rows : int
+        At most.
+    logarithmic : bool
+    """
+    n_rows, n_columns = min(len(positions), n_rows), min(levels.shape[1], n_columns)
+    steps = (np.geomspace if logarithmic else np.linspace)(positions[0], positions[-1], n_rows)
+    rows = np.searchsorted(positions, steps).clip(0, len(positions) - 1)
+    edges = np.linspace(0, levels.shape[1], n_columns + 1).astype(int)[:-1]
+    if n_rows > 1:
+        levels = np.maximum.reduceat(levels, rows, axis=0)
+    return np.maximum.reduceat(levels, edges, axis=1), rows
+
+
 def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") -> Figure:
     """Draw panels below each other.
 
@@ -144,10 +168,14 @@ def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") 
     return figure
 
 
+def line_colour(number: int) -> str:
+    """Return the colour of a `ChartLine` on paper."""
+    cycle = (style.MEASURED, style.FAULT, style.MESH, style.BEARING, style.SHAFT)
+    return style.QUIET if number < 0 else cycle[number % len(cycle)]
+
+
 def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> None:
-    others = (style.MESH, style.BEARING, style.SHAFT)
-    cycle = (style.MEASURED, style.FAULT, *others)
-    colour = style.QUIET if line.colour < 0 else cycle[line.colour % len(cycle)]
+    colour = line_colour(line.colour)
     ascending = len(line.x) > series.N_POINTS and bool(np.all(np.diff(line.x) > 0.0))
     if line.peaks and ascending:
         x, _, y = series.envelope(line.x, line.y, series.N_POINTS // 2)

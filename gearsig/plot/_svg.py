@@ -16,13 +16,15 @@ from math import ceil, floor, log10
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.orders import OrderMap, SynchronousAverage
+from gearsig.orders import SynchronousAverage
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import AngleMark, Cursor
-from gearsig.plot._style import decibels, unit_text
+from gearsig.plot._panels import LevelPanel, LinePanel, line_colour, pooled_levels
+from gearsig.plot._style import unit_text
 
-LEFT, RIGHT, BOTTOM, ROW = 62, 12, 38, 14
+LEFT, RIGHT, BOTTOM, ROW, BAR = 62, 12, 38, 14, 46
 N_COLUMNS = 420
+N_SHADES = 48
 MAX_ROWS = 4
 LETTER = 6.2
 """Width of a letter in units of the drawing, for keeping labels apart."""
@@ -104,40 +106,67 @@ def svg_lines(
     return _svg(width, top + height + BOTTOM, parts)
 
 
-def svg_map(order_map: OrderMap, *, highest: float | None = None, width: int = 760, height: int = 230) -> str:
-    """Draw levels over order or frequency and time, 60 dB below the largest; the largest in each pixel.
+def svg_panel(panel: LinePanel | LevelPanel, *, width: int = 760) -> str:
+    """Draw a panel of lines or of levels; of levels the largest in each pixel, with the bar of their colours.
 
     Parameters
     ----------
-    order_map : OrderMap
-    highest : float or None
-        Of the axis shown; None: all.
-    width, height : int
-        Of the drawing, and of its panel.
+    panel : LinePanel or LevelPanel
+    width : int
+        Of the drawing.
     """
+    curves = [
+        Curve(line.x, line.y, line.name if len(panel.lines) > 1 else "", line_colour(line.colour), line.peaks)
+        for line in panel.lines
+    ]
+    if isinstance(panel, LevelPanel):
+        return _svg_levels(panel, curves, width)
+    limits = min(float(c.x[0]) for c in curves), max(float(c.x[-1]) for c in curves)
+    return svg_lines(
+        curves,
+        x=panel.x,
+        y=panel.y,
+        x_limits=limits,
+        y_limits=panel.limits,
+        logarithmic=panel.logarithmic,
+        cursors=panel.cursors,
+        width=width,
+    )
+
+
+def _svg_levels(panel: LevelPanel, lines: Sequence[Curve], width: int, height: int = 230) -> str:
     from PIL import Image
 
-    stop = len(order_map.positions)
-    if highest is not None:
-        stop = max(int(np.searchsorted(order_map.positions, highest, side="right")), min(2, stop))
-    levels = decibels(order_map.values[:, :stop], order_map.scaling)
-    time = order_map.time_s
-    rows = np.searchsorted(time, np.linspace(time[0], time[-1], min(160, 2 * len(time)))).clip(0, len(time) - 1)
-    borders = np.linspace(0, stop, min(stop, 440) + 1).astype(int)[:-1]
-    levels = np.maximum.reduceat(levels[rows], borders, axis=1)
-    shade = np.clip(255 * (levels - levels.max() + 60) / 60, 0, 255).astype(np.uint8)
-    buffer = BytesIO()
-    image = Image.fromarray(style.level_colours()[shade[::-1]]).quantize(48, dither=Image.Dither.NONE)
+    levels, _ = pooled_levels(panel.levels, panel.positions, N_COLUMNS, 160, logarithmic=panel.logarithmic)
+    high, span = float(panel.levels.max()), 60.0 if panel.span is None else panel.span
+    shade = np.clip(255 * (levels - high + span) / span, 0, 255).astype(np.uint8)
+    colours, buffer = style.level_colours(), BytesIO()
+    image = Image.fromarray(colours[shade[::-1]]).quantize(N_SHADES, dither=Image.Dither.NONE)
     image.save(buffer, format="png", optimize=True)
     uri = b64encode(buffer.getvalue()).decode("ascii")
-    limits = (float(order_map.positions[0]), float(order_map.positions[stop - 1]))
-    panel = _Panel(LEFT, 8, width - LEFT - RIGHT, height, limits, (float(time[0]), float(time[-1])), logarithmic=False)
+    x_limits = (float(panel.at[0]), float(panel.at[-1]))
+    y_limits = (float(panel.positions[0]), float(panel.positions[-1]))
+    labels, n_rows = _placed(panel.cursors, x_limits, width - BAR)
+    top = 10 + ROW * n_rows
+    frame = _Panel(LEFT, top, width - LEFT - RIGHT - BAR, height, x_limits, y_limits, panel.logarithmic)
     picture = (
-        f'<image href="data:image/png;base64,{uri}" x="{LEFT}" y="8" width="{panel.width}" height="{height}" '
+        f'<image href="data:image/png;base64,{uri}" x="{LEFT}" y="{top}" width="{frame.width}" height="{height}" '
         'preserveAspectRatio="none"/>'
     )
-    name = f"order (of {order_map.shaft or 'the shaft'})" if order_map.axis == "order" else "frequency (Hz)"
-    return _svg(width, 8 + height + BOTTOM, [picture, panel.axes(name, "time (s)", grid=False)])
+    parts = [picture, frame.axes(panel.x, panel.y, grid=False), frame.cursors(panel.cursors, labels, through=False)]
+    for line in lines:
+        path = frame.path(*_columns(line, x_limits))
+        parts.append(f'<path d="{path}" fill="none" stroke="{line.colour}" stroke-width="1.1"/>')
+    left, n = width - RIGHT - BAR + 12, 32
+    for k in range(n):
+        red, green, blue = colours[255 - 255 * k // (n - 1)]
+        tint = f"#{red:02x}{green:02x}{blue:02x}"
+        parts.append(f'<path d="M{left} {top + height * k / n:g}h9v{height / n:g}h-9z" fill="{tint}" stroke="{tint}"/>')
+    ends = ((top + 9, high), (top + height, high - span))
+    parts += [f'<text x="{left + 13}" y="{y}">{_number(float(f"{level:.3g}"))}</text>' for y, level in ends]
+    middle = f"translate({left + 24} {top + height / 2}) rotate(-90)"
+    parts.append(f'<text transform="{middle}" text-anchor="middle">{escape(panel.unit)}</text>')
+    return _svg(width, top + height + BOTTOM, parts)
 
 
 def svg_ring(
@@ -226,7 +255,10 @@ class _Panel:
         return np.asarray(self.top + (1 - np.clip(share, -0.02, 1.02)) * self.height)
 
     def path(self, x: FloatArray, y: FloatArray) -> str:
-        return _path(self.across(x), self.up(y))
+        known = np.isfinite(y)
+        starts = np.flatnonzero(np.diff(known, prepend=False) & known)
+        stops = np.flatnonzero(np.diff(known, append=False) & known) + 1
+        return "".join(_path(self.across(x[a:b]), self.up(y[a:b])) for a, b in zip(starts, stops, strict=True))
 
     def axes(self, x: str, y: str, *, grid: bool = True) -> str:
         bottom, right = self.top + self.height, self.left + self.width
@@ -253,7 +285,7 @@ class _Panel:
             f'<text transform="translate(11 {middle}) rotate(-90)" text-anchor="middle">{escape(y)}</text>'
         )
 
-    def cursors(self, cursors: Sequence[Cursor], labels: Sequence[tuple[Cursor, int]]) -> str:
+    def cursors(self, cursors: Sequence[Cursor], labels: Sequence[tuple[Cursor, int]], *, through: bool = True) -> str:
         parts = []
         for kind in dict.fromkeys(cursor.kind for cursor in cursors):
             at = [
@@ -261,7 +293,7 @@ class _Panel:
                 for c in cursors
                 if c.kind == kind and self.x[0] <= c.position <= self.x[1]
             ]
-            d = "".join(f"M{value:.1f} {self.top}v{self.height}" for value in at)
+            d = "".join(f"M{value:.1f} {self.top}v{self.height if through else -5}" for value in at)
             colour = style.CURSOR_COLOURS.get(kind, style.FAULT)
             dash = "" if kind == "mesh" else ' stroke-dasharray="4 3"'
             parts.append(f'<path d="{d}" stroke="{colour}" stroke-opacity="0.55"{dash}/>')
@@ -317,7 +349,7 @@ def _columns(curve: Curve, limits: tuple[float, float], n_columns: int = N_COLUM
     if len(x) <= 2 * n_columns:
         return x, y
     borders = list(pairwise(np.linspace(0, len(x), n_columns + 1).astype(int)))
-    chosen = [a + int(np.argmax(y[a:b])) for a, b in borders]
+    chosen = [a + int(np.argmax(y[a:b])) for a, b in borders]  # of gaps the first: nan is the largest to argmax
     if not curve.peaks:
         chosen += [a + int(np.argmin(y[a:b])) for a, b in borders]
     at = np.unique(chosen)

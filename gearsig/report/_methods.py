@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from gearsig.cache import write_text
 from gearsig.checks import closest_match_hint, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.methods import METHODS, TRANSFORMS, MethodAnswer, apply_method
-from gearsig.plot import Captioned
+from gearsig.plot import Picture, embed, svg_panel
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
 from gearsig.report._files import made_folder
@@ -100,14 +99,14 @@ def fitting_methods(
 ) -> tuple[str, ...]:
     """Return the methods that a recording calls for, besides those that every page has.
 
-    A run-up or coast-down: order map, frequency map and tracked orders. A suspected crack or other damage of a tooth:
-    the squeezed transform of its most impulsive mode. Else a suspected bearing: the kurtogram. A simulated motion at a
-    steady speed: its Poincaré section in the phase plane.
+    A run-up or coast-down: the frequency map, beside the order map and the levels over speed that such a page has. A
+    suspected crack or other damage of a tooth: the squeezed transform of its most impulsive mode. Else a suspected
+    bearing: the kurtogram. A simulated motion at a steady speed: its Poincaré section in the phase plane.
     """
     names: list[str] = []
     sweeps = angle is not None and bool(np.ptp(angle.speed_range_rpm) > 0.1 * angle.mean_speed_rpm)
     if sweeps:
-        names += ["order-map", "frequency-map", "tracking"]
+        names.append("frequency-map")
     if suspects_crack:
         names.append("modes+squeezed-cwt")
     elif suspects_bearing:
@@ -119,12 +118,12 @@ def fitting_methods(
 
 def method_pictures(
     names: Sequence[str], prepared: PreparedRecording, channel: str = ""
-) -> tuple[tuple[Captioned, ...], tuple[str, ...]]:
-    """Return the figures of several methods of one channel, and why others have none.
+) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
+    """Return the pictures of several methods of one channel, and why others have none.
 
     Maps over time show the first twelve revolutions, or what is there.
     """
-    pictures: list[Captioned] = []
+    pictures: list[Picture] = []
     reasons: list[str] = []
     for text in names:
         name, options = named_method(text)
@@ -137,6 +136,10 @@ def method_pictures(
         except RefusalError as refusal:
             reasons.append(f"{text}: {refusal}")
             continue
-        caption = f"{answer.caption[0].upper()}{answer.caption[1:]}, {answer.channel}."
-        pictures.append(replace(answer.picture, caption=caption))
+        about = f"{answer.caption[0].upper()}{answer.caption[1:]}, {answer.channel}."
+        if not answer.panels:
+            pictures.append(embed(answer.draw(), about, about))
+        for panel in answer.panels:
+            caption = about if panel is answer.panels[-1] else ""
+            pictures.append(Picture.of_svg(svg_panel(panel), caption, f"{panel.y} over {panel.x}, {answer.channel}."))
     return tuple(pictures), tuple(reasons)

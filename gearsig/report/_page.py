@@ -369,7 +369,7 @@ def _further_methods(
     pictures, reasons = method_pictures(chosen, prepare(analysis.recording, analysis.rig), channel)
     if methods is None:  # nobody asked for what cannot be had
         reasons = ()
-    return tuple(embed(f.figure, f.caption, f.alternative) for f in pictures), reasons
+    return pictures, reasons
 
 
 def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
@@ -557,9 +557,19 @@ def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
     order_map = channel.order_map
     if order_map is None:
         return
-    highest = highest_order_of_interest(analysis, order_map) if order_map.axis == "order" else None
+    highest = highest_order_of_interest(analysis, order_map) if order_map.axis == "order" else np.inf
+    kept = order_map.positions <= highest
+    panel = plot.LevelPanel(
+        plot.decibels(order_map.values[:, kept], order_map.scaling),
+        order_map.positions[kept],
+        order_map.time_s,
+        order_map.axis_label,
+        "time (s)",
+        f"dB re 1 {unit_text(order_map.unit)}".strip(),
+        cursors=[c for c in line_cursors(analysis, order_map, n_sidebands=0) if c.position <= highest],
+    )
     yield Picture.of_svg(
-        plot.svg_map(order_map, highest=highest),
+        plot.svg_panel(panel),
         "Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.",
         f"Levels of {channel.channel} over {order_map.axis} and time.",
     )

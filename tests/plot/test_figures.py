@@ -1,13 +1,16 @@
 """Every kind of figure draws what it is given, at its edges too."""
 
 import gc
+import re
 import weakref
+from base64 import b64decode
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
 from time import perf_counter
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError
@@ -15,12 +18,16 @@ from gearsig.indicators import Indicator
 from gearsig.orders import OrderMap
 from gearsig.plot import (
     AngleMark,
+    ChartLine,
     Cursor,
+    LevelPanel,
+    LinePanel,
     average_figure,
     order_map_figure,
     polar_figure,
     spectrum_figure,
     speed_figure,
+    svg_panel,
     time_figure,
     trend_figure,
 )
@@ -185,3 +192,20 @@ def test_figures_can_be_made_in_threads_and_leave_nothing(spectrum_of):
     assert len({picture for picture, _ in results}) == 1
     gc.collect()
     assert all(figure() is None for _, figure in results)
+
+
+def test_a_panel_as_svg_breaks_lines_at_gaps_and_keeps_the_largest_level() -> None:
+    x = np.arange(5.0)
+    line = ChartLine(x, np.array([0.0, 1.0, np.nan, 1.0, 0.0]), "a")
+    (d,) = re.findall(r'd="([^"]+)" fill="none" stroke', svg_panel(LinePanel([line], "x", "y")))
+    assert d.count("M") == 2
+    levels = np.full((400, 3000), -90.0)
+    levels[100, 1500] = 0.0
+    panel = LevelPanel(levels, np.arange(3000.0), np.arange(400.0), "x", "y", "dB")
+    packed = re.search(r"base64,([^\"]+)", svg_panel(panel))
+    assert packed is not None
+    picture = np.asarray(Image.open(BytesIO(b64decode(packed[1]))).convert("L"), dtype=float)
+    row, column = np.unravel_index(picture.argmin(), picture.shape)  # dark is high
+    assert (1 - (row + 0.5) / picture.shape[0]) * 400 == pytest.approx(100, abs=3)
+    assert (column + 0.5) / picture.shape[1] * 3000 == pytest.approx(1500, abs=8)
+    assert np.sum(picture < picture.max()) == 1

@@ -21,7 +21,7 @@ from app.dashboard.components import component_of
 from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
-from gearsig.plot import LONGEST, ChartLine, Cursor, LevelPanel, LinePanel, plain
+from gearsig.plot import LONGEST, ChartLine, Cursor, LevelPanel, LinePanel, plain, pooled_levels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as PictureFigure
@@ -247,12 +247,8 @@ def show_map(
     start = max(int(np.searchsorted(x, span[0] - half)), 0)
     stop = max(int(np.searchsorted(x, span[1] + half)), start + 2)
     part = values[:, start:stop]
-    columns, rows = min(part.shape[1], MAP_COLUMNS), min(len(y), MAP_ROWS)
     # rows of the picture lie at equal steps of y, those of the map need not
-    steps = np.geomspace(y[0], y[-1], rows) if axes.logarithmic else np.linspace(y[0], y[-1], rows)
-    at = np.searchsorted(y, steps).clip(0, len(y) - 1)
-    edges = np.linspace(0, part.shape[1], columns + 1).astype(int)[:-1]
-    pooled = np.maximum.reduceat(np.maximum.reduceat(part, at, axis=0), edges, axis=1) if rows > 1 else part
+    pooled, at = pooled_levels(part, y, MAP_COLUMNS, MAP_ROWS, logarithmic=axes.logarithmic)
     high = float(values.max())
     low = high - dynamic_range_db
     levels = np.clip(255 * (pooled - low) / (high - low), 0, 255).astype(np.uint8)

@@ -284,12 +284,11 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
     cursors = [c for c in line_cursors(analysis, shown_map) if c.kind == "mesh"]
     # over frequency and speed an order is a ray
     rays = [] if lines == "Order" else [ChartLine(c / 60.0 * y, y, "mesh", 2) for c in _mesh_orders(analysis)]
-    x_name = f"order (of {shown_map.shaft or 'the shaft'})" if lines == "Order" else "frequency (Hz)"
     show_map(
         plot.decibels(shown_map.values[rows], shown_map.scaling),
         shown_map.positions,
         y,
-        Axes(x_name, "time (s)" if along == "Time" else "speed (rpm)", (0.0, highest)),
+        Axes(shown_map.axis_label, "time (s)" if along == "Time" else "speed (rpm)", (0.0, highest)),
         state.view_key(f"map of {channel.channel} {lines} {along}", analysis),
         unit=f"dB re 1 {plot.unit_text(shown_map.unit)}",
         cursors=cursors if lines == "Order" else (),
