@@ -18,7 +18,12 @@ from gearsig.orders import OrderMap, order_map
 from sims import reduced_fe
 from sims.gear_pair import build_rig
 from sims.machine import Operation, Profile
-from sims.reduced_fe import FlexiblePair, MeshMaps, SpeedSweep, SpreadingCheck
+from sims.reduced_fe import (
+    FlexiblePair,
+    MeshMaps,
+    SpeedSweep,
+    SpreadingCheck,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

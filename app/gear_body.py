@@ -12,8 +12,8 @@ import numpy as np
 from gearsig.checks import FloatArray, count, within
 from gearsig.plot import gear_mesh_figure, gear_modes_figure, gear_stress_figure
 from gearsig.report import made_folder
-from sims import reduced_fe
-from sims.reduced_fe import (
+from sims import fe_gear
+from sims.fe_gear import (
     CraigBamptonGear,
     CyclicGear,
     CyclicModes,
@@ -98,38 +98,36 @@ def study_gear(
     # beyond 300 modes, the search takes many minutes, and teeth alone move
     within(count(n_modes, "n_modes"), "n_modes", 1, 300)
     on_progress("mesh", 0.0)
-    size = reduced_fe.mesh_size_for(blank, n_dof)
+    size = fe_gear.mesh_size_for(blank, n_dof)
     if reduce:
-        reduced_fe.check_reducible(blank, size)
-    reduced_fe.check_memory(
-        reduced_fe.craig_bampton_bytes(blank, size, reduced_fe.N_COMPARED)
-        if reduce
-        else reduced_fe.sector_bytes(blank, size)
+        fe_gear.check_reducible(blank, size)
+    fe_gear.check_memory(
+        fe_gear.craig_bampton_bytes(blank, size, fe_gear.N_COMPARED) if reduce else fe_gear.sector_bytes(blank, size)
     )
-    mesh = reduced_fe.sector_mesh(blank, size)
+    mesh = fe_gear.sector_mesh(blank, size)
     gear = CyclicGear(mesh, springs)
     on_progress("modes", 0.05)
     elastic = held == "free" and springs is None
-    with reduced_fe.one_thread():
-        modes = reduced_fe.cyclic_modes(gear, n_modes, held, elastic=elastic)
+    with fe_gear.one_thread():
+        modes = fe_gear.cyclic_modes(gear, n_modes, held, elastic=elastic)
     on_progress("stress", 0.25 if reduce else 0.6)
-    load = reduced_fe.load_tooth(mesh, force_n)
+    load = fe_gear.load_tooth(mesh, force_n)
     error = None
-    if mesh.n_dof < reduced_fe.FINER_DOF / 2:
+    if mesh.n_dof < fe_gear.FINER_DOF / 2:
         on_progress("finer mesh", 0.3)
-        error = reduced_fe.discretisation_error(gear, modes, load, held, elastic=elastic)
+        error = fe_gear.discretisation_error(gear, modes, load, held, elastic=elastic)
     reduced = both = None
     if reduce:
         on_progress("free-interface reduction", 0.35)
-        reduced = reduced_fe.cached_gear(blank, reduced_fe.ReductionPlan(size))
+        reduced = fe_gear.cached_gear(blank, fe_gear.ReductionPlan(size))
         on_progress("Craig–Bampton reduction", 0.7)
         # contact patches along the face, where the mesh has layers enough
-        plan = reduced_fe.CraigBamptonPlan(n_slices=min(5, mesh.tooth.shape[2]))
-        both = reduced_fe.craig_bampton(mesh, plan)
+        plan = fe_gear.CraigBamptonPlan(n_slices=min(5, mesh.tooth.shape[2]))
+        both = fe_gear.craig_bampton(mesh, plan)
     on_progress("done", 1.0)
     return GearBodyStudy(
         mesh,
-        reduced_fe.mesh_quality(mesh),
+        fe_gear.mesh_quality(mesh),
         gear,
         held if springs is None else "springs",
         modes,
@@ -155,10 +153,10 @@ def write_gear_body(study: GearBodyStudy, folder: Path, *, vtk: bool = False) ->
         paths.append(folder / f"{name}.png")
         figure.savefig(paths[-1], dpi=160)
     if vtk:
-        paths.append(reduced_fe.write_vtk(folder / "gear.vtu", study.mesh, _fields(study)))
+        paths.append(fe_gear.write_vtk(folder / "gear.vtu", study.mesh, _fields(study)))
     if study.reduced is not None:
         paths.append(folder / "reduced.npz")
-        reduced_fe.write_gear(paths[-1], study.reduced)
+        fe_gear.write_gear(paths[-1], study.reduced)
     if study.craig_bampton is not None:
         paths.append(folder / "craig_bampton.txt")
         paths[-1].write_text(study.craig_bampton.accuracy.table() + "\n", encoding="utf-8")
@@ -167,7 +165,7 @@ def write_gear_body(study: GearBodyStudy, folder: Path, *, vtk: bool = False) ->
 
 def figures(study: GearBodyStudy) -> dict[str, Figure]:
     """Return mesh, modes and stress by their files' names; a mesh of first order has no stress worth showing."""
-    mesh, view = study.mesh, reduced_fe.face_view(study.mesh)
+    mesh, view = study.mesh, fe_gear.face_view(study.mesh)
     g = mesh.blank.geometry
     name = f"{g.teeth} teeth, module {g.module_mm:g} mm"
     near = (g.root_radius_mm - 3.0 * g.module_mm, g.tip_radius_mm + 0.5 * g.module_mm)
@@ -230,7 +228,7 @@ def _cells(study: GearBodyStudy) -> str:
 def label(study: GearBodyStudy, k: int) -> str:
     """Frequency and kind of mode k."""
     n = int(study.modes.nodal_diameters[k])
-    whole = reduced_fe.rigid_part(study.gear, study.modes, k)
+    whole = fe_gear.rigid_part(study.gear, study.modes, k)
     kind = whole or f"{n} nodal diameter{'s' if n != 1 else ''}"
     return f"{study.modes.frequencies_hz[k]:.1f} Hz, {kind}"
 
@@ -245,12 +243,12 @@ def in_the_whole_gear(mesh: SectorMesh, vectors: FloatArray) -> FloatArray:
 
 def _motion(study: GearBodyStudy, view: FaceView, k: int) -> FloatArray:
     """Motion of the view's points in the axes of the whole gear."""
-    return in_the_whole_gear(study.mesh, reduced_fe.mode_field(study.gear, study.modes, k)[:, view.nodes])
+    return in_the_whole_gear(study.mesh, fe_gear.mode_field(study.gear, study.modes, k)[:, view.nodes])
 
 
 def _stress(study: GearBodyStudy, near: tuple[float, float, float, float], name: str) -> Figure:
-    load, view = study.load, reduced_fe.face_view(study.mesh, NEIGHBOURS)
-    point, push = reduced_fe.point_and_push(study.mesh.blank.geometry, load.roll_rad, 1.0)
+    load, view = study.load, fe_gear.face_view(study.mesh, NEIGHBOURS)
+    point, push = fe_gear.point_and_push(study.mesh.blank.geometry, load.roll_rad, 1.0)
     return gear_stress_figure(
         view.points_mm,
         view.triangles,
@@ -270,7 +268,5 @@ def _fields(study: GearBodyStudy) -> dict[str, FloatArray]:
         "von_mises_pa": np.array([study.load.von_mises_pa(k) for k in range(z)]),
     }
     for k in range(min(N_SHOWN, len(study.modes.frequencies_hz))):
-        fields[f"mode_{k + 1}_{study.modes.frequencies_hz[k]:.0f}_hz"] = reduced_fe.mode_field(
-            study.gear, study.modes, k
-        )
+        fields[f"mode_{k + 1}_{study.modes.frequencies_hz[k]:.0f}_hz"] = fe_gear.mode_field(study.gear, study.modes, k)
     return fields

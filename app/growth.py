@@ -17,20 +17,22 @@ from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.plot import CurvePanel, curves_figure
 from gearsig.report import made_folder
-from sims.mesh import GearMesh
-from sims.reduced_fe import (
+from sims.fe_gear import (
     READY,
-    CrackGrowth,
     GearBlank,
-    GrowthLaw,
     ReducedGear,
-    StressIntensity,
     cached_gear,
-    crack_growth,
     crack_size,
     deepest_followed_mm,
     plan_for,
     ready_gear,
+)
+from sims.mesh import GearMesh
+from sims.reduced_fe import (
+    CrackGrowth,
+    GrowthLaw,
+    StressIntensity,
+    crack_growth,
     stress_intensity,
 )
 

@@ -128,8 +128,9 @@ def gear_body(
     """
     from app.gear_body import lines, study_gear, write_gear_body
     from gearsig.checks import one_of
+    from sims.fe_gear import GearBlank
     from sims.mesh import GearGeometry
-    from sims.reduced_fe import NAME, GearBlank
+    from sims.reduced_fe import NAME
 
     def length(text: str, name: str) -> float | None:
         return quantity(text, "mm", name) if text else None

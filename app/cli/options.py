@@ -250,7 +250,8 @@ def clear_other_versions(model: str | None) -> None:
     InputError
         If the model keeps nothing.
     """
-    from sims.reduced_fe import NAME, forget_other_versions
+    from sims.fe_gear import forget_other_versions
+    from sims.reduced_fe import NAME
 
     if model != NAME:
         raise InputError(f"--fresh is given, but the model {model} keeps nothing", remedy="leave out --fresh")

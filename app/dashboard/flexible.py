@@ -15,10 +15,11 @@ from app.dashboard.widgets.charts import download, packed, show_picture
 from app.gear_body import GearBodyStudy
 from gearsig.checks import FloatArray
 from gearsig.plot import level_colours
-from sims import reduced_fe
+from sims import fe_gear
+from sims.fe_gear import GearBlank
 from sims.mesh import GearGeometry
 from sims.presets import presets
-from sims.reduced_fe import GearBlank, ReducedPair
+from sims.reduced_fe import ReducedPair
 from sims.simulator import SimulationSetup
 
 _solid = component_of("solid")
@@ -48,7 +49,7 @@ class SolidView:
 
 def solid_view(study: GearBodyStudy) -> SolidView:
     """Return what is seen of the study's gear from all sides."""
-    faces = reduced_fe.outer_faces(study.mesh)
+    faces = fe_gear.outer_faces(study.mesh)
     nodes, inverse = np.unique(faces, return_inverse=True)
     n_teeth = study.mesh.blank.n_teeth
     one = np.broadcast_to(study.mesh.points_m[nodes] * 1e3, (n_teeth, len(nodes), 3))
@@ -57,13 +58,13 @@ def solid_view(study: GearBodyStudy) -> SolidView:
 
 
 @st.cache_resource(max_entries=3, show_spinner="Meshing the gear, finding its modes …")
-def studied(blank: GearBlank, held: reduced_fe.Held, force_n: float) -> tuple[GearBodyStudy, SolidView]:
+def studied(blank: GearBlank, held: fe_gear.Held, force_n: float) -> tuple[GearBodyStudy, SolidView]:
     """Mesh, modes and stress of one gear, done once for equal requests."""
     study = gear_body.study_gear(blank, DOF, n_modes=2 * gear_body.N_SHOWN, held=held, force_n=force_n)
     return study, solid_view(study)
 
 
-def choose_blank() -> tuple[GearBlank, reduced_fe.Held, float]:
+def choose_blank() -> tuple[GearBlank, fe_gear.Held, float]:
     """Let the user set teeth, module, width, body, and how it is held."""
     first, second = st.columns(4), st.columns(4)
     teeth = int(first[0].number_input("Teeth", 12, 120, 50, key="gear teeth", persist_state="session"))
@@ -92,7 +93,7 @@ def show_gear() -> None:
             f"von Mises stress, 0 to {top * 1e-6:.3g} MPa, at {study.load.force_n:g} N · drag to turn, wheel to zoom"
         )
     else:
-        field = reduced_fe.mode_field(study.gear, study.modes, names.index(shown))[:, view.nodes]
+        field = fe_gear.mode_field(study.gear, study.modes, names.index(shown))[:, view.nodes]
         values = np.linalg.norm(field, axis=2).ravel()
         top = float(values.max())
         legend = "coloured by the motion · drag to turn, wheel to zoom, arrow keys turn too"

@@ -20,6 +20,7 @@ from gearsig.plot import CurvePanel, ResponseCase, curves_figure
 from gearsig.spectra import amplitude_spectrum
 from gearsig.timefreq import UniformSignal, squeezed_cwt_map
 from sims.cracked import Response, respond
+from sims.fe_gear import compare_crack_laws, crack_added_m_per_n, ready_gear
 from sims.gear_pair import PARAMETERS, build_machine
 from sims.machine import Machine, Operation
 from sims.mesh import (
@@ -31,7 +32,6 @@ from sims.mesh import (
     mesh_stiffness,
 )
 from sims.presets import preset
-from sims.reduced_fe import compare_crack_laws, crack_added_m_per_n, ready_gear
 from sims.simulator import ParameterValue, complete_values
 
 if TYPE_CHECKING:

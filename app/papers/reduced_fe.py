@@ -14,7 +14,7 @@ from app.papers.gallery import Claim, Paper, PaperFigure, Progress, judged, with
 from gearsig import plot
 from gearsig.checks import FloatArray
 from gearsig.plot import CurvePanel, curves_figure
-from sims import reduced_fe
+from sims import fe_gear, reduced_fe
 from sims.machine import Operation
 from sims.reduced_fe import FlexiblePair, ReducedPair
 from sims.simulator import SimulationSetup
@@ -208,14 +208,14 @@ def _kinematics(pair: FlexiblePair, torque_nm: float, step_s: float) -> PaperFig
 def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
     """Full static stress, by modes alone, and what these leave out; then two contacts that move."""
     blank = pair.gears[0].blank
-    mesh = reduced_fe.sector_mesh(blank, reduced_fe.mesh_size_for(blank, MESH_DOF))
-    gear = reduced_fe.CyclicGear(mesh)
-    view = reduced_fe.face_view(mesh, NEIGHBOURS)
+    mesh = fe_gear.sector_mesh(blank, fe_gear.mesh_size_for(blank, MESH_DOF))
+    gear = fe_gear.CyclicGear(mesh)
+    view = fe_gear.face_view(mesh, NEIGHBOURS)
     g = blank.geometry
     near = (g.root_radius_mm - 4.0 * g.module_mm, g.tip_radius_mm + 0.5 * g.module_mm, -12.0, 15.0)
 
     def shown(field: FloatArray) -> dict[str, FloatArray]:
-        by_sector = [reduced_fe.polar_stress_pa(mesh, field[k]) for k in NEIGHBOURS]
+        by_sector = [fe_gear.polar_stress_pa(mesh, field[k]) for k in NEIGHBOURS]
         return {name: view.values(np.array([part[name] for part in by_sector])) for name in by_sector[0]}
 
     maps = pair.maps(torque_nm=np.array([torque_nm]), mesh_cycles=np.linspace(0.0, 1.0, 9)[:-1])
@@ -235,17 +235,17 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
                 float(pair_geometry.contact_radii_mm(np.clip(zeta, 0.0, pair_geometry.contact_ratio))[0])
                 / g.base_radius_mm
             )
-            load = reduced_fe.load_tooth(mesh, force, min(max(roll, g.form_roll_rad), g.tip_roll_rad))
+            load = fe_gear.load_tooth(mesh, force, min(max(roll, g.form_roll_rad), g.tip_roll_rad))
             field += np.roll(load.displacement_m, -1 - number, axis=0)  # the tooth ahead entered earlier
             forces.append(force)
         return field, forces
 
     force = torque_nm / (g.base_radius_mm * 1e-3)
-    load = reduced_fe.load_tooth(mesh, force)
+    load = fe_gear.load_tooth(mesh, force)
     full = shown(load.displacement_m)
-    with reduced_fe.one_thread():
-        modes = reduced_fe.cyclic_modes(gear, N_MODES, "bore")
-    modal = shown(reduced_fe.modal_load(gear, modes, load))
+    with fe_gear.one_thread():
+        modes = fe_gear.cyclic_modes(gear, N_MODES, "bore")
+    modal = shown(fe_gear.modal_load(gear, modes, load))
     error = {f"{name}, full less modal": full[name] - modal[name] for name in full}
     size = float(np.sqrt(np.mean(full["von Mises"] ** 2)))
     left = float(np.sqrt(np.mean(error["von Mises, full less modal"] ** 2))) / size

@@ -17,7 +17,13 @@ from sims.gear_pair import ReadyPair, build_rig, draw_roughness
 from sims.machine import Machine, Operation, log_uniform
 from sims.measure import MeasuredChannel, ModalPath, PathMode
 from sims.mesh import GearGeometry, deepest_crack_mm
-from sims.reduced_fe import TWIN_STEP_S, PreparedPair, ReducedPair, simulate_pair, twin_parameters
+from sims.reduced_fe import (
+    TWIN_STEP_S,
+    PreparedPair,
+    ReducedPair,
+    simulate_pair,
+    twin_parameters,
+)
 from sims.simulator import ParameterValue, SimulationSetup
 
 CALIBRATION_MODULES_MM = (1.5, 2.0, 2.5, 3.0, 4.0)

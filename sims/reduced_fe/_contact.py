@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError, RefusalError
 from sims.compiled import UNCOUNTED
+from sims.fe_gear import ReducedGear, crack_added_m_per_n
 from sims.mesh import (
     HEALTHY,
     GearMesh,
@@ -27,8 +28,6 @@ from sims.mesh import (
     separation_table,
     tooth_rows,
 )
-from sims.reduced_fe._crack import crack_added_m_per_n
-from sims.reduced_fe._reduced_gear import ReducedGear
 
 # Where a tooth pair touches over its progress, and how far apart it is before and after: corner contact.
 

@@ -10,10 +10,9 @@ import numpy as np
 from gearsig.checks import FloatArray, count, not_negative, positive, within
 from gearsig.errors import InputError
 from gearsig.results import Result
+from sims.fe_gear import DEPTH_PARTS, ReducedGear, crack_added_m_per_n, crack_size, deepest_followed_mm
 from sims.mesh import GearMesh, RootCrack, deepest_crack_mm, share_torque
 from sims.reduced_fe._contact import over_height, rolls_rad
-from sims.reduced_fe._crack import DEPTH_PARTS, crack_added_m_per_n, crack_size, deepest_followed_mm
-from sims.reduced_fe._reduced_gear import ReducedGear
 
 
 def energy_release_m(depth_m: FloatArray, compliance_m_per_n: FloatArray, at_m: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, positive, within
 from gearsig.errors import InputError
+from sims.fe_gear import ReducedGear, one_thread
 from sims.gear_pair import (
     BEARING_FIELDS,
     FRICTION_FIELDS,
@@ -23,7 +24,6 @@ from sims.gear_pair import (
 )
 from sims.machine import BearingSupport, Machine, Operation
 from sims.mesh import GearMesh, one_mesh_cycle
-from sims.reduced_fe._blank import one_thread
 from sims.reduced_fe._contact import (
     FLANK,
     SIGNS,
@@ -41,7 +41,6 @@ from sims.reduced_fe._contact import (
     static_table,
     teeth_of,
 )
-from sims.reduced_fe._reduced_gear import ReducedGear
 
 if TYPE_CHECKING:
     from sims.reduced_fe._respond import FlexState

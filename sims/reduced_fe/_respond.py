@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, closest_match_hint, count, positive
 from gearsig.errors import InputError
 from gearsig.results import Result
+from sims.fe_gear import one_thread
 from sims.gear_pair import COORDINATES, YIELDS, PairResponse, RunPlan, StepConvergence, profile_points
 from sims.machine import Operation, Profile
 from sims.mesh import one_mesh_cycle
-from sims.reduced_fe._blank import one_thread
 from sims.reduced_fe._integrate import Method, step_coefficients
 from sims.reduced_fe._pair import (
     FlexiblePair,

@@ -14,6 +14,7 @@ from gearsig.errors import InputError
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from sims.effects import effects, with_effects
+from sims.fe_gear import READY, GearBlank, ReducedGear, cached_gear, plan_for, ready_gear
 from sims.gear_pair import (
     PARAMETERS as SHARED,
 )
@@ -35,10 +36,8 @@ from sims.machine import Machine, Operation
 from sims.measure import plain
 from sims.mesh import Material
 from sims.presets import Preset
-from sims.reduced_fe._blank import GearBlank
 from sims.reduced_fe._contact import MARGIN, corner_separation_m
 from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, eigenfrequencies_hz, torsional_mode
-from sims.reduced_fe._reduced_gear import READY, ReducedGear, cached_gear, plan_for, ready_gear
 from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, check_convergence, followed_step_s, respond
 from sims.simulator import Parameter, ParameterValue, ParameterValues, Values
 

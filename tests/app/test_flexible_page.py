@@ -8,8 +8,14 @@ from streamlit.testing.v1 import AppTest
 
 import app.dashboard
 from app.gear_body import in_the_whole_gear
+from sims.fe_gear import (
+    GearBlank,
+    MeshSize,
+    mesh_quality,
+    outer_faces,
+    sector_mesh,
+)
 from sims.mesh import GearGeometry
-from sims.reduced_fe import GearBlank, MeshSize, mesh_quality, outer_faces, sector_mesh
 
 MAIN = Path(app.dashboard.__file__).parent / "main.py"
 

@@ -11,8 +11,16 @@ from typer.testing import CliRunner
 from app.cli.main import app
 from gearsig.cache import OtherVersionError
 from gearsig.errors import InputError
+from sims.fe_gear import (
+    GearBlank,
+    gear_key,
+    gear_name,
+    plan_for,
+    read_gear,
+    ready_gear,
+    write_gear,
+)
 from sims.mesh import GearGeometry
-from sims.reduced_fe import GearBlank, gear_key, gear_name, plan_for, read_gear, ready_gear, write_gear
 
 SMALL = ["--teeth", "16", "--profile-shift", "0.2", "--face", "10mm", "--bore", "8mm", "--dof", "15000"]
 

@@ -8,8 +8,7 @@ import pytest
 from app.papers import Paper, PaperFigure, judged, paper, within_part, write_paper
 from gearsig.errors import InputError
 from gearsig.plot import CurvePanel, curves_figure
-from sims.mesh import GearGeometry, GearMesh, PairGeometry, friction_compliance, tooth_compliance
-from sims.reduced_fe import (
+from sims.fe_gear import (
     CyclicGear,
     GearBlank,
     MeshSize,
@@ -21,6 +20,7 @@ from sims.reduced_fe import (
     stress_pa,
     von_mises_pa,
 )
+from sims.mesh import GearGeometry, GearMesh, PairGeometry, friction_compliance, tooth_compliance
 
 SMALL = GearBlank(GearGeometry(18, 3.0, face_width_mm=20.0, bore_radius_mm=6.0))
 SIZE = MeshSize(n_across=2, n_gap=1, n_up=3, n_rim=1, n_body=1, n_along=1)

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from time import process_time
 
-from sims.reduced_fe import (
+from sims.fe_gear import (
     READY,
     CyclicGear,
     MeshSize,
@@ -22,7 +22,7 @@ from sims.reduced_fe import (
     reduce_gear,
     sector_mesh,
 )
-from tests.sims.reduced_fe.fe_gears import full_modes
+from tests.sims.fe_gear.fe_gears import full_modes
 
 GEAR = READY["z50_m3"]
 WANTED = 277_200

@@ -7,9 +7,9 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.recording import check_memory, container_free_bytes
-from sims import reduced_fe
-from sims.reduced_fe import mesh_size_for
-from tests.sims.reduced_fe.fe_gears import PAPER
+from sims import fe_gear
+from sims.fe_gear import mesh_size_for
+from tests.sims.fe_gear.fe_gears import PAPER
 
 V1 = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
 V2 = ("memory.max", "memory.current", "inactive_file")
@@ -49,9 +49,9 @@ def test_version_1_with_its_limit_at_the_root_of_what_is_seen(tmp_path: Path, pa
 
 def test_a_reduction_that_the_container_cannot_hold_is_refused(tmp_path: Path) -> None:
     group(tmp_path, V2, 400_000_000, 0.3e9, 0.0)
-    needed = reduced_fe.sector_bytes(PAPER, mesh_size_for(PAPER, 947_000))
+    needed = fe_gear.sector_bytes(PAPER, mesh_size_for(PAPER, 947_000))
     with pytest.raises(InputError, match=r"about 0\.\d+ GB of memory are needed, 0\.1 GB are free"):
-        reduced_fe.check_memory(needed, container_free_bytes(own(tmp_path, "0::/\n"), tmp_path))
+        fe_gear.check_memory(needed, container_free_bytes(own(tmp_path, "0::/\n"), tmp_path))
 
 
 def test_a_file_that_the_container_cannot_hold_is_refused_before_it_is_decoded(tmp_path: Path) -> None:

@@ -22,8 +22,8 @@ from sims.registry import simulator
 from sims.simulator import ParameterValue, SimulationSetup, parameter
 
 if TYPE_CHECKING:
+    from sims.fe_gear import ReducedGear
     from sims.machine import Machine
-    from sims.reduced_fe import ReducedGear
 
 
 MODEL = "cracked"
@@ -252,7 +252,7 @@ def _greatest(model: str, preset_name: str, name: str, high: float, options: Opt
 
 def _meshed(machine: Machine, gears: tuple[ReducedGear, ...]) -> bool:
     """Whether the finite elements of the gears, if there are any, can follow the cracks."""
-    from sims.reduced_fe import crack_size, deepest_followed_mm
+    from sims.fe_gear import crack_size, deepest_followed_mm
 
     cracks = (machine.mesh.cracks_1, machine.mesh.cracks_2)
     return all(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sims import simulate
+from sims.fe_gear import compare_crack_laws, ready_gear
 from sims.mesh import (
     GearMesh,
     PairGeometry,
@@ -13,7 +14,7 @@ from sims.mesh import (
     mesh_stiffness,
     share_torque,
 )
-from sims.reduced_fe import compare_crack_laws, mesh_maps, ready_gear
+from sims.reduced_fe import mesh_maps
 
 NAMES = ("z50_m3", "z55_m2", "z75_m2")
 

@@ -7,8 +7,9 @@ from functools import cache
 
 import numpy as np
 
+from sims.fe_gear import ready_gear
 from sims.mesh import GearMesh, PairGeometry
-from sims.reduced_fe import FlexiblePair, ReducedPair, ready_gear
+from sims.reduced_fe import FlexiblePair, ReducedPair
 from sims.simulator import SimulationSetup
 from tests.sims.reduced_fe.synthetic import synthetic_gear
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from sims.fe_gear import FlankGrid, GearBlank, ReducedGear
 from sims.mesh import STEEL, GearGeometry, disc_inertia_kg_m2, disc_mass_kg, tooth_compliance
-from sims.reduced_fe import FlankGrid, GearBlank, ReducedGear
 
 BODY_HZ = ((2, 3910.0), (3, 8915.0), (1, 12641.0), (4, 15000.0), (5, 21000.0))
 """Nodal diameters and frequencies; those up to the third are the disc's of the finite-element model."""

@@ -9,7 +9,12 @@ import sims
 from gearsig.errors import InputError
 from sims.gear_pair import YIELDS
 from sims.machine import Operation, RaceDefect
-from sims.reduced_fe import TRANSMISSION_ERROR, bearing_springs, respond, start_state
+from sims.reduced_fe import (
+    TRANSMISSION_ERROR,
+    bearing_springs,
+    respond,
+    start_state,
+)
 from tests.sims.reduced_fe.flexible_pairs import pair_of, synthetic_pair
 
 RUN = Operation.steady(1000.0, 170.0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
+from sims.fe_gear import ready_gear
 from sims.machine import Operation
 from sims.reduced_fe import (
     constants,
@@ -12,7 +13,6 @@ from sims.reduced_fe import (
     growth,
     kept_modes,
     mirror_groups,
-    ready_gear,
     residual_compliance,
     respond,
     spreading_check,

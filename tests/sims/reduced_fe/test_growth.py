@@ -8,21 +8,23 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.mesh import GearGeometry, GearMesh, PairGeometry
-from sims.reduced_fe import (
-    STEEL_IN_AIR,
+from sims.fe_gear import (
     GearBlank,
-    GrowthLaw,
-    GrowthStage,
     MeshSize,
     SectorMesh,
-    crack_growth,
     cylindrical_turn,
-    energy_release_m,
     factorised,
     ready_gear,
     sector_matrices,
     sector_mesh,
+)
+from sims.mesh import GearGeometry, GearMesh, PairGeometry
+from sims.reduced_fe import (
+    STEEL_IN_AIR,
+    GrowthLaw,
+    GrowthStage,
+    crack_growth,
+    energy_release_m,
     stress_intensity,
 )
 

@@ -7,7 +7,15 @@ import pytest
 
 from gearsig.errors import InputError
 from sims.mesh import GearGeometry, GearMesh, Lead, PairGeometry, RootCrack, load_dependent_contact_coefficient
-from sims.reduced_fe import MeshMaps, folded, force_map, mesh_maps, mirror_groups, mirrors, static_table
+from sims.reduced_fe import (
+    MeshMaps,
+    folded,
+    force_map,
+    mesh_maps,
+    mirror_groups,
+    mirrors,
+    static_table,
+)
 from tests.sims.reduced_fe.flexible_pairs import ready_mesh
 from tests.sims.reduced_fe.synthetic import synthetic_gear
 

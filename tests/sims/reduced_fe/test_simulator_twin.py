@@ -12,7 +12,14 @@ from gearsig.gap import Added, OperatingCondition
 from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 from sims import simulate
 from sims.effects import effects
-from sims.reduced_fe import TRANSMISSION_ERROR, TWIN_STEP_S, ReducedPair, ReducedTwin, constants, respond
+from sims.reduced_fe import (
+    TRANSMISSION_ERROR,
+    TWIN_STEP_S,
+    ReducedPair,
+    ReducedTwin,
+    constants,
+    respond,
+)
 from sims.registry import gap_simulator
 from sims.simulator import SimulationSetup
 from tests.sims.reduced_fe.synthetic import synthetic_gear

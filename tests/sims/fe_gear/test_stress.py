@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.mesh import GearGeometry
-from sims.reduced_fe import (
+from sims.fe_gear import (
     GearBlank,
     MeshSize,
     cyclic_modes,
@@ -21,7 +20,8 @@ from sims.reduced_fe import (
     von_mises_pa,
     write_vtk,
 )
-from tests.sims.reduced_fe.fe_gears import COARSE, SMALL, full_matrices, small_cyclic, small_reduced
+from sims.mesh import GearGeometry
+from tests.sims.fe_gear.fe_gears import COARSE, SMALL, full_matrices, small_cyclic, small_reduced
 
 
 def test_uniaxial_tension_has_its_own_stress() -> None:

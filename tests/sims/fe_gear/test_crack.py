@@ -9,8 +9,7 @@ from scipy import sparse
 
 from gearsig.cache import OtherVersionError
 from gearsig.errors import InputError
-from sims.mesh import RootCrack, deepest_crack_mm, tooth_compliance
-from sims.reduced_fe import (
+from sims.fe_gear import (
     MeshSize,
     crack_added_m_per_n,
     crack_meshes,
@@ -26,7 +25,8 @@ from sims.reduced_fe import (
     sector_mesh,
     tooth_compliance_with,
 )
-from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, small_cyclic, small_reduced
+from sims.mesh import RootCrack, deepest_crack_mm, tooth_compliance
+from tests.sims.fe_gear.fe_gears import COARSE, PAPER, SMALL, small_cyclic, small_reduced
 
 SIZE = MeshSize(4, 1, 4, 2, 1, 2)
 
@@ -119,7 +119,7 @@ def test_between_solved_depths_and_widths_the_table_is_that_of_the_crack() -> No
 
 def test_cracks_of_other_gears_are_kept_on_disk(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path))
-    monkeypatch.setattr("sims.reduced_fe._crack.COARSE_SIZE", SIZE)
+    monkeypatch.setattr("sims.fe_gear._crack.COARSE_SIZE", SIZE)
     gear, crack = small_reduced(), RootCrack(1.3, 60.0)
     first = crack_added_m_per_n(gear, crack)
     kept = sorted((tmp_path / "cracks").iterdir())

@@ -18,8 +18,7 @@ import numpy as np
 from gearsig.cache import FRESH, OtherVersionError, cache_folder, modules_digest, read_arrays, write_whole
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
 from gearsig.errors import InputError
-from sims.mesh import GearGeometry, involute_outline
-from sims.reduced_fe._blank import (
+from sims.fe_gear._blank import (
     GearBlank,
     MeshSize,
     check_memory,
@@ -30,7 +29,7 @@ from sims.reduced_fe._blank import (
     row_places,
     side_curve,
 )
-from sims.reduced_fe._cyclic import (
+from sims.fe_gear._cyclic import (
     ComplexArray,
     CyclicGear,
     CyclicModes,
@@ -38,7 +37,8 @@ from sims.reduced_fe._cyclic import (
     cyclic_modes,
     hub_sum,
 )
-from sims.reduced_fe._mesh import IntArray, SectorMesh, line_weights, mesh_quality, parabolic_weights, sector_mesh
+from sims.fe_gear._mesh import IntArray, SectorMesh, line_weights, mesh_quality, parabolic_weights, sector_mesh
+from sims.mesh import GearGeometry, involute_outline
 
 Support = Literal["free", "hub_held", "bore_clamped"]
 """How the body is held while a flank is pushed; see `ReducedGear.compliance_m_per_n`."""
@@ -510,7 +510,7 @@ def reduce_gear(blank: GearBlank, plan: ReductionPlan) -> ReducedGear:
     attachment modes; D. L. Thomas, International Journal for Numerical Methods in Engineering 14 (1979), for cyclic
     symmetry.
     """
-    from sims.reduced_fe._blank import sector_bytes
+    from sims.fe_gear._blank import sector_bytes
 
     if plan.n_offsets > blank.n_teeth // 2:
         raise InputError(f"n_offsets is {plan.n_offsets}", allowed=f"at most {blank.n_teeth // 2}, half of the teeth")
@@ -638,7 +638,7 @@ def _real_modes(
 FORMAT = 1
 """Of the file and of what its numbers mean; raised when either changes."""
 _SOURCES = (
-    *(f"sims.reduced_fe.{name}" for name in ("_blank", "_mesh", "_cyclic", "_reduced_gear")),
+    *(f"sims.fe_gear.{name}" for name in ("_blank", "_mesh", "_cyclic", "_reduced_gear")),
     "sims.mesh._geometry",
 )
 """Modules whose code changes a reduced gear; the last makes the outline."""
@@ -769,7 +769,7 @@ def is_of_this_code(path: Path) -> bool:
         return False
 
 
-# Reduced gears that come with the product: `python -m sims.reduced_fe._reduced_gear` makes their files again. Their
+# Reduced gears that come with the product: `python -m sims.fe_gear._reduced_gear` makes their files again. Their
 # cracks are in a file of their own.
 
 FOLDER = Path(__file__).parent / "gears"

@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gearsig.errors import InputError
-from sims.mesh import GearGeometry, Material
-from sims.reduced_fe import (
+from sims.fe_gear import (
     READY,
     CyclicGear,
     GearBlank,
@@ -27,7 +26,8 @@ from sims.reduced_fe import (
     sector_matrices,
     sector_mesh,
 )
-from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL
+from sims.mesh import GearGeometry, Material
+from tests.sims.fe_gear.fe_gears import COARSE, PAPER, SMALL
 
 WEB = GearBlank(
     GearGeometry(30, 3.0, bore_radius_mm=12.0), web_thickness_mm=6.0, rim_thickness_mm=5.0, hub_thickness_mm=6.0

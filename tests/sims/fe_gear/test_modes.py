@@ -7,8 +7,7 @@ import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.mesh import Material
-from sims.reduced_fe import (
+from sims.fe_gear import (
     CyclicGear,
     CyclicModes,
     GearBlank,
@@ -19,7 +18,8 @@ from sims.reduced_fe import (
     modes_of_diameter,
     sector_mesh,
 )
-from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, full_matrices, full_modes, small_cyclic
+from sims.mesh import Material
+from tests.sims.fe_gear.fe_gears import COARSE, PAPER, SMALL, full_matrices, full_modes, small_cyclic
 
 
 def repeated(modes: CyclicModes, n_sectors: int) -> FloatArray:

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from gearsig.checks import FloatArray, count, frozen_array
 from gearsig.errors import InputError
 from gearsig.results import Result
-from sims.reduced_fe._mesh import IntArray, SectorMesh, sector_matrices, whole_weights
+from sims.fe_gear._mesh import IntArray, SectorMesh, sector_matrices, whole_weights
 
 # A sector is its own mirror image: in the right coordinates its Hermitian matrices are real.
 

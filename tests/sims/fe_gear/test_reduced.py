@@ -9,8 +9,7 @@ import pytest
 from gearsig.cache import OtherVersionError
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.mesh import foundation_compliance, tooth_compliance
-from sims.reduced_fe import (
+from sims.fe_gear import (
     PLAN,
     READY,
     CyclicGear,
@@ -33,7 +32,8 @@ from sims.reduced_fe import (
     static_compliance,
     write_gear,
 )
-from tests.sims.reduced_fe.fe_gears import COARSE, PAPER, SMALL, full_matrices, small_cyclic, small_reduced
+from sims.mesh import foundation_compliance, tooth_compliance
+from tests.sims.fe_gear.fe_gears import COARSE, PAPER, SMALL, full_matrices, small_cyclic, small_reduced
 
 ARRAYS = ("frequencies_hz", "flank_modes", "free_compliance_m_per_n", "clamped_compliance_m_per_n", "hub_compliance")
 
@@ -210,7 +210,7 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path, monkeypatch: pytest.M
     flip(path)
     with pytest.raises(InputError, match="is not a reduced gear"):
         read_gear(path)
-    monkeypatch.setattr("sims.reduced_fe._reduced_gear.FORMAT", 999)
+    monkeypatch.setattr("sims.fe_gear._reduced_gear.FORMAT", 999)
     write_gear(path, small_reduced())
     monkeypatch.undo()
     with pytest.raises(InputError, match="is of format 999: another version of gearsig wrote it"):

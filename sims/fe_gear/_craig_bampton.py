@@ -10,12 +10,12 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count
 from gearsig.errors import InputError
-from sims.reduced_fe._blank import (
+from sims.fe_gear._blank import (
     check_memory,
     craig_bampton_bytes,
     one_thread,
 )
-from sims.reduced_fe._cyclic import (
+from sims.fe_gear._cyclic import (
     ComplexArray,
     CyclicGear,
     CyclicModes,
@@ -23,8 +23,8 @@ from sims.reduced_fe._cyclic import (
     hub_sum,
     lowest_with_static,
 )
-from sims.reduced_fe._mesh import IntArray, SectorMesh
-from sims.reduced_fe._reduced_gear import (
+from sims.fe_gear._mesh import IntArray, SectorMesh
+from sims.fe_gear._reduced_gear import (
     N_HUB,
     flank_grid,
     height_nodes,

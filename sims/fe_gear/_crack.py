@@ -17,19 +17,10 @@ from scipy import sparse
 from gearsig.cache import FRESH, OtherVersionError, cache_folder, keep, modules_digest, read_arrays, write_whole
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.mesh import (
-    CRACK_LAWS,
-    RootCrack,
-    check_crack,
-    crack_mouth_mm,
-    crack_tip_mm,
-    deepest_crack_mm,
-    tooth_compliance,
-)
-from sims.reduced_fe._blank import GearBlank, MeshSize, one_thread
-from sims.reduced_fe._cyclic import factorised
-from sims.reduced_fe._mesh import CrackLine, IntArray, SectorMesh, sector_matrices, sector_mesh
-from sims.reduced_fe._reduced_gear import (
+from sims.fe_gear._blank import GearBlank, MeshSize, one_thread
+from sims.fe_gear._cyclic import factorised
+from sims.fe_gear._mesh import CrackLine, IntArray, SectorMesh, sector_matrices, sector_mesh
+from sims.fe_gear._reduced_gear import (
     FOLDER,
     READY,
     FlankGrid,
@@ -39,6 +30,15 @@ from sims.reduced_fe._reduced_gear import (
     flank_rows,
     is_of_this_code,
     ready_gear,
+)
+from sims.mesh import (
+    CRACK_LAWS,
+    RootCrack,
+    check_crack,
+    crack_mouth_mm,
+    crack_tip_mm,
+    deepest_crack_mm,
+    tooth_compliance,
 )
 
 CRACK_SIZE = MeshSize(n_across=8, n_gap=1, n_up=9, n_rim=3, n_body=2, n_along=4)
@@ -454,7 +454,7 @@ def _read(path: Path) -> tuple[str, FloatArray | None]:
 @cache
 def _code() -> str:
     """Digest of the code that meshes a gear, opens and solves a crack."""
-    return f"{code_digest()}-{modules_digest(('sims.reduced_fe._crack',))}"
+    return f"{code_digest()}-{modules_digest(('sims.fe_gear._crack',))}"
 
 
 def forget_other_versions() -> tuple[Path, ...]:

@@ -11,8 +11,7 @@ from scipy import sparse
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.mesh import GearGeometry, Material, fillet_outline, involute_outline, root_half_angle_rad
-from sims.reduced_fe._blank import (
+from sims.fe_gear._blank import (
     Curve,
     GearBlank,
     MeshSize,
@@ -26,6 +25,7 @@ from sims.reduced_fe._blank import (
     side_curve,
     with_middles,
 )
+from sims.mesh import GearGeometry, Material, fillet_outline, involute_outline, root_half_angle_rad
 
 # The transverse plane of one sector: nine-node quadrilaterals in five blocks.
 #

@@ -8,8 +8,7 @@ from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from gearsig.checks import FloatArray
-from sims.mesh import GearGeometry
-from sims.reduced_fe import (
+from sims.fe_gear import (
     CyclicGear,
     GearBlank,
     MeshSize,
@@ -19,6 +18,7 @@ from sims.reduced_fe import (
     reduce_gear,
     sector_mesh,
 )
+from sims.mesh import GearGeometry
 
 SMALL = GearBlank(GearGeometry(12, 3.0, profile_shift=0.4, face_width_mm=12.0, bore_radius_mm=6.0))
 COARSE = MeshSize(2, 1, 3, 1, 1, 1)

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from sims.reduced_fe import (
+from sims.fe_gear import (
     CraigBamptonGear,
     CraigBamptonPlan,
     CyclicGear,
@@ -22,7 +22,7 @@ from sims.reduced_fe import (
     mesh_size_for,
     sector_mesh,
 )
-from tests.sims.reduced_fe.fe_gears import PAPER, full_matrices, small_cyclic
+from tests.sims.fe_gear.fe_gears import PAPER, full_matrices, small_cyclic
 
 PLAN = CraigBamptonPlan(n_dof=120, n_teeth=2, n_slices=3, n_auxiliary=2, n_shapes=20)
 
