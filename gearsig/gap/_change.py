@@ -83,20 +83,20 @@ def segment_changes(now: ReducedRecording, healthy: ReducedRecording) -> FloatAr
     return changes
 
 
-def _segments(gathered: ReducedRecording, channel: str) -> FloatArray:
+def _segments(reduced: ReducedRecording, channel: str) -> FloatArray:
     """Return the levels of the three parts of each segment, (n_harmonics, 3), in dB."""
     power = np.zeros((N_MESH_HARMONICS, 3))
     floor = np.zeros((N_MESH_HARMONICS, 2))
     for side in (DRIVER, DRIVEN):
-        average = gathered.average(channel, side)
+        average = reduced.average(channel, side)
         square, noise, teeth = np.abs(average.lines) ** 2, average.noise, average.teeth
         for k in range(1, N_MESH_HARMONICS + 1):
             low, high = round((k - 0.5) * teeth) + 1, round((k + 0.5) * teeth)
             if high > average.highest:
                 power[k - 1] = np.nan
                 continue
-            own = np.arange(low, high) != k * teeth
-            beside, under = square[low:high][own], noise[low:high][own]
+            is_own_sideband = np.arange(low, high) != k * teeth
+            beside, under = square[low:high][is_own_sideband], noise[low:high][is_own_sideband]
             power[k - 1, REPEATED] += max(float(np.sum(beside - under)), 0.0)
             floor[k - 1, 1] += float(under.sum())
             if side == DRIVER:
@@ -108,8 +108,8 @@ def _segments(gathered: ReducedRecording, channel: str) -> FloatArray:
 
 
 def _seen(values: FloatArray) -> FloatArray:
-    found: FloatArray = values[np.isfinite(values)]
-    return found
+    finite: FloatArray = values[np.isfinite(values)]
+    return finite
 
 
 def _median(values: FloatArray) -> float:
@@ -158,14 +158,14 @@ def _scatter(changes: FloatArray) -> float:
     return float(np.sqrt(np.mean((changes - changes.mean(axis=0)) ** 2))) if len(changes) > 1 else 0.0
 
 
-def _mesh_levels(gathered: ReducedRecording) -> FloatArray:
+def _mesh_levels(reduced: ReducedRecording) -> FloatArray:
     """Return the mesh harmonics' levels, (n_channels, n_harmonics), in dB."""
-    return _decibels(np.array([average.mesh_lines for average in gathered.averages(DRIVER)]))
+    return _decibels(np.array([average.mesh_lines for average in reduced.averages(DRIVER)]))
 
 
-def _floor_levels(gathered: ReducedRecording) -> FloatArray:
+def _floor_levels(reduced: ReducedRecording) -> FloatArray:
     """Return the residual's levels in bands, (n_channels, n_bands), in dB."""
-    return _decibels(np.array([sums.moments.mean(axis=0)[:, 0] for sums in gathered.channels.values()]))
+    return _decibels(np.array([sums.moments.mean(axis=0)[:, 0] for sums in reduced.channels.values()]))
 
 
 def _decibels(power: FloatArray) -> FloatArray:
@@ -231,8 +231,8 @@ def _with_scatter(names: tuple[str, ...], values: FloatArray, *left_out: FloatAr
     return Features(names, values, np.sqrt(variance), left_out)
 
 
-def _parts(gathered: ReducedRecording) -> Iterator[ReducedRecording]:
-    return (gathered.without(block) for block in range(gathered.n_blocks))
+def _parts(reduced: ReducedRecording) -> Iterator[ReducedRecording]:
+    return (reduced.without(block) for block in range(reduced.n_blocks))
 
 
 def _joined(
@@ -296,32 +296,32 @@ def surprises(now: ReducedRecording, healthy: ReducedRecording, turned: ShaftLin
     pattern's power about that order, s = `REPEATS`; scaled so that a healthy machine's energy is about 1 all round,
     whatever the machine. A change counts where it is sure, and not where the vibration is loud.
     """
-    found = []
+    surprises_by_channel = []
     n = turned.lines.shape[1]
-    own = lines_of_shaft(healthy, side).lines
-    for row, born, name in zip(turned.lines, own, now.channels, strict=True):
+    healthy_lines = lines_of_shaft(healthy, side).lines
+    for row, born, name in zip(turned.lines, healthy_lines, now.channels, strict=True):
         here = now.average(name, side)
         noise = here.noise[:n] + healthy.average(name, side).noise[:n] + MIN_NOISE * here.mesh_power / n
         expected = np.sqrt(noise + REPEATS**2 * smooth_power(np.abs(born[:n]) ** 2))
         kept = here.residual(_filled(row / expected, here))
-        found.append(kept * np.sqrt(2.0 / max(int(np.count_nonzero(kept)), 1)))
-    return found
+        surprises_by_channel.append(kept * np.sqrt(2.0 / max(int(np.count_nonzero(kept)), 1)))
+    return surprises_by_channel
 
 
-def lines_of_shaft(gathered: ReducedRecording, side: int) -> ShaftLines:
+def lines_of_shaft(reduced: ReducedRecording, side: int) -> ShaftLines:
     """Return the averages' lines in the form that the alignment takes."""
-    averages, frame = gathered.averages(side), gathered.frame
+    averages, frame = reduced.averages(side), reduced.frame
     highest = averages[0].highest
     return ShaftLines(
         frame.shafts[side],
         frame.teeth[side],
         frame.teeth[1 - side],
         np.stack([average.lines[: highest + 1] for average in averages]),
-        int(gathered.n_revolutions * frame.shaft_orders[side]),
+        int(reduced.n_revolutions * frame.shaft_orders[side]),
         highest,
-        gathered.speed_hz * frame.shaft_orders[side],
-        tuple(gathered.channels),
-        gathered.marks[side],
+        reduced.speed_hz * frame.shaft_orders[side],
+        tuple(reduced.channels),
+        reduced.marks[side],
     )
 
 
@@ -428,9 +428,9 @@ def seen_rows(names: Sequence[str], distances: FloatArray) -> FloatArray:
 
 def _pairs(place: dict[str, int]) -> list[tuple[str, str]]:
     of_a_shaft = _OF_A_SHAFT + _OF_A_DIFFERENCE
-    found = [(a.format(side), b.format(side)) for side in SIDES for a, b in of_a_shaft]
-    found += [(name.format(SIDES[0]), name.format(SIDES[1])) for name in _BETWEEN_SHAFTS]
-    return [pair for pair in (*found, *_OF_ALL) if pair[0] in place and pair[1] in place]
+    pairs = [(a.format(side), b.format(side)) for side in SIDES for a, b in of_a_shaft]
+    pairs += [(name.format(SIDES[0]), name.format(SIDES[1])) for name in _BETWEEN_SHAFTS]
+    return [pair for pair in (*pairs, *_OF_ALL) if pair[0] in place and pair[1] in place]
 
 
 def mirrored(names: Sequence[str]) -> np.ndarray:

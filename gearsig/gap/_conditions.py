@@ -154,8 +154,10 @@ def with_channels_of(simulation: ReducedRecording, now: ReducedRecording) -> Red
     """Return a simulation with the recording's channels: those of equal name, or else in their order."""
     if set(now.channels) <= set(simulation.channels):
         return simulation.with_channels({name: simulation.channels[name] for name in now.channels})
-    own = list(simulation.channels.values())
-    return simulation.with_channels({name: own[i % len(own)] for i, name in enumerate(now.channels)})
+    simulated_channels = list(simulation.channels.values())
+    return simulation.with_channels(
+        {name: simulated_channels[i % len(simulated_channels)] for i, name in enumerate(now.channels)}
+    )
 
 
 def compare(
@@ -207,19 +209,19 @@ def matching_reference(
     """Return the reference at the recording's point, with the channels of both, or none and why."""
     if not references:
         return None, ""
-    nearest = min(references, key=lambda one: _distance(now, rig, one))
-    found = nearest.reduced
-    change = now.speed_hz / found.speed_hz - 1.0
+    nearest = min(references, key=lambda candidate: _distance(now, rig, candidate))
+    reference = nearest.reduced
+    change = now.speed_hz / reference.speed_hz - 1.0
     if abs(change) > LARGEST_SPEED_DIFFERENCE:
         return None, f"no reference within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
     if _torque_difference(rig, nearest.rig) > LARGEST_TORQUE_DIFFERENCE:
         here, there = _torque_nm(rig), _torque_nm(nearest.rig)
         return None, f"the reference at its speed has {there:.3g} N m, the recording {here:.3g} N m"
     if nearest.whole is not None:
-        found = as_long_as(nearest.whole, found, now)
-    named = _with_names_of(found, now)
+        reference = as_long_as(nearest.whole, reference, now)
+    named = _with_names_of(reference, now)
     if named is None:
-        return None, f"the reference has the channels {', '.join(found.channels)}"
+        return None, f"the reference has the channels {', '.join(reference.channels)}"
     return replace(nearest, reduced=named), ""
 
 
@@ -227,17 +229,17 @@ MUCH_LONGER = 1.25
 """Times the revolutions of the other recording."""
 
 
-def as_long_as(recording: PreparedRecording, reduced: ReducedRecording, other: ReducedRecording) -> ReducedRecording:
+def as_long_as(recording: PreparedRecording, reduced: ReducedRecording, shorter: ReducedRecording) -> ReducedRecording:
     """Return a recording reduced over as many revolutions as another one has, where those are few.
 
     An average over few revolutions holds more of the other shaft and of noise, and its lines are wider: of a healthy
     machine 8 revolutions beside 60 differ by 1.0 structural floors, beside 8 by 0.5. `ShaftAverage.power` sees to that
     from `NOMINAL_REVOLUTIONS` on.
     """
-    fewest = other.fewest_revolutions
+    fewest = shorter.fewest_revolutions
     if fewest >= NOMINAL_REVOLUTIONS or reduced.fewest_revolutions <= MUCH_LONGER * fewest:
         return reduced
-    part = recording.recording.between(0.0, (other.n_revolutions + LEAD) / reduced.speed_hz)
+    part = recording.recording.between(0.0, (shorter.n_revolutions + LEAD) / reduced.speed_hz)
     return reduce_recording(part, channels=tuple(reduced.channels))
 
 
@@ -275,10 +277,10 @@ def observed(condition: Condition, index: int, n: int, change: Features | None =
     return ObservedChange(index, structural.from_centre(used.names, used.values)[:n], both[:n])
 
 
-def halves(gathered: ReducedRecording) -> tuple[ReducedRecording, ReducedRecording]:
+def halves(reduced: ReducedRecording) -> tuple[ReducedRecording, ReducedRecording]:
     """Return the blocks of revolutions with even and with odd numbers."""
-    n = gathered.n_blocks
-    first = second = gathered
+    n = reduced.n_blocks
+    first = second = reduced
     for block in reversed(range(n)):
         first, second = (first.without(block), second) if block % 2 else (first, second.without(block))
     return first, second
@@ -370,12 +372,12 @@ def _explained(now: ReducedRecording, side: int) -> dict[int, float]:
         whole.append(power / max(float(power.sum()), 1e-300))
     shares = np.mean(whole, axis=0)
     orders = np.arange(len(shares))
-    found = {}
+    explained = {}
     for teeth in range(MIN_TEETH, min(MAX_TEETH, len(shares) // 2) + 1):
         near = orders_from_mesh(orders, teeth) <= NEAR_MESH
         by_chance = float(near[SLOW + 1 :].mean())
-        found[teeth] = (float(shares[near].sum()) - by_chance) / (1.0 - by_chance)
-    return found
+        explained[teeth] = (float(shares[near].sum()) - by_chance) / (1.0 - by_chance)
+    return explained
 
 
 def exchanged(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
@@ -388,22 +390,22 @@ def exchanged(now: ReducedRecording, reference: ReducedRecording, name: str) -> 
             difference, _ = turned_difference(now, reference, side)
         except RefusalError:
             return []
-        own = lines_of_shaft(now, side).lines[:, : difference.lines.shape[1]]
+        recorded = lines_of_shaft(now, side).lines[:, : difference.lines.shape[1]]
         changed, here, there = (
-            _energy(now, side, difference, lines) for lines in (difference.lines, own, own - difference.lines)
+            _energy(now, side, difference, lines) for lines in (difference.lines, recorded, recorded - difference.lines)
         )
         at = int(np.argmax(changed))
-        lost_db, own_db = decibel(there[at] / here[at]), decibel(there[at] / float(np.median(there)))
+        lost_db, prominence_db = decibel(there[at] / here[at]), decibel(there[at] / float(np.median(there)))
         elsewhere = np.roll(changed, -at)[2 * STEPS_PER_TOOTH : -2 * STEPS_PER_TOOTH]
-        is_one = changed[at] >= max(CLEAR_CHANGE * float(np.median(changed)), ALONE * float(elsewhere.max()))
-        if is_one and lost_db >= LOST_DB and own_db >= OWN_DB:
+        is_one_tooth = changed[at] >= max(CLEAR_CHANGE * float(np.median(changed)), ALONE * float(elsewhere.max()))
+        if is_one_tooth and lost_db >= LOST_DB and prominence_db >= OWN_DB:
             place = (at / len(changed) + (0.5 - load_calibration().lag_pitches) / difference.teeth) % 1.0
             tooth = f"Tooth {int(place * difference.teeth) + 1}" if now.marks[side] else "One tooth"
             remark = (
                 f"{name}: recording and reference may have been exchanged. {tooth} of {shaft_words(now.frame, side)} "
-                f"(at {360.0 * place:.0f}°) stands {own_db:.0f} dB above the middling one in the reference, and is "
-                f"{lost_db:.0f} dB weaker in the recording; damage adds such a burst and takes none away. If so, what "
-                "is named is what the reference has: give the two the other way round."
+                f"(at {360.0 * place:.0f}°) stands {prominence_db:.0f} dB above the middling one in the reference, "
+                f"and is {lost_db:.0f} dB weaker in the recording; damage adds such a burst and takes none away. If "
+                "so, what is named is what the reference has: give the two the other way round."
             )
             return [remark]
     return []
@@ -436,7 +438,7 @@ def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
 
 def strange_pattern(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
     """Say so where neither gear's pattern of teeth is that of the reference; flawless gears have none to compare."""
-    if not all(_has_pattern(one, side) for one in (now, reference) for side in (DRIVER, DRIVEN)):
+    if not all(_has_pattern(recording, side) for recording in (now, reference) for side in (DRIVER, DRIVEN)):
         return []
     try:
         agreements = [turned_difference(now, reference, side)[1] for side in (DRIVER, DRIVEN)]
@@ -452,10 +454,10 @@ def strange_pattern(now: ReducedRecording, reference: ReducedRecording, name: st
     return [remark]
 
 
-def _has_pattern(gathered: ReducedRecording, side: int) -> bool:
+def _has_pattern(reduced: ReducedRecording, side: int) -> bool:
     """Return whether what tells a gear's teeth apart stands clear of noise in the channel where it is clearest."""
     clearest = 0.0
-    for average in gathered.averages(side):
+    for average in reduced.averages(side):
         used = telling_teeth_apart(np.arange(len(average.lines)), average.teeth)
         clearest = max(clearest, float(np.sum(np.abs(average.lines[used]) ** 2) / np.sum(average.noise[used])))
     return clearest >= MIN_PATTERN
@@ -558,19 +560,19 @@ def readable(
     RefusalError
         If none can be read: why not the first.
     """
-    found, refused = [], list[RefusalError]()
+    read_recordings, refused = [], list[RefusalError]()
     for recording in recordings:
         try:
-            one, remarks = read(recording)
+            content, remarks = read(recording)
         except RefusalError as refusal:
             refused.append(RefusalError(f"{recording.recording.name}: {refusal.reason}", remedy=refusal.remedy))
         else:
-            found.append(one)
+            read_recordings.append(content)
             notices += remarks
-    if refused and not found:
+    if refused and not read_recordings:
         raise refused[0]
     notices += [f"{refusal.reason}; this {what} is left out." for refusal in refused]
-    return found
+    return read_recordings
 
 
 def read_healthy(recording: PreparedRecording) -> tuple[HealthyReference, list[str]]:
@@ -612,7 +614,7 @@ def with_common_channels(
     notices: list[str],
 ) -> ReducedRecording:
     """Return a recording with the channels that its reference has as well, and say what was made of the others."""
-    if not any(set(reference.channels) & set(one.reduced.channels) for one in healthy):
+    if not any(set(reference.channels) & set(candidate.reduced.channels) for candidate in healthy):
         notices.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
     left_out = [channel for channel in now.channels if channel not in reference.channels]
     if left_out:

@@ -69,16 +69,16 @@ def spectrum_curves(
     runs = _Runs(now, before, after, reference)
     names = (channel,) if channel else tuple(now.channels)
     averages = (_of_average(side, runs, names, unit) for side in (DRIVER, DRIVEN))
-    found = (*averages, _of_residual(runs, names, unit))
-    features = [average_features(side, now.frame.teeth[side], len(found[side].orders)) for side in (DRIVER, DRIVEN)]
-    features.append(residual_features(now, found[2].orders))
+    spectra = (*averages, _of_residual(runs, names, unit))
+    features = [average_features(side, now.frame.teeth[side], len(spectra[side].orders)) for side in (DRIVER, DRIVEN)]
+    features.append(residual_features(now, spectra[2].orders))
     return tuple(
         replace(
             curves,
             structural_db=NOTHING if structural is None else structural.of(belonging),
             reference_structural_db=NOTHING if reference_structural is None else reference_structural.of(belonging),
         )
-        for curves, belonging in zip(found, features, strict=True)
+        for curves, belonging in zip(spectra, features, strict=True)
     )
 
 
@@ -101,18 +101,18 @@ class _Runs:
 def average_features(side: int, teeth: int, n: int) -> list[str]:
     """Return for each order of a shaft the feature that it belongs to."""
     name = SIDES[side]
-    found = []
+    features = []
     for order in range(n):
         harmonic, offset = round(order / teeth), abs((order + teeth // 2) % teeth - teeth // 2)
         if order <= MAX_SHAFT_ORDERS and 2 * order < teeth:
-            found.append(f"shaft.{name}.{max(order, 1)}" if order <= 3 else f"shaft.{name}.low")
+            features.append(f"shaft.{name}.{max(order, 1)}" if order <= 3 else f"shaft.{name}.low")
         elif offset == 0 and harmonic <= N_MESH_HARMONICS:
-            found.append(f"mesh.share.{harmonic}")
+            features.append(f"mesh.share.{harmonic}")
         else:
             near = (label for label, (first, last) in SIDEBANDS.items() if first <= offset <= last)
             label = next(near, "")
-            found.append(f"sideband.{name}.{label}" if label else f"tooth.{name}.level")
-    return found
+            features.append(f"sideband.{name}.{label}" if label else f"tooth.{name}.level")
+    return features
 
 
 def residual_features(now: ReducedRecording, orders: FloatArray) -> list[str]:
@@ -127,9 +127,9 @@ def _of_average(side: int, runs: _Runs, names: Sequence[str], unit: str) -> Spec
     power, noise = _average_power(now, side, names)
     others = {name: _average_power(run, side, names) for name, run in runs.beside.items()}
     last = int((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[side])
-    n = min(last + 1, len(power), *(len(of_other) for of_other, _ in others.values()))
-    floors = {name: np.sqrt(_RARE * (noise[:n] + of_other[:n])) for name, (_, of_other) in others.items()}
-    amplitudes = {name: np.sqrt(of_other[:n]) for name, (of_other, _) in others.items()}
+    n = min(last + 1, len(power), *(len(level) for level, _ in others.values()))
+    floors = {name: np.sqrt(_RARE * (noise[:n] + level[:n])) for name, (_, level) in others.items()}
+    amplitudes = {name: np.sqrt(level[:n]) for name, (level, _) in others.items()}
     return SpectrumCurves(
         f"average over {shaft_words(now.frame, side)}",
         unit,
@@ -141,9 +141,9 @@ def _of_average(side: int, runs: _Runs, names: Sequence[str], unit: str) -> Spec
     )
 
 
-def _average_power(gathered: ReducedRecording, side: int, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+def _average_power(reduced: ReducedRecording, side: int, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
     """Return lines' power, as squares of peaks, and that of their noise: means over channels."""
-    averages = [gathered.average(name, side) for name in names]
+    averages = [reduced.average(name, side) for name in names]
     n = averages[0].highest + 1
     power: FloatArray = np.mean([np.abs(average.lines[:n]) ** 2 for average in averages], axis=0)
     noise: FloatArray = np.mean([average.noise[:n] for average in averages], axis=0)
@@ -175,8 +175,8 @@ def _of_residual(runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves
     )
 
 
-def _residual_power(gathered: ReducedRecording, names: Sequence[str]) -> FloatArray:
-    power: FloatArray = np.mean([gathered.channels[name].residual_power.mean(axis=0) for name in names], axis=0)
+def _residual_power(reduced: ReducedRecording, names: Sequence[str]) -> FloatArray:
+    power: FloatArray = np.mean([reduced.channels[name].residual_power.mean(axis=0) for name in names], axis=0)
     return power
 
 
@@ -247,7 +247,7 @@ def angle_curves(
         has none, and its curve is 0.
     """
     compared = healthy is not None and simulated_healthy is not None
-    found = []
+    both_shafts = []
     for side in (DRIVER, DRIVEN):
         measured = _energy(now, healthy if compared else None, side)
         middling = max(float(np.median(measured)), 1e-300)
@@ -262,10 +262,10 @@ def angle_curves(
         angle, shift = _angles(now.frame.teeth[side])
         first, second, third = ([np.roll(values, -shift) for values in curves] + [NOTHING])[:3]
         frame = now.frame
-        found.append(
+        both_shafts.append(
             AngleCurves(frame.shafts[side], unit, frame.teeth[side], now.marks[side], angle, first, second, third)
         )
-    return tuple(found)
+    return tuple(both_shafts)
 
 
 def _energy(run: ReducedRecording, healthy: ReducedRecording | None, side: int) -> FloatArray:

@@ -40,7 +40,7 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
         One per condition.
     frame : GearFrame
     """
-    clearest = max(observed, key=lambda one: float(np.abs(one.normalised).max()))
+    clearest = max(observed, key=lambda change: float(np.abs(change.normalised).max()))
     predicted = fit.at(clearest.condition)
     sizes = np.maximum(OWN_COUNTS * np.abs(predicted), np.abs(clearest.distances)) / clearest.floors
     clear = np.maximum(np.abs(predicted), np.abs(clearest.distances)) >= CLEAR * clearest.floors
@@ -79,13 +79,13 @@ def weighed_evidence(
     least : float
         Floors from which a prediction of the right size speaks for the effect.
     """
-    size, left = abs(predicted_db), abs(predicted_db - observed_db)
+    size, remainder = abs(predicted_db), abs(predicted_db - observed_db)
     if size == 0.0 or size < SMALLEST * floor_db:
         return Evidence(feature, predicted_db, observed_db, floor_db, speaks_for=False)
     ratio, is_clear = observed_db / predicted_db, size >= CLEAR * floor_db
     alike = size >= least * floor_db and AGREES <= ratio <= 1.0 / AGREES
-    agrees = alike or (is_clear and left <= floor_db)
-    further = not agrees and ratio > 1.0 and (is_clear or left <= floor_db)
+    agrees = alike or (is_clear and remainder <= floor_db)
+    further = not agrees and ratio > 1.0 and (is_clear or remainder <= floor_db)
     return Evidence(feature, predicted_db, observed_db, floor_db, agrees, further)
 
 

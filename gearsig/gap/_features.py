@@ -93,9 +93,9 @@ def _feature_of(name: str) -> Feature:
     return Feature(family, side, detail) if side in SIDES else Feature(family, "", rest)
 
 
-def line_features(gathered: ReducedRecording, channel: str) -> Iterator[NamedValue]:
+def line_features(reduced: ReducedRecording, channel: str) -> Iterator[NamedValue]:
     """Yield name and value, in dB, of one channel's mesh, sideband and shaft-order features."""
-    driver, driven = (gathered.average(channel, side) for side in (DRIVER, DRIVEN))
+    driver, driven = (reduced.average(channel, side) for side in (DRIVER, DRIVEN))
     total = driver.mesh_power
     yield from _mesh(driver.power, driver.teeth, driver.highest, total)
     for average, side in ((driver, SIDES[DRIVER]), (driven, SIDES[DRIVEN])):
@@ -131,8 +131,8 @@ def _sidebands(power: FloatArray, teeth: int, highest: int, total: float, side: 
         orders = [o for o in orders if 0 < o <= highest and o % teeth]
         lines = float(np.mean(power[orders])) if orders else 1e-300
         yield f"sideband.{side}.{label}", decibel(lines / total)
-    own = [decibel(float(power[c - 1] + power[c + 1]) / max(float(power[c]), 1e-300)) for c in carriers]
-    yield f"sideband.{side}.own", float(np.median(own))
+    first_pairs = [decibel(float(power[c - 1] + power[c + 1]) / max(float(power[c]), 1e-300)) for c in carriers]
+    yield f"sideband.{side}.own", float(np.median(first_pairs))
     far = [
         o for c in carriers for o in (*range(c - 12, c - 2), *range(c + 3, c + 13)) if 0 < o <= highest and o % teeth
     ]
@@ -176,10 +176,10 @@ def tooth_energy(lines: NDArray[np.complex128], teeth: int) -> FloatArray:
     return energy
 
 
-def tooth_features(gathered: ReducedRecording) -> Iterator[NamedValue]:
+def tooth_features(reduced: ReducedRecording) -> Iterator[NamedValue]:
     """Yield the tooth features of all channels together, since a tooth shows at one angle on all of them."""
     for side in (DRIVER, DRIVEN):
-        averages = gathered.averages(side)
+        averages = reduced.averages(side)
         noises = [np.where(a.pattern != 0, a.noise, 0.0).sum() / 2.0 / a.mesh_power for a in averages]
         yield from pattern_features(
             f"tooth.{SIDES[side]}",
@@ -269,11 +269,11 @@ def floor_ratio(power: FloatArray) -> FloatArray:
     return ratio
 
 
-def cyclic_features(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[NamedValue]:
+def cyclic_features(reduced: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[NamedValue]:
     """Yield excesses in dB of families of envelope lines and of residual lines: the largest over channels and bands."""
-    frame = gathered.frame
-    envelopes = np.concatenate([envelope_ratios(gathered, c) for c in channels])
-    step, levels = gathered.cycle_step, excesses(envelopes)
+    frame = reduced.frame
+    envelopes = np.concatenate([envelope_ratios(reduced, c) for c in channels])
+    step, levels = reduced.cycle_step, excesses(envelopes)
     known = gear_orders(frame)
     yield from _families(frame, levels, step, known, "envelope")
     for side, order in enumerate(frame.shaft_orders):
@@ -282,19 +282,19 @@ def cyclic_features(gathered: ReducedRecording, channels: Sequence[ChannelSums])
     yield "envelope.strange", _strange(envelopes, step, known_modulation(frame), first=LOWEST_STRANGE)
     depth = max(float(c.envelope_power.mean(axis=0)[:, 2:].sum(axis=1).max()) for c in channels)
     yield "envelope.depth", decibel(depth)
-    residuals = residual_ratios(gathered, channels)
+    residuals = residual_ratios(reduced, channels)
     levels = excesses(residuals)
-    yield from _families(frame, levels, gathered.order_step, known, "line")
-    yield "line.half_mesh", _family(levels, frame.teeth[0] / 2.0, 1, gathered.order_step, (), 0.0)
-    yield "line.strange", _strange(residuals, gathered.order_step, known_lines(frame), first=LOWEST_STRANGE)
+    yield from _families(frame, levels, reduced.order_step, known, "line")
+    yield "line.half_mesh", _family(levels, frame.teeth[0] / 2.0, 1, reduced.order_step, (), 0.0)
+    yield "line.strange", _strange(residuals, reduced.order_step, known_lines(frame), first=LOWEST_STRANGE)
 
 
-def envelope_ratios(gathered: ReducedRecording, sums: ChannelSums) -> FloatArray:
+def envelope_ratios(reduced: ReducedRecording, sums: ChannelSums) -> FloatArray:
     """Return the lines of each band's envelope over their floor; 1 beyond the band's width, where there is nothing."""
     ratios = floor_ratio(sums.envelope_power.mean(axis=0))
-    cycles = np.arange(ratios.shape[1]) * gathered.cycle_step
-    for row, (low, high) in zip(ratios, gathered.bands_hz, strict=True):
-        row[cycles > USED_OF_BAND * (high - low) / gathered.speed_hz] = 1.0
+    cycles = np.arange(ratios.shape[1]) * reduced.cycle_step
+    for row, (low, high) in zip(ratios, reduced.bands_hz, strict=True):
+        row[cycles > USED_OF_BAND * (high - low) / reduced.speed_hz] = 1.0
     return ratios
 
 
@@ -359,10 +359,10 @@ def free_lines(n_lines: int, step: float, known: Sequence[Known], *, first: floa
     return free
 
 
-def residual_ratios(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> FloatArray:
+def residual_ratios(reduced: ReducedRecording, channels: Sequence[ChannelSums]) -> FloatArray:
     """Return the residuals' lines over their floor, one row per channel."""
     ratios = floor_ratio(np.stack([c.residual_power.mean(axis=0) for c in channels]))
-    return ratios[:, : int(gathered.highest_order / gathered.order_step)]
+    return ratios[:, : int(reduced.highest_order / reduced.order_step)]
 
 
 def gear_orders(frame: GearFrame) -> list[float]:
@@ -386,7 +386,7 @@ def known_lines(frame: GearFrame) -> list[Known]:
 
 def _bearing_orders(frame: GearFrame) -> list[Known]:
     """Return the orders of every bearing's families with their sidebands; what rolls may slip."""
-    found = []
+    orders = []
     for bearing in frame.bearings:
         shaft = frame.shaft_orders[bearing.side]
         for order, side in (
@@ -397,8 +397,8 @@ def _bearing_orders(frame: GearFrame) -> list[Known]:
         ):
             if np.isfinite(order):
                 sidebands = (-1, 0, 1) if side else (0,)
-                found += [(k * order + j * side, SLIP * k * order) for k in range(1, N_FAMILY + 1) for j in sidebands]
-    return found
+                orders += [(k * order + j * side, SLIP * k * order) for k in range(1, N_FAMILY + 1) for j in sidebands]
+    return orders
 
 
 # --------------------
@@ -410,12 +410,12 @@ MIN_SHARE = 1e-6
 """Below one sample of any record."""
 
 
-def broadband_features(gathered: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[NamedValue]:
+def broadband_features(reduced: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[NamedValue]:
     """Yield band levels and kurtosis of the residual, tail figures of the raw signal, in dB; means over channels."""
     moments = np.stack([c.moments.mean(axis=0) for c in channels])  # (channel, band, moment)
     squares = np.log10(np.maximum(moments[:, :, 0], 1e-300)).mean(axis=0) * 10.0
     kurtosis = np.log10(np.maximum(moments[:, :, 1] / np.maximum(moments[:, :, 0], 1e-300) ** 2, 1e-3)) * 10.0
-    for i in range(len(gathered.bands_hz) - 1):
+    for i in range(len(reduced.bands_hz) - 1):
         yield f"floor.band.{i + 1}", float(squares[i])
         yield f"floor.kurtosis.{i + 1}", float(kurtosis[:, i].max())
     yield "floor.total", float(squares[-1])
@@ -427,13 +427,13 @@ def broadband_features(gathered: ReducedRecording, channels: Sequence[ChannelSum
     yield "raw.near_the_extreme", decibel(max(float(raw[:, 2].max()), MIN_SHARE))
 
 
-def speed_features(gathered: ReducedRecording) -> Iterator[NamedValue]:
+def speed_features(reduced: ReducedRecording) -> Iterator[NamedValue]:
     """Yield the figures of the speed and of the supply's hum."""
-    drift, swing, line, _ = gathered.speed
+    drift, swing, line, _ = reduced.speed
     yield "speed.drift", decibel(abs(drift) + 1e-5) * 2.0
     yield "speed.swing", decibel(swing + 1e-6) * 2.0
     yield "speed.swing_line", decibel(line)
-    yield "hum", max(gathered.hum)
+    yield "hum", max(reduced.hum)
 
 
 WHOLE_RECORD_DB = {"hum": 1.3, "speed.drift": 3.0, "speed.swing": 1.0, "speed.swing_line": 2.0}
@@ -461,25 +461,25 @@ class Features:
     left_out: tuple[FloatArray, ...] = ()
 
 
-def features_of(gathered: ReducedRecording) -> Features:
+def features_of(reduced: ReducedRecording) -> Features:
     """Return a recording's features with their standard errors by the jackknife over blocks of revolutions.
 
     SE² = (B − 1)/B Σ_b (f_(b) − mean)², f_(b) without block b.
     """
-    names, values = whole_and_parts(gathered)
+    names, values = whole_and_parts(reduced)
     without = values[1:]
     variance = (len(without) - 1.0) * without.var(axis=0) + whole_record_variance(names)
     return Features(names, values[0], np.sqrt(variance), (without,))
 
 
-def whole_and_parts(gathered: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
+def whole_and_parts(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values, (1 + n_blocks, n): of the whole, and without each of its blocks; computed once."""
-    if "features" not in gathered.kept:
-        names, values = once(gathered)
-        parts = [once(gathered.without(b))[1] for b in range(gathered.n_blocks)]
-        gathered.kept["features"] = names, np.stack([values, *parts])
-    found: tuple[tuple[str, ...], FloatArray] = gathered.kept["features"]
-    return found
+    if "features" not in reduced.kept:
+        names, values = once(reduced)
+        parts = [once(reduced.without(b))[1] for b in range(reduced.n_blocks)]
+        reduced.kept["features"] = names, np.stack([values, *parts])
+    rows: tuple[tuple[str, ...], FloatArray] = reduced.kept["features"]
+    return rows
 
 
 def whole_record_variance(names: Sequence[str]) -> FloatArray:
@@ -487,13 +487,13 @@ def whole_record_variance(names: Sequence[str]) -> FloatArray:
     return np.array([WHOLE_RECORD_DB.get(name, 0.0) ** 2 for name in names])
 
 
-def once(gathered: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
+def once(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values of the features, without their scatter."""
-    channels = list(gathered.channels.values())
-    per_channel = [dict(line_features(gathered, channel)) for channel in gathered.channels]
-    found = {name: float(np.mean([one[name] for one in per_channel])) for name in per_channel[0]}
-    found |= dict(tooth_features(gathered))
-    found |= dict(cyclic_features(gathered, channels))
-    found |= dict(broadband_features(gathered, channels))
-    found |= dict(speed_features(gathered))
-    return tuple(found), np.array(list(found.values()))
+    channels = list(reduced.channels.values())
+    per_channel = [dict(line_features(reduced, channel)) for channel in reduced.channels]
+    features = {name: float(np.mean([of_channel[name] for of_channel in per_channel])) for name in per_channel[0]}
+    features |= dict(tooth_features(reduced))
+    features |= dict(cyclic_features(reduced, channels))
+    features |= dict(broadband_features(reduced, channels))
+    features |= dict(speed_features(reduced))
+    return tuple(features), np.array(list(features.values()))

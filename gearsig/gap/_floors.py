@@ -77,8 +77,8 @@ def shown_in(names: Sequence[str], shows_in: Sequence[str]) -> np.ndarray:
     array of bool, (n,)
     """
     kinds = kinds_of(shows_in)
-    found = np.array([_is_shown(name, kinds, shows_in) for name in names], dtype=np.bool_)
-    return found if found.any() else np.ones(len(names), dtype=np.bool_)
+    shown = np.array([_is_shown(name, kinds, shows_in) for name in names], dtype=np.bool_)
+    return shown if shown.any() else np.ones(len(names), dtype=np.bool_)
 
 
 def _is_shown(name: str, kinds: set[PlaceKind], shows_in: Sequence[str]) -> bool:
@@ -124,10 +124,10 @@ def _sized(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
 
 @cache
 def _members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
-    found: dict[Family, list[int]] = {}
+    members_of: dict[Family, list[int]] = {}
     for i, name in enumerate(names):
-        found.setdefault(family_of(name), []).append(i)
-    return {family: np.array(members, dtype=np.intp) for family, members in found.items()}
+        members_of.setdefault(family_of(name), []).append(i)
+    return {family: np.array(members, dtype=np.intp) for family, members in members_of.items()}
 
 
 REPEATABLE = 1.96
@@ -361,6 +361,6 @@ def credibility_of(features: FloatArray, simulated: FloatArray) -> FloatArray:
     ----------
     features, simulated : arrays, (n, n_features)
     """
-    own, twin = features - features.mean(axis=0), simulated - simulated.mean(axis=0)
-    slope: FloatArray = (own * twin).sum(axis=0) / np.maximum((twin**2).sum(axis=0), 1e-9)
+    recorded, twin = features - features.mean(axis=0), simulated - simulated.mean(axis=0)
+    slope: FloatArray = (recorded * twin).sum(axis=0) / np.maximum((twin**2).sum(axis=0), 1e-9)
     return np.clip(slope, 0.0, 1.0)

@@ -143,19 +143,19 @@ def analysed(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
 
 def _with_bearings(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
     """Analyse a recording whose bearings must be examined, as there is nothing else."""
-    found = analysed(recording)
-    for finding in found[0].findings:
+    analysis_and_angle = analysed(recording)
+    for finding in analysis_and_angle[0].findings:
         if finding.code in ("all-channels-dead", "bearings-not-examined"):
             raise RefusalError(finding.title, remedy=finding.surer or "check the measurement chain")
-    return found
+    return analysis_and_angle
 
 
 def examined(
-    name: str, found: tuple[Analysis, ShaftAngle], references: Sequence[tuple[Analysis, ShaftAngle]]
+    name: str, analysis_and_angle: tuple[Analysis, ShaftAngle], references: Sequence[tuple[Analysis, ShaftAngle]]
 ) -> ExaminedRecording:
     """Return what stands out of a recording, beyond the reference at its speed where there is one."""
-    analysis, angle = found
-    reference, notices = _reference(name, found, references)
+    analysis, angle = analysis_and_angle
+    reference, notices = _reference(name, analysis_and_angle, references)
     standing = []
     for finding in analysis.findings:
         if finding.code not in (*RACES, *IMPACTS, LINE):
@@ -172,15 +172,15 @@ def examined(
 
 def surest(every: Sequence[ExaminedRecording]) -> list[Standing]:
     """Return what stands out, each part once, from the recording that shows it surest; single lines last."""
-    found: dict[tuple[str, str], Standing] = {}
-    for one in (standing for recording in every for standing in recording.standing):
-        key = (one.finding.code, one.finding.where.bearing)
-        if key not in found or one.sureness > found[key].sureness:
-            found[key] = one
+    surest_of: dict[tuple[str, str], Standing] = {}
+    for part in (standing for recording in every for standing in recording.standing):
+        key = (part.finding.code, part.finding.where.bearing)
+        if key not in surest_of or part.sureness > surest_of[key].sureness:
+            surest_of[key] = part
     kinds = list(Kind)
     return sorted(
-        found.values(),
-        key=lambda one: (one.finding.code == LINE, kinds.index(one.finding.kind), -one.finding.confidence),
+        surest_of.values(),
+        key=lambda part: (part.finding.code == LINE, kinds.index(part.finding.kind), -part.finding.confidence),
     )
 
 
@@ -188,10 +188,10 @@ def bearings_text(finding: Finding, rig: Rig) -> str:
     """Name the bearing of a finding, and those whose same part has the same order; empty where there is none."""
     name = PARTS.get(finding.code, ("", ""))[1]
     orders = {b.name: b.orders().get(name, 0.0) * (rig.ratio(b.shaft) or 0.0) for b in rig.bearings}
-    own = orders.get(finding.where.bearing)
-    if not own:
+    bearing_order = orders.get(finding.where.bearing)
+    if not bearing_order:
         return ""
-    alike = [other for other, order in orders.items() if abs(order / own - 1.0) < SAME_BEARING_ORDER]
+    alike = [other for other, order in orders.items() if abs(order / bearing_order - 1.0) < SAME_BEARING_ORDER]
     return named("bearing", " or ".join(alike))
 
 
@@ -208,14 +208,14 @@ def _rise_db(finding: Finding, earlier: Earlier) -> float | None:
 
 
 def _reference(
-    name: str, found: tuple[Analysis, ShaftAngle], references: Sequence[tuple[Analysis, ShaftAngle]]
+    name: str, analysis_and_angle: tuple[Analysis, ShaftAngle], references: Sequence[tuple[Analysis, ShaftAngle]]
 ) -> tuple[Analysis | None, list[str]]:
     """Return the healthy reference at the recording's speed, or none and why."""
     if not references:
         return None, []
-    analysis, angle = found
+    analysis, angle = analysis_and_angle
     speed = angle.mean_speed_rpm
-    nearest, its_angle = min(references, key=lambda one: abs(one[1].mean_speed_rpm - speed))
+    nearest, its_angle = min(references, key=lambda candidate: abs(candidate[1].mean_speed_rpm - speed))
     why = ""
     if abs(its_angle.mean_speed_rpm / speed - 1.0) > LARGEST_SPEED_DIFFERENCE:
         why = f"no reference is within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
@@ -258,17 +258,17 @@ def causes_of(
     effects : mapping
         Those that may be named.
     """
-    races = {name: one for one in reversed(standing) if (name := RACES.get(one.finding.code, "")) in effects}
+    races = {name: part for part in reversed(standing) if (name := RACES.get(part.finding.code, "")) in effects}
     outcome, why = _outcome(standing, races, every, rig)
-    total = sum(one.finding.confidence for one in races.values())
-    left = 1.0 - min(total, 1.0)
-    unknown = left * _share_of_unknown(standing, races, every)
+    total = sum(part.finding.confidence for part in races.values())
+    rest = 1.0 - min(total, 1.0)
+    unknown = rest * _share_of_unknown(standing, races, every)
     causes = [
         _race(effects[name], races.get(name), rig, scale=1.0 / max(total, 1.0))
         for name in RACES.values()
         if name in effects
     ]
-    strange = [one.finding for one in standing if one not in races.values()]
+    strange = [part.finding for part in standing if part not in races.values()]
     causes += [
         GapCause(
             UNKNOWN,
@@ -278,7 +278,7 @@ def causes_of(
             unknown,
             remarks=_remarks(strange[0]) if strange and outcome is GapOutcome.UNKNOWN else (),
         ),
-        GapCause(NONE, NONE, why if outcome is GapOutcome.NO_GAP else "no damage", "", left - unknown),
+        GapCause(NONE, NONE, why if outcome is GapOutcome.NO_GAP else "no damage", "", rest - unknown),
     ]
     firsts = {GapOutcome.UNKNOWN: UNKNOWN, GapOutcome.NO_GAP: NONE}
     first = firsts.get(outcome) or RACES[_sure(races)[0].finding.code]
@@ -287,8 +287,8 @@ def causes_of(
 
 def _sure(races: Races) -> list[Standing]:
     """Return the races whose damage the search is sure of, surest first."""
-    found = [one for one in races.values() if one.finding.kind is Kind.FAULT]
-    return sorted(found, key=lambda one: -one.finding.confidence)
+    faults = [race for race in races.values() if race.finding.kind is Kind.FAULT]
+    return sorted(faults, key=lambda race: -race.finding.confidence)
 
 
 def _outcome(
@@ -299,17 +299,17 @@ def _outcome(
         return GapOutcome.EFFECT, ""
     if standing:
         return GapOutcome.UNKNOWN, _why_unknown(standing[0], races, rig)
-    if all(one.reference is not None for one in every):
+    if all(recording.reference is not None for recording in every):
         return GapOutcome.NO_GAP, "nothing stands out that the healthy reference does not show"
-    if all(one.is_healthy for one in every):
+    if all(recording.is_healthy for recording in every):
         return GapOutcome.NO_GAP, "nothing stands out, and damage of a race would have"
     return GapOutcome.UNKNOWN, "nothing stands out, but damage of a race might not have"
 
 
-def _why_unknown(one: Standing, races: Races, rig: Rig) -> str:
-    code = one.finding.code
+def _why_unknown(part: Standing, races: Races, rig: Rig) -> str:
+    code = part.finding.code
     if code in RACES:
-        is_known = one in races.values()
+        is_known = part in races.values()
         return (
             "the lines of the race are not clear enough" if is_known else "the race is not among the effects asked for"
         )
@@ -321,19 +321,19 @@ def _why_unknown(one: Standing, races: Races, rig: Rig) -> str:
 
 
 def _share_of_unknown(standing: Sequence[Standing], races: Races, every: Sequence[ExaminedRecording]) -> float:
-    impacts = [one.finding.confidence for one in standing if one.finding.code in IMPACTS]
+    impacts = [part.finding.confidence for part in standing if part.finding.code in IMPACTS]
     if races:  # a line may be the ringing of the race's impacts, and says nothing beside them
         return max([UNDECIDED, *impacts])
     if standing:
-        return max(one.finding.confidence for one in standing)
-    return HIDDEN if all(one.is_healthy for one in every) else UNDECIDED
+        return max(part.finding.confidence for part in standing)
+    return HIDDEN if all(part.is_healthy for part in every) else UNDECIDED
 
 
-def _race(effect: GapEffect, found: Standing | None, rig: Rig, *, scale: float) -> GapCause:
+def _race(effect: GapEffect, part: Standing | None, rig: Rig, *, scale: float) -> GapCause:
     cause = GapCause(effect.name, effect.group, effect.title, effect.unit, 0.0)
-    if found is None:
+    if part is None:
         return cause
-    finding = found.finding
+    finding = part.finding
     return replace(
         cause,
         probability=scale * finding.confidence,
@@ -355,7 +355,7 @@ def _remarks(finding: Finding) -> tuple[str, ...]:
 NAN = float("nan")
 
 
-def standing_place(one: Standing, rig: Rig, *, name: str = "") -> GapPlace:
+def standing_place(part: Standing, rig: Rig, *, name: str = "") -> GapPlace:
     """Return the place of what stands out, without sizes in floors, for nothing is simulated to find it.
 
     Parameters
@@ -365,18 +365,18 @@ def standing_place(one: Standing, rig: Rig, *, name: str = "") -> GapPlace:
     name : str
         The recording's where there are several.
     """
-    where = one.finding.where
+    where = part.finding.where
     order, frequency = where.order or NAN, where.frequency_hz or NAN
-    over = f"{one.over_floor_db:.0f} dB over their floor" + (
+    over = f"{part.over_floor_db:.0f} dB over their floor" + (
         f" in {band_words(where.band_hz)}" if where.band_hz else ""
     )
-    since = "" if one.rise_db is None else f", {signed(one.rise_db)} dB over the reference"
+    since = "" if part.rise_db is None else f", {signed(part.rise_db)} dB over the reference"
     seen = f", in {name}" if name else ""
     driver = rig.ratio(rig.pairs[0].driver) if rig.pairs else 1.0
     return GapPlace(
-        PlaceKind.LINE if one.finding.code == LINE else PlaceKind.ENVELOPE,
-        f"{_what(one, rig)} (order {order:.4g}, {hertz(frequency)}), {over}{since}{seen}",
-        one.over_floor_db if one.rise_db is None else one.rise_db,
+        PlaceKind.LINE if part.finding.code == LINE else PlaceKind.ENVELOPE,
+        f"{_what(part, rig)} (order {order:.4g}, {hertz(frequency)}), {over}{since}{seen}",
+        part.over_floor_db if part.rise_db is None else part.rise_db,
         repeatability=NAN,
         structural=NAN,
         share=NAN,
@@ -387,10 +387,10 @@ def standing_place(one: Standing, rig: Rig, *, name: str = "") -> GapPlace:
     )
 
 
-def _what(one: Standing, rig: Rig) -> str:
-    code = one.finding.code
+def _what(part: Standing, rig: Rig) -> str:
+    code = part.finding.code
     if code in PARTS:
-        return f"envelope lines of the {PARTS[code][0]} of {bearings_text(one.finding, rig)}"
+        return f"envelope lines of the {PARTS[code][0]} of {bearings_text(part.finding, rig)}"
     if code == LINE:
         return "the strongest line of no known shaft or bearing"
     loose = shafts_of_unknown_speed(rig)
@@ -494,14 +494,14 @@ def _loose_shafts(rig: Rig) -> list[str]:
 
 def _limits(standing: Sequence[Standing], every: Sequence[ExaminedRecording]) -> list[str]:
     """Say where several races, or several recordings, do not agree on one answer."""
-    faults = [one for one in standing if one.finding.kind is Kind.FAULT]
+    faults = [part for part in standing if part.finding.kind is Kind.FAULT]
     texts = []
-    if len({one.finding.code for one in faults if one.finding.code in RACES}) > 1:
+    if len({part.finding.code for part in faults if part.finding.code in RACES}) > 1:
         texts.append("Both races stand out and may both be damaged: the probabilities, of one cause each, are shared.")
     for fault in faults:
         key = (fault.finding.code, fault.finding.where.bearing)
         others = [
-            one.name for one in every if key not in [(s.finding.code, s.finding.where.bearing) for s in one.standing]
+            part.name for part in every if key not in [(s.finding.code, s.finding.where.bearing) for s in part.standing]
         ]
         if others:
             texts.append(
@@ -510,13 +510,13 @@ def _limits(standing: Sequence[Standing], every: Sequence[ExaminedRecording]) ->
     return texts
 
 
-def _facts(one: ExaminedRecording) -> ConditionFacts:
-    recording = one.analysis.recording
+def _facts(examined_recording: ExaminedRecording) -> ConditionFacts:
+    recording = examined_recording.analysis.recording
     torque = None if recording.rig is None else recording.rig.nominal_torque_nm()
     return ConditionFacts(
-        one.name,
-        OperatingCondition(one.angle.mean_speed_rpm, NAN if torque is None else torque),
-        one.angle.n_revolutions,
+        examined_recording.name,
+        OperatingCondition(examined_recording.angle.mean_speed_rpm, NAN if torque is None else torque),
+        examined_recording.angle.n_revolutions,
         recording.duration_s,
         recording.sampling_rate_hz,
     )
@@ -527,8 +527,8 @@ def _spectra(standing: Sequence[Standing], every: Sequence[ExaminedRecording]) -
     families = [one for one in standing if one.finding.code != LINE]
     name = families[0].recording if families else every[0].name
     channels = next(one for one in every if one.name == name).analysis.channels
-    wanted = families[0].finding.where.channels if families else ()
-    channel = next((c for c in channels if c.channel in wanted), channels[0])
+    shown_channels = families[0].finding.where.channels if families else ()
+    channel = next((c for c in channels if c.channel in shown_channels), channels[0])
     spectrum, band = channel.envelope_spectrum, channel.envelope_band_hz
     if spectrum is None or band is None:
         return ()
@@ -581,14 +581,14 @@ def stood_out(
     if nearest is not None:
         with suppress(RefusalError):
             healthy = [analysed(nearest)]
-    found = examined(name, now, healthy)
+    now_examined = examined(name, now, healthy)
     warnings = _fault_of_reference(healthy[0][0], now[0], name) if healthy else []
-    weak = [one for one in found.standing if one.finding.code == LINE or one.finding.kind is Kind.NOTICE]
-    strong = [one for one in found.standing if one not in weak]
+    weak = [part for part in now_examined.standing if part.finding.code == LINE or part.finding.kind is Kind.NOTICE]
+    strong = [part for part in now_examined.standing if part not in weak]
     remarks = [
-        f"Not explained by the gear model, in {name}: {one.finding.title.rstrip('.')}{_odds(one)}."
-        for one in weak
-        if not (one.finding.code == LINE and any(_is_harmonic(one, family) for family in strong))
+        f"Not explained by the gear model, in {name}: {part.finding.title.rstrip('.')}{_odds(part)}."
+        for part in weak
+        if not (part.finding.code == LINE and any(_is_harmonic(part, family) for family in strong))
     ]
     return strong, remarks, warnings
 
@@ -601,13 +601,13 @@ def beside_standing(outcome: GapOutcome, standing: Sequence[Standing]) -> tuple[
     """
     if not standing or outcome not in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
         return outcome, []
-    races = [one for one in standing if one.finding.code in RACES]
+    races = [part for part in standing if part.finding.code in RACES]
     if len(races) < len(standing):
         return GapOutcome.UNKNOWN, []
     return GapOutcome.UNDECIDED, [
-        f"{one.recording}: {one.finding.title.rstrip('.')}{_odds(one)}, by the search for bearing orders; few of the "
-        "features that are compared show it."
-        for one in races
+        f"{part.recording}: {part.finding.title.rstrip('.')}{_odds(part)}, by the search for bearing orders; few of "
+        "the features that are compared show it."
+        for part in races
     ]
 
 
@@ -620,8 +620,8 @@ def _is_harmonic(line: Standing, family: Standing) -> bool:
     return 1 <= n <= HIGHEST_HARMONIC and abs(order / (n * base) - 1.0) < SAME_ORDER
 
 
-def _odds(one: Standing) -> str:
-    return "" if one.finding.code == LINE else f" (at most {100 * one.finding.confidence:.0f} %)"
+def _odds(part: Standing) -> str:
+    return "" if part.finding.code == LINE else f" (at most {100 * part.finding.confidence:.0f} %)"
 
 
 def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[str]:

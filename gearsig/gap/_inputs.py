@@ -118,32 +118,32 @@ def _rigs(asked: GapRequest, files: Sequence[Path]) -> tuple[Rig, ...]:
     """Return the rig of each file, all of the same machine."""
     common = read_rig(asked.rig) if asked.rig is not None else None
     first = common
-    found = []
+    rigs = []
     for place, path in enumerate(files):
         beside = rig_file_beside(path)
-        is_own = beside is not None and (asked.rig is None or beside.resolve() != asked.rig.resolve())
-        own = read_rig(beside) if beside is not None and is_own else None
-        if own is None and common is None:
+        is_beside = beside is not None and (asked.rig is None or beside.resolve() != asked.rig.resolve())
+        rig_beside = read_rig(beside) if beside is not None and is_beside else None
+        if rig_beside is None and common is None:
             raise InputError(
                 "no rig file is given, and none lies beside it",
                 where=str(path),
                 remedy="give --rig RIG.toml with the gears' teeth and module; `gearsig rig example` prints one",
             )
-        first = first or own
-        if own is not None and first is not None:
-            _check_same(first, own, path.name)
-        rig = _merged(common, own)
-        found.append(_with_torque(rig, asked, place))
-    return tuple(found)
+        first = first or rig_beside
+        if rig_beside is not None and first is not None:
+            _check_same(first, rig_beside, path.name)
+        rig = _merged(common, rig_beside)
+        rigs.append(_with_torque(rig, asked, place))
+    return tuple(rigs)
 
 
-def _merged(common: Rig | None, own: Rig | None) -> Rig:
+def _merged(common: Rig | None, of_recording: Rig | None) -> Rig:
     """Return the common rig at the operating point and with the speed source of the recording's own."""
-    if common is None or own is None:
-        rig = common or own
+    if common is None or of_recording is None:
+        rig = common or of_recording
         assert rig is not None  # noqa: S101 - the caller has made sure of one
         return rig
-    point, there = own.operating_point, common.operating_point
+    point, there = of_recording.operating_point, common.operating_point
     if point.shaft in ("", there.shaft):
         point = replace(
             point,
@@ -151,7 +151,7 @@ def _merged(common: Rig | None, own: Rig | None) -> Rig:
             speed_rpm=there.speed_rpm if point.speed_rpm is None else point.speed_rpm,
             torque_nm=there.torque_nm if point.torque_nm is None else point.torque_nm,
         )
-    return replace(common, operating_point=point, speed=own.speed or common.speed)
+    return replace(common, operating_point=point, speed=of_recording.speed or common.speed)
 
 
 def _with_torque(rig: Rig, asked: GapRequest, place: int) -> Rig:
@@ -162,9 +162,9 @@ def _with_torque(rig: Rig, asked: GapRequest, place: int) -> Rig:
     return replace(rig, operating_point=replace(rig.operating_point, torque_nm=torque_nm))
 
 
-def _check_same(rig: Rig, own: Rig, name: str) -> None:
+def _check_same(rig: Rig, of_recording: Rig, name: str) -> None:
     """Compare what both rig files state of the machine."""
-    for what, stated in _identity(own).items():
+    for what, stated in _identity(of_recording).items():
         expected = _identity(rig).get(what)
         if expected is not None and expected != stated:
             raise InputError(
@@ -240,15 +240,15 @@ def read_labelled(
     def read(path: Path) -> Recording:
         on_file(path.name)
         beside = rig_file_beside(path)
-        own = read_rig(beside) if beside is not None else None
-        if own is not None and rig is not None:
-            _check_same(rig, own, path.name)
-        if own is None and rig is None:
+        rig_beside = read_rig(beside) if beside is not None else None
+        if rig_beside is not None and rig is not None:
+            _check_same(rig, rig_beside, path.name)
+        if rig_beside is None and rig is None:
             raise InputError("no rig is given, and none lies beside it", where=path.name, remedy="give --rig RIG.toml")
-        recording = read_recording(path, rig=_merged(rig, own), sampling_rate_hz=sampling_rate_hz)
+        recording = read_recording(path, rig=_merged(rig, rig_beside), sampling_rate_hz=sampling_rate_hz)
         return recording.with_name(f"{folder.name}/{path.name}")
 
-    found = []
+    labelled = []
     for where, line in _lines(folder / TABLE):
         path = _named(folder, line["file"], where, "file")
         label, severity = _label(line["effect"], where), _severity(line.get("severity", ""), where)
@@ -258,8 +258,8 @@ def read_labelled(
             if there == path:
                 raise InputError("a recording is its own reference", where=where, remedy="name a healthy one, or none")
             healthy = references[there] = references.get(there) or read(there)
-        found.append(LabelledRecording(read(path), label, healthy, severity))
-    return tuple(found)
+        labelled.append(LabelledRecording(read(path), label, healthy, severity))
+    return tuple(labelled)
 
 
 def _lines(path: Path) -> list[tuple[str, Mapping[str, str]]]:

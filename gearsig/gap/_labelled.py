@@ -108,21 +108,23 @@ def labelled_changes(
     """
     ways = sorted({c.reference is not None for c in conditions})
     channels = tuple(conditions[0].now.channels)
-    shared = [read_healthy(one)[0] for one in references]
-    found, remarks = list[LabelledChange](), list[str]()
-    for one in labelled:
+    shared = [read_healthy(recording)[0] for recording in references]
+    changes_of_labels, remarks = list[LabelledChange](), list[str]()
+    for recording in labelled:
         try:
-            found.append(_change(one, shared, ways, channels, conditions[0].learned, twin, None if fresh else cache))
+            changes_of_labels.append(
+                _change(recording, shared, ways, channels, conditions[0].learned, twin, None if fresh else cache)
+            )
         except RefusalError as refusal:
-            remarks.append(f"{one.recording.name}: {refusal.reason}; this labelled recording is left out.")
+            remarks.append(f"{recording.recording.name}: {refusal.reason}; this labelled recording is left out.")
     if cache is not None:
-        for change in found:
+        for change in changes_of_labels:
             _keep(change, cache)
-    return found, remarks
+    return changes_of_labels, remarks
 
 
 def _change(
-    one: LabelledRecording,
+    labelled: LabelledRecording,
     shared: Sequence[HealthyReference],
     ways: Sequence[bool],
     channels: Sequence[str],
@@ -130,14 +132,14 @@ def _change(
     twin: Twin,
     cache: Path | None,
 ) -> LabelledChange:
-    prepared = PreparedRecording(one.recording)
-    key = _key(one, shared, ways, channels, twin)
-    kept = None if cache is None else _kept(cache, key, one.effect)
+    prepared = PreparedRecording(labelled.recording)
+    key = _key(labelled, shared, ways, channels, twin)
+    kept = None if cache is None else _kept(cache, key, labelled.effect)
     if kept is not None:
         return kept
     now = _on(reduce_recording(prepared), channels)
     facts = facts_of(prepared, now, twin)
-    healthy = list(shared) if one.reference is None else [read_healthy(PreparedRecording(one.reference))[0]]
+    healthy = list(shared) if labelled.reference is None else [read_healthy(PreparedRecording(labelled.reference))[0]]
     match, why = matching_reference(now, prepared.rig, healthy)
     changes: dict[bool, Features] = {}
     if True in ways and match is not None:
@@ -149,7 +151,7 @@ def _change(
     if not changes:
         reason = why or "it has no healthy reference, and the diagnosis compares with one"
         raise RefusalError(reason, remedy="name its reference in the table")
-    return LabelledChange(one.effect, facts.point, changes, key)
+    return LabelledChange(labelled.effect, facts.point, changes, key)
 
 
 def _on(reduced: ReducedRecording, channels: Sequence[str]) -> ReducedRecording:
@@ -159,15 +161,15 @@ def _on(reduced: ReducedRecording, channels: Sequence[str]) -> ReducedRecording:
 
 
 def _key(
-    one: LabelledRecording,
+    labelled: LabelledRecording,
     shared: Sequence[HealthyReference],
     ways: Sequence[bool],
     channels: Sequence[str],
     twin: Twin,
 ) -> str:
     digest = sha256(repr((ways, tuple(channels), features_digest(), twin.key if False in ways else "")).encode())
-    healthy = [one.reference] if one.reference is not None else [s.whole.recording for s in shared if s.whole]
-    for recording in (one.recording, *healthy):
+    healthy = [labelled.reference] if labelled.reference is not None else [s.whole.recording for s in shared if s.whole]
+    for recording in (labelled.recording, *healthy):
         digest.update(np.ascontiguousarray(recording.samples).tobytes())
         digest.update(repr((recording.sampling_rate_hz, recording.channels, recording.rig)).encode())
     return digest.hexdigest()[:32]
@@ -247,7 +249,7 @@ def labelled_evidence(
     conditions: Sequence[Condition], loads_n_per_mm: Sequence[float], labelled: Sequence[LabelledChange]
 ) -> LabelledEvidence:
     """Return what labelled recordings say of the conditions, see `LabelSpace`."""
-    labels = list(dict.fromkeys(one.label for one in labelled))
+    labels = list(dict.fromkeys(change.label for change in labelled))
     ratios: dict[str, list[float]] = {label: [] for label in labels}
     alike: dict[str, list[float]] = {}
     for condition, load in zip(conditions, loads_n_per_mm, strict=True):
@@ -256,23 +258,23 @@ def labelled_evidence(
         row = within_reach(recogniser.input_row(condition.change, load))
         here = recogniser.probabilities(condition.change, load)
         for label in labels:
-            given = [one for one in labelled if one.label == label and way in one.changes]
-            near = [one for one in given if _speed_ratio(one, condition) <= SAME_SPEED] or given
+            given = [change for change in labelled if change.label == label and way in change.changes]
+            near = [change for change in given if _speed_ratio(change, condition) <= SAME_SPEED] or given
             if not near:
                 continue
-            rows = np.array([within_reach(recogniser.input_row(one.changes[way], load)) for one in near])
+            rows = np.array([within_reach(recogniser.input_row(change.changes[way], load)) for change in near])
             ratios[label].append(labelled_support(recogniser.labels.log_ratios(row, rows, label)))
             if label not in recogniser.causes:
-                there = [recogniser.probabilities(one.changes[way], load) for one in near]
+                there = [recogniser.probabilities(change.changes[way], load) for change in near]
                 mean = {name: float(np.mean([p[name] for p in there])) for name in here}
                 alike.setdefault(label, []).append(sum(min(here[name], mean[name]) for name in here))
-    counts = {label: sum(one.label == label for one in labelled) for label in labels}
+    counts = {label: sum(change.label == label for change in labelled) for label in labels}
     means = {label: float(np.mean(values)) for label, values in ratios.items() if values}
     return LabelledEvidence(counts, means, {label: float(np.mean(values)) for label, values in alike.items()})
 
 
-def _speed_ratio(one: LabelledChange, condition: Condition) -> float:
-    return float(np.exp(abs(log(one.point.speed_rpm / condition.facts.point.speed_rpm))))
+def _speed_ratio(change: LabelledChange, condition: Condition) -> float:
+    return float(np.exp(abs(log(change.point.speed_rpm / condition.facts.point.speed_rpm))))
 
 
 def with_labelled(

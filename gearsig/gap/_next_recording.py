@@ -79,13 +79,13 @@ def next_recordings(
         return ()
     now = max(distances[OWN] for distances in known)
     best_sensor = max(d for distances in known for channel, d in distances.items() if channel not in places)
-    found = []
+    recordings = []
     for point, distances in at.items():
         for channel, apart in _worth_naming(distances, places, now, best_sensor):
             place = places.get(channel, "")
             text = _text(point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in here)
-            found.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
-    return tuple(sorted(found, key=lambda one: -one.standard_deviations)[:5])
+            recordings.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
+    return tuple(sorted(recordings, key=lambda one: -one.standard_deviations)[:5])
 
 
 def _rounded(speed_rpm: float, torque_nm: float) -> OperatingCondition:
@@ -95,31 +95,31 @@ def _rounded(speed_rpm: float, torque_nm: float) -> OperatingCondition:
 
 def _distinct(points: Sequence[OperatingCondition]) -> list[OperatingCondition]:
     """Return the points without those at nearly the speed and torque of one before them."""
-    found: list[OperatingCondition] = []
+    distinct: list[OperatingCondition] = []
     for point in points:
-        if not any(same_condition(point, other) for other in found):
-            found.append(point)
-    return found
+        if not any(same_condition(point, before) for before in distinct):
+            distinct.append(point)
+    return distinct
 
 
-def _distances(conditions: Sequence[Condition], one: Reduced | str, other: Reduced | str) -> dict[str, float]:
+def _distances(conditions: Sequence[Condition], first: Reduced | str, second: Reduced | str) -> dict[str, float]:
     """Return the distance of two simulations on the rig's own sensors together, and on each sensor alone."""
-    if not (isinstance(one, Reduced) and isinstance(other, Reduced)):
+    if not (isinstance(first, Reduced) and isinstance(second, Reduced)):
         return {}
-    alone = {name: _apart(conditions, change - other.alone[name]) for name, change in one.alone.items()}
-    return {OWN: _apart(conditions, one.change - other.change), **alone}
+    alone = {name: _apart(conditions, change - second.alone[name]) for name, change in first.alone.items()}
+    return {OWN: _apart(conditions, first.change - second.change), **alone}
 
 
 def _worth_naming(
     distances: Mapping[str, float], places: Mapping[str, str], now: float, best_sensor: float
 ) -> Iterator[tuple[str, float]]:
     """Yield the rig's own sensors, and the best further one if it shows more than they, where it is worth it."""
-    own = distances.get(OWN, 0.0)
-    if own >= ENOUGH * now:
-        yield OWN, own
+    on_own_sensors = distances.get(OWN, 0.0)
+    if on_own_sensors >= ENOUGH * now:
+        yield OWN, on_own_sensors
     further = {name: d for name, d in distances.items() if name in places}
     best = max(further, key=further.__getitem__, default="")
-    usual = max([best_sensor, own, *(d for name, d in distances.items() if name not in places)])
+    usual = max([best_sensor, on_own_sensors, *(d for name, d in distances.items() if name not in places)])
     if best and further[best] >= ENOUGH * usual:
         yield best, further[best]
 
@@ -196,13 +196,13 @@ def next_steps(
     likely = [cause.name for cause in causes if cause.probability >= LIKELY]
     speeds = [point.speed_rpm for point in points]
     slow = {round(point.torque_nm, 3) for point in points if point.speed_rpm <= SLOW_RPM}
-    one_tooth = sum(name in ON_A_TOOTH for name in likely) > 1
+    is_which_tooth_fault = sum(name in ON_A_TOOTH for name in likely) > 1
     passed_on = any(sum(name in group for name in likely) > 1 for group in (PASSED_ON, AROUND_A_SHAFT))
-    wanted = {
+    is_worth = {
         "healthy": not has_reference,
-        "encoders": one_tooth and not has_encoders,
-        "slow_loads": one_tooth and len(slow) < 2,
+        "encoders": is_which_tooth_fault and not has_encoders,
+        "slow_loads": is_which_tooth_fault and len(slow) < 2,
         "run_up": passed_on and max(speeds) < WIDE * min(speeds),
         "label": not is_labelled and outcome is not GapOutcome.EFFECT,
     }
-    return tuple(NextStep(code, STEPS[code]) for code, is_wanted in wanted.items() if is_wanted)
+    return tuple(NextStep(code, STEPS[code]) for code, worth in is_worth.items() if worth)

@@ -77,12 +77,12 @@ def ranked_places(places: Sequence[GapPlace], standing: Sequence[GapPlace] = ())
     standing : sequence of GapPlace
         Found without a simulation, surest first.
     """
-    left, first = list(places), []
-    for one in standing:
-        same = [place for place in left if _same_family(place, one)]
-        first.append(_joined(one, same))
-        left = [place for place in left if place not in same]
-    return (*first, *sorted(left, key=_rank))
+    remaining, first = list(places), []
+    for stood_out in standing:
+        same = [place for place in remaining if _same_family(place, stood_out)]
+        first.append(_joined(stood_out, same))
+        remaining = [place for place in remaining if place not in same]
+    return (*first, *sorted(remaining, key=_rank))
 
 
 def _rank(place: GapPlace) -> tuple[bool, float]:
@@ -133,13 +133,13 @@ def counted_against(
         Of the gap, with their shares.
     frame : GearFrame
     """
-    found = dict(probabilities)
-    for place in (one for one in places if one.share > MOST and _is_an_order(one, frame)):
+    lowered = dict(probabilities)
+    for place in (candidate for candidate in places if candidate.share > MOST and _is_an_order(candidate, frame)):
         for name in probabilities.keys() & effects.keys():
             if not _can_make(effects[name].shows_in, place):
-                found[name] *= 2.0 * (1.0 - place.share)
-    found[UNKNOWN] += 1.0 - sum(found.values())
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+                lowered[name] *= 2.0 * (1.0 - place.share)
+    lowered[UNKNOWN] += 1.0 - sum(lowered.values())
+    return dict(sorted(lowered.items(), key=lambda item: -item[1]))
 
 
 def _is_an_order(place: GapPlace, frame: GearFrame) -> bool:
@@ -212,13 +212,13 @@ def envelope_spot(comparison: ComparedPair) -> LocatedChange:
     both = [np.concatenate([envelope_ratios(g, g.channels[name]) for name in names]) for g in (now, comparison.other)]
     levels = _levels(comparison, both, now.cycle_step, comparison.other.cycle_step)
     levels, sign = _upwards(levels, comparison.size[comparison.strongest("envelope.")])
-    found = _told_apart(_best_race(comparison, levels), _strongest(comparison, levels, fundamental=True))
-    found = max(found, *_shafts(comparison, levels), key=lambda one: one.rise_db)
+    family = _told_apart(_best_race(comparison, levels), _strongest(comparison, levels, fundamental=True))
+    family = max(family, *_shafts(comparison, levels), key=lambda candidate: candidate.rise_db)
     bands = now.bands_hz * len(names)
-    change = sign * found.rise_db
-    title = f"envelope lines {found.words}, {by_decibels(change)} in {band_words(bands[found.row])}"
-    channel = names[found.row // len(now.bands_hz)]
-    return LocatedChange(title, change, found.orders, bands[found.row], channel=channel)
+    change = sign * family.rise_db
+    title = f"envelope lines {family.words}, {by_decibels(change)} in {band_words(bands[family.row])}"
+    channel = names[family.row // len(now.bands_hz)]
+    return LocatedChange(title, change, family.orders, bands[family.row], channel=channel)
 
 
 def line_spot(comparison: ComparedPair) -> LocatedChange:
@@ -255,27 +255,27 @@ def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_d
     return replace(_line(comparison, _Found(words, rise, (order,), row), 1.0), kind=PlaceKind.LINE)
 
 
-def _line(comparison: ComparedPair, found: _Found, sign: float) -> LocatedChange:
-    change = sign * found.rise_db
-    title = f"line {found.words} ({hertz(found.orders[0] * comparison.now.speed_hz)}), {by_decibels(change)}"
-    return LocatedChange(title, change, found.orders, channel=list(comparison.now.channels)[found.row])
+def _line(comparison: ComparedPair, line: _Found, sign: float) -> LocatedChange:
+    change = sign * line.rise_db
+    title = f"line {line.words} ({hertz(line.orders[0] * comparison.now.speed_hz)}), {by_decibels(change)}"
+    return LocatedChange(title, change, line.orders, channel=list(comparison.now.channels)[line.row])
 
 
 def _residual_levels(comparison: ComparedPair) -> LineLevels:
-    now, other = comparison.now, comparison.other
-    both = [residual_ratios(g, [g.channels[name] for name in now.channels]) for g in (now, other)]
-    return _levels(comparison, both, now.order_step, other.order_step)
+    now, before = comparison.now, comparison.other
+    both = [residual_ratios(g, [g.channels[name] for name in now.channels]) for g in (now, before)]
+    return _levels(comparison, both, now.order_step, before.order_step)
 
 
-def _levels(comparison: ComparedPair, ratios: list[FloatArray], step: float, other_step: float) -> LineLevels:
-    now, other = (10.0 * np.log10(np.maximum(rows, 1.0)) for rows in ratios)
-    orders = np.arange(min(now.shape[1], int(other.shape[1] * other_step / step))) * step
-    before = _widened(other)
+def _levels(comparison: ComparedPair, ratios: list[FloatArray], step: float, step_before: float) -> LineLevels:
+    now, before_db = (10.0 * np.log10(np.maximum(rows, 1.0)) for rows in ratios)
+    orders = np.arange(min(now.shape[1], int(before_db.shape[1] * step_before / step))) * step
+    before = _widened(before_db)
     shafts = np.array(comparison.now.frame.shaft_orders)[:, None]
     away = np.abs(orders / shafts - np.rint(orders / shafts)) * shafts
     return LineLevels(
         now[:, : len(orders)],
-        np.stack([np.interp(orders, np.arange(other.shape[1]) * other_step, row) for row in before]),
+        np.stack([np.interp(orders, np.arange(before_db.shape[1]) * step_before, row) for row in before]),
         step,
         (away < 1.5 * step).any(axis=0) | (orders < LOWEST_STRANGE),
     )
@@ -302,13 +302,13 @@ def _told_apart(family: _Found, line: _Found) -> _Found:
     if family.rise_db < MIN_OF_A_FAMILY_DB or (harmonic > 1.5 and abs(harmonic / round(harmonic) - 1.0) < MISSED):
         return line  # of a lower line's harmonics, the family has but some
     multiple = line.orders[0] / family.orders[0]
-    is_one = round(multiple) in range(1, HIGHEST_MULTIPLE + 1) and abs(multiple / round(multiple) - 1.0) < MISSED
-    return family if is_one or family.rise_db > A_FAMILY_IS_HEARD * line.rise_db else line
+    is_multiple = round(multiple) in range(1, HIGHEST_MULTIPLE + 1) and abs(multiple / round(multiple) - 1.0) < MISSED
+    return family if is_multiple or family.rise_db > A_FAMILY_IS_HEARD * line.rise_db else line
 
 
 def _best_race(comparison: ComparedPair, levels: LineLevels) -> _Found:
     """Return the bearing's family whose lines rose most."""
-    found = [_Found("", 0.0, (), 0)]
+    races = [_Found("", 0.0, (), 0)]
     now, other = _widened(levels.now), levels.other
     for bearing in comparison.now.frame.bearings:
         for kind, (attribute, factor) in RACES.items():
@@ -316,8 +316,8 @@ def _best_race(comparison: ComparedPair, levels: LineLevels) -> _Found:
             if np.isfinite(order):
                 rise, row, slipped = _family_rise(now - other, order, levels)
                 words = f"of the {RACE_WORDS[kind]} of {_bearing(bearing.name)} (order {slipped:.3g})"
-                found.append(_Found(words, rise, _multiples(slipped, N_FAMILY), row))
-    return max(found, key=lambda one: one.rise_db)
+                races.append(_Found(words, rise, _multiples(slipped, N_FAMILY), row))
+    return max(races, key=lambda family: family.rise_db)
 
 
 def _bearing(name: str) -> str:
@@ -345,14 +345,14 @@ def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[fl
 
 def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_Found]:
     """Return the shafts' families, where the features say that they changed."""
-    found, rise = [], _widened(levels.now) - levels.other
+    families, rise = [], _widened(levels.now) - levels.other
     for side, order in enumerate(comparison.now.frame.shaft_orders):
         lines = np.rint(order * np.arange(1, N_SHAFT_FAMILY + 1) / levels.step).astype(np.intp)
         means = rise[:, lines[lines < rise.shape[1]]].mean(axis=1)
         felt = abs(comparison.size[f"envelope.{SIDES[side]}_shaft"]) > 1.0
         words = f"at multiples of {shaft_words(comparison.now.frame, side)}"
-        found.append(_Found(words, float(means.max()) if felt else 0.0, _multiples(order, 3), int(np.argmax(means))))
-    return found
+        families.append(_Found(words, float(means.max()) if felt else 0.0, _multiples(order, 3), int(np.argmax(means))))
+    return families
 
 
 def _multiples(order: float, n: int) -> tuple[float, ...]:
@@ -464,7 +464,7 @@ def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
 
 def sideband_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
     """Return about which mesh harmonic a shaft's sidebands changed most, and which of them."""
-    now, other = _both(comparison, side, relative=not comparison.is_reference)
+    now, before = _both(comparison, side, relative=not comparison.is_reference)
     frame = comparison.now.frame
     teeth, n = frame.teeth[side], now.power.shape[1]
     reach = min(FURTHEST_SIDEBAND, teeth // 2)
@@ -473,11 +473,11 @@ def sideband_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
         for k in range(1, N_SIDEBAND_HARMONICS + 1)
         if k * teeth + 1 < n
     ]
-    strongest = _strongest_group(now, other, groups)
+    strongest = _strongest_group(now, before, groups)
     if strongest is None or abs(strongest[2]) < MIN_CHANGE_DB:
         return None
     row, best, change = strongest
-    lines = _largest_lines(now.own[row] - other.own[row], groups[best])
+    lines = _largest_lines(now.own[row] - before.own[row], groups[best])
     title = f"sidebands of {shaft_words(frame, side)} about {_times(best + 1)}mesh, {by_decibels(change)}"
     carrier = (best + 1) * teeth
     title += _how_far_apart([abs(line - carrier) for line in lines])
@@ -525,28 +525,28 @@ class _Lines:
 def _both(comparison: ComparedPair, side: int, *, relative: bool) -> tuple[_Lines, _Lines]:
     """Return the lines of both on the same orders; `relative` to each channel's mesh harmonics."""
     names = tuple(comparison.now.channels)
-    now, other = (_lines(run, names, side, relative=relative) for run in (comparison.now, comparison.other))
-    n = min(now.power.shape[1], other.power.shape[1])
-    return now.first(n), other.first(n)
+    now, before = (_lines(run, names, side, relative=relative) for run in (comparison.now, comparison.other))
+    n = min(now.power.shape[1], before.power.shape[1])
+    return now.first(n), before.first(n)
 
 
 def _lines(gathered: ReducedRecording, names: Sequence[str], side: int, *, relative: bool) -> _Lines:
     averages = [gathered.average(name, side) for name in names]
     n, rows = averages[0].highest + 1, []
     for average in averages:
-        own = np.where(average.is_synchronous, average.excess, 0.0)
+        synchronous = np.where(average.is_synchronous, average.excess, 0.0)
         scale = average.mesh_power if relative else 1.0
-        rows.append([values[:n] / scale for values in (average.power, own, average.power - average.excess)])
+        rows.append([values[:n] / scale for values in (average.power, synchronous, average.power - average.excess)])
     return _Lines(*(np.stack(values) for values in zip(*rows, strict=True)))
 
 
-def _strongest_group(now: _Lines, other: _Lines, groups: Sequence[list[int]]) -> tuple[int, int, float] | None:
+def _strongest_group(now: _Lines, before: _Lines, groups: Sequence[list[int]]) -> tuple[int, int, float] | None:
     """Return channel, group and change in dB of the largest ratio among those whose power changed much.
 
     Channels are weighed by their own largest change: a sensor with a small gain sees the same. What changed must be the
     shaft's own lines; None where it is noise, or leaks into the average.
     """
-    here, there = now.of_groups(groups), other.of_groups(groups)
+    here, there = now.of_groups(groups), before.of_groups(groups)
     floor = np.maximum(np.maximum(here.floor, there.floor), 1e-300)
     ratio = 10.0 * np.log10((here.own + floor) / (there.own + floor))
     moved, whole = np.abs(here.own - there.own), np.abs(here.power - there.power)
@@ -691,10 +691,10 @@ class ToothPattern:
         return (centre - load_calibration().lag_pitches / self.lines.teeth) % 1.0
 
 
-def own_pattern(gathered: ReducedRecording, side: int) -> ToothPattern:
+def own_pattern(reduced: ReducedRecording, side: int) -> ToothPattern:
     """Return the pattern of a recording by itself."""
-    residuals = [average.pattern for average in gathered.averages(side)]
-    return _pattern(gathered, side, residuals, lines_of_shaft(gathered, side))
+    residuals = [average.pattern for average in reduced.averages(side)]
+    return _pattern(reduced, side, residuals, lines_of_shaft(reduced, side))
 
 
 def changed_pattern(now: ReducedRecording, healthy: ReducedRecording, side: int) -> ToothPattern:
@@ -704,14 +704,14 @@ def changed_pattern(now: ReducedRecording, healthy: ReducedRecording, side: int)
 
 
 def _pattern(
-    gathered: ReducedRecording, side: int, residuals: Sequence[NDArray[np.complex128]], lines: ShaftLines
+    reduced: ReducedRecording, side: int, residuals: Sequence[NDArray[np.complex128]], lines: ShaftLines
 ) -> ToothPattern:
     powers = [np.abs(residual) ** 2 for residual in residuals]
-    held = [average.is_synchronous for average in gathered.averages(side)]
-    own = sum(float(power[own].sum()) for power, own in zip(powers, held, strict=True))
+    held = [average.is_synchronous for average in reduced.averages(side)]
+    synchronous = sum(float(power[synchronous].sum()) for power, synchronous in zip(powers, held, strict=True))
     whole = sum(float(power.sum()) for power in powers)
     energy = np.stack([tooth_energy(residual, lines.teeth) for residual in residuals])
-    return ToothPattern(energy, lines, own / max(whole, 1e-300))
+    return ToothPattern(energy, lines, synchronous / max(whole, 1e-300))
 
 
 def tooth_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
@@ -802,19 +802,19 @@ def gap_places(
     spots = {family: _spot(comparison, family) for family, energy in energies.items() if energy > least}
     following = {family for family, spot in spots.items() if spot is not None and spot.follows}
     total = sum(energy for family, energy in energies.items() if family not in following)
-    found = []
+    places = []
     for family, spot in spots.items():
         if spot is not None:
             sizes = [family_size(distances[members[family]] / floor[members[family]]) for floor in floors]
             share = float("nan") if family in following else energies[family] / total
-            found.append(_place(family, spot, (sizes[0], sizes[1]), share, now))
-    return ranked_places(_merged(found))
+            places.append(_place(family, spot, (sizes[0], sizes[1]), share, now))
+    return ranked_places(_merged(places))
 
 
 def _merged(places: list[GapPlace]) -> list[GapPlace]:
     """Return the places with those put together to which two families of features led."""
     merged: dict[tuple[PlaceKind, str, bool], GapPlace] = {}
-    for place in sorted(places, key=lambda one: -one.structural):
+    for place in sorted(places, key=lambda duplicate: -duplicate.structural):
         key = (place.kind, place.shaft, place.follows)
         if key in merged:
             merged[key] = replace(merged[key], share=merged[key].share + place.share)

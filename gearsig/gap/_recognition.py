@@ -52,7 +52,7 @@ class Trees:
     @classmethod
     def of(cls, forest: Any) -> Trees:
         """Return those of a fitted forest of scikit-learn, whose trees are numbered depth first, left before right."""
-        trees = [one.tree_ for one in forest.estimators_]
+        trees = [estimator.tree_ for estimator in forest.estimators_]
         roots = np.cumsum([0, *(tree.node_count for tree in trees[:-1])]).astype(np.int32)
         columns = np.concatenate([tree.feature for tree in trees]).astype(np.int16)
         leaves = columns < 0
@@ -89,9 +89,9 @@ class Trees:
                 break
             goes_left = values[columns] <= self.thresholds[nodes]
             nodes = np.where(leaves, nodes, np.where(goes_left, nodes + 1, self._right[nodes]))
-        found: FloatArray = self.shares[self._leaf[nodes]].astype(np.float64).mean(axis=0)
-        found /= found.sum()
-        return found
+        shares: FloatArray = self.shares[self._leaf[nodes]].astype(np.float64).mean(axis=0)
+        shares /= shares.sum()
+        return shares
 
 
 WHOLE = 15
@@ -115,8 +115,8 @@ class LinearRule:
         """Return those of the causes, (n_causes,), for one row of input."""
         levels = self.weights @ row + self.offsets
         weights = np.exp(levels - levels.max())
-        found: FloatArray = weights / weights.sum()
-        return found
+        probabilities: FloatArray = weights / weights.sum()
+        return probabilities
 
 
 # --------------------
@@ -219,10 +219,10 @@ def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArra
     regular = (1.0 - WITHIN_SHRINKAGE) * within + WITHIN_SHRINKAGE * np.diag(diagonal)
     _, vectors = eigh(np.cov(centres.T), regular)
     directions = vectors[:, ::-1][:, :N_DIRECTIONS]
-    found, of = centres @ directions, cause[first]
-    means = np.array([found[of == i].mean(axis=0) for i in range(len(names))])
-    spread = np.mean((found - means[of]) ** 2, axis=0) - np.mean(1.0 / counts)
-    whole = np.array([found.mean(axis=0), found.var(axis=0)])
+    projected, of = centres @ directions, cause[first]
+    means = np.array([projected[of == i].mean(axis=0) for i in range(len(names))])
+    spread = np.mean((projected - means[of]) ** 2, axis=0) - np.mean(1.0 / counts)
+    whole = np.array([projected.mean(axis=0), projected.var(axis=0)])
     return LabelSpace(directions, tuple(map(str, names)), means, np.maximum(spread, MIN_BETWEEN), whole)
 
 
@@ -340,13 +340,13 @@ class Recogniser:
             Whose textbook signs are asked, without a reference.
         """
         row = self.input_row(change, tooth_load_n_per_mm)
-        found = self.trees.probabilities(row)
+        shares = self.trees.probabilities(row)
         if self.linear is not None:
             told = self.linear.probabilities(within_reach(row))
-            found = (1.0 - LINEAR_SHARE) * found + LINEAR_SHARE * told
-            found = found * self._by_the_rules(change, textbook_rules(effects))
-        found = np.maximum(found, MIN_PROBABILITY)
-        return dict(zip(self.causes, (found / found.sum()).tolist(), strict=True))
+            shares = (1.0 - LINEAR_SHARE) * shares + LINEAR_SHARE * told
+            shares = shares * self._by_the_rules(change, textbook_rules(effects))
+        shares = np.maximum(shares, MIN_PROBABILITY)
+        return dict(zip(self.causes, (shares / shares.sum()).tolist(), strict=True))
 
     def input_row(self, change: Features, tooth_load_n_per_mm: float = nan) -> FloatArray:
         """Return what trees and rules see of a change, see `probabilities`."""
@@ -463,20 +463,20 @@ def write_learned(learned: Learned, path: Path) -> None:
         "credibility": learned.credibility.astype(np.float32),
     }
     for flag, way in _WAYS.items():
-        one = learned.recognisers[flag]
-        found = {key: getattr(one.trees, key) for key in _TREES} | {
-            "causes": np.array(one.causes),
-            "usual_load_n_per_mm": np.float64(one.usual_load_n_per_mm),
-            "floor_names": np.array(one.floor.names),
-            "floors": one.floor.values.astype(np.float32),
-            "centres": np.asarray(one.floor.centres, dtype=np.float32),
-            "largest": np.float64(one.floor.whole_of(one.floor.names)),
-            "labels": np.array(one.labels.causes),
+        recogniser = learned.recognisers[flag]
+        arrays_of_recogniser = {key: getattr(recogniser.trees, key) for key in _TREES} | {
+            "causes": np.array(recogniser.causes),
+            "usual_load_n_per_mm": np.float64(recogniser.usual_load_n_per_mm),
+            "floor_names": np.array(recogniser.floor.names),
+            "floors": recogniser.floor.values.astype(np.float32),
+            "centres": np.asarray(recogniser.floor.centres, dtype=np.float32),
+            "largest": np.float64(recogniser.floor.whole_of(recogniser.floor.names)),
+            "labels": np.array(recogniser.labels.causes),
         }
-        found |= {key: getattr(one.labels, key).astype(np.float32) for key in _LABELS}
-        if one.linear is not None:
-            found |= {key: getattr(one.linear, key).astype(np.float16) for key in _LINEAR}
-        arrays |= {f"{way}/{key}": array for key, array in found.items()}
+        arrays_of_recogniser |= {key: getattr(recogniser.labels, key).astype(np.float32) for key in _LABELS}
+        if recogniser.linear is not None:
+            arrays_of_recogniser |= {key: getattr(recogniser.linear, key).astype(np.float16) for key in _LINEAR}
+        arrays |= {f"{way}/{key}": array for key, array in arrays_of_recogniser.items()}
     write_whole(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
 
 
@@ -494,15 +494,15 @@ def read_learned(path: Path) -> Learned | None:
 
 
 def _recogniser(arrays: Mapping[str, Any], way: str) -> Recogniser:
-    found = {key.removeprefix(f"{way}/"): array for key, array in arrays.items() if key.startswith(f"{way}/")}
+    stored = {key.removeprefix(f"{way}/"): array for key, array in arrays.items() if key.startswith(f"{way}/")}
     floor = StructuralFloor(
-        tuple(map(str, found["floor_names"])),
-        found["floors"].astype(np.float64),
-        found["centres"].astype(np.float64),
-        float(found["largest"]),
+        tuple(map(str, stored["floor_names"])),
+        stored["floors"].astype(np.float64),
+        stored["centres"].astype(np.float64),
+        float(stored["largest"]),
     )
-    linear = LinearRule(*(found[key].astype(np.float64) for key in _LINEAR)) if _LINEAR[0] in found else None
-    directions, *others = (found[key].astype(np.float64) for key in _LABELS)
-    labels = LabelSpace(directions, tuple(map(str, found["labels"])), *others)
-    trees, usual_load = Trees(*(found[key] for key in _TREES)), float(found["usual_load_n_per_mm"])
-    return Recogniser(tuple(map(str, found["causes"])), floor, trees, usual_load, labels, linear)
+    linear = LinearRule(*(stored[key].astype(np.float64) for key in _LINEAR)) if _LINEAR[0] in stored else None
+    directions, *others = (stored[key].astype(np.float64) for key in _LABELS)
+    labels = LabelSpace(directions, tuple(map(str, stored["labels"])), *others)
+    trees, usual_load = Trees(*(stored[key] for key in _TREES)), float(stored["usual_load_n_per_mm"])
+    return Recogniser(tuple(map(str, stored["causes"])), floor, trees, usual_load, labels, linear)

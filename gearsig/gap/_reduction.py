@@ -99,10 +99,12 @@ def gear_frame(rig: Rig) -> GearFrame:
         if bearing.shaft not in shafts:
             continue
         side = shafts.index(bearing.shaft)
-        own = {name: order * ratios[side] for name, order in bearing.orders().items()}
+        orders_of_shaft = {name: order * ratios[side] for name, order in bearing.orders().items()}
         nan = float("nan")
         bearings.append(
-            BearingFrame(bearing.name, side, *(own.get(name, nan) for name in ("BPFO", "BPFI", "BSF", "FTF")))
+            BearingFrame(
+                bearing.name, side, *(orders_of_shaft.get(name, nan) for name in ("BPFO", "BPFI", "BSF", "FTF"))
+            )
         )
     return GearFrame(pair, shafts, teeth, tuple(bearings), other_lines(rig))
 
@@ -120,13 +122,13 @@ def other_lines(rig: Rig) -> tuple[float, ...]:
     if len(rig.pairs) < 2:
         return ()
     first, *others = rig.pairs
-    found: set[float] = set()
+    line_orders: set[float] = set()
     for pair in others:
         mesh = rig.mesh_order(pair, first.driver)
         turns = [rig.ratio(shaft, to=first.driver) for shaft in (pair.driver, pair.driven)]
         for shaft, ratio in zip((pair.driver, pair.driven), turns, strict=True):
             if ratio is not None and shaft not in (first.driver, first.driven):
-                found |= {k * ratio for k in range(1, N_BACKGROUND_ORDERS + 1)}
+                line_orders |= {k * ratio for k in range(1, N_BACKGROUND_ORDERS + 1)}
         if mesh is None:
             continue
         beside = {0.0} | {
@@ -136,16 +138,16 @@ def other_lines(rig: Rig) -> tuple[float, ...]:
             for k in range(1, N_BACKGROUND_SIDEBANDS + 1)
             for sign in (-1, 1)
         }
-        found |= {k * mesh + step for k in range(1, N_BACKGROUND_HARMONICS + 1) for step in beside}
-    own_turns = (1.0, rig.ratio(first.driven, to=first.driver) or 1.0)
-    steps = np.array([k * ratio for ratio in own_turns for k in range(-SMOOTH_SIDEBANDS, SMOOTH_SIDEBANDS + 1)])
+        line_orders |= {k * mesh + step for k in range(1, N_BACKGROUND_HARMONICS + 1) for step in beside}
+    shaft_ratios = (1.0, rig.ratio(first.driven, to=first.driver) or 1.0)
+    steps = np.array([k * ratio for ratio in shaft_ratios for k in range(-SMOOTH_SIDEBANDS, SMOOTH_SIDEBANDS + 1)])
     teeth = float(first.driver_teeth or np.inf)
 
     def is_own(order: float) -> bool:
         beside = order - steps
         return bool(np.min(np.abs(beside - teeth * np.maximum(np.round(beside / teeth), 1.0))) < CLOSE)
 
-    return tuple(sorted(order for order in found if order > 0.0 and not is_own(order)))
+    return tuple(sorted(order for order in line_orders if order > 0.0 and not is_own(order)))
 
 
 CLOSE = 0.03
@@ -430,7 +432,7 @@ def _excess(values: FloatArray, recording: Recording, supply_hz: float, speed_hz
     x = np.asarray(values, dtype=np.float64)
     power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(n))) ** 2
     step = recording.sampling_rate_hz / n
-    found = []
+    excesses_db = []
     for k in range(1, N_HARMONICS + 1):
         frequency = k * supply_hz
         width = max(2.0 * step, _TOLERANCE * frequency)
@@ -441,8 +443,8 @@ def _excess(values: FloatArray, recording: Recording, supply_hz: float, speed_hz
         positions = np.arange(len(power)) * step
         line = np.abs(positions - frequency) <= width
         around = (np.abs(positions - frequency) <= _NEIGHBOURHOOD_HZ) & (np.abs(positions - frequency) > 2.0 * width)
-        found.append(10.0 * np.log10(power[line].max() / max(float(np.median(power[around])), 1e-300)))
-    return float(np.mean(found)) if found else 0.0
+        excesses_db.append(10.0 * np.log10(power[line].max() / max(float(np.median(power[around])), 1e-300)))
+    return float(np.mean(excesses_db)) if excesses_db else 0.0
 
 
 def _on_a_gear_line(frequency_hz: float, width_hz: float, speed_hz: float, frame: GearFrame) -> bool:
@@ -531,11 +533,11 @@ def _without_cycles(rest: FloatArray, cycles: Sequence[float]) -> FloatArray:
         return rest
     phase = 2.0 * np.pi * np.outer(np.arange(len(rest)), cycles)
     waves = np.hstack([np.cos(phase), np.sin(phase)])
-    found = np.linalg.lstsq(waves, rest, rcond=None)[0]
-    amplitudes = np.hypot(*found.reshape(2, -1))
+    coefficients = np.linalg.lstsq(waves, rest, rcond=None)[0]
+    amplitudes = np.hypot(*coefficients.reshape(2, -1))
     taken = np.minimum(1.0, MAX_RUN_OUT / np.maximum(amplitudes, 1e-300))
-    left: FloatArray = rest - waves @ (found * np.tile(taken, 2))
-    return left
+    remainder: FloatArray = rest - waves @ (coefficients * np.tile(taken, 2))
+    return remainder
 
 
 MIN_REVOLUTIONS = 8

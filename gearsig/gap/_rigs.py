@@ -112,7 +112,7 @@ def twin_rig(rig: Rig) -> tuple[Rig, list[str]]:
             f"{width:g} mm. A machine may have half or twice that: severities in mm and µm are orders of magnitude."
         )
     if len(rig.pairs) > 1:
-        others = ", ".join(one.name for one in rig.pairs[1:])
+        others = ", ".join(further.name for further in rig.pairs[1:])
         remarks.append(f"Diagnosed is {pair.name}; what {others} is heard at is background, and taken out.")
     elif not remarks:
         return rig, []

@@ -112,18 +112,20 @@ def _resampled(rows: FloatArray) -> FloatArray:
     both = min(len(lines), len(kept))
     # Both are at the middles of their steps.
     kept[:both] = lines[:both] * np.exp(1j * pi * np.arange(both) * (1.0 / m - 1.0 / n))
-    found: FloatArray = np.fft.irfft(kept, m).reshape(-1, STEPS) * (m / n)
-    return found
+    resampled: FloatArray = np.fft.irfft(kept, m).reshape(-1, STEPS) * (m / n)
+    return resampled
 
 
 def _turned(before: FloatArray, here: FloatArray) -> FloatArray:
     x, y = here.ravel(), before.ravel()
     alike = np.fft.irfft(np.fft.rfft(x) * np.conj(np.fft.rfft(y)), len(x))
     turns = [0, *np.argsort(-alike)[:5].tolist()]
-    left = [float(np.median(np.abs(_banded((x - np.roll(y, t)).reshape(here.shape), LOWEST_ORDER)))) for t in turns]
-    best = int(np.argmin(left))
-    found: FloatArray = np.roll(y, turns[best] if 2.0 * left[best] < left[0] else 0).reshape(here.shape)
-    return found
+    differences = [
+        float(np.median(np.abs(_banded((x - np.roll(y, t)).reshape(here.shape), LOWEST_ORDER)))) for t in turns
+    ]
+    best = int(np.argmin(differences))
+    turned: FloatArray = np.roll(y, turns[best] if 2.0 * differences[best] < differences[0] else 0).reshape(here.shape)
+    return turned
 
 
 def _banded(pattern: FloatArray, lowest: int) -> FloatArray:
@@ -131,8 +133,8 @@ def _banded(pattern: FloatArray, lowest: int) -> FloatArray:
     lines = np.fft.rfft(pattern.ravel())
     orders = np.arange(len(lines))
     part = np.cos(0.5 * pi * np.clip(orders / len(pattern) / HIGHEST_PITCH_ORDER, 0.0, 1.0)) ** 2
-    found: FloatArray = np.fft.irfft(lines * np.where(orders < lowest, 0.0, part), pattern.size)
-    return found
+    banded: FloatArray = np.fft.irfft(lines * np.where(orders < lowest, 0.0, part), pattern.size)
+    return banded
 
 
 def _window_energy(wave: FloatArray) -> FloatArray:
@@ -302,9 +304,13 @@ UNLIKE = 0.3
 """Probability of the likeliest of four faults, below which they are as good as equal."""
 
 
-def mean_log_likelihoods(found: Sequence[ToothErrorEvidence]) -> dict[str, float]:
+def mean_log_likelihoods(evidence: Sequence[ToothErrorEvidence]) -> dict[str, float]:
     """Return fault → mean ln L over conditions, which say nearly the same; empty where there is none."""
-    return {name: float(np.mean([one.log_likelihoods[name] for one in found])) for name in TOOTH_FAULTS if found}
+    return {
+        name: float(np.mean([at_condition.log_likelihoods[name] for at_condition in evidence]))
+        for name in TOOTH_FAULTS
+        if evidence
+    }
 
 
 def tooth_error_evidence(recording: Recording, reference: Recording) -> ToothErrorEvidence | None:

@@ -329,10 +329,10 @@ class GapCause(Result):
 
 def group_probabilities(causes: Sequence[GapCause]) -> dict[str, float]:
     """Return group → probability of its causes together, likeliest first."""
-    found: dict[str, float] = {}
+    by_group: dict[str, float] = {}
     for cause in causes:
-        found[cause.group] = found.get(cause.group, 0.0) + cause.probability
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+        by_group[cause.group] = by_group.get(cause.group, 0.0) + cause.probability
+    return dict(sorted(by_group.items(), key=lambda item: -item[1]))
 
 
 OWN_LABELS = "your own labels"

@@ -220,8 +220,8 @@ def _next(report: GapReport) -> str:
     if best:
         return f"Next: {best}"
     if report.outcome in (GapOutcome.UNKNOWN, GapOutcome.UNDECIDED):
-        other = {"speed": ", which tells orders from resonances"}
-        ways = "".join(f", or another {what}{other.get(what, '')}" for what in _not_varied(report)[:1])
+        purpose = {"speed": ", which tells orders from resonances"}
+        ways = "".join(f", or another {what}{purpose.get(what, '')}" for what in _not_varied(report)[:1])
         return f"Next: another sensor nearer to where it is loudest{ways}."
     if report.outcome is GapOutcome.NO_GAP:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."

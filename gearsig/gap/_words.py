@@ -238,16 +238,16 @@ def point_text(point: OperatingCondition) -> str:
     return f"{float(f'{point.speed_rpm:.4g}'):.6g} rpm and {point.torque_nm:.3g} N·m"
 
 
-def same_condition(one: OperatingCondition, other: OperatingCondition) -> bool:
+def same_condition(first: OperatingCondition, second: OperatingCondition) -> bool:
     """Whether two points are one operating condition."""
-    return same_speed(one, other) and same_load(one, other)
+    return same_speed(first, second) and same_load(first, second)
 
 
-def same_speed(one: OperatingCondition, other: OperatingCondition) -> bool:
+def same_speed(first: OperatingCondition, second: OperatingCondition) -> bool:
     """Whether two points are at one speed."""
-    return isclose(one.speed_rpm, other.speed_rpm, rel_tol=SAME_SPEED)
+    return isclose(first.speed_rpm, second.speed_rpm, rel_tol=SAME_SPEED)
 
 
-def same_load(one: OperatingCondition, other: OperatingCondition) -> bool:
+def same_load(first: OperatingCondition, second: OperatingCondition) -> bool:
     """Whether two points are at one torque."""
-    return isclose(one.torque_nm, other.torque_nm, rel_tol=SAME_TORQUE)
+    return isclose(first.torque_nm, second.torque_nm, rel_tol=SAME_TORQUE)
