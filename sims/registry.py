@@ -18,8 +18,8 @@ def simulators() -> dict[str, Simulator]:
     from sims.forging import ForgingManipulator
     from sims.reduced_fe import ReducedPair
 
-    found: tuple[Simulator, ...] = (CrackedPair(), ReducedPair(), ForgingManipulator())
-    return {simulator.name: simulator for simulator in found}
+    all_simulators: tuple[Simulator, ...] = (CrackedPair(), ReducedPair(), ForgingManipulator())
+    return {simulator.name: simulator for simulator in all_simulators}
 
 
 def simulator(name: str) -> Simulator:
@@ -34,8 +34,8 @@ def gap_simulators() -> dict[str, GapSimulator | DriveSimulator]:
     from sims.forging import forging_gap_simulator
     from sims.reduced_fe import reduced_gap_simulator
 
-    found = (cracked_gap_simulator(), reduced_gap_simulator(), forging_gap_simulator())
-    return {simulator.name: simulator for simulator in found}
+    all_simulators = (cracked_gap_simulator(), reduced_gap_simulator(), forging_gap_simulator())
+    return {simulator.name: simulator for simulator in all_simulators}
 
 
 def gap_simulator(name: str) -> GapSimulator | DriveSimulator:
@@ -52,8 +52,8 @@ def sources_digest() -> str:
     """Return a short hash of the code that simulates: kept results of another state are not taken for this one's."""
     from sims.effects import own_files
 
-    own = sha256(b"".join(path.read_bytes() for path in own_files())).hexdigest()[:8] if own_files() else ""
-    return _listed_sources() + own
+    of_users = sha256(b"".join(path.read_bytes() for path in own_files())).hexdigest()[:8] if own_files() else ""
+    return _listed_sources() + of_users
 
 
 @cache

@@ -267,10 +267,10 @@ def operation_of(
     """Return the wanted operation, the preset's own where only one of the two is given, None where neither is."""
     if speed_rpm is None and torque_nm is None:
         return None
-    own = preset(model, preset_name).operation
+    of_preset = preset(model, preset_name).operation
     return Operation(
-        own.speed_rpm if speed_rpm is None else _profile(speed_rpm, "speed_rpm"),
-        own.torque_nm if torque_nm is None else _profile(torque_nm, "torque_nm"),
+        of_preset.speed_rpm if speed_rpm is None else _profile(speed_rpm, "speed_rpm"),
+        of_preset.torque_nm if torque_nm is None else _profile(torque_nm, "torque_nm"),
     )
 
 

@@ -140,16 +140,16 @@ class Sweep:
         """Run one point."""
         import sims
 
-        own = self.at(point)
+        settings = self.at(point)
         return sims.simulate(
-            own.model,
-            preset=own.preset,
-            parameters=own.parameters,
-            effects=own.effects,
-            speed_rpm=own.speed_rpm,
-            torque_nm=own.torque_nm,
-            duration_s=own.duration_s,
-            sampling_rate_hz=own.sampling_rate_hz,
+            settings.model,
+            preset=settings.preset,
+            parameters=settings.parameters,
+            effects=settings.effects,
+            speed_rpm=settings.speed_rpm,
+            torque_nm=settings.torque_nm,
+            duration_s=settings.duration_s,
+            sampling_rate_hz=settings.sampling_rate_hz,
             seed=point.seed,
         )
 
@@ -351,13 +351,13 @@ def claimed(folder: Path, definition: Mapping[str, Any], name: str = DEFINITION,
 
 def _check_same(definition: Path, text: str, kind: str) -> None:
     try:
-        there, wanted = json.loads(definition.read_text(encoding="utf-8")), json.loads(text)
+        there, asked = json.loads(definition.read_text(encoding="utf-8")), json.loads(text)
     except ValueError:
         raise InputError(
             f"is not the definition of a {kind}", where=str(definition), remedy="choose another folder"
         ) from None
-    if there != wanted:
-        differing = [key for key in wanted if not isinstance(there, dict) or there.get(key) != wanted[key]]
+    if there != asked:
+        differing = [key for key in asked if not isinstance(there, dict) or there.get(key) != asked[key]]
         raise InputError(
             f"holds another {kind}: {', '.join(differing) or 'its definition'} differs",
             where=str(definition.parent),

@@ -114,11 +114,15 @@ def _cause(cause: GapCause) -> AnsweredCause:
     return AnsweredCause(cause.name, float(cause.probability), options, _shrinkage(cause.shrinkage))
 
 
-def _shrinkage(found: Shrinkage | None) -> AnsweredShrinkage | None:
-    if found is None:
+def _shrinkage(shrinkage: Shrinkage | None) -> AnsweredShrinkage | None:
+    if shrinkage is None:
         return None
     return AnsweredShrinkage(
-        float(found.shrink.value), float(found.slope), float(found.placebo), found.held_out, found.n_placebos
+        float(shrinkage.shrink.value),
+        float(shrinkage.slope),
+        float(shrinkage.placebo),
+        shrinkage.held_out,
+        shrinkage.n_placebos,
     )
 
 

@@ -150,7 +150,11 @@ class Plan:
 
 
 def _shuffled(plan: Plan, rng: np.random.Generator) -> list[PlannedCase]:
-    drawn = [one for kind, n in counts_of(SHARES, plan.n_cases).items() for one in _of_kind(kind, n, plan, rng)]
+    drawn = [
+        planned_case
+        for kind, n in counts_of(SHARES, plan.n_cases).items()
+        for planned_case in _of_kind(kind, n, plan, rng)
+    ]
     order = rng.permutation(len(drawn))
     return [PlannedCase(i, BLIND, *drawn[place]) for i, place in enumerate(order, 1)]
 
@@ -283,24 +287,24 @@ def record_same(plan: Plan, planned: PlannedCase, case: BlindCase) -> tuple[Case
 
 
 def _added(twin: PairTwin, name: str, level: float, rng: np.random.Generator) -> Added:
-    drawn = sorted((twin.draw(name, rng) for _ in range(N_DRAWS)), key=lambda one: one.severity)
+    drawn = sorted((twin.draw(name, rng) for _ in range(N_DRAWS)), key=lambda candidate: candidate.severity)
     return drawn[min(int(level * N_DRAWS), N_DRAWS - 1)]
 
 
 def _place(added: Added, case: BlindCase) -> dict[str, Any]:
     """Return where the effect sits, in the words of the blind rig's labels."""
-    found: dict[str, Any] = {}
+    place: dict[str, Any] = {}
     for name in ("gear", "shaft"):
         if name in added.options:
-            found["shaft"] = SHAFTS[added.options[name] == "driven"]
+            place["shaft"] = SHAFTS[added.options[name] == "driven"]
     if "bearing" in added.options:
         bearing = str(added.options["bearing"])
-        found |= {"bearing": bearing, "shaft": SHAFTS[bearing in ("bearing 3", "bearing 4")]}
-    if "tooth" in added.options and found.get("shaft") == SHAFTS[0]:
-        found["angle_deg"] = 360.0 * (float(added.options["tooth"]) - 0.5) / case.rig.pair.z1
+        place |= {"bearing": bearing, "shaft": SHAFTS[bearing in ("bearing 3", "bearing 4")]}
+    if "tooth" in added.options and place.get("shaft") == SHAFTS[0]:
+        place["angle_deg"] = 360.0 * (float(added.options["tooth"]) - 0.5) / case.rig.pair.z1
     if "order" in added.options:
-        found |= {"order": float(added.options["order"]), "shaft": SHAFTS[0]}
-    return found
+        place |= {"order": float(added.options["order"]), "shaft": SHAFTS[0]}
+    return place
 
 
 def _labels(case: BlindCase, planned: PlannedCase, added: list[Added], made: CaseRecordings) -> dict[str, Any]:

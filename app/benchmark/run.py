@@ -191,10 +191,10 @@ def environment(folder: Path, names: Sequence[str]) -> dict[str, str]:
 
 def state_of_code() -> str:
     """Return a hash of everything that makes or answers a case: answers of other code are no answers of this one."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for room in ("gearsig", "sims", "app/benchmark"):
         for path in sorted((_ROOT / room).rglob("*")):
-            own = path.relative_to(_ROOT)
-            if path.suffix in (".py", ".json", ".toml", ".npz") and not _SHOWS_ONLY & set(own.parts):
-                found.update(own.as_posix().encode() + b"\0" + path.read_bytes())
-    return found.hexdigest()[:16]
+            relative_path = path.relative_to(_ROOT)
+            if path.suffix in (".py", ".json", ".toml", ".npz") and not _SHOWS_ONLY & set(relative_path.parts):
+                digest.update(relative_path.as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -614,13 +614,13 @@ def machine() -> str:
 
 def programs() -> str:
     """Return the versions of what is compared, where it is installed."""
-    found = []
+    versions = []
     for name in ("numpy", "scipy", "numba", "PyWavelets", "ssqueezepy", "vmdpy", "pyfcwt", "PySDKit"):
         try:
-            found.append(f"{name} {version(name)}")
+            versions.append(f"{name} {version(name)}")
         except PackageNotFoundError:
             continue
-    return ", ".join(found)
+    return ", ".join(versions)
 
 
 def _ms(seconds: Any) -> str:

@@ -360,7 +360,7 @@ def standing_place(part: Standing, rig: Rig, *, name: str = "") -> GapPlace:
 
     Parameters
     ----------
-    one : Standing
+    part : Standing
     rig : Rig
     name : str
         The recording's where there are several.

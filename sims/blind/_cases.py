@@ -139,10 +139,10 @@ def record_case(case: BlindCase, *, encoder_counts: int = 0) -> CaseRecordings:
 def _kind(kind: str | None, effect: str | None, drawn: str) -> str:
     if effect is not None:
         one_of(effect, "effect", EVERY)
-        own = "unknown" if effect in OUTSIDE_CATALOGUE else "single"
-        if kind not in (None, own):
-            raise InputError(f"effect {effect!r} does not make a case of kind {kind!r}", allowed=own)
-        return own
+        kind_of_effect = "unknown" if effect in OUTSIDE_CATALOGUE else "single"
+        if kind not in (None, kind_of_effect):
+            raise InputError(f"effect {effect!r} does not make a case of kind {kind!r}", allowed=kind_of_effect)
+        return kind_of_effect
     return one_of(kind, "kind", KINDS) if kind is not None else drawn
 
 

@@ -143,8 +143,8 @@ BEARING_CHANGES = (
 def _channels(scene: Scene, choice: np.random.Generator) -> list[int]:
     """Return all sensors, or one of them."""
     n = len(scene.rig.chains)
-    one = int(choice.integers(n))
-    return [one] if choice.random() < 0.5 else list(range(n))
+    channel = int(choice.integers(n))
+    return [channel] if choice.random() < 0.5 else list(range(n))
 
 
 def _path(scene: Scene, severity: float, choice: np.random.Generator) -> Place:

@@ -196,9 +196,9 @@ def drive(
     at = time / number[GRID_S]
     cell = min(int(at), speed.shape[0] - 2)
     part = at - cell
-    wanted = speed[cell, 0] + part * (speed[cell + 1, 0] - speed[cell, 0])
+    set_speed = speed[cell, 0] + part * (speed[cell + 1, 0] - speed[cell, 0])
     gain = speed[cell, 1] + part * (speed[cell + 1, 1] - speed[cell, 1])
-    error = wanted - v[7]
+    error = set_speed - v[7]
     push[0] += number[MOTOR_NM] + number[LINE_INERTIA] * gain
     push[0] += number[MOTOR_GAIN] * (error + behind * number[MOTOR_MEMORY])
     push[3] -= number[LOAD_NM] + number[LOAD_SLOPE] * (v[8] - number[OMEGA_2])

@@ -118,15 +118,15 @@ def step_coefficients(modes: ModalForm, step_s: float) -> Matrix:
 
     Source: M. Hochbruck and A. Ostermann, Exponential integrators, *Acta Numerica* 19 (2010).
     """
-    found = np.empty((8, N_DOF))
+    coefficients = np.empty((8, N_DOF))
     for i, (w, z) in enumerate(zip(modes.omega, modes.zeta, strict=True)):
         a = np.zeros((4, 4))
         a[0, 1] = a[2, 3] = a[1, 2] = 1.0
         a[1, 0], a[1, 1] = -(w**2), -2 * z * w
         e: Any = expm(a * step_s)
         rate = e[:2, 3] / step_s
-        found[:, i] = *e[0, :2], *e[1, :2], e[0, 2] - rate[0], rate[0], e[1, 2] - rate[1], rate[1]
-    return found
+        coefficients[:, i] = *e[0, :2], *e[1, :2], e[0, 2] - rate[0], rate[0], e[1, 2] - rate[1], rate[1]
+    return coefficients
 
 
 def static_shape(modes: ModalForm, mesh_n_per_m: float, forces: Matrix) -> Matrix:

@@ -338,10 +338,10 @@ def _train_arrays(scene: Scene) -> tuple[Matrix, Matrix, Matrix, Matrix, Matrix]
 
 
 def _padded(arrays: list[FloatArray], fill: float) -> Matrix:
-    found = np.full((len(arrays), max((len(a) for a in arrays), default=1)), fill)
-    for row, values in zip(found, arrays, strict=True):
+    padded = np.full((len(arrays), max((len(a) for a in arrays), default=1)), fill)
+    for row, values in zip(padded, arrays, strict=True):
         row[: len(values)] = values
-    return found
+    return padded
 
 
 # --------------------

@@ -92,8 +92,8 @@ def run(machine: BlindDrive, chain: Chain, duration_s: float, rng: np.random.Gen
     y = np.zeros(N_STATES)
     y[0] = y[2] = rng.uniform(0.0, 2.0 * pi)
     y[4] = y[6] = y[0] * n["rb1"] / n["rb2"]
-    found = march(machine.record(), y, *machine.errors, round(duration_s / INTERVAL_S), INTERVAL_S, STEP_S)
-    rows = _readings(machine, chain, found, rng)
+    rows_of_run = march(machine.record(), y, *machine.errors, round(duration_s / INTERVAL_S), INTERVAL_S, STEP_S)
+    rows = _readings(machine, chain, rows_of_run, rng)
     return Recording(
         np.vstack(rows[: chain.n_channels]),
         1.0 / INTERVAL_S,
@@ -104,36 +104,36 @@ def run(machine: BlindDrive, chain: Chain, duration_s: float, rng: np.random.Gen
     )
 
 
-def _readings(machine: BlindDrive, chain: Chain, found: FloatArray, rng: np.random.Generator) -> list[FloatArray]:
+def _readings(machine: BlindDrive, chain: Chain, motion: FloatArray, rng: np.random.Generator) -> list[FloatArray]:
     def noise(level: float) -> FloatArray:
-        return level * rng.standard_normal(len(found))
+        return level * rng.standard_normal(len(motion))
 
     def read(angle: FloatArray) -> FloatArray:
         step = 2.0 * pi / chain.counts
         return np.asarray(np.round((angle + noise(0.3 * step)) / step) * step)
 
     full = machine.drawing.torque_nm
-    torque = machine.numbers["gain"] * found[:, 6] + chain.torque_offset * full
-    wheel = found[:, 3] + chain.wheel_zero_rad + _slips(machine, found, rng)
+    torque = machine.numbers["gain"] * motion[:, 6] + chain.torque_offset * full
+    wheel = motion[:, 3] + chain.wheel_zero_rad + _slips(machine, motion, rng)
     return [
         torque + noise(chain.torque_noise * full),
-        read(found[:, 0]),
+        read(motion[:, 0]),
         read(wheel),
-        found[:, 1] + noise(chain.speed_noise),
-        found[:, 4] + noise(chain.speed_noise),
-        found[:, 2] + noise(chain.acceleration_noise),
-        found[:, 5] + noise(chain.acceleration_noise),
-        chain.force_gain * found[:, 7] + noise(0.005 * machine.drawing.tooth_force_n),
+        motion[:, 1] + noise(chain.speed_noise),
+        motion[:, 4] + noise(chain.speed_noise),
+        motion[:, 2] + noise(chain.acceleration_noise),
+        motion[:, 5] + noise(chain.acceleration_noise),
+        chain.force_gain * motion[:, 7] + noise(0.005 * machine.drawing.tooth_force_n),
     ]
 
 
-def _slips(machine: BlindDrive, found: FloatArray, rng: np.random.Generator) -> FloatArray:
+def _slips(machine: BlindDrive, motion: FloatArray, rng: np.random.Generator) -> FloatArray:
     """The wheel's encoder stays behind by a random way in each start."""
-    angle = np.zeros(len(found))
+    angle = np.zeros(len(motion))
     slip, n = machine.numbers["slip"], machine.numbers
     if slip == 0.0:
         return angle
-    time = np.arange(len(found)) * INTERVAL_S
+    time = np.arange(len(motion)) * INTERVAL_S
     for start in np.arange(0.0, time[-1], n["period"]):
         way = slip * rng.uniform(0.3, 1.7) / n["rb2"]
         angle -= way * np.clip((time - start - 0.1) / (0.5 * n["on"]), 0.0, 1.0)
@@ -227,8 +227,8 @@ def draw_case(
 
 def record_case(case: DriveCase) -> MadeCase:
     """Record a case."""
-    rng, other = np.random.default_rng(case.seed).spawn(2)
-    reference = run(case.healthy, case.chain, case.duration_s, other) if case.with_reference else None
+    rng, reference_rng = np.random.default_rng(case.seed).spawn(2)
+    reference = run(case.healthy, case.chain, case.duration_s, reference_rng) if case.with_reference else None
     return MadeCase(run(case.machine, case.chain, case.duration_s, rng), reference)
 
 

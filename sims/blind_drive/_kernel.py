@@ -118,11 +118,11 @@ def march(r, y, errors_1, errors_2, n_samples, interval, longest_step):
     """Run with the classical Runge–Kutta method from state y; return (n_samples, N_OUT)."""
     n_steps = ceil(interval / longest_step)
     h = interval / n_steps
-    found = np.empty((n_samples, N_OUT))
+    rows = np.empty((n_samples, N_OUT))
     slopes, at, out = np.empty((4, N_STATES)), np.empty(N_STATES), np.empty(N_OUT)
     for sample in range(n_samples):
         t = sample * interval
-        _rates(r, t, y, errors_1, errors_2, slopes[0], found[sample])
+        _rates(r, t, y, errors_1, errors_2, slopes[0], rows[sample])
         for i in range(n_steps):
             s = t + i * h
             _rates(r, s, y, errors_1, errors_2, slopes[0], out)
@@ -133,4 +133,4 @@ def march(r, y, errors_1, errors_2, n_samples, interval, longest_step):
                 _rates(r, s + ahead, at, errors_1, errors_2, slopes[stage], out)
             for m in range(N_STATES):
                 y[m] += h / 6.0 * (slopes[0, m] + 2.0 * slopes[1, m] + 2.0 * slopes[2, m] + slopes[3, m])
-    return found
+    return rows

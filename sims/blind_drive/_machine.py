@@ -126,8 +126,8 @@ class BlindDrive:
         r = np.zeros(1, dtype=kind)
         for name, value in self.numbers.items():
             r[name] = value
-        found: np.recarray = r.view(np.recarray)[0]
-        return found
+        numbers: np.recarray = r.view(np.recarray)[0]
+        return numbers
 
 
 def draw_drawing(rng: np.random.Generator, role: str) -> Drawing:
@@ -325,9 +325,9 @@ def _load_friction(m: BlindDrive, percent: float, _: np.random.Generator) -> App
 
 def _crack(m: BlindDrive, depth_mm: float, rng: np.random.Generator) -> Applied:
     """A tooth's root as a cantilever: compliance with the third power of what is left of its thickness."""
-    left = 1.0 - depth_mm / (2.2 * m.drawing.module_mm)
+    thickness_share = 1.0 - depth_mm / (2.2 * m.drawing.module_mm)
     tooth = int(rng.integers(m.drawing.z1))
-    return {"crack": 0.12 * (left**-3 - 1.0), "cracked": float(tooth)}, {"tooth": tooth + 1}
+    return {"crack": 0.12 * (thickness_share**-3 - 1.0), "cracked": float(tooth)}, {"tooth": tooth + 1}
 
 
 def _inertia(m: BlindDrive, percent: float, rng: np.random.Generator) -> Applied:

@@ -354,8 +354,8 @@ def _eigenvalues_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> NDArray[n
 def slowest_decay_s(machine: Machine, operation: Operation) -> float:
     """Time in which the least damped motion falls to 1/e: of the vibrations, or of the speed that the drive holds."""
     force = operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
-    found = _eigenvalues_per_s(*matrices(machine, force))
-    ringing = found[np.abs(found.imag) > 1.0]
+    eigenvalues = _eigenvalues_per_s(*matrices(machine, force))
+    ringing = eigenvalues[np.abs(eigenvalues.imag) > 1.0]
     recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
     return max(recovery, 1.0 / max(float(-ringing.real.max()), 1e-3) if len(ringing) else 0.0)
 

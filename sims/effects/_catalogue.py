@@ -57,14 +57,14 @@ def loaded(path: Path) -> Effect:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # anything: it is somebody else's program
         raise InputError(f"does not run ({type(error).__name__}: {error})", where=str(path)) from error
-    found = getattr(module, "EFFECT", None)
-    if not isinstance(found, Effect):
+    effect_of_file = getattr(module, "EFFECT", None)
+    if not isinstance(effect_of_file, Effect):
         raise InputError(
             "defines no effect",
             where=str(path),
             remedy="set EFFECT = Effect(…), as sims/effects/tooth_wear.py does",
         )
-    return replace(found, change=partial(_changed, path, found))
+    return replace(effect_of_file, change=partial(_changed, path, effect_of_file))
 
 
 def _changed(
@@ -106,13 +106,15 @@ def effects() -> dict[str, Effect]:
     InputError
         If a file of one's own effect cannot be used.
     """
-    found = dict(_listed())
+    by_name = dict(_listed())
     for path in own_files():
-        own = loaded(path)
-        if own.name in found:
-            raise InputError(f"there is an effect {own.name!r} already", where=str(path), remedy="choose another name")
-        found[own.name] = own
-    return dict(sorted(found.items(), key=lambda item: (GROUPS.index(item[1].group), item[0])))
+        further = loaded(path)
+        if further.name in by_name:
+            raise InputError(
+                f"there is an effect {further.name!r} already", where=str(path), remedy="choose another name"
+            )
+        by_name[further.name] = further
+    return dict(sorted(by_name.items(), key=lambda item: (GROUPS.index(item[1].group), item[0])))
 
 
 def add_effect(path: str | Path) -> Effect:
@@ -154,8 +156,8 @@ def _listed() -> dict[str, Effect]:
     import sims.effects as package
 
     modules = [import_module(f"sims.effects.{m.name}") for m in iter_modules(package.__path__)]
-    found = [m.EFFECT for m in modules if hasattr(m, "EFFECT")]
-    return {e.name: e for e in found}
+    listed = [m.EFFECT for m in modules if hasattr(m, "EFFECT")]
+    return {e.name: e for e in listed}
 
 
 def effect(name: str) -> Effect:

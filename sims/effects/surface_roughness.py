@@ -24,18 +24,18 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return replace(machine, roughness=replace(machine.roughness, rms_um=rms_um, locked_to=locked_to))
 
 
-def _locked_to(now: Roughness, wanted: str) -> str:
-    if wanted in (_AS_IT_IS, now.locked_to):
+def _locked_to(now: Roughness, asked: str) -> str:
+    if asked in (_AS_IT_IS, now.locked_to):
         return now.locked_to
     # Otherwise a vanishing severity would change the profile that is already there.
     if now.rms_um > 0:
         raise InputError(
-            f"the flanks already have {now.rms_um:g} µm, locked to {now.locked_to!r}, and {wanted!r} was asked for",
+            f"the flanks already have {now.rms_um:g} µm, locked to {now.locked_to!r}, and {asked!r} was asked for",
             where="locked_to of surface_roughness",
             allowed=f"{_AS_IT_IS!r} or {now.locked_to!r}",
             remedy="change the model's own roughness",
         )
-    return wanted
+    return asked
 
 
 def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
@@ -60,8 +60,8 @@ def _born_with(scene: SyntheticScene, side: int, rng: np.random.Generator) -> Fl
     )
     wave = np.fft.irfft(lines, 8 * n)
     places = scene.revolutions * scene.shaft_orders[side] % 1.0 * len(wave)
-    found: FloatArray = np.interp(places, np.arange(len(wave) + 1), np.append(wave, wave[0]))
-    return found / max(float(found.std()), 1e-12)
+    waveform: FloatArray = np.interp(places, np.arange(len(wave) + 1), np.append(wave, wave[0]))
+    return waveform / max(float(waveform.std()), 1e-12)
 
 
 EFFECT = Effect(

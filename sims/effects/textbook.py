@@ -390,9 +390,9 @@ def uneven(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
     total = np.zeros(len(scene.time_s))
     for side, weight in zip((0, 1), rng.uniform(0.0, 1.0, 2), strict=True):
         teeth = scene.teeth[side]
-        own = rng.standard_normal(teeth)
+        of_teeth = rng.standard_normal(teeth)
         place = scene.revolutions * scene.shaft_orders[side] * teeth % teeth
-        total += weight * np.interp(place, np.arange(teeth + 1), np.append(own, own[0]))
+        total += weight * np.interp(place, np.arange(teeth + 1), np.append(of_teeth, of_teeth[0]))
     return np.clip(total, -2.5, 2.5)
 
 

@@ -243,8 +243,8 @@ def _edge_error_mm(curve: Curve, places: FloatArray, order: int) -> float:
         a, c = nodes[:, k], nodes[:, k + 2]
         b = nodes[:, k + 1] if order == 2 else (a + c) / 2.0
         edge = (1 - t) * (1 - 2 * t) * a + 4 * t * (1 - t) * b + t * (2 * t - 1) * c
-        own = curve(np.linspace(places[k], places[k + 2], 400))
-        distance = np.hypot(edge[:, :1] - own[0], edge[:, 1:] - own[1]).min(axis=1)
+        on_curve = curve(np.linspace(places[k], places[k + 2], 400))
+        distance = np.hypot(edge[:, :1] - on_curve[0], edge[:, 1:] - on_curve[1]).min(axis=1)
         worst = max(worst, float(distance.max()))
     return worst
 
@@ -272,8 +272,8 @@ def _joined(pieces: tuple[tuple[Curve, float, float], ...]) -> tuple[Curve, floa
         points = np.empty((2, len(s)))
         which = np.clip(np.searchsorted(ends, s, side="right") - 1, 0, len(pieces) - 1)
         for k, (curve, _, _) in enumerate(pieces):
-            own = which == k
-            points[:, own] = curve(np.interp(s[own] - ends[k], tables[k][1], tables[k][0]))
+            on_piece = which == k
+            points[:, on_piece] = curve(np.interp(s[on_piece] - ends[k], tables[k][1], tables[k][0]))
         return points
 
     return joined, float(ends[-1])

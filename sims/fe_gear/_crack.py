@@ -156,10 +156,12 @@ def tooth_compliance_with(mesh: SectorMesh, chain: FloatArray, grid: FlankGrid, 
 
 def _ring(mesh: SectorMesh, chain: FloatArray) -> tuple[sparse.csc_array, IntArray]:
     """Stiffness of a sector, closed to a ring by others, over its degrees of freedom that are not held."""
-    own = sector_matrices(mesh)[0]
+    sector_stiffness = sector_matrices(mesh)[0]
     ends = np.concatenate((_free_side(mesh, mesh.high_side), _free_side(mesh, mesh.low_side)))
     places = (np.repeat(ends, len(ends)), np.tile(ends, len(ends)))
-    stiffness = own + sparse.csr_array(sparse.coo_array((chain.ravel(), places), shape=own.shape))
+    stiffness = sector_stiffness + sparse.csr_array(
+        sparse.coo_array((chain.ravel(), places), shape=sector_stiffness.shape)
+    )
     kept = _free_dof(mesh)
     return sparse.csc_array(stiffness[kept][:, kept]), kept
 
@@ -176,10 +178,10 @@ def front_widths_mm(blank: GearBlank, size: MeshSize = CRACK_SIZE) -> FloatArray
 def other_sectors(blank: GearBlank, size: MeshSize) -> FloatArray:
     """Stiffness of all sectors but one at the sides of that one, high and low, the bore held; cracks leave it be."""
     mesh = sector_mesh(blank, size)
-    one = _condensed(sector_matrices(mesh)[0], mesh)
+    condensed = _condensed(sector_matrices(mesh)[0], mesh)
     n_sectors = blank.n_teeth - 1
     chain: FloatArray | None = None
-    power = one
+    power = condensed
     while n_sectors:
         if n_sectors % 2:
             chain = power if chain is None else _joined(chain, power)
@@ -328,8 +330,8 @@ def compare_crack_laws(gear: ReducedGear, depth_mm: FloatArray, angle_deg: float
     roll, width = gear.grid.roll_rad, g.face_width_mm * 1e-3
     cracks = [RootCrack(float(q), angle_deg) for q in np.atleast_1d(depth_mm)]
     _, n_heights, n_slices = gear.grid.shape
-    own = gear.clamped_compliance_m_per_n[0].reshape(2, n_heights, n_slices, 2, n_heights, n_slices)
-    healthy = own[0, :, :, 0].mean(axis=(1, 3)).diagonal()
+    at_own_tooth = gear.clamped_compliance_m_per_n[0].reshape(2, n_heights, n_slices, 2, n_heights, n_slices)
+    healthy = at_own_tooth[0, :, :, 0].mean(axis=(1, 3)).diagonal()
     added = {"finite elements": np.array([crack_added_m_per_n(gear, crack).mean(axis=(1, 2)) for crack in cracks])}
     whole = tooth_compliance(g, material, roll).total
     for law in CRACK_LAWS:
@@ -407,11 +409,11 @@ def solved_crack_m_per_n(gear: ReducedGear, angle_deg: float, place: int) -> Flo
     opened = open_crack(gear.blank, RootCrack(depth, angle_deg), gear.grid, spread, crack_size(gear))
     n_heights, n_slices = gear.grid.shape[1:]
     heights = np.arange(n_heights)
-    found = [
+    by_width = [
         opened.added_m_per_n(layer).reshape(n_heights, n_slices, n_heights, n_slices)[heights, :, heights, :]
         for layer in range(2, opened.last_layer + 1, 2)
     ]
-    return np.array(found)
+    return np.array(by_width)
 
 
 @lru_cache(maxsize=1)

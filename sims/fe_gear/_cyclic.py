@@ -62,8 +62,8 @@ class SectorMirror:
         self._n = len(points_m)
         self._on_low = np.zeros(self._n, dtype=bool)
         self._on_low[low_side] = True
-        found = cKDTree(points_m).query(points_m * np.array([1.0, -1.0, 1.0]))
-        distance, image = np.array(found[0], dtype=np.float64), np.array(found[1], dtype=np.int64)
+        nearest = cKDTree(points_m).query(points_m * np.array([1.0, -1.0, 1.0]))
+        distance, image = np.array(nearest[0], dtype=np.float64), np.array(nearest[1], dtype=np.int64)
         image[self._on_low] = np.flatnonzero(self._on_low)
         distance[self._on_low] = 0.0
         if distance.max() > 1e-9 or np.any(image[image] != np.arange(self._n)):
@@ -260,8 +260,8 @@ class CyclicGear:
     @cached_property
     def own_nodes(self) -> IntArray:
         """Nodes of the sector without its high side."""
-        own: IntArray = np.setdiff1d(np.arange(self.mesh.n_nodes), self.mesh.high_side)
-        return own
+        nodes: IntArray = np.setdiff1d(np.arange(self.mesh.n_nodes), self.mesh.high_side)
+        return nodes
 
     @cached_property
     def _fold(self) -> tuple[sparse.csr_array, sparse.csr_array]:
@@ -462,23 +462,23 @@ def cyclic_modes(gear: CyclicGear, n_modes: int = 20, held: Held = "free", *, el
     Source: D. L. Thomas, Dynamics of rotationally periodic structures, International Journal for Numerical Methods in
     Engineering 14 (1979).
     """
-    wanted = count(n_modes, "n_modes")
-    found: list[tuple[float, int, ComplexArray]] = []
+    n_asked = count(n_modes, "n_modes")
+    modes: list[tuple[float, int, ComplexArray]] = []
     empty = 0
     for n in gear.diameters:
         # With too few yet, as many as are wanted are looked for: the limit comes down with each nodal diameter.
-        limit = _limit(found, wanted, gear.n_sectors)
-        new = _below(gear, n, held, wanted, limit, elastic)
-        found += new
+        limit = _limit(modes, n_asked, gear.n_sectors)
+        new = _below(gear, n, held, n_asked, limit, elastic)
+        modes += new
         empty = 0 if new else empty + 1
         if empty == 2 and np.isfinite(limit):
             break
-    found.sort(key=lambda mode: mode[:2])
+    modes.sort(key=lambda mode: mode[:2])
     kept, total = 0, 0
-    while kept < len(found) and total < wanted:
-        total += _multiplicity(found[kept][1], gear.n_sectors)
+    while kept < len(modes) and total < n_asked:
+        total += _multiplicity(modes[kept][1], gear.n_sectors)
         kept += 1
-    chosen = found[:kept]
+    chosen = modes[:kept]
     shapes = np.column_stack([shape for *_, shape in chosen])
     return CyclicModes(np.array([m[0] for m in chosen]), np.array([m[1] for m in chosen]), shapes)
 
@@ -558,14 +558,14 @@ def _below(
         if frequencies[-1] > limit_hz or n_shapes >= wanted + 2 or n_shapes > shapes.shape[0] // 4:
             break
         n_shapes = 2 * n_shapes
-    own = range(len(frequencies))
+    indices = range(len(frequencies))
     least = RIGID_HZ if elastic else -1.0
-    return [(float(frequencies[k]), n, shapes[:, k]) for k in own if least < frequencies[k] <= limit_hz]
+    return [(float(frequencies[k]), n, shapes[:, k]) for k in indices if least < frequencies[k] <= limit_hz]
 
 
-def _limit(found: list[tuple[float, int, ComplexArray]], wanted: int, n_sectors: int) -> float:
+def _limit(modes: list[tuple[float, int, ComplexArray]], wanted: int, n_sectors: int) -> float:
     """Frequency of the last wanted mode so far; infinite while there are too few."""
-    repeated = sorted(f for f, n, _ in found for _ in range(_multiplicity(n, n_sectors)))
+    repeated = sorted(f for f, n, _ in modes for _ in range(_multiplicity(n, n_sectors)))
     return repeated[wanted - 1] if len(repeated) >= wanted else np.inf
 
 

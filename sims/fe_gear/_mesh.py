@@ -387,8 +387,8 @@ def face_view(mesh: SectorMesh, sectors: tuple[int, ...] | None = None) -> FaceV
         turned = flat @ np.array([[c, s], [-s, c]])
         points.append(turned)
         outlines.append(turned[np.stack([local[:, r, q] for r, q in _OUTLINES[faces.shape[1]]], axis=1)])
-    one = np.concatenate((_walls(flat, local), _triangles(local)))
-    triangles = (one[None] + (len(nodes) * np.arange(len(shown)))[:, None, None]).reshape(-1, 3)
+    of_sector = np.concatenate((_walls(flat, local), _triangles(local)))
+    triangles = (of_sector[None] + (len(nodes) * np.arange(len(shown)))[:, None, None]).reshape(-1, 3)
     return FaceView(np.concatenate(points), triangles, np.concatenate(outlines), np.tile(cells, len(shown)), nodes)
 
 
@@ -445,12 +445,12 @@ def _walls(points_mm: FloatArray, local: IntArray) -> IntArray:
 
 def _triangles(local: IntArray) -> IntArray:
     """Two triangles between any four neighbours of each face."""
-    found = []
+    triangles = []
     for r in range(local.shape[1] - 1):
         for q in range(local.shape[2] - 1):
             a, b, c, d = local[:, r, q], local[:, r + 1, q], local[:, r + 1, q + 1], local[:, r, q + 1]
-            found += [np.stack((a, b, c), axis=1), np.stack((a, c, d), axis=1)]
-    return np.concatenate(found)
+            triangles += [np.stack((a, b, c), axis=1), np.stack((a, c, d), axis=1)]
+    return np.concatenate(triangles)
 
 
 # Weights of nodes for means along a line of cells of three nodes (order 2) or two (order 1).
@@ -668,9 +668,9 @@ def _shape_functions(local: FloatArray, n_each_way: int) -> tuple[FloatArray, Fl
     values, slopes = np.empty((n_local, local.shape[1])), np.empty((local.shape[1], 3, n_local))
     order = n_each_way ** np.array([2, 1, 0])
     for k, place in enumerate(np.rint((n_each_way - 1) * np.asarray(element.doflocs)).astype(int)):
-        own = int(place @ order)
+        node = int(place @ order)
         value, slope = element.lbasis(local, k)
-        values[own], slopes[:, :, own] = value, np.asarray(slope).T
+        values[node], slopes[:, :, node] = value, np.asarray(slope).T
     return values, slopes
 
 

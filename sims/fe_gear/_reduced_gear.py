@@ -566,18 +566,18 @@ def static_compliance(
     z, points = gear.n_sectors, grid.n_points
     flanks = np.zeros((n_offsets, points, points))
     hub_flank, hub = np.zeros((6, points)), np.zeros((6, 6))
-    own = _solved_points(grid)
+    solved = _solved_points(grid)
     for n in gear.diameters:
         weight = (1.0 if n == 0 or 2 * n == z else 2.0) / z
         shares = hub_sum(n, z) @ gear.hub if n <= 1 else np.zeros((0, rows.shape[1]))
-        loads = np.hstack((rows[own].T, shares.conj().T))
+        loads = np.hstack((rows[solved].T, shares.conj().T))
         moved = _response(gear, n, loads, held)
-        at_flanks = _mirrored((rows @ moved[:, : len(own)]).astype(np.complex128), grid, own)
+        at_flanks = _mirrored((rows @ moved[:, : len(solved)]).astype(np.complex128), grid, solved)
         for offset in range(n_offsets):
             flanks[offset] += weight * np.real(at_flanks * np.exp(1j * gear.phase_rad(n) * offset))
         if n <= 1:
-            hub += weight * np.real(shares @ moved[:, len(own) :])
-            hub_flank += weight * np.real(moved[:, len(own) :].conj().T @ rows.T)
+            hub += weight * np.real(shares @ moved[:, len(solved) :])
+            hub_flank += weight * np.real(moved[:, len(solved) :].conj().T @ rows.T)
     return StaticCompliance(flanks, hub_flank, hub)
 
 
@@ -600,7 +600,7 @@ def _solved_points(grid: FlankGrid) -> IntArray:
     return index[0, :, : (grid.shape[2] + 1) // 2].ravel()
 
 
-def _mirrored(part: ComplexArray, grid: FlankGrid, own: IntArray) -> ComplexArray:
+def _mirrored(part: ComplexArray, grid: FlankGrid, solved: IntArray) -> ComplexArray:
     """H of all points from its columns of some.
 
     H is the same seen from the other end of the shaft, and a mirror at the middle of the tooth makes n to −n, which is
@@ -609,8 +609,8 @@ def _mirrored(part: ComplexArray, grid: FlankGrid, own: IntArray) -> ComplexArra
     index = np.arange(grid.n_points).reshape(grid.shape)
     end, flank = index[:, :, ::-1].ravel(), index[::-1].ravel()
     whole = np.zeros((grid.n_points, grid.n_points), dtype=np.complex128)
-    whole[:, own] = part
-    whole[:, end[own]] = part[end]
+    whole[:, solved] = part
+    whole[:, end[solved]] = part[end]
     first = index[0].ravel()
     whole[:, flank[first]] = whole[flank][:, first].conj()
     return whole

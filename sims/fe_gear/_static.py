@@ -75,8 +75,8 @@ def load_tooth(
     grid = FlankGrid(np.array([roll]), np.array([0.0]))
     row = flank_rows(mesh, grid, spread, gear.own_places, 3 * len(gear.own_nodes))[int(flank)]
     with one_thread():
-        own = _static_field(gear, force * row)
-    return ToothLoad(mesh, force, float(roll), gear.sector_fields(own), float(own[0] @ row))
+        field_of_sectors = _static_field(gear, force * row)
+    return ToothLoad(mesh, force, float(roll), gear.sector_fields(field_of_sectors), float(field_of_sectors[0] @ row))
 
 
 def stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
@@ -124,8 +124,8 @@ def polar_stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> dict[str, F
     out = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
     around = np.stack((-np.sin(angle), np.cos(angle), np.zeros_like(angle)), axis=1)
     components = {"radial": (out, out), "tangential": (around, around), "shear": (out, around)}
-    found = {name: np.einsum("ni,nij,nj->n", a, stress, b) for name, (a, b) in components.items()}
-    return {**found, "von Mises": _von_mises(stress)}
+    by_component = {name: np.einsum("ni,nij,nj->n", a, stress, b) for name, (a, b) in components.items()}
+    return {**by_component, "von Mises": _von_mises(stress)}
 
 
 def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad, spread: Spread = "patch") -> FloatArray:
@@ -148,8 +148,8 @@ def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad, spread: Sp
     pairs = modes.multiplicity(gear.n_sectors)
     for which, hertz in enumerate(modes.frequencies_hz):
         for sine in (False, True)[: int(pairs[which])]:
-            own = modes.shapes[:, which].imag if sine else modes.shapes[:, which].real
-            share = load.force_n * float(row @ own) / (2.0 * np.pi * hertz) ** 2
+            shape = modes.shapes[:, which].imag if sine else modes.shapes[:, which].real
+            share = load.force_n * float(row @ shape) / (2.0 * np.pi * hertz) ** 2
             total += share * mode_field(gear, modes, which, sine=sine)
     return total
 
@@ -204,11 +204,11 @@ def discretisation_error(
     """
     blank = gear.mesh.blank
     mesh = sector_mesh(blank, mesh_size_for(blank, FINER_DOF))
-    wanted = int(modes.multiplicity(gear.n_sectors).sum())
+    n_modes = int(modes.multiplicity(gear.n_sectors).sum())
     with one_thread():
-        finer = cyclic_modes(CyclicGear(mesh, gear.hub_stiffness), wanted + 8, held, elastic=elastic)
-    own, theirs = _by_diameter(modes), _by_diameter(finer)
-    ratio = [own[name] / theirs[name] - 1.0 for name in own if name in theirs]
+        finer = cyclic_modes(CyclicGear(mesh, gear.hub_stiffness), n_modes + 8, held, elastic=elastic)
+    coarse, theirs = _by_diameter(modes), _by_diameter(finer)
+    ratio = [coarse[name] / theirs[name] - 1.0 for name in coarse if name in theirs]
     again = load_tooth(mesh, load.force_n, load.roll_rad)
     return DiscretisationError(mesh.n_dof, np.array(ratio), load.push_m / again.push_m - 1.0)
 
@@ -216,12 +216,12 @@ def discretisation_error(
 def _by_diameter(modes: CyclicModes) -> dict[tuple[int, int], float]:
     """Frequencies by nodal diameters and rank among those with as many; rigid motions left out."""
     seen: Counter[int] = Counter()
-    found = {}
+    frequencies = {}
     for hertz, n in zip(modes.frequencies_hz, modes.nodal_diameters, strict=True):
         seen[int(n)] += 1
         if hertz > 1.0:
-            found[int(n), seen[int(n)]] = float(hertz)
-    return found
+            frequencies[int(n), seen[int(n)]] = float(hertz)
+    return frequencies
 
 
 # Meshes, modes and stresses for other finite-element programs, through meshio.

@@ -593,9 +593,9 @@ def build_rig(
 
 
 def _stiffness(values: ParameterValues, path: PathOfContact) -> float:
-    own = values.optional("stiffness_n_per_m_lambda")
-    if own is not None:
-        return own
+    stated = values.optional("stiffness_n_per_m_lambda")
+    if stated is not None:
+        return stated
     if values.number("exponent") != 1.5:
         raise InputError(
             f"exponent is {values.number('exponent'):g}, and both named stiffnesses hold for 1.5",

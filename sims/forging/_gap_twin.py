@@ -179,8 +179,15 @@ class ForgingGapSimulator:
         """Return the effects that have a meaning for this model."""
         known = [(effect(name), shows_in) for name, shows_in in _SHOWS_IN.items()]
         return {
-            one.name: GapEffect(one.name, one.group, one.title, one.severity.name, one.severity.unit, shows_in=shows_in)
-            for one, shows_in in known
+            known_effect.name: GapEffect(
+                known_effect.name,
+                known_effect.group,
+                known_effect.title,
+                known_effect.severity.name,
+                known_effect.severity.unit,
+                shows_in=shows_in,
+            )
+            for known_effect, shows_in in known
         } | _WRONG_VALUES
 
     def drive_twin_of(self, facts: DriveFacts) -> ForgingTwin:

@@ -448,17 +448,17 @@ def _to_event(k, y, t, h, mode, profile, stages, end, out, next_flank):
             high = middle
         else:
             low = middle
-    found = high * h
+    length = high * h
     for _ in range(4):
-        found = min(max(found, 1e-15), h)
-        step(k, y, t, found, mode, profile, stages, end, out)
+        length = min(max(length, 1e-15), h)
+        step(k, y, t, length, mode, profile, stages, end, out)
         edge, over = reach(k, end[0], flank)
-        left = flank * end[2] - edge
+        distance = flank * end[2] - edge
         speed = flank * end[3] - over * end[1]
-        if abs(left) < ROOT_M or speed == 0.0:
+        if abs(distance) < ROOT_M or speed == 0.0:
             break
-        change = left / speed
+        change = distance / speed
         if abs(change) > 0.1 * h:
             break
-        found -= change
-    return found
+        length -= change
+    return length

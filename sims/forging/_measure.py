@@ -56,13 +56,13 @@ def filtered_signals(
     reach = ceil(chain.reach_s(sampling_rate_hz) * sampling_rate_hz) + 1
     lasts_s = (n_samples + reach) / sampling_rate_hz
     together = max(1, MAX_VALUES // ((n_samples + 2 * reach) * SLOW_FINE_POINTS))
-    found: dict[str, FloatArray] = {}
+    signals: dict[str, FloatArray] = {}
     for first in range(0, len(names), together):
         chosen = names[first : first + together]
         run = respond(drive, profiles, duration_s=lasts_s, interval_s=step_s, signals=chosen)
         fine = np.pad(np.stack([run[name] for name in chosen]), ((0, 0), (reach * SLOW_FINE_POINTS, 0)), mode="edge")
-        found |= zip(chosen, chain.sample(fine, step_s, sampling_rate_hz, reach, n_samples), strict=True)
-    return found
+        signals |= zip(chosen, chain.sample(fine, step_s, sampling_rate_hz, reach, n_samples), strict=True)
+    return signals
 
 
 MIN_VIBRATION_HZ = 5000.0
@@ -92,8 +92,8 @@ VIBRATION = Channel("vibration", "acceleration", "m/s^2", "pinion bearing, along
 
 def sensors(sampling_rate_hz: float) -> tuple[Sensor, ...]:
     """Return the sensors of a recording at that rate, for its rig file."""
-    wanted = (*CHANNELS, VIBRATION) if sampling_rate_hz >= MIN_VIBRATION_HZ else CHANNELS
-    return tuple(Sensor(c.name, c.quantity, c.unit, c.position) for c in wanted)
+    channels = (*CHANNELS, VIBRATION) if sampling_rate_hz >= MIN_VIBRATION_HZ else CHANNELS
+    return tuple(Sensor(c.name, c.quantity, c.unit, c.position) for c in channels)
 
 
 def record(

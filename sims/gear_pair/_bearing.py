@@ -63,9 +63,9 @@ def bearing_fields(machine: Machine, mesh_force_n: float, rng: np.random.Generat
     loads = bearing_loads_n(machine, mesh_force_n)
     defects = [_defect(b) for b in supports]
     places = np.zeros((4, N_PLACES))
-    for row, (support, own) in enumerate(zip(supports, rng.spawn(4), strict=True)):
+    for row, (support, bearing_rng) in enumerate(zip(supports, rng.spawn(4), strict=True)):
         if support.defect is not None and support.defect.spacing_jitter > 0:
-            places[row] = np.clip(own.standard_normal(N_PLACES), -3, 3) * support.defect.spacing_jitter
+            places[row] = np.clip(bearing_rng.standard_normal(N_PLACES), -3, 3) * support.defect.spacing_jitter
     return {
         "bearing_mass": np.array([b.mass_kg for b in supports]),
         "per_bearing_mass": 1.0 / np.array([b.mass_kg for b in supports]),

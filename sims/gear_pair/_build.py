@@ -410,11 +410,11 @@ def _check_balls(bearing: Bearing) -> None:
 
 
 def _sensors(chain: MeasurementChain, shaft: str) -> tuple[Sensor, ...]:
-    found = [Sensor(c.name, "acceleration", "m/s^2", c.position) for c in chain.channels]
+    sensors = [Sensor(c.name, "acceleration", "m/s^2", c.position) for c in chain.channels]
     if isinstance(chain.tachometer, Tachometer):
-        found.append(Sensor(chain.tachometer.channel, "tachometer", "V", f"{chain.tachometer.shaft or shaft} shaft"))
-    found += [Sensor(e.channel, "encoder", "deg", e.shaft or shaft, wraps=e.wraps) for e in chain.encoders]
-    return tuple(found)
+        sensors.append(Sensor(chain.tachometer.channel, "tachometer", "V", f"{chain.tachometer.shaft or shaft} shaft"))
+    sensors += [Sensor(e.channel, "encoder", "deg", e.shaft or shaft, wraps=e.wraps) for e in chain.encoders]
+    return tuple(sensors)
 
 
 def _speed_source(chain: MeasurementChain, shaft: str) -> SpeedSource | None:

@@ -191,9 +191,9 @@ def installed_of_rig(rig: Rig, size: float, modes: Sequence[HousingMode], used: 
     shafts = (pair.driver, pair.driven)
     bearings: list[Bearing] = []
     for side in range(2):
-        own = sorted(own_bearings(rig, shafts[side]), key=lambda b: b.name not in used)[:2]
-        bearings += [completed(b, size) for b in own]
-        bearings += [_spare(rig, shafts[side], 2 * side + n + 1, size) for n in range(len(own), 2)]
+        of_shaft = sorted(own_bearings(rig, shafts[side]), key=lambda b: b.name not in used)[:2]
+        bearings += [completed(b, size) for b in of_shaft]
+        bearings += [_spare(rig, shafts[side], 2 * side + n + 1, size) for n in range(len(of_shaft), 2)]
     pickup = _pickup(rig, shafts)
     return Installed(
         shafts,

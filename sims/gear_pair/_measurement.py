@@ -95,15 +95,15 @@ class Measurement:
         positive(duration_s, "duration_s", "s")
         rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
         chain = replace(machine.chain, sampling_rate_hz=rate)
-        wanted_hz = motion_rate_hz(chain)
-        per_sample = ceil(max(1.0 / positive(longest_step_s, "step_s", "s"), wanted_hz) / rate - 1e-9)
+        rate_hz = motion_rate_hz(chain)
+        per_sample = ceil(max(1.0 / positive(longest_step_s, "step_s", "s"), rate_hz) / rate - 1e-9)
         return cls(
             machine,
             chain,
             duration_s,
             ceil(lead_in_s(machine, chain) * rate) / rate,
             1.0 / (rate * per_sample),
-            max(floor(rate * per_sample / wanted_hz + 1e-9), 1),
+            max(floor(rate * per_sample / rate_hz + 1e-9), 1),
             used_positions(chain),
         )
 

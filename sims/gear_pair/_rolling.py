@@ -85,13 +85,13 @@ def stiffness_under_load_n_per_m(support: BearingSupport, load_n: FloatArray, n_
     if support.law == "linear" or float(np.hypot(*load_n)) == 0.0:
         return support.stiffness_n_per_m
     n, toward = support.bearing.n_rolling_elements or 1, float(np.arctan2(load_n[1], load_n[0]))
-    contact, found = contact_n_per_m15(support.bearing), []
+    contact, stiffnesses = contact_n_per_m15(support.bearing), []
     for cage in 2.0 * pi / n * np.arange(n_places) / n_places:
         loads = element_loads_n(support, load_n, float(cage))
         root_depth = (loads / contact) ** (1.0 / 3.0)
         along = np.cos(element_angles_rad(n, float(cage)) - toward) ** 2
-        found.append(float(np.sum(1.5 * contact * root_depth * along)))
-    return float(np.mean(found))
+        stiffnesses.append(float(np.sum(1.5 * contact * root_depth * along)))
+    return float(np.mean(stiffnesses))
 
 
 def balanced(

@@ -89,16 +89,16 @@ def usual_parameters(nominal: Nominal) -> dict[str, ParameterValue]:
 
 def specimen_parameters(nominal: Nominal, rng: np.random.Generator) -> dict[str, ParameterValue]:
     """Return what differs between machines of one drawing: tolerances, half to twice the usual, and their places."""
-    found: dict[str, ParameterValue] = {"tolerance_seed": int(rng.integers(10**6))}
+    parameters: dict[str, ParameterValue] = {"tolerance_seed": int(rng.integers(10**6))}
     widest = max(nominal.pitch_diameters_mm)
-    found["pitch_deviation_um"] = PITCH_RMS_SHARE * pitch_tolerance_um(nominal.module_mm, widest) * _spread(rng)
+    parameters["pitch_deviation_um"] = PITCH_RMS_SHARE * pitch_tolerance_um(nominal.module_mm, widest) * _spread(rng)
     for side, name in enumerate(("driver", "driven")):
         diameter = nominal.pitch_diameters_mm[side]
-        found[f"runout_{name}_um"] = RUNOUT_SHARE * runout_tolerance_um(nominal.module_mm, diameter) * _spread(rng)
-        found[f"unbalance_{name}_g_mm"] = UNBALANCE_UM * usual_mass_kg(nominal, side) * _spread(rng)
+        parameters[f"runout_{name}_um"] = RUNOUT_SHARE * runout_tolerance_um(nominal.module_mm, diameter) * _spread(rng)
+        parameters[f"unbalance_{name}_g_mm"] = UNBALANCE_UM * usual_mass_kg(nominal, side) * _spread(rng)
         for what in ("runout", "unbalance"):
-            found[f"{what}_angle_{name}_deg"] = float(rng.uniform(0.0, 360.0))
-    return found
+            parameters[f"{what}_angle_{name}_deg"] = float(rng.uniform(0.0, 360.0))
+    return parameters
 
 
 def usual_housing(rng: np.random.Generator) -> tuple[HousingMode, ...]:
@@ -232,19 +232,19 @@ class PairTwin:
         starts follow from seed and noise; run 0 starts at the driver's first tooth.
         """
         count(seed, "seed", minimum=0)
-        own = self.preset(point, added, seed=seed)
+        preset_at_point = self.preset(point, added, seed=seed)
         run_rng = np.random.default_rng([seed, count(noise, "noise", minimum=0)])
         skipped = 0
         if noise:
             skipped = round(run_rng.uniform(0.0, LONGEST_LEAD_REV) * 60.0 / point.speed_rpm * sampling_rate_hz)
         machine_rng = np.random.default_rng(seed)
         recording = self.pair_model.record(
-            self._prepared(own, machine_rng, sampling_rate_hz),
+            self._prepared(preset_at_point, machine_rng, sampling_rate_hz),
             machine_rng,
             rig=self._rig_at(point),
             sampling_rate_hz=sampling_rate_hz,
             duration_s=duration_s + skipped / sampling_rate_hz,
-            step_s=self._step_s(own),
+            step_s=self._step_s(preset_at_point),
             noise_rng=run_rng if noise else None,
         )
         recording = replace(recording, truth={**(recording.truth or {}), "seed": seed, "noise": noise})
@@ -355,8 +355,8 @@ class PairTwin:
         rms = np.mean([np.std(healthy.values(name)) for name in healthy.vibration_names()])
         return MachineFacts(self.nominal, (pair.driver, pair.driven), bearings, float(rms))
 
-    def _prepared(self, own: Preset, rng: np.random.Generator, sampling_rate_hz: float = 20480.0) -> ReadyPair:
-        ready: ReadyPair = self.pair_model.prepare(SimulationSetup(own), rng, sampling_rate_hz=sampling_rate_hz)
+    def _prepared(self, preset: Preset, rng: np.random.Generator, sampling_rate_hz: float = 20480.0) -> ReadyPair:
+        ready: ReadyPair = self.pair_model.prepare(SimulationSetup(preset), rng, sampling_rate_hz=sampling_rate_hz)
         return ready
 
     def _step_s(self, own: Preset) -> float:
@@ -368,8 +368,8 @@ class PairTwin:
         return values
 
     def _rig_at(self, point: OperatingCondition) -> Rig:
-        own = OperatingPoint(self.rig.pairs[0].driver, point.speed_rpm, torque_nm=point.torque_nm)
-        return replace(self.rig, operating_point=own)
+        operating_point = OperatingPoint(self.rig.pairs[0].driver, point.speed_rpm, torque_nm=point.torque_nm)
+        return replace(self.rig, operating_point=operating_point)
 
 
 @dataclass(frozen=True)

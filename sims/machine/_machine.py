@@ -384,9 +384,9 @@ class Machine:
         not_negative(self.half_backlash_um, "half_backlash_um", "µm")
         not_negative(self.gravity_mps2, "gravity_mps2", "m/s^2")
         within(self.line_of_action_deg, "line_of_action_deg", -180.0, 180.0, "°")
-        for name, wanted in (("wheels", 2), ("shafts", 2), ("bearings", 4)):
-            if len(getattr(self, name)) != wanted:
-                raise InputError(f"{len(getattr(self, name))} {name}", where="machine", allowed=str(wanted))
+        for name, n_expected in (("wheels", 2), ("shafts", 2), ("bearings", 4)):
+            if len(getattr(self, name)) != n_expected:
+                raise InputError(f"{len(getattr(self, name))} {name}", where="machine", allowed=str(n_expected))
 
     @property
     def shaft_names(self) -> tuple[str, str]:

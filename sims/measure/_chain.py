@@ -329,8 +329,8 @@ class MeasurementChain:
         low, high = covered(motion.n_steps, motion.step_s, rate, self.anti_alias.reach_s(rate) + motion.step_s)
         first = max(low, ceil(lead_s * rate - 1e-9))
         most = high - first + 1
-        wanted = most if duration_s is None else round(positive(duration_s, "duration_s", "s") * rate)
-        if wanted < 1 or wanted > most:
+        n_samples = most if duration_s is None else round(positive(duration_s, "duration_s", "s") * rate)
+        if n_samples < 1 or n_samples > most:
             lasts_s = motion.n_steps * motion.step_s
             raise InputError(
                 f"the motion lasts {lasts_s:g} s, of which {max(most, 0) / rate:g} s can be recorded",
@@ -338,7 +338,7 @@ class MeasurementChain:
                 allowed="at least one sample and no more than that",
                 remedy="simulate longer: MeasurementChain.simulated_s tells how long",
             )
-        return first, wanted
+        return first, n_samples
 
     def _vibration(
         self,

@@ -196,10 +196,10 @@ def _crossings(periods: FloatArray, time_s: FloatArray) -> tuple[FloatArray, Flo
     """Times of passing whole numbers, forwards and backwards."""
     whole = np.floor(periods)
     step = np.diff(whole)
-    found = []
+    crossings = []
     for direction in (1.0, -1.0):
         i = np.flatnonzero(step == direction)
         target = whole[i + 1] if direction > 0 else whole[i]
         part = (target - periods[i]) / (periods[i + 1] - periods[i])
-        found.append(time_s[i] + part * (time_s[i + 1] - time_s[i]))
-    return found[0], found[1]
+        crossings.append(time_s[i] + part * (time_s[i + 1] - time_s[i]))
+    return crossings[0], crossings[1]

@@ -169,8 +169,8 @@ def _least_section(gear: GearGeometry, depth_mm: float, angle_deg: float) -> flo
     fillet = fillet_outline(gear, np.linspace(pi / 2.0, gear.pressure_angle_rad, 60))
     flank = involute_outline(gear, np.linspace(gear.form_roll_rad, gear.tip_roll_rad, 60))
     x, y = np.concatenate((fillet.x_mm, flank.x_mm)), np.concatenate((fillet.y_mm, flank.y_mm))
-    left = effective_flank_mm(gear, depth_mm, angle_deg, x, y)
-    return float(np.min((left + y) / (2.0 * y)))
+    thickness = effective_flank_mm(gear, depth_mm, angle_deg, x, y)
+    return float(np.min((thickness + y) / (2.0 * y)))
 
 
 def _angle_rad(angle_deg: float) -> float:

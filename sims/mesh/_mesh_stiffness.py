@@ -507,8 +507,8 @@ def share_load(
     for i in range(compliance.size):
         if weight[i] > 0.0:
             n = force / weight[i]
-            own = compliance[i] * n + (contact * n**0.9 if load_dependent else contact * n)
-            delta = min(delta, separation[i] + own)
+            approach = compliance[i] * n + (contact * n**0.9 if load_dependent else contact * n)
+            delta = min(delta, separation[i] + approach)
     slope = 0.0
     for _ in range(60):
         total, slope = -force, 0.0

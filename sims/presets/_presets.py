@@ -69,24 +69,24 @@ class Preset:
 @cache
 def presets(model: str) -> dict[str, Preset]:
     """Return the presets of a model by name, in alphabetical order."""
-    found = [read_preset(path) for path in sorted(Path(__file__).parent.glob("*.toml"))]
-    return {preset.name: preset for preset in found if preset.model == model}
+    all_presets = [read_preset(path) for path in sorted(Path(__file__).parent.glob("*.toml"))]
+    return {preset.name: preset for preset in all_presets if preset.model == model}
 
 
 def preset(model: str, name: str) -> Preset:
     """Return the preset `name` of a model; an empty name is its first, one that ends in .toml is a file."""
     if is_file(name):
         return _of_model(read_preset(Path(name)), model)
-    found = presets(model)
-    if not name and found:
-        return next(iter(found.values()))
-    if name not in found:
+    of_model = presets(model)
+    if not name and of_model:
+        return next(iter(of_model.values()))
+    if name not in of_model:
         raise InputError(
             f"{model} has no preset {name!r}",
-            allowed=", ".join([*found, "or a file, NAME.toml"]),
-            remedy=closest_match_hint(name, found),
+            allowed=", ".join([*of_model, "or a file, NAME.toml"]),
+            remedy=closest_match_hint(name, of_model),
         )
-    return found[name]
+    return of_model[name]
 
 
 def is_file(name: str) -> bool:
@@ -125,30 +125,32 @@ def read_preset(path: Path) -> Preset:
     )
 
 
-def _of_model(found: Preset, model: str) -> Preset:
-    if found.model != model:
-        raise InputError(f"is a preset of the model {found.model!r}", where=f"{found.name}.toml", allowed=f"{model!r}")
-    return found
+def _of_model(candidate: Preset, model: str) -> Preset:
+    if candidate.model != model:
+        raise InputError(
+            f"is a preset of the model {candidate.model!r}", where=f"{candidate.name}.toml", allowed=f"{model!r}"
+        )
+    return candidate
 
 
 def _effects(rows: object, where: str) -> tuple[EffectSetting, ...]:
     if not isinstance(rows, list):
         raise InputError("is not a list of tables", where=where, allowed="[[effects]] with name, severity, options")
-    found = []
+    settings = []
     for row in rows:
         table = _table(row, where)
         _check_keys(table, _EFFECT[:2], where, _EFFECT[2:])
         options = _values(table.get("options", {}), f"{where}: options")
-        found.append(EffectSetting(_text(table["name"], where), _number(table["severity"], where), options))
-    return tuple(found)
+        settings.append(EffectSetting(_text(table["name"], where), _number(table["severity"], where), options))
+    return tuple(settings)
 
 
 def _values(table: object, where: str) -> dict[str, ParameterValue]:
-    found = _table(table, where)
-    for name, value in found.items():
+    values = _table(table, where)
+    for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, (int, float, str)):
             raise InputError(f"{name} is {value!r}", where=where, allowed="a number or a text in quotes")
-    return found
+    return values
 
 
 def _table(value: object, where: str) -> dict[str, Any]:

@@ -84,8 +84,8 @@ def _corner_mm(rb_flank: float, rb_tip: float, length: float, start: float, befo
     radius = np.hypot(across, up)
     tangent = np.sqrt(np.maximum((radius / rb_flank) ** 2 - 1.0, 0.0))
     base_angle = np.arctan2(up, across) + tangent - np.arctan(tangent)
-    own = (start - before) / rb_flank
-    result: FloatArray = np.where(before > 0.0, rb_flank * (base_angle - own), 0.0)
+    roll = (start - before) / rb_flank
+    result: FloatArray = np.where(before > 0.0, rb_flank * (base_angle - roll), 0.0)
     return result
 
 
@@ -94,18 +94,18 @@ def slice_progress(pair: PairGeometry, lead: Lead, z_m: FloatArray, progress: Fl
     return progress[:, None] - lead.late(pair, z_m * 1e3 / pair.face_width_mm)
 
 
-def over_height(roll: FloatArray, values: FloatArray, wanted: FloatArray) -> FloatArray:
+def over_height(roll: FloatArray, values: FloatArray, heights: FloatArray) -> FloatArray:
     """Values at the heights of a grid (first axis) between them, by a cubic spline; held beyond the grid's ends.
 
     Where `wanted` is (n, n_slices), each slice (second axis) has heights of its own.
     """
     from scipy.interpolate import CubicSpline
 
-    if wanted.ndim == 2:
-        slices = [over_height(roll, values[:, s], wanted[:, s]) for s in range(wanted.shape[1])]
+    if heights.ndim == 2:
+        slices = [over_height(roll, values[:, s], heights[:, s]) for s in range(heights.shape[1])]
         return np.stack(slices, axis=1)
     spline = CubicSpline(roll, values, axis=0)
-    result: FloatArray = spline(np.clip(wanted, roll[0], roll[-1]))
+    result: FloatArray = spline(np.clip(heights, roll[0], roll[-1]))
     return result
 
 
@@ -125,19 +125,19 @@ def fault_compliance_rows(
     -----
     A crack leaves the gear's modes as they are: one tooth in fifty hardly changes them.
     """
-    own, n_slices = mesh.side(side), len(gear.grid.z_m)
-    if own.faulty_teeth and mesh.overlap_ratio:
+    gear_side, n_slices = mesh.side(side), len(gear.grid.z_m)
+    if gear_side.faulty_teeth and mesh.overlap_ratio:
         raise InputError(
             "a faulty tooth in a helical pair of finite-element gears",
             allowed="healthy teeth, or no helix",
             remedy="take the model 'cracked'",
         )
-    variant = np.zeros(own.gear.teeth, dtype=np.int64)
+    variant = np.zeros(gear_side.gear.teeth, dtype=np.int64)
     rows = [np.zeros((len(progress), n_slices, n_slices))]
     healthy = mesh.gear_compliance(side, progress)
     roll = rolls_rad(mesh.pair, progress)[side - 1]
-    for row, tooth in enumerate(own.faulty_teeth, start=1):
-        faults = own.faults_of(tooth)
+    for row, tooth in enumerate(gear_side.faulty_teeth, start=1):
+        faults = gear_side.faults_of(tooth)
         lost = mesh.gear_compliance(side, progress, faults._replace(crack=HEALTHY.crack)) - healthy
         added = n_slices * lost[:, None, None] * np.eye(n_slices)
         if faults.crack is not None:
@@ -284,10 +284,13 @@ def static_table(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, *, supp
 
 def check_gears(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh) -> None:
     """Refuse reduced gears that are not those of the mesh."""
-    for name, gear, wanted in zip(("driver", "driven"), gears, (mesh.pair.driver, mesh.pair.driven), strict=True):
-        own = gear.blank.geometry
-        if replace(own, bore_radius_mm=None) != replace(wanted, bore_radius_mm=None) or own.bore_mm != wanted.bore_mm:
-            raise InputError(f"the {name}'s reduced gear is of {own}", where="gears", allowed=f"{wanted}")
+    for name, gear, drawn in zip(("driver", "driven"), gears, (mesh.pair.driver, mesh.pair.driven), strict=True):
+        reduced = gear.blank.geometry
+        if (
+            replace(reduced, bore_radius_mm=None) != replace(drawn, bore_radius_mm=None)
+            or reduced.bore_mm != drawn.bore_mm
+        ):
+            raise InputError(f"the {name}'s reduced gear is of {reduced}", where="gears", allowed=f"{drawn}")
     if len(gears[0].grid.z_m) != len(gears[1].grid.z_m) or not np.allclose(gears[0].grid.z_m, gears[1].grid.z_m):
         raise InputError("the slices of the two reduced gears differ", remedy="reduce both with the same slices")
 
@@ -326,10 +329,10 @@ def _between(gear: ReducedGear, teeth: list[int], compliance: ToothCompliance) -
     return result
 
 
-def _along_diagonal(roll: FloatArray, block: FloatArray, wanted: FloatArray) -> FloatArray:
+def _along_diagonal(roll: FloatArray, block: FloatArray, at: FloatArray) -> FloatArray:
     """Compliance between slices at one height, (n, n_slices, n_slices)."""
     heights = np.arange(len(roll))
-    return over_height(roll, block[heights, :, heights, :], wanted)
+    return over_height(roll, block[heights, :, heights, :], at)
 
 
 def _over_both(roll: FloatArray, block: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
@@ -338,11 +341,13 @@ def _over_both(roll: FloatArray, block: FloatArray, first: FloatArray, second: F
 
     n_slices, order = block.shape[1], min(3, len(roll) - 1)
     x, y = (np.clip(place, roll[0], roll[-1]) for place in (first, second))
-    found = np.empty((*first.shape, n_slices))
+    between = np.empty((*first.shape, n_slices))
     for s in range(n_slices):
         for t in range(n_slices):
-            found[:, s, t] = RectBivariateSpline(roll, roll, block[:, s, :, t], kx=order, ky=order).ev(x[:, s], y[:, t])
-    return found
+            between[:, s, t] = RectBivariateSpline(roll, roll, block[:, s, :, t], kx=order, ky=order).ev(
+                x[:, s], y[:, t]
+            )
+    return between
 
 
 # Slices that mirror each other carry alike where nothing tells the ends of the face apart: then one stands for two.
@@ -795,7 +800,7 @@ def _solved(
     delta = np.zeros(shape)
     force, tangent = (np.zeros((*shape, table.n_slots, table.n_slices)) for _ in range(2))
     greatest = float(loads[-1]) if by_force else max(float(loads[-1]), 1e-6) * 3e8
-    found = loaded_contact(
+    converged = loaded_contact(
         np.array(cycles, dtype=np.float64),  # copies: the kernel would be compiled again for read-only arrays
         np.array(loads, dtype=np.float64),
         by_force,
@@ -809,7 +814,7 @@ def _solved(
         force,
         tangent,
     )
-    if not found:
+    if not converged:
         raise RefusalError("no equilibrium of the tooth contact was found", remedy="look at loads and separations")
     return delta, force, tangent
 
@@ -924,7 +929,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
         for load in range(loads.shape[0]):
             enough = ENOUGH * max(loads[load] if by_force else loads[load] * 1e8, small)
             at = at if by_force else loads[load]
-            found = False
+            is_solved = False
             # Newton's method for the approach whose forces add up to the load; one solution where it is given.
             for _ in range(100):
                 for p in range(n):
@@ -942,14 +947,14 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
                 for p in range(m):
                     stiffness += unit[p]
                 if not by_force:
-                    found = True
+                    is_solved = True
                     break
                 missing = loads[load] - total
                 if abs(missing) <= 1e-9 * loads[load]:
-                    found = True
+                    is_solved = True
                     break
                 at += missing / stiffness if m > 0 and stiffness > 0.0 else max(r[0, 0] * missing, 1e-9)
-            if not found:
+            if not is_solved:
                 return False
             # Results by slot, counted from the newest pair.
             delta[row, load] = at if by_force else total

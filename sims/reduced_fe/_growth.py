@@ -47,8 +47,8 @@ def energy_release_m(depth_m: FloatArray, compliance_m_per_n: FloatArray, at_m: 
     beyond = slope[-1] + (slope[-1] - slope[-2]) * (depth[-1] - middle[-1]) / (middle[-1] - middle[-2])
     places = np.concatenate(([0.0], middle, depth[-1:]))
     values = np.concatenate((0.0 * slope[:1], slope, beyond[None]))
-    found: FloatArray = PchipInterpolator(places, values, axis=0)(at_m)
-    return found
+    release: FloatArray = PchipInterpolator(places, values, axis=0)(at_m)
+    return release
 
 
 @dataclass(frozen=True)
@@ -185,32 +185,32 @@ def stress_intensity(
     if gear.blank.geometry != mesh.side(side).gear:
         raise InputError("the finite-element gear is not the one of the mesh", where="gear")
     deepest = deepest_followed_mm(gear.blank, crack_size(gear), angle_deg)
-    wanted = np.atleast_1d(np.asarray(depth_mm, dtype=np.float64))
-    if deepest == 0.0 or wanted.min() <= 0.0 or wanted.max() > deepest * (1.0 + 1e-9):
+    depths = np.atleast_1d(np.asarray(depth_mm, dtype=np.float64))
+    if deepest == 0.0 or depths.min() <= 0.0 or depths.max() > deepest * (1.0 + 1e-9):
         raise InputError(
-            f"depths from {wanted.min():g} to {wanted.max():g} mm",
+            f"depths from {depths.min():g} to {depths.max():g} mm",
             where="depth_mm",
             allowed=f"above 0, up to {deepest:.3g} mm at {angle_deg:g}°, as far as the finite elements follow",
         )
     solved = deepest_crack_mm(gear.blank.geometry, angle_deg) * np.array(DEPTH_PARTS)
     solved = solved[solved <= deepest * (1.0 + 1e-9)]
     added = np.array([crack_added_m_per_n(gear, RootCrack(float(q), angle_deg)).mean(axis=(1, 2)) for q in solved])
-    per_force2 = energy_release_m(solved * 1e-3, added, wanted * 1e-3)  # (n, n_heights)
+    per_force2 = energy_release_m(solved * 1e-3, added, depths * 1e-3)  # (n, n_heights)
     cycles = np.linspace(0.0, mesh.pair.contact_ratio, 120)[1:-1]
     roll = rolls_rad(mesh.pair, cycles)[side - 1]
     slot = np.floor(cycles + mesh.ramp / 2.0).astype(int)
     material = gear.blank.material
     stiffness = material.youngs_modulus_pa / (1.0 - material.poisson_ratio**2)
     rows = []
-    for depth, release in zip(wanted, per_force2, strict=True):
+    for depth, release in zip(depths, per_force2, strict=True):
         cracked = replace(mesh, **{f"cracks_{side}": (RootCrack(float(depth), angle_deg),)})  # type: ignore[arg-type]
         force = share_torque(cracked, torque_nm, cycles).pair_forces_n[np.arange(len(cycles)), slot]
         slope = np.maximum(over_height(gear.grid.roll_rad, release, roll), 0.0)
         k = force * np.sqrt(stiffness * slope / (2.0 * mesh.face_width_m))
         most = int(np.argmax(k))
         rows.append((float(k[most]) * 1e-6, float(force[most]), float(cycles[most])))
-    k_found, force_found, at = np.array(rows).T
-    return StressIntensity(wanted, k_found, force_found, at)
+    k_values, forces, at = np.array(rows).T
+    return StressIntensity(depths, k_values, forces, at)
 
 
 @dataclass(frozen=True)

@@ -98,8 +98,8 @@ def rolling_fields(
         given[row] = load / support.stiffness_n_per_m
         if support.clearance_um > 0.0:
             play[row] = support.clearance_um * 1e-6 * load / np.hypot(*load)
-    own = {"bearing_yield": given, "bearing_play": play, "bearing_spring": springs}
-    return bearing_fields(machine, force_n, rng) | own
+    fields = {"bearing_yield": given, "bearing_play": play, "bearing_spring": springs}
+    return bearing_fields(machine, force_n, rng) | fields
 
 
 def _check_load(machine: Machine, operation: Operation) -> None:
@@ -151,10 +151,10 @@ class HubSprings:
         """Return those of a gear beside the kept modes, of which none may move the hub along x or y."""
         hub = gear.hub_modes[kept][:, PLANE]
         soft = hub / gear.angular_frequencies_rad_s[kept, None] ** 2
-        own = np.diag(gear.hub_compliance)[list(PLANE)] - np.sum(soft * hub, axis=0)
-        for value in own:
+        compliance = np.diag(gear.hub_compliance)[list(PLANE)] - np.sum(soft * hub, axis=0)
+        for value in compliance:
             positive(float(value), "compliance between hub and body", remedy="lower mode_limit_hz")
-        return cls(own, gear.hub_flank_compliance[list(PLANE)] - soft.T @ gear.flank_modes[kept])
+        return cls(compliance, gear.hub_flank_compliance[list(PLANE)] - soft.T @ gear.flank_modes[kept])
 
     def seen_from_the_line_of_action(
         self, gear: ReducedGear, mesh: GearMesh, index: int, progress: FloatArray
@@ -320,9 +320,9 @@ def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> Retain
     paired = (gear.nodal_diameters > 0) & (2 * gear.nodal_diameters < gear.blank.n_teeth)
     first = np.flatnonzero(paired)[::2]
     part[first] = part[first + 1] = np.maximum(part[first], part[first + 1])
-    wanted = (gear.frequencies_hz <= limit_hz) & (part >= MIN_PART * part.max()) & (gear.nodal_diameters != 1)
-    pairs = first[wanted[first]]
-    return RetainedModes(np.flatnonzero(wanted & ~paired), np.column_stack((pairs, pairs + 1)))
+    matters = (gear.frequencies_hz <= limit_hz) & (part >= MIN_PART * part.max()) & (gear.nodal_diameters != 1)
+    pairs = first[matters[first]]
+    return RetainedModes(np.flatnonzero(matters & ~paired), np.column_stack((pairs, pairs + 1)))
 
 
 def residual_compliance(gear: ReducedGear, teeth: list[int], kept: RetainedModes) -> FloatArray:
@@ -372,7 +372,7 @@ def build_side(
     silent = np.max(np.abs(rows), axis=(0, 1)) < 1e-9 * np.max(np.abs(rows))
     line = [np.flatnonzero(~silent), np.flatnonzero(silent)]
     others = np.concatenate((kept.single[alone], kept.pairs[:, 0], kept.pairs[:, 1]))
-    own = gear.angular_frequencies_rad_s[others]
+    elastic_omega = gear.angular_frequencies_rad_s[others]
 
     def joined(train: FloatArray, rest: FloatArray) -> FloatArray:
         """Modes that stand alone, pairs, silent ones; modes along the last axis."""
@@ -383,8 +383,8 @@ def build_side(
     turning[[ROTOR, GEAR, HUB]] = 1.0 if index == 0 else 1.0 / machine.ratio
     forces = _input_places(len(shapes), -(mass @ turning)) @ shapes
     return FlexibleSide(
-        omega_rad_s=joined(np.sqrt(squares), own),
-        damping_rate=joined(rate, 2.0 * body_damping_ratio * own),
+        omega_rad_s=joined(np.sqrt(squares), elastic_omega),
+        damping_rate=joined(rate, 2.0 * body_damping_ratio * elastic_omega),
         shapes=joined(shapes[: len(COORDINATES)], np.zeros((len(COORDINATES), len(others)))),
         inputs=joined(forces, np.zeros((len(INPUTS), len(others)))),
         hub=joined(base_m * shapes[HUB], zero),
@@ -408,18 +408,18 @@ def _elastic_rows(machine: Machine, index: int, gear: ReducedGear, table: Contac
 def hub_inertia(machine: Machine, index: int, gear: ReducedGear) -> tuple[float, float]:
     """Mass (kg) and moment of inertia (kg m²) that hub and shaft add to the finite-element body."""
     wheel = machine.wheels[index]
-    found = []
-    for what, unit, total, own in (
+    added = []
+    for what, unit, total, of_body in (
         ("mass", "kg", wheel.mass_kg, gear.mass_kg),
         ("inertia", "kg m^2", wheel.inertia_kg_m2, gear.polar_inertia_kg_m2),
     ):
-        if total < own * (1.0 - INERTIA_TOLERANCE):
+        if total < of_body * (1.0 - INERTIA_TOLERANCE):
             raise InputError(
                 f"{what} of the {('driver', 'driven gear')[index]} is {total:.4g} {unit}",
-                allowed=f"at least {own:.4g} {unit}, that of the toothed body alone",
+                allowed=f"at least {of_body:.4g} {unit}, that of the toothed body alone",
             )
-        found.append(max(total - own, 0.0))
-    return found[0], found[1]
+        added.append(max(total - of_body, 0.0))
+    return added[0], added[1]
 
 
 def _matrices(
@@ -433,18 +433,18 @@ def _matrices(
     loads_n: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """M, K and C over `COORDINATES` and the modes that twist the hub."""
-    n, n_own = len(COORDINATES) + len(modes), len(COORDINATES)
+    n, n_coordinates = len(COORDINATES) + len(modes), len(COORDINATES)
     shaft, bearings = machine.shafts[index], machine.bearings[2 * index : 2 * index + 2]
     hub_kg, hub_kg_m2 = hub_inertia(machine, index, gear)
     mass = np.eye(n)
     body = [gear.mass_kg, gear.mass_kg, gear.polar_inertia_kg_m2]
     hub = np.maximum([hub_kg, hub_kg, hub_kg_m2], MIN_HUB * np.array(body))
-    own = [shaft.rotor_inertia_kg_m2, body[2], *body[:2], *(b.mass_kg for b in bearings for _ in range(2)), *hub]
-    mass[range(n_own), range(n_own)] = own
+    inertias = [shaft.rotor_inertia_kg_m2, body[2], *body[:2], *(b.mass_kg for b in bearings for _ in range(2)), *hub]
+    mass[range(n_coordinates), range(n_coordinates)] = inertias
     stiffness, damping = np.zeros((n, n)), np.zeros((n, n))
     omega = gear.angular_frequencies_rad_s[modes]
-    stiffness[range(n_own, n), range(n_own, n)] = omega**2
-    damping[range(n_own, n), range(n_own, n)] = 2.0 * body_damping_ratio * omega
+    stiffness[range(n_coordinates, n), range(n_coordinates, n)] = omega**2
+    damping[range(n_coordinates, n), range(n_coordinates, n)] = 2.0 * body_damping_ratio * omega
     twisted = np.zeros(n)
     twisted[[ROTOR, HUB]] = 1.0, -1.0
     lines: list[tuple[FloatArray, float, float]] = [
@@ -454,10 +454,10 @@ def _matrices(
         inside = np.zeros(n)
         inside[[HUB_X + c, place]] = 1.0, -1.0
         if place == GEAR:
-            inside[n_own:] = -twist
-        own_k = float(1.0 / springs.compliance[c])
-        own_c = 2.0 * body_damping_ratio * float(np.sqrt(own_k / (1.0 / hub[c] + 1.0 / body[c])))
-        lines.append((inside, own_k, own_c))
+            inside[n_coordinates:] = -twist
+        spring_k = float(1.0 / springs.compliance[c])
+        spring_c = 2.0 * body_damping_ratio * float(np.sqrt(spring_k / (1.0 / hub[c] + 1.0 / body[c])))
+        lines.append((inside, spring_k, spring_c))
     for axis in range(2):
         bent = np.zeros(n)
         bent[[HUB_X + axis, 4 + axis, 6 + axis]] = 1.0, -0.5, -0.5
@@ -600,11 +600,11 @@ class FlexiblePairConstants:
     def turn(self) -> FloatArray:
         """Cosine and sine of nψ for each tooth, (2, z, 2, n_pairs)."""
         teeth = self.record["teeth"]
-        found = np.zeros((2, int(teeth.max()), 2, self.sides[0].n_pairs))
+        angles = np.zeros((2, int(teeth.max()), 2, self.sides[0].n_pairs))
         for index, side in enumerate(self.sides):
             angle = 2.0 * pi / teeth[index] * np.outer(np.arange(int(teeth[index])), side.diameters)
-            found[index, : len(angle), 0], found[index, : len(angle), 1] = np.cos(angle), np.sin(angle)
-        return found
+            angles[index, : len(angle), 0], angles[index, : len(angle), 1] = np.cos(angle), np.sin(angle)
+        return angles
 
 
 @one_thread()
@@ -896,8 +896,10 @@ def torsional_mode(
         Mesh angles in a cycle.
     """
     pair_constants = constants(pair, operation) if ready is None else ready
-    frequency, contact, other = _torsional(pair, pair_constants, operation, one_mesh_cycle(n_points)).mean(axis=0)
-    return TorsionalMode(float(frequency), float(contact), float(other))
+    frequency, contact, others_damping = _torsional(pair, pair_constants, operation, one_mesh_cycle(n_points)).mean(
+        axis=0
+    )
+    return TorsionalMode(float(frequency), float(contact), float(others_damping))
 
 
 def torsional_curve_hz(pair: FlexiblePair, operation: Operation, mesh_cycles: FloatArray) -> FloatArray:

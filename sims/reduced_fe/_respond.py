@@ -77,15 +77,15 @@ def growth(
     extrapolated = np.hstack((nothing, nothing, 2.0 * same, -same))
     free_q, free_v = np.hstack((qq, qv, q0, nothing)), np.hstack((vq, vv, v0, nothing))
     seen = free_q + q1 @ extrapolated + float(pair_constants.record["damping_time"]) * (free_v + v1 @ extrapolated)
-    found = 0.0
+    worst = 0.0
     for cycles in one_mesh_cycle(N_POINTS):
         rows, stiff = contact_rows(pair, pair_constants, operation, cycles)
         force = -rows.T @ stiff @ rows @ seen
         step = np.vstack(
             (free_q + q1 @ force, free_v + v1 @ force, force, np.hstack((nothing, nothing, same, nothing)))
         )
-        found = max(found, float(np.abs(np.linalg.eigvals(step)).max()))
-    return found - 1.0
+        worst = max(worst, float(np.abs(np.linalg.eigvals(step)).max()))
+    return worst - 1.0
 
 
 def check_step(

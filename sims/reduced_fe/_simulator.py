@@ -68,9 +68,9 @@ _CHANGED = {
 
 
 def _bodies() -> tuple[Parameter, ...]:
-    found: list[Parameter] = []
+    parameters: list[Parameter] = []
     for side, whose in (("driver", "the driver"), ("driven", "the driven gear")):
-        found += [
+        parameters += [
             Parameter(f"web_thickness_{side}_mm", "mm", f"web of {whose}; none: a full disc", 0.1, 500, None),
             Parameter(f"rim_thickness_{side}_mm", "mm", f"rim of {whose}; none: 3 modules", 0.1, 500, None),
             Parameter(f"hub_thickness_{side}_mm", "mm", f"hub of {whose}; none: 3 modules", 0.1, 500, None),
@@ -79,7 +79,7 @@ def _bodies() -> tuple[Parameter, ...]:
             ),
             Parameter(f"hub_mass_{side}_kg", "kg", f"what hub and shaft add to the mass of {whose}", 0, 1e5, 0.0),
         ]
-    return tuple(found)
+    return tuple(parameters)
 
 
 _DYNAMICS = (
@@ -397,8 +397,8 @@ housing differs from another's."""
 def twin_parameters(values: Mapping[str, ParameterValue], teeth: tuple[int, int]) -> dict[str, ParameterValue]:
     """Return those parameters of the 16-DOF pair that this model has, with the mesh of a twin's gears."""
     known = {p.name for p in PARAMETERS}
-    own = {name: value for name, value in values.items() if name in known}
-    return own | {"mesh_dof": float(max(MESH_DOF, MESH_DOF_PER_TOOTH * max(teeth)))}
+    known_values = {name: value for name, value in values.items() if name in known}
+    return known_values | {"mesh_dof": float(max(MESH_DOF, MESH_DOF_PER_TOOTH * max(teeth)))}
 
 
 @dataclass(frozen=True)

@@ -59,13 +59,13 @@ def spreading_check(pair: FlexiblePair, operation: Operation, mesh_cycles: Float
     first, second = (gear.blank for gear in pair.gears)
     for spread in SPREADS:
         plan = ReductionPlan(SIZE, n_heights=N_HEIGHTS, n_slices=1, spread=spread)
-        one = reduce_gear(first, plan)
-        gears = (one, one if second == first else reduce_gear(second, plan))
-        own = replace(pair, gears=gears)
-        frequency[spread] = torsional_curve_hz(own, operation, mesh_cycles)
+        reduced = reduce_gear(first, plan)
+        gears = (reduced, reduced if second == first else reduce_gear(second, plan))
+        respread = replace(pair, gears=gears)
+        frequency[spread] = torsional_curve_hz(respread, operation, mesh_cycles)
         inner = slice(2, N_HEIGHTS - 2)  # the ends of the involute have neighbours on one side only
-        compliance = np.log(np.diag(one.clamped_compliance_m_per_n[0])[:N_HEIGHTS][inner])
-        roll = one.grid.roll_rad[inner]
+        compliance = np.log(np.diag(reduced.clamped_compliance_m_per_n[0])[:N_HEIGHTS][inner])
+        roll = reduced.grid.roll_rad[inner]
         smooth = np.polyval(np.polyfit(roll, compliance, DEGREE), roll)
         ripple[spread] = float(np.std(compliance - smooth))
     return SpreadingCheck(mesh_cycles, frequency, ripple)

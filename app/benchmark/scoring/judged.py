@@ -78,12 +78,12 @@ def located(place: Mapping[str, Any], effect: str, answer: Answer, pair: Mapping
 def _tooth(angle_deg: float, options: Mapping[str, Any], places: tuple[AnsweredPlace, ...], n_teeth: int) -> bool:
     pitch = 360.0 / n_teeth
     angles = [p.angle_deg for p in places if p.kind == PlaceKind.TOOTH.value and p.shaft == "input"]
-    found = next((a for a in angles if a is not None), None)
-    if found is None and options.get("gear") == "driver" and "tooth" in options:
-        found = (float(options["tooth"]) - 0.5) * pitch
-    if found is None:
+    answered_deg = next((a for a in angles if a is not None), None)
+    if answered_deg is None and options.get("gear") == "driver" and "tooth" in options:
+        answered_deg = (float(options["tooth"]) - 0.5) * pitch
+    if answered_deg is None:
         return False
-    apart = abs((found - angle_deg + 180.0) % 360.0 - 180.0)
+    apart = abs((answered_deg - angle_deg + 180.0) % 360.0 - 180.0)
     return apart <= 1.5 * pitch
 
 
@@ -159,9 +159,9 @@ def strength(truth: Truth, floors: Floors) -> float:
     if floor is None:
         return float("nan")
     known = [name for name in floor.names if all(name in change for change in truth.fault_changes)]
-    own = floor.of(known)
+    floors_of_known = floor.of(known)
     sizes = [
-        soft_size(known, np.array([change[name] for name in known]) / own) / floor.whole_of(known)
+        soft_size(known, np.array([change[name] for name in known]) / floors_of_known) / floor.whole_of(known)
         for change in truth.fault_changes
         if change
     ]

@@ -272,10 +272,10 @@ def confusions_table(result: BenchmarkResult) -> Table:
     rows = [r for r in result.rows[result.judged] if r.source == BLIND and r.kind != "pair"]
     if result.strengths_known:
         rows = [r for r in rows if r.kind == "none" or r.strength >= STRONG]
-    found = Counter(
+    confusions = Counter(
         (r.truths[0] if r.kind != "unknown" else r.effects[0], r.first) for r in rows if r.first not in r.truths
     )
-    table = [(true, said or "no answer", str(n), _common(true, said)) for (true, said), n in found.most_common()]
+    table = [(true, said or "no answer", str(n), _common(true, said)) for (true, said), n in confusions.most_common()]
     return Table(
         "What was taken for what",
         "In common: kinds of features in which theory expects both.",
@@ -368,8 +368,8 @@ def scores_json(result: BenchmarkResult, command: str, date: datetime) -> str:
 
 
 def _plain(score: Score) -> dict[str, float | int | None]:
-    found = asdict(score)
-    return {**{key: rounded(found[key]) for key in ("value", "low", "high")}, "n": score.n}
+    values = asdict(score)
+    return {**{key: rounded(values[key]) for key in ("value", "low", "high")}, "n": score.n}
 
 
 def cases_csv(result: BenchmarkResult, cases: Sequence[Done]) -> str:
@@ -479,12 +479,12 @@ def _calibration(result: BenchmarkResult) -> tuple[Picture, ...]:
     curves = {}
     for name in (result.judged, *(b for b in BASELINES if b in result.rows and b != result.judged)):
         rows = [r for r in result.rows[name] if r.source == BLIND and is_one_answer(r)]
-        found = bins_of([r.confidence for r in rows], [r.first in r.truths for r in rows])
-        ends = [share(round(b.accuracy * b.n), b.n) for b in found]
-        if found:
+        bins = bins_of([r.confidence for r in rows], [r.first in r.truths for r in rows])
+        ends = [share(round(b.accuracy * b.n), b.n) for b in bins]
+        if bins:
             curves[name] = (
-                np.array([b.confidence for b in found]),
-                np.array([b.accuracy for b in found]),
+                np.array([b.confidence for b in bins]),
+                np.array([b.accuracy for b in bins]),
                 np.array([s.low for s in ends]),
                 np.array([s.high for s in ends]),
             )

@@ -86,10 +86,10 @@ def resampled(
     if not isfinite(value):
         return NOTHING
     picks = rng.integers(len(rows), size=(N_RESAMPLES, len(rows)))
-    found = [other for pick in picks if isfinite(other := statistic([rows[i] for i in pick]))]
-    low, high = np.quantile(found, (0.05, 0.95))
+    resamples = [resampled_value for pick in picks if isfinite(resampled_value := statistic([rows[i] for i in pick]))]
+    low, high = np.quantile(resamples, (0.05, 0.95))
     if centred:
-        low, high = (max(0.0, value + q - float(np.mean(found))) for q in (low, high))
+        low, high = (max(0.0, value + q - float(np.mean(resamples))) for q in (low, high))
     return Score(value, float(low), float(high), len(rows))
 
 
@@ -150,9 +150,9 @@ def calibration_error(confidence: Sequence[float], right: Sequence[bool], n_bins
     Source: M. P. Naeini, G. F. Cooper, M. Hauskrecht, *Obtaining well calibrated probabilities using Bayesian binning*
     (AAAI, 2015), with bins of equal mass.
     """
-    found = bins_of(confidence, right, n_bins)
-    total = sum(b.n for b in found)
-    return sum(b.n * abs(b.accuracy - b.confidence) for b in found) / total if total else float("nan")
+    bins = bins_of(confidence, right, n_bins)
+    total = sum(b.n for b in bins)
+    return sum(b.n * abs(b.accuracy - b.confidence) for b in bins) / total if total else float("nan")
 
 
 def error_by_chance(confidence: Sequence[float], rng: np.random.Generator) -> float:
@@ -199,8 +199,8 @@ def counted(of: Callable[[Row], bool], hit: Callable[[Row], bool]) -> Measure:
     """Return the measure that counts hits among the rows it applies to."""
 
     def measure(rows: Rows, rng: np.random.Generator) -> Score:  # noqa: ARG001 - all measures have one form
-        own = [row for row in rows if of(row)]
-        return share(sum(hit(row) for row in own), len(own))
+        applicable = [row for row in rows if of(row)]
+        return share(sum(hit(row) for row in applicable), len(applicable))
 
     return measure
 
@@ -216,8 +216,8 @@ def mean_of(value: Callable[[Row], float]) -> Measure:
     """Return the mean over the rows that have the value."""
 
     def measure(rows: Rows, rng: np.random.Generator) -> Score:
-        found = [x for row in rows if isfinite(x := value(row))]
-        return resampled(found, lambda drawn: float(np.mean(drawn)), rng)
+        values = [x for row in rows if isfinite(x := value(row))]
+        return resampled(values, lambda drawn: float(np.mean(drawn)), rng)
 
     return measure
 
@@ -230,8 +230,8 @@ def _of_place(part: str) -> Measure:
     """Return the share of faults whose place of this kind was found."""
 
     def at(row: Row) -> bool | None:
-        found: bool | None = getattr(row.located, part)
-        return found
+        is_right: bool | None = getattr(row.located, part)
+        return is_right
 
     return counted(lambda r: r.is_mechanical and at(r) is not None, lambda r: bool(at(r)))
 
@@ -250,8 +250,8 @@ def macro_f1(rows: Rows) -> float:
     true = Counter(name for row in rows for name in row.truths)
     said = Counter(row.first for row in rows)
     hits = Counter(row.first for row in rows if row.first in row.truths)
-    found = [2.0 * hits[name] / (true[name] + said[name]) for name in MECHANICAL if true[name]]
-    return sum(found) / len(found) if found else float("nan")
+    f1_scores = [2.0 * hits[name] / (true[name] + said[name]) for name in MECHANICAL if true[name]]
+    return sum(f1_scores) / len(f1_scores) if f1_scores else float("nan")
 
 
 def ece(rows: Rows) -> float:
@@ -281,13 +281,13 @@ def _shrink_named(row: Row) -> float:
 
 
 def _placebo(row: Row) -> float:
-    found = _of_true(row)
-    return found.placebo if found is not None and found.n_placebos else float("nan")
+    shrinkage = _of_true(row)
+    return shrinkage.placebo if shrinkage is not None and shrinkage.n_placebos else float("nan")
 
 
 def _slope(row: Row) -> float:
-    found = _of_true(row)
-    return found.slope if found is not None else float("nan")
+    shrinkage = _of_true(row)
+    return shrinkage.slope if shrinkage is not None else float("nan")
 
 
 def _of_true(row: Row) -> AnsweredShrinkage | None:
@@ -501,9 +501,13 @@ class BenchmarkResult:
 
     def part(self, name: str, *, diagnoser: str = "", source: str = BLIND, strong: bool | None = None) -> Part:
         """Return a part; `strong` None: strong faults only, where strength is known."""
-        wanted = self.strengths_known if strong is None else strong
-        own = diagnoser or self.judged
-        return next(p for p in self.parts if (p.diagnoser, p.source, p.name, p.strong) == (own, source, name, wanted))
+        strong_only_part = self.strengths_known if strong is None else strong
+        chosen_diagnoser = diagnoser or self.judged
+        return next(
+            p
+            for p in self.parts
+            if (p.diagnoser, p.source, p.name, p.strong) == (chosen_diagnoser, source, name, strong_only_part)
+        )
 
 
 def judge(wanted: BenchmarkRequest, cases: Sequence[Done]) -> BenchmarkResult:
@@ -534,9 +538,9 @@ def score_parts(
     for name, of_all in rows.items():
         for source in (BLIND, SAME) if request.plan.same_simulator else (BLIND,):
             for part, belongs in parts.items():
-                own = [row for row in of_all if row.source == source and belongs(row)]
+                rows_of_part = [row for row in of_all if row.source == source and belongs(row)]
                 for strong in strengths:
-                    chosen = strong_only(own, STRONG) if strong else own
+                    chosen = strong_only(rows_of_part, STRONG) if strong else rows_of_part
                     figured = scores(chosen, request.plan.seed, figures)
                     scored.append(Part(name, source, part, strong, len(chosen), figured))
     return tuple(scored)

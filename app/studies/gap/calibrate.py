@@ -163,13 +163,13 @@ def cases_of(population: Population, simulator: str, *, with_reference: bool) ->
     Only the independent rig's machines were recorded at two operating points with the same effect.
     """
     rng = np.random.default_rng(SEED)
-    own = np.flatnonzero((population.simulators == simulator) & ~population.by_hand)
+    rows_of_simulator = np.flatnonzero((population.simulators == simulator) & ~population.by_hand)
     drawn = []
-    for cause in np.unique(population.causes[own]):
-        rows = own[population.causes[own] == cause]
+    for cause in np.unique(population.causes[rows_of_simulator]):
+        rows = rows_of_simulator[population.causes[rows_of_simulator] == cause]
         n = PER_NO_EFFECT if cause in (NONE, UNKNOWN) else PER_EFFECT
         drawn += rng.permutation(rows)[:n].tolist()
-    pairs = two_conditions(population, rng.permutation(own)) if simulator == INDEPENDENT else []
+    pairs = two_conditions(population, rng.permutation(rows_of_simulator)) if simulator == INDEPENDENT else []
     with without_machines_of(simulator):
         single = [_weighed(population, (row,), simulator, with_reference=with_reference) for row in drawn]
         both = [_weighed(population, rows, simulator, with_reference=with_reference) for rows in pairs]
@@ -196,13 +196,13 @@ def _weighed(population: Population, rows: tuple[int, ...], simulator: str, *, w
     learned = load_learned()
     recogniser = learned.recognisers[with_reference]
     effects = cracked_gap_simulator().gap_effects().values()
-    found, sizes = [], []
+    by_condition, sizes = [], []
     for row in rows:
         change = _change(population, learned, row, with_reference=with_reference)
-        found.append(recogniser.probabilities(change, float(population.loads_n_per_mm[row]), effects))
+        by_condition.append(recogniser.probabilities(change, float(population.loads_n_per_mm[row]), effects))
         sizes.append(gap_size(change, recogniser.floor).structural.value)
     loads = [float(population.loads_n_per_mm[row]) for row in rows]
-    forest = joint_probabilities(found, loads, recogniser.causes)
+    forest = joint_probabilities(by_condition, loads, recogniser.causes)
     return WeighedCase((str(population.causes[rows[0]]),), forest, {}, max(sizes), len(rows), simulator)
 
 

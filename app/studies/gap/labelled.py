@@ -206,9 +206,9 @@ def _case(table: Mapping[str, Any], i: int, recogniser: Recogniser) -> _Case:
     floor = recogniser.floor
     size = soft_size(floor.names, floor.over(change)) / floor.whole_of(floor.names)
     calibration = load_gap_calibration(with_reference=True)
-    found = calibration.probabilities(recogniser.probabilities(change, load), {}, size)
+    probabilities = calibration.probabilities(recogniser.probabilities(change, load), {}, size)
     row = within_reach(recogniser.input_row(change, load))
-    return _Case(int(table["rig"][i]), str(table["label"][i]), size, row, found)
+    return _Case(int(table["rig"][i]), str(table["label"][i]), size, row, probabilities)
 
 
 def _scored(cases: Sequence[_Case], recogniser: Recogniser, n: int) -> str:
@@ -252,8 +252,8 @@ def main() -> None:
         return
     jobs = [(name, i) for i in range(given.machines) for name in given.simulator or _MAKE]
     samples: list[PopulationSample] = []
-    for _, found in answers_of(of_job, jobs, 2):
-        samples += found
+    for _, new_samples in answers_of(of_job, jobs, 2):
+        samples += new_samples
         write(given.to, samples)
 
 

@@ -114,8 +114,8 @@ def another_day(drawn: DrawnRig, rng: np.random.Generator) -> OperatingDay:
 
 def _wander(drawn: DrawnRig, rng: np.random.Generator) -> EffectSetting:
     """Return the drive's wander on one day: its kind belongs to the machine."""
-    own = np.random.default_rng([drawn.seed, 5])
-    percent, frequency_hz = (log_uniform(own, *span) for span in (WANDER_PERCENT, WANDER_HZ))
+    machine_rng = np.random.default_rng([drawn.seed, 5])
+    percent, frequency_hz = (log_uniform(machine_rng, *span) for span in (WANDER_PERCENT, WANDER_HZ))
     today = float(np.exp(WANDER_SCATTER * rng.standard_normal()))
     return EffectSetting("speed_fluctuation", percent * today, {"frequency_hz": frequency_hz})
 
@@ -219,16 +219,16 @@ class Ordinary:
         signatures = _tolerances(scene, np.random.default_rng([self.seed, 11]))
         samples = recording.samples.copy()
         for k, i in enumerate(vibrations(recording)):
-            own, scale = np.random.default_rng([self.seed, 12, i]), self.scales[i]
+            machine_rng, scale = np.random.default_rng([self.seed, 12, i]), self.scales[i]
             values = _through(samples[i], self.paths[i], recording.sampling_rate_hz)
             for signature in signatures:
-                values = signature.on(values, scene, own, scale)
+                values = signature.on(values, scene, machine_rng, scale)
             if changed_paths:
                 values = changed_paths[k].of(values, recording.sampling_rate_hz)
-            values = values + log_uniform(own, *NOISE) * scale * rng.standard_normal(len(values))
+            values = values + log_uniform(machine_rng, *NOISE) * scale * rng.standard_normal(len(values))
             for n in (1, 2, 3):
                 hum = np.sin(2 * np.pi * (n * mains_hz * scene.time_s + rng.uniform()))
-                values = values + log_uniform(own, *HUM) / n * scale * hum
+                values = values + log_uniform(machine_rng, *HUM) / n * scale * hum
             samples[i] = values
         for i, channel in enumerate(recording.channels):
             if channel.quantity == "tachometer":
@@ -295,16 +295,16 @@ def _through(values: FloatArray, path: tuple[int, float], rate_hz: float) -> Flo
 
 def _tolerances(scene: textbook.SyntheticScene, rng: np.random.Generator) -> list[textbook.Signature]:
     """Return what the machine's own shafts, gears and drive do."""
-    found = []
+    tolerances = []
     for order in scene.shaft_orders:
         swing, late = log_uniform(rng, *SWINGS), log_uniform(rng, *SWINGS)
         lines = [log_uniform(rng, *LINES) * textbook.tone(n * order, scene, rng) for n in (1, 2, 3)]
-        found.append(
+        tolerances.append(
             textbook.Signature(
                 1.0 + swing * textbook.tone(order, scene, rng),
                 textbook.MAX_ADVANCE * late / scene.teeth[0] * textbook.tone(order, scene, rng),
                 tuple(lines),
             )
         )
-    found += [SIGNATURES["pitch_error"](scene, log_uniform(rng, *PITCH), rng) for _ in scene.shaft_orders]
-    return [*found, SIGNATURES["torque_ripple"](scene, log_uniform(rng, *PULLS), rng)]
+    tolerances += [SIGNATURES["pitch_error"](scene, log_uniform(rng, *PITCH), rng) for _ in scene.shaft_orders]
+    return [*tolerances, SIGNATURES["torque_ripple"](scene, log_uniform(rng, *PULLS), rng)]

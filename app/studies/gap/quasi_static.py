@@ -880,9 +880,9 @@ def _recordings(machine: StaticMachine, levels: FloatArray, rng: np.random.Gener
         yield UNKNOWN, foreign, 0.0, recording, torque_nm
     for i, name in enumerate(map(str, rng.choice(made_by_hand(healthy[0], torque_nm), N_BY_HAND, replace=False))):
         yield name, BY_HAND, 0.0, with_signature(healthy[i % N_HEALTHY], name, rng)[0], torque_nm
-    own = np.random.default_rng([machine.seed, 5])
+    path_rng = np.random.default_rng([machine.seed, 5])
     for _ in range(N_PATHS):
         state = machine.healthy()
-        size = textbook.path_size(own.uniform())
-        state.paths = textbook.draw_path_changes(N_CHANNELS, size, machine.rate_hz, own)
-        yield "transfer_path", "", 0.0, recorded(state, own), torque_nm
+        size = textbook.path_size(path_rng.uniform())
+        state.paths = textbook.draw_path_changes(N_CHANNELS, size, machine.rate_hz, path_rng)
+        yield "transfer_path", "", 0.0, recorded(state, path_rng), torque_nm

@@ -117,12 +117,12 @@ def _alone(features: Features) -> Features:
 
 def reduced(recording: Recording, rig: int) -> ReducedRecording:
     """Return a recording's sums, with the channels that are known of its machine."""
-    found = reduce_recording(recording, rig_of(recording))
+    reduced_recording = reduce_recording(recording, rig_of(recording))
     draw = np.random.default_rng([SEED, rig, 1])
     if draw.uniform() >= ONE_SENSOR_SHARE:
-        return found
-    name = str(draw.choice(sorted(found.channels)))
-    return found.with_channels({name: found.channels[name]})
+        return reduced_recording
+    name = str(draw.choice(sorted(reduced_recording.channels)))
+    return reduced_recording.with_channels({name: reduced_recording.channels[name]})
 
 
 def write(path: Path, samples: Sequence[PopulationSample]) -> None:
@@ -276,13 +276,13 @@ N_BY_HAND = 2
 def one_case(index: int) -> list[PopulationSample]:
     """Return the samples of one case: its effect, the same without it, and a few made by hand of the latter."""
     rng = np.random.default_rng([SEED, 2, index])
-    wanted = ROUND[index % len(ROUND)]
+    cause = ROUND[index % len(ROUND)]
     case = draw_case(
         rng,
         "development",
-        kind=NONE if wanted == NONE else "single",
-        effect=None if wanted == NONE else wanted,
-        level=None if wanted == NONE else float(rng.uniform(MIN_LEVEL, 1.0)),
+        kind=NONE if cause == NONE else "single",
+        effect=None if cause == NONE else cause,
+        level=None if cause == NONE else float(rng.uniform(MIN_LEVEL, 1.0)),
         with_reference=True,
     )
     recorded = record_case(case)
@@ -291,14 +291,14 @@ def one_case(index: int) -> list[PopulationSample]:
     for i, now in enumerate(recorded.conditions):
         rig, healthy = FIRST_RIG + MAX_CONDITIONS * index + i, (recorded.twins or recorded.conditions)[i]
         three = now, healthy, recorded.references[i]
-        made = partial(_condition, rig, wanted, severity, case.conditions[i].stated_nm, three, rng)
+        made = partial(_condition, rig, cause, severity, case.conditions[i].stated_nm, three, rng)
         samples += samples_of(INDEPENDENT, rig, made)
     return samples
 
 
 def _condition(
     rig: int,
-    wanted: str,
+    cause: str,
     severity: float,
     torque_nm: float,
     recordings: tuple[Recording, Recording, Recording],
@@ -317,12 +317,12 @@ def _condition(
 
     def compared() -> Iterator[Recorded]:
         yield NONE, "", 0.0, healthy, torque_nm
-        if wanted != NONE:
-            yield wanted, "", severity, now, torque_nm
+        if cause != NONE:
+            yield cause, "", severity, now, torque_nm
         recording, foreign = with_foreign_vibration(healthy, rng)
         yield UNKNOWN, foreign, 0.0, recording, torque_nm
         for name in map(str, rng.choice(made_by_hand(healthy, torque_nm), N_BY_HAND, replace=False)):
             signed, _ = with_signature(healthy, name, rng)
-            yield name, BY_HAND, severity if name == wanted else 0.0, signed, torque_nm
+            yield name, BY_HAND, severity if name == cause else 0.0, signed, torque_nm
 
     return reference, with_channels_of(reduce_recording(run, known), here), compared()

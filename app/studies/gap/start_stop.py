@@ -92,12 +92,12 @@ def fit_calibration(weighed: Sequence[tuple[str, Attribution[FittedDriveCause]]]
         logs = [np.log(max(w.probabilities(calibration).get(t, 0.0), MIN_SHARE)) for t, w in weighed]
         return float(-np.mean(logs) + RIDGE * np.sum((values - np.array(START)) ** 2))
 
-    found = minimize(loss, np.array(START), method="Nelder-Mead", options={"maxiter": 400, "xatol": 1e-3})
-    calibration = _calibration(found.x)
+    solution = minimize(loss, np.array(START), method="Nelder-Mead", options={"maxiter": 400, "xatol": 1e-3})
+    calibration = _calibration(solution.x)
     healthy = [w.probabilities(calibration) for t, w in weighed if t == NONE]
     named = sorted(1.0 - p[NONE] - p[UNKNOWN] for p in healthy)
     limit = float(np.quantile(named, 1.0 - FALSE_ALARMS, method="higher")) if named else MIN_NAMED
-    return _calibration(found.x, float(np.clip(limit, MIN_NAMED, MAX_NAMED)))
+    return _calibration(solution.x, float(np.clip(limit, MIN_NAMED, MAX_NAMED)))
 
 
 def _calibration(values: FloatArray, named_from: float = MIN_NAMED) -> GapCalibration:

@@ -175,15 +175,15 @@ SIMULATORS: dict[str, Drawn] = {"shared load": shared_load, "quasi-static": quas
 def courses_of(simulator: str, n_each: int) -> KnownCourses:
     """Return the courses of so many faults of each kind."""
     rng = np.random.default_rng([SEED, [*SIMULATORS].index(simulator)])
-    found: list[FloatArray] = []
+    rows: list[FloatArray] = []
     for fault in TOOTH_FAULTS:
-        n_wanted = len(found) + n_each
-        while len(found) < n_wanted:
+        n_rows = len(rows) + n_each
+        while len(rows) < n_rows:
             try:
-                found.append(course_descriptors(SIMULATORS[simulator](fault, rng)))
+                rows.append(course_descriptors(SIMULATORS[simulator](fault, rng)))
             except (InputError, RefusalError):
                 continue
-    return KnownCourses(np.array(found), np.repeat(TOOTH_FAULTS, n_each))
+    return KnownCourses(np.array(rows), np.repeat(TOOTH_FAULTS, n_each))
 
 
 def named(known: KnownCourses, rows: FloatArray) -> tuple[NDArray[np.str_], FloatArray]:
@@ -195,10 +195,10 @@ def named(known: KnownCourses, rows: FloatArray) -> tuple[NDArray[np.str_], Floa
 
 def _told(title: str, truth: NDArray[np.str_], likeliest: NDArray[np.str_], probability: FloatArray) -> None:
     right, sure = truth == likeliest, probability >= 0.9
-    one = truth != "pitch_error"
+    one_tooth = truth != "pitch_error"
     of_each = ", ".join(f"{name} {np.mean(right[truth == name]):.2f}" for name in TOOTH_FAULTS if (truth == name).any())
     typer.echo(
-        f"{title}: right {right.mean():.2f} of {len(right)} ({of_each}; faults of one tooth {right[one].mean():.2f}); "
+        f"{title}: right {right.mean():.2f} of {len(right)} ({of_each}; faults of one tooth {right[one_tooth].mean():.2f}); "
         f"said with 0.9 {sure.sum()}, right {right[sure].mean() if sure.any() else float('nan'):.2f}"
     )
 
