@@ -198,7 +198,7 @@ def _told(title: str, truth: NDArray[np.str_], likeliest: NDArray[np.str_], prob
     one_tooth = truth != "pitch_error"
     of_each = ", ".join(f"{name} {np.mean(right[truth == name]):.2f}" for name in TOOTH_FAULTS if (truth == name).any())
     typer.echo(
-        f"{title}: right {right.mean():.2f} of {len(right)} ({of_each}; faults of one tooth {right[one_tooth].mean():.2f}); "
+        f"{title}: right {right.mean():.2f} of {len(right)} ({of_each}; of one tooth {right[one_tooth].mean():.2f}); "
         f"said with 0.9 {sure.sum()}, right {right[sure].mean() if sure.any() else float('nan'):.2f}"
     )
 
