@@ -11,7 +11,7 @@ from app import flexible as pair_study
 from app import gear_body
 from app.dashboard.components import component_of
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import download, packed, show_picture
+from app.dashboard.widgets.charts import download, packed, show_figure
 from app.gear_body import GearBodyStudy
 from gearsig.checks import FloatArray
 from gearsig.plot import level_colours
@@ -153,7 +153,7 @@ def show_pair() -> None:
         "Show", list(WORDS), default="sweeps", format_func=WORDS.__getitem__, key="pair shown", persist_state="session"
     )
     name = shown or "sweeps"
-    show_picture(drawn[name], WORDS[name])
+    show_figure(drawn[name], WORDS[name], f"pair {name}")
     for row in pair_study.summary(study)["sweeps"]:  # type: ignore[attr-defined]  # a list of mappings
         said = {way: row[f"jump_{way}_hz"] for way in ("up", "down")}
         jumps = ", ".join(f"{way}: {'no jump' if hz is None else f'jump at {hz:.0f} Hz'}" for way, hz in said.items())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import show_picture
+from app.dashboard.widgets.charts import show_figure
 from app.papers import PAPERS, Paper, paper
 
 
@@ -25,7 +25,7 @@ def show_publications() -> None:
     st.markdown(f"**{found.summary}** {as_typed(found.source)}")
     for item in found.figures:
         st.subheader(f"{item.answers}: {item.title}")
-        show_picture(item.figure, item.title)
+        show_figure(item.figure, item.title, f"publication {name} {item.answers}")
         rows = [
             {"the publication says": c.statement, "the model gives": c.found, "verdict": c.judgement}
             for c in item.claims

@@ -69,7 +69,7 @@ from gearsig.plot._methods import (
     vmd,
 )
 from gearsig.plot._modes import modes_figure
-from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, panels_figure, pooled_levels
+from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, panels_figure, panels_of, pooled_levels
 from gearsig.plot._phase import (
     bifurcation_figure,
     chaos_test_figure,
@@ -193,6 +193,7 @@ __all__ = [
     "order_overlay_figure",
     "order_spectrum",
     "panels_figure",
+    "panels_of",
     "phase_plane",
     "phase_portrait_figure",
     "place",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,27 +29,31 @@ class ChartLine:
     ----------
     x, y : array, (n,)
     name : str
-    colour : int
-        0 what was measured, 1 a fault or what a method takes out, -1 quiet; further numbers are further colours.
+    colour : int or str
+        0 what was measured, 1 a fault or what a method takes out, -1 quiet; further numbers are further colours; or
+        the colour itself.
     band : (low, high) or None
         A pale band behind it.
     dotted : bool
     peaks : bool
         Where there are more points than pixels, join the highest, over a pale band down to the lowest: of spectra.
+    dots : bool
+        Points that are not joined.
     """
 
     x: FloatArray
     y: FloatArray
     name: str
-    colour: int = 0
+    colour: int | str = 0
     band: tuple[FloatArray, FloatArray] | None = None
     dotted: bool = False
     peaks: bool = False
+    dots: bool = False
 
 
 @dataclass(frozen=True)
 class LinePanel:
-    """Lines over one axis.
+    """Lines over one axis, or paths and points in a plane.
 
     Parameters
     ----------
@@ -62,6 +66,14 @@ class LinePanel:
         The value axis.
     cursors : sequence of Cursor
         Lines that the machine implies.
+    x_limits : (float, float) or None
+        None: from the first to the last point of a line.
+    spans : sequence of (low, high, colour)
+        Shaded parts of the x axis.
+    is_plane : bool
+        Whether `x` need not ascend.
+    title : str
+        What the panel shows, where that is not plain.
     """
 
     lines: Sequence[ChartLine]
@@ -70,6 +82,10 @@ class LinePanel:
     limits: tuple[float, float] | None = None
     logarithmic: bool = False
     cursors: Sequence[Cursor] = ()
+    x_limits: tuple[float, float] | None = None
+    spans: Sequence[tuple[float, float, str]] = ()
+    is_plane: bool = False
+    title: str = ""
 
 
 @dataclass(frozen=True)
@@ -91,6 +107,7 @@ class LevelPanel:
         On the x axis.
     span : float or None
         Of the colours below the largest level; None: what the reader wants.
+    title : str
     """
 
     levels: FloatArray
@@ -103,6 +120,7 @@ class LevelPanel:
     lines: Sequence[ChartLine] = ()
     cursors: Sequence[Cursor] = ()
     span: float | None = None
+    title: str = ""
 
 
 def pooled_levels(
@@ -168,10 +186,14 @@ def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") 
     return figure
 
 
-def line_colour(number: int) -> str:
+_CYCLE = (style.MEASURED, style.FAULT, style.MESH, style.BEARING, style.SHAFT)
+
+
+def line_colour(colour: int | str) -> str:
     """Return the colour of a `ChartLine` on paper."""
-    cycle = (style.MEASURED, style.FAULT, style.MESH, style.BEARING, style.SHAFT)
-    return style.QUIET if number < 0 else cycle[number % len(cycle)]
+    if isinstance(colour, str):
+        return colour
+    return style.QUIET if colour < 0 else _CYCLE[colour % len(_CYCLE)]
 
 
 def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> None:
@@ -184,3 +206,124 @@ def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> None:
     if line.band is not None:
         axes.fill_between(line.x, *line.band, color=colour, alpha=0.2, linewidth=0)
     axes.plot(x, y, color=colour, lw=1.0, ls=":" if line.dotted else "-", label=line.name)
+
+
+# --------------------
+# The other way: what a figure shows, as panels.
+# --------------------
+
+
+def panels_of(figure: Figure) -> list[list[list[LinePanel | LevelPanel]]]:
+    """Return what a figure of lines, bars and points shows: rows of columns of panels, to be zoomed.
+
+    Axes that share a place, for two quantities over one axis, are panels of one column. Empty where a figure shows
+    what no panel can: polar axes, surfaces, filled areas.
+    """
+    from matplotlib.collections import LineCollection
+
+    places: dict[tuple[float, float], list[LinePanel | LevelPanel]] = {}
+    for axes in figure.axes:
+        if not axes.axison or axes.get_label() == "<colorbar>":
+            continue
+        if axes.name != "rectilinear" or not all(isinstance(c, LineCollection) for c in axes.collections):
+            return []
+        box = axes.get_position()
+        panel = _level_panel(axes) if axes.images else _line_panel(axes, _names_of_colours(figure, axes))
+        places.setdefault((-round(box.y1, 2), round(box.x0, 2)), []).append(panel)
+    rows = [[places[place] for place in sorted(places) if place[0] == y] for y in sorted({y for y, _ in places})]
+    return [row for row in rows if any(panel for panels in row for panel in panels)]
+
+
+def _names_of_colours(figure: Figure, axes: Axes) -> dict[str, str]:
+    from matplotlib.lines import Line2D
+
+    legends = [legend for legend in (*figure.legends, axes.get_legend()) if legend is not None]
+    return {
+        _colour(handle.get_color()): text.get_text()
+        for legend in legends
+        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True)
+        if isinstance(handle, Line2D)
+    }
+
+
+def _colour(colour: Any) -> str:
+    from matplotlib.colors import to_hex
+
+    return to_hex(colour).upper()
+
+
+def _number_of(colour: str) -> int | str:
+    known = [each.upper() for each in _CYCLE]
+    if colour in known:
+        return known.index(colour)
+    quiet = (style.QUIET, style.FLOOR, style.INK, style.RULE)
+    return -1 if colour in {each.upper() for each in quiet} else colour
+
+
+def _words_of(axes: Axes) -> str:
+    words = [axes.get_title(loc="left"), *(text.get_text() for text in axes.texts)]
+    return " · ".join(word for word in words if word)
+
+
+def _level_panel(axes: Axes) -> LevelPanel:
+    image = axes.images[0]
+    left, right, low, high = image.get_extent()
+    values = np.asarray(image.get_array(), dtype=np.float64)
+    at, positions = (np.linspace(a, b, n) for a, b, n in ((left, right, values.shape[1]), (low, high, values.shape[0])))
+    span = float(np.ptp(values)) or 1.0
+    return LevelPanel(values, at, positions, axes.get_xlabel(), axes.get_ylabel(), "", span=span, title=_words_of(axes))
+
+
+def _line_panel(axes: Axes, names: Mapping[str, str]) -> LinePanel:
+    from matplotlib.patches import Rectangle
+
+    lines: list[ChartLine] = []
+    cursors: list[Cursor] = []
+    limits = axes.get_xlim()
+
+    def take(x: Any, y: Any, colour: Any, **looks: Any) -> None:
+        is_quiet = isinstance(number := _number_of(name := _colour(colour)), int) and number < 0
+        about = "" if is_quiet else names.get(name, "")
+        lines.append(ChartLine(np.asarray(x, float), np.asarray(y, float), about, number, **looks))
+
+    for line in axes.lines:
+        x, y = line.get_xdata(), line.get_ydata()
+        dashed, joined = line.get_linestyle() not in ("-", "None"), line.get_linestyle() != "None"
+        if line.get_transform() == axes.get_xaxis_transform():
+            is_fault = _number_of(_colour(line.get_color())) == 1
+            cursors.append(Cursor(float(np.ravel(x)[0]), "finding" if is_fault else "", ""))
+        elif line.get_transform() == axes.get_yaxis_transform():
+            take(limits, np.ravel(y)[[0, 0]], line.get_color(), dotted=True)
+        elif len(np.ravel(x)):
+            take(x, y, line.get_color(), dotted=dashed, dots=not joined)
+    collections: list[Any] = list(axes.collections)
+    for collection in collections:  # upright lines
+        ends = np.array(collection.get_segments()).reshape(-1, 2, 2)
+        gaps = np.concatenate([ends, np.full((len(ends), 1, 2), np.nan)], axis=1)
+        gaps[:, 2, 0] = ends[:, 1, 0]
+        take(gaps[..., 0].ravel(), gaps[..., 1].ravel(), collection.get_edgecolor()[0])
+    in_bars = {patch for bars in axes.containers for patch in bars}
+    for bars in axes.containers:
+        corners = [(b.get_x(), b.get_width(), b.get_y(), b.get_height()) for b in bars]
+        x = [at for left, width, *_ in corners for at in (left, left, left + width, left + width, left + width)]
+        y = [at for *_, low, height in corners for at in (low, low + height, low + height, low, np.nan)]
+        take(x, y, bars[0].get_facecolor())
+    spans = [
+        (patch.get_x(), patch.get_x() + patch.get_width(), _colour(patch.get_facecolor()))
+        for patch in axes.patches
+        if isinstance(patch, Rectangle) and patch not in in_bars
+    ]
+    is_plane = any(line.dots or bool(np.any(np.diff(line.x) < 0.0)) for line in lines)
+    fixed = is_plane or not axes.get_autoscaley_on()
+    return LinePanel(
+        lines,
+        axes.get_xlabel(),
+        axes.get_ylabel(),
+        axes.get_ylim() if fixed else None,
+        axes.get_yscale() == "log",
+        cursors,
+        limits,
+        spans,
+        is_plane,
+        _words_of(axes),
+    )

@@ -170,7 +170,12 @@ def _svg_levels(panel: LevelPanel, lines: Sequence[Curve], width: int, height: i
 
 
 def svg_ring(
-    average: SynchronousAverage, *, n_teeth: int | None = None, marks: Sequence[AngleMark] = (), ink: str = ""
+    average: SynchronousAverage,
+    *,
+    n_teeth: int | None = None,
+    marks: Sequence[AngleMark] = (),
+    ink: str = "",
+    line: str = style.MEASURED,
 ) -> str:
     """Draw one mean revolution around the circle, with the gear's teeth; marked ones in the colour of faults.
 
@@ -184,6 +189,8 @@ def svg_ring(
     marks : sequence of AngleMark
     ink : str
         Colour of text and axes; empty: of the text around.
+    line : str
+        Colour of the average.
     """
     size, zero, swing, rim = 400, 92.0, 52.0, 154.0
     full = float(np.max(np.abs(average.values), initial=0.0)) or 1.0
@@ -217,7 +224,7 @@ def svg_ring(
         parts.append(f'<path d="M0 0L{points}Z" fill="{style.FAULT}" fill-opacity="0.16"/>')
     radius = zero + swing * values / full
     d = _path(radius * np.sin(at), -radius * np.cos(at))
-    parts.append(f'<path d="{d}" fill="none" stroke="{style.MEASURED}" stroke-width="1.3" stroke-linejoin="round"/>')
+    parts.append(f'<path d="{d}" fill="none" stroke="{line}" stroke-width="1.3" stroke-linejoin="round"/>')
     note = f"{average.kind} of {average.shaft}, {average.channel}, {average.n_revolutions} revolutions"
     scale = f"rings: ± {round_value:g} {unit_text(average.unit)}".rstrip()
     parts += [

@@ -6,7 +6,7 @@ from app.dashboard.laboratory import bifurcation as bifurcation_view
 from app.dashboard.laboratory.views import TAB
 from app.dashboard.methods.form import two_numbers
 from gearsig.errors import InputError
-from tests.app.pages import opened_at, pictures, shown_text
+from tests.app.pages import figures, opened_at, shown_text
 from tests.app.test_laboratory import opened
 
 
@@ -20,7 +20,7 @@ def test_every_question_is_answered_or_says_why_not(method):
     if method == "Lyapunov exponent":
         assert "looks stochastic or too noisy" in page.error[0].value.replace("\\", "")
         return
-    assert len(pictures(page)) == 1
+    assert len(figures(page)) == (1 if method == "Recurrence" else 2)
     assert not page.error
     assert method != "Kind of motion" or "the signal as measured" in shown_text(page)
 
@@ -67,12 +67,12 @@ def button(page, label):
 @pytest.mark.slow
 def test_a_bifurcation_is_drawn_on_demand():
     page = at_bifurcation()
-    assert not pictures(page)
+    assert not figures(page)
     assert "Nothing is drawn yet" in shown_text(page)
     button(page, "Draw").click().run()
     assert not page.exception
     assert not page.error
-    assert len(pictures(page)) == 1
+    assert [figure["plane"] for figure in figures(page)] == [True, True]
     assert any(b.proto.label == "Points (CSV)" for b in page.get("download_button"))
 
 
@@ -82,7 +82,7 @@ def test_stopped_it_keeps_what_is_complete(monkeypatch):
 
     monkeypatch.setattr(bifurcation_view, "_go_on", lambda: None)
     button(page, "Draw").click().run()
-    assert not pictures(page)
+    assert not figures(page)
     button(page, "Stop").click().run()
     assert page.session_state[bifurcation_view.ASKED] == ""
 

@@ -6,7 +6,7 @@ from streamlit.testing.v1 import AppTest
 from app.dashboard.laboratory.drive import FAULTS, NUMBERS, VIEWS
 from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup
 from sims.effects import EffectSetting
-from tests.app.pages import FOLDER
+from tests.app.pages import FOLDER, figures
 
 
 def opened(machine: str = "manipulator_formula") -> AppTest:
@@ -22,7 +22,7 @@ def test_every_view_of_the_healthy_drive() -> None:
         page.run()
         assert not page.exception
         assert not page.error
-        assert len(page.get("image")) + len(page.dataframe) >= 1
+        assert len(figures(page)) + len(page.dataframe) >= 1
     assert [metric.label for metric in page.metric] == [name[:1].upper() + name[1:] for name in NUMBERS]
     backlash = next(m for m in page.metric if m.label == "Backlash")
     assert float(backlash.value.split()[0]) == pytest.approx(300.0, rel=0.02)
@@ -33,7 +33,7 @@ def test_an_effect_shows_beside_the_healthy_drive() -> None:
     page.sidebar.slider(key="lab severity of backlash of the drive").set_value(100.0).run()
     assert not page.exception
     assert not page.error
-    assert len(page.get("image")) + len(page.get("imgs")) >= 1
+    assert len(figures(page)) == 5
     backlash = next(m for m in page.metric if m.label == "Backlash")
     assert float(backlash.value.split()[0]) == pytest.approx(400.0, rel=0.02)
     assert backlash.delta.startswith("healthy 299")

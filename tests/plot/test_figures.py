@@ -17,13 +17,16 @@ from gearsig.errors import InputError
 from gearsig.indicators import Indicator
 from gearsig.orders import OrderMap
 from gearsig.plot import (
+    FAULT,
     AngleMark,
     ChartLine,
     Cursor,
     LevelPanel,
     LinePanel,
     average_figure,
+    new_figure,
     order_map_figure,
+    panels_of,
     polar_figure,
     spectrum_figure,
     speed_figure,
@@ -209,3 +212,34 @@ def test_a_panel_as_svg_breaks_lines_at_gaps_and_keeps_the_largest_level() -> No
     assert (1 - (row + 0.5) / picture.shape[0]) * 400 == pytest.approx(100, abs=3)
     assert (column + 0.5) / picture.shape[1] * 3000 == pytest.approx(1500, abs=8)
     assert np.sum(picture < picture.max()) == 1
+
+
+def test_a_figure_is_taken_apart_into_panels_that_zoom(average_of) -> None:
+
+    figure = new_figure(3.0)
+    left, right = figure.subplots(1, 2)
+    turn = np.linspace(0.0, 4.0 * np.pi, 200)
+    left.plot(np.cos(turn), np.sin(turn), color=FAULT)
+    left.plot([0.5], [0.25], "o", color="#123456")
+    right.plot([0.0, 1.0], [2.0, 3.0], "--", color=FAULT, label="fault")
+    right.legend()
+    right.axvline(0.25)
+    right.axhline(2.5)
+    right.axvspan(0.5, 0.75, color="#00FF00")
+    right.bar([0.1], [1.5], width=0.2)
+    right.twinx().vlines([0.1, 0.2], 0.0, [1.0, 2.0])
+    right.set_xlabel("time (s)")
+    ((plane,), (lines, twin)) = panels_of(figure)[0]
+    assert plane.is_plane
+    assert [(line.colour, line.dots) for line in plane.lines] == [(1, False), ("#123456", True)]
+    np.testing.assert_array_equal(plane.lines[0].x, np.cos(turn))
+    assert not lines.is_plane
+    assert lines.x == "time (s)"
+    assert [c.position for c in lines.cursors] == [0.25]
+    assert lines.spans == [(0.5, 0.75, "#00FF00")]
+    dashed, level, bar = lines.lines
+    assert (dashed.name, dashed.dotted, tuple(level.y)) == ("fault", True, (2.5, 2.5))
+    assert np.nanmax(bar.y) == 1.5
+    assert np.nanmax(bar.x) == pytest.approx(0.2)
+    np.testing.assert_array_equal(twin.lines[0].y, [0.0, 1.0, np.nan, 0.0, 2.0, np.nan])
+    assert panels_of(polar_figure(average_of(np.zeros(64)))) == []

@@ -1,5 +1,6 @@
 // A figure of lines or of a map over one axis. Dragging zooms, and the server is told the range that is looked at, so
-// that it sends the detail of it. Cursors, peak table and export need no server.
+// that it sends the detail of it. Cursors, peak table and export need no server. A plane, of paths and points, is sent
+// whole and zoomed along both axes.
 
 const NS = "http://www.w3.org/2000/svg";
 const LEFT = 74, RIGHT = 16, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12;
@@ -36,15 +37,15 @@ class Figure {
   }
 
   update(data) {
-    const asked = this.asked;
+    const asked = this.asked, stays = data.plane && this.data?.plane && same(data.whole, this.whole);
     this.data = data;
     this.lines = data.lines.map((line) => ({ ...line, x: numbers(line.x), y: numbers(line.y), low: numbers(line.low), high: numbers(line.high) }));
     this.levels = data.map && bytes(data.map.levels);
     this.whole = data.whole;
     // An answer to an earlier question does not undo a zoom that is under way.
-    if (!asked || same(asked, data.shown)) {
+    if (!stays && (!asked || same(asked, data.shown))) {
       this.view = data.shown;
-      this.asked = null;
+      this.asked = this.across = null;
     }
     this.drawBar();
     this.draw();
@@ -52,14 +53,17 @@ class Figure {
 
   // ---------- what is looked at
 
-  look(range) {
+  look(range, across = this.across) {
     const least = (this.whole[1] - this.whole[0]) * 1e-6;
     let [low, high] = range;
     if (high - low < least) high = low + least;
     const span = Math.min(high - low, this.whole[1] - this.whole[0]);
     low = Math.max(this.whole[0], Math.min(low, this.whole[1] - span));
-    this.view = this.asked = [low, low + span];
+    this.view = [low, low + span];
+    this.across = same(this.view, this.whole) ? null : across; // of a plane: the values shown
+    this.asked = this.data.plane ? null : this.view;
     this.draw();
+    if (this.data.plane) return;
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.tell(this.view), 200);
   }
@@ -67,7 +71,13 @@ class Figure {
   type(event) {
     const [low, high] = this.view, span = high - low, middle = (low + high) / 2;
     const moved = (by) => [low + by * span, high + by * span];
-    const next = {
+    const { plane } = this.data, [bottom, top] = this.limits, tall = top - bottom;
+    const next = plane && {
+      ArrowUp: () => this.look(this.view, [bottom + 0.2 * tall, top + 0.2 * tall]),
+      ArrowDown: () => this.look(this.view, [bottom - 0.2 * tall, top - 0.2 * tall]),
+      "+": () => this.look([middle - span / 4, middle + span / 4], [bottom + tall / 4, top - tall / 4]),
+      "-": () => this.look([middle - span, middle + span], [bottom - tall / 2, top + tall / 2]),
+    }[event.key] || {
       ArrowLeft: () => (this.at === null ? this.look(moved(-0.2)) : this.moveTo(this.at - span / 400)),
       ArrowRight: () => (this.at === null ? this.look(moved(0.2)) : this.moveTo(this.at + span / 400)),
       "+": () => this.look([middle - span / 4, middle + span / 4]),
@@ -87,14 +97,15 @@ class Figure {
     event.preventDefault();
     this.svg.focus({ preventScroll: true });
     this.svg.setPointerCapture(event.pointerId);
-    const held = this.held(start), before = [...this.view], from = event.offsetX;
+    const held = this.held(start), before = [...this.view], from = event.offsetX, height = event.offsetY;
+    const tall = (e) => (this.data.plane && Math.abs(e.offsetY - height) > 5 ? [height, e.offsetY].sort((a, b) => a - b) : null);
     const move = (e) => {
       const now = this.unscale(e.offsetX);
       if (held) this.moveTo(now, held);
       else if (event.shiftKey) {
         const by = ((from - e.offsetX) / this.plotWidth) * (before[1] - before[0]);
         this.look([before[0] + by, before[1] + by]);
-      } else this.band(start, now);
+      } else this.band(start, now, tall(e));
     };
     const stop = (e) => {
       this.svg.removeEventListener("pointermove", move);
@@ -102,7 +113,8 @@ class Figure {
       this.svg.removeEventListener("pointercancel", stop);
       this.band(null);
       if (held || event.shiftKey || e.type === "pointercancel") return;
-      if (Math.abs(e.offsetX - from) > 5) this.look([start, this.unscale(e.offsetX)].sort((a, b) => a - b));
+      const across = tall(e)?.map((py) => this.fall(py)).reverse();
+      if (Math.abs(e.offsetX - from) > 5) this.look([start, this.unscale(e.offsetX)].sort((a, b) => a - b), across);
       else if (this.tool) this.moveTo(start);
     };
     this.svg.addEventListener("pointermove", move);
@@ -164,6 +176,8 @@ class Figure {
     return this.top + (1 - share) * this.plotHeight;
   }
 
+  fall(py) { return this.ofShare(1 - (py - this.top) / this.plotHeight); }
+
   ofShare(share) {
     const [low, high] = this.limits;
     return this.data.log ? low * (high / low) ** share : low + share * (high - low);
@@ -180,7 +194,7 @@ class Figure {
     const height = this.top + this.plotHeight + BOTTOM;
     this.ink = style.getPropertyValue("--ink").trim() || style.color;
     this.rule = style.getPropertyValue("--rule").trim() || "#8884";
-    this.limits = data.map ? data.map.limits : data.limits ?? this.ownLimits();
+    this.limits = data.map ? data.map.limits : (data.plane && this.across) || data.limits || this.ownLimits();
     const { svg } = this;
     svg.replaceChildren();
     set(svg, { width: this.width, height, viewBox: `0 0 ${this.width} ${height}`, "font-family": "system-ui, sans-serif", "font-size": 12, "aria-label": data.alternative });
@@ -189,6 +203,8 @@ class Figure {
     add(add(add(svg, "defs"), "clipPath", { id: clip }), "rect", rect);
     this.drawAxes();
     const inside = add(svg, "g", { "clip-path": `url(#${clip})` });
+    for (const [from, to, colour] of data.spans ?? [])
+      add(inside, "rect", { x: this.scale(from), width: Math.max(this.scale(to) - this.scale(from), 1), y: this.top, height: this.plotHeight, fill: colour, opacity: 0.14 });
     if (data.map) this.drawMap(inside);
     for (const line of this.lines) this.drawLine(inside, line);
     for (const [x, y] of data.marked)
@@ -203,8 +219,8 @@ class Figure {
   ownLimits() {
     let low = Infinity, high = -Infinity;
     for (const line of this.lines) {
-      const { x, y, low: floor } = line;
-      for (let i = lowerBound(x, this.view[0]); i < x.length && x[i] <= this.view[1]; i++) {
+      const { x, y, low: floor } = line, { plane } = this.data;
+      for (let i = plane ? 0 : lowerBound(x, this.view[0]); i < x.length && (plane || x[i] <= this.view[1]); i++) {
         if (Number.isNaN(y[i])) continue;
         low = Math.min(low, floor.length ? floor[i] : y[i]);
         high = Math.max(high, floor.length ? line.high[i] : y[i]);
@@ -239,20 +255,20 @@ class Figure {
   }
 
   drawLine(inside, line) {
-    const { x, y, low } = line, parts = [], from = Math.max(lowerBound(x, this.view[0]) - 1, 0);
-    const to = Math.min(lowerBound(x, this.view[1]) + 1, x.length), band = [];
+    const { x, y, low } = line, parts = [], { plane } = this.data, from = plane ? 0 : Math.max(lowerBound(x, this.view[0]) - 1, 0);
+    const to = plane ? x.length : Math.min(lowerBound(x, this.view[1]) + 1, x.length), band = [];
     let pen = "M";
     for (let i = from; i < to; i++) {
       if (Number.isNaN(y[i])) { pen = "M"; continue; }
-      parts.push(`${pen}${this.scale(x[i]).toFixed(1)},${this.rise(y[i]).toFixed(1)}`);
-      pen = "L";
+      parts.push(`${pen}${this.scale(x[i]).toFixed(1)},${this.rise(y[i]).toFixed(1)}${line.dots ? "h0" : ""}`);
+      if (!line.dots) pen = "L";
     }
     if (low.length) {
       for (let i = from; i < to; i++) band.push(`${this.scale(x[i]).toFixed(1)},${this.rise(line.high[i]).toFixed(1)}`);
       for (let i = to - 1; i >= from; i--) band.push(`${this.scale(x[i]).toFixed(1)},${this.rise(low[i]).toFixed(1)}`);
       add(inside, "polygon", { points: band.join(" "), fill: line.colour, opacity: 0.22 });
     }
-    add(inside, "path", { d: parts.join(""), fill: "none", stroke: line.colour, "stroke-width": 1.2, "stroke-linejoin": "round", "stroke-dasharray": line.dotted ? "2 3" : null });
+    add(inside, "path", { d: parts.join(""), fill: "none", stroke: line.colour, "stroke-width": line.dots ? 4 : plane ? 0.8 : 1.2, opacity: plane && !line.dots ? 0.6 : null, "stroke-linecap": line.dots ? "round" : null, "stroke-linejoin": "round", "stroke-dasharray": line.dotted ? "2 3" : null });
   }
 
   // Cursors that the machine implies, and the rows of their labels: the first of a family finds a place first.
@@ -319,10 +335,10 @@ class Figure {
     text(this.svg, x + 14, this.top + this.plotHeight / 2, map.unit.startsWith("dB") ? "dB" : map.unit, { fill: this.ink, opacity: 0.75 });
   }
 
-  band(from, to) {
+  band(from, to, tall = null) {
     if (from === null) return set(this.selection, { width: 0 });
-    const [low, high] = [this.scale(from), this.scale(to)].sort((a, b) => a - b);
-    set(this.selection, { x: low, width: high - low });
+    const [low, high] = [this.scale(from), this.scale(to)].sort((a, b) => a - b), [top, bottom] = tall ?? [this.top, this.top + this.plotHeight];
+    set(this.selection, { x: low, width: high - low, y: top, height: bottom - top });
   }
 
   // ---------- reading off
@@ -339,12 +355,27 @@ class Figure {
     const near = (4 / this.plotWidth) * (this.view[1] - this.view[0]), lines = [];
     const cursors = data.cursors.filter(({ at }) => Math.abs(at - x) < near).slice(0, 6);
     if (data.map) lines.push(this.levelAt(x, event.offsetY));
-    for (const line of this.lines) {
+    if (data.plane) lines.push(this.nearest(event.offsetX, event.offsetY));
+    for (const line of data.plane ? [] : this.lines) {
       const value = this.highest(x - near, x + near, line);
       if (value) lines.push(`${this.lines.length > 1 ? line.name + ": " : ""}${this.named(value[0])}, ${figure(value[1])} ${data.y_unit}`);
     }
     for (const { label, at } of cursors) lines.push(`${label}: ${this.named(at)}`);
     this.showTip(lines, event);
+  }
+
+  // The point of a plane under the pointer, in words.
+  nearest(px, py) {
+    let best = 144, words = "";
+    for (const { name, x, y } of this.lines)
+      for (let i = 0; i < x.length; i++) {
+        const away = (this.scale(x[i]) - px) ** 2 + (this.rise(y[i]) - py) ** 2;
+        if (away < best) {
+          best = away;
+          words = `${this.data.legend ? `${name}: ` : ""}${this.named(x[i])}, ${figure(y[i])} ${this.data.y_unit}`;
+        }
+      }
+    return words;
   }
 
   levelAt(x, py) {
@@ -455,7 +486,7 @@ class Figure {
     }
     const rows = [["line", data.x, data.y].map(quoted).join(",")];
     for (const { name, x, y } of this.lines)
-      for (let i = lowerBound(x, this.view[0]); i < x.length && x[i] <= this.view[1]; i++) rows.push(`${quoted(name)},${x[i]},${y[i]}`);
+      for (let i = data.plane ? 0 : lowerBound(x, this.view[0]); i < x.length && (data.plane || x[i] <= this.view[1]); i++) rows.push(`${quoted(name)},${x[i]},${y[i]}`);
     return rows.join("\n");
   }
 }

@@ -15,7 +15,7 @@ from app.bifurcation import NAMES, BifurcationRequest, KeptValue, figure_of, mea
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import MODEL, WIDEST, Setup, shown_unit
 from app.dashboard.theme import as_typed, capitalised
-from app.dashboard.widgets.charts import show_picture
+from app.dashboard.widgets.charts import show_figure
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError, InputError
 from sims.cracked import DECAYS, RAMP_S, SECTIONS, Branch, slowest_decay_s
@@ -236,7 +236,7 @@ def _fill(request: BifurcationRequest, branches: Branches) -> bool:
 
 def _show(request: BifurcationRequest, branches: Branches, chosen: Range) -> None:
     n_done = sum(len(kept) for kept in branches.values())
-    show_picture(figure_of(request.branch, branches), f"Poincaré points over {chosen.title}")
+    show_figure(figure_of(request.branch, branches), f"Poincaré points over {chosen.title}", "bifurcation")
     st.caption(
         "Upper panel: one point per cycle; a single point is a motion that repeats each cycle, two a motion that takes "
         "two cycles, a smear one that never repeats. Lower panel: how large the motion is. Shaded: two motions are "

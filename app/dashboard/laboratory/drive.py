@@ -18,7 +18,7 @@ from app.dashboard.laboratory.setup import (
 )
 from app.dashboard.laboratory.views import show_metrics, show_title
 from app.dashboard.theme import as_typed, capitalised
-from app.dashboard.widgets.charts import show_picture
+from app.dashboard.widgets.charts import show_figure
 from app.dashboard.work import kept
 from gearsig import motion as motions
 from gearsig import plot
@@ -220,7 +220,9 @@ def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
         words = (
             "Healthy and faulty drive: speed, phase plane, torque over twist, drive flank over the mesh cycle, teeth"
         )
-        show_picture(plot.start_stop_pair_figure(healthy.examined, faulty.examined, curves_um=curves), words)
+        show_figure(
+            plot.start_stop_pair_figure(healthy.examined, faulty.examined, curves_um=curves), words, "both drives"
+        )
     elif view == "Force between the teeth":
         _show_force(run)
     elif view == "Impacts":
@@ -230,7 +232,7 @@ def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
         st.dataframe(rows, hide_index=True)
     else:
         words = "Speed of the pinion with the impacts, phase plane of the teeth, torque over twist"
-        show_picture(plot.start_stop_figure(run.examined, title=run.setup.preset), words)
+        show_figure(plot.start_stop_figure(run.examined, title=run.setup.preset), words, "drive")
     for text in (*(f"Cannot tell the {text}" for text in run.examined.refusals), *run.examined.notes):
         st.caption(f":material/info: {as_typed(text)}")
 
@@ -240,7 +242,7 @@ def _show_force(run: DriveRun) -> None:
         st.info(as_typed(run.refusal))
         return
     words = "Force between the teeth: measured, piecewise model, Hunt–Crossley; below, the errors"
-    show_picture(plot.force_figure(run.force, title=run.setup.preset), words)
+    show_figure(plot.force_figure(run.force, title=run.setup.preset), words, "force of the drive")
     rows = [
         {
             "model": e.model,
@@ -259,7 +261,7 @@ def _show_impacts(run: DriveRun) -> None:
         return
     motion = run.examined.motion
     figure = plot.impacts_figure(run.examined.impacts, motion.path.teeth[0], restitution=motion.contact.restitution)
-    show_picture(figure, "Energy of the impacts over time and over the tooth, restitution over speed")
+    show_figure(figure, "Energy of the impacts over time and over the tooth, restitution over speed", "impacts")
     rows = [
         {
             "time (s)": i.time_s,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import streamlit as st
@@ -15,7 +15,7 @@ from app.dashboard.laboratory.gears import show_gears
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import Setup, effect_text
 from app.dashboard.theme import as_typed, capitalised, palette
-from app.dashboard.widgets.charts import FAULT, MEASURED, Axes, padded_limits, show_chart, show_lines
+from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, Axes, padded_limits, show_lines
 from app.dashboard.widgets.spectrum import show_spectrum
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
@@ -25,10 +25,6 @@ from gearsig.recording import Recording
 from gearsig.spectra import Spectrum, amplitude_spectrum, band_envelope, envelope_spectrum
 from sims.effects import effect
 from sims.mesh import mesh_stiffness
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
-
 
 HEIGHT_PX = 300
 MOTION = {
@@ -260,7 +256,6 @@ MAX_POINTS = 10_000
 """A browser without a graphics card draws so many at once."""
 REVOLUTIONS = 1.3
 """Of the line, so that every tooth is on it; the points are of the whole run."""
-Limits = tuple[tuple[float, float], tuple[float, float]]
 Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
@@ -281,11 +276,12 @@ def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     both = [healthy] if faulty is None else [healthy, faulty]
     portraits = [portrait(run, GEARS[gear or "Driver"], n) for run in both]
     limits = [padded_limits([p[axis] for p in portraits]) for axis in (0, 1)]
-    for column, shown, name in zip(st.columns(2), portraits, ("healthy", "faulty"), strict=False):
-        figure = portrait_figure(shown, (limits[0], limits[1]), faulty=name == "faulty")
-        words = f"Velocity over displacement of the {name} machine with its Poincaré points"
+    axes = Axes("displacement (µm)", "velocity (mm/s)", limits[0], limits[1])
+    for column, (y, v, y_points, v_points), name in zip(st.columns(2), portraits, ("healthy", "faulty"), strict=False):
+        path = ChartLine(y, v, name, MEASURED if name == "healthy" else FAULT)
+        dots = ChartLine(y_points, v_points, "Poincaré points", SHAFT, dots=True)
         with column:
-            show_chart(figure, f"phase of {name}", words)
+            show_lines([path, dots], axes, f"phase of {name}", legend=True, is_plane=True)
     st.caption(
         "Along the line of action. A closed curve repeats every mesh period, and its points fall together; "
         "scattered points mean a motion that does not repeat."
@@ -302,38 +298,6 @@ def portrait(run: LaboratoryRun, signal: str, n_per_revolution: float) -> Portra
     n = len(y) if turned <= REVOLUTIONS else round(len(y) * REVOLUTIONS / turned)
     every = -(-n // MAX_POINTS)
     return y[-n::every], v[-n::every], points[0], points[1]
-
-
-def portrait_figure(shown: Portrait, limits: Limits, *, faulty: bool) -> Figure:
-    """Draw one portrait."""
-    from plotly.graph_objects import Figure
-
-    colours, figure = palette(), Figure()
-    y, v, y_points, v_points = shown
-    figure.add_scatter(
-        x=y,
-        y=v,
-        mode="lines",
-        line={"width": 0.8, "color": colours.fault if faulty else colours.measured},
-        opacity=0.45,
-        hoverinfo="skip",
-    )
-    figure.add_scatter(
-        x=y_points,
-        y=v_points,
-        mode="markers",
-        marker={"size": 5, "color": colours.cursors["shaft"], "line": {"width": 0.5, "color": "black"}},
-        hovertemplate="%{x:.4g} µm, %{y:.4g} mm/s<extra></extra>",
-    )
-    figure.update_layout(
-        height=430,
-        margin={"l": 8, "r": 8, "t": 30, "b": 8},
-        title={"text": "faulty" if faulty else "healthy", "x": 0.5, "font": {"size": 14}},
-        showlegend=False,
-        xaxis={"title": "displacement (µm)", "range": limits[0]},
-        yaxis={"title": "velocity (mm/s)", "range": limits[1]},
-    )
-    return figure
 
 
 View = Callable[[LaboratoryRun, LaboratoryRun | None, str], None]

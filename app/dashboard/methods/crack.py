@@ -12,7 +12,7 @@ from app.dashboard.cached import recorded
 from app.dashboard.methods.form import MethodPage
 from app.dashboard.methods.page import cached, show_table
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import show_picture
+from app.dashboard.widgets.charts import show_figure
 from app.dashboard.widgets.chooser import choose_file, choose_sample
 from app.dashboard.widgets.messages import show_error, show_facts
 from gearsig.angle import find_shaft_angle, resample_to_angle
@@ -136,7 +136,7 @@ def _show_figure(recording: Recording, reference: Recording | None, estimate: Cr
     except GearsigError as error:
         show_error(error)
         return
-    show_picture(figure, f"Mean revolution of {estimate.shaft} without mesh harmonics, with the cracked tooth")
+    show_figure(figure, f"Mean revolution of {estimate.shaft}, with the cracked tooth", f"crack {channel}")
     text = f"The mean revolution of shaft {as_typed(estimate.shaft)} without mesh harmonics, three times in a row; "
     text += f"channel {as_typed(channel)}."
     if compared is not None:

@@ -38,8 +38,8 @@ P = ParamSpec("P")
 R = TypeVar("R")
 OVER_TIME, OVER_ANGLE = (".csv", ".h5", ".wav", ".parquet", ".mat"), (".csv",)
 """What waveforms are written to: recordings, which run over time; signals over angle are plain columns."""
-_SPOKEN = re.compile(r"(?:(?!\*\*)\S)+")
-"""Words of a text in which ** makes bold."""
+_SPOKEN = re.compile(r"(\*\*| )")
+"""Parts the words of a text in which ** makes bold."""
 MEMORY_LIMIT_MB, N_PREPARED = 256.0, 4
 """What is kept of a segment between two looks at it, and of how many segments."""
 
@@ -157,7 +157,7 @@ def _show(name: str, page: MethodPage) -> None:
 def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | CannotTell) -> None:
     """Show what was found: words, figures, waveforms, tables."""
     for fact in answer.facts:
-        st.markdown(_SPOKEN.sub(lambda part: as_typed(part.group()), fact))
+        st.markdown("".join(part if part in (" ", "**") else as_typed(part) for part in _SPOKEN.split(fact)))
     show_warnings([capitalised(text) for text in answer.warnings])
     span = 60.0
     if any(isinstance(panel, LevelPanel) and panel.span is None for panel in answer.panels):
@@ -167,7 +167,7 @@ def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | Cann
     if answer.path is not None:
         _show_space(page, answer.path)
     elif not answer.panels and answer.waveforms is None:
-        charts.show_picture(answer.draw(), f"{answer.caption}, {answer.channel}")
+        charts.show_figure(answer.draw(), f"{answer.caption}, {answer.channel}", page.key("figure"))
     for note in answer.notes:
         st.caption(as_typed(note))
     if answer.waveforms is not None and "signal" in answer.waveforms.columns:

@@ -107,7 +107,7 @@ def show() -> None:
                     if page == "analysis":
                         open_sample("damaged_tooth")
                     st.switch_page(state.ANALYSIS_PAGE.with_name(f"{page}.py"))
-    left, right = st.columns((5, 7), gap="large")
+    left, right = st.container(key="own").columns((5, 7), gap="large")
     with left:
         show_own()
     with right:
@@ -134,11 +134,11 @@ def show_samples() -> None:
     """Show the samples that show most."""
     st.markdown("##### Samples, each with what it shows")
     for sample in samples()[:N_SHOWN]:
-        with st.container(horizontal=True, vertical_alignment="center"):
-            st.markdown(f"**{sample.title}** — :gray[{sample.about}]")
-            if st.button("Open", key=f"sample {sample.rig.stem}"):
-                open_sample(sample.rig.stem)
-                st.switch_page(state.ANALYSIS_PAGE)
+        text, button = st.columns((6, 1), vertical_alignment="center")
+        text.markdown(f"**{sample.title}** — :gray[{sample.about}]")
+        if button.button("Open", key=f"sample {sample.rig.stem}", width="stretch", help=sample.title):
+            open_sample(sample.rig.stem)
+            st.switch_page(state.ANALYSIS_PAGE)
 
 
 try:

@@ -21,14 +21,14 @@ from app.dashboard.components import component_of
 from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
-from gearsig.plot import LONGEST, ChartLine, Cursor, LevelPanel, LinePanel, plain, pooled_levels
+from gearsig.plot import LONGEST, ChartLine, Cursor, LevelPanel, LinePanel, panels_of, plain, pooled_levels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as PictureFigure
     from plotly.graph_objects import Figure
 
 CONFIG = {"displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"], "scrollZoom": False}
-MEASURED, FAULT, QUIET = 0, 1, -1
+MEASURED, FAULT, SHAFT, QUIET = 0, 1, 4, -1
 """Colours of lines by meaning; further numbers are further colours."""
 
 
@@ -95,6 +95,8 @@ def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[f
 
 def show_panel(panel: LinePanel | LevelPanel, key: str, span_db: float) -> None:
     """Show a panel that a method gives, to be zoomed; of levels that range below the largest has colours."""
+    if panel.title:
+        st.caption(as_typed(panel.title))
     if isinstance(panel, LevelPanel):
         show_map(
             panel.levels,
@@ -109,8 +111,33 @@ def show_panel(panel: LinePanel | LevelPanel, key: str, span_db: float) -> None:
         )
         return
     ends = [float(end) for line in panel.lines for end in (line.x.min(), line.x.max())]
-    axes = Axes(panel.x, panel.y, (min(ends), max(ends)), panel.limits, logarithmic=panel.logarithmic)
-    show_lines(panel.lines, axes, key, cursors=panel.cursors, legend=len(panel.lines) > 1)
+    limits = panel.x_limits or (min(ends), max(ends))
+    axes = Axes(panel.x, panel.y, limits, panel.limits, logarithmic=panel.logarithmic)
+    many = len({line.name for line in panel.lines if line.name}) > 1
+    show_lines(panel.lines, axes, key, cursors=panel.cursors, legend=many, spans=panel.spans, is_plane=panel.is_plane)
+
+
+def show_figure(figure: PictureFigure, words: str, key: str) -> None:
+    """Show a figure to be zoomed, as the picture that it is where it cannot; `words` are for those who do not see it.
+
+    Parameters
+    ----------
+    figure : Figure
+        Of matplotlib.
+    words : str
+    key : str
+        Of its widgets, unique on the page.
+    """
+    rows = panels_of(figure)
+    if not rows:
+        show_picture(figure, words)
+    place = st.container(key=f"panels {key}")
+    for i, row in enumerate(rows):
+        columns = place.columns(len(row)) if len(row) > 1 else [place.container()]
+        for k, (column, panels) in enumerate(zip(columns, row, strict=True)):
+            for n, panel in enumerate(panels):
+                with column:
+                    show_panel(panel, f"{key} {i}{k}{n}", 60.0)
 
 
 def show_chart(figure: Figure, key: str, alternative: str) -> None:
@@ -159,6 +186,8 @@ def show_lines(
     whole: tuple[float, float] | None = None,
     per_unit: tuple[float, str] | None = None,
     step: float | None = None,
+    spans: Sequence[tuple[float, float, str]] = (),
+    is_plane: bool = False,
 ) -> None:
     """Show lines with cursors and marked points; of long lines the extremes of each pixel column of what is shown.
 
@@ -183,11 +212,15 @@ def show_lines(
         What one unit of the x axis is in another unit, for the readout of cursors.
     step : float or None
         Distance of the sidebands that are offered first.
+    spans : sequence of (low, high, colour)
+        Shaded parts of the x axis.
+    is_plane : bool
+        Of paths and points in a plane, which are sent whole.
     """
     colours, ends = palette(), whole or axes.x_limits
     shown = looked_at(key, ends, axes.x_limits)
-    data = _described(axes, key, shown, ends, height_px) | {
-        "lines": [_sent(line, shown, alone=len(lines) == 1) for line in lines],
+    data = _described(axes, key, shown, ends, height_px, is_plane=is_plane) | {
+        "lines": [_sent(line, None if is_plane else shown, alone=len(lines) == 1) for line in lines],
         "cursors": _cursor_rows(cursors, colours),
         "marked": [[float(x), float(y)] for x, y in marked],
         "legend": legend,
@@ -195,6 +228,8 @@ def show_lines(
         "limits": axes.y_limits,
         "per_unit": per_unit,
         "step": step,
+        "spans": list(spans),
+        "plane": is_plane,
     }
     _figure(key=key, data=data, on_range_change=_ignore, default={"range": None})
 
@@ -280,7 +315,13 @@ def _ignore() -> None:
 
 
 def _described(
-    axes: Axes, key: str, shown: tuple[float, float], whole: tuple[float, float], height_px: int
+    axes: Axes,
+    key: str,
+    shown: tuple[float, float],
+    whole: tuple[float, float],
+    height_px: int,
+    *,
+    is_plane: bool = False,
 ) -> dict[str, object]:
     return {
         "x": one_line(axes.x),
@@ -294,7 +335,7 @@ def _described(
         "dates": axes.dates,
         "alternative": one_line(f"{axes.y} over {axes.x}"),
         "name": re.sub(r"[^\w-]+", "-", key.split(" of ", maxsplit=1)[0]).strip("-") or "figure",
-        "has_tools": height_px >= 200,
+        "has_tools": height_px >= 200 and not is_plane,
     }
 
 
@@ -303,15 +344,16 @@ def _unit_of(label: str) -> str:
     return one_line(unit.removesuffix(")") if bracket else "")
 
 
-def _sent(line: ChartLine, shown: tuple[float, float], *, alone: bool = True) -> dict[str, object]:
-    """Return a line as the component takes it; of several spectra, pale bands would hide the others."""
-    colours = palette()
+def _sent(line: ChartLine, shown: tuple[float, float] | None, *, alone: bool = True) -> dict[str, object]:
+    """Return a line as the component takes it, whole where `shown` is None; pale bands would hide other spectra."""
+    colours, colour = palette(), line.colour
     cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
-    colour = colours.quiet if line.colour == QUIET else cycle[line.colour % len(cycle)]
-    x, y, *band = _columns(line, shown)
+    if isinstance(colour, int):
+        colour = colours.quiet if colour == QUIET else cycle[colour % len(cycle)]
+    x, y, *band = (line.x, line.y) if shown is None else _columns(line, shown)
     band = band if alone or line.band is not None else []
     curves = {name: packed(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
-    return {"name": one_line(line.name), "colour": colour, "dotted": line.dotted, **curves}
+    return {"name": one_line(line.name), "colour": colour, "dotted": line.dotted, "dots": line.dots, **curves}
 
 
 def packed(values: FloatArray) -> str:

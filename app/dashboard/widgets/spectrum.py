@@ -9,13 +9,24 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.theme import as_typed, is_dark
-from app.dashboard.widgets.charts import N_COLUMNS, Axes, looked_at, picture_bytes, show_lines
+from app.dashboard.theme import as_typed, palette
+from app.dashboard.widgets.charts import N_COLUMNS, Axes, looked_at, show_lines
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.formatting import readable
 from gearsig.orders import SynchronousAverage
-from gearsig.plot import AngleMark, ChartLine, Cursor, Scale, above_zero, decibels, unit_text, with_unit
+from gearsig.plot import (
+    AngleMark,
+    ChartLine,
+    Cursor,
+    Scale,
+    above_zero,
+    decibels,
+    marks_of,
+    svg_ring,
+    unit_text,
+    with_unit,
+)
 from gearsig.spectra import Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
@@ -108,6 +119,7 @@ def show_spectrum(
         cursors=[_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen],
         marked=[(p, float(values[first.index_of(p)])) for p in marked],
         height_px=270 if plain else 340,
+        legend=bool(names),
         whole=whole,
         per_unit=per_unit,
         step=min(shafts, default=None),
@@ -209,29 +221,20 @@ def teeth_choice(analysis: Analysis, shaft: str) -> int | None:
 
 
 def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) -> None:
-    from app.dashboard.methods.page import content_key
-    from gearsig.plot import marks_of
-
     marks = marks_of(analysis.findings, average.shaft, n_teeth)
     seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
     words = f"Polar picture: {average.kind} of {average.channel} over one revolution of {average.shaft}{seen}"
-    polar, unrolled = st.columns((6, 7), vertical_alignment="center")
-    with polar:
-        key = content_key((average, n_teeth, marks))
-        st.image(_polar(key, is_dark(), average, n_teeth, marks), width="stretch", alt=as_typed(words))
-    with unrolled:
-        _show_unrolled(analysis, average, n_teeth, [Cursor(m.angle_deg, "finding", m.label) for m in marks])
+    with st.container(key="average"):
+        polar, unrolled = st.columns((6, 7), vertical_alignment="center")
+        polar.image(ring_of(average, n_teeth, marks), width="stretch", alt=as_typed(words))
+        with unrolled:
+            _show_unrolled(analysis, average, n_teeth, [Cursor(m.angle_deg, "finding", m.label) for m in marks])
 
 
-@st.cache_data(max_entries=16, show_spinner=False)
-def _polar(
-    key: str, dark: bool, _average: SynchronousAverage, _n_teeth: int | None, _marks: Sequence[AngleMark]
-) -> bytes:
-    """Draw the polar picture, most of the time that the page takes, once for an average that is shown again."""
-    from gearsig.plot import polar_figure
-
-    del key  # it stands for what is drawn
-    return picture_bytes(polar_figure(_average, n_teeth=_n_teeth, marks=_marks), dark=dark)
+def ring_of(average: SynchronousAverage, n_teeth: int | None, marks: Sequence[AngleMark]) -> str:
+    """Return the ring of teeth in the page's colours."""
+    colours = palette()
+    return svg_ring(average, n_teeth=n_teeth, marks=marks, ink=colours.quiet, line=colours.measured)
 
 
 def _show_unrolled(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, marks: list[Cursor]) -> None:

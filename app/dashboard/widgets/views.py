@@ -17,7 +17,7 @@ from app.dashboard.methods.form import MethodPage
 from app.dashboard.methods.page import cached, show_method
 from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import Axes, show_lines, show_map, show_picture
+from app.dashboard.widgets.charts import Axes, show_figure, show_lines, show_map
 from app.dashboard.widgets.machine import show_machine
 from app.dashboard.widgets.messages import show_error, show_facts, show_unknown_speed
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
@@ -329,8 +329,8 @@ def show_start_stop(analysis: Analysis) -> None:
 
     if analysis.motion is None:
         return
-    for drawn in start_stop_figures(analysis.motion):
-        show_picture(drawn.figure, drawn.alternative)
+    for number, drawn in enumerate(start_stop_figures(analysis.motion)):
+        show_figure(drawn.figure, drawn.alternative, state.view_key(f"motion {number}", analysis))
         st.caption(as_typed(drawn.caption))
 
 
