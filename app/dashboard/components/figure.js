@@ -20,7 +20,7 @@ class Figure {
     this.at = null; // position of the cursor, or of the first harmonic, or of the carrier
     this.step = null; // distance of the sidebands
     this.peaks = false;
-    this.svg = element("svg", { role: "img", tabindex: 0 });
+    this.svg = element("svg", { role: "img", tabindex: 0, "aria-keyshortcuts": "ArrowLeft ArrowRight + - 0 Escape" });
     this.bar = html("div", "bar");
     this.words = html("div", "words");
     this.table = html("div", "peaks");
@@ -71,6 +71,11 @@ class Figure {
   type(event) {
     const [low, high] = this.view, span = high - low, middle = (low + high) / 2;
     const moved = (by) => [low + by * span, high + by * span];
+    const push = (way) => {
+      if (this.at === null) this.look(moved(0.2 * way));
+      else if (event.shiftKey && this.tool === "sidebands") this.moveTo(this.at + this.step + (way * span) / 2000, { of: "step", times: 1 });
+      else this.moveTo(this.at + (way * span) / 400);
+    };
     const { plane } = this.data, [bottom, top] = this.limits, tall = top - bottom;
     const next = plane && {
       ArrowUp: () => this.look(this.view, [bottom + 0.2 * tall, top + 0.2 * tall]),
@@ -78,8 +83,8 @@ class Figure {
       "+": () => this.look([middle - span / 4, middle + span / 4], [bottom + tall / 4, top - tall / 4]),
       "-": () => this.look([middle - span, middle + span], [bottom - tall / 2, top + tall / 2]),
     }[event.key] || {
-      ArrowLeft: () => (this.at === null ? this.look(moved(-0.2)) : this.moveTo(this.at - span / 400)),
-      ArrowRight: () => (this.at === null ? this.look(moved(0.2)) : this.moveTo(this.at + span / 400)),
+      ArrowLeft: () => push(-1),
+      ArrowRight: () => push(1),
       "+": () => this.look([middle - span / 4, middle + span / 4]),
       "-": () => this.look([middle - span, middle + span]),
       0: () => this.look(this.whole),
@@ -448,7 +453,7 @@ class Figure {
       }
     if (this.data.has_tools) {
       for (const [tool, label] of Object.entries(TOOLS))
-        right.append(button(label, () => this.choose(tool), `${label}: drag it along, or use the arrow keys`, this.tool === tool));
+        right.append(button(label, () => this.choose(tool), `${label}: drag it along, or use the arrow keys${tool === "sidebands" ? ", with Shift for their distance" : ""}`, this.tool === tool));
       if (this.lines.length)
         right.append(button("Peaks", () => { this.peaks = !this.peaks; this.drawBar(); this.draw(); }, "Table of the highest peaks shown", this.peaks));
     }

@@ -17,7 +17,6 @@ from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError
 from gearsig.recording import FORMAT_NAMES
 
-SVG = "http://www.w3.org/2000/svg"
 BLUE, ORANGE = "#2B86C5", "#D55E00"
 N_SHOWN = 8
 
@@ -100,7 +99,7 @@ def show() -> None:
     with st.container(key="try"):
         for column, (title, about, label, picture, page) in zip(st.columns(3), TO_TRY, strict=True):
             with column.container(border=True, height="stretch"):
-                st.image(f'<svg xmlns="{SVG}" viewBox="0 0 300 124">{picture()}</svg>', width="stretch", alt="")
+                st.html(f'<svg viewBox="0 0 300 124" aria-hidden="true">{picture()}</svg>')
                 st.markdown(f"**{title}**")
                 st.caption(about)
                 if st.button(label, type="primary", width="stretch", key=f"try {page}"):
@@ -116,7 +115,7 @@ def show() -> None:
 
 def show_own() -> None:
     """Take a file of the user's, or one of those that were open last."""
-    st.markdown("##### Open your own file")
+    st.subheader("Open your own file", anchor=False)
     st.caption(f"{FORMAT_NAMES}. It stays on this machine; the machine is described in a form afterwards.")
     file = choose_file("Recording", "start file", rig="Rig file (TOML), if you have one")
     if file is not None:
@@ -132,11 +131,11 @@ def show_own() -> None:
 
 def show_samples() -> None:
     """Show the samples that show most."""
-    st.markdown("##### Samples, each with what it shows")
+    st.subheader("Samples, each with what it shows", anchor=False)
     for sample in samples()[:N_SHOWN]:
-        text, button = st.columns((6, 1), vertical_alignment="center")
-        text.markdown(f"**{sample.title}** — :gray[{sample.about}]")
-        if button.button("Open", key=f"sample {sample.rig.stem}", width="stretch", help=sample.title):
+        button, text = st.columns((2, 5), vertical_alignment="center")
+        text.markdown(f":gray[{sample.about}]")
+        if button.button(sample.title, key=f"sample {sample.rig.stem}", width="stretch"):
             open_sample(sample.rig.stem)
             st.switch_page(state.ANALYSIS_PAGE)
 
