@@ -1,4 +1,5 @@
 # ruff: noqa: I001 - one import a room; the names of `gearsig`, read by type checkers and by `__init__.py` at run time
+from . import plot as plot
 from .angle import (
     AngleSignal as AngleSignal,
     ShaftAngle as ShaftAngle,

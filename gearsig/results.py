@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from html import escape
@@ -77,8 +77,9 @@ class Result:
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.repr}  # type: ignore[arg-type]
         arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray) and value.ndim}
         texts = {name: _value_text(value) for name, value in values.items() if name not in arrays}
-        facts = ", ".join(f"{name} {text}" for name, text in texts.items() if text)
-        head = wrap(f"{type(self).__name__}: {facts}", _LINE, subsequent_indent="  ")
+        head = [line for text in _verdict_of(self) for line in wrap(text, _LINE, subsequent_indent="  ")]
+        facts = ", ".join(f"{name} {text}" for name, text in texts.items() if text and not (head and name == "verdict"))
+        head += wrap(f"{type(self).__name__}: {facts}", _LINE, subsequent_indent="  ")
         width = max(map(len, arrays), default=0)
         return "\n".join([*head, *(f"  {name:<{width}}  {_array_text(a)}" for name, a in arrays.items())])
 
@@ -99,6 +100,22 @@ class Result:
 
         table = _table_of(self)
         return DataFrame([_row_of(self)]) if table is None else table
+
+
+def verdict_html(verdict: Sequence[str], head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a verdict over a table, for notebooks; texts may come from files.
+
+    Parameters
+    ----------
+    verdict, head : sequence of str
+    rows : iterable of sequences of str
+        As long as the head.
+    """
+    cell = "<{0} style='text-align:left'>{1}</{0}>"
+    lines = [("th", head), *(("td", row) for row in rows)]
+    table = "".join(f"<tr>{''.join(cell.format(kind, escape(text)) for text in line)}</tr>" for kind, line in lines)
+    said = "".join(f"<p><strong>{escape(text)}</strong></p>" for text in verdict)
+    return f"{said}<table>{table}</table>" if len(lines) > 1 else said
 
 
 def to_frame(result: object) -> DataFrame:
@@ -192,6 +209,15 @@ def _row_of(item: Any, path: str = "") -> dict[str, Any]:
 
 # The words of a `repr`.
 
+
+def _verdict_of(result: object) -> tuple[str, ...]:
+    """Return what a result says in words, which comes first."""
+    verdict = getattr(result, "verdict", ())
+    if isinstance(verdict, str):
+        return (verdict,) if " " in verdict else ()  # one word stands among the others
+    return tuple(verdict)
+
+
 _SIMPLE = (str, bool, int, float, np.number)
 
 
@@ -227,7 +253,7 @@ def _value_text(value: Any) -> str:
         text = f"{len(value)} × {' or '.join(sorted({type(item).__name__ for item in items}))}"
     elif is_dataclass(value):
         name = getattr(value, "name", "")
-        text = f"{type(value).__name__}{f' {name!r}' if name else ''}"
+        text = f"{type(value).__name__} {name!r}" if name else ""
     else:
         text = str(value)[:_TEXT]
     return text

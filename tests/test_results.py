@@ -2,6 +2,8 @@
 
 import importlib
 import pkgutil
+import subprocess
+import sys
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -12,7 +14,7 @@ from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.recording import Channel, Recording
-from gearsig.results import Result, to_frame
+from gearsig.results import Result, to_frame, verdict_html
 
 RATE_HZ = 1000.0
 
@@ -131,3 +133,25 @@ def test_notebooks_show_a_table_in_which_names_are_text():
     assert "<script>" not in html
     assert "&lt;script&gt;" in html
     assert html.count("<tr>") == 2
+
+
+def test_a_notebook_shows_what_is_said_first() -> None:
+    @dataclass(frozen=True)
+    class Told(Result):
+        verdict: str
+        n_tried: int
+
+    assert repr(Told("the <b> stands out", 3)).splitlines() == ["the <b> stands out", "Told: n_tried 3"]
+    assert repr(Told("regular", 3)) == "Told: verdict 'regular', n_tried 3"  # a word needs no line of its own
+    html = verdict_html(["a < b"], ("cause",), [("<i>",)])
+    assert "a &lt; b" in html
+    assert "&lt;i&gt;" in html
+    shown = Recording(np.zeros((1, 8)), 4.0, (Channel("<x>", "acceleration", "g"),))._repr_html_()
+    assert "&lt;x&gt;" in shown
+    assert "2 s at 4 Hz" in shown
+
+
+def test_figures_are_part_of_the_vocabulary() -> None:
+    """As somebody writes who has imported nothing else."""
+    code = "import gearsig, numpy; print(len(gearsig.plot.amplitude_spectrum(numpy.ones(64), 64.0).axes))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "1\n"

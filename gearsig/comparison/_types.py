@@ -9,7 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.orders import SynchronousAverage
-from gearsig.results import Result
+from gearsig.results import Result, verdict_html
 from gearsig.spectra import Spectrum
 
 BEYOND = 2.0
@@ -331,6 +331,10 @@ class Comparison(Result, rows="channels"):
     notes: tuple[str, ...]
     verdict: str
     findings: tuple[str, ...]
+
+    def _repr_html_(self) -> str:
+        """Return verdict and findings for notebooks."""
+        return verdict_html([self.verdict], ("findings",), [(text,) for text in self.findings])
 
 
 DEEPEST_DB = 160.0

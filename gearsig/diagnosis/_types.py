@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from html import escape
 from math import e, exp, log
 
 from gearsig.angle import ShaftAngle
@@ -14,7 +13,7 @@ from gearsig.indicators import Indicator
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.recording import Recording
-from gearsig.results import Result
+from gearsig.results import Result, verdict_html
 from gearsig.rig import Rig
 from gearsig.severity import CrackEstimate, NoCrackSeen
 from gearsig.spectra import BandCandidate, Kurtogram, Spectrum
@@ -319,13 +318,8 @@ class Analysis(Result, rows="findings"):
 
     def _repr_html_(self) -> str:
         """Return verdict and findings for notebooks; texts may come from files."""
-        rows = "".join(
-            f"<tr><td>{escape(f.kind.value)}</td><td style='text-align:left'>{escape(f.title)}</td>"
-            f"<td>{f.confidence:.2g}</td></tr>"
-            for f in self.findings
-        )
-        head = "<tr><th></th><th style='text-align:left'>finding</th><th>confidence</th></tr>"
-        return f"<p><strong>{escape(self.verdict)}</strong></p><table>{head}{rows}</table>"
+        rows = [(f.kind.value, f.title, f"{f.confidence:.2g}") for f in self.findings]
+        return verdict_html([self.verdict], ("", "finding", "confidence"), rows)
 
 
 def outcome_of(findings: Sequence[Finding]) -> Outcome:

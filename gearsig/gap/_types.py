@@ -11,7 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap._simulator import Added, OperatingCondition
-from gearsig.results import Result
+from gearsig.results import Result, verdict_html
 
 # --------------------
 # The curves that a gap report draws: order spectra, energy over the angle, synchronous averages.
@@ -552,6 +552,12 @@ class GapReport(Result, rows="causes"):
     def kind(self) -> GapKind | None:
         """The kind of fault that is named; None where nothing is, or no kind is likelier than all else together."""
         return kind_of(self.causes, self.groups) if self.outcome in NAMING else None
+
+    def _repr_html_(self) -> str:
+        """Return the four lines of the verdict and the likeliest causes, for notebooks."""
+        likeliest = [cause for cause in self.causes if cause.probability >= 0.01][:5]
+        rows = [(cause.title, f"{100.0 * cause.probability:.0f} %", cause.place) for cause in likeliest]
+        return verdict_html(self.verdict, ("cause", "probability", "place"), rows)
 
     @property
     def is_simulated(self) -> bool:

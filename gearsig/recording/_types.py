@@ -12,6 +12,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array, known_name, one_of, positive, within
 from gearsig.errors import InputError
+from gearsig.results import verdict_html
 from gearsig.rig import QUANTITIES, PulseTimes, Rig, SpeedSource
 
 if TYPE_CHECKING:
@@ -283,6 +284,11 @@ class Recording:
         shown = [f"  {c.name}: {c.quantity}{f' ({c.unit})' if c.unit else ''}" for c in self.channels[:6]]
         more = len(self.channels) - len(shown)
         return "\n".join([head, *shown, *([f"  … and {more} more channels"] if more else [])])
+
+    def _repr_html_(self) -> str:
+        """Return the same as a table, for notebooks."""
+        rows = [(c.name, c.quantity.replace("_", " "), c.unit, c.position) for c in self.channels]
+        return verdict_html([repr(self).splitlines()[0]], ("channel", "quantity", "unit", "position"), rows)
 
     @property
     def name(self) -> str:

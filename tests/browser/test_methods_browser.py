@@ -80,5 +80,5 @@ def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page) -> 
 def test_the_depth_of_a_crack_against_the_healthy_sample(page: playwright.Page) -> None:
     open_analysis(page, "root_crack_3mm")
     panel = open_method(page, "Crack severity")
-    panel.locator("img").first.wait_for()
+    panel.locator(".figure").first.wait_for()
     assert "tooth 21" in panel.get_by_test_id("stAlert").filter(has_text="tooth").inner_text().replace("\u2060", "")
