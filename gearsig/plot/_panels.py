@@ -265,6 +265,15 @@ def _words_of(axes: Axes) -> str:
     return " · ".join(word for word in words if word)
 
 
+def _x_label(axes: Axes) -> str:
+    """Return the name of the x axis; of panels below each other over the same range only the last shows it."""
+    left, limits = round(axes.get_position().x0, 2), axes.get_xlim()
+    figure = axes.get_figure(root=True)
+    alike = [each for each in (figure.axes if figure is not None else ()) if each.get_xlim() == limits]
+    names = [each.get_xlabel() for each in (axes, *alike) if round(each.get_position().x0, 2) == left]
+    return next(filter(None, names), "")
+
+
 def _level_panel(axes: Axes) -> LevelPanel:
     image = axes.images[0]
     left, right, low, high = image.get_extent()
@@ -317,7 +326,7 @@ def _line_panel(axes: Axes, names: Mapping[str, str]) -> LinePanel:
     fixed = is_plane or not axes.get_autoscaley_on()
     return LinePanel(
         lines,
-        axes.get_xlabel(),
+        _x_label(axes),
         axes.get_ylabel(),
         axes.get_ylim() if fixed else None,
         axes.get_yscale() == "log",
