@@ -30,6 +30,16 @@ def _common(
     speed_rpm: options.SpeedOption = None,
     tach_times: options.TachometerTimesOption = None,
     pulses_per_revolution: options.PulsesOption = 1,
+    memory: Annotated[
+        float,
+        typer.Option(
+            "--memory",
+            metavar="GB",
+            min=0.25,
+            help="What may be taken. Of a longer recording density, maps, average and envelope are computed in blocks; "
+            "others ask for a part.",
+        ),
+    ] = 2.0,
     json: options.JsonOption = False,
     output: Annotated[
         Path | None,
@@ -174,13 +184,14 @@ def _answer(
     speed_rpm: float | None,
     tach_times: Path | None,
     pulses_per_revolution: int,
+    memory: float,
     json: bool,
     output: Path | None,
     **given: Any,
 ) -> None:
     from rich.console import Console
 
-    from gearsig.methods import apply_method
+    from gearsig.methods import apply_method_to_file
     from gearsig.report import answer_json, check_writable, write_answer
 
     settings = {option.name: _value(option, given[option.name]) for option in method.options}
@@ -190,9 +201,11 @@ def _answer(
         check_writable(output)
     speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
     machine = options.open_rig(rig, recording)
-    opened = options.open_recording(recording, machine, fs, speed)
     with Console(stderr=True).status(name):
-        answer = apply_method(name, opened, channel, start_s=start_s, end_s=end_s, **settings)
+        answer = apply_method_to_file(
+            name, recording, machine, channel, start_s=start_s, end_s=end_s, memory_bytes=1e9 * memory,
+            sampling_rate_hz=fs, speed=speed, **settings,
+        )  # fmt: skip
         paths = () if output is None else write_answer(answer, output)
     if json or output is None:
         typer.echo(answer_json(answer))

@@ -20,7 +20,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.recording import Recording, n_samples_of, read_recording
 from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource, TachometerChannel
-from gearsig.spectra import Spectrum, power_density, squared_unit
+from gearsig.spectra import Scaling, Spectrum, plan_blocks, power_density, spectrum_of_blocks, squared_unit
 
 BLOCK_SAMPLES = 1 << 20
 """Of a block, per channel: some 100 MB of work at a time."""
@@ -49,15 +49,28 @@ class RecordBlocks:
     n_samples: int
     read: Callable[[slice], Recording]
 
+    def power_density(self, channel: str, *, n_per_block: int = 8192) -> Spectrum:
+        """Return the power density of all of the record: the mean of all half overlapping spectra (Hann)."""
+        levels = self.frequency_map(channel, n_per_block=n_per_block)
+        hop = n_per_block // 2
+        n_spectra = (self.n_samples - n_per_block) // hop + 1
+        # All columns are means of as many spectra but the last.
+        n_each = np.full(len(levels.time_s), ceil(n_spectra / len(levels.time_s)))
+        n_each[-1] = n_spectra - n_each[:-1].sum()
+        head = np.zeros(n_per_block)
+        empty = power_density(head, self.head.sampling_rate_hz, n_per_block=n_per_block, unit=self._unit(channel))
+        return replace(empty, values=n_each @ levels.values / n_spectra, n_averages=n_spectra, source=channel)
+
     def frequency_map(
         self,
         channel: str,
         *,
         n_per_block: int = 8192,
         n_columns_max: int = 1000,
+        scaling: Scaling = "power density",
         shaft_angle: ShaftAngle | None = None,
     ) -> OrderMap:
-        """Return power densities over time, the mean of all half overlapping spectra in each column.
+        """Return spectra over time, in each column the mean power of all half overlapping ones that begin in it.
 
         Parameters
         ----------
@@ -66,6 +79,8 @@ class RecordBlocks:
             Samples of a spectrum (Hann).
         n_columns_max : int
             Bounds the memory: spectra are averaged where there are more.
+        scaling : str
+            As in `amplitude_spectrum`, or "power density".
         shaft_angle : ShaftAngle or None
             For the speed of each column; None: said to be 0.
 
@@ -88,7 +103,8 @@ class RecordBlocks:
             for begin in range(0, last - first, per_column):
                 end = min(begin + per_column, last - first)
                 piece = x[begin * hop : (end - 1) * hop + n_per_block]
-                spectrum = power_density(piece, rate, n_per_block=n_per_block, unit=self._unit(channel), source=channel)
+                plan = plan_blocks(len(piece), n_per_block, 0.5, "hann")
+                spectrum = spectrum_of_blocks(piece, rate, plan, scaling, self._unit(channel), channel)
                 rows.append(spectrum.values)
         assert spectrum is not None  # noqa: S101 - said to the type checker: there is at least one
         begins = np.arange(len(rows)) * per_column
@@ -100,11 +116,69 @@ class RecordBlocks:
             time_s=time_s,
             speed_rpm=np.zeros(len(rows)) if shaft_angle is None else shaft_angle.speed_rpm_at(time_s),
             axis="frequency",
-            scaling="power density",
+            scaling=scaling,
             unit=spectrum.unit,
             resolution=spectrum.resolution,
             source=channel,
-            shaft="",
+            shaft="" if shaft_angle is None else shaft_angle.shaft,
+        )
+
+    def order_map(
+        self,
+        channel: str,
+        shaft_angle: ShaftAngle | None = None,
+        *,
+        revolutions_per_block: int = 10,
+        n_columns_max: int = 1000,
+        samples_per_revolution: int | None = None,
+    ) -> OrderMap:
+        """Return amplitudes over order along the record, in each column the rms of all spectra that begin in it.
+
+        Spectra (Hann) are of so many revolutions and begin half as many apart, rounded down.
+
+        Parameters
+        ----------
+        channel, shaft_angle, samples_per_revolution
+            As in `average`.
+        revolutions_per_block, n_columns_max : int
+            As in `gearsig.orders.order_map`, and `frequency_map`.
+        """
+        turns = self._turns(channel, shaft_angle, samples_per_revolution)
+        hop = max(1, count(revolutions_per_block, "revolutions_per_block") // 2)
+        n_spectra = (turns.last - turns.first - revolutions_per_block) // hop + 1
+        if n_spectra < 1:
+            raise RefusalError(f"{self.head.name} holds fewer than {revolutions_per_block} whole revolutions")
+        per_column = ceil(n_spectra / count(n_columns_max, "n_columns_max"))
+        columns: list[Spectrum] = []
+        ends: list[tuple[int, int]] = []
+        for first in range(0, n_spectra, per_column):
+            n_here = min(per_column, n_spectra - first)
+            begin = turns.first + first * hop
+            end = begin + (n_here - 1) * hop + revolutions_per_block
+            x = np.concatenate([rows.reshape(-1) for _, rows in turns.between(begin, end)])
+            plan = plan_blocks(
+                len(x), revolutions_per_block * turns.n_per_revolution, 1.0 - hop / revolutions_per_block, "hann"
+            )
+            columns.append(
+                spectrum_of_blocks(
+                    x, turns.n_per_revolution, plan, "amplitude peak", self._unit(channel), channel,
+                    axis="order", highest=turns.highest_order, shaft=turns.angle.shaft,
+                )
+            )  # fmt: skip
+            ends.append((begin, end))
+        n_lines = min(len(column.values) for column in columns)
+        begin_s, end_s = np.interp(np.array(ends).T, turns.angle.revolutions, turns.angle.time_s)
+        return OrderMap(
+            values=np.stack([column.values[:n_lines] for column in columns]),
+            positions=columns[0].positions[:n_lines],
+            time_s=(begin_s + end_s) / 2.0,
+            speed_rpm=60.0 * np.diff(np.array(ends), axis=1)[:, 0] / (end_s - begin_s),
+            axis="order",
+            scaling="amplitude peak",
+            unit=columns[0].unit,
+            resolution=columns[0].resolution,
+            source=channel,
+            shaft=turns.angle.shaft,
         )
 
     def envelope_density(self, channel: str, band_hz: tuple[float, float], *, n_per_block: int = 8192) -> Spectrum:
@@ -221,6 +295,24 @@ class RecordBlocks:
         n_jackknife_blocks : int
             For the standard error, as in `synchronous_average`.
         """
+        turns = self._turns(channel, shaft_angle, samples_per_revolution)
+        n, first, last = turns.n_per_revolution, turns.first, turns.last
+        edges = first + np.linspace(0, last - first, min(last - first, n_jackknife_blocks) + 1).round().astype(int)
+        sums = np.zeros((len(edges) - 1, n))
+        for begin, rows in turns.between(first, last):
+            for i in range(len(edges) - 1):
+                a, b = max(begin, edges[i]) - begin, min(begin + len(rows), edges[i + 1]) - begin
+                if b > a:
+                    sums[i] += rows[a:b].sum(axis=0, dtype=np.float64)
+        total, n_revolutions = sums.sum(axis=0), last - first
+        without = (total - sums) / (n_revolutions - np.diff(edges))[:, None]
+        error = np.sqrt((len(sums) - 1.0) * without.var(axis=0))
+        return SynchronousAverage(
+            total / n_revolutions, error, n_revolutions, turns.angle.shaft, channel, self._unit(channel), "average",
+            turns.highest_order,
+        )  # fmt: skip
+
+    def _turns(self, channel: str, shaft_angle: ShaftAngle | None, samples_per_revolution: int | None) -> _Turns:
         angle, rate = shaft_angle or self.shaft_angle(), self.head.sampling_rate_hz
         ends_s = np.array([REACH, self.n_samples - 1 - REACH]) / rate
         begin, end = angle.revolutions_at(np.clip(ends_s, angle.start_s, angle.end_s))
@@ -228,38 +320,7 @@ class RecordBlocks:
         first, last = ceil(begin - 1e-9), floor(end + 1.0 / n + 1e-9)  # the last sample lies a step before its end
         if last - first < 2:
             raise RefusalError(f"{self.head.name} holds fewer than two whole revolutions")
-        edges = first + np.linspace(0, last - first, min(last - first, n_jackknife_blocks) + 1).round().astype(int)
-        # Nearly: they only say what is read, with a twentieth of a revolution to spare.
-        starts_s = np.interp(np.arange(first, last + 1), angle.revolutions, angle.time_s)
-        spare = KERNEL_SAMPLES + ceil(0.05 * rate * float(np.diff(starts_s).max()))
-        n_at_once = max(1, floor(BLOCK_SAMPLES / rate / float(np.median(np.diff(starts_s)))))
-        sums: FloatArray | None = None
-        highest = 0.0
-        for begin in range(first, last, n_at_once):
-            end = min(begin + n_at_once, last)
-            left = max(0, floor(starts_s[begin - first] * rate) - spare)
-            right = min(self.n_samples, ceil(starts_s[end - first] * rate) + spare)
-            signal = resample_to_angle(
-                self.read(slice(left, right)),
-                _moved(angle, left / rate, right / rate, begin),
-                channels=(channel,),
-                samples_per_revolution=n,
-            )
-            skip = round(-signal.start_revolution * n)
-            rows = signal.samples[0, skip : skip + (end - begin) * n].reshape(end - begin, n)
-            sums = np.zeros((len(edges) - 1, n)) if sums is None else sums
-            highest = min(highest or signal.highest_order, signal.highest_order)
-            for i in range(len(edges) - 1):
-                a, b = max(begin, edges[i]) - begin, min(end, edges[i + 1]) - begin
-                if b > a:
-                    sums[i] += rows[a:b].sum(axis=0, dtype=np.float64)
-        assert sums is not None  # noqa: S101 - said to the type checker: there are two revolutions
-        total, n_revolutions = sums.sum(axis=0), last - first
-        without = (total - sums) / (n_revolutions - np.diff(edges))[:, None]
-        error = np.sqrt((len(sums) - 1.0) * without.var(axis=0))
-        return SynchronousAverage(
-            total / n_revolutions, error, n_revolutions, angle.shaft, channel, self._unit(channel), "average", highest
-        )
+        return _Turns(self, channel, angle, n, first, last)
 
     def _grid(self, channel: str, angle: ShaftAngle) -> int:
         """Return the samples per revolution that the first block calls for."""
@@ -271,8 +332,47 @@ class RecordBlocks:
         return self.head.channels[self.head.index(channel)].unit
 
 
+@dataclass
+class _Turns:
+    """Whole revolutions of one channel of a record, `first` to `last`; `highest_order` of those read so far."""
+
+    blocks: RecordBlocks
+    channel: str
+    angle: ShaftAngle
+    n_per_revolution: int
+    first: int
+    last: int
+    highest_order: float = np.inf
+
+    def between(self, first: int, last: int) -> Iterator[tuple[int, FloatArray]]:
+        """Yield the number of a revolution, and it and those that follow as rows, (n, n_per_revolution)."""
+        angle, rate, n = self.angle, self.blocks.head.sampling_rate_hz, self.n_per_revolution
+        # Nearly: they only say what is read, with a twentieth of a revolution to spare.
+        starts_s = np.interp(np.arange(first, last + 1), angle.revolutions, angle.time_s)
+        spare = KERNEL_SAMPLES + ceil(0.05 * rate * float(np.diff(starts_s).max()))
+        n_at_once = max(1, floor(BLOCK_SAMPLES / rate / float(np.median(np.diff(starts_s)))))
+        for begin in range(first, last, n_at_once):
+            end = min(begin + n_at_once, last)
+            left = max(0, floor(starts_s[begin - first] * rate) - spare)
+            right = min(self.blocks.n_samples, ceil(starts_s[end - first] * rate) + spare)
+            signal = resample_to_angle(
+                self.blocks.read(slice(left, right)),
+                _moved(angle, left / rate, right / rate, begin),
+                channels=(self.channel,),
+                samples_per_revolution=n,
+            )
+            skip = round(-signal.start_revolution * n)
+            self.highest_order = min(self.highest_order, signal.highest_order)
+            yield begin, signal.samples[0, skip : skip + (end - begin) * n].reshape(end - begin, n)
+
+
 def record_blocks(
-    path: str | Path, rig: Rig | None = None, *, sampling_rate_hz: float | None = None, speed: SpeedSource | None = None
+    path: str | Path,
+    rig: Rig | None = None,
+    *,
+    sampling_rate_hz: float | None = None,
+    speed: SpeedSource | None = None,
+    part: slice | None = None,
 ) -> RecordBlocks:
     """Open a recording that is read block by block: HDF5, TDMS, Parquet or WAV.
 
@@ -281,20 +381,22 @@ def record_blocks(
     path : str or Path
     rig, sampling_rate_hz, speed
         As in `read_recording`.
+    part : slice or None
+        These samples alone, as if there were no others.
 
     Raises
     ------
     InputError
         As `read_recording`, and for a format that is only read whole.
     """
-
-    def read(part: slice) -> Recording:
-        return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed, part=part)
-
-    head = read(slice(0, KERNEL_SAMPLES))
     n_samples = n_samples_of(path)
-    assert n_samples is not None  # noqa: S101 - said to the type checker: what is read in parts has a length
-    return RecordBlocks(head, n_samples, read)
+    first, last, _ = (part or slice(None)).indices(n_samples or 0)
+
+    def read(block: slice) -> Recording:
+        inside = slice(first + block.start, first + block.stop)
+        return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed, part=inside)
+
+    return RecordBlocks(read(slice(0, min(KERNEL_SAMPLES, last - first) or 1)), last - first, read)
 
 
 def _moved(angle: ShaftAngle, start_s: float, end_s: float, revolution: int) -> ShaftAngle:

@@ -9,7 +9,7 @@ with text, limits and what a recording offers for them.
 
 from __future__ import annotations
 
-from gearsig.methods._apply import METHODS, apply_method
+from gearsig.methods._apply import METHODS, apply_method, apply_method_to_file
 from gearsig.methods._decompose import by_centre
 from gearsig.methods._phase import N_IN_SPACE
 from gearsig.methods._table import (
@@ -35,6 +35,7 @@ __all__ = [
     "Waveforms",
     "angle_or_none",
     "apply_method",
+    "apply_method_to_file",
     "by_centre",
     "part_of",
     "usual_channel",

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from gearsig.checks import closest_match_hint
+from gearsig.checks import closest_match_hint, positive
+from gearsig.diagnosis import MEMORY_BYTES, RecordBlocks, record_blocks
 from gearsig.errors import InputError
+from gearsig.formatting import file_label
 from gearsig.methods._decompose import PARTS
 from gearsig.methods._orders import ALONG
 from gearsig.methods._phase import IN_PHASE
@@ -14,7 +18,8 @@ from gearsig.methods._spectra import RHYTHMS, WHOLE
 from gearsig.methods._table import Method, MethodAnswer, part_of, usual_channel
 from gearsig.methods._timefreq import MAPS
 from gearsig.prepared import PreparedRecording, prepare
-from gearsig.recording import Recording
+from gearsig.recording import Recording, n_samples_of, read_recording
+from gearsig.rig import Rig, SpeedSource
 
 METHODS: dict[str, Method] = {**WHOLE, **ALONG, **RHYTHMS, **MAPS, **PARTS, **IN_PHASE}
 """The methods by the names that command line and reports know them by."""
@@ -29,7 +34,7 @@ def apply_method(
     end_s: float | None = None,
     **options: Any,
 ) -> MethodAnswer:
-    """Apply a method to one channel of a recording.
+    """Apply a method to one channel of a recording that is in memory.
 
     Parameters
     ----------
@@ -50,6 +55,17 @@ def apply_method(
     RefusalError
         If the recording does not allow it: no speed, too short.
     """
+    method, settings = _method(name, options)
+    prepared = prepare(recording)
+    if start_s is not None or end_s is not None:
+        end = prepared.recording.duration_s if end_s is None else end_s
+        prepared = part_of(prepared, start_s or 0.0, end)
+    answer = method.answer(prepared, usual_channel(prepared.recording, channel), **settings)
+    return replace(answer, method=name)
+
+
+def _method(name: str, options: Mapping[str, Any]) -> tuple[Method, dict[str, Any]]:
+    """Return a method and all its options, checked."""
     if name not in METHODS:
         raise InputError(
             f"there is no method {name!r}", allowed=", ".join(METHODS), remedy=closest_match_hint(name, list(METHODS))
@@ -62,10 +78,102 @@ def apply_method(
             remedy = f"it is an option of {', '.join(fitting)}" if fitting else f"it takes {', '.join(taken) or 'none'}"
             raise InputError(f"{name} takes no {key.replace('_', ' ')}", remedy=remedy)
         taken[key].check(value)
-    prepared = prepare(recording)
-    if start_s is not None or end_s is not None:
-        end = prepared.recording.duration_s if end_s is None else end_s
-        prepared = part_of(prepared, start_s or 0.0, end)
-    settings = {key: option.default for key, option in taken.items()} | options
-    answer = method.answer(prepared, usual_channel(prepared.recording, channel), **settings)
-    return replace(answer, method=name)
+    return method, {key: option.default for key, option in taken.items()} | dict(options)
+
+
+# --------------------
+# Recordings in files, which may be longer than memory.
+# --------------------
+
+PROGRAM_BYTES = 2e8
+"""What Python and its libraries take."""
+READING_BYTES = 24.0
+"""Of each sample of each channel: as it is read, as a number, and while it is checked."""
+ANGLE_BYTES = 220.0
+"""Of each sample: a stated speed is refined by the vibration, where there is no tachometer."""
+
+
+def apply_method_to_file(
+    name: str,
+    path: str | Path,
+    rig: Rig | None = None,
+    channel: str = "",
+    *,
+    start_s: float | None = None,
+    end_s: float | None = None,
+    memory_bytes: float = MEMORY_BYTES,
+    sampling_rate_hz: float | None = None,
+    speed: SpeedSource | None = None,
+    **options: Any,
+) -> MethodAnswer:
+    """Apply a method to a file in bounded memory: to all of it where it fits, else in blocks, else not at all.
+
+    Parameters
+    ----------
+    name, channel, start_s, end_s, **options
+        As in `apply_method`.
+    path : str or Path
+    rig : Rig or None
+    memory_bytes : float
+        What may be taken, from 0.25 GB.
+    sampling_rate_hz, speed
+        As in `read_recording`.
+
+    Raises
+    ------
+    InputError
+        As `apply_method` and `read_recording`; where the part does not fit and the method does not work in blocks, or
+        the format is only read whole.
+    """
+    method, settings = _method(name, options)
+    allowed = positive(memory_bytes - PROGRAM_BYTES, "memory less 0.2 GB", "bytes", remedy="allow more than 0.2 GB")
+    given: dict[str, Any] = {"rig": rig, "sampling_rate_hz": sampling_rate_hz, "speed": speed}
+    n_samples, blocks = n_samples_of(path), None
+    if n_samples is None:
+        recording = read_recording(path, **given)
+        n_samples, head = recording.n_samples, recording
+    else:
+        blocks = record_blocks(path, **given)
+        head = blocks.head
+    rate = head.sampling_rate_hz
+    first = min(n_samples - 1, max(0, round((start_s or 0.0) * rate)))
+    last = n_samples if end_s is None else max(first + 1, min(n_samples, round(end_s * rate)))
+    per_sample = method.bytes_per_sample(settings) if callable(method.bytes_per_sample) else method.bytes_per_sample
+    reading, is_part = READING_BYTES * len(head.channels), last - first < n_samples
+    whole_bytes = n_samples * (reading + (ANGLE_BYTES if is_part else 0.0)) + (last - first) * per_sample
+    if whole_bytes <= allowed:
+        whole = head if blocks is None else read_recording(path, **given)
+        return apply_method(name, whole, channel, start_s=start_s, end_s=end_s, **options)
+    part_bytes = (last - first) * (reading + per_sample)
+    if blocks is not None and part_bytes <= allowed:
+        return apply_method(name, read_recording(path, **given, part=slice(first, last)), channel, **options)
+    if blocks is not None and method.in_blocks is not None:
+        return _in_blocks(name, method, record_blocks(path, **given, part=slice(first, last)), channel, settings)
+    longest_s = float(f"{0.9 * allowed / (reading + per_sample) / rate:.2g}")
+    begin_s = start_s or 0.0
+    remedy = f"look at a part, e.g. --from {begin_s:g}s --to {begin_s + longest_s:g}s, or give more with --memory"
+    if blocks is None:
+        remedy += ", or convert it to HDF5, Parquet, TDMS or WAV, which are read in parts"
+    elif method.in_blocks is None:
+        all_of_it = ", ".join(other for other, m in METHODS.items() if m.in_blocks is not None)
+        remedy += f"; all of it is looked at by: {all_of_it}"
+    needed = whole_bytes if blocks is None else part_bytes
+    raise InputError(
+        f"{name} of {last - first} samples takes {needed / 1e9:.3g} GB",
+        where=file_label(path),
+        allowed=f"up to {memory_bytes / 1e9:.3g} GB",
+        remedy=remedy,
+    )
+
+
+def _in_blocks(
+    name: str, method: Method, blocks: RecordBlocks, channel: str, settings: Mapping[str, Any]
+) -> MethodAnswer:
+    """Apply a method that works in blocks; what names its lines asks a prepared recording for rig and angle only."""
+    assert method.in_blocks is not None  # noqa: S101 - said to the type checker: looked at by the caller
+    prepared = prepare(blocks.head)
+    prepared.keep_angle(blocks.shaft_angle)
+    answer = method.in_blocks(blocks, prepared, usual_channel(blocks.head, channel), **settings)
+    duration_s = blocks.n_samples / blocks.head.sampling_rate_hz
+    note = f"Of {duration_s:.5g} s, longer than memory, in blocks: no speed is refined by the vibration."
+    return replace(answer, method=name, notes=(*answer.notes, note))

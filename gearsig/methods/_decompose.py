@@ -280,6 +280,12 @@ def _denoising(
     )
 
 
+def _bytes_per_sample_of_modes(options: Mapping[str, Any]) -> float:
+    n_modes = options["n_modes"] or 8
+    # vmdpy keeps the spectra of all modes of all iterations, of the signal mirrored at both ends.
+    return 400.0 + 50.0 * n_modes if options["engine"] == "gearsig" else 32.0 * n_modes * options["iterations"]
+
+
 def _samples_of_modes(options: Mapping[str, Any]) -> int:
     return 2**13 if options["engine"] == "vmdpy" else 2**21  # vmdpy keeps all iterations, 16 kB per sample and mode
 
@@ -344,6 +350,7 @@ PARTS = {
         2**16,
         2**21,
         _samples_of_modes,
+        _bytes_per_sample_of_modes,
     ),
     "denoising": Method(
         "Denoising",

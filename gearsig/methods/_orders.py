@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gearsig import plot
+from gearsig.diagnosis import RecordBlocks
 from gearsig.errors import GearsigError
 from gearsig.formatting import readable
 from gearsig.methods._spectra import cursors_of, highest_order
@@ -82,6 +83,20 @@ def _frequency_map(prepared: PreparedRecording, channel: str, highest: float | N
         unit=unit_of(prepared, channel),
         source=channel,
     )
+    return _map_answer(prepared, channel, levels, highest)
+
+
+def _order_map_in_blocks(
+    blocks: RecordBlocks, prepared: PreparedRecording, channel: str, shaft: str, highest: float | None
+) -> MethodAnswer:
+    levels = blocks.order_map(channel, prepared.angle_of(shaft))
+    return _map_answer(prepared, channel, levels, highest_order(prepared, levels) if highest is None else highest)
+
+
+def _frequency_map_in_blocks(
+    blocks: RecordBlocks, prepared: PreparedRecording, channel: str, highest: float | None
+) -> MethodAnswer:
+    levels = blocks.frequency_map(channel, n_per_block=4096, scaling="amplitude peak", shaft_angle=prepared.shaft_angle)
     return _map_answer(prepared, channel, levels, highest)
 
 
@@ -243,8 +258,13 @@ def _samples_of_vold_kalman(options: Mapping[str, Any]) -> int:
 
 
 ALONG = {
-    "order-map": Method("Order map", "Orders over time and speed.", _order_map, (HIGHEST, SHAFT)),
-    "frequency-map": Method("Frequency map", "Frequencies over time and speed.", _frequency_map, (HIGHEST,)),
+    "order-map": Method(
+        "Order map", "Orders over time and speed.", _order_map, (HIGHEST, SHAFT), in_blocks=_order_map_in_blocks,
+    ),
+    "frequency-map": Method(
+        "Frequency map", "Frequencies over time and speed.", _frequency_map, (HIGHEST,),
+        in_blocks=_frequency_map_in_blocks,
+    ),
     "tracking": Method(
         "Tracked orders", "Level and phase of orders over speed.", _tracking, (ORDERS, SHAFT), "Map", 10_000_000, 10**7
     ),
@@ -284,5 +304,6 @@ ALONG = {
         "Map",
         250_000,
         limit=_samples_of_vold_kalman,
+        bytes_per_sample=lambda options: 250.0 + 150.0 * max(2, len(options["orders"])),
     ),
 }  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig import plot, spectra
 from gearsig.angle import resample_to_angle
+from gearsig.diagnosis import RecordBlocks
 from gearsig.errors import InputError, RefusalError
 from gearsig.methods._table import (
     LINES,
@@ -24,7 +25,7 @@ from gearsig.methods._table import (
     unit_of,
     waveforms_of,
 )
-from gearsig.orders import OrderMap, order_spectrum
+from gearsig.orders import OrderMap, SynchronousAverage, order_spectrum
 from gearsig.plot import ChartLine, Cursor, LevelPanel, LinePanel, order_cursors, rhythm_cursors, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Channel, Recording
@@ -105,6 +106,12 @@ def _density(prepared: PreparedRecording, channel: str, **lines: float | None) -
     return _spectrum_answer(prepared, channel, prepared.power_density(channel), "power spectral density", **lines)
 
 
+def _density_in_blocks(
+    blocks: RecordBlocks, prepared: PreparedRecording, channel: str, **lines: float | None
+) -> MethodAnswer:
+    return _spectrum_answer(prepared, channel, blocks.power_density(channel), "power spectral density", **lines)
+
+
 def _cepstrum(prepared: PreparedRecording, channel: str, **lines: float | None) -> MethodAnswer:
     spectrum = spectra.cepstrum(prepared.recording, channel)
     return _spectrum_answer(prepared, channel, spectrum, "real cepstrum: families of lines as one peak", **lines)
@@ -177,6 +184,27 @@ def _envelope(
     answer = _spectrum_answer(prepared, channel, banded.spectrum, text, lowest, top)
     numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}
     return replace(answer, numbers={**answer.numbers, **numbers}, warnings=banded.warnings)
+
+
+def _envelope_in_blocks(
+    blocks: RecordBlocks,
+    prepared: PreparedRecording,
+    channel: str,
+    band_hz: tuple[float, float] | None,
+    lowest: float | None,
+    highest: float | None,
+) -> MethodAnswer:
+    if band_hz is None:
+        raise InputError(
+            "the record is longer than memory, and no band is given",
+            allowed="--band FROM..TO",
+            remedy="gearsig show kurtogram finds one in a part: --from 0s --to 10s",
+        )
+    spectrum = blocks.envelope_density(channel, band_hz)
+    text = f"power density of the squared envelope of {band_hz[0]:.4g} to {band_hz[1]:.4g} Hz"
+    top = highest if highest is not None else min(float(spectrum.positions[-1]), (band_hz[1] - band_hz[0]) / 2)
+    answer = _spectrum_answer(prepared, channel, spectrum, text, lowest, top)
+    return replace(answer, numbers={**answer.numbers, "band_hz": list(band_hz)})
 
 
 def _kurtogram(
@@ -418,9 +446,15 @@ def _deconvolution(
 
 
 def _average(prepared: PreparedRecording, channel: str, shaft: str) -> MethodAnswer:
-    shaft = shaft or prepared.shaft_angle.shaft
-    average = prepared.average(shaft, channel)
-    rig = prepared.rig
+    return _average_answer(prepared, channel, prepared.average(shaft or prepared.shaft_angle.shaft, channel))
+
+
+def _average_in_blocks(blocks: RecordBlocks, prepared: PreparedRecording, channel: str, shaft: str) -> MethodAnswer:
+    return _average_answer(prepared, channel, blocks.average(channel, prepared.angle_of(shaft)))
+
+
+def _average_answer(prepared: PreparedRecording, channel: str, average: SynchronousAverage) -> MethodAnswer:
+    rig, shaft = prepared.rig, average.shaft
     sides = [side for p in rig.pairs for side in ((p.driver, p.driver_teeth), (p.driven, p.driven_teeth))]
     teeth = next((n for name, n in sides if name == shaft), None)
     table = {
@@ -473,7 +507,10 @@ WHOLE = {
     "waveform": Method("Waveform", "The signal over time.", _waveform),
     "speed": Method("Speed", "The speed that everything over angle rests on.", _speed),
     "spectrum": Method("Spectrum", "Tones and their amplitudes.", _spectrum, LINES),
-    "density": Method("Density", "Noise over frequency.", _density, LINES, "Spectrum", 1_000_000, 20_000_000),
+    "density": Method(
+        "Density", "Noise over frequency.", _density, LINES, "Spectrum", 1_000_000, 20_000_000,
+        in_blocks=_density_in_blocks,
+    ),
     "cepstrum": Method(
         "Cepstrum",
         "Families of equally spaced lines, as one peak each.",
@@ -484,11 +521,16 @@ WHOLE = {
         20_000_000,
     ),
     "order-spectrum": Method("Order spectrum", "Lines that turn with a shaft.", _order_spectrum, (*LINES, SHAFT)),
-    "average": Method("Synchronous average", "The mean revolution of a shaft.", _average, (SHAFT,)),
+    "average": Method(
+        "Synchronous average", "The mean revolution of a shaft.", _average, (SHAFT,), in_blocks=_average_in_blocks,
+    ),
     "indicators": Method("Indicators", "Every condition indicator of the channel.", _indicators),
-}
+}  # fmt: skip
 RHYTHMS = {
-    "envelope": Method("Envelope spectrum", "The rhythm of impacts in a band.", _envelope, (BAND, *LINES)),
+    "envelope": Method(
+        "Envelope spectrum", "The rhythm of impacts in a band.", _envelope, (BAND, *LINES),
+        in_blocks=_envelope_in_blocks,
+    ),
     "kurtogram": Method(
         "Kurtogram",
         "Finds the band that carries impacts, and what rhythm they have: the spectrum of its envelope.",

@@ -204,6 +204,11 @@ class Method:
         Samples that a page analyses at first, and at most: a few seconds.
     limit : callable or None
         Options → samples, where they decide how many a page can analyse.
+    bytes_per_sample : float or callable
+        What it takes of memory besides the recording, at most, for each sample of the part; or options → that.
+    in_blocks : callable or None
+        Of records longer than memory: blocks, a prepared recording that knows rig and angle alone, channel and the
+        options by name → answer.
     """
 
     title: str
@@ -214,6 +219,8 @@ class Method:
     n_first: int = 200_000
     n_max: int = 1_000_000
     limit: Callable[[Mapping[str, Any]], int] | None = None
+    bytes_per_sample: float | Callable[[Mapping[str, Any]], float] = 400.0
+    in_blocks: Callable[..., MethodAnswer] | None = None
 
 
 def usual_channel(recording: Recording, name: str = "") -> str:

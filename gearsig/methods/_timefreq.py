@@ -235,6 +235,10 @@ def _limit(options: Mapping[str, Any]) -> int:
     return {"stft": 20_000_000, "cwt": 10_000_000, "squeezed-stft": 4_000_000}.get(options["transform"], 2_000_000)
 
 
+def _bytes_per_sample(options: Mapping[str, Any]) -> float:
+    return {"stft": 500.0, "squeezed-stft": 900.0}.get(options["transform"], 400.0)
+
+
 # Wavelet packets.
 
 PACKET_WAVELETS = ("sym12", "sym8", "db4", "db10", "db20", "coif3", "dmey", "haar")
@@ -317,6 +321,7 @@ MAPS = {
         "Time–frequency",
         n_max=20_000_000,
         limit=_limit,
+        bytes_per_sample=_bytes_per_sample,
     ),
     "ridges": Method(
         "Ridges",
@@ -350,6 +355,7 @@ MAPS = {
         ),
         "Time–frequency",
         limit=_limit,
+        bytes_per_sample=_bytes_per_sample,
     ),
     "wavelet-packets": Method(
         "Wavelet packets",

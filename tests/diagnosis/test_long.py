@@ -8,7 +8,7 @@ import pytest
 from gearsig.angle import find_shaft_angle, resample_to_angle
 from gearsig.diagnosis import Analysis, LongAnalysis, RecordBlocks, analyze_file, long_overview
 from gearsig.errors import InputError
-from gearsig.orders import synchronous_average
+from gearsig.orders import order_map, synchronous_average
 from gearsig.recording import Channel, Recording, n_samples_of, read_recording, write_recording
 from gearsig.rig import ConstantSpeed, PulseTimes, TachometerChannel
 from gearsig.spectra import power_density
@@ -181,3 +181,28 @@ def test_an_average_in_blocks_is_that_of_the_whole_record(blocks, speed):
 def test_a_speed_from_the_vibration_gives_no_average_in_blocks(blocks):
     with pytest.raises(InputError, match="constant speed or tachometer"):
         blocks(LONG).average("a")
+
+
+def test_the_density_of_the_whole_record_in_blocks(blocks):
+    found = blocks(LONG).power_density("a", n_per_block=1024)
+    whole = power_density(LONG, "a", n_per_block=1024)
+    np.testing.assert_allclose(found.values, whole.values, rtol=1e-5)
+    assert (found.unit, found.noise_bandwidth) == (whole.unit, whole.noise_bandwidth)
+
+
+@pytest.mark.parametrize("n_columns", [9, 1000])
+def test_an_order_map_in_blocks_is_that_of_the_whole_record(blocks, n_columns):
+    recording = _turning(TachometerChannel("tacho"))
+    signal = resample_to_angle(recording, find_shaft_angle(recording), channels=("a",), samples_per_revolution=256)
+    found = blocks(recording).order_map("a", n_columns_max=n_columns, samples_per_revolution=256)
+    whole = order_map(signal, "a", n_blocks_max=10_000)
+    k = -(-len(whole.time_s) // n_columns)
+    assert len(found.time_s) == -(-len(whole.time_s) // k)
+    for column in (0, len(found.time_s) // 2, len(found.time_s) - 1):
+        own = slice(column * k, column * k + k)
+        n_lines = found.values.shape[1]
+        rms = np.sqrt(np.mean(whole.values[own, :n_lines] ** 2, axis=0))
+        np.testing.assert_allclose(found.values[column], rms, rtol=1e-3, atol=1e-4)
+        assert found.time_s[column] == pytest.approx(whole.time_s[own].mean(), abs=0.02)
+        assert found.speed_rpm[column] == pytest.approx(whole.speed_rpm[own].mean(), rel=2e-3)
+    assert found.positions[np.argmax(found.values.mean(axis=0))] == pytest.approx(7.0)
