@@ -8,16 +8,14 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import file_label
 from gearsig.processes import n_processors, run_jobs
 
 if TYPE_CHECKING:
-    from gearsig.prepared import PreparedRecording
     from gearsig.report import Entry, Failure
     from gearsig.rig import Rig, SpeedSource
 
@@ -66,6 +64,7 @@ class _Job:
     made_of: str = ""
     pdf: bool = False
     methods: tuple[str, ...] | None = None
+    memory_bytes: float = 2e9
 
 
 def report_many(
@@ -83,6 +82,7 @@ def report_many(
     torque_nm: float | None = None,
     pdf: bool = False,
     methods: Sequence[str] | None = None,
+    memory_bytes: float = 2e9,
 ) -> BatchResult:
     """Analyse recordings and write a page for each, and an index that compares them.
 
@@ -120,6 +120,9 @@ def report_many(
         Write each page and the index as PDF as well.
     methods : sequence of str or None
         Further methods that the pages show; None: those that each recording calls for.
+    memory_bytes : float
+        What the analysis of one recording may take; of a longer one the page shows the most severe part, see
+        `gearsig.diagnosis.analyze_file`.
 
     Returns
     -------
@@ -165,8 +168,11 @@ def report_many(
         path = folder / f"{page}.html"
         facts = (rig, sampling_rate_hz, speed, command)
         jobs.append(
-            _Job(file, name, path, *facts, compared, torque_nm, is_reference=is_healthy, pdf=pdf, methods=chosen)
-        )
+            _Job(
+                file, name, path, *facts, compared, torque_nm, is_reference=is_healthy, pdf=pdf, methods=chosen,
+                memory_bytes=memory_bytes,
+            )
+        )  # fmt: skip
     made_of = _made_of()
     jobs = [replace(job, made_of=made_of(job)) for job in jobs]
     results: dict[int, Entry | Failure] = {n: kept for n, job in enumerate(jobs) if (kept := _kept(job)) is not None}
@@ -222,7 +228,7 @@ def _made_of() -> Callable[[_Job], str]:
             return ""
         parts = [__version__, files, job.name, repr(job.rig), repr(job.speed), job.sampling_rate_hz, job.torque_nm]
         return hashlib.sha256(
-            json.dumps([*parts, job.is_reference, job.methods]).encode("utf-8", "surrogateescape")
+            json.dumps([*parts, job.is_reference, job.methods, job.memory_bytes]).encode("utf-8", "surrogateescape")
         ).hexdigest()
 
     return made_of
@@ -250,19 +256,18 @@ def _kept(job: _Job) -> Entry | None:
 def _report_one(job: _Job) -> Entry | Failure:
     """Analyse one recording and write its page; every error becomes a reason."""
     from gearsig.cache import write_text
-    from gearsig.diagnosis import analyze
-    from gearsig.recording import read_recording
+    from gearsig.diagnosis import LongAnalysis, analyze_file, read_reference
     from gearsig.report import Entry, entry_of, from_plain, page_pdf, plain, write_page, write_pdf
     from gearsig.rig import read_rig, rig_file_beside
 
     try:
         beside = rig_file_beside(job.path) if job.rig is None else None
         rig = read_rig(beside) if beside is not None else job.rig
-        analysis = analyze(
-            read_recording(job.path, rig=rig, sampling_rate_hz=job.sampling_rate_hz, speed=job.speed),
-            reference=_reference_of(job, rig),
-            torque_nm=job.torque_nm,
-        )
+        given: dict[str, Any] = {"sampling_rate_hz": job.sampling_rate_hz, "speed": job.speed}
+        given["memory_bytes"] = job.memory_bytes
+        reference = None if job.reference is None else read_reference(job.reference, rig, **given)
+        found = analyze_file(job.path, rig, reference=reference, torque_nm=job.torque_nm, **given)
+        analysis = found.as_one() if isinstance(found, LongAnalysis) else found
         write_page(analysis, job.page, command=job.command, index="index.html", methods=job.methods)
         if job.pdf:
             write_pdf(job.page.with_suffix(".pdf"), page_pdf(analysis, command=job.command, methods=job.methods))
@@ -275,31 +280,6 @@ def _report_one(job: _Job) -> Entry | Failure:
         return _failure(job, str(error))
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
         return _failure(job, f"unexpected error, please report: {type(error).__name__}: {' '.join(str(error).split())}")
-
-
-def _reference_of(job: _Job, rig: Rig | None) -> PreparedRecording | None:
-    """Return the recording of the healthy machine; pulse times would belong to the other one."""
-    from gearsig.diagnosis import rig_of_reference
-    from gearsig.rig import PulseTimes
-
-    if job.reference is None:
-        return None
-    speed = None if isinstance(job.speed, PulseTimes) else job.speed
-    own = rig_of_reference(job.reference, rig)
-    modified_ns = job.reference.stat().st_mtime_ns if job.reference.is_file() else 0
-    return _read_reference(job.reference, own, job.sampling_rate_hz, speed, modified_ns)
-
-
-@lru_cache(maxsize=1)
-def _read_reference(
-    path: Path, rig: Rig | None, sampling_rate_hz: float | None, speed: SpeedSource | None, modified_ns: int
-) -> PreparedRecording:
-    """Read it once a process: what is found in it stays with it."""
-    from gearsig.prepared import prepare
-    from gearsig.recording import read_recording
-
-    del modified_ns  # tells the cache that the file is another one
-    return prepare(read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed))
 
 
 def _killed(job: _Job) -> Failure:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -23,16 +23,7 @@ def analyze(
     torque: options.TorqueOption = None,
     json: options.JsonOption = False,
     indicators: Annotated[bool, typer.Option("--indicators", help="Print the table of indicators as well.")] = False,
-    memory: Annotated[
-        float,
-        typer.Option(
-            "--memory",
-            metavar="GB",
-            min=0.25,
-            help="What the analysis may take. A longer recording is read in blocks: levels and spectra of all of it, "
-            "the detectors on its most telling parts.",
-        ),
-    ] = 2.0,
+    memory: options.MemoryOption = 2.0,
 ) -> None:
     """Say what a recording shows of the machine's condition, most important first.
 
@@ -44,28 +35,24 @@ def analyze(
     """
     from rich.console import Console
 
-    from gearsig.diagnosis import LongAnalysis, analyze_file
-    from gearsig.diagnosis import analyze as run_analysis
+    from gearsig.diagnosis import LongAnalysis, analyze_file, read_reference
 
-    speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
+    given: dict[str, Any] = {"memory_bytes": 1e9 * memory, "sampling_rate_hz": fs}
     machine, torque_nm = options.open_rig(rig, recording), options.torque_of(torque)
     with Console(stderr=True).status("reading") as status:  # shown on a terminal only
-        if reference is None and torque_nm is None:
-            result = analyze_file(
-                recording,
-                machine,
-                memory_bytes=1e9 * memory,
-                sampling_rate_hz=fs,
-                speed=speed,
-                on_stage=status.update,
-            )
-        else:
-            result = run_analysis(
-                options.open_recording(recording, machine, fs, speed),
-                reference=options.open_reference(reference, machine, fs, speed_rpm),
-                torque_nm=torque_nm,
-                on_stage=status.update,
-            )
+        healthy = None
+        if reference is not None:
+            stated = options.stated_speed(speed_rpm, None, 1)  # pulse times belong to the other recording
+            healthy = read_reference(reference, machine, speed=stated, **given)
+        result = analyze_file(
+            recording,
+            machine,
+            speed=options.stated_speed(speed_rpm, tach_times, pulses_per_revolution),
+            reference=healthy,
+            torque_nm=torque_nm,
+            on_stage=status.update,
+            **given,
+        )
     if isinstance(result, LongAnalysis):
         from gearsig.report import long_analysis_text, long_analysis_to_json
 

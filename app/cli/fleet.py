@@ -72,6 +72,7 @@ def add(
     ] = False,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
+    memory: options.MemoryOption = 2.0,
     json: options.JsonOption = False,
 ) -> None:
     """Analyse recordings that are new and keep their results; what is known already is passed over.
@@ -112,6 +113,7 @@ def add(
                 speed=options.stated_speed(speed_rpm, None, 1),
                 reference=reference,
                 torque_nm=options.torque_of(torque),
+                memory_bytes=1e9 * memory,
                 n_processes=workers.n_workers if workers else jobs,
                 executor=workers.executor if workers else None,
                 on_progress=advance,
@@ -289,6 +291,7 @@ def watch(
     once: Annotated[bool, typer.Option("--once", help="End when all that is there has been taken.")] = False,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
+    memory: options.MemoryOption = 2.0,
     json: Annotated[bool, typer.Option("--json", help="A line of JSON for each recording.")] = False,
 ) -> None:
     """Take new recordings as they appear, with a line for each, until it is stopped (Ctrl-C or SIGTERM).
@@ -331,6 +334,7 @@ def watch(
                 point=point,
                 rig=opened,
                 sampling_rate_hz=fs,
+                memory_bytes=1e9 * memory,
             )
         except KeyboardInterrupt:
             typer.echo("gearsig: the watch was stopped", err=True)

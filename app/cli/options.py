@@ -67,6 +67,16 @@ ChannelsOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")]
 JobsOption = Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one per processor.")]
+MemoryOption = Annotated[
+    float,
+    typer.Option(
+        "--memory",
+        metavar="GB",
+        min=0.25,
+        help="What the analysis of a recording may take. A longer one is read in blocks: levels and spectra of all of "
+        "it, the detectors on its most telling parts.",
+    ),
+]
 ClusterOption = Annotated[
     str,
     typer.Option(
@@ -120,9 +130,9 @@ def open_recording(
     path: Path, rig: Rig | None, sampling_rate_hz: float | None, speed: SpeedSource | None = None
 ) -> Recording:
     """Read one recording with what the options say of it."""
-    from gearsig.recording import read_recording
+    from gearsig.diagnosis import read_whole
 
-    return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    return read_whole(path, rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
 
 
 def open_reference(

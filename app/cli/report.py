@@ -38,6 +38,7 @@ def report(
     ] = None,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
+    memory: options.MemoryOption = 2.0,
     pdf: Annotated[bool, typer.Option("--pdf", help="Write each page and the index as PDF as well.")] = False,
 ) -> None:
     """Write one self-contained HTML page per recording, and an index page that compares them.
@@ -62,6 +63,7 @@ def report(
         reference=reference,
         torque_nm=options.torque_of(torque),
         cluster=cluster,
+        memory_bytes=1e9 * memory,
         pdf=pdf,
         methods=[] if methods == ["none"] else methods,
     )
@@ -81,6 +83,7 @@ def make_report(
     torque_nm: float | None = None,
     cluster: str = "",
     *,
+    memory_bytes: float = 2e9,
     pdf: bool = False,
     methods: list[str] | None = None,
 ) -> int:
@@ -109,6 +112,7 @@ def make_report(
                     command=command,
                     reference=reference,
                     torque_nm=torque_nm,
+                    memory_bytes=memory_bytes,
                     pdf=pdf,
                     methods=methods,
                 )

@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import re
 import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import streamlit as st
 
@@ -19,7 +21,7 @@ from app.dashboard.work import kept
 if TYPE_CHECKING:
     from gearsig.diagnosis import Analysis
     from gearsig.recording import ChannelProblem, Recording
-    from gearsig.rig import Rig
+    from gearsig.rig import ConstantSpeed, Rig
 
 
 # --------------------
@@ -75,17 +77,34 @@ def read_content(
     InputError
         As `gearsig.recording.read_recording`.
     """
-    from gearsig.recording import read_recording
-    from gearsig.rig import ConstantSpeed
+    from gearsig.diagnosis import read_whole
 
-    speed = None if speed_rpm is None else ConstantSpeed(speed_rpm)
+    with _as_file(content, name) as path:
+        recording = read_whole(path, rig, sampling_rate_hz=sampling_rate_hz, speed=_constant(speed_rpm))
+    return recording if isinstance(content, Path) else _named(recording, name)
+
+
+@contextmanager
+def _as_file(content: bytes | Content, name: str) -> Iterator[Path]:
+    """Give a file of this machine, or the bytes of one called `name` as a file that is gone afterwards."""
     if isinstance(content, Path):
-        return read_recording(content, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+        yield content
+        return
     with TemporaryDirectory(prefix="gearsig-") as folder:
         path = Path(folder) / safe_file_name(name)
         path.write_bytes(content)
-        recording = read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
-    return replace(recording, provenance=replace(recording.provenance, source=one_line(name)))
+        yield path
+
+
+def _named(recording: Recording, name: str, sha256: str = "") -> Recording:
+    known = recording.provenance
+    return replace(recording, provenance=replace(known, source=one_line(name), sha256=known.sha256 or sha256))
+
+
+def _constant(speed_rpm: float | None) -> ConstantSpeed | None:
+    from gearsig.rig import ConstantSpeed
+
+    return None if speed_rpm is None else ConstantSpeed(speed_rpm)
 
 
 def _read(request: AnalysisRequest, name: str, content: Content, rig: Rig | None) -> Recording:
@@ -124,13 +143,19 @@ def _size(content: Content) -> int:
 
 
 def read_and_analyze(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
-    """Read rig, recording and reference, and analyse."""
-    from gearsig.diagnosis import analyze
+    """Read rig, recording and reference, and analyse; of recordings longer than memory their most telling parts."""
+    from gearsig.diagnosis import LongAnalysis, analyze_file, read_usual_part
 
     rig = read_rig_text(request.rig_text, request.rig_name)
-    recording = _read(request, request.name, content, rig)
-    then = None if reference is None else _read(request, request.reference_name, reference, rig)
-    return analyze(recording, reference=then, torque_nm=request.torque_nm)
+    given: dict[str, Any] = {"sampling_rate_hz": request.sampling_rate_hz, "speed": _constant(request.speed_rpm)}
+    then = None
+    if reference is not None:
+        with _as_file(reference, request.reference_name) as path:
+            then = _named(read_usual_part(path, rig, **given), request.reference_name)
+    with _as_file(content, request.name) as path:
+        found = analyze_file(path, rig, reference=then, torque_nm=request.torque_nm, **given)
+    analysis = found.as_one() if isinstance(found, LongAnalysis) else found
+    return replace(analysis, recording=_named(analysis.recording, request.name, request.sha256))
 
 
 _small, _large = (kept(n, "Reading and analysing …", key=lambda request, *_: request)(read_and_analyze) for n in (6, 2))

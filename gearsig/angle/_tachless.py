@@ -357,6 +357,7 @@ def estimate_shaft_angle(
     *,
     channels: Sequence[str] | None = None,
     speed_range_rpm: tuple[float, float] | None = None,
+    explained: bool = True,
 ) -> ShaftAngle:
     """Estimate the angle of the reference shaft from mesh harmonics, their sidebands and shaft harmonics.
 
@@ -374,6 +375,8 @@ def estimate_shaft_angle(
     speed_range_rpm : (float, float), optional
         Of the reference shaft. Default: the rig's nominal speed with its tolerance, else 30 to 30000 rpm as far as
         sampling rate and duration allow.
+    explained : bool
+        Whether a refusal says at which other speeds a comb lies, which takes about as long as the search.
 
     Returns
     -------
@@ -395,7 +398,7 @@ def estimate_shaft_angle(
     varying = varying_speed(search, steady if _is_sharp(search, steady) else None)
     candidate = _better(search, steady, varying)
     if candidate is None or candidate.decision.quality < MIN_QUALITY:
-        raise _refusal(search, candidate, rig)
+        raise _refusal(search, candidate, rig, explained=explained)
     usual = _range_without_slips(candidate.angle)
     if usual is None:
         return _finished(search, candidate)
@@ -405,7 +408,7 @@ def estimate_shaft_angle(
             "the speed that follows from the mesh lines jumps for moments, as no shaft does: the phase slips by cycles",
             remedy="give a tachometer, or a recording with less noise",
         )
-    return estimate_shaft_angle(recording, rig, channels=channels, speed_range_rpm=usual)
+    return estimate_shaft_angle(recording, rig, channels=channels, speed_range_rpm=usual, explained=explained)
 
 
 def _range_without_slips(angle: ShaftAngle) -> tuple[float, float] | None:
@@ -528,13 +531,13 @@ def _finished(search: SpeedSearch, candidate: SpeedCandidate) -> ShaftAngle:
     )
 
 
-def _refusal(search: SpeedSearch, best: SpeedCandidate | None, rig: Rig) -> RefusalError:
+def _refusal(search: SpeedSearch, best: SpeedCandidate | None, rig: Rig, *, explained: bool) -> RefusalError:
     """Explain what was searched and found instead, also outside of the nominal range."""
     reason = f"no comb of mesh lines stands out between {60 * search.low:.4g} and {60 * search.high:.4g} rpm"
     if best is not None:
         reason += f" ({best.decision.evidence()}; quality {best.decision.quality:.2f}, needed {MIN_QUALITY})"
     middle = 30.0 * (search.low + search.high)
-    if search.high / search.low < 4.0:
+    if explained and search.high / search.low < 4.0:
         elsewhere = comb_elsewhere(search.recording, rig, middle)
         if elsewhere is not None:
             reason += ". " + elsewhere.text

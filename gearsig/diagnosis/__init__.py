@@ -18,6 +18,9 @@ from gearsig.diagnosis._long import (
     analysis_bytes,
     analyze_file,
     long_overview,
+    read_reference,
+    read_usual_part,
+    read_whole,
 )
 from gearsig.diagnosis._modulation import Modulation, modulation_of
 from gearsig.diagnosis._reference import (
@@ -85,6 +88,9 @@ __all__ = [
     "modulation_of",
     "outcome_of",
     "ranked",
+    "read_reference",
+    "read_usual_part",
+    "read_whole",
     "record_blocks",
     "rig_of_reference",
     "slower_train",

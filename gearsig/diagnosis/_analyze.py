@@ -153,7 +153,7 @@ def _examined(
         if then is None:
             findings = beside_reference(findings, reference_analysis)
         else:
-            now, before = in_common_bands(signals, envelopes, *then)
+            now, before = in_common_bands(signals, envelopes, *then, healthy)
             beside = (signals, now, then[0], before)
             findings = beside_reference(findings, reference_analysis, lambda f: family_change(f, *beside))
             findings = with_clearest_band(findings, signals, then[0])

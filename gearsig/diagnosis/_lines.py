@@ -8,7 +8,7 @@ from math import isfinite
 
 import numpy as np
 
-from gearsig.angle import ShaftAngle, comb_elsewhere
+from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
 from gearsig.prepared import MAINS_HZ, RUN_UP_FOOT_ORDERS, LineExcess, floor_of, levels_beside
@@ -141,7 +141,7 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
         title += f"harmonic {harmonic})."
         return Finding("mesh-found", Kind.INFORMATION, title, where, strength, 0.99, _OVER_FLOOR)
     # At which multiple of the stated speed the mesh lines do lie, if anywhere.
-    elsewhere = comb_elsewhere(signals.recording, signals.rig, signals.frequency_per_order_hz * 60)
+    elsewhere = signals.comb_elsewhere
     near = f"The best of {N_HARMONICS} harmonics is {line.ratio_db:.1f} dB over the floor."
     if not line.is_highest:
         near = f"Near harmonic {harmonic} a line stands beside its place: the speed may be off by little, and small "

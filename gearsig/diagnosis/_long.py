@@ -9,16 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gearsig.checks import FloatArray, freeze, positive
 from gearsig.diagnosis._analyze import analyze
-from gearsig.diagnosis._types import Analysis, Outcome
+from gearsig.diagnosis._reference import rig_of_reference
+from gearsig.diagnosis._types import Analysis, Finding, Kind, Outcome
+from gearsig.diagnosis._verdict import ranked
 from gearsig.errors import InputError
-from gearsig.recording import Recording, n_samples_of, read_recording
-from gearsig.rig import Rig, SpeedSource
+from gearsig.formatting import file_label
+from gearsig.prepared import PreparedRecording, prepare
+from gearsig.recording import Recording, check_memory, n_samples_of, read_recording
+from gearsig.rig import PulseTimes, Rig, SpeedSource
 from gearsig.spectra import Spectrum, power_density
 
 MEMORY_BYTES = 2e9
@@ -110,11 +116,48 @@ class LongAnalysis:
     @property
     def verdict(self) -> str:
         """What the most severe part comes to, and how much of the record was looked at so closely."""
-        part = next(p for p in self.parts if p.analysis.outcome is self.outcome)
+        part = self.most_severe
         looked_s = sum(p.end_s - p.start_s for p in self.parts)
         return (
             f"{part.analysis.verdict} Seen from {part.start_s:.4g} to {part.end_s:.4g} s ({part.reason}); "
             f"the detectors looked at {looked_s:.4g} of {self.duration_s:.4g} s, levels and spectra at all of it."
+        )
+
+    @property
+    def most_severe(self) -> AnalysedPart:
+        """The first part whose outcome is that of all."""
+        return next(part for part in self.parts if part.analysis.outcome is self.outcome)
+
+    def as_one(self) -> Analysis:
+        """Return the most severe part's analysis for whoever shows one: verdict and a finding speak of all parts.
+
+        Its indicators are those of the part of usual level, so that recordings compare over time.
+        """
+        shown, overview = self.most_severe, self.overview
+        usual = next((part for part in self.parts if part.reason == USUAL), shown)
+        evidence = [
+            f"From {part.start_s:.4g} to {part.end_s:.4g} s ({part.reason}): {part.analysis.verdict}"
+            for part in self.parts
+            if part is not shown
+        ]
+        for name, unit, rms in zip(overview.channel_names, overview.units, overview.rms, strict=True):
+            at_s = float(overview.time_s[int(np.argmax(rms))])
+            evidence.append(
+                f"{name}: rms {rms.min():.4g} to {rms.max():.4g} {unit} over all of it, highest at {at_s:.4g} s."
+            )
+        told = Finding(
+            "part-of-long-record",
+            Kind.NOTICE,
+            f"The recording lasts {self.duration_s:.5g} s, longer than memory; shown are {shown.start_s:.5g} to "
+            f"{shown.end_s:.5g} s ({shown.reason}), indicators of {usual.start_s:.5g} to {usual.end_s:.5g} s.",
+            evidence=tuple(evidence),
+            surer="gearsig analyze says all of each part; with more --memory the recording is looked at whole.",
+        )
+        return replace(
+            shown.analysis,
+            findings=ranked([*shown.analysis.findings, told]),
+            verdict=self.verdict,
+            indicators=usual.analysis.indicators,
         )
 
 
@@ -130,6 +173,8 @@ def analyze_file(
     memory_bytes: float = MEMORY_BYTES,
     sampling_rate_hz: float | None = None,
     speed: SpeedSource | None = None,
+    reference: Recording | PreparedRecording | None = None,
+    torque_nm: float | None = None,
     on_stage: Callable[[str], object] | None = None,
 ) -> Analysis | LongAnalysis:
     """Diagnose a recording in bounded memory: whole where it fits, else by an overview and the analysis of parts.
@@ -142,6 +187,8 @@ def analyze_file(
         What may be taken, from 0.2 GB.
     sampling_rate_hz, speed
         As in `read_recording`.
+    reference, torque_nm
+        As in `analyze`; for a reference in a file see `read_reference`.
     on_stage : callable or None
         Called with a few words as each stage begins.
 
@@ -160,34 +207,140 @@ def analyze_file(
     def read(part: slice | None) -> Recording:
         return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed, part=part)
 
+    healthy = None if reference is None else prepare(reference)
+    reference_bytes = 0.0
+    if healthy is not None:
+        reference_bytes = analysis_bytes(healthy.recording.n_samples, len(healthy.recording.channels))
     n_samples = n_samples_of(path)
     if n_samples is None:
         recording = read(None)
-        needed = analysis_bytes(recording.n_samples, len(recording.vibration_names()))
-        if needed > memory_bytes:
-            raise InputError(
-                f"{recording.n_samples} samples × {len(recording.vibration_names())} channels take {needed / 1e9:.3g} "
-                "GB to analyse",
-                where=recording.name,
-                allowed=f"up to {memory_bytes / 1e9:.3g} GB",
-                remedy="give more with --memory, or convert it to HDF5, Parquet, TDMS or WAV, which are read in parts",
-            )
-        return analyze(recording, on_stage=on_stage)
+        n_channels = len(recording.vibration_names())
+        _check_fits(recording, analysis_bytes(recording.n_samples, n_channels) + reference_bytes, memory_bytes)
+        return analyze(recording, reference=healthy, torque_nm=torque_nm, on_stage=on_stage)
     head = read(slice(0, min(n_samples, N_PER_SPECTRUM)))
     n_channels = len(head.channels)
-    if analysis_bytes(n_samples, n_channels) <= memory_bytes:
-        return analyze(read(None), on_stage=on_stage)
+    if analysis_bytes(n_samples, n_channels) + reference_bytes <= memory_bytes:
+        return analyze(read(None), reference=healthy, torque_nm=torque_nm, on_stage=on_stage)
     announce("levels over time")
     overview = long_overview(head, n_samples, read)
-    n_part = int(min(PART_SAMPLES, memory_bytes / (BYTES_PER_SAMPLE * n_channels)))
+    n_part = _part_samples(memory_bytes - reference_bytes, n_channels)
     parts = []
     for first, reason in _chosen(overview, n_part, n_samples, head.sampling_rate_hz):
         announce(reason)
         recording = read(slice(first, first + n_part))
-        found = analyze(recording)
+        found = analyze(recording, reference=healthy, torque_nm=torque_nm)
         rate = recording.sampling_rate_hz
         parts.append(AnalysedPart(first / rate, first / rate + recording.duration_s, reason, found))
     return LongAnalysis(head.name, n_samples / head.sampling_rate_hz, overview, tuple(parts))
+
+
+def read_reference(
+    path: str | Path,
+    rig: Rig | None = None,
+    *,
+    memory_bytes: float = MEMORY_BYTES,
+    sampling_rate_hz: float | None = None,
+    speed: SpeedSource | None = None,
+) -> PreparedRecording:
+    """Read the recording of a healthy machine once, also for many that are compared with it; of a long one a part.
+
+    The part is of usual level. What is found in it stays with it: recordings that follow, in this process, share it.
+
+    Parameters
+    ----------
+    path : str or Path
+    rig : Rig or None
+        Of the recording that is compared; see `rig_of_reference`.
+    memory_bytes : float
+        What the analysis of both may take; the reference may take half of it.
+    sampling_rate_hz, speed
+        As in `read_recording`; pulse times belong to the other recording.
+    """
+    file = Path(path)
+    modified_ns = file.stat().st_mtime_ns if file.is_file() else 0
+    own_speed = None if isinstance(speed, PulseTimes) else speed
+    return _read_reference(
+        file, rig_of_reference(file, rig), memory_bytes / 2, sampling_rate_hz, own_speed, modified_ns
+    )
+
+
+@lru_cache(maxsize=1)
+def _read_reference(
+    path: Path,
+    rig: Rig | None,
+    memory_bytes: float,
+    sampling_rate_hz: float | None,
+    speed: SpeedSource | None,
+    modified_ns: int,
+) -> PreparedRecording:
+    del modified_ns  # tells the cache that the file is another one
+    return prepare(
+        read_usual_part(path, rig, memory_bytes=memory_bytes, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    )
+
+
+def read_usual_part(
+    path: str | Path,
+    rig: Rig | None = None,
+    *,
+    memory_bytes: float = MEMORY_BYTES,
+    sampling_rate_hz: float | None = None,
+    speed: SpeedSource | None = None,
+) -> Recording:
+    """Return a recording whole where its analysis fits into memory, else a part of usual level."""
+
+    def read(part: slice | None) -> Recording:
+        return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed, part=part)
+
+    n_samples = n_samples_of(path)
+    if n_samples is None:
+        recording = read(None)
+        _check_fits(recording, analysis_bytes(recording.n_samples, len(recording.channels)), memory_bytes)
+        return recording
+    head = read(slice(0, min(n_samples, N_PER_SPECTRUM)))
+    if analysis_bytes(n_samples, len(head.channels)) <= memory_bytes:
+        return read(None)
+    n_part = _part_samples(memory_bytes, len(head.channels))
+    parts = _chosen(long_overview(head, n_samples, read), n_part, n_samples, head.sampling_rate_hz, (USUAL,))
+    return read(slice(parts[0][0], parts[0][0] + n_part))
+
+
+def read_whole(
+    path: str | Path,
+    rig: Rig | None = None,
+    *,
+    sampling_rate_hz: float | None = None,
+    speed: SpeedSource | None = None,
+) -> Recording:
+    """Read a recording for what looks at all of it at once; refuse before one that half of the free memory is less for.
+
+    Raises
+    ------
+    InputError
+        As `read_recording`, and where `analysis_bytes` is more than half of the memory that is free.
+    """
+    n_samples = n_samples_of(path)
+    if n_samples is not None:
+        given: dict[str, Any] = {"rig": rig, "sampling_rate_hz": sampling_rate_hz, "speed": speed}
+        n_channels = len(read_recording(path, **given, part=slice(0, min(n_samples, N_PER_SPECTRUM))).channels)
+        check_memory(int(analysis_bytes(n_samples, n_channels)), file_label(path))
+    return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+
+
+def _part_samples(memory_bytes: float, n_channels: int) -> int:
+    return max(1, int(min(PART_SAMPLES, memory_bytes / (BYTES_PER_SAMPLE * n_channels))))
+
+
+def _check_fits(recording: Recording, needed_bytes: float, memory_bytes: float) -> None:
+    """Raise for a recording that does not fit, and is of a format that is only read whole."""
+    if needed_bytes > memory_bytes:
+        n_channels = len(recording.vibration_names())
+        raise InputError(
+            f"{recording.n_samples} samples × {n_channels} channels take {needed_bytes / 1e9:.3g} GB to analyse",
+            where=recording.name,
+            allowed=f"up to {memory_bytes / 1e9:.3g} GB",
+            remedy="give more with --memory, or convert it to HDF5, Parquet, TDMS or WAV, which are read in parts",
+        )
 
 
 def long_overview(head: Recording, n_samples: int, read: Callable[[slice], Recording]) -> LongOverview:
@@ -272,18 +425,25 @@ def _figures(x: FloatArray, interval: int, *, last: bool) -> Iterator[FloatArray
         yield np.stack([rms, peak, peak / np.sqrt(safe), fourth / safe**2])
 
 
-def _chosen(overview: LongOverview, n_part: int, n_samples: int, rate_hz: float) -> list[tuple[int, str]]:
-    """Return first samples of the parts to look at closely, in the order of time, and why."""
+USUAL = "the usual level"
+
+
+def _chosen(
+    overview: LongOverview, n_part: int, n_samples: int, rate_hz: float, reasons: tuple[str, ...] = ()
+) -> list[tuple[int, str]]:
+    """Return first samples of the parts to look at closely, in the order of time, and why; of these reasons, if any."""
     level = np.log(np.maximum(overview.rms, 1e-300)).mean(axis=0)
     impulsive = overview.kurtosis.max(axis=0)
     usual = int(np.argmin(np.abs(level - np.median(level))))
     wanted = [
-        (usual, "the usual level"),
+        (usual, USUAL),
         (int(np.argmax(level)), "the highest level"),
         (int(np.argmax(impulsive)), f"the most impulsive second, kurtosis {impulsive.max():.3g}"),
     ]
     found: list[tuple[int, str]] = []
     for second, reason in wanted:
+        if reasons and reason not in reasons:
+            continue
         middle = round((overview.time_s[second] + INTERVAL_S / 2) * rate_hz)
         first = min(max(0, middle - n_part // 2), max(0, n_samples - n_part))
         if all(abs(first - other) >= n_part // 2 for other, _ in found):

@@ -118,10 +118,10 @@ def _by_gears(signals: AnalysisSignals, angle: ShaftAngle | CannotTell) -> Findi
     if isinstance(angle, ShaftAngle):
         if not isinstance(recording.speed_source, ConstantSpeed) or speed_is_confirmed(signals):
             return None
-        stated_rpm: float | None = angle.mean_speed_rpm
+        elsewhere = signals.comb_elsewhere
     else:
         stated_rpm = rig.nominal_speed_rpm()
-    elsewhere = comb_elsewhere(recording, rig, stated_rpm) if stated_rpm else None
+        elsewhere = comb_elsewhere(recording, rig, stated_rpm) if stated_rpm else None
     factor = None if elsewhere is None else _usual(1 / elsewhere.factor, STATED_SPEED_TOLERANCE)
     if elsewhere is None or factor is None:
         return None

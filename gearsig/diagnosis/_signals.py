@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import log10
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.angle import AngleSignal, CombElsewhere, ShaftAngle, comb_elsewhere
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._types import AnalysisSettings, ChannelAnalysis, Finding, Kind, OrderLevel, Strength, Where
 from gearsig.errors import InputError, RefusalError
@@ -108,6 +109,11 @@ class AnalysisSignals:
         if self.angle is None:
             raise RefusalError("the speed is not known")
         return self.angle.mean_speed_rpm / 60
+
+    @cached_property
+    def comb_elsewhere(self) -> CombElsewhere | None:
+        """At which multiple of the mean speed the gears' comb lies, if anywhere else; sought once, it takes long."""
+        return comb_elsewhere(self.recording, self.rig, 60.0 * self.frequency_per_order_hz)
 
     @property
     def speed_varies(self) -> bool:
@@ -313,13 +319,21 @@ def in_common_bands(
     envelopes: Sequence[BandEnvelope],
     reference: AnalysisSignals,
     reference_envelopes: Sequence[BandEnvelope],
+    healthy: PreparedRecording,
 ) -> tuple[list[BandEnvelope], list[BandEnvelope]]:
-    """Return the envelopes of two recordings in the same bands: those of the one that is sampled more slowly."""
+    """Return the envelopes of two recordings in the same bands: those of the one that is sampled more slowly.
+
+    The prepared reference keeps its own, as it is compared with recordings of one rate again and again.
+    """
     now, then = list(envelopes), list(reference_envelopes)
     if signals.recording.sampling_rate_hz > reference.recording.sampling_rate_hz:
         now = [e for band in _bands(then) for e in envelopes_in(signals, signals.recording, band)]
     elif signals.recording.sampling_rate_hz < reference.recording.sampling_rate_hz:
-        then = [e for band in _bands(now) for e in envelopes_in(reference, reference.recording, band)]
+        bands = _bands(now)
+        then = healthy.keep(
+            ("diagnosis", "envelopes", reference.settings, bands),
+            lambda: [e for band in bands for e in envelopes_in(reference, reference.recording, band)],
+        )
     return now, then
 
 

@@ -46,6 +46,8 @@ class AnalysisOptions:
         Recording of the machine when it was healthy.
     torque_nm : float or None
         Instead of the rig's operating point.
+    memory_bytes : float
+        What the analysis of one recording may take; of a longer one, see `gearsig.diagnosis.analyze_file`.
     """
 
     rig: Rig | None = None
@@ -53,6 +55,7 @@ class AnalysisOptions:
     speed: SpeedSource | None = None
     reference: Path | None = None
     torque_nm: float | None = None
+    memory_bytes: float = 2e9
 
 
 @dataclass(frozen=True)
@@ -189,32 +192,31 @@ COMPACT_FROM = 128
 
 def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
     """Analyse one recording; every error becomes a reason. The key is empty where nothing is to be kept."""
-    from gearsig.diagnosis import analyze, rig_of_reference
-    from gearsig.recording import read_recording
-    from gearsig.rig import PulseTimes
+    from gearsig.diagnosis import LongAnalysis, analyze_file, read_reference
+    from gearsig.recording import sha256_of
 
     options, path, began = job.options, job.origin.path, time.process_time()
     try:
         rig = options.rig
         if rig is None and (beside := rig_file_beside(path)) is not None:
             rig = read_rig(beside)
-        rate_hz = options.sampling_rate_hz
-        recording = read_recording(path, rig=rig, sampling_rate_hz=rate_hz, speed=options.speed)
-        if recording.provenance.sha256 != job.sha256:
-            return _row(job, outcome=FAILED, reason="it was written while it was read", key=""), [], job.origin
+        given: dict[str, Any] = {"sampling_rate_hz": options.sampling_rate_hz, "speed": options.speed}
+        given["memory_bytes"] = options.memory_bytes
         reference = None
         if options.reference is not None and options.reference.resolve() != path.resolve():
-            speed = None if isinstance(options.speed, PulseTimes) else options.speed
-            own = rig_of_reference(options.reference, rig)
-            reference = read_recording(options.reference, rig=own, sampling_rate_hz=rate_hz, speed=speed)
-        analysis = analyze(recording, reference=reference, torque_nm=options.torque_nm)
+            reference = read_reference(options.reference, rig, **given)
+        found = analyze_file(path, rig, reference=reference, torque_nm=options.torque_nm, **given)
+        analysis = found.as_one() if isinstance(found, LongAnalysis) else found
+        if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # of parts no hash is taken
+            return _row(job, outcome=FAILED, reason="it was written while it was read", key=""), [], job.origin
     except GearsigError as error:
         return _row(job, outcome=FAILED, reason=str(error)), [], job.origin
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
         text = " ".join(str(error).split())
         reason = f"unexpected error, please report: {type(error).__name__}: {text}"
         return _row(job, outcome=FAILED, reason=reason), [], job.origin
-    row = _row(job, **_facts(analysis, options), cpu_s=time.process_time() - began)
+    facts = _facts(analysis, options) | ({"duration_s": found.duration_s} if isinstance(found, LongAnalysis) else {})
+    row = _row(job, **facts, cpu_s=time.process_time() - began)
     return row, _indicators(analysis), job.origin
 
 

@@ -139,6 +139,7 @@ class Fleet:
         speed: SpeedSource | None = None,
         reference: str | Path | None = None,
         torque_nm: float | None = None,
+        memory_bytes: float = 2e9,
         n_processes: int | None = None,
         executor: Executor | None = None,
         on_progress: Progress | None = None,
@@ -154,7 +155,7 @@ class Fleet:
             Files, folders with sub-folders, "folder/*.csv"; or what `gearsig.fleet.origins` found, for a look first.
         pattern, machine, point, date
             See `gearsig.fleet.origins`.
-        rig, sampling_rate_hz, speed, reference, torque_nm
+        rig, sampling_rate_hz, speed, reference, torque_nm, memory_bytes
             As for `gearsig.batch.report_many`; None: what files and rig files say.
         n_processes : int or None
             Local processes; None: one per processor.
@@ -176,7 +177,7 @@ class Fleet:
         if paths or not found:
             found += origins(paths, pattern=pattern, machine=machine, point=point, date=date, rig=rig)
         options = AnalysisOptions(
-            rig, sampling_rate_hz, speed, Path(reference) if reference is not None else None, torque_nm
+            rig, sampling_rate_hz, speed, Path(reference) if reference is not None else None, torque_nm, memory_bytes
         )
         result = add_recordings(
             self._store, found, options, n_processes=n_processes, executor=executor, on_progress=on_progress

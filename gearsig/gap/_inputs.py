@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from gearsig.diagnosis import read_whole
 from gearsig.errors import InputError
 from gearsig.gap._labelled import LabelledRecording
 from gearsig.gap._types import NONE, UNKNOWN
-from gearsig.recording import Recording, read_recording
+from gearsig.recording import Recording
 from gearsig.rig import ConstantSpeed, Rig, read_rig, rig_file_beside
 
 
@@ -83,7 +84,7 @@ def read_gap_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda
     for path, name, rig in zip(files, names, _rigs(asked, files), strict=True):
         on_file(path.name)
         speed = None if asked.speed_rpm is None else ConstantSpeed(asked.speed_rpm)
-        recording = read_recording(path, rig=rig, sampling_rate_hz=asked.sampling_rate_hz, speed=speed)
+        recording = read_whole(path, rig, sampling_rate_hz=asked.sampling_rate_hz, speed=speed)
         recordings.append(recording.with_name(name))
     n, labelled = len(asked.recordings), tuple[LabelledRecording, ...]()
     if asked.learn is not None:
@@ -245,7 +246,7 @@ def read_labelled(
             _check_same(rig, rig_beside, path.name)
         if rig_beside is None and rig is None:
             raise InputError("no rig is given, and none lies beside it", where=path.name, remedy="give --rig RIG.toml")
-        recording = read_recording(path, rig=_merged(rig, rig_beside), sampling_rate_hz=sampling_rate_hz)
+        recording = read_whole(path, _merged(rig, rig_beside), sampling_rate_hz=sampling_rate_hz)
         return recording.with_name(f"{folder.name}/{path.name}")
 
     labelled = []

@@ -146,7 +146,7 @@ def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAng
     speed = stated.mean_speed_rpm
     limits = (speed * (1 - STATED_SPEED_TOLERANCE), speed * (1 + STATED_SPEED_TOLERANCE))
     try:
-        return estimate_shaft_angle(recording, rig, speed_range_rpm=limits)
+        return estimate_shaft_angle(recording, rig, speed_range_rpm=limits, explained=False)
     except RefusalError:
         return None
 

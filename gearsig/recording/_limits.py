@@ -110,7 +110,7 @@ def check_memory(needed_bytes: int, where: str, free_bytes: float | None = None)
     allowed = int(available_memory_bytes() if free_bytes is None else free_bytes) // 2
     if needed_bytes > allowed:
         raise InputError(
-            f"decoded size is about {needed_bytes / 1e9:.3g} GB",
+            f"takes about {needed_bytes / 1e9:.3g} GB of memory",
             where=where,
             allowed=f"up to {allowed / 1e9:.3g} GB on this machine now",
             remedy="split the file or export fewer channels",

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from gearsig.angle import find_shaft_angle, resample_to_angle
-from gearsig.diagnosis import Analysis, LongAnalysis, RecordBlocks, analyze_file, long_overview
+from gearsig.diagnosis import (
+    Analysis,
+    LongAnalysis,
+    RecordBlocks,
+    analyze,
+    analyze_file,
+    long_overview,
+    read_reference,
+)
 from gearsig.errors import InputError
 from gearsig.orders import order_map, synchronous_average
 from gearsig.recording import Channel, Recording, n_samples_of, read_recording, write_recording
@@ -206,3 +214,63 @@ def test_an_order_map_in_blocks_is_that_of_the_whole_record(blocks, n_columns):
         assert found.time_s[column] == pytest.approx(whole.time_s[own].mean(), abs=0.02)
         assert found.speed_rpm[column] == pytest.approx(whole.speed_rpm[own].mean(), rel=2e-3)
     assert found.positions[np.argmax(found.values.mean(axis=0))] == pytest.approx(7.0)
+
+
+@pytest.fixture
+def short_memory(monkeypatch):
+    """As if a sample took a hundred times the memory: 48 s do not fit, parts of 2 s do."""
+    monkeypatch.setattr("gearsig.diagnosis._long.PART_SAMPLES", 8192)
+    monkeypatch.setattr("gearsig.diagnosis._long.BYTES_PER_SAMPLE", 24_000.0)
+
+
+@pytest.mark.usefixtures("short_memory")
+def test_a_long_record_as_one_analysis_says_of_which_part_it_is(tmp_path):
+    path = write_recording(LONG, tmp_path / "x.h5")
+    found = analyze_file(path, speed=ConstantSpeed(600.0), memory_bytes=1e9)
+    one = found.as_one()
+    told = next(finding for finding in one.findings if finding.code == "part-of-long-record")
+    assert "48.828 s" in told.title
+    assert len(told.evidence) == len(found.parts) - 1 + 2
+    assert one.outcome is found.outcome
+    usual = next(part for part in found.parts if part.reason == "the usual level")
+    assert one.indicators == usual.analysis.indicators
+    assert one.recording.n_samples == 8192
+
+
+@pytest.mark.usefixtures("short_memory")
+def test_a_long_record_is_compared_part_by_part_with_a_part_of_a_long_reference(tmp_path):
+    quiet = replace(LONG, samples=0.1 * RNG.standard_normal(X.shape).astype(np.float32))
+    now, then = write_recording(LONG, tmp_path / "now.h5"), write_recording(quiet, tmp_path / "then.h5")
+    healthy = read_reference(then, speed=ConstantSpeed(600.0), memory_bytes=1e9)
+    assert healthy.recording.n_samples == 8192
+    assert read_reference(then, speed=ConstantSpeed(600.0), memory_bytes=1e9) is healthy
+    found = analyze_file(now, speed=ConstantSpeed(600.0), memory_bytes=1e9, reference=healthy)
+    for part in found.parts:
+        assert part.analysis.reference is found.parts[0].analysis.reference
+        overall = [c for c in part.analysis.level_changes if c.kind == "noise"]
+        assert overall
+        assert min(c.level_db - c.reference_db for c in overall) > 15.0  # ten times
+
+
+@pytest.mark.usefixtures("short_memory")
+def test_reports_and_fleets_of_long_records_stay_in_memory(tmp_path, monkeypatch):
+    pytest.importorskip("duckdb", reason="the extra fleet is not installed")
+    from gearsig.batch import report_many
+    from gearsig.fleet import open_fleet
+
+    def whole(recording, *args, **more):
+        assert recording.n_samples <= 8192
+        return analyze(recording, *args, **more)
+
+    monkeypatch.setattr("gearsig.diagnosis._long.analyze", whole)
+    (tmp_path / "data").mkdir()
+    path = write_recording(replace(LONG, speed=ConstantSpeed(600.0)), tmp_path / "data" / "pump.h5")
+    made = report_many([path], tmp_path / "report", n_processes=1, memory_bytes=1e9)
+    assert [failure.reason for failure in made.failures] == []
+    page = (tmp_path / "report" / made.entries[0].page).read_text(encoding="utf-8")
+    assert "48.828" in page
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(tmp_path / "data", n_processes=1, memory_bytes=1e9)
+    row = fleet.recordings().iloc[0]
+    assert row["duration_s"] == pytest.approx(200_000 / RATE)
+    assert row["outcome"] in ("fault", "suspicion", "cannot tell", "no fault")

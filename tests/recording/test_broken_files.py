@@ -184,7 +184,7 @@ def test_packed_bomb_in_mat(tmp_path, monkeypatch):
     monkeypatch.setattr("gearsig.recording._limits.available_memory_bytes", lambda: 1 << 24)
     savemat(tmp_path / "x.mat", {"s": {"a": np.zeros(1 << 21)}, "fs": 1.0}, do_compression=True)
     assert (tmp_path / "x.mat").stat().st_size < 1 << 15
-    refused(tmp_path / "x.mat", "decoded size")
+    refused(tmp_path / "x.mat", "of memory")
 
 
 TABLE = "1.0,2.0\n1.5,2.5\n" * 20

@@ -58,5 +58,5 @@ def test_a_file_that_the_container_cannot_hold_is_refused_before_it_is_decoded(t
     group(tmp_path, V2, 400_000_000, 0.3e9, 0.0)
     allowed = container_free_bytes(own(tmp_path, "0::/\n"), tmp_path)
     check_memory(40_000_000, "small.csv", allowed)
-    with pytest.raises(InputError, match=r"decoded size is about 0\.2 GB"):
+    with pytest.raises(InputError, match=r"takes about 0\.2 GB"):
         check_memory(200_000_000, "large.csv", allowed)

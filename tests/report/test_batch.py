@@ -89,7 +89,7 @@ def test_unexpected_errors_ask_for_a_report(recordings, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise ZeroDivisionError("by\nnothing")
 
-    monkeypatch.setattr("gearsig.recording.read_recording", fail)
+    monkeypatch.setattr("gearsig.diagnosis.analyze_file", fail)
     result = report_many(recordings, tmp_path / "out", n_processes=1)
     assert result.failures[0] == Failure("one.csv", "unexpected error, please report: ZeroDivisionError: by nothing")
 

@@ -88,7 +88,7 @@ def test_of_what_does_not_fit_a_part_is_looked_at(path):
 def test_without_blocks_it_is_refused_before_anything_is_read(path, monkeypatch, capsys):
     monkeypatch.setattr("gearsig.methods._apply.read_recording", None)
     for name in ("spectrum", "kurtogram", "modes"):
-        with pytest.raises(InputError, match=r"GB.*--from 0s --to \d+s.*--memory.*density"):
+        with pytest.raises(InputError, match=r"GB.*--from 0s --to [\d.]+s.*--memory.*density"):
             apply_method_to_file(name, path, RIG)
     with pytest.raises(InputError, match="no band is given"):
         apply_method_to_file("envelope", path, RIG)
