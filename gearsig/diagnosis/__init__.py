@@ -1,6 +1,6 @@
 """From signals and indicators to findings in words and numbers."""
 
-from gearsig.diagnosis._analyze import analyze
+from gearsig.diagnosis._analyze import analyze, with_known_angle
 from gearsig.diagnosis._bearing import smallest_depth
 from gearsig.diagnosis._bearing_families import (
     BEARING_PARTS,
@@ -98,4 +98,5 @@ __all__ = [
     "stands_out_from_neighbours",
     "verdict_of",
     "with_crack",
+    "with_known_angle",
 ]

@@ -36,7 +36,7 @@ from gearsig.diagnosis._types import Analysis, AnalysisSettings, CannotTell, Fin
 from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import SeparatedAverage, band_passed_mesh
-from gearsig.prepared import PreparedRecording, prepare
+from gearsig.prepared import MEMORY_LIMIT_MB, PreparedRecording, prepare
 from gearsig.recording import Recording
 from gearsig.rig import EncoderChannel, Rig, TachometerChannel
 
@@ -195,6 +195,30 @@ def _of_machine(
     trains = tuple(f.where.order for f in impacts if f.where.order is not None and f.where.band_hz is not None)
     yield from detect_sidebands(signals, trains)
     yield from detect_lines(signals, trains)
+
+
+def with_known_angle(
+    recording: Recording, angle: ShaftAngle | CannotTell, *, memory_limit_mb: float = MEMORY_LIMIT_MB
+) -> PreparedRecording:
+    """Return a recording prepared with the angle that an analysis found, or with why there is none.
+
+    Parameters
+    ----------
+    recording : Recording
+        With its rig.
+    angle : ShaftAngle or CannotTell
+    memory_limit_mb : float
+        As of `PreparedRecording`.
+    """
+    prepared = PreparedRecording(recording, memory_limit_mb=memory_limit_mb)
+
+    def known() -> ShaftAngle:
+        if isinstance(angle, CannotTell):
+            raise RefusalError(angle.reason, remedy=angle.remedy)
+        return angle
+
+    prepared.keep_angle(known)
+    return prepared
 
 
 def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:

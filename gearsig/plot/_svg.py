@@ -23,8 +23,10 @@ from gearsig.plot._panels import LevelPanel, LinePanel, line_colour, pooled_leve
 from gearsig.plot._style import unit_text
 
 LEFT, RIGHT, BOTTOM, ROW, BAR = 62, 12, 38, 14, 46
-N_COLUMNS = 420
+N_COLUMNS, N_ROWS = 420, 160
 N_SHADES = 48
+MAX_IMAGE_BYTES = 24_000
+"""Levels of gears compress to half of it; where noise alone does not, a quarter of the pixels shows as much."""
 MAX_ROWS = 4
 LETTER = 6.2
 """Width of a letter in units of the drawing, for keeping labels apart."""
@@ -134,16 +136,30 @@ def svg_panel(panel: LinePanel | LevelPanel, *, width: int = 760) -> str:
     )
 
 
-def _svg_levels(panel: LevelPanel, lines: Sequence[Curve], width: int, height: int = 230) -> str:
+def _image_of_levels(panel: LevelPanel, n_columns: int, n_rows: int) -> bytes:
+    """Return the levels as PNG, the largest of each pixel."""
     from PIL import Image
 
-    levels, _ = pooled_levels(panel.levels, panel.positions, N_COLUMNS, 160, logarithmic=panel.logarithmic)
-    high, span = float(panel.levels.max()), 60.0 if panel.span is None else panel.span
+    levels, _ = pooled_levels(panel.levels, panel.positions, n_columns, n_rows, logarithmic=panel.logarithmic)
+    high, span = _range_of(panel)
     shade = np.clip(255 * (levels - high + span) / span, 0, 255).astype(np.uint8)
     colours, buffer = style.level_colours(), BytesIO()
     image = Image.fromarray(colours[shade[::-1]]).quantize(N_SHADES, dither=Image.Dither.NONE)
     image.save(buffer, format="png", optimize=True)
-    uri = b64encode(buffer.getvalue()).decode("ascii")
+    return buffer.getvalue()
+
+
+def _range_of(panel: LevelPanel) -> tuple[float, float]:
+    """Return the highest level, and how far the colours reach below it."""
+    return float(panel.levels.max()), 60.0 if panel.span is None else panel.span
+
+
+def _svg_levels(panel: LevelPanel, lines: Sequence[Curve], width: int, height: int = 230) -> str:
+    image = _image_of_levels(panel, N_COLUMNS, N_ROWS)
+    if len(image) > MAX_IMAGE_BYTES:
+        image = _image_of_levels(panel, N_COLUMNS // 2, N_ROWS // 2)
+    uri, colours = b64encode(image).decode("ascii"), style.level_colours()
+    high, span = _range_of(panel)
     x_limits = (float(panel.at[0]), float(panel.at[-1]))
     y_limits = (float(panel.positions[0]), float(panel.positions[-1]))
     labels, n_rows = _placed(panel.cursors, x_limits, width - BAR)

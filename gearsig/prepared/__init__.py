@@ -30,7 +30,7 @@ from gearsig.prepared._lines import (
     score_needed,
     tail_probability,
 )
-from gearsig.prepared._recording import PreparedRecording, has_mark, prepare
+from gearsig.prepared._recording import MEMORY_LIMIT_MB, PreparedRecording, has_mark, prepare
 from gearsig.prepared._revolution import shift_scores, sliding_mean, strongest_window, turned_lines
 
 __all__ = [
@@ -38,6 +38,7 @@ __all__ = [
     "LOG_RATIO_LIMIT",
     "MAINS_HZ",
     "MAINS_TOLERANCE",
+    "MEMORY_LIMIT_MB",
     "RUN_UP_FOOT_ORDERS",
     "STATED_SPEED_TOLERANCE",
     "Comb",

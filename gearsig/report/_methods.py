@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
 from gearsig.angle import ShaftAngle
-from gearsig.cache import write_text
+from gearsig.cache import write_text, write_whole
 from gearsig.checks import closest_match_hint, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.methods import METHODS, TRANSFORMS, MethodAnswer, apply_method
@@ -22,7 +23,7 @@ from gearsig.report._json import plain
 
 
 def write_answer(answer: MethodAnswer, folder: str | Path, name: str = "") -> tuple[Path, ...]:
-    """Write figure (PNG and SVG), table (CSV), arrays (HDF5) and numbers (JSON) into a folder.
+    """Write figure (PNG and SVG), table (CSV), arrays (HDF5) and numbers (JSON), each whole or not at all.
 
     Parameters
     ----------
@@ -36,26 +37,33 @@ def write_answer(answer: MethodAnswer, folder: str | Path, name: str = "") -> tu
     -------
     tuple of Path
     """
-    import h5py
     from pandas import DataFrame
 
     stem = made_folder(Path(folder)) / (name or answer.method)
     paths = tuple(stem.with_name(f"{stem.name}{ending}") for ending in (".png", ".svg", ".csv", ".h5", ".json"))
-    figure = answer.draw()
-    for path in paths[:2]:
-        figure.savefig(path)
-    DataFrame(dict(answer.table)).to_csv(paths[2], index=False, float_format="%.9g")
-    groups = {"table": answer.table, "matrices": answer.matrices, "axes": answer.axes}
-    groups |= {f"tables/{what}": table for what, table in answer.tables.items()}
-    with h5py.File(paths[3], "w") as file:
-        file.attrs["method"], file.attrs["channel"] = answer.method, answer.channel
-        for group, arrays in groups.items():
-            for title, values in arrays.items():
-                column = np.asarray(values)
-                written = column.astype(h5py.string_dtype()) if column.dtype.kind in "OU" else column
-                file.create_dataset(f"{group}/{title.replace('/', '∕')}", data=written, track_order=True)
+    figure, frame = answer.draw(), DataFrame(dict(answer.table))
+    write_whole(paths[0], lambda file: figure.savefig(file, format="png"))
+    write_whole(paths[1], lambda file: figure.savefig(file, format="svg"))
+    write_whole(paths[2], lambda file: frame.to_csv(file, index=False, float_format="%.9g"))
+    write_whole(paths[3], lambda file: _write_arrays(answer, file))
     write_text(paths[4], answer_json(answer))
     return paths
+
+
+def _write_arrays(answer: MethodAnswer, file: IO[bytes]) -> None:
+    import h5py
+
+    groups = {"table": answer.table, "matrices": answer.matrices, "axes": answer.axes}
+    groups |= {f"tables/{what}": table for what, table in answer.tables.items()}
+    content = BytesIO()  # HDF5 ends in more ways than one where a disk is full
+    with h5py.File(content, "w") as arrays:
+        arrays.attrs["method"], arrays.attrs["channel"] = answer.method, answer.channel
+        for group, columns in groups.items():
+            for title, values in columns.items():
+                column = np.asarray(values)
+                written = column.astype(h5py.string_dtype()) if column.dtype.kind in "OU" else column
+                arrays.create_dataset(f"{group}/{title.replace('/', '∕')}", data=written, track_order=True)
+    file.write(content.getbuffer())
 
 
 def answer_json(answer: MethodAnswer) -> str:

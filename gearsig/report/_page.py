@@ -14,14 +14,13 @@ from gearsig import plot
 from gearsig.angle import ShaftAngle
 from gearsig.cache import write_text
 from gearsig.checks import FloatArray
-from gearsig.diagnosis import Analysis, ChannelAnalysis, Finding, Kind, Where, changes
+from gearsig.diagnosis import Analysis, ChannelAnalysis, Finding, Kind, Where, changes, with_known_angle
 from gearsig.errors import RefusalError
 from gearsig.formatting import readable
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.plot import Captioned, Cursor, Picture, embed, order_cursors, unit_text
 from gearsig.plot import _style as style
-from gearsig.prepared import prepare
 from gearsig.recording import SI_FACTORS
 from gearsig.report._files import render
 from gearsig.report._methods import fitting_methods, method_pictures
@@ -366,7 +365,8 @@ def _further_methods(
     angle = analysis.shaft_angle if isinstance(analysis.shaft_angle, ShaftAngle) else None
     suspects = {"suspects_crack": bool(teeth), "suspects_bearing": bool(bearings)}
     chosen = fitting_methods(analysis.recording, angle, **suspects) if methods is None else methods
-    pictures, reasons = method_pictures(chosen, prepare(analysis.recording, analysis.rig), channel)
+    recording = analysis.recording if analysis.rig is None else analysis.recording.with_rig(analysis.rig)
+    pictures, reasons = method_pictures(chosen, with_known_angle(recording, analysis.shaft_angle), channel)
     if methods is None:  # nobody asked for what cannot be had
         reasons = ()
     return pictures, reasons

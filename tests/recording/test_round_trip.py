@@ -123,3 +123,19 @@ def test_damaged_description(tmp_path, damage):
     path.write_text(damage(path.read_text()))
     with pytest.raises(InputError, match=r"r\.csv: gearsig's description"):
         read_recording(path)
+
+
+@pytest.mark.parametrize("extension", EXTENSIONS)
+@pytest.mark.parametrize("most_bytes", [0, 3_000, 40_000])
+def test_a_full_disk_is_said_and_leaves_nothing(extension, most_bytes, tmp_path):
+    resource = pytest.importorskip("resource")
+    x = np.random.default_rng(0).normal(size=(2, 20_000)).astype(np.float32)
+    recording = Recording(x, 1000.0, (Channel("a", "acceleration", "g"), Channel("b", "acceleration", "g")))
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, before[1]))  # as if no more room were left
+    try:
+        with pytest.raises(InputError, match="cannot be written"):
+            write_recording(recording, tmp_path / f"x{extension}")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not any(tmp_path.iterdir())

@@ -123,3 +123,18 @@ def test_the_command_writes_what_the_method_finds(tmp_path, capsys) -> None:
     assert not ended.value.code
     printed = capsys.readouterr().out
     assert json.loads(printed[printed.index("{") :])["method"] == "modes"
+
+
+@pytest.mark.parametrize("most_bytes", [0, 30_000, 200_000])
+def test_a_full_disk_is_said_and_no_file_of_an_answer_is_half_written(most_bytes, tmp_path) -> None:
+    resource = pytest.importorskip("resource")
+    answer = apply_method("waveform", recording())
+    whole = {path.name: path.stat().st_size for path in write_answer(answer, tmp_path / "whole")}
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, before[1]))  # as if no more room were left
+    try:
+        with pytest.raises(InputError, match="cannot be written"):
+            write_answer(answer, tmp_path / "full")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert all(path.stat().st_size == whole[path.name] for path in (tmp_path / "full").iterdir())

@@ -23,7 +23,7 @@ from app.dashboard.widgets import charts
 from app.dashboard.widgets.messages import show_error, show_unknown_speed, show_warnings
 from app.dashboard.work import Kept, kept
 from gearsig.angle import ShaftAngle
-from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis
+from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, with_known_angle
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.methods import METHODS, MethodAnswer, Waveforms, angle_or_none, apply_method, part_of
 from gearsig.plot import ChartLine, LevelPanel, with_unit
@@ -89,23 +89,10 @@ def _feed(digest: blake2b, value: object) -> None:
         digest.update(f"{value!r};".encode())
 
 
-def prepared_of(recording: Recording, angle: ShaftAngle | CannotTell) -> PreparedRecording:
-    """Return a recording with the angle that is known of it, or why there is none."""
-    prepared = PreparedRecording(recording, memory_limit_mb=MEMORY_LIMIT_MB)
-
-    def known() -> ShaftAngle:
-        if isinstance(angle, CannotTell):
-            raise RefusalError(angle.reason, remedy=angle.remedy)
-        return angle
-
-    prepared.keep_angle(known)
-    return prepared
-
-
 @cached(N_PREPARED, "Preparing …")
 def _segment(part: Recording, angle: ShaftAngle | CannotTell) -> tuple[PreparedRecording, Lock]:
     """Return a segment that methods share, and the lock under which one at a time works with it."""
-    return prepared_of(part, angle), Lock()
+    return with_known_angle(part, angle, memory_limit_mb=MEMORY_LIMIT_MB), Lock()
 
 
 @cached(8, "Computing …")
@@ -136,7 +123,10 @@ def show_method(name: str, analysis: Analysis, channel: ChannelAnalysis) -> None
 def _show(name: str, page: MethodPage) -> None:
     method, analysis = METHODS[name], page.analysis
     recording = analysis.recording if analysis.rig is None else analysis.recording.with_rig(analysis.rig)
-    whole, rate = prepared_of(recording, analysis.shaft_angle), recording.sampling_rate_hz
+    whole, rate = (
+        with_known_angle(recording, analysis.shaft_angle, memory_limit_mb=MEMORY_LIMIT_MB),
+        recording.sampling_rate_hz,
+    )
     start, stop = page.segment(n_first=method.n_first)
     said = st.empty()
     options = ask_options(page, method, part_of(whole, start / rate, stop / rate))

@@ -174,16 +174,24 @@ def write_hdf5(recording: Recording, path: Path) -> None:
     """Write the datasets /samples (channel, time) and /gearsig_recording (JSON).
 
     /samples carries the attributes sampling_rate_hz, channel_names and units for other software.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
     """
     import h5py
 
-    with h5py.File(path, "w") as file:
-        samples = file.create_dataset(OWN_SAMPLES, data=recording.samples)
-        samples.attrs["sampling_rate_hz"] = recording.sampling_rate_hz
-        # HDF5 texts end at a NUL.
-        samples.attrs["channel_names"] = [c.name.replace("\0", " ") for c in recording.channels]
-        samples.attrs["units"] = [c.unit.replace("\0", " ") for c in recording.channels]
-        file.create_dataset(OWN_NAME, data=metadata_json(recording))
+    try:
+        with h5py.File(path, "w") as file:
+            samples = file.create_dataset(OWN_SAMPLES, data=recording.samples)
+            samples.attrs["sampling_rate_hz"] = recording.sampling_rate_hz
+            # HDF5 texts end at a NUL.
+            samples.attrs["channel_names"] = [c.name.replace("\0", " ") for c in recording.channels]
+            samples.attrs["units"] = [c.unit.replace("\0", " ") for c in recording.channels]
+            file.create_dataset(OWN_NAME, data=metadata_json(recording))
+    except RuntimeError as error:  # of a file that cannot be closed, as on a disk that is full
+        raise OSError(str(error)) from error
 
 
 def _sniff(head: bytes) -> str:
