@@ -71,10 +71,14 @@ def bearing_cursors(analysis: Analysis, spectrum: Spectrum) -> tuple[Cursor, ...
 
 
 def highest_order_of_interest(analysis: Analysis, spectrum: Spectrum | OrderMap) -> float:
-    """Return where an order spectrum may end: past the third harmonic of the fastest mesh, at 50 if none is known."""
+    """Return where a spectrum may end: past the third harmonic of the fastest mesh.
+
+    Where none is known, an order spectrum may end at 50, one over frequency at its own end.
+    """
     end = float(spectrum.positions[-1])
     meshes = [cursor.position for cursor in line_cursors(analysis, spectrum) if cursor.kind == "mesh"]
-    highest = 1.12 * max(meshes) if meshes else WITHOUT_MESH
+    without_mesh = WITHOUT_MESH if spectrum.axis == "order" else end
+    highest = 1.12 * max(meshes) if meshes else without_mesh
     return min(end, highest) if spectrum.resolution < highest else end
 
 

@@ -17,6 +17,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError
 from gearsig.recording import FORMAT_NAMES
 
+SVG = "http://www.w3.org/2000/svg"
 BLUE, ORANGE = "#2B86C5", "#D55E00"
 N_SHOWN = 8
 
@@ -99,7 +100,7 @@ def show() -> None:
     with st.container(key="try"):
         for column, (title, about, label, picture, page) in zip(st.columns(3), TO_TRY, strict=True):
             with column.container(border=True, height="stretch"):
-                st.html(f'<svg viewBox="0 0 300 124" aria-hidden="true">{picture()}</svg>')
+                st.image(f'<svg xmlns="{SVG}" viewBox="0 0 300 124">{picture()}</svg>', width="stretch", alt="")
                 st.markdown(f"**{title}**")
                 st.caption(about)
                 if st.button(label, type="primary", width="stretch", key=f"try {page}"):

@@ -35,6 +35,8 @@ def choose_view(analysis: Analysis, names: Sequence[str]) -> str:
     """Return the view that the user chose; it is in the address, too."""
     picture = verdict_picture(analysis)
     first = FIRST_OF.get(picture.about if picture is not None else "", "Order spectrum")
+    if isinstance(analysis.shaft_angle, CannotTell):  # the form asks for the speed, of a machine that is described too
+        first = "Machine" if analysis.rig is None or not analysis.rig.shafts else "Spectrum"
     chosen = state.addressed(state.TAB, "view", first if first in names else names[0])
     if chosen not in names:
         chosen = names[0]
