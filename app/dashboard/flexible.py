@@ -13,6 +13,7 @@ from app.dashboard.components import component_of
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import download, packed, show_figure
 from app.gear_body import GearBodyStudy
+from app.papers import PAPERS, Paper, paper
 from gearsig.checks import FloatArray
 from gearsig.plot import level_colours
 from sims import fe_gear
@@ -160,3 +161,40 @@ def show_pair() -> None:
         st.caption(f"Torsional mode {row['torsional_mode_hz']:.0f} Hz. Sweep {jumps}. {row['n_steps']} steps.")
     st.caption("Short sweeps load the teeth by the rotors' inertia, more on the way up than on the way down.")
     download("Sweeps as CSV", pair_study.sweeps_csv(study).encode(), "sweeps.csv", "text/csv")
+
+
+# --------------------
+# The figures of three publications beside the models' own, each statement judged by numbers.
+# --------------------
+
+
+@st.cache_resource(max_entries=3, show_spinner="Computing every figure: one to two minutes …")
+def computed(name: str) -> Paper:
+    """Return the figures of a publication, done once."""
+    return paper(name)
+
+
+def show_publications() -> None:
+    """Choose a publication; its figures are computed when asked for."""
+    name = st.selectbox("Publication", list(PAPERS), format_func=PAPERS.__getitem__, key="publication")
+    if not st.toggle("Compute its figures", key=f"publication {name} wanted"):
+        st.caption(f"Takes one to two minutes, once. The same as files: `gearsig papers {name} -o out`.")
+        return
+    found = computed(name)
+    st.markdown(f"**{found.summary}** {as_typed(found.source)}")
+    for item in found.figures:
+        st.subheader(f"{item.answers}: {item.title}")
+        show_figure(item.figure, item.title, f"publication {name} {item.answers}")
+        rows = [
+            {"the publication says": c.statement, "the model gives": c.found, "verdict": c.judgement}
+            for c in item.claims
+        ]
+        if rows:
+            st.dataframe(rows, hide_index=True, width="stretch")
+    if found.unanswered:
+        st.subheader("Figures without an answer")
+        st.dataframe(
+            [{"figure": figure, "why": why} for figure, why in found.unanswered.items()],
+            hide_index=True,
+            width="stretch",
+        )

@@ -82,11 +82,6 @@ def as_typed(text: object) -> str:
     return _MARKUP.sub(r"\\\1", _REPLACED.sub(_JOINER, one_line(text)))
 
 
-def as_plot_text(text: object) -> str:
-    """Return text for a figure of plotly, which reads a small part of HTML."""
-    return one_line(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-
-
 def one_line(text: object) -> str:
     """Return `text` on one line without control characters."""
     line = "".join(c if c.isprintable() else " " for c in _INVISIBLE.sub(" ", str(text)))

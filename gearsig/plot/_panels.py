@@ -217,15 +217,17 @@ def panels_of(figure: Figure) -> list[list[list[LinePanel | LevelPanel]]]:
     """Return what a figure of lines, bars and points shows: rows of columns of panels, to be zoomed.
 
     Axes that share a place, for two quantities over one axis, are panels of one column. Empty where a figure shows
-    what no panel can: polar axes, surfaces, filled areas.
+    what no panel can: polar axes, places with names instead of numbers, surfaces, filled areas.
     """
     from matplotlib.collections import LineCollection
+    from matplotlib.ticker import FixedFormatter
 
     places: dict[tuple[float, float], list[LinePanel | LevelPanel]] = {}
     for axes in figure.axes:
         if not axes.axison or axes.get_label() == "<colorbar>":
             continue
-        if axes.name != "rectilinear" or not all(isinstance(c, LineCollection) for c in axes.collections):
+        is_named = any(isinstance(a.get_major_formatter(), FixedFormatter) for a in (axes.xaxis, axes.yaxis))
+        if axes.name != "rectilinear" or is_named or not all(isinstance(c, LineCollection) for c in axes.collections):
             return []
         box = axes.get_position()
         panel = _level_panel(axes) if axes.images else _line_panel(axes, _names_of_colours(figure, axes))

@@ -12,7 +12,7 @@ from markdown_it import MarkdownIt
 
 from app.dashboard.cached import command_of, read_and_analyze, read_content, read_rig_text, safe_file_name
 from app.dashboard.state import AnalysisRequest
-from app.dashboard.theme import as_plot_text, as_typed, one_line
+from app.dashboard.theme import as_typed, one_line
 from app.dashboard.widgets.charts import picture_bytes
 from app.dashboard.widgets.verdict import headline_of
 from app.dashboard.widgets.views import csv_text, indicator_frame
@@ -79,10 +79,6 @@ def test_a_headline_and_its_rest_are_the_verdict(words: str) -> None:
     headline, rest = headline_of(words)
     assert f"{headline} {rest}".split() == words.split()
     assert len(words) > 120 or headline == words
-
-
-def test_text_for_figures_holds_no_tags() -> None:
-    assert as_plot_text("<b>&lt;</b>") == "&lt;b&gt;&amp;lt;&lt;/b&gt;"
 
 
 def test_formulas_do_not_reach_a_spreadsheet() -> None:

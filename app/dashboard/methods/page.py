@@ -18,7 +18,7 @@ import streamlit as st
 
 from app.dashboard.cached import safe_file_name
 from app.dashboard.methods.form import MethodPage, ask_options
-from app.dashboard.theme import as_plot_text, as_typed, capitalised, one_line, palette
+from app.dashboard.theme import as_typed, capitalised, one_line, palette
 from app.dashboard.widgets import charts
 from app.dashboard.widgets.messages import show_error, show_unknown_speed, show_warnings
 from app.dashboard.work import Kept, kept
@@ -184,11 +184,11 @@ def _show_space(page: MethodPage, path: np.ndarray) -> None:
     figure, (x, y, z) = Figure(), path.T
     line = {"width": 1.5, "color": palette().measured}
     figure.add_scatter3d(x=x, y=y, z=z, mode="lines", line=line, opacity=0.5, hoverinfo="skip")
-    titles = {f"{axis}axis": {"title": {"text": as_plot_text(f"x(t + {k}τ)")}} for k, axis in enumerate("xyz")}
+    titles = {f"{axis}axis": {"title": {"text": f"x(t + {k}τ)"}} for k, axis in enumerate("xyz")}
     figure.update_layout(
         height=560, margin=dict.fromkeys("lrtb", 0), showlegend=False, scene={**titles, "aspectmode": "cube"}
     )
-    charts.show_chart(figure, page.key("space"), "Path in space")
+    st.plotly_chart(figure, width="stretch", key=page.key("space"), config={"displaylogo": False}, alt="Path in space")
     st.caption("The last points of the path. Drag to turn it.")
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import streamlit as st
 
-from app.dashboard.flexible import show_gear, show_pair
-from app.dashboard.publications import show_publications
+from app.dashboard.flexible import show_gear, show_pair, show_publications
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 

@@ -25,9 +25,7 @@ from gearsig.plot import LONGEST, ChartLine, Cursor, LevelPanel, LinePanel, pane
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as PictureFigure
-    from plotly.graph_objects import Figure
 
-CONFIG = {"displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"], "scrollZoom": False}
 MEASURED, FAULT, SHAFT, QUIET = 0, 1, 4, -1
 """Colours of lines by meaning; further numbers are further colours."""
 
@@ -138,11 +136,6 @@ def show_figure(figure: PictureFigure, words: str, key: str) -> None:
             for n, panel in enumerate(panels):
                 with column:
                     show_panel(panel, f"{key} {i}{k}{n}", 60.0)
-
-
-def show_chart(figure: Figure, key: str, alternative: str) -> None:
-    """Show a figure of plotly; `key` is the widget's, unique on the page."""
-    st.plotly_chart(figure, width="stretch", key=key, config=CONFIG, alt=as_typed(alternative))
 
 
 _figure = component_of("figure")
