@@ -1,17 +1,18 @@
 """Take the README's pictures of the dashboard, and say how long each took: `python sample_data/make_screens.py`.
 
-It starts the dashboard of this checkout and drives Chromium by Playwright.
+It starts the dashboard of this checkout and drives Chromium by Playwright. Seconds are those of the clock, from the
+click until the page stands still, and those that the server worked, which do not tell of other work on the machine.
 """
 
 from __future__ import annotations
 
+import os
 import shutil
 import socket
 import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Callable
 from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
@@ -30,62 +31,80 @@ def settle(page: Page) -> None:
     page.wait_for_function(SETTLED)
 
 
-def take(page: Page) -> None:
+class Clock:
+    """Tells what an interaction took since the last call of `start`."""
+
+    def __init__(self, page: Page, server: int) -> None:
+        self._page, self._server = page, server
+        self.start()
+
+    def start(self) -> None:
+        """Begin here."""
+        self._begun, self._worked = time.monotonic(), processor_s(self._server)
+
+    def tell(self, what: str, *, settled: bool = True) -> None:
+        """Print the row of a table, once the page stands still."""
+        if settled:
+            settle(self._page)
+        seconds, worked = time.monotonic() - self._begun, processor_s(self._server) - self._worked
+        print(f"| {what} | {seconds:.1f} | {worked:.2f} |", flush=True)  # noqa: T201 - a script
+
+
+def processor_s(server: int) -> float:
+    """Return the processor time of the server and of the processes that it waited for; nan where there is no /proc."""
+    stat = Path(f"/proc/{server}/stat")
+    if not stat.exists():
+        return float("nan")
+    return sum(map(int, stat.read_text().rpartition(")")[2].split()[11:15])) / os.sysconf("SC_CLK_TCK")
+
+
+def take(page: Page, clock: Clock) -> None:
     """Go through the pages as a first-time user would."""
-    begun = time.monotonic()
-
-    def tell(what: str) -> None:
-        nonlocal begun
-        settle(page)
-        print(f"| {what} | {time.monotonic() - begun:.1f} |")  # noqa: T201 - a script
-        begun = time.monotonic()
-
     page.get_by_role("button", name="Open the recording").wait_for()
-    tell("start page, from its address")
+    clock.tell("start page, from its address")
     page.screenshot(path=PICTURES / "start.png")
-    begun = time.monotonic()
+    clock.start()
     page.get_by_role("button", name="Open the recording").click()
     page.locator(".st-key-verdict img").wait_for()
-    tell("one click to the verdict with its picture, first analysis of the server")
+    clock.tell("one click to the verdict with its picture, first analysis of the server")
     page.locator(".strip").wait_for()
     settle(page)
     page.screenshot(path=PICTURES / "dashboard.png")
     for view in ("Order spectrum", "Map", "Envelope", "Machine"):
-        begun = time.monotonic()
+        clock.start()
         page.locator(".strip button").filter(has_text=view).first.click()
         page.locator(".strip button[aria-pressed=true]").filter(has_text=view).wait_for()
-        tell(f"view {view}")
+        clock.tell(f"view {view}")
+    clock.start()
     page.get_by_role("link", name="Fault laboratory").click()
-    begun = time.monotonic()
     page.get_by_role("tab", name="Gears").wait_for(timeout=300_000)
-    tell("fault laboratory, first run of the server")
-    pull(page, tell)
+    clock.tell("fault laboratory, first run of the server")
+    pull(page, clock)
+    clock.start()
     page.get_by_role("link", name="Comparison").click()
-    begun = time.monotonic()
     page.get_by_role("tab", name="Orders").wait_for()
-    tell("comparison, with a simulation of five seconds")
+    clock.tell("comparison, with a simulation of five seconds")
     page.get_by_role("link", name="Gap").click()
+    settle(page)
+    clock.start()
     page.get_by_role("button", name="Diagnose").click()
-    begun = time.monotonic()
     page.get_by_role("tab", name="How far").wait_for(timeout=600_000)
-    tell("gap of two samples, nothing kept of the rig")
+    clock.tell("gap of two samples, nothing kept of the rig")
 
 
-def pull(page: Page, tell: Callable[[str], None]) -> None:
+def pull(page: Page, clock: Clock) -> None:
     """Pull the crack's slider by a step, and from end to end as a key that is held does."""
     slider = page.get_by_role("slider", name="Crack in a tooth root")
     slider.focus()
     for n_steps, depth in ((1, 0.02), (99, 2)):
+        clock.start()
         for _ in range(n_steps):
             page.keyboard.press("ArrowRight")
-        begun = time.monotonic()
         page.get_by_role("heading", name=f"Crack in a tooth root, {depth} mm", exact=True).wait_for()
         steps = "one step of a slider" if n_steps == 1 else f"{n_steps} steps of a slider at once"
-        print(f"| {steps} of the laboratory, to the preview | {time.monotonic() - begun:.1f} |")  # noqa: T201
+        clock.tell(f"{steps} of the laboratory, to the preview", settled=False)
         page.get_by_text("Preview of").wait_for(state="hidden")
-        settle(page)
-        print(f"| the same, to the whole recording | {time.monotonic() - begun:.1f} |")  # noqa: T201
-    tell("both")
+        clock.tell("the same, to the whole recording")
     page.screenshot(path=PICTURES / "laboratory.png")
 
 
@@ -108,7 +127,7 @@ def main() -> None:
                 page = browser.new_page(viewport={"width": 1440, "height": 900})
                 page.set_default_timeout(180_000)
                 page.goto(f"http://localhost:{port}/")
-                take(page)
+                take(page, Clock(page, server.pid))
                 browser.close()
         finally:
             server.terminate()
