@@ -130,15 +130,23 @@ def run_benchmark(
 
 def _one(request: BenchmarkRequest, planned: PlannedCase, folder: Path, makers: Executor, running: Running) -> Done:
     kept = folder / ANSWERS_FOLDER / f"case_{planned.number:04d}.json"
-    if kept.exists():
-        truth = makers.submit(request.plan.make, planned, None).result()
-        return Done(planned, truth, from_text(kept.read_text(encoding="utf-8")))
+    if (known := _kept_answers(kept, request.diagnosers)) is not None:
+        return Done(planned, makers.submit(request.plan.make, planned, None).result(), known)
     with TemporaryDirectory(prefix="gearsig-") as name:
         place = Path(name)
         truth = makers.submit(request.plan.make, planned, place).result()
         answers = diagnosed(place, request.diagnosers, running)
     write_text(kept, to_text(answers))
     return Done(planned, truth, answers)
+
+
+def _kept_answers(path: Path, diagnosers: Sequence[str]) -> dict[str, Answer] | None:
+    """Return the answers of an earlier run; None where there are none, or they are damaged: they are given again."""
+    try:
+        answers = from_text(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+    return answers if set(answers) == set(diagnosers) else None
 
 
 def n_answered(folder: Path) -> int:

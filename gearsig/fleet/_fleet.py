@@ -359,7 +359,10 @@ class Fleet:
         """
         one_of(table, "table", TABLES)
         target = Path(path)
-        forms = {".csv": "csv, HEADER", ".parquet": "parquet, COMPRESSION snappy", ".jsonl": "json"}
+        # Dictionaries of texts that hardly repeat, and filters over them, cost time and save no room; small groups of
+        # rows stay in the processor's cache.
+        parquet = "parquet, COMPRESSION snappy, DICTIONARY_SIZE_LIMIT 1000, WRITE_BLOOM_FILTER false, "
+        forms = {".csv": "csv, HEADER", ".parquet": f"{parquet} ROW_GROUP_SIZE 61440", ".jsonl": "json"}
         form = forms[one_of(target.suffix.lower(), f"ending of {target.name}", forms)]
         self._check_place(machine, point)
         dated = table in ("indicators", "recordings")

@@ -156,10 +156,19 @@ def test_a_stopped_run_leaves_answers_and_goes_on(tmp_path, capsys, monkeypatch)
     assert kept
     assert {p.name for p in target.iterdir()} == {"benchmark.json", ANSWERS_FOLDER}
     options = ["--cases", "2", "--seed", "4", "--role", "development", "--with-reference", "--longest", "2"]
+    command = ["benchmark", "gap", *options, "--diagnoser", "rules", "-j", "2", "-o", str(target)]
     with pytest.raises(SystemExit) as end:
-        main(["benchmark", "gap", *options, "--diagnoser", "rules", "-j", "2", "-o", str(target)])
+        main(command)
     assert not end.value.code
     assert all(path.stat().st_mtime_ns == time for path, time in kept.items())
+    damaged = next(iter(kept))
+    whole = damaged.read_text(encoding="utf-8")
+    for content in (whole[: len(whole) // 2], '{"rules": {}}'):
+        damaged.write_text(content, encoding="utf-8")  # given again, not believed
+        with pytest.raises(SystemExit) as end:
+            main(command)
+        assert not end.value.code
+        assert set(json.loads(damaged.read_text(encoding="utf-8"))) == {"majority", "rules"}
     told = capsys.readouterr().out
     assert "Against the targets" in told
     check_files(target, wanted.plan)

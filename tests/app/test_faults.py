@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -231,8 +232,9 @@ def test_two_share_a_folder_and_one_is_killed(name, tmp_path, undisturbed):
     draw = _draw(name)
     for place in _places(tmp_path, name):
         killed, other = place.start(), place.start()
-        with pytest.raises(subprocess.TimeoutExpired):
-            killed.communicate(timeout=draw.uniform(0.3, 0.7) * duration_s)
+        with suppress(subprocess.TimeoutExpired):
+            said = killed.communicate(timeout=draw.uniform(0.3, 0.7) * duration_s)[1]
+            assert "Traceback" not in said, said  # it may say that the other one runs, or be quicker than the first was
         killed.kill()
         killed.communicate()
         said = other.communicate()[1]
