@@ -136,9 +136,27 @@ class Plan:
         """Return the generator of what the diagnosing simulator draws for itself: severities, places, noise."""
         return np.random.default_rng([self.seed, 2, case.number])
 
+    def draw(self, planned: PlannedCase) -> BlindCase:
+        """Draw a case's rig, conditions and fault, without recording them."""
+        case = draw_case(
+            self.rng_of(planned),
+            self.role,
+            kind=planned.kind,
+            effect=planned.effect,
+            level=planned.level if planned.kind != "none" else None,
+            n_conditions=planned.n_conditions,
+            with_reference=planned.with_reference,
+        )
+        longest = self.longest_s
+        if longest is None:
+            return case
+        conditions = tuple(replace(c, duration_s=min(c.duration_s, longest)) for c in case.conditions)
+        references = tuple(replace(c, duration_s=min(c.duration_s, longest)) for c in case.references)
+        return replace(case, conditions=conditions, references=references)
+
     def make(self, planned: PlannedCase, folder: Path | None) -> Truth:
         """Draw and record a case; write what may be seen into `folder` (None: nowhere); return the truth."""
-        case = _drawn(self, planned)
+        case = self.draw(planned)
         if planned.source == SAME:
             made, label = record_same(self, planned, case)
         else:
@@ -200,24 +218,6 @@ class Truth:
     fault_changes: tuple[Mapping[str, float], ...]
     healthy: Mapping[str, float]
     healthy_change: Mapping[str, float]
-
-
-def _drawn(plan: Plan, planned: PlannedCase) -> BlindCase:
-    case = draw_case(
-        plan.rng_of(planned),
-        plan.role,
-        kind=planned.kind,
-        effect=planned.effect,
-        level=planned.level if planned.kind != "none" else None,
-        n_conditions=planned.n_conditions,
-        with_reference=planned.with_reference,
-    )
-    longest = plan.longest_s
-    if longest is None:
-        return case
-    conditions = tuple(replace(c, duration_s=min(c.duration_s, longest)) for c in case.conditions)
-    references = tuple(replace(c, duration_s=min(c.duration_s, longest)) for c in case.references)
-    return replace(case, conditions=conditions, references=references)
 
 
 def _truth(label: Mapping[str, Any], made: CaseRecordings) -> Truth:

@@ -56,6 +56,7 @@ from gearsig.gap._diagnose import (
 )
 from gearsig.gap._evidence import (
     SIGNS,
+    TOOTH_FAULTS,
     ShaftSigns,
     evidence_of,
     over_floors,
@@ -153,7 +154,6 @@ from gearsig.gap._simulator import (
 )
 from gearsig.gap._tooth_error import (
     TOOTH_ERRORS_FILE,
-    TOOTH_FAULTS,
     KnownCourses,
     ToothErrorChange,
     ToothErrorEvidence,
@@ -200,7 +200,12 @@ from gearsig.gap._types import (
 )
 from gearsig.gap._verdict import rivals, unbounded_fits, within_the_floor
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
-from gearsig.gap._waveform import WaveformMatch, best_match, waveform_log_likelihood
+from gearsig.gap._waveform import (
+    SimulatedCourse,
+    WaveformMatch,
+    compared_course,
+    waveform_match,
+)
 from gearsig.gap._words import (
     ComparedPair,
     feature_words,
@@ -281,6 +286,7 @@ __all__ = [
     "ReducedRecording",
     "ShaftSigns",
     "Shrinkage",
+    "SimulatedCourse",
     "SpectrumCurves",
     "SpeedFigures",
     "Standing",
@@ -303,12 +309,12 @@ __all__ = [
     "average_curves",
     "banks_of",
     "beside_standing",
-    "best_match",
     "beyond_the_mesh",
     "change_features",
     "change_once",
     "check_steady",
     "compare",
+    "compared_course",
     "conditions_of",
     "counted_against",
     "course_descriptors",
@@ -399,7 +405,7 @@ __all__ = [
     "try_effects",
     "twin_rig",
     "unbounded_fits",
-    "waveform_log_likelihood",
+    "waveform_match",
     "weighed_evidence",
     "with_channels_of",
     "with_common_channels",

@@ -18,7 +18,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from gearsig.gap._conditions import Condition
-from gearsig.gap._evidence import ONE_TOOTH
+from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._labelled import LabelledChange, LabelledEvidence, labelled_evidence, with_labelled
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
@@ -281,7 +281,7 @@ class Attribution(Generic[TriedT]):
 
     @property
     def matches(self) -> dict[str, float]:
-        """Effect → log-likelihood of its waveform, of the faults of one tooth that were tried."""
+        """Effect → log-likelihood of its waveform, of the faults of teeth that were tried."""
         known = ((name, getattr(tried, "match", None)) for name, tried in self.tried.items())
         return {name: match.log_likelihood for name, match in known if match is not None}
 
@@ -370,8 +370,8 @@ def attribute(
     likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
     heard_of = _known_to_forests(conditions)
     own = [name for name in effects or known if name not in heard_of] if max_tried else []
-    if max_tried and any(name in ONE_TOOTH for name in likely):  # waveforms part them: all are tried, or none
-        likely += [name for name in ONE_TOOTH if name in first and name in known and name not in likely]
+    if max_tried and any(name in TOOTH_FAULTS for name in likely):  # waveforms part them: all are tried, or none
+        likely += [name for name in TOOTH_FAULTS if name in first and name in known and name not in likely]
     likely += own
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_where_none_ran(tried, likely, twin)

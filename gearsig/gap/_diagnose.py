@@ -51,6 +51,7 @@ from gearsig.gap._types import (
     group_probabilities,
 )
 from gearsig.gap._verdict import in_order, likeliest_two, named_cause, rivals, unbounded_fits, within_the_floor
+from gearsig.gap._waveform import gain_scatter
 from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
 from gearsig.prepared import PreparedRecording
@@ -79,6 +80,11 @@ OF_THE_TWIN = (
     "middle 5 times, and within the interval in 12. Take it for an order of magnitude, rather too small."
 )
 """By `tests/benchmarks/gap_severity.py 70`."""
+
+OF_THE_WAVEFORM = (
+    "The severity is the one with which the twin's waveform comes nearest; its interval holds nine in ten where the "
+    "simulator is as like the machine as one of its own specimens is to another."
+)
 
 OF_THE_DEPTH = (
     "The crack's depth is that of `gearsig crack`, {depth:.2g} mm ({low:.2g} to {high:.2g} mm): of the machines that "
@@ -264,8 +270,8 @@ def diagnose_gap(
             ),
             *effects_without_place(twin, allowed),
             *remarks,
-            *(depths or _of_the_fit(named)),
-            *_of_the_waveforms(tried, known),
+            *(depths or _of_the_fit(named, tried)),
+            *_of_the_waveforms(tried, known, clearest),
             *(_of_the_encoders(courses, known) if named is not None else ()),
         ),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
@@ -389,18 +395,24 @@ def effects_without_place(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[
     return [remark]
 
 
-def _of_the_waveforms(tried: Mapping[str, TriedEffect], known: Mapping[str, GapEffect]) -> list[str]:
-    """Say how well the twin shows the faults of one tooth, and what follows from it."""
+def _of_the_waveforms(
+    tried: Mapping[str, TriedEffect], known: Mapping[str, GapEffect], condition: Condition
+) -> list[str]:
+    """Say how well the twin shows the faults of a tooth and the healthy machine, and what follows from it."""
     matches = {known[name].title: trial.match.correlation for name, trial in tried.items() if trial.match is not None}
-    if not matches:
+    if not matches or condition.reference is None:
         return []
+    missed_db = 20.0 / np.log(10.0) * gain_scatter(condition.reference, condition.simulated)
     ranked = sorted(matches.items(), key=lambda item: -item[1])
     seen = ", ".join(f"{title} {correlation:.2f}" for title, correlation in ranked)
     told = any(trial.match is not None and trial.match.is_good for trial in tried.values())
     meant = "the highest is likeliest" if told else "too little to part them: the twin is not like this machine"
-    return [
-        f"As a waveform beside the mesh harmonics, the recorded change correlates with the twin's: {seen}; {meant}."
-    ]
+    said = (
+        f"As a waveform beside the mesh harmonics, the recorded change correlates with the twin's: {seen}; {meant}. "
+        f"The healthy twin's mesh harmonics miss those of the reference by {missed_db:.0f} dB beside each other, and "
+        "as much is allowed to each harmonic of a fault: the more, the less its waveform tells."
+    )
+    return [said]
 
 
 def _courses(
@@ -429,10 +441,12 @@ def _of_the_encoders(courses: Sequence[ToothErrorEvidence], known: Mapping[str, 
     return [f"{changed}{where}; by its course alone, all faults of teeth as likely before: {likely}."]
 
 
-def _of_the_fit(named: GapCause | None) -> list[str]:
-    """Say what the fitted severity is worth, or that there is none."""
+def _of_the_fit(named: GapCause | None, tried: Mapping[str, TriedEffect]) -> list[str]:
+    """Say what the stated severity is worth, or that there is none."""
     if named is None:
         return []
+    if named.name in tried and tried[named.name].is_shown:
+        return [OF_THE_WAVEFORM]
     nearer = [OF_THE_TWIN] if named.severity is not None and not named.severity.is_unbounded else []
     return [*nearer, *([NOT_NEARER.format(title=named.title)] if not named.fitted and named.shrinkage else [])]
 
@@ -479,7 +493,7 @@ def _cause(
     frame = conditions[0].now.frame
     return replace(
         cause,
-        severity=None if placing is None else placing.fit.severity,
+        severity=None if placing is None else placing.severity,
         fitted=None if placing is None else at_its_tooth(placing.added, frame, places),
         shrinkage=trial.shrinkage,
         evidence=evidence_of(trial.fit, observed_changes(conditions), frame),

@@ -101,6 +101,9 @@ def weighed_evidence(
 ONE_TOOTH = ("root_crack", "tooth_spall", "chipped_tooth")
 """Causes on a single tooth."""
 
+TOOTH_FAULTS = (*ONE_TOOTH, "pitch_error")
+"""Causes that change one engagement each, with a course of its own: waveforms and encoders tell them apart."""
+
 _BURST = ("change.{}.peak", "change.{}.prominence", "tooth.{}.peak", "tooth.{}.prominence", "tooth.{}.kurtosis")
 _ALL_ROUND = ("change.{}.level", "change.{}.elsewhere", "tooth.{}.level", "tooth.{}.elsewhere", "shaft.{}.low")
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap._conditions import SEED, Condition
-from gearsig.gap._evidence import ONE_TOOTH
+from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._floors import family_members
 from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin
 from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared
@@ -155,7 +155,6 @@ to 3000 rpm 55."""
 WIDE = 2.0
 """Ratio of speeds from which a resonance is told from an order."""
 
-ON_A_TOOTH = (*ONE_TOOTH, "pitch_error")
 PASSED_ON = ("transfer_path", "tooth_wear", "surface_roughness", "sliding_friction", "bearing_clearance")
 AROUND_A_SHAFT = ("unbalance", "eccentricity", "misalignment")
 """Effects that are taken for each other."""
@@ -196,7 +195,7 @@ def next_steps(
     likely = [cause.name for cause in causes if cause.probability >= LIKELY]
     speeds = [point.speed_rpm for point in points]
     slow = {round(point.torque_nm, 3) for point in points if point.speed_rpm <= SLOW_RPM}
-    is_which_tooth_fault = sum(name in ON_A_TOOTH for name in likely) > 1
+    is_which_tooth_fault = sum(name in TOOTH_FAULTS for name in likely) > 1
     passed_on = any(sum(name in group for name in likely) > 1 for group in (PASSED_ON, AROUND_A_SHAFT))
     is_worth = {
         "healthy": not has_reference,

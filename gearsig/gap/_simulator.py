@@ -29,6 +29,8 @@ class GapEffect:
         The textbook's: features that rise (1), fall (−1) or change either way (0); ``{side}`` is driver or driven.
     moves_pitches : float
         By how much, either way, its place within a tooth's engagement moves between the severities of its candidates.
+    is_on_every_tooth : bool
+        Whether it sits on all teeth of a gear, on each by itself.
     """
 
     name: str
@@ -41,6 +43,7 @@ class GapEffect:
     is_nuisance: bool = False
     signs: tuple[tuple[str, int], ...] = ()
     moves_pitches: float = 0.0
+    is_on_every_tooth: bool = False
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,15 @@ class CanBeQuiet(Protocol):
 
     def quiet(self) -> Twin:
         """Return the machine without the noise of its surroundings, its own vibration as small as may be."""
+        ...
+
+
+@runtime_checkable
+class HasCourses(Protocol):
+    """A twin that knows further settings of a tooth's fault, which take another course over the engagement."""
+
+    def courses(self, effect: str) -> Sequence[Added]:
+        """Return those settings, beside the candidates; none where these show all there is."""
         ...
 
 

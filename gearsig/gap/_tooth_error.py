@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, InputError
+from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._features import SIDES
 from gearsig.motion import TransmissionError, transmission_error
 from gearsig.recording import Recording
@@ -29,9 +30,6 @@ from gearsig.recording import Recording
 TOOTH_ERRORS_FILE = Path(__file__).with_name("tooth_errors.npz")
 MAX_BYTES = 10_000_000
 MAKE_TOOTH_ERRORS = "in a checkout of the project: python -m app.studies.gap.tooth_errors"
-
-TOOTH_FAULTS = ("root_crack", "tooth_spall", "chipped_tooth", "pitch_error")
-"""Effects that the course of the transmission error tells apart."""
 
 STEPS = 32
 """Of a pitch."""

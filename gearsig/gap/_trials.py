@@ -17,7 +17,7 @@ from gearsig.cache import keep, modules_digest, read_arrays
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.gap._conditions import SEED, Condition, halves, observed
-from gearsig.gap._evidence import ONE_TOOTH, SIGNS, told_options
+from gearsig.gap._evidence import ONE_TOOTH, SIGNS, TOOTH_FAULTS, told_options
 from gearsig.gap._features import SIDES, whole_and_parts
 from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
 from gearsig.gap._places import SAME_ORDER
@@ -34,9 +34,19 @@ from gearsig.gap._prediction import (
     transplanted,
 )
 from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording
-from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, OperatingCondition, Twin
+from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, HasCourses, OperatingCondition, Twin
 from gearsig.gap._types import GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
-from gearsig.gap._waveform import N_HARMONICS, OFFSETS, WaveformMatch, best_match, mesh_sidebands, sideband_weights
+from gearsig.gap._waveform import (
+    N_HARMONICS,
+    OFFSETS,
+    WaveformMatch,
+    compared_course,
+    gain_scatter,
+    joined_courses,
+    mesh_sidebands,
+    sideband_noise,
+    waveform_match,
+)
 from gearsig.gap._words import shaft_words
 from gearsig.processes import active_cluster, can_be_sent, run_jobs
 
@@ -487,7 +497,7 @@ class TriedEffect:
     shrinkage : Shrinkage
         On held-out data.
     match : WaveformMatch or None
-        Of a fault of one tooth, with a reference: how well the twin shows its course.
+        Of a tooth's fault, with a reference: how well the twin shows its course, and at which severity.
     """
 
     name: str
@@ -503,10 +513,13 @@ class TriedEffect:
 
     @property
     def added(self) -> Added:
-        """The setting that comes nearest, on the gear whose waveform is the recorded one."""
-        if self.match is None or not self.match.is_good:
-            return self.fit.added
-        return replace(self.fit.added, options={**self.fit.added.options, "gear": self.match.gear})
+        """The setting that comes nearest: by waveform where the twin shows it well."""
+        return self.match.added if self.match is not None and self.match.is_good else self.fit.added
+
+    @property
+    def severity(self) -> Interval:
+        """The same as an interval."""
+        return self.match.severity if self.match is not None and self.match.is_good else self.fit.severity
 
     @property
     def explains(self) -> bool:
@@ -533,9 +546,13 @@ def try_effects(
     told = {effect.name: told_options(effect.name, changes, teeth) for effect in effects}
     folds = folds_of(conditions)
     where = " and ".join(c.facts.name for c in conditions)
+    candidates = {name: worth_simulating(twin.candidates(name), told[name]) for name in told}
+    courses: dict[str, Sequence[Added]] = {}
+    if isinstance(twin, HasCourses) and any(condition.reference is not None for condition in conditions):
+        courses = {n: [a for a in twin.courses(n) if told[n].items() <= a.options.items()] for n in told}
     banks = banks_of(
         [_run(twin, condition) for condition in conditions],
-        {name: worth_simulating(twin.candidates(name), told[name]) for name in told},
+        {name: [*candidates[name], *courses.get(name, ())] for name in told},
         seeds=[SEED],
         folder=cache,
         processes=PROCESSES,
@@ -545,11 +562,11 @@ def try_effects(
     found = {}
     for effect in effects:
         name = effect.name
-        every = _paths([at[name] for at in banks], conditions, effect.shows_in)
+        every = _paths([at[name] for at in banks], candidates[name], conditions, effect.shows_in)
         if every:
             paths, excluded = on_shaft(every, told[name])
             shrink = shrinkage(paths, folds, HELD_OUT, excluded)
-            match = _match([at[name] for at in banks], conditions, effect.moves_pitches) if name in ONE_TOOTH else None
+            match = _match([at[name] for at in banks], conditions, effect) if name in TOOTH_FAULTS else None
             found[name] = TriedEffect(name, paths, fit_effect(paths, observed_changes(conditions)), shrink, match)
     return found
 
@@ -568,25 +585,40 @@ def worth_simulating(candidates: Sequence[Added], told: Mapping[str, str]) -> li
     return [*placed, *elsewhere.values()]
 
 
-def _match(banks: Sequence[Bank], conditions: Sequence[Condition], moves_pitches: float) -> WaveformMatch | None:
-    """Return the likeliest match over both gears and the conditions that have a reference."""
+def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEffect) -> WaveformMatch | None:
+    """Return what an effect's waveforms say at the conditions that have a reference."""
     found = []
     for bank, condition in zip(banks, conditions, strict=True):
         if condition.reference is None:
             continue
-        observed = mesh_sidebands(condition.now, condition.reference, is_turned=True)
-        weights = sideband_weights(condition.now, condition.reference, observed)
         names, simulated = list(condition.now.channels), list(condition.simulated.channels)
         if not set(names) <= set(simulated) or len(simulated) != bank.sidebands.shape[1]:
             continue
         channels = [simulated.index(name) for name in names]
-        for side, gear in enumerate(SIDES):
-            own = [i for i, added in enumerate(bank.added) if added.options.get("gear") == gear]
-            trials = [bank.sidebands[i][channels, side] for i in own]
-            match = best_match(observed[:, side], weights[:, side], trials, moves_pitches=moves_pitches)
-            found.append(None if match is None else replace(match, gear=gear))
-    matches = [match for match in found if match is not None]
-    return max(matches, key=lambda match: match.log_likelihood, default=None)
+        observed = mesh_sidebands(condition.now, condition.reference, is_turned=True)
+        noise = sideband_noise(condition.now, condition.reference)
+        scatter = gain_scatter(condition.reference, condition.simulated)
+        compared = [
+            compared_course(
+                added,
+                sidebands[channels, side],
+                observed[:, side],
+                noise[:, side],
+                moves_pitches=effect.moves_pitches,
+                n_teeth=condition.now.frame.teeth[side] if effect.is_on_every_tooth else 0,
+                gain_scatter=scatter,
+            )
+            for added, sidebands in zip(bank.added, bank.sidebands, strict=True)
+            if (side := _side(added)) is not None and ("tooth" in added.options or not effect.is_on_every_tooth)
+        ]
+        found.append([course for course in compared if course is not None])
+    severities = [added.severity for bank in banks for added in bank.added]
+    return waveform_match(joined_courses(found), min(severities), max(severities)) if severities else None
+
+
+def _side(added: Added) -> int | None:
+    gear = added.options.get("gear")
+    return SIDES.index(str(gear)) if gear in SIDES else None
 
 
 def on_shaft(
@@ -620,10 +652,12 @@ def _run(twin: Twin, condition: Condition) -> TwinRun:
     )
 
 
-def _paths(banks: Sequence[Bank], conditions: Sequence[Condition], shows_in: tuple[str, ...]) -> tuple[EffectPath, ...]:
+def _paths(
+    banks: Sequence[Bank], candidates: Sequence[Added], conditions: Sequence[Condition], shows_in: tuple[str, ...]
+) -> tuple[EffectPath, ...]:
     """Return an effect's paths over the candidates that could be simulated at every condition."""
     n = n_compared(conditions)
-    kept = [a for a in banks[0].added if all(a in bank.added for bank in banks)]
+    kept = [a for a in candidates if all(a in bank.added for bank in banks)]
     tables = [
         _distances(bank, kept, condition, shows_in)[:, :, :n] for bank, condition in zip(banks, conditions, strict=True)
     ]
@@ -810,7 +844,7 @@ def cause_place(
     changes = [condition.over_floors for condition in conditions]
     told: dict[str, float | str] = {**told_options(name, changes, frame.teeth)}
     if tried is not None and tried.match is not None and tried.is_shown:
-        told["gear"] = tried.match.gear
+        told["gear"] = tried.match.added.options["gear"]
     if told or name not in SIGNS:
         added = tried.added if tried is not None else Added(name, 0.0, _with_a_tooth(name, told))
         return place_of(added, frame, places)

@@ -179,6 +179,7 @@ def as_gap_effect(shown: Effect) -> GapEffect:
         shown.group == "measurement chain",
         shown.textbook.signs if shown.textbook else (),
         shown.moves_pitches,
+        shown.is_on_every_tooth,
     )
 
 

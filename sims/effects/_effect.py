@@ -164,6 +164,9 @@ class PlausibleRange:
         Largest severity that the machine allows.
     n_severities : int
         Worth a try, at even ratios.
+    courses : callable
+        Further option sets, with which the fault of a tooth takes another course over the engagement, and with which of
+        these severities each is worth a try.
     """
 
     low: float
@@ -174,6 +177,7 @@ class PlausibleRange:
     drawn: Callable[[MachineFacts, np.random.Generator], Options] = lambda _machine, _rng: {}
     largest: Scale = lambda _machine, _options: float("inf")
     n_severities: int = 3
+    courses: Callable[[MachineFacts], Sequence[tuple[Options, Sequence[int]]]] = lambda _machine: ()
 
 
 # --------------------
@@ -238,6 +242,8 @@ class Effect:
     moves_pitches : float
         By how much, either way, its place within a tooth's engagement moves between severities that are tried; 0: it
         stays where it is.
+    is_on_every_tooth : bool
+        Whether it sits on all teeth of a gear, on each by itself.
     """
 
     name: str
@@ -253,6 +259,7 @@ class Effect:
     on_drive: Callable[[DriveParameters, float, Options], DriveEffect] | None = None
     textbook: Textbook | None = None
     moves_pitches: float = 0.0
+    is_on_every_tooth: bool = False
 
     def __post_init__(self) -> None:
         one_of(self.group, f"group of {self.name}", GROUPS)

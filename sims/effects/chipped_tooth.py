@@ -42,7 +42,7 @@ EFFECT = Effect(
     "sidebands of that shaft, ringing resonances, envelope lines at multiples of its order. Small chips lie in double "
     "contact and show little.",
     shows_in=("tooth_window", "envelope_orders", "mesh_sidebands", "resonances"),
-    moves_pitches=0.2,  # the pair lets go a quarter of a pitch earlier for each millimetre at a module of 4 mm
+    moves_pitches=0.24,  # the pair lets go a quarter of a pitch earlier for each millimetre at a module of 4 mm
     change=change,
     options=(
         GEAR_OPTION,
@@ -59,6 +59,12 @@ EFFECT = Effect(
             **shared.any_tooth(machine, rng),
             "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0))),
         },
+        # Without its whole tip a tooth carries nothing there; with most of it left, nearly as much as ever.
+        courses=lambda machine: [
+            (options, (0, 1, 2))
+            for percent in (35.0, 100.0)
+            for options in shared.first_teeth(machine, width_percent=percent)
+        ],
     ),
     textbook=book.Textbook(
         (("tooth.{side}.peak", book.UP), ("tooth.{side}.prominence", book.UP), ("tooth.{side}.second", book.UP)),

@@ -8,17 +8,21 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from sims.effects import _shared as shared
-from sims.effects._effect import GEAR_OPTION, Effect, Options, PlausibleRange, Severity
+from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Options, PlausibleRange, Severity
 from sims.effects.textbook import MAX_ADVANCE, UP, Signature, SyntheticScene, Textbook, balance, draw_side
 from sims.machine import Machine, pitch_tolerance_um
 from sims.mesh import FlankDeviation
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with pitch errors added to those it has."""
+    """Return the machine with pitch errors added to those it has: of all teeth, or of one that stands behind."""
     index = shared.gear_index(options)
     flank: FlankDeviation = shared.mesh_field(machine, "flank", index)
-    added = severity * cumulative_pitch(shared.gear_geometry(machine, index).teeth, rng)
+    if "tooth" in options:
+        added = np.zeros(shared.gear_geometry(machine, index).teeth)
+        added[shared.tooth_number(machine, options)] = severity
+    else:
+        added = severity * cumulative_pitch(shared.gear_geometry(machine, index).teeth, rng)
     total = added + np.asarray(flank.pitch_um) if flank.pitch_um else added
     return shared.with_mesh_field(machine, "flank", index, replace(flank, pitch_um=tuple(total.tolist())))
 
@@ -69,8 +73,12 @@ EFFECT = Effect(
     "particular, so that the synchronous average changes all round while its kurtosis hardly does. It fades as the "
     "load rises.",
     shows_in=("shaft_orders", "mesh_sidebands"),
+    is_on_every_tooth=True,
     change=change,
-    options=(GEAR_OPTION,),
+    options=(
+        GEAR_OPTION,
+        replace(TOOTH_OPTION, default=None, meaning="the only tooth that is out, behind by that much; none: all are"),
+    ),
     plausible=PlausibleRange(
         0.4,
         3.0,
@@ -78,6 +86,8 @@ EFFECT = Effect(
         shared.tolerance_of(pitch_tolerance_um),
         shared.either_gear,
         shared.any_gear,
+        # The teeth's deviations are drawn; what one of them changes, each changes, as long as no tooth parts.
+        courses=lambda machine: [(options, (0,)) for options in shared.first_teeth(machine)],
     ),
     textbook=Textbook(
         (("tooth.{side}.elsewhere", UP), ("shaft.{side}.low", UP), ("sideband.{side}.3to5", UP)),

@@ -56,6 +56,12 @@ EFFECT = Effect(
         85.0,
         "percent of the face; a pit of a tenth is lost in ordinary flanks, 90 is the model's limit",
         choices=lambda machine: first_teeth(machine, length_mm=0.45 * machine.nominal.module_mm),
+        # The ends of a spall are two steps: how far they lie apart decides which orders they add up or cancel at.
+        courses=lambda machine: [
+            (options, (2,))
+            for length in (0.2, 0.3, 0.67, 1.0)
+            for options in first_teeth(machine, length_mm=length * machine.nominal.module_mm)
+        ],
         drawn=lambda machine, rng: {
             **any_tooth(machine, rng),
             "length_mm": machine.nominal.module_mm * log_uniform(rng, 0.2, 1.0),

@@ -17,7 +17,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.gap import Added, GapEffect, OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import OperatingPoint, Rig, rig_to_dict
-from sims.effects import GEARS, EffectSetting, MachineFacts, as_gap_effect, effect, effects
+from sims.effects import GEARS, EffectSetting, MachineFacts, Options, as_gap_effect, effect, effects
 from sims.gear_pair._installed import HousingMode, SensorSeat, completed, further_seats, installed_of_rig, table_of
 from sims.gear_pair._simulator import PairModel, ReadyPair
 from sims.machine import Nominal, log_uniform, nominal_of, pitch_tolerance_um, runout_tolerance_um, usual_mass_kg
@@ -260,14 +260,21 @@ class PairTwin:
 
     def candidates(self, name: str) -> Sequence[Added]:
         """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
-        chosen, machine = effect(name), self._facts
-        candidates = []
-        for options in chosen.plausible_range.choices(machine):
-            severities = np.geomspace(
-                *chosen.plausible_severities(machine, options), chosen.plausible_range.n_severities
-            )
-            candidates += [Added(name, float(f"{severity:.4g}"), options) for severity in severities]
-        return candidates
+        plausible = effect(name).plausible_range
+        which = range(plausible.n_severities)
+        return self._settings(name, [(options, which) for options in plausible.choices(self._facts)])
+
+    def courses(self, name: str) -> Sequence[Added]:
+        """Return further settings, with which a tooth's fault takes another course over the engagement."""
+        return self._settings(name, effect(name).plausible_range.courses(self._facts))
+
+    def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[int]]]) -> list[Added]:
+        """Return each set of options with some of its severities."""
+        n, found = effect(name).plausible_range.n_severities, []
+        for options, which in chosen:
+            severities = np.geomspace(*effect(name).plausible_severities(self._facts, options), n)
+            found += [Added(name, float(f"{severities[i]:.4g}"), options) for i in which]
+        return found
 
     def with_further_sensors(self) -> tuple[Self, Mapping[str, str]]:
         """Return the machine with an upright sensor over each bearing that has none, and those channels' places."""

@@ -1,4 +1,4 @@
-"""Faults of one tooth told apart by the course of what they change."""
+"""Faults of teeth told apart, and measured, by the course of what they change."""
 
 from __future__ import annotations
 
@@ -6,54 +6,140 @@ import numpy as np
 import pytest
 
 from gearsig.gap import SIDEBAND_OFFSETS as OFFSETS
-from gearsig.gap import best_match, told_apart, waveform_log_likelihood
+from gearsig.gap import Added, SimulatedCourse, compared_course, told_apart, waveform_match
 
 N_CHANNELS, N_HARMONICS = 2, 8
-WEIGHTS = np.ones((N_CHANNELS, N_HARMONICS))
+HARMONICS = np.arange(1, N_HARMONICS + 1)[:, None]
+NOISE = np.full((N_CHANNELS, N_HARMONICS, len(OFFSETS)), 1e-6)
 
 
-def course(centre: float, width: float, amplitude: float = 1.0) -> np.ndarray:
+def course(centre: float, width: float, amplitude: float = 1.0, later_pitches: float = 0.0) -> np.ndarray:
     """Sidebands of a bump over the angle, of which every harmonic shows another part."""
-    harmonics = np.arange(1, N_HARMONICS + 1)[:, None]
     one = (
         amplitude
         * np.exp(-((width * OFFSETS) ** 2))
         * np.exp(-1j * OFFSETS * centre)
-        * np.exp(1j * harmonics * width * 40.0)
+        * np.exp(1j * HARMONICS * width * 40.0)
+        * np.exp(-2j * np.pi * HARMONICS * later_pitches)
     )
     return np.stack([one] * N_CHANNELS)
 
 
+def noise_alone(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    shape = course(0.0, 0.05).shape
+    return rng.normal(size=shape) + 1j * rng.normal(size=shape)
+
+
+def compared(observed: np.ndarray, simulated: np.ndarray, severity: float = 1.0, **how: float) -> SimulatedCourse:
+    found = compared_course(Added("root_crack", severity, {"gear": "driver"}), simulated, observed, NOISE, **how)  # type: ignore[arg-type]
+    assert found is not None
+    return found
+
+
+def likely(observed: np.ndarray, simulated: np.ndarray, **how: float) -> float:
+    match = waveform_match([compared(observed, simulated, **how)], 0.3, 3.0)
+    assert match is not None
+    return match.log_likelihood
+
+
 @pytest.mark.parametrize("turn", [0.0, 1.3, -2.7])
 def test_the_same_course_at_any_turn_and_scale_correlates_by_one(turn: float) -> None:
-    match = best_match(0.5 * course(turn, 0.05), WEIGHTS, [course(0.0, 0.05)])
-    assert match is not None
-    assert match.correlation == pytest.approx(1.0, abs=1e-3)
-    assert match.scale == pytest.approx(0.5, rel=1e-3)
+    found = compared(0.5 * course(turn, 0.05), course(0.0, 0.05))
+    assert found.correlation == pytest.approx(1.0, abs=0.03)  # turns are looked at in steps
+    assert found.log_size == pytest.approx(np.log(2.0), abs=1e-6)
 
 
-def test_another_course_correlates_less_and_noise_hardly() -> None:
-    rng = np.random.default_rng(4)
-    noise = rng.normal(size=course(0, 0.05).shape) + 1j * rng.normal(size=course(0, 0.05).shape)
+def test_another_course_is_less_likely_and_noise_tells_nothing() -> None:
     seen = course(0.4, 0.05)
-    other, by_chance = (best_match(seen, WEIGHTS, [trial]) for trial in (course(0.0, 0.11), noise))
-    assert other is not None
-    assert by_chance is not None
-    assert other.correlation < 0.95
-    assert by_chance.correlation < 0.4
-    assert by_chance.log_likelihood < 0.9
+    same, other, by_chance = (likely(seen, trial) for trial in (course(0.0, 0.05), course(0.0, 0.11), noise_alone(4)))
+    assert same > other + 5.0
+    assert abs(by_chance) < 2.5
+    assert compared(seen, noise_alone(5)).correlation < 0.4
 
 
-def test_the_severity_of_the_right_strength_is_likelier() -> None:
-    trials = [course(0.0, 0.05, amplitude) for amplitude in (0.2, 1.0, 5.0)]
-    match = best_match(course(1.0, 0.05, 1.1), WEIGHTS, trials)
+def test_harmonics_that_the_healthy_twin_misses_tell_less() -> None:
+    rng = np.random.default_rng(7)
+    seen = course(0.4, 0.05) * np.exp(2j * np.pi * rng.uniform(size=(N_HARMONICS, 1)))
+    strict, lenient = (likely(seen, course(0.0, 0.05), gain_scatter=alpha) for alpha in (0.3, 1.5))
+    assert lenient > strict + 5.0  # what is not alike is no evidence against the fault
+    same, other = (likely(course(0.4, 0.05), course(0.0, width), gain_scatter=1.5) for width in (0.05, 0.055))
+    sure, unlikely = (likely(course(0.4, 0.05), course(0.0, width), gain_scatter=0.3) for width in (0.05, 0.055))
+    assert sure - unlikely > same - other > 0.0  # nor is what is alike as much evidence for it
+
+
+def test_the_severity_is_that_of_the_right_size_and_its_interval_holds_it() -> None:
+    severities = (0.5, 1.0, 2.0, 4.0)  # sidebands grow as the square
+    trials = [compared(course(1.0, 0.05, 1.7**2), course(0.0, 0.05, s**2), s) for s in severities]
+    match = waveform_match(trials, 0.5, 4.0)
     assert match is not None
-    assert match.scale == pytest.approx(1.1, rel=1e-3)
+    assert match.severity.value == pytest.approx(1.7, rel=0.1)
+    assert 1.0 < match.severity.low < 1.7 < match.severity.high < 2.8
+    assert match.added.options == {"gear": "driver"}
+
+
+def test_one_severity_grows_as_the_fullest_set_does() -> None:
+    def with_length(length: float, severity: float) -> SimulatedCourse:
+        found = compared_course(
+            Added("tooth_spall", severity, {"length_mm": length}),
+            course(0.0, 0.03 * length, severity**2),
+            course(1.0, 0.06, 0.25),
+            NOISE,
+        )
+        assert found is not None
+        return found
+
+    trials = [*(with_length(1.0, s) for s in (0.25, 0.5, 1.0)), with_length(2.0, 1.0)]
+    match = waveform_match(trials, 0.25, 1.0)
+    assert match is not None
+    assert match.added.options == {"length_mm": 2.0}
+    assert match.severity.value == pytest.approx(0.5, rel=0.15)
+
+
+def test_where_any_severity_fits_nothing_bounds_it() -> None:
+    match = waveform_match([compared(noise_alone(1), course(0.0, 0.05), s) for s in (1.0, 2.0)], 1.0, 2.0)
+    assert match is not None
+    assert match.severity.is_unbounded
+    assert not match.is_good
 
 
 def test_where_nothing_was_seen_or_simulated_there_is_no_match() -> None:
-    assert best_match(course(0.0, 0.05), 0.0 * WEIGHTS, [course(0.0, 0.05)]) is None
-    assert best_match(course(0.0, 0.05), WEIGHTS, []) is None
+    added = Added("root_crack", 1.0, {"gear": "driver"})
+    nothing = 0.0 * course(0.0, 0.05)
+    assert compared_course(added, course(0.0, 0.05), nothing, NOISE) is None
+    assert compared_course(added, nothing, course(0.0, 0.05), NOISE) is None
+    assert waveform_match([], 1.0, 2.0) is None
+
+
+def test_a_fault_that_may_move_is_found_where_it_is_and_pays_for_its_freedom() -> None:
+    seen = course(0.3, 0.05, later_pitches=0.13)
+    fixed, free = (likely(seen, course(0.0, 0.05), moves_pitches=moves) for moves in (0.0, 0.24))
+    known = likely(course(0.3, 0.05), course(0.0, 0.05))
+    assert fixed < free - 5.0
+    assert free < known - 0.5
+
+
+def test_uneven_pitch_is_the_course_of_one_tooth_with_any_pattern() -> None:
+    rng = np.random.default_rng(3)
+    n_teeth = 40
+    half = len(OFFSETS) // 2
+    spread = np.sqrt(n_teeth / 8.0) / np.sin(np.pi * OFFSETS[half:] / n_teeth)
+    pattern = spread * (rng.normal(size=half) + 1j * rng.normal(size=half)) / np.sqrt(2.0)
+    both_sides = np.concatenate([np.conj(pattern[::-1]), pattern])
+    seen = 3.0 * both_sides * course(0.0, 0.05)
+    added = Added("pitch_error", 1.0, {"gear": "driver", "tooth": 1.0})
+    every = compared_course(added, course(0.0, 0.05), seen, NOISE, n_teeth=n_teeth)
+    assert every is not None
+    assert every.correlation == pytest.approx(1.0, abs=0.01)
+    match = waveform_match([every], 0.5, 20.0)
+    assert match is not None
+    assert match.severity.low < 3.0 / np.sqrt(2.0) < match.severity.high
+    assert match.log_likelihood > likely(seen, course(0.0, 0.05)) + 5.0
+    # A fault of one tooth has one size at all orders, and gains of harmonics are allowed it: a pattern is less likely.
+    local = course(0.3, 0.05) * (1.0 + 0.3 * noise_alone(8)[:1, :, :1])
+    as_pattern = compared_course(added, course(0.0, 0.05), local, NOISE, n_teeth=n_teeth)
+    assert as_pattern is not None
+    assert likely(local, course(0.0, 0.05)) > float(as_pattern.levels.max()) + 5.0
 
 
 def test_waveforms_part_what_faults_of_a_tooth_have_together() -> None:
@@ -64,22 +150,3 @@ def test_waveforms_part_what_faults_of_a_tooth_have_together() -> None:
     assert after["root_crack"] / after["tooth_spall"] == pytest.approx(0.6 * np.exp(2.0))
     assert next(iter(after)) == "root_crack"
     assert told_apart(before, {"root_crack": 5.0}) == before
-
-
-def test_a_twin_that_resembles_nothing_says_nothing() -> None:
-    assert waveform_log_likelihood(0.0, 0.0) == 0.0
-    assert waveform_log_likelihood(0.15, 1.0) < 0.15
-    assert waveform_log_likelihood(0.9, 1.0) > waveform_log_likelihood(0.9, 0.3) > 5.0
-
-
-def test_a_fault_that_may_move_is_found_where_it_is_and_pays_for_its_freedom() -> None:
-    harmonics = np.arange(1, N_HARMONICS + 1)[:, None]
-    seen = course(0.3, 0.05) * np.exp(-2j * np.pi * harmonics * 0.13)
-    fixed, free = (best_match(seen, WEIGHTS, [course(0.0, 0.05)], moves_pitches=moves) for moves in (0.0, 0.2))
-    assert fixed is not None
-    assert free is not None
-    assert fixed.correlation < 0.6
-    assert free.correlation == pytest.approx(1.0, abs=1e-3)
-    known = best_match(course(0.3, 0.05), WEIGHTS, [course(0.0, 0.05)])
-    assert known is not None
-    assert fixed.log_likelihood < free.log_likelihood < known.log_likelihood - 1.0

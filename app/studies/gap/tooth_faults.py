@@ -1,0 +1,230 @@
+"""How well faults of teeth are told from each other, and how severe they are, where the simulator is a good one.
+
+`python -m app.studies.gap.tooth_faults [--source same] [--rigs 6] [--seed 8101] [--role development]` draws rigs,
+records a specimen of each healthy and with every fault of a tooth, and asks the diagnosis with the 16-degree-of-freedom
+pair as twin: that is another specimen with another housing, flanks and tolerances. `--source blind`
+and `--source reduced-fe` record the independent rig and the pair of finite-element gears instead: poor twins, whose
+trials must do no harm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import typer
+
+from app.benchmark.cases import Plan, PlannedCase
+from gearsig.errors import GearsigError, RefusalError
+from gearsig.gap import (
+    TOOTH_FAULTS,
+    Added,
+    Interval,
+    OperatingCondition,
+    attribute,
+    conditions_of,
+    tooth_load_n_per_mm,
+)
+from gearsig.prepared import PreparedRecording
+from gearsig.recording import Recording
+from gearsig.rig import Rig
+from gearsig.severity import CrackEstimate, estimate_crack
+from sims.blind import BlindCase, labels, record_case
+from sims.gear_pair import PairTwin
+from sims.registry import gap_simulator
+
+LEVELS = (0.25, 0.6)
+"""Shares of the plausible severities, in logarithms, above which each fault is drawn."""
+BLIND_LEVELS = (0.5, 0.9)
+MIN_LOAD_N_PER_MM = 30.0
+"""With less, flanks part and no fault of a tooth is what one sees."""
+LONGEST_S = 4.0
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """One recording with its healthy reference, and what is wrong; severity nan where units differ."""
+
+    name: str
+    severity: float
+    now: Recording
+    reference: Recording
+
+
+@dataclass(frozen=True)
+class Answered:
+    """What was said of one recording.
+
+    Parameters
+    ----------
+    name : str
+        The true fault.
+    severity : float
+    forests, both : mapping
+        Fault of a tooth → probability among them, without and with waveforms.
+    likeliest : str
+        Of all causes.
+    correlation : float
+        Of the true fault's waveform.
+    said : Interval or None
+        The severity that is stated of the true fault.
+    """
+
+    name: str
+    severity: float
+    forests: dict[str, float]
+    both: dict[str, float]
+    likeliest: str
+    correlation: float
+    said: Interval | None
+
+
+def drawn_cases(plan: Plan, n_rigs: int) -> Iterator[tuple[int, BlindCase]]:
+    """Yield so many cases with their numbers, each of another rig under load, shortened to `LONGEST_S`."""
+    number = found = 0
+    while found < n_rigs:
+        number += 1
+        case = plan.draw(PlannedCase(number, "blind", "single", TOOTH_FAULTS[0], LEVELS[0], True, 1))
+        first = case.conditions[0]
+        rig = case.rig.description(first.stated_rpm, first.stated_nm)
+        if tooth_load_n_per_mm(rig.pairs[0], first.true_nm) >= MIN_LOAD_N_PER_MM:
+            found += 1
+            yield number, case
+
+
+def simulated(case: BlindCase, model: str, seed: int) -> Iterator[Recorded]:
+    """Yield a specimen of a simulator with each fault."""
+    rng = np.random.default_rng(seed)
+    first, healthy = case.conditions[0], case.references[0]
+    twin = gap_simulator(model).twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
+    assert isinstance(twin, PairTwin)  # noqa: S101  both models are
+    specimen = int(rng.integers(1, 2**31))
+
+    def run(rpm: float, nm: float, added: Sequence[Added], noise: int) -> Recording:
+        made = twin.run(
+            OperatingCondition(rpm, nm),
+            added,
+            seed=specimen,
+            duration_s=min(first.duration_s, LONGEST_S),
+            sampling_rate_hz=case.rig.sampling_rate_hz,
+            noise=noise,
+        )
+        return made.with_rig(case.rig.description(first.stated_rpm, first.stated_nm))
+
+    reference = run(healthy.true_rpm, healthy.true_nm, (), 1)
+    for name in TOOTH_FAULTS:
+        for k, level in enumerate(LEVELS, 2):
+            added = twin.draw(name, rng, above=level)
+            try:
+                now = run(first.true_rpm, first.true_nm, (added,), k)
+            except GearsigError as error:
+                typer.echo(f"left out: {name} {added.severity:.3g}: {error}")
+                continue
+            yield Recorded(name, added.severity, now.with_name(f"{name} {k}"), reference.with_name("healthy"))
+
+
+def independent(plan: Plan, number: int) -> Iterator[Recorded]:
+    """Yield the independent rig with each fault."""
+    for name in TOOTH_FAULTS:
+        for level in BLIND_LEVELS:
+            case = plan.draw(PlannedCase(number, "blind", "single", name, level, True, 1))
+            made = record_case(case)
+            severity = float(labels(case, made)["effects"][0]["severity"])
+            now, reference = made.conditions[0], made.references[0]
+            yield Recorded(name, severity, now.with_name(f"{name} {level}"), reference.with_name("healthy"))
+
+
+def answered(one: Recorded, rig: Rig, cache: Path) -> Answered:
+    """Diagnose one recording as far as its likeliest causes."""
+    simulator = gap_simulator("cracked")
+    known, twin = simulator.gap_effects(), simulator.twin_of(rig)
+    now, reference = PreparedRecording(one.now.with_rig(rig)), PreparedRecording(one.reference.with_rig(rig))
+    conditions, _ = conditions_of([now], [reference], twin)
+    attribution = attribute(conditions, known, (), twin, cache, lambda _what, _done: None)
+    before, after = (a.probabilities() for a in (replace(attribution, tried={}), attribution))
+    trial = attribution.tried.get(one.name)
+    said = None if trial is None else trial.severity
+    if one.name == "root_crack" and isinstance(depth := _crack(now, reference), CrackEstimate):
+        said = Interval(depth.depth_mm, *depth.interval_mm)
+    match = None if trial is None else trial.match
+    return Answered(
+        one.name,
+        one.severity,
+        _among(before),
+        _among(after),
+        next(iter(after)),
+        0.0 if match is None else match.correlation,
+        said,
+    )
+
+
+def _crack(now: PreparedRecording, reference: PreparedRecording) -> object:
+    try:
+        return estimate_crack(now, reference=reference)
+    except GearsigError:
+        return None
+
+
+def _among(probabilities: dict[str, float]) -> dict[str, float]:
+    total = sum(probabilities[name] for name in TOOTH_FAULTS)
+    return {name: probabilities[name] / total for name in TOOTH_FAULTS}
+
+
+def told(rows: Sequence[Answered]) -> Iterator[str]:
+    """Yield the table: by fault and all, forests alone and with waveforms."""
+    for name in (*TOOTH_FAULTS, "all"):
+        own = [row for row in rows if name in (row.name, "all")]
+        if not own:
+            continue
+        parts = []
+        for said in ([row.forests for row in own], [row.both for row in own]):
+            right = sum(max(p, key=p.__getitem__) == row.name for p, row in zip(said, own, strict=True))
+            loss = float(np.mean([-np.log(max(p[row.name], 1e-9)) for p, row in zip(said, own, strict=True)]))
+            parts.append(f"{right:3} of {len(own):3}, log loss {loss:.2f}")
+        held = [row.said.low <= row.severity <= row.said.high for row in own if row.said is not None]
+        likeliest = sum(row.likeliest == row.name for row in own)
+        yield (
+            f"{name:14} forests {parts[0]}; with waveforms {parts[1]}; likeliest of all causes {likeliest}; "
+            f"severity held {sum(held)} of {len(held)}"
+        )
+
+
+def main() -> None:
+    """Record, ask, print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--source", choices=("same", "blind", "reduced-fe"), default="same")
+    parser.add_argument("--rigs", type=int, default=6)
+    parser.add_argument("--seed", type=int, default=8101)
+    parser.add_argument("--role", default="development")
+    given = parser.parse_args()
+    plan, rows = Plan(1000, given.seed, given.role, reference="with", longest_s=LONGEST_S), []
+    for number, case in drawn_cases(plan, given.rigs):
+        first = case.conditions[0]
+        rig = case.rig.description(first.stated_rpm, first.stated_nm)
+        model = "cracked" if given.source == "same" else given.source
+        is_blind = given.source == "blind"
+        recorded = independent(plan, number) if is_blind else simulated(case, model, given.seed + number)
+        with tempfile.TemporaryDirectory() as cache:
+            for one in recorded:
+                try:
+                    row = answered(one, rig, Path(cache))
+                except RefusalError as error:
+                    typer.echo(f"refused: {one.name}: {error}")
+                    continue
+                rows.append(row)
+                interval = (
+                    "" if row.said is None else f"{row.said.value:.3g} ({row.said.low:.3g} to {row.said.high:.3g})"
+                )
+                p = ", ".join(f"{name} {value:.2f}" for name, value in row.both.items())
+                true = f"{number:3} {row.name:14}{row.severity:8.3g}"
+                typer.echo(f"{true}  {interval:28} ρ {row.correlation:.2f}  {p}; {row.likeliest}")
+    for line in told(rows):
+        typer.echo(line)
+
+
+if __name__ == "__main__":
+    main()
