@@ -600,7 +600,8 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
         scatter = gain_scatter(condition.reference, condition.simulated)
         compared = [
             compared_course(
-                added,
+                # One tooth was simulated of an effect that sits on all.
+                Added(added.name, added.severity, {"gear": SIDES[side]}) if effect.is_on_every_tooth else added,
                 sidebands[channels, side],
                 observed[:, side],
                 noise[:, side],

@@ -191,7 +191,8 @@ def compared_course(
     if not np.any(seen):
         return None
     power = np.where(seen, power, 1.0)
-    o, t = np.where(seen, observed, 0.0), np.where(seen, simulated, 0.0)
+    o: ComplexArray = np.where(seen, observed, 0.0)
+    t: ComplexArray = np.where(seen, simulated, 0.0)
     moved = _moved(moves_pitches, observed.shape[1])
     counted = COUNTED / len(observed)
     rows, correlations = [], []
@@ -199,7 +200,8 @@ def compared_course(
         # With all of it unexplained there is no room for noise beside.
         variance = np.minimum(noise, (1.0 - misfit) * power) + misfit * power
         explained = float(np.sum(np.where(seen, 1.0 + np.log(power / variance) - np.abs(o) ** 2 / variance, 0.0)))
-        products, own = counted * np.conj(t) * o / variance, counted * np.abs(t) ** 2 / variance
+        products: ComplexArray = counted * np.conj(t) * o / variance
+        own: FloatArray = counted * np.abs(t) ** 2 / variance
         whole = counted * float(np.sum(np.abs(o) ** 2 / variance))
         scales = (1.0 - misfit) ** 0.5 * np.exp(LOG_SCALES)
         if n_teeth:
@@ -364,17 +366,16 @@ def _straight(log_severity: FloatArray, shape: Sequence[SimulatedCourse]) -> Flo
     at, size = (np.array(v) for v in zip(*((np.log(c.added.severity), c.log_size) for c in shape), strict=True))
     if len(at) == 1:
         return np.asarray(size[0] + (log_severity - at[0]))
-    found = np.interp(log_severity, at, size)
-    for end, next_to, beyond in ((0, 1, log_severity < at[0]), (-1, -2, log_severity > at[-1])):
-        slope = (size[end] - size[next_to]) / (at[end] - at[next_to])
-        found[beyond] = size[end] + slope * (log_severity[beyond] - at[end])
-    return np.asarray(found)
+    found: FloatArray = np.interp(log_severity, at, size)
+    slopes = np.diff(size) / np.diff(at)
+    found += slopes[0] * np.minimum(log_severity - at[0], 0.0) + slopes[-1] * np.maximum(log_severity - at[-1], 0.0)
+    return found
 
 
 def _interval(severities: FloatArray, density: FloatArray) -> Interval:
     """Return median and 5th to 95th percentile; no end where the largest or the least is as likely as any."""
     below = np.cumsum(density) / density.sum()
-    low, value, high = (float(severities[min(np.searchsorted(below, q), len(below) - 1)]) for q in (0.05, 0.5, 0.95))
+    low, value, high = (float(severities[int(np.searchsorted(below[:-1], q))]) for q in (0.05, 0.5, 0.95))
     as_likely = density >= _AS_LIKELY * density.max()
     return Interval(value, 0.0 if as_likely[0] else low, inf if as_likely[-1] else high)
 

@@ -18,11 +18,12 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     """Return the machine with pitch errors added to those it has: of all teeth, or of one that stands behind."""
     index = shared.gear_index(options)
     flank: FlankDeviation = shared.mesh_field(machine, "flank", index)
+    n_teeth = shared.gear_geometry(machine, index).teeth
     if "tooth" in options:
-        added = np.zeros(shared.gear_geometry(machine, index).teeth)
-        added[shared.tooth_number(machine, options)] = severity
+        pattern: FloatArray = np.eye(n_teeth)[shared.tooth_number(machine, options)]
     else:
-        added = severity * cumulative_pitch(shared.gear_geometry(machine, index).teeth, rng)
+        pattern = cumulative_pitch(n_teeth, rng)
+    added = severity * pattern
     total = added + np.asarray(flank.pitch_um) if flank.pitch_um else added
     return shared.with_mesh_field(machine, "flank", index, replace(flank, pitch_um=tuple(total.tolist())))
 
