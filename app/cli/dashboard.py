@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -32,18 +33,26 @@ def dashboard(
     browser: Annotated[bool, typer.Option(help="Open a browser window.")] = True,
 ) -> None:
     """Open the dashboard in a browser. It listens on localhost only and sends nothing anywhere."""
-    from streamlit import net_util
     from streamlit.runtime.pages_manager import PagesManager
-    from streamlit.web import cli as streamlit_cli
 
     from app import compiled
-    from app.dashboard.theme import THEME_OPTIONS
 
     # main.py lists the pages. Streamlit would take a folder called "pages" for a list of its own until main.py has run
     # once, and show that instead to who opens a page by its address first.
     PagesManager.uses_pages_directory = False
     _without_advertisement()
-    compiled.begin()
+    with TemporaryDirectory(prefix="gearsig-") as folder:
+        _say_where_the_server_is(Path(folder))
+        compiled.begin()
+        _run(port, browser=browser)
+
+
+def _run(port: int, *, browser: bool) -> NoReturn:
+    from streamlit import net_util
+    from streamlit.web import cli as streamlit_cli
+
+    from app.dashboard.theme import THEME_OPTIONS
+
     net_util.get_external_ip = lambda: None  # it would ask a server elsewhere who we are, to judge a foreign origin
     own = (
         f"server.port={port}",
@@ -63,3 +72,24 @@ def _without_advertisement() -> None:
         skills: Any = import_module("streamlit.web.skills")
         skills.nudge_suppression_reason = lambda *_: "not for the users of an application"
         skills.are_skills_installed = lambda *_, **__: True
+
+
+def _say_where_the_server_is(folder: Path) -> None:
+    """Let the first page name the server, in a copy of it in that folder.
+
+    On an address with a path, /analysis, Streamlit's script looks for its server below that path first, and the browser
+    reports two errors. Where links to files are not allowed, or another version keeps its page elsewhere, it does.
+    """
+    from streamlit import file_util
+
+    static = Path(file_util.get_static_dir())
+    page = (static / "index.html").read_text(encoding="utf-8") if (static / "index.html").exists() else ""
+    try:
+        for entry in static.iterdir():
+            if entry.name != "index.html":
+                (folder / entry.name).symlink_to(entry, target_is_directory=entry.is_dir())
+    except OSError:
+        return
+    here = "<script>window.__streamlit = { BACKEND_BASE_URL: location.origin + '/' }</script>"
+    (folder / "index.html").write_text(page.replace("<head>", f"<head>{here}", 1), encoding="utf-8")
+    file_util.get_static_dir = lambda: str(folder)

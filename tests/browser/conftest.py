@@ -102,12 +102,11 @@ def page(address: str) -> Iterator[playwright.Page]:
 def is_error(message: playwright.ConsoleMessage) -> bool:
     """Say whether a message tells of an error; a picture that a rerun replaced before it was fetched is none.
 
-    Streamlit drops the old picture at once. Those that stay on the page are looked at in the end. On an address with a
-    path, Streamlit first looks for its server below that path.
+    Streamlit drops the old picture at once. Those that stay on the page are looked at in the end.
     """
     url = message.location.get("url", "")
     replaced = "/media/" in message.text or "/media/" in url
-    return bool(message.type == "error" and not replaced and "/_stcore/" not in url)
+    return bool(message.type == "error" and not replaced)
 
 
 def is_local(url: str) -> bool:

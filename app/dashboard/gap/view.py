@@ -22,6 +22,7 @@ from app.dashboard.widgets.charts import (
     picture_bytes,
     show_differences,
     show_lines,
+    show_picture,
 )
 from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.verdict import Colour
@@ -478,7 +479,8 @@ def _show_figures(finished: Finished, question: Question) -> None:
 
 
 def _show_figure(finished: Finished, one: GapFigure) -> None:
-    st.image(finished.picture(one, dark=is_dark()), width="stretch", alt=as_typed(one.shows))
+    number = finished.figures.index(one)
+    show_picture(finished.picture(one, dark=is_dark()), one.figure, one.shows, f"gap-{number} of {finished.key}")
     st.caption(as_typed(one.look))
 
 

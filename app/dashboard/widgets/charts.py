@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 import numpy as np
@@ -128,7 +128,7 @@ def show_figure(figure: PictureFigure, words: str, key: str) -> None:
     """
     rows = panels_of(figure)
     if not rows:
-        show_picture(figure, words)
+        show_picture(picture_bytes(figure, dark=is_dark()), figure, words, key)
     place = st.container(key=f"panels {key}")
     for i, row in enumerate(rows):
         columns = place.columns(len(row)) if len(row) > 1 else [place.container()]
@@ -327,7 +327,7 @@ def _described(
         "fault": palette().fault,
         "dates": axes.dates,
         "alternative": one_line(f"{axes.y} over {axes.x}"),
-        "name": re.sub(r"[^\w-]+", "-", key.split(" of ", maxsplit=1)[0]).strip("-") or "figure",
+        "name": file_stem(key),
         "has_tools": height_px >= 200 and not is_plane,
     }
 
@@ -395,9 +395,48 @@ BRIGHTEST = 0.93
 HALF_TURN = np.array([[-0.574, 1.430, 0.144], [0.426, 0.430, 0.144], [0.426, 1.430, -0.856]])
 
 
-def show_picture(figure: PictureFigure, words: str, width: int | Literal["stretch"] = "stretch") -> None:
-    """Show a figure; `words` say what it shows, for those who do not see it."""
-    st.image(picture_bytes(figure, dark=is_dark()), width=width, alt=as_typed(words))
+def show_picture(png: bytes, figure: PictureFigure, words: str, key: str) -> None:
+    """Show a figure that does not zoom, and offer it as files.
+
+    Parameters
+    ----------
+    png : bytes
+        The figure in the page's colours.
+    figure : Figure
+        Of matplotlib.
+    words : str
+        What it shows, for those who do not see it.
+    key : str
+        Unique on the page.
+    """
+    st.image(png, width="stretch", alt=as_typed(words))
+
+    def svg() -> bytes:
+        buffer = BytesIO()
+        figure.savefig(buffer, format="svg")
+        return buffer.getvalue()
+
+    offer_picture({"png": png, "svg": svg}, key)
+
+
+def offer_picture(files: Mapping[str, bytes | str | Callable[[], bytes]], key: str) -> None:
+    """Offer a picture as files, by their ending; `key` is unique on the page."""
+    with st.container(horizontal=True, horizontal_alignment="right"):
+        for ending, data in files.items():
+            st.download_button(
+                ending.upper(),
+                data,
+                file_name=f"{file_stem(key)}.{ending}",
+                mime={"svg": "image/svg+xml"}.get(ending, f"image/{ending}"),
+                on_click="ignore",
+                type="tertiary",
+                key=f"{ending} of {key}",
+            )
+
+
+def file_stem(key: str) -> str:
+    """Return what the files of a figure are called, by the key of its widget."""
+    return re.sub(r"[^\w-]+", "-", key.split(" of ", maxsplit=1)[0]).strip("-") or "figure"
 
 
 def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:

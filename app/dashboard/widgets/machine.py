@@ -74,6 +74,9 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
         st.info("The rig file is no TOML yet: mend it as text.", icon=":material/edit:")
         _show_text(file, text, is_open=True)
         return
+    is_unknown = not table.get("shaft")
+    if is_unknown:  # the speed alone says most, and takes one number
+        show_stated(file)
     with st.container(key="machine"):
         form, follows = st.columns((7, 5), gap="medium")
         with form:
@@ -86,7 +89,8 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
             look = ":material/check:"
             st.button("Analyse with this machine", type="primary", icon=look, on_click=_take, args=(file, changed))
             st.button("Discard", on_click=_take, args=(file, text))
-    show_stated(file)
+    if not is_unknown:
+        show_stated(file)
     _show_text(file, text)
 
 

@@ -10,7 +10,7 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.theme import as_typed, palette
-from app.dashboard.widgets.charts import N_COLUMNS, Axes, looked_at, show_lines
+from app.dashboard.widgets.charts import N_COLUMNS, Axes, looked_at, offer_picture, show_lines
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.formatting import readable
@@ -139,12 +139,12 @@ def show_spectrum(
 def _choose_looks(source: Analysis | str, cursors: Sequence[Cursor], name: str, scale: str) -> tuple[str, list[str]]:
     """Return the scale and the kinds of cursors that the user chose."""
     kinds = [kind for kind in KIND_NAMES if any(cursor.kind == kind for cursor in cursors)]
-    left, right = st.columns((2, 3), vertical_alignment="bottom")
+    row = st.container(horizontal=True, vertical_alignment="bottom")  # which wraps where it is narrow
     key = state.view_key(f"{name} scale", source)
-    label = left.segmented_control("Amplitude", list(SCALES), default=scale, key=key)
+    label = row.segmented_control("Amplitude", list(SCALES), default=scale, key=key)
     if not kinds:
         return label or scale, kinds
-    chosen = right.pills(
+    chosen = row.pills(
         "Cursors",
         kinds,
         default=[kind for kind in kinds if kind != "hunting"],
@@ -226,7 +226,10 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) 
     words = f"Polar picture: {average.kind} of {average.channel} over one revolution of {average.shaft}{seen}"
     with st.container(key="average"):
         polar, unrolled = st.columns((6, 7), vertical_alignment="center")
-        polar.image(ring_of(average, n_teeth, marks), width="stretch", alt=as_typed(words))
+        ring = ring_of(average, n_teeth, marks)
+        with polar:
+            st.image(ring, width="stretch", alt=as_typed(words))
+            offer_picture({"svg": ring}, f"ring-{average.shaft} of {average.channel} {average.kind}")
         with unrolled:
             _show_unrolled(analysis, average, n_teeth, [Cursor(m.angle_deg, "finding", m.label) for m in marks])
 
