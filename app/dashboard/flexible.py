@@ -12,6 +12,7 @@ from app import gear_body
 from app.dashboard.components import component_of
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import download, packed, show_figure
+from app.dashboard.work import kept
 from app.gear_body import GearBodyStudy
 from app.papers import PAPERS, Paper, paper
 from gearsig.checks import FloatArray
@@ -58,7 +59,7 @@ def solid_view(study: GearBodyStudy) -> SolidView:
     return SolidView(nodes, gear_body.in_the_whole_gear(study.mesh, one), quads.reshape(-1, 4))
 
 
-@st.cache_resource(max_entries=3, show_spinner="Meshing the gear, finding its modes …")
+@kept(3, "Meshing the gear, finding its modes …")
 def studied(blank: GearBlank, held: fe_gear.Held, force_n: float) -> tuple[GearBodyStudy, SolidView]:
     """Mesh, modes and stress of one gear, done once for equal requests."""
     study = gear_body.study_gear(blank, DOF, n_modes=2 * gear_body.N_SHOWN, held=held, force_n=force_n)
@@ -122,7 +123,7 @@ def show_gear() -> None:
     )
 
 
-@st.cache_resource(max_entries=4, show_spinner="Running both sweeps …")
+@kept(4, "Running both sweeps …")
 def pair_studied(preset: str, torque_nm: float, sweep_s: float) -> pair_study.Study:
     """Maps, sweeps and spectra of a pair, done once for equal requests."""
     ready = ReducedPair().prepare(SimulationSetup(preset, {}), np.random.default_rng(0))
@@ -168,7 +169,7 @@ def show_pair() -> None:
 # --------------------
 
 
-@st.cache_resource(max_entries=3, show_spinner="Computing every figure: one to two minutes …")
+@kept(3, "Computing every figure: one to two minutes …")
 def computed(name: str) -> Paper:
     """Return the figures of a publication, done once."""
     return paper(name)
