@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ pytest.importorskip("duckdb", reason="the extra fleet is not installed")
 
 from distributed import Client
 
+from app.cli.main import main
 from gearsig.batch import report_many
 from gearsig.errors import InputError
 from gearsig.fleet import open_fleet
@@ -130,6 +132,40 @@ def test_jobs_of_a_block_run_on_its_cluster(scheduler, tmp_path):
         branch = Branch(sweep((600.0, 900.0)), "transmission_error_m", "mesh", 20)
         values = run_folder(BifurcationRequest(branch, "rest", 0.0, False), tmp_path / "jump")
         assert [value.reason for value in values["rest"]] == ["", ""]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_gap_study_loses_a_worker_and_nothing_else(scheduler, tmp_path, capsys):
+    """Its trials run on the cluster; one of two workers is killed as soon as it has simulated for a second."""
+    address, workers = scheduler
+    samples = ROOT / "sample_data"
+
+    def busy_s(process: "subprocess.Popen[bytes]") -> float:
+        fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    at_rest_s = busy_s(workers[0])
+    killed = []
+
+    def kill_one() -> None:
+        while not killed and busy_s(workers[0]) < at_rest_s + 1.0:
+            time.sleep(0.05)
+        os.kill(workers[0].pid, signal.SIGKILL)
+        killed.append(workers[0].pid)
+
+    thread = Thread(target=kill_one, daemon=True)
+    thread.start()
+    words = ["gap", str(samples / "root_crack_3mm.h5"), "--reference", str(samples / "root_crack_0mm.h5")]
+    words += ["--cache", str(tmp_path / "cache"), "--cluster", address, "-o", str(tmp_path / "out")]
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert not ended.value.code
+    assert killed
+    assert "1 more was lost, and what it ran was run again" in capsys.readouterr().out
+    found = json.loads((tmp_path / "out" / "gap.json").read_text(encoding="utf-8"))
+    assert max(found["causes"], key=lambda cause: cause["probability"])["name"] == "root_crack"
+    assert "was killed" not in json.dumps(found)
 
 
 def test_what_is_no_scheduler_is_said():

@@ -116,10 +116,13 @@ def gap(
         check_writable(cache)
     if fresh and model == "reduced-fe":
         clear_other_versions(model)
-    with open_cluster(cluster):
+    with open_cluster(cluster) as workers:
         report = _diagnosed(request, model, cache, fresh=fresh)
+        ran = workers.text() if workers else ""
     written = write_results(report, output, command=typed_command())
     _tell(report, written)
+    if ran:
+        typer.echo(f"It ran {ran}.")
 
 
 def _torques(texts: list[str] | None) -> tuple[float, ...]:

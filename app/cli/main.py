@@ -36,7 +36,9 @@ app = typer.Typer(
     help="""Signal processing and diagnostics for gear vibration.
 
     Start with **gearsig demo**; then **gearsig analyze RECORDING --rig RIG** on a recording of your own.
-    A rig file says what is known of the machine: **gearsig rig example** prints one to start from.""",
+    A rig file says what is known of the machine: **gearsig rig example** prints one to start from.
+
+    Python files that the variable GEARSIG_EFFECTS names, effects of your own, are executed by every command.""",
 )
 COMMANDS: tuple[Callable[..., None] | typer.Typer, ...] = (
     *(analyze, show, modes, crack, force, start_stop, identify, compare, report, fleet_app, rig_app),

@@ -153,14 +153,17 @@ def bifurcation(
     study_request = study.BifurcationRequest(Branch(varied, signal, section, n_points), direction, phase, kind)
     study_request.branch.check_signal()
     try:
-        with options.open_cluster(cluster), progress_bar("simulating", study_request.n_values) as show:
+        with options.open_cluster(cluster) as workers, progress_bar("simulating", study_request.n_values) as show:
             values = study.run_folder(study_request, output, n_processes=jobs, on_progress=show)
+            ran = workers.text() if workers else ""
     except KeyboardInterrupt:
         n = study.n_complete(study_request, output)
         if n:
             _print_bifurcation(study_request, study.complete(study_request, output), output)
         raise stopped(f"{n} of {study_request.n_values} values are in {output}") from None
     _print_bifurcation(study_request, values, output)
+    if ran:
+        typer.echo(f"It ran {ran}.")
 
 
 def _print_bifurcation(request: BifurcationRequest, values: Values, output: Path) -> None:
