@@ -517,7 +517,7 @@ def _unchanged(changes: Sequence[LevelChange]) -> Finding:
     return Finding(
         UNCHANGED,
         Kind.INFORMATION,
-        f"Nothing has changed since the reference: no level by {MIN_CHANGE_DB:.0f} dB and beyond its scatter.",
+        f"Levels are those of the reference: none has changed by {MIN_CHANGE_DB:.0f} dB and beyond its scatter.",
         confidence=0.9,
         confidence_basis=f"{len(changes)} levels: shafts, meshes, sidebands, bearings, noise; segment against segment",
         evidence=evidence,
