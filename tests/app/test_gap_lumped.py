@@ -7,7 +7,7 @@ import pytest
 
 from app.studies.gap import lumped_rig
 from app.studies.gap.lumped import EFFECTS, outside
-from app.studies.gap.lumped_rig import Geometry, LumpedDay, LumpedFault, LumpedRig, record
+from app.studies.gap.lumped_rig import LumpedDay, LumpedFault, LumpedGeometry, LumpedRig, record
 from gearsig.gap import ReducedRecording, reduce_recording
 from gearsig.orders import order_spectrum
 from gearsig.recording import Recording
@@ -53,7 +53,7 @@ def test_unbalance_is_an_order_of_its_shaft(rig: LumpedRig) -> None:
 
 
 def test_one_tooth_out_of_place_is_found_on_its_gear(rig: LumpedRig) -> None:
-    shape = Geometry.of(rig)
+    shape = LumpedGeometry.of(rig)
     late = LumpedFault(gaps_m=[(1, 7, np.full(len(shape.path), 40e-6))])
     healthy, off = reduced(rig), reduced(rig, late)
 
@@ -68,6 +68,6 @@ def test_one_tooth_out_of_place_is_found_on_its_gear(rig: LumpedRig) -> None:
 
 def test_every_effect_and_what_is_outside_can_be_recorded(rig: LumpedRig) -> None:
     rng = np.random.default_rng(8)
-    faults = [effect(rig, Geometry.of(rig), rng) for effect in EFFECTS.values()]
+    faults = [effect(rig, LumpedGeometry.of(rig), rng) for effect in EFFECTS.values()]
     for fault in [*faults, *(outside(rig, rng)[1] for _ in range(6))]:
         assert np.all(np.isfinite(recorded(rig, fault).samples))

@@ -18,9 +18,9 @@ import typer
 from app.studies.gap.calibrate import WeighedCase, table
 from app.studies.gap.lumped_rig import (
     N_PATH,
-    Geometry,
     LumpedDay,
     LumpedFault,
+    LumpedGeometry,
     LumpedRig,
     record,
 )
@@ -51,7 +51,7 @@ SEED = 515
 
 
 Draw = np.random.Generator
-LumpedEffect = Callable[[LumpedRig, Geometry, Draw], LumpedFault]
+LumpedEffect = Callable[[LumpedRig, LumpedGeometry, Draw], LumpedFault]
 Foreign = Callable[[FloatArray, FloatArray, float, Draw], tuple[FloatArray, FloatArray]]
 """Time of each step, of each slow step, usual mesh force, chance → forces (2, n) on the housing, N; share of torque."""
 
@@ -61,7 +61,7 @@ def _side_and_tooth(rig: LumpedRig, rng: Draw) -> tuple[int, int]:
     return side, int(rng.integers(rig.teeth[side]))
 
 
-def _root_crack(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _root_crack(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """A chord of 2.05 modules, cut to a part; the longer the lever, the softer. Neighbours give a little."""
     side, tooth = _side_and_tooth(rig, rng)
     softer = (1.0 - log_uniform(rng, 0.15, 0.75)) ** -2.2 - 1.0
@@ -72,7 +72,7 @@ def _root_crack(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
     return LumpedFault(compliances=[(side, tooth, own), (side, tooth - 1, beside), (side, tooth + 1, beside)])
 
 
-def _tooth_spall(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _tooth_spall(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """Less width carries near the pitch line; only a spall of the whole width is a step."""
     side, tooth = _side_and_tooth(rig, rng)
     whole = shape.before + shape.after
@@ -86,7 +86,7 @@ def _tooth_spall(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
     )
 
 
-def _chipped_tooth(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _chipped_tooth(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """A corner of the tip is gone, wider towards the tip; nearly the whole width leaves a gap."""
     side, tooth = _side_and_tooth(rig, rng)
     width, height = min(1.0, log_uniform(rng, 0.3, 1.1)), rng.uniform(0.4, 0.65)
@@ -97,7 +97,7 @@ def _chipped_tooth(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
     return LumpedFault(compliances=[(side, tooth, soft)], gaps_m=[(side, tooth, gap)])
 
 
-def _tooth_wear(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _tooth_wear(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """Archard: as deep as flanks slide, nothing at the pitch point; both gears."""
     depth = log_uniform(rng, 8e-6, 90e-6) * (rig.module_mm / 2.0) ** 0.5
     sliding = np.abs(shape.path) / max(shape.before, shape.after)
@@ -109,14 +109,14 @@ def _tooth_wear(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
     return LumpedFault(gaps_m=gaps, further_backlash_m=0.5 * depth)
 
 
-def _pitch_error(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _pitch_error(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """One tooth stands ahead or behind."""
     side, tooth = _side_and_tooth(rig, rng)
     error = log_uniform(rng, 6e-6, 45e-6) * rng.choice([-1.0, 1.0])
     return LumpedFault(gaps_m=[(side, tooth, np.full(len(shape.path), error))])
 
 
-def _surface_roughness(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _surface_roughness(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     rms_um = log_uniform(rng, 0.6, 4.5)
     smooth = np.hanning(7) / np.sqrt(np.sum(np.hanning(7) ** 2))
     gaps: list[tuple[int, int | None, FloatArray]] = []
@@ -127,12 +127,12 @@ def _surface_roughness(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFaul
     return LumpedFault(gaps_m=gaps, friction=float(rig.numbers["friction"]) * (1.0 + 0.04 * rms_um))
 
 
-def _sliding_friction(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _sliding_friction(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     del rig, shape
     return LumpedFault(friction=log_uniform(rng, 0.075, 0.2))
 
 
-def _eccentricity(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _eccentricity(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """A gear off its axis, which its mass is as well, by less."""
     del shape
     side = int(rng.integers(2))
@@ -142,7 +142,7 @@ def _eccentricity(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
     )
 
 
-def _unbalance(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _unbalance(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     del shape
     side = int(rng.integers(2))
     turning = rig.speeds_rpm[0] * pi / 30.0 * (1.0, rig.teeth[0] / rig.teeth[1])[side]
@@ -150,7 +150,7 @@ def _unbalance(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
     return LumpedFault(unbalance_kg_m={side: complex(amount)})
 
 
-def _misalignment(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _misalignment(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """Part of the face carries, and a coupling pushes one, two and three times a turn."""
     angle = log_uniform(rng, 0.5e-3, 4e-3)
     force = rig.loads_nm[0] / shape.base_radii[1]
@@ -165,18 +165,18 @@ def _misalignment(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
     )
 
 
-def _torque_ripple(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _torque_ripple(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     del rig, shape
     order = float(rng.choice([2.0, 3.0, 4.0, 6.0, 12.0]))
     return LumpedFault(ripple=(log_uniform(rng, 0.06, 0.5), order, rng.uniform(0, 2 * pi)))
 
 
-def _speed_fluctuation(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _speed_fluctuation(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     del rig, shape
     return LumpedFault(wander=(log_uniform(rng, 0.005, 0.04), rng.uniform(0.6, 3.0)))
 
 
-def _backlash(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _backlash(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     del rig, shape
     return LumpedFault(backlash=log_uniform(rng, 1.7, 9.0))
 
@@ -184,7 +184,7 @@ def _backlash(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
 def _race(kind: float, narrow_mm: float, wide_mm: float) -> LumpedEffect:
     """A ball drops into a pit, as deep as its shape lets it; on the outer race near the load, on the inner anywhere."""
 
-    def race(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+    def race(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
         del shape
         side, width = int(rng.integers(2)), log_uniform(rng, narrow_mm, wide_mm)
         _, ball, pitch = rig.balls[side]
@@ -198,12 +198,12 @@ def _race(kind: float, narrow_mm: float, wide_mm: float) -> LumpedEffect:
     return race
 
 
-def _bearing_clearance(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _bearing_clearance(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     del rig, shape
     return LumpedFault(clearance_m={int(rng.integers(2)): log_uniform(rng, 20e-6, 150e-6)})
 
 
-def _transfer_path(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _transfer_path(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """A loose sensor, or a housing that has become softer here and stiffer there."""
     del shape
     if rng.uniform() < 0.6:
@@ -214,12 +214,12 @@ def _transfer_path(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
     return LumpedFault(moved_modes=1.0 + size * signs, damped_modes=1.0 + 4.0 * size)
 
 
-def _mains_hum(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _mains_hum(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     del rig, shape
     return LumpedFault(hum=log_uniform(rng, 0.04, 0.6))
 
 
-def _clipping(rig: LumpedRig, shape: Geometry, rng: Draw) -> LumpedFault:
+def _clipping(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     del rig, shape
     return LumpedFault(clipped=(int(rng.integers(3)), rng.uniform(0.35, 0.9)))
 
@@ -358,7 +358,7 @@ def _faults(rig: LumpedRig, rng: Draw) -> Iterator[tuple[str, str, LumpedFault]]
     for _ in range(N_HEALTHY):
         yield NONE, NONE, LumpedFault()
     for name, effect in EFFECTS.items():
-        yield name, name, effect(rig, Geometry.of(rig), rng)
+        yield name, name, effect(rig, LumpedGeometry.of(rig), rng)
     for _ in range(N_OUTSIDE):
         yield UNKNOWN, *outside(rig, rng)
 

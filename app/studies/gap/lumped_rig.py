@@ -40,7 +40,7 @@ OVERSAMPLING = {25600: 6, 20000: 8}
 # --------------------
 
 
-class Bearings(NamedTuple):
+class LumpedBearings(NamedTuple):
     """Drive-end bearings of both shafts, and the linear far ends.
 
     Parameters
@@ -67,7 +67,7 @@ class Bearings(NamedTuple):
     defect: tuple[float, float, float, float, float]
 
 
-class Mesh(NamedTuple):
+class LumpedMesh(NamedTuple):
     """The mesh: base radii, pitch and path in m; backlash; damping; friction; direction of the line of action."""
 
     base_radii_m: tuple[float, float]
@@ -88,7 +88,7 @@ class Mesh(NamedTuple):
     wobble_phase: float
 
 
-class Bodies(NamedTuple):
+class LumpedBodies(NamedTuple):
     """Inertias, masses, shafts, housing, and what turns with the shafts: run-out (m) and unbalance (kg m) by phase."""
 
     inertia: tuple[float, float, float, float]
@@ -104,7 +104,7 @@ class Bodies(NamedTuple):
     unbalance: tuple[tuple[float, float], tuple[float, float]]
 
 
-class Drive(NamedTuple):
+class LumpedDrive(NamedTuple):
     """Torques (N m) and forces that the machine's surroundings give; see `LumpedFault` for what they mean."""
 
     motor_nm: float
@@ -497,13 +497,13 @@ class LumpedFault:
     clearance_m : dict
         Gear → radial clearance of both ends.
     defect : tuple
-        See `Bearings`.
+        See `LumpedBearings`.
     ripple : tuple of float
         Share of the torque, order, phase.
     wander : tuple of float
         Share of the speed, Hz.
     drive : dict
-        Fields of `Drive`.
+        Fields of `LumpedDrive`.
     loose_sensor : tuple of float
         Row, resonance (Hz), damping ratio of its mount.
     moved_modes, damped_modes : of the housing
@@ -539,7 +539,7 @@ class LumpedFault:
 
 
 @dataclass(frozen=True)
-class Geometry:
+class LumpedGeometry:
     """Radii (m), base pitch, path before and after the pitch point, heights and usual compliances along it."""
 
     radii: tuple[float, float]
@@ -555,7 +555,7 @@ class Geometry:
     teeth_m_per_n: tuple[FloatArray, FloatArray]
 
     @classmethod
-    def of(cls, rig: LumpedRig, stiffer: float = 1.0) -> Geometry:
+    def of(cls, rig: LumpedRig, stiffer: float = 1.0) -> LumpedGeometry:
         """Return that of a rig; `stiffer` on the day."""
         m = rig.module_mm * 1e-3
         r = tuple(m * z / 2.0 for z in rig.teeth)
@@ -589,7 +589,7 @@ class Geometry:
 
 
 def tooth_tables(
-    rig: LumpedRig, shape: Geometry, fault: LumpedFault
+    rig: LumpedRig, shape: LumpedGeometry, fault: LumpedFault
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
     """Return gap (m) and compliance (m/N) of each tooth of both gears along the path, (teeth, N_PATH)."""
     s, n = shape.path, rig.numbers
@@ -679,7 +679,7 @@ def _motion(
     rig: LumpedRig, point: int, day: LumpedDay, fault: LumpedFault, rng: np.random.Generator, duration_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return bearing forces (4) and housing accelerations (3) of each interval, (n, 7), and the pinion's angle."""
-    n, shape = rig.numbers, Geometry.of(rig, day.stiffness)
+    n, shape = rig.numbers, LumpedGeometry.of(rig, day.stiffness)
     gaps, compliances = tooth_tables(rig, shape, fault)
     fine_hz = rig.rate_hz * OVERSAMPLING[rig.rate_hz]
     n_steps = round((SETTLING_S + duration_s) * fine_hz)
@@ -722,7 +722,7 @@ def _motion(
     direction = float(n["centre_line_rad"]) - PRESSURE_ANGLE
     normal = -sin(direction), cos(direction)
     damping = 2.0 * float(n["mesh_damping_ratio"]) * day.damping / (mean_stiffness / moved) ** 0.5
-    mesh = Mesh(
+    mesh = LumpedMesh(
         shape.base_radii,
         shape.base_pitch,
         shape.before,
@@ -741,7 +741,7 @@ def _motion(
         fault.phase,
     )
     ripple, order, ripple_phase = fault.ripple
-    usual = Drive(
+    usual = LumpedDrive(
         motor_nm=motor,
         load_nm=load,
         follows=max(float(turning) / 0.15, motor / (0.03 * speed)),
@@ -779,10 +779,10 @@ def _motion(
     )
 
 
-def _bearings_of(rig: LumpedRig, day: LumpedDay, fault: LumpedFault, cage: Sequence[float]) -> Bearings:
+def _bearings_of(rig: LumpedRig, day: LumpedDay, fault: LumpedFault, cage: Sequence[float]) -> LumpedBearings:
     n, loose = rig.numbers, [fault.clearance_m.get(side) for side in range(2)]
     far, clearance = n["far_n_per_m"] * day.stiffness, n["clearance_m"] + day.clearance_m
-    return Bearings(
+    return LumpedBearings(
         (rig.balls[0][0], rig.balls[1][0]),
         _pair(n["ball_n_per_m15"] * day.stiffness),
         _pair(far),
@@ -794,10 +794,10 @@ def _bearings_of(rig: LumpedRig, day: LumpedDay, fault: LumpedFault, cage: Seque
     )
 
 
-def _bodies_of(rig: LumpedRig, day: LumpedDay, fault: LumpedFault) -> Bodies:
+def _bodies_of(rig: LumpedRig, day: LumpedDay, fault: LumpedFault) -> LumpedBodies:
     n, inertia, mass, ratio = rig.numbers, rig.numbers["inertia"], rig.numbers["mass_kg"], rig.teeth[0] / rig.teeth[1]
     housing = float(n["housing_kg"])
-    apart = sum(Geometry.of(rig).radii)
+    apart = sum(LumpedGeometry.of(rig).radii)
     roll = housing * (1.2 * apart) ** 2 * 0.5
     mounts = np.array([housing, housing, roll]) * (2 * pi * n["mount_hz"] * [day.mounts, day.mounts, 1.0]) ** 2
     mount_damping = 2.0 * n["mount_damping_ratio"] * np.sqrt(mounts * [housing, housing, roll])
@@ -807,7 +807,7 @@ def _bodies_of(rig: LumpedRig, day: LumpedDay, fault: LumpedFault) -> Bodies:
     balance = mass * n["balance_mps"] / (rig.speeds_rpm[0] * pi / 30.0 * np.array([1.0, ratio]))
     runout = [n["runout_m"][side] + fault.runout_m.get(side, 0.0) for side in range(2)]
     unbalance = [balance[side] + fault.unbalance_kg_m.get(side, 0.0) for side in range(2)]
-    return Bodies(
+    return LumpedBodies(
         (float(inertia[0]), float(inertia[1]), float(inertia[2]), float(inertia[3])),
         _pair(n["shafts"]),
         _pair(0.06 * np.sqrt(n["shafts"] * reduced)),
