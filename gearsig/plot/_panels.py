@@ -19,6 +19,7 @@ from gearsig.plot._maps import draw_level_map
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 
 @dataclass(frozen=True)
@@ -230,22 +231,27 @@ def panels_of(figure: Figure) -> list[list[list[LinePanel | LevelPanel]]]:
         if axes.name != "rectilinear" or is_named or not all(isinstance(c, LineCollection) for c in axes.collections):
             return []
         box = axes.get_position()
-        panel = _level_panel(axes) if axes.images else _line_panel(axes, _names_of_colours(figure, axes))
+        panel = _level_panel(axes) if axes.images else _line_panel(axes, _names_of_looks(figure, axes))
         places.setdefault((-round(box.y1, 2), round(box.x0, 2)), []).append(panel)
     rows = [[places[place] for place in sorted(places) if place[0] == y] for y in sorted({y for y, _ in places})]
     return [row for row in rows if any(panel for panels in row for panel in panels)]
 
 
-def _names_of_colours(figure: Figure, axes: Axes) -> dict[str, str]:
+def _names_of_looks(figure: Figure, axes: Axes) -> dict[tuple[str, bool], str]:
+    """Return what legends call lines, by colour and whether they are broken."""
     from matplotlib.lines import Line2D
 
     legends = [legend for legend in (*figure.legends, axes.get_legend()) if legend is not None]
     return {
-        _colour(handle.get_color()): text.get_text()
+        (_colour(handle.get_color()), _is_broken(handle)): text.get_text()
         for legend in legends
         for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True)
         if isinstance(handle, Line2D)
     }
+
+
+def _is_broken(line: Line2D) -> bool:
+    return line.get_linestyle() not in ("-", "None")
 
 
 def _colour(colour: Any) -> str:
@@ -285,7 +291,7 @@ def _level_panel(axes: Axes) -> LevelPanel:
     return LevelPanel(values, at, positions, axes.get_xlabel(), axes.get_ylabel(), "", span=span, title=_words_of(axes))
 
 
-def _line_panel(axes: Axes, names: Mapping[str, str]) -> LinePanel:
+def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
     from matplotlib.patches import Rectangle
 
     lines: list[ChartLine] = []
@@ -294,19 +300,19 @@ def _line_panel(axes: Axes, names: Mapping[str, str]) -> LinePanel:
 
     def take(x: Any, y: Any, colour: Any, **looks: Any) -> None:
         is_quiet = isinstance(number := _number_of(name := _colour(colour)), int) and number < 0
-        about = "" if is_quiet else names.get(name, "")
+        about = "" if is_quiet else names.get((name, looks.get("dotted", False)), "") or names.get((name, False), "")
         lines.append(ChartLine(np.asarray(x, float), np.asarray(y, float), about, number, **looks))
 
     for line in axes.lines:
         x, y = line.get_xdata(), line.get_ydata()
-        dashed, joined = line.get_linestyle() not in ("-", "None"), line.get_linestyle() != "None"
+        joined = line.get_linestyle() != "None"
         if line.get_transform() == axes.get_xaxis_transform():
             is_fault = _number_of(_colour(line.get_color())) == 1
             cursors.append(Cursor(float(np.ravel(x)[0]), "finding" if is_fault else "", ""))
         elif line.get_transform() == axes.get_yaxis_transform():
             take(limits, np.ravel(y)[[0, 0]], line.get_color(), dotted=True)
         elif len(np.ravel(x)):
-            take(x, y, line.get_color(), dotted=dashed, dots=not joined)
+            take(x, y, line.get_color(), dotted=_is_broken(line), dots=not joined)
     collections: list[Any] = list(axes.collections)
     for collection in collections:  # upright lines
         ends = np.array(collection.get_segments()).reshape(-1, 2, 2)

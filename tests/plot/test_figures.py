@@ -222,6 +222,7 @@ def test_a_figure_is_taken_apart_into_panels_that_zoom(average_of) -> None:
     left.plot(np.cos(turn), np.sin(turn), color=FAULT)
     left.plot([0.5], [0.25], "o", color="#123456")
     right.plot([0.0, 1.0], [2.0, 3.0], "--", color=FAULT, label="fault")
+    right.plot([0.0, 1.0], [1.0, 1.0], color=FAULT, label="whole")
     right.legend()
     right.axvline(0.25)
     right.axhline(2.5)
@@ -237,7 +238,8 @@ def test_a_figure_is_taken_apart_into_panels_that_zoom(average_of) -> None:
     assert lines.x == "time (s)"
     assert [c.position for c in lines.cursors] == [0.25]
     assert lines.spans == [(0.5, 0.75, "#00FF00")]
-    dashed, level, bar = lines.lines
+    dashed, whole, level, bar = lines.lines
+    assert (whole.name, whole.dotted) == ("whole", False)
     assert (dashed.name, dashed.dotted, tuple(level.y)) == ("fault", True, (2.5, 2.5))
     assert np.nanmax(bar.y) == 1.5
     assert np.nanmax(bar.x) == pytest.approx(0.2)

@@ -446,7 +446,7 @@ class Figure {
     if (this.lines.length > 1 && this.data.legend)
       for (const line of this.lines) {
         const key = html("i");
-        key.style.background = line.colour;
+        key.style.background = line.dotted ? `repeating-linear-gradient(90deg, ${line.colour} 0 3px, transparent 3px 5px)` : line.colour;
         const entry = html("span", "key");
         entry.append(key, line.name);
         left.append(entry);

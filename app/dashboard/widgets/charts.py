@@ -343,6 +343,9 @@ def _sent(line: ChartLine, shown: tuple[float, float] | None, *, alone: bool = T
     cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
     if isinstance(colour, int):
         colour = colours.quiet if colour == QUIET else cycle[colour % len(cycle)]
+    elif is_dark():
+        on_paper = np.frombuffer(bytes.fromhex(colour.removeprefix("#")), np.uint8) / 255
+        colour = "#" + (255 * turned_over(on_paper)).astype(np.uint8).tobytes().hex()
     x, y, *band = (line.x, line.y) if shown is None else _columns(line, shown)
     band = band if alone or line.band is not None else []
     curves = {name: packed(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
@@ -439,6 +442,12 @@ def file_stem(key: str) -> str:
     return re.sub(r"[^\w-]+", "-", key.split(" of ", maxsplit=1)[0]).strip("-") or "figure"
 
 
+def turned_over(colours: FloatArray) -> FloatArray:
+    """Return colours of paper, (…, 3) from 0 to 1, for a dark page: light and dark change places, hues stay."""
+    turned: FloatArray = np.clip((1 - colours) @ HALF_TURN.T, 0, 1)
+    return DARK_GROUND + (BRIGHTEST - DARK_GROUND) * turned
+
+
 def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:
     """Return the figure as PNG; `dark` turns light and dark over and keeps the hues."""
     from PIL import Image
@@ -447,8 +456,7 @@ def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:
     figure.savefig(pixels, format="png", dpi=DOTS_PER_INCH, pil_kwargs={"compress_level": 0})
     image = Image.open(pixels).convert("RGB")
     if dark:
-        turned = np.clip((1 - np.asarray(image, dtype=np.float32) / 255) @ HALF_TURN.T, 0, 1)
-        image = Image.fromarray((255 * (DARK_GROUND + (BRIGHTEST - DARK_GROUND) * turned)).astype(np.uint8))
+        image = Image.fromarray((255 * turned_over(np.asarray(image, dtype=np.float32) / 255)).astype(np.uint8))
     image.save(buffer, format="png", compress_level=1)
     return buffer.getvalue()
 
