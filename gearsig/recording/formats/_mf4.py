@@ -51,7 +51,11 @@ def read_mf4(path: Path) -> RawTable:
 
 
 def _load() -> None:
+    import logging
+
     import asammdf  # noqa: F401
+
+    logging.getLogger("asammdf").disabled = True  # it writes of damaged files; what they come to is said once, by us
 
 
 def _read(path: Path) -> RawTable:
