@@ -111,13 +111,15 @@ def show_spectrum(
         logarithmic=scaled == "log",
     )
     values = _displayed(first, scaled)
+    # a finding names an order to less than a line: the tallest beside it is meant
+    places = [(p, max(first.index_of(p) - 2, 0)) for p in marked]
     shafts = [cursor.position for cursor in cursors if cursor.kind == "shaft"]
     show_lines(
         lines[::-1],
         axes,
         chart,
         cursors=[_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen],
-        marked=[(p, float(values[first.index_of(p)])) for p in marked],
+        marked=[(p, float(values[start : start + 5].max())) for p, start in places],
         height_px=270 if plain else 340,
         legend=bool(names),
         whole=whole,
