@@ -16,6 +16,7 @@ from gearsig.diagnosis._bearing_families import (
     clearest_family,
     expected_parts,
     find_families,
+    mains_beside,
     part_text,
     parts_on_shaft,
     slip_of,
@@ -174,9 +175,12 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         for name, shaft in signals.known_shaft_orders.items()
         if abs(order / shaft - 1) <= 0.03
     ]
-    strong = candidate.modulation >= CLEAR_MODULATION and not (near and not speed_is_confirmed(signals))
+    mains = mains_beside(signals, candidate)
+    strong = candidate.modulation >= CLEAR_MODULATION and not (near and not speed_is_confirmed(signals)) and not mains
     causes = ["A rolling bearing that is not in the rig file is the usual cause; other machines and belts do it too."]
-    if candidate.in_train:
+    if mains:
+        causes = [f"It is the rate of {mains}, or of what that supply feeds."]
+    elif candidate.in_train:
         causes = ["The rate is low for a race: another machine, a belt or a shaft that is not in the rig file does it."]
         beside = [
             part_text(name, bearing.name)

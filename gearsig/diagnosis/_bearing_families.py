@@ -215,8 +215,9 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
     """Return the families of the envelopes, each put down to a part of a bearing only if nothing else explains it.
 
     A family at a part's order that belongs to a slower train of impacts is the train's; the train is then hidden and
-    the search begins anew, so that a damaged part beside it is found. A train whose lines are those of a stronger
-    family explains nothing: sums and differences of that family and the shaft lie on it.
+    the search begins anew, so that a damaged part beside it is found, as it does behind the clicks of a supply. A train
+    whose lines are those of a stronger family explains nothing: sums and differences of that family and the shaft lie
+    on it.
     """
     trains: list[Candidate] = []
     for _ in range(3):
@@ -243,6 +244,10 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
         free = best_unnamed(signals, envelopes)
         if free is not None and free.bearing is not None:
             return Families((free,), (), tuple(unclear))
+        if free is not None and mains_beside(signals, free):  # clicks of a supply hide what is slower and weaker
+            behind = [replace(e, excess=e.excess.without_multiples(free.comb.fundamental)) for e in envelopes]
+            further = find_families(signals, behind)
+            return replace(further, trains=(free, *further.trains))
         trains = [] if free is None else [free]
     return Families(tuple(clear), tuple(trains), tuple(unclear))
 
@@ -317,7 +322,10 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
     if train is not None:
         return _as_cage(signals, replace(best, comb=train, in_train=True))
     known = _known_multiple(signals, best)
-    return known if known is not None and _stands_out(signals, known) else best
+    if known is None:
+        return best
+    # Smeared lines do not stand out from families beside them; of all orders theirs is the clearest all the same.
+    return known if _stands_out(signals, known) else replace(known, share=0.5 * known.share)
 
 
 def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:
@@ -438,7 +446,7 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         if abs(slip) <= slip_of(signals):
             others += _weight(signals, name, slip) * (1.0 if near in (None, bearing) else 0.5)
             rivals.append(f"the {part_text(name, bearing.name)}")
-    beside = _shaft_beside(signals, candidate) or _half_beside(signals, candidate) or _mains_beside(signals, candidate)
+    beside = _shaft_beside(signals, candidate) or _half_beside(signals, candidate) or mains_beside(signals, candidate)
     if beside:
         others += 1.0
         rivals.append(beside)
@@ -521,7 +529,7 @@ def _half_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
     return ""
 
 
-def _mains_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
+def mains_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
     """Name the multiple of twice the mains' frequency that the family's fundamental is on: magnetic forces modulate."""
     own_hz = candidate.comb.fundamental * signals.frequency_per_order_hz
     for mains_hz in MAINS_HZ:

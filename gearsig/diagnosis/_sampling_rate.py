@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import log10
+from math import log, log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,12 @@ COMMON_RATES_HZ = (
 CLOSE_TOLERANCE = 0.005
 """Of the speed, by which rates are told apart that differ by less than a stated speed is to be trusted."""
 
+SMEAR = 0.003
+"""Relative width of a part's lines: by so much impacts that slip come together and apart."""
+
+NEAR_TOLERANCE = 0.015
+"""Of the speed, where nothing but multiples of one order speaks for a rate: a motor's slip under load."""
+
 N_LINES = 12
 HIGHEST_ORDER = 12.0
 CLEAR_DB = 12.0
@@ -53,8 +59,15 @@ SHARE_OF_STATED = 0.25
 BY_ONE_RACE = 1 / 3
 """Share of another rate's sum from which the shafts and one race at the stated rate are explanation enough."""
 
+EXPLAINED_EACH = -3.5
+"""lg p of a spectrum, from which shafts, or one race beside them, explain its strongest lines at the stated rate: of
+measured recordings -5 or less at the right rate, -2 or more at one that is too high."""
+
 AS_GOOD = 0.6
-"""Share of the best factor's sum that makes a milder one preferred."""
+"""Share of the best factor's sum that makes a smaller one preferred."""
+
+NAMED_AS_WELL = 0.35
+"""Share of the best factor's sum from which another factor is said beside the preferred one."""
 
 
 def detect_sampling_rate(
@@ -77,15 +90,16 @@ def detect_sampling_rate(
     return None
 
 
-def _finding(recording: Recording, factor: float, evidence: str, surer: str) -> Finding:
-    """Return the finding that the true rate is `factor` times the stated one."""
+def _finding(recording: Recording, factor: float, evidence: str, surer: str, others: Sequence[float] = ()) -> Finding:
+    """Return the finding that the true rate is `factor` times the stated one, or one of the others."""
     stated_hz = recording.sampling_rate_hz
     times = f"{factor:.4g} times" if factor > 1 else f"1/{1 / factor:.4g} of"
+    as_well = f"; {' or '.join(f'{other * stated_hz:.6g} Hz' for other in others)} nearly as well" if others else ""
     return Finding(
         SAMPLING_RATE,
         Kind.DATA_PROBLEM,
         f"The sampling rate is probably wrong: {factor * stated_hz:.6g} Hz, {times} the stated {stated_hz:.6g} Hz, "
-        "would fit best.",
+        f"would fit best{as_well}.",
         confidence=0.9,
         confidence_basis="what the factor explains that the stated rate does not",
         evidence=(evidence,),
@@ -169,65 +183,87 @@ def _strong_lines(excess: LineExcess, highest: float) -> StrongLines | None:
 
 def _near(lines: StrongLines, places: FloatArray) -> NDArray[np.bool_]:
     """Which of the lines lie at one of the places."""
-    if not len(places):
-        return np.zeros(len(lines.orders), dtype=bool)
-    places = np.sort(places)
-    right = np.clip(np.searchsorted(places, lines.orders), 1, len(places) - 1) if len(places) > 1 else 0
-    nearest: FloatArray = np.minimum(np.abs(lines.orders - places[right]), np.abs(lines.orders - places[right - 1]))
-    beside: NDArray[np.bool_] = nearest < lines.half_width
+    beside: NDArray[np.bool_] = np.any(np.abs(lines.orders - places[:, None]) < lines.half_width, axis=0)
     return beside
 
 
 def _log_p(
-    lines: StrongLines,
+    spectra: Sequence[StrongLines],
     factor: float,
     shafts: Sequence[float],
     parts: Sequence[tuple[float, float]],
     tolerance: float = STATED_SPEED_TOLERANCE,
 ) -> float:
-    r"""Return lg of the probability that chance puts so many of n lines on the places of shafts and races.
+    r"""Return lg of the chance that so many strong lines lie on the places of shafts and races, in all spectra.
 
-    .. math:: p = T \sum_{k \ge m} \binom{n}{k} c^k (1 - c)^{n - k}
+    .. math:: p = T \prod_s \sum_{k \ge m_s} \binom{n_s}{k} c_s^k (1 - c_s)^{n_s - k}
 
-    c is the share of the range that the places cover, T the number of speeds and slips tried: the true speed may be
-    that tolerance beside the stated one, a part 1.5 % beside its kinematic order. Each multiple of a part has two
-    sidebands to either side: of a race at its shaft's order, of a rolling element at the cage's.
+    m of n lines lie on the places, which cover the share c of the range; T is the number of speeds and slips tried: the
+    true speed may be that tolerance beside the stated one, a part 1.5 % beside its kinematic order, each alike in all
+    spectra. Each multiple of a part has two sidebands to either side: of a race at its shaft's order, of a rolling
+    element at the cage's. Impacts that come unevenly smear a part's lines, the more the higher.
     """
-    highest = max(lines.highest, 1.0)
-    n_speeds = min(4001, int(2 * tolerance * highest / (lines.half_width / 1.5)) + 2)
+    if not spectra:
+        return 0.0
+    highest, half_width = max(x.highest for x in spectra), min(x.half_width for x in spectra)
+    n_speeds = min(4001, int(2 * tolerance * max(highest, 1.0) / (half_width / 1.5)) + 2)
     speeds = np.linspace(1 - tolerance, 1 + tolerance, n_speeds) / factor
-    ratio = lines.orders[:, None] / speeds
-    beside = np.abs(ratio - np.maximum(np.rint(ratio), 1)) * speeds
+    on_shaft = np.zeros(n_speeds)
+    for lines in spectra:
+        ratio = lines.orders[:, None] / speeds
+        beside = np.abs(ratio - np.maximum(np.rint(ratio), 1)) * speeds
+        on_shaft += (beside < lines.half_width).sum(axis=0)
     # The speed that puts most lines on the shaft's multiples, or the stated one where those are weak.
-    best = float(speeds[int(np.argmax((beside < lines.half_width).sum(axis=0)))])
-    return min(_log_p_at(lines, speed, n_speeds, shafts, parts) for speed in (best, 1 / factor))
+    best = float(speeds[int(np.argmax(on_shaft))])
+    return min(_log_p_at(spectra, speed, n_speeds, shafts, parts) for speed in (best, 1 / factor))
 
 
 def _log_p_at(
-    lines: StrongLines, speed: float, n_speeds: int, shafts: Sequence[float], parts: Sequence[tuple[float, float]]
+    spectra: Sequence[StrongLines],
+    speed: float,
+    n_speeds: int,
+    shafts: Sequence[float],
+    parts: Sequence[tuple[float, float]],
 ) -> float:
     from scipy.stats import binom
 
-    places = [np.arange(1, int(lines.highest / (shaft * speed)) + 2) * shaft * speed for shaft in shafts]
-    seen: NDArray[np.bool_] = _near(lines, np.concatenate(places))
-    tries = float(n_speeds)
+    highest = max(x.highest for x in spectra)
+    places = np.concatenate([np.arange(1, int(highest / (s * speed)) + 2) * s * speed for s in shafts])
+    smeared = np.zeros(0)
+    seen = [_near(lines, places) for lines in spectra]
+    tries = log10(n_speeds)
     for part, sideband in parts:
         slips = part * np.linspace(0.985, 1.015, 61)
-        new = (_near_family(lines, slips * speed, sideband * speed) & ~seen).sum(axis=1)
+        near = [_near_family(lines, slips * speed, sideband * speed) for lines in spectra]
+        new = sum((x & ~y).sum(axis=1) for x, y in zip(near, seen, strict=True))
         best = int(np.argmax(new))
-        tries *= 3.0
+        tries += log10(3.0)
         if new[best] >= 2:
-            places.append(_family(slips[best], sideband, lines.highest / speed) * speed)
-            seen = np.logical_or(seen, _near(lines, places[-1]))
-            tries *= len(slips) / 3
-    inside = np.sort(np.concatenate(places))
-    inside = inside[(inside > lines.lowest) & (inside < lines.highest)]
-    if not len(inside):
-        return 0.0
-    width = np.minimum(np.diff(inside), 2 * lines.half_width).sum() + 2 * lines.half_width
-    covered = min(1.0, width / (lines.highest - lines.lowest))
-    p_value = tries * float(binom.sf(int(seen.sum()) - 1, len(lines.orders), covered))
-    return min(0.0, log10(max(p_value, 1e-30)))
+            family = _family(slips[best], sideband, highest / speed) * speed
+            smeared = np.concatenate([smeared, family])
+            seen = [x | y[best] for x, y in zip(seen, near, strict=True)]
+            tries += log10(len(slips) / 3)
+    found = tries
+    for lines, on_place in zip(spectra, seen, strict=True):
+        widths = np.concatenate([np.full(len(places), lines.half_width), _smeared(lines, smeared)])
+        middles = np.concatenate([places, smeared])
+        covered = _covered(middles - widths, middles + widths, lines.lowest, lines.highest)
+        found += max(float(binom.logsf(int(on_place.sum()) - 1, len(lines.orders), covered)) / log(10), -30.0)
+    return min(0.0, found)
+
+
+def _smeared(lines: StrongLines, places: FloatArray) -> FloatArray:
+    """Return the half widths within which lines of parts are at their places."""
+    widths: FloatArray = np.maximum(lines.half_width, SMEAR * np.abs(places))
+    return widths
+
+
+def _covered(starts: FloatArray, ends: FloatArray, lowest: float, highest: float) -> float:
+    """Return the share of a range that some intervals cover together."""
+    order = np.argsort(starts)
+    starts, ends = (np.clip(x[order], lowest, highest) for x in (starts, ends))
+    before = np.concatenate([[lowest], np.maximum.accumulate(ends)[:-1]])
+    return float(np.maximum(ends - np.maximum(starts, before), 0.0).sum()) / (highest - lowest)
 
 
 def _near_family(lines: StrongLines, parts: FloatArray, sideband: float) -> NDArray[np.bool_]:
@@ -235,7 +271,8 @@ def _near_family(lines: StrongLines, parts: FloatArray, sideband: float) -> NDAr
     carrier = lines.orders - sideband * np.arange(-2, 3)[:, None]  # (n_sidebands, n_lines)
     parts = parts[:, None, None]
     multiple = np.clip(np.rint(carrier / parts), 1, np.floor(lines.highest / parts) + 1)
-    near: NDArray[np.bool_] = np.any(np.abs(carrier - multiple * parts) < lines.half_width, axis=1)
+    reach = _smeared(lines, lines.orders)
+    near: NDArray[np.bool_] = np.any(np.abs(carrier - multiple * parts) < reach, axis=1)
     return near
 
 
@@ -256,36 +293,50 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         tolerance: float = STATED_SPEED_TOLERANCE,
         at: Sequence[tuple[float, float]] | None = None,
     ) -> float:
-        """Sum over the spectra, of lg of the chance that lines up to an order lie as well."""
-        strong = (_strong_lines(excess, highest) for excess in spectra)
+        """Return lg of the chance that lines up to an order lie as well."""
+        strong = [x for excess in spectra if (x := _strong_lines(excess, highest)) is not None]
         at = at if at is not None else parts if factor == 1.0 else races
-        return sum(_log_p(lines, factor, shafts, at, tolerance) for lines in strong if lines is not None)
+        return _log_p(strong, factor, shafts, at, tolerance)
 
-    if evidence(1.0, HIGHEST_ORDER) <= ENOUGH_EVIDENCE:
-        return None
     usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
     candidates = [*usual, *common]
     factors = _apart(candidates)
     # A rate that is too high moves everything up, and more of the spectrum counts.
     ranges = {factor: HIGHEST_ORDER * max(1.0, 1 / factor) for factor in factors}
     sums = {factor: evidence(factor, ranges[factor]) for factor in factors}
-    # Among so many rates one makes any family of lines the shaft's or a race's: both must speak for it.
-    for factor in set(factors).difference(usual):
+    # One family alone may be the shaft's or a race's at some rate and some speed: both must speak for a rate that is
+    # one of many, and for a usual factor without races the speed must be near the stated one.
+    for factor in factors:
         of_shafts = evidence(factor, ranges[factor], at=())
         if max(of_shafts, sums[factor] - of_shafts) > ENOUGH_OF_EACH:
             sums[factor] = 0.0
-    # The mildest factor that explains nearly as much as the best: its multiples do so, too, with more places.
-    as_good = [f for f in factors if sums[f] <= AS_GOOD * min(sums.values())]
-    factor = min(as_good, key=lambda f: (round(abs(log10(f)), 6), sums[f]))
-    stated = evidence(1.0, ranges[factor])
+        if factor in usual and not sums[factor]:
+            sums[factor] = evidence(factor, ranges[factor], NEAR_TOLERANCE)
+            # Halves of the shaft's order are looseness, multiples blades or poles: shafts alone tell no such rate.
+            alone = evidence(factor, ranges[factor], NEAR_TOLERANCE, ()) if factor > 2 else 0.0
+            if alone < min(sums[factor], evidence(2.0, HIGHEST_ORDER, NEAR_TOLERANCE, ())):
+                sums[factor] = alone
+    # The smallest factor that explains nearly as much as the best: its multiples do so, too, with more places.
+    best = min(sums.values())
+    factor = min(f for f in factors if sums[f] <= AS_GOOD * best)
+    others = sorted((f for f in factors if f != factor and sums[f] <= NAMED_AS_WELL * best), key=lambda f: sums[f])
     # With all parts of all bearings nearly every order is some part's, and lines there say nothing: one race at a time
     # says more. In a short record q times its order is a whole number, and all of its lines are then those of a shaft
     # that turns q times slower as well.
     of_shafts = evidence(1.0, ranges[factor], at=())
     by_one_race = min((evidence(1.0, ranges[factor], at=[race]) for race in races), default=0.0)
-    if by_one_race - of_shafts <= ENOUGH_OF_EACH and by_one_race <= BY_ONE_RACE * sums[factor]:
+    if factor > 1 and by_one_race - of_shafts <= ENOUGH_OF_EACH and by_one_race <= BY_ONE_RACE * sums[factor]:
         return None
-    if min(sums.values()) > ENOUGH_EVIDENCE or stated < SHARE_OF_STATED * sums[factor]:
+    # Beside a lower rate, with more of the spectrum and more places, the strongest lines decide: at that rate hardly
+    # any is where the stated one puts a shaft's or a race's.
+    strongest = [strong for excess in spectra if (strong := _strong_lines(excess, HIGHEST_ORDER)) is not None]
+    plain = min(_log_p(strongest, 1.0, shafts, at, CLOSE_TOLERANCE) for at in ((), *([race] for race in races)))
+    if factor < 1 and plain < EXPLAINED_EACH * len(strongest):
+        return None
+    if evidence(1.0, ranges[factor], CLOSE_TOLERANCE, ()) <= sums[factor]:
+        return None
+    stated = evidence(1.0, ranges[factor])
+    if best > ENOUGH_EVIDENCE or stated < SHARE_OF_STATED * sums[factor]:
         return None
     explained, highest = sums[factor], ranges[factor]
     close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
@@ -296,6 +347,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         f"The strongest lines of {len(spectra)} spectra then lie at orders of shafts and races (lg p "
         f"{explained:.0f} in sum); at the stated rate they do not ({stated:.0f}).",
         "Check the sampling rate, and whether another shaft turns that much slower or faster.",
+        others[:2],
     )
 
 

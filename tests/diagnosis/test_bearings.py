@@ -328,6 +328,20 @@ def test_noise_that_the_supplys_pull_modulates_is_no_race() -> None:
     assert found.kind is not Kind.FAULT
 
 
+def test_a_race_behind_the_clicks_of_a_supply_is_named() -> None:
+    def clicking(heights: tuple[float, float]) -> Recording:
+        quiet = at_sensors(5.4152 * 1.003, heights)
+        samples, clicks_s = np.array(quiet.samples), np.arange(0.003, quiet.duration_s, 1 / 100.0)
+        samples[:, np.round(clicks_s * quiet.sampling_rate_hz).astype(int)] += 8.0
+        return replace(quiet, samples=samples)
+
+    damaged, sound = (analyze(clicking(heights)) for heights in ((0.85, 0.255), (0.0, 0.0)))
+    assert finding(damaged, "bearing-inner-race").kind is Kind.FAULT
+    assert finding(damaged, "non-synchronous-impacts").kind is Kind.NOTICE
+    assert not NAMED & set(codes(sound))
+    assert finding(sound, "non-synchronous-impacts").kind is Kind.NOTICE
+
+
 def test_of_two_like_bearings_the_one_at_the_loudest_sensor_is_named() -> None:
     recording = at_sensors(3.5848, (2.0, 6.0))
     samples = np.array(recording.samples)

@@ -62,6 +62,9 @@ def test_by_a_tachometer() -> None:
         pytest.param("normal_0", 48_000, 12_000, marks=pytest.mark.slow),
         pytest.param("IR021_0", 12_000, 48_000, marks=pytest.mark.slow),
         ("OR007@6_0", 12_000, 25_600),
+        pytest.param("OR007@6_0", 12_000, 30_720, marks=pytest.mark.slow),
+        pytest.param("IR021_0", 12_000, 30_720, marks=pytest.mark.slow),
+        pytest.param("normal_0", 48_000, 4_800, marks=pytest.mark.slow),
     ],
 )
 def test_of_a_measured_motor(name: str, right_hz: int, stated_hz: int) -> None:
