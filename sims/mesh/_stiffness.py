@@ -118,20 +118,26 @@ def tooth_compliance(
     return ToothCompliance(bending / e, shear / e, axial / e)
 
 
-def friction_compliance(gear: GearGeometry, material: Material, roll_rad: FloatArray) -> FloatArray:
+def friction_compliance(
+    gear: GearGeometry, material: Material, roll_rad: FloatArray, *, along_itself: bool = False
+) -> FloatArray:
     """Deflection of a tooth along the contact's normal for 1 N of friction on 1 m of face width, towards its tip.
 
     c_nt = (1/E) Σ [12 M_n M_t/h³ + 2.4 (1 + ν) sin α_m cos α_m/h − sin α_m cos α_m/h] dx,
     M_n = r_b − x cos α_m,  M_t = (x_c − x) sin α_m + y_c cos α_m
 
+    and along the friction itself, c_tt, with M_t², sin² α_m and cos² α_m.
+
     Friction μN turns a contact's compliance into c_nn ± μ c_nt: towards the root in approach (stiffer), towards the tip
     in recess (softer). Squaring M_n ± μ M_t, as is common, doubles that: the work of the friction force, which the
-    normal deflection does not hold, is then in it.
+    normal deflection does not hold, is then in it: c_nn ± 2 μ c_nt + μ² c_tt.
 
     Parameters
     ----------
     gear, material, roll_rad
         As for `tooth_compliance`; the gear's body is left out.
+    along_itself : bool
+        The deflection along the friction.
 
     Returns
     -------
@@ -146,9 +152,10 @@ def friction_compliance(gear: GearGeometry, material: Material, roll_rad: FloatA
     base, height = gear.base_radius_mm * 1e-3, sections.front + sections.back
     normal = base - sections.x * cosine
     along = (place.x_mm * 1e-3 - sections.x) * sine + place.y_mm * 1e-3 * cosine
-    bending = np.sum(12.0 * normal * along / height**3 * sections.dx, axis=1)
-    shear = (2.0 * SHEAR_FACTOR * (1.0 + material.poisson_ratio) - 1.0) * (sine * cosine)[:, 0]
-    result: FloatArray = (bending + shear * np.sum(sections.dx / height, axis=1)) / material.youngs_modulus_pa
+    lever, shear, axial = (along, sine**2, cosine**2) if along_itself else (normal, sine * cosine, -sine * cosine)
+    bending = np.sum(12.0 * lever * along / height**3 * sections.dx, axis=1)
+    stretch = (2.0 * SHEAR_FACTOR * (1.0 + material.poisson_ratio) * shear + axial)[:, 0]
+    result: FloatArray = (bending + stretch * np.sum(sections.dx / height, axis=1)) / material.youngs_modulus_pa
     return result
 
 
