@@ -42,7 +42,8 @@ EFFECT = Effect(
     "sidebands of that shaft, ringing resonances, envelope lines at multiples of its order. Small chips lie in double "
     "contact and show little.",
     shows_in=("tooth_window", "envelope_orders", "mesh_sidebands", "resonances"),
-    moves_pitches=0.24,  # the pair lets go a quarter of a pitch earlier for each millimetre at a module of 4 mm
+    # The pair lets go a pitch earlier for each module: half of what lies between two severities that are tried, about.
+    moves_pitches=0.16,
     change=change,
     options=(
         GEAR_OPTION,
