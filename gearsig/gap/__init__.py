@@ -198,7 +198,7 @@ from gearsig.gap._types import (
     SpectrumCurves,
     group_probabilities,
 )
-from gearsig.gap._verdict import rivals, unbounded_fits, within_the_floor
+from gearsig.gap._verdict import is_settled, rivals, unbounded_fits, within_the_floor
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
 from gearsig.gap._waveform import (
     SimulatedCourse,
@@ -344,6 +344,7 @@ __all__ = [
     "independent_whole",
     "is_beyond",
     "is_calibrated",
+    "is_settled",
     "joint_probabilities",
     "labelled_changes",
     "labelled_support",

@@ -50,7 +50,15 @@ from gearsig.gap._types import (
     NextRecording,
     group_probabilities,
 )
-from gearsig.gap._verdict import in_order, likeliest_two, named_cause, rivals, unbounded_fits, within_the_floor
+from gearsig.gap._verdict import (
+    in_order,
+    is_settled,
+    likeliest_two,
+    named_cause,
+    rivals,
+    unbounded_fits,
+    within_the_floor,
+)
 from gearsig.gap._waveform import gain_scatter
 from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
@@ -545,7 +553,7 @@ def _next(
     conditions: Sequence[Condition],
 ) -> tuple[NextRecording, ...]:
     pair = likeliest_two(causes)
-    if pair is None or any(name not in tried for name in pair):
+    if pair is None or is_settled(causes) or any(name not in tried for name in pair):
         return ()
     first, second = pair
     return next_recordings(tried[first], tried[second], (known[first].title, known[second].title), twin, conditions)

@@ -139,6 +139,16 @@ def likeliest_two(causes: Sequence[GapCause]) -> tuple[str, str] | None:
     return (names[0], names[1]) if len(names) > 1 else None
 
 
+SETTLED = 0.01
+"""Probability of the second effect below which nobody needs a further recording to tell it from the first."""
+
+
+def is_settled(causes: Sequence[GapCause]) -> bool:
+    """Whether of all effects one alone is likely."""
+    probabilities = sorted((c.probability for c in causes if c.name not in (NONE, UNKNOWN)), reverse=True)
+    return len(probabilities) > 1 and probabilities[1] < SETTLED <= probabilities[0]
+
+
 def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
     """Return the effects that cannot be told apart: the two likeliest, and more until they are `TOGETHER`."""
     effects = sorted((c for c in causes if c.name not in (NONE, UNKNOWN)), key=lambda cause: -cause.probability)
@@ -230,7 +240,10 @@ def _next(report: GapReport) -> str:
         return f"Next: another {ways}; no two effects are likely enough to compute which would tell most."
     seen = _place_of_both(report)
     look = f"look at {seen}; " if seen else ""
-    return f"Next: {look}no other speed or load that was simulated would put the two likeliest effects further apart."
+    why = "speed or load that was simulated would put the two likeliest effects further apart"
+    if is_settled(report.causes):
+        why = "effect is likely enough to be told from this one by a further recording"
+    return f"Next: {look}no other {why}."
 
 
 def _not_varied(report: GapReport) -> list[str]:

@@ -17,6 +17,7 @@ from gearsig.gap import (
     Interval,
     OperatingCondition,
     PlaceKind,
+    is_settled,
     rivals,
     unbounded_fits,
     within_the_floor,
@@ -192,6 +193,16 @@ def test_a_gap_within_the_floor_has_no_unknown_cause() -> None:
 def at(*points: tuple[float, float]) -> tuple[ConditionFacts, ...]:
     first = effect_report().conditions[0]
     return tuple(replace(first, point=OperatingCondition(*point)) for point in points)
+
+
+def test_where_one_effect_alone_is_likely_no_recording_is_asked_for() -> None:
+    report = replace(effect_report(), next_recordings=(), references=("healthy.h5",))
+    first, *others = report.causes
+    sure = (replace(first, probability=0.996), *(replace(cause, probability=0.001) for cause in others))
+    assert is_settled(sure)
+    assert not is_settled(report.causes)
+    assert not is_settled(sure[:1])
+    assert "further apart" not in replace(report, causes=sure).verdict[3]
 
 
 def test_what_was_varied_already_is_not_advised() -> None:

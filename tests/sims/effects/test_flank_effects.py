@@ -105,6 +105,12 @@ def test_single_pitch_deviations_have_the_severity_as_standard_deviation() -> No
     assert values[:, 0].std() == pytest.approx(8.0, rel=0.15)  # nothing special about the first tooth
 
 
+def test_one_tooth_alone_may_be_out() -> None:
+    pitch = np.array(apply(spur_pair_machine(), "pitch_error", 8.0, gear="driven", tooth=7).mesh.flank_2.pitch_um)
+    assert np.flatnonzero(pitch).tolist() == [6]
+    assert pitch[6] == 8.0
+
+
 def test_pitch_errors_add_and_grow_in_proportion() -> None:
     once = np.array(apply(spur_pair_machine(), "pitch_error", 5.0).mesh.flank_1.pitch_um)
     machine = apply(spur_pair_machine(), "pitch_error", 5.0)
