@@ -28,8 +28,9 @@ from gearsig.rig import PulseTimes, Rig, SpeedSource
 from gearsig.spectra import Spectrum, power_density
 
 MEMORY_BYTES = 2e9
-BYTES_PER_SAMPLE = 240.0
-"""What `analyze` takes at most for one sample of one channel: 23.8 GB for 10⁸ were measured."""
+BYTES_PER_SAMPLE, BYTES_PER_CHANNEL = 330.0, 100.0
+"""What `analyze` takes at most for each sample in time, and of each channel besides: 3.36 GB were measured for 8.2
+million samples of one channel whose speed no line confirms, 1.47 GB for 2.05 million of four."""
 
 PART_SAMPLES = 1 << 19
 """Of a part, per channel: 400 revolutions at 25.6 kHz and 1200 rpm."""
@@ -163,7 +164,7 @@ class LongAnalysis:
 
 def analysis_bytes(n_samples: int, n_channels: int) -> float:
     """Return the memory that `analyze` takes of a recording, as an upper estimate."""
-    return BYTES_PER_SAMPLE * n_samples * n_channels
+    return (BYTES_PER_SAMPLE + BYTES_PER_CHANNEL * n_channels) * n_samples
 
 
 def analyze_file(
@@ -328,7 +329,7 @@ def read_whole(
 
 
 def _part_samples(memory_bytes: float, n_channels: int) -> int:
-    return max(1, int(min(PART_SAMPLES, memory_bytes / (BYTES_PER_SAMPLE * n_channels))))
+    return max(1, int(min(PART_SAMPLES, memory_bytes / analysis_bytes(1, n_channels))))
 
 
 def _check_fits(recording: Recording, needed_bytes: float, memory_bytes: float) -> None:
