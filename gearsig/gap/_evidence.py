@@ -101,7 +101,10 @@ def weighed_evidence(
 ONE_TOOTH = ("root_crack", "tooth_spall", "chipped_tooth")
 """Causes on a single tooth."""
 
-TOOTH_FAULTS = (*ONE_TOOTH, "pitch_error")
+DISPLACED = "pitch_error"
+"""What may be of one tooth as well."""
+
+TOOTH_FAULTS = (*ONE_TOOTH, DISPLACED)
 """Causes that change one engagement each, with a course of its own: waveforms and encoders tell them apart."""
 
 _BURST = ("change.{}.peak", "change.{}.prominence", "tooth.{}.peak", "tooth.{}.prominence", "tooth.{}.kurtosis")
