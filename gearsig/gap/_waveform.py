@@ -137,7 +137,7 @@ def gain_scatter(healthy: ReducedRecording, simulated: ReducedRecording) -> floa
         both = np.abs(np.stack([here.lines[orders], there.lines[orders]]))
         ratio = np.diff(np.log(np.maximum(both, 1e-300)), axis=0)[0]
         ratios.append(float(np.var(ratio)))
-    return float(max(np.mean(ratios) ** 0.5, MIN_GAIN_SCATTER))
+    return max(float(np.sqrt(np.mean(ratios))), MIN_GAIN_SCATTER)
 
 
 @dataclass(frozen=True)
