@@ -316,9 +316,15 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
             alone = evidence(factor, ranges[factor], NEAR_TOLERANCE, ()) if factor > 2 else 0.0
             if alone < min(sums[factor], evidence(2.0, HIGHEST_ORDER, NEAR_TOLERANCE, ())):
                 sums[factor] = alone
-    # The smallest factor that explains nearly as much as the best: its multiples do so, too, with more places.
+    # The smallest factor that explains nearly as much as the best: its multiples do so, too, with more places. Of a
+    # rate that is too low one damaged race tells more than all, whose places cover much of the range.
     best = min(sums.values())
     factor = min(f for f in factors if sums[f] <= AS_GOOD * best)
+    for milder in sorted(f for f in factors if f in usual and 1 < f < factor):
+        of_one = min((evidence(milder, ranges[milder], at=[race]) for race in races), default=0.0)
+        if of_one <= AS_GOOD * best:
+            factor, sums[milder] = milder, of_one
+            break
     others = sorted((f for f in factors if f != factor and sums[f] <= NAMED_AS_WELL * best), key=lambda f: sums[f])
     # With all parts of all bearings nearly every order is some part's, and lines there say nothing: one race at a time
     # says more. In a short record q times its order is a whole number, and all of its lines are then those of a shaft
