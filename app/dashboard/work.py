@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import os
+import sys
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from functools import update_wrapper
 from threading import Lock, Thread, Timer
 from time import monotonic
+from types import FrameType
 from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import streamlit as st
@@ -61,14 +64,22 @@ class Work(Generic[R]):
         return not self._thread.is_alive()
 
     def cancel(self) -> None:
-        """Stop it at its next step in Python: compiled kernels end first."""
+        """Stop it at its next step in Python: compiled kernels, imports and compilations end first."""
         with self._lock:
             if self._is_over or self.is_cancelled:
                 return
             self.is_cancelled = True
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(
-                ctypes.c_ulong(self._thread.ident or 0), ctypes.py_object(Cancelled)
-            )
+        self._stop()
+
+    def _stop(self) -> None:
+        with self._lock:
+            if self._is_over or not self._thread.is_alive():
+                return
+            ident = self._thread.ident or 0
+            if not _may_hold_a_lock(sys._current_frames().get(ident)):
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident), ctypes.py_object(Cancelled))
+                return
+        _later(LOOK_EVERY_S, self._stop)
 
     @property
     def has_failed(self) -> bool:
@@ -82,6 +93,23 @@ class Work(Generic[R]):
         if self.is_cancelled:
             raise Cancelled
         return cast("R", self._result)
+
+
+def _may_hold_a_lock(frame: FrameType | None) -> bool:
+    """Whether a thread is importing, compiling, or taking a lock: broken off there, it could keep the lock for ever."""
+    if frame is not None and frame.f_code.co_filename.endswith("threading.py"):
+        return frame.f_code.co_name not in ("join", "_wait_for_tstate_lock")
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib") or f"numba{os.sep}core" in frame.f_code.co_filename:
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _later(seconds: float, function: Callable[[], None]) -> None:
+    timer = Timer(seconds, function)
+    timer.daemon = True
+    timer.start()
 
 
 class Kept(Generic[P, R]):
@@ -183,9 +211,7 @@ def _cancel_unwatched(work: Work[Any], grace_s: float) -> None:
     if grace_s <= 0.0:
         look()
         return
-    timer = Timer(grace_s, look)
-    timer.daemon = True
-    timer.start()
+    _later(grace_s, look)
 
 
 def _offer_again(name: str) -> None:

@@ -1,6 +1,9 @@
 """Work beside a page: computed once for equal requests, cancelled where nobody waits for it."""
 
+import sys
+from pathlib import Path
 from threading import Event
+from time import sleep
 
 import pytest
 from streamlit.testing.v1 import AppTest
@@ -75,3 +78,28 @@ def test_what_was_cancelled_waits_until_it_is_started_again() -> None:
     assert not page.title
     page.button[0].click().run()
     assert page.title[0].value == "6"
+
+
+def test_an_import_is_not_broken_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is cancelled while it imports a module imports it first: half a module, or its lock, would be left else."""
+    slow = "import time\nfor _ in range(30):\n    time.sleep(0.01)\ncomplete = True\n"
+    (tmp_path / "slow_to_import.py").write_text(slow)
+    monkeypatch.syspath_prepend(tmp_path)
+    reached = []
+
+    def compute() -> None:
+        import slow_to_import
+
+        reached.append(slow_to_import.complete)
+        for _ in range(1000):
+            sleep(0.01)
+        reached.append("the end")
+
+    work = Work(compute)
+    while "slow_to_import" not in sys.modules:
+        sleep(0.001)
+    work.cancel()
+    assert work.wait(5.0)
+    assert reached == [True]
+    with pytest.raises(Cancelled):
+        work.result()
