@@ -345,6 +345,11 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     if best > ENOUGH_EVIDENCE or stated < SHARE_OF_STATED * sums[factor]:
         return None
     explained, highest = sums[factor], ranges[factor]
+    if factor < 1:
+        # Multiples of the shaft's order are blades or poles as well, and what is at no part's place is a stranger.
+        of_races = explained - evidence(factor, highest, at=())
+        if races and (of_races > ENOUGH_OF_EACH or _of_a_stranger(spectra, highest, shafts) <= explained):
+            return None
     close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
     factor = min(close, key=lambda f: evidence(f, highest, CLOSE_TOLERANCE))
     return _finding(
@@ -355,6 +360,17 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         "Check the sampling rate, and whether another shaft turns that much slower or faster.",
         others[:2],
     )
+
+
+def _of_a_stranger(spectra: Sequence[LineExcess], highest: float, shafts: Sequence[float]) -> float:
+    """Return lg p of shafts and one part of unknown order, that of a strong line, at the stated rate.
+
+    Where something strange knocks and no more, that is likelier than a rate that puts it on a shaft or a race.
+    """
+    strong = [x for excess in spectra if (x := _strong_lines(excess, highest)) is not None]
+    orders = sorted({round(float(order), 2) for x in strong for order in x.orders if order > 0.3})
+    sums = (_log_p(strong, 1.0, shafts, [(order, 0.0)], CLOSE_TOLERANCE) for order in orders)
+    return min(sums, default=0.0) + log10(max(len(orders), 1))
 
 
 def _factors(stated_hz: float, *, with_parts: bool) -> tuple[list[float], list[float]]:

@@ -359,8 +359,9 @@ def _choose_option(option: Option, key: str) -> float | str | None:
         return st.selectbox(label, choices, index=index, key=key, help=option.meaning, persist_state="session")
     looks = {"key": key, "help": option.meaning, "persist_state": "session"}
     if option.whole:
-        value = int(option.default or 0)
-        return float(st.number_input(label, min_value=int(option.low or 0), value=value, step=1, **looks))  # type: ignore[call-overload]
+        value = None if option.default is None else int(option.default)
+        number = st.number_input(label, min_value=int(option.low or 0), value=value, step=1, **looks)  # type: ignore[call-overload]
+        return None if number is None else float(number)
     number = st.number_input(label, value=option.default, placeholder="drawn", format="%g", **looks)  # type: ignore[call-overload]
     return None if number is None else float(number)
 
