@@ -15,7 +15,7 @@ from math import pi
 import numpy as np
 import typer
 
-from app.studies.gap.calibrate import WeighedCase, table
+from app.studies.gap.calibrate import STRONG, WeighedCase, table
 from app.studies.gap.lumped_rig import (
     N_PATH,
     LumpedDay,
@@ -387,6 +387,10 @@ def main() -> None:
     for n, title in ((1, "one operating condition"), (2, "two conditions")):
         chosen = [(words, case) for words, case in cases if case.n_conditions == n]
         typer.echo(f"{title}: {table(calibration, [case for _, case in chosen])[0]}")
+        middling = [case for words, case in chosen if words in EFFECTS and 1.0 <= case.size < STRONG]
+        ranks = [list(case.by(calibration)).index(case.truths[0]) for case in middling]
+        first, two = (np.mean([rank < n_first for rank in ranks]) for n_first in (1, 2))
+        typer.echo(f"  one to three floors {len(ranks)}: likeliest {first:.2f}, two {two:.2f}")
         for name in dict.fromkeys(words for words, _ in chosen):
             likeliest = [next(iter(case.by(calibration))) for words, case in chosen if words == name]
             typer.echo(
