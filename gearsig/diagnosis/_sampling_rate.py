@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 from math import log, log10
 
 import numpy as np
@@ -181,6 +182,10 @@ def _strong_lines(excess: LineExcess, highest: float) -> StrongLines | None:
     return StrongLines(spectrum.positions[places], 1.5 * spectrum.resolution, lowest, highest)
 
 
+def _strong_of_all(spectra: Sequence[LineExcess], highest: float) -> list[StrongLines]:
+    return [lines for excess in spectra if (lines := _strong_lines(excess, highest)) is not None]
+
+
 def _near(lines: StrongLines, places: FloatArray) -> NDArray[np.bool_]:
     """Which of the lines lie at one of the places."""
     beside: NDArray[np.bool_] = np.any(np.abs(lines.orders - places[:, None]) < lines.half_width, axis=0)
@@ -286,6 +291,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     spectra = [*signals.order_excess.values(), *(e.excess for e in envelopes)]
     shafts = sorted(signals.known_shaft_orders.values())
     races, parts = (list(_parts(signals, with_elements=so)) for so in (False, True))
+    strong_to = cache(partial(_strong_of_all, spectra))
 
     def evidence(
         factor: float,
@@ -294,9 +300,14 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         at: Sequence[tuple[float, float]] | None = None,
     ) -> float:
         """Return lg of the chance that lines up to an order lie as well."""
-        strong = [x for excess in spectra if (x := _strong_lines(excess, highest)) is not None]
         at = at if at is not None else parts if factor == 1.0 else races
-        return _log_p(strong, factor, shafts, at, tolerance)
+        return _log_p(strong_to(highest), factor, shafts, at, tolerance)
+
+    def has_plain_lines() -> bool:
+        """Whether shafts, or one race beside them, explain the strongest lines at the stated rate."""
+        strong = strong_to(HIGHEST_ORDER)
+        plain = min(_log_p(strong, 1.0, shafts, at, CLOSE_TOLERANCE) for at in ((), *([race] for race in races)))
+        return plain < EXPLAINED_EACH * len(strong)
 
     usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
     candidates = [*usual, *common]
@@ -316,9 +327,11 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
             alone = evidence(factor, ranges[factor], NEAR_TOLERANCE, ()) if factor > 2 else 0.0
             if alone < min(sums[factor], evidence(2.0, HIGHEST_ORDER, NEAR_TOLERANCE, ())):
                 sums[factor] = alone
+    best = min(sums.values())
+    if best > ENOUGH_EVIDENCE:
+        return None
     # The smallest factor that explains nearly as much as the best: its multiples do so, too, with more places. Of a
     # rate that is too low one damaged race tells more than all, whose places cover much of the range.
-    best = min(sums.values())
     factor = min(f for f in factors if sums[f] <= AS_GOOD * best)
     for milder in sorted(f for f in factors if f in usual and 1 < f < factor):
         of_one = min((evidence(milder, ranges[milder], at=[race]) for race in races), default=0.0)
@@ -335,20 +348,17 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         return None
     # Beside a lower rate, with more of the spectrum and more places, the strongest lines decide: at that rate hardly
     # any is where the stated one puts a shaft's or a race's.
-    strongest = [strong for excess in spectra if (strong := _strong_lines(excess, HIGHEST_ORDER)) is not None]
-    plain = min(_log_p(strongest, 1.0, shafts, at, CLOSE_TOLERANCE) for at in ((), *([race] for race in races)))
-    if factor < 1 and plain < EXPLAINED_EACH * len(strongest):
-        return None
-    if evidence(1.0, ranges[factor], CLOSE_TOLERANCE, ()) <= sums[factor]:
+    if factor < 1 and has_plain_lines():
         return None
     stated = evidence(1.0, ranges[factor])
-    if best > ENOUGH_EVIDENCE or stated < SHARE_OF_STATED * sums[factor]:
+    by_shafts = evidence(1.0, ranges[factor], CLOSE_TOLERANCE, ())
+    if by_shafts <= sums[factor] or stated < SHARE_OF_STATED * sums[factor]:
         return None
     explained, highest = sums[factor], ranges[factor]
-    if factor < 1:
+    if factor < 1 and races:
         # Multiples of the shaft's order are blades or poles as well, and what is at no part's place is a stranger.
         of_races = explained - evidence(factor, highest, at=())
-        if races and (of_races > ENOUGH_OF_EACH or _of_a_stranger(spectra, highest, shafts) <= explained):
+        if of_races > ENOUGH_OF_EACH or _of_a_stranger(strong_to(highest), shafts) <= explained:
             return None
     close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
     factor = min(close, key=lambda f: evidence(f, highest, CLOSE_TOLERANCE))
@@ -362,12 +372,11 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     )
 
 
-def _of_a_stranger(spectra: Sequence[LineExcess], highest: float, shafts: Sequence[float]) -> float:
+def _of_a_stranger(strong: Sequence[StrongLines], shafts: Sequence[float]) -> float:
     """Return lg p of shafts and one part of unknown order, that of a strong line, at the stated rate.
 
     Where something strange knocks and no more, that is likelier than a rate that puts it on a shaft or a race.
     """
-    strong = [x for excess in spectra if (x := _strong_lines(excess, highest)) is not None]
     orders = sorted({round(float(order), 2) for x in strong for order in x.orders if order > 0.3})
     sums = (_log_p(strong, 1.0, shafts, [(order, 0.0)], CLOSE_TOLERANCE) for order in orders)
     return min(sums, default=0.0) + log10(max(len(orders), 1))

@@ -121,12 +121,9 @@ class GapCalibration:
         total = sum(weights.values())
         probabilities = {name: w / total for name, w in weights.items()}
         if DISPLACED in probabilities:
-            for name in ONE_TOOTH:
-                moved = DISPLACED_SHARE * probabilities.get(name, 0.0)
-                probabilities |= {
-                    name: probabilities.get(name, 0.0) - moved,
-                    DISPLACED: probabilities[DISPLACED] + moved,
-                }
+            moved = {name: DISPLACED_SHARE * probabilities[name] for name in ONE_TOOTH if name in probabilities}
+            probabilities |= {name: probabilities[name] - share for name, share in moved.items()}
+            probabilities[DISPLACED] += sum(moved.values())
         return dict(sorted(probabilities.items(), key=lambda item: -item[1]))
 
     def outcome(

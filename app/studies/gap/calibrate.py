@@ -29,6 +29,7 @@ from gearsig.gap import (
     GapCalibration,
     Learned,
     Population,
+    Recogniser,
     gap_size,
     joint_probabilities,
     load_learned,
@@ -194,16 +195,30 @@ def two_conditions(population: Population, rows: Iterable[int]) -> list[tuple[in
 
 def _weighed(population: Population, rows: tuple[int, ...], simulator: str, *, with_reference: bool) -> WeighedCase:
     learned = load_learned()
-    recogniser = learned.recognisers[with_reference]
-    effects = cracked_gap_simulator().gap_effects().values()
-    by_condition, sizes = [], []
-    for row in rows:
-        change = _change(population, learned, row, with_reference=with_reference)
-        by_condition.append(recogniser.probabilities(change, float(population.loads_n_per_mm[row]), effects))
-        sizes.append(gap_size(change, recogniser.floor).structural.value)
+    changes = [_change(population, learned, row, with_reference=with_reference) for row in rows]
     loads = [float(population.loads_n_per_mm[row]) for row in rows]
-    forest = joint_probabilities(by_condition, loads, recogniser.causes)
-    return WeighedCase((str(population.causes[rows[0]]),), forest, {}, max(sizes), len(rows), simulator)
+    recogniser = learned.recognisers[with_reference]
+    return weighed_case(str(population.causes[rows[0]]), changes, loads, recogniser, simulator)
+
+
+def weighed_case(
+    cause: str, changes: Sequence[Features], loads: Sequence[float], recogniser: Recogniser, simulator: str
+) -> WeighedCase:
+    """Return what forests say of one machine's change at one or several operating points, without trials.
+
+    Parameters
+    ----------
+    cause : str
+    changes, loads : sequences
+        Of each point; load of the teeth in N/mm.
+    recogniser : Recogniser
+    simulator : str
+    """
+    effects = cracked_gap_simulator().gap_effects().values()
+    by_condition = [recogniser.probabilities(c, load, effects) for c, load in zip(changes, loads, strict=True)]
+    forest = joint_probabilities(by_condition, list(loads), recogniser.causes)
+    size = max(gap_size(change, recogniser.floor).structural.value for change in changes)
+    return WeighedCase((cause,), forest, {}, size, len(changes), simulator)
 
 
 def _change(population: Population, learned: Learned, row: int, *, with_reference: bool) -> Features:

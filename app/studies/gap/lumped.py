@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from math import pi
 
 import numpy as np
 import typer
 
-from app.studies.gap.calibrate import STRONG, WeighedCase, table
+from app.studies.gap.calibrate import STRONG, WeighedCase, table, weighed_case
 from app.studies.gap.lumped_rig import (
     N_PATH,
     LumpedDay,
@@ -29,17 +29,13 @@ from gearsig.checks import FloatArray
 from gearsig.gap import (
     NONE,
     UNKNOWN,
-    Features,
     ReducedRecording,
     change_features,
-    gap_size,
-    joint_probabilities,
     load_gap_calibration,
     load_learned,
     reduce_recording,
     tooth_load_n_per_mm,
 )
-from sims.cracked import cracked_gap_simulator
 from sims.machine import log_uniform
 
 LUMPED = "lumped"
@@ -345,12 +341,12 @@ def cases_of_machine(index: int) -> list[tuple[str, WeighedCase]]:
     references = [reduced(point, LumpedFault()) for point in POINTS]
     pair = references[0].frame.pair
     loads = [tooth_load_n_per_mm(pair, rig.torque_nm(point)) for point in POINTS]
-    cases = []
+    recogniser, cases = load_learned().recognisers[True], []
     for cause, words, fault in _faults(rig, rng):
         touched = 1.8 if cause == NONE else 1.0
         changes = [change_features(reduced(point, fault, touched), references[point]) for point in POINTS]
-        alone = [_weighed(cause, [change], [load]) for change, load in zip(changes, loads, strict=True)]
-        cases += [(words, case) for case in (*alone, _weighed(cause, changes, loads))]
+        points = (slice(0, 1), slice(1, 2), slice(0, 2))
+        cases += [(words, weighed_case(cause, changes[p], loads[p], recogniser, LUMPED)) for p in points]
     return cases
 
 
@@ -361,15 +357,6 @@ def _faults(rig: LumpedRig, rng: Draw) -> Iterator[tuple[str, str, LumpedFault]]
         yield name, name, effect(rig, LumpedGeometry.of(rig), rng)
     for _ in range(N_OUTSIDE):
         yield UNKNOWN, *outside(rig, rng)
-
-
-def _weighed(cause: str, changes: Sequence[Features], loads: Sequence[float]) -> WeighedCase:
-    recogniser = load_learned().recognisers[True]
-    effects = cracked_gap_simulator().gap_effects().values()
-    by_point = [recogniser.probabilities(c, load, effects) for c, load in zip(changes, loads, strict=True)]
-    forest = joint_probabilities(by_point, list(loads), recogniser.causes)
-    size = max(gap_size(change, recogniser.floor).structural.value for change in changes)
-    return WeighedCase((cause,), forest, {}, size, len(changes), LUMPED)
 
 
 def main() -> None:

@@ -156,7 +156,7 @@ def _far_end(x, y, stiffness, play):  # type: ignore[no-untyped-def]
 def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the other: mesh, shafts, bearings, housing
     n, keep, step, mesh, bearings, bodies, drive, q, v, gaps, compliances, set_speed, motor, load, cage, on_housing
 ):  # fmt: skip
-    """Return means of `keep` steps: bearing forces (4), housing accelerations (3), pinion's angle; the parted share."""
+    """Return means of `keep` steps: bearing forces (4), housing accelerations (3), pinion's angle."""
     out = np.zeros((n // keep, 8))
     a = np.zeros(11)
     rb1, rb2 = mesh.base_radii_m
@@ -165,9 +165,9 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
     before = mesh.before_m + mesh.beyond_m
     after = mesh.after_m + mesh.beyond_m
     per_m = (gaps[0].shape[1] - 1) / (before + after)
-    n_out, n_mean, n_parted = 0, 0, 0
+    n_out, n_mean = 0, 0
     for i in range(n):
-        k, part = i // 32, (i % 32) / 32.0
+        k, part = i // SLOW, (i % SLOW) / SLOW
         wanted = set_speed[k] + part * (set_speed[k + 1] - set_speed[k])
         # mesh
         th1, th2, w1, w2 = q[1], q[2], v[1], v[2]
@@ -204,7 +204,6 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
                 rubbing += friction
                 moment_1 += friction * (rb1 * TAN + s)
                 moment_2 += friction * (rb2 * TAN - s)
-        n_parted += force <= 0.0
         back = -nearer - mesh.backlash_m
         if back > 0.0:
             push = mesh.back_n_per_m * (back - mesh.damping_s * rate * min(1.0, back * 1e6))
@@ -283,7 +282,7 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
             n_mean += 1
             if n_mean == keep:
                 n_out, n_mean = n_out + 1, 0
-    return out, n_parted / n
+    return out
 
 
 # --------------------
@@ -678,7 +677,7 @@ def _slow(n: int, rate: float, size: float, corner_hz: float, rng: np.random.Gen
 def _motion(
     rig: LumpedRig, point: int, day: LumpedDay, fault: LumpedFault, rng: np.random.Generator, duration_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return bearing forces (4) and housing accelerations (3) of each interval, (n, 7), and the pinion's angle."""
+    """Return of each interval bearing forces (4), housing accelerations (3), forces on it (2); the pinion's angle."""
     n, shape = rig.numbers, LumpedGeometry.of(rig, day.stiffness)
     gaps, compliances = tooth_tables(rig, shape, fault)
     fine_hz = rig.rate_hz * OVERSAMPLING[rig.rate_hz]
@@ -693,6 +692,7 @@ def _motion(
     mean_stiffness = 1.4 / shape.pair_m_per_n
     moved = 1.0 / (shape.base_radii[0] ** 2 / inertia[1] + shape.base_radii[1] ** 2 / inertia[2])
 
+    # what changes slowly: the set speed, torques, the cages' slip
     share, wander_hz = fault.wander
     phase = rng.uniform(0, 2 * pi)
     swing = np.sin(2 * pi * wander_hz * time + phase) + 0.25 * np.sin(4.6 * pi * wander_hz * time + 2 * phase)
@@ -718,6 +718,7 @@ def _motion(
             for side, turn in enumerate((speed, -speed * ratio))
         ]
     )
+    # the machine as the kernel reads it
     bearings, bodies = _bearings_of(rig, day, fault, cage), _bodies_of(rig, day, fault)
     direction = float(n["centre_line_rad"]) - PRESSURE_ANGLE
     normal = -sin(direction), cos(direction)
@@ -761,6 +762,7 @@ def _motion(
     shares = {"coupling_nm": motor, "whirl_n": max(force, 150.0)}
     drive = usual._replace(**{name: value * shares.get(name, 1.0) for name, value in fault.drive.items()})
 
+    # from rest under load, at any tooth, already turning
     angle = 2 * pi * rng.integers(rig.teeth[1]) + rng.uniform(0, 2 * pi)
     bent = force / (2.0 * bearings.far_n_per_m[0])
     q = np.zeros(11)
@@ -770,13 +772,12 @@ def _motion(
     v = np.zeros(11)
     v[:4] = speed, speed, speed * ratio, speed * ratio
     keep = OVERSAMPLING[rig.rate_hz] // 2
-    out, _ = march(
+    out = march(
         n_steps, keep, 1.0 / fine_hz, mesh, bearings, bodies, drive, q, v, gaps, compliances, set_speed, torque,
         braking, slips, on_housing,
     )  # fmt: skip
-    return np.column_stack([out[:, :7], on_housing[:, : len(out) * keep].T.reshape(len(out), keep, 2).mean(axis=1)]), (
-        out[:, 7]
-    )
+    pushed = on_housing[:, : len(out) * keep].T.reshape(len(out), keep, 2).mean(axis=1)
+    return np.column_stack([out[:, :7], pushed]), out[:, 7]
 
 
 def _bearings_of(rig: LumpedRig, day: LumpedDay, fault: LumpedFault, cage: Sequence[float]) -> LumpedBearings:
