@@ -25,7 +25,6 @@ from gearsig.gap import (
     ReducedRecording,
     once,
     reduce_recording,
-    rivals,
     rule_strengths,
     textbook_rules,
     without_machines_of,
@@ -179,12 +178,9 @@ def bare_report(
         conditions=(),
         references=(),
         outcome=outcome or likeliest,
+        causes=causes,
         size=_NOTHING,
         repeatability=0.0,
-        places=(),
-        causes=causes,
-        groups={},
-        inseparable=rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else None,
     )
 
 

@@ -197,8 +197,9 @@ from gearsig.gap._types import (
     Shrinkage,
     SpectrumCurves,
     group_probabilities,
+    rivals,
 )
-from gearsig.gap._verdict import is_settled, rivals, unbounded_fits, within_the_floor
+from gearsig.gap._verdict import is_settled, unbounded_fits, within_the_floor
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
 from gearsig.gap._waveform import (
     SimulatedCourse,

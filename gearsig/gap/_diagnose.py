@@ -42,20 +42,17 @@ from gearsig.gap._trials import (
 from gearsig.gap._types import (
     NAMING,
     GapCause,
-    GapOutcome,
     GapPlace,
     GapReport,
     Interval,
     LabelledFacts,
     NextRecording,
-    group_probabilities,
 )
 from gearsig.gap._verdict import (
     in_order,
     is_settled,
     likeliest_two,
     named_cause,
-    rivals,
     unbounded_fits,
     within_the_floor,
 )
@@ -245,8 +242,6 @@ def diagnose_gap(
         repeatability=clearest.size.repeatability.value,
         places=places,
         causes=causes,
-        groups=group_probabilities(causes),
-        inseparable=rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else None,
         steps=steps_of(conditions, tried, causes) if tried and named is not None else (),
         next_recordings=next_ones,
         spectra=spectrum_curves(

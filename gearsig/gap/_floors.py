@@ -282,8 +282,7 @@ def _size(change: Features, structural: StructuralFloor, floors: FloatArray, who
 
     value = size(change.values)
     variance = sum((len(rows) - 1.0) * float(np.var([size(row) for row in rows])) for rows in change.left_out)
-    half = t_quantile(_degrees(change)) * variance**0.5
-    return Interval(value, max(0.0, value - half), value + half)
+    return Interval.around(value, t_quantile(_degrees(change)) * variance**0.5, low=0.0)
 
 
 def _degrees(change: Features) -> int:

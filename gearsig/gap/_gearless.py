@@ -33,11 +33,10 @@ from gearsig.gap._types import (
     GapOutcome,
     GapPlace,
     GapReport,
-    Interval,
     PlaceKind,
     SpectrumCurves,
-    group_probabilities,
 )
+from gearsig.gap._verdict import named_cause
 from gearsig.gap._words import band_words, hertz
 from gearsig.prepared import PreparedRecording
 from gearsig.rig import Rig
@@ -330,16 +329,11 @@ def _share_of_unknown(standing: Sequence[Standing], races: Races, every: Sequenc
 
 
 def _race(effect: GapEffect, part: Standing | None, rig: Rig, *, scale: float) -> GapCause:
-    cause = GapCause(effect.name, effect.group, effect.title, effect.unit, 0.0)
     if part is None:
-        return cause
+        return named_cause(effect.name, 0.0, {effect.name: effect})
     finding = part.finding
-    return replace(
-        cause,
-        probability=scale * finding.confidence,
-        place=bearings_text(finding, rig),
-        remarks=_remarks(finding),
-    )
+    cause = named_cause(effect.name, scale * finding.confidence, {effect.name: effect}, bearings_text(finding, rig))
+    return replace(cause, remarks=_remarks(finding))
 
 
 def _remarks(finding: Finding) -> tuple[str, ...]:
@@ -462,11 +456,8 @@ def diagnose_gearless(
         conditions=tuple(_facts(one) for one in every),
         references=tuple(one.recording.name for one in references) if any(e.reference for e in every) else (),
         outcome=outcome,
-        size=Interval(NAN, NAN, NAN),
-        repeatability=NAN,
         places=tuple(standing_place(one, rig, name=one.recording if len(every) > 1 else "") for one in standing),
         causes=causes,
-        groups=group_probabilities(causes),
         spectra=_spectra(standing, every),
         notices=(
             NOT_SIMULATED,

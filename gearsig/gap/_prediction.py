@@ -539,13 +539,14 @@ def shrinkage(
         Of the effect where the recordings tell that it is not: on the other shaft, say. They serve as placebos.
     """
     folds, scores = _telling(folds, [_score(paths, fold, excluded) for fold in folds])
-    before, after, shrink = np.mean([score.sizes for score in scores], axis=0)
+    before, after, shrink = np.mean([score.sizes for score in scores], axis=0).tolist()
     n_blocks = min((len(group) for fold in folds for group in fold.again), default=2)
-    wide = t_quantile(max(n_blocks - 1, 1)) * np.sqrt(np.mean([score.variances for score in scores], axis=0))
+    variances = np.mean([score.variances for score in scores], axis=0)
+    wide = (t_quantile(max(n_blocks - 1, 1)) * np.sqrt(variances)).tolist()
     return Shrinkage(
-        _interval(before, wide[0], 0.0, np.inf),
-        _interval(after, wide[1], 0.0, np.inf),
-        _interval(shrink, wide[2], -np.inf, 1.0),
+        Interval.around(before, wide[0], low=0.0),
+        Interval.around(after, wide[1], low=0.0),
+        Interval.around(shrink, wide[2], high=1.0),
         float(np.mean([score.slope for score in scores])),
         float(np.mean([score.placebo for score in scores])),
         held_out,
@@ -579,10 +580,6 @@ def _elsewhere(paths: Sequence[EffectPath], fold: Fold) -> float | None:
         if one.condition == fold.scored.condition:
             fit = fit.at_level_of(one)
     return _before_and_after(fit, fold.scored, own_features(fit, fold.scored))[2]
-
-
-def _interval(value: float, wide: float, least: float, most: float) -> Interval:
-    return Interval(float(value), float(max(value - wide, least)), float(min(value + wide, most)))
 
 
 def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPath]) -> _Score:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from math import inf, isinf
+from math import inf, isinf, nan
 
 import numpy as np
 
@@ -217,6 +217,7 @@ class Interval:
         return f"{write(self.low)} or more" if isinf(self.high) else f"{write(self.low)} to {write(self.high)}"
 
 
+NOT_KNOWN = Interval(nan, nan, nan)
 MIN_PREDICTED = 0.5
 """Floors: what a simulator changes by less tells nothing, whether the gap shrinks or grows."""
 
@@ -333,6 +334,19 @@ def group_probabilities(causes: Sequence[GapCause]) -> dict[str, float]:
     for cause in causes:
         by_group[cause.group] = by_group.get(cause.group, 0.0) + cause.probability
     return dict(sorted(by_group.items(), key=lambda item: -item[1]))
+
+
+TOGETHER, MAX_RIVALS = 0.9, 4
+"""What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
+more of them than anybody would look at."""
+
+
+def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
+    """Return the effects that cannot be told apart: the two likeliest, and more until they are `TOGETHER`."""
+    effects = sorted((c for c in causes if c.name not in (NONE, UNKNOWN)), key=lambda cause: -cause.probability)
+    shares = np.cumsum([cause.probability for cause in effects])
+    n = int(np.searchsorted(shares, TOGETHER * shares[-1])) + 1 if effects else 0
+    return tuple(cause.name for cause in effects[: int(np.clip(n, 2, MAX_RIVALS))])
 
 
 OWN_LABELS = "your own labels"
@@ -502,9 +516,9 @@ class GapReport(Result, rows="causes"):
     causes : tuple of GapCause
         What the outcome names first, the others by probability; these add up to 1.
     groups : mapping
-        Group → probability.
+        Group → probability; default: of the causes.
     inseparable : tuple of str or None
-        Causes that these recordings cannot tell apart, likeliest first.
+        Causes that these recordings cannot tell apart, likeliest first; default: `rivals`, where the outcome says so.
     steps : tuple of GapStep
         Before, with each effect, what is left.
     next_recordings : tuple of NextRecording
@@ -531,11 +545,11 @@ class GapReport(Result, rows="causes"):
     conditions: tuple[ConditionFacts, ...]
     references: tuple[str, ...]
     outcome: GapOutcome
-    size: Interval
-    repeatability: float
-    places: tuple[GapPlace, ...]
     causes: tuple[GapCause, ...]
-    groups: Mapping[str, float]
+    size: Interval = NOT_KNOWN
+    repeatability: float = nan
+    places: tuple[GapPlace, ...] = ()
+    groups: Mapping[str, float] = field(default_factory=dict)
     inseparable: tuple[str, ...] | None = None
     steps: tuple[GapStep, ...] = ()
     next_recordings: tuple[NextRecording, ...] = ()
@@ -547,6 +561,12 @@ class GapReport(Result, rows="causes"):
     warnings: tuple[str, ...] = ()
     labelled: LabelledFacts | None = None
     next_steps: tuple[NextStep, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.groups:
+            object.__setattr__(self, "groups", group_probabilities(self.causes))
+        if self.inseparable is None and self.outcome is GapOutcome.CANNOT_SEPARATE:
+            object.__setattr__(self, "inseparable", rivals(self.causes))
 
     @property
     def kind(self) -> GapKind | None:

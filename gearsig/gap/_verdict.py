@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import isfinite
 
-import numpy as np
-
 from gearsig.gap._next_recording import HEALTHY_MACHINE, STEPS
 from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import (
@@ -21,6 +19,7 @@ from gearsig.gap._types import (
     GapPlace,
     GapReport,
     Interval,
+    rivals,
 )
 from gearsig.gap._words import hardly_predicted, odds_text, same_load, same_speed, severity_unit
 
@@ -35,9 +34,6 @@ def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
 NO_SIMULATION = (
     "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
 )
-TOGETHER, MAX_RIVALS = 0.9, 4
-"""What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
-more of them than anybody would look at."""
 
 
 def _where(report: GapReport) -> str:
@@ -147,14 +143,6 @@ def is_settled(causes: Sequence[GapCause]) -> bool:
     """Whether of all effects one alone is likely."""
     probabilities = sorted((c.probability for c in causes if c.name not in (NONE, UNKNOWN)), reverse=True)
     return len(probabilities) > 1 and probabilities[1] < SETTLED <= probabilities[0]
-
-
-def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
-    """Return the effects that cannot be told apart: the two likeliest, and more until they are `TOGETHER`."""
-    effects = sorted((c for c in causes if c.name not in (NONE, UNKNOWN)), key=lambda cause: -cause.probability)
-    shares = np.cumsum([cause.probability for cause in effects])
-    n = int(np.searchsorted(shares, TOGETHER * shares[-1])) + 1 if effects else 0
-    return tuple(cause.name for cause in effects[: int(np.clip(n, 2, MAX_RIVALS))])
 
 
 def within_the_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:

@@ -29,7 +29,7 @@ from gearsig.gap._evidence import weighed_evidence
 from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
 from gearsig.gap._types import NAMING, GapCause, GapOutcome, GapPlace, GapReport, Interval
-from gearsig.gap._verdict import in_order, likeliest_two, named_cause, rivals
+from gearsig.gap._verdict import in_order, likeliest_two, named_cause
 from gearsig.gap._words import fitted_words, severity_unit
 from gearsig.gap.start_stop._attribution import (
     CRACK,
@@ -156,8 +156,6 @@ def drive_report(diagnosis: DriveDiagnosis) -> GapReport:
         repeatability=float(np.sqrt(np.nanmean(repeated**2))),
         places=drive_places(compared),
         causes=causes,
-        groups=types.group_probabilities(causes),
-        inseparable=rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else None,
         steps=_steps(compared, seen, first) if is_named else (),
         next_recordings=_next_recordings(compared, seen, fits, pair, effects)
         if pair and outcome is not GapOutcome.NO_GAP
