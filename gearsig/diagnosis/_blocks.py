@@ -38,16 +38,23 @@ class RecordBlocks:
     Parameters
     ----------
     head : Recording
-        Its beginning: channels, rate, rig and source of speed.
+        Its beginning: channels, rate, rig and source of speed; all of it where it is only read whole.
     n_samples : int
         Per channel.
     read : callable
-        A slice of samples → Recording.
+        A slice of samples → Recording; None → all of it.
+    is_parted : bool
+        Whether the format is read in parts.
     """
 
     head: Recording
     n_samples: int
-    read: Callable[[slice], Recording]
+    read: Callable[[slice | None], Recording]
+    is_parted: bool = True
+
+    def whole(self) -> Recording:
+        """Return all of it."""
+        return self.read(None) if self.is_parted else self.head
 
     def power_density(self, channel: str, *, n_per_block: int = 8192) -> Spectrum:
         """Return the power density of all of the record: the mean of all half overlapping spectra (Hann)."""
@@ -374,7 +381,7 @@ def record_blocks(
     speed: SpeedSource | None = None,
     part: slice | None = None,
 ) -> RecordBlocks:
-    """Open a recording that is read block by block: HDF5, TDMS, Parquet or WAV.
+    """Open a recording that is read block by block: HDF5, TDMS, Parquet or WAV. One of another format is read.
 
     Parameters
     ----------
@@ -387,15 +394,18 @@ def record_blocks(
     Raises
     ------
     InputError
-        As `read_recording`, and for a format that is only read whole.
+        As `read_recording`, and for a part of what is only read whole.
     """
     n_samples = n_samples_of(path)
     first, last, _ = (part or slice(None)).indices(n_samples or 0)
 
-    def read(block: slice) -> Recording:
-        inside = slice(first + block.start, first + block.stop)
+    def read(block: slice | None) -> Recording:
+        inside = part if block is None else slice(first + block.start, first + block.stop)
         return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed, part=inside)
 
+    if n_samples is None:
+        whole = read(None)
+        return RecordBlocks(whole, whole.n_samples, read, is_parted=False)
     return RecordBlocks(read(slice(0, min(KERNEL_SAMPLES, last - first) or 1)), last - first, read)
 
 

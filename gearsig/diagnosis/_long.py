@@ -11,19 +11,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from gearsig.checks import FloatArray, freeze, positive
 from gearsig.diagnosis._analyze import analyze
+from gearsig.diagnosis._blocks import RecordBlocks, record_blocks
 from gearsig.diagnosis._reference import rig_of_reference
 from gearsig.diagnosis._types import Analysis, Finding, Kind, Outcome
 from gearsig.diagnosis._verdict import ranked
 from gearsig.errors import InputError
 from gearsig.formatting import file_label
 from gearsig.prepared import PreparedRecording, prepare
-from gearsig.recording import Recording, check_memory, n_samples_of, read_recording
+from gearsig.recording import Recording, check_memory
 from gearsig.rig import PulseTimes, Rig, SpeedSource
 from gearsig.spectra import Spectrum, power_density
 
@@ -204,35 +204,20 @@ def analyze_file(
     """
     positive(memory_bytes - 2e8, "memory less 0.2 GB", "bytes", remedy="allow more than 0.2 GB")
     announce = on_stage or (lambda _: None)
-
-    def read(part: slice | None) -> Recording:
-        return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed, part=part)
-
     healthy = None if reference is None else prepare(reference)
-    reference_bytes = 0.0
-    if healthy is not None:
-        reference_bytes = analysis_bytes(healthy.recording.n_samples, len(healthy.recording.channels))
-    n_samples = n_samples_of(path)
-    if n_samples is None:
-        recording = read(None)
-        n_channels = len(recording.vibration_names())
-        _check_fits(recording, analysis_bytes(recording.n_samples, n_channels) + reference_bytes, memory_bytes)
-        return analyze(recording, reference=healthy, torque_nm=torque_nm, on_stage=on_stage)
-    head = read(slice(0, min(n_samples, N_PER_SPECTRUM)))
-    n_channels = len(head.channels)
-    if analysis_bytes(n_samples, n_channels) + reference_bytes <= memory_bytes:
-        return analyze(read(None), reference=healthy, torque_nm=torque_nm, on_stage=on_stage)
+    left_bytes = memory_bytes if healthy is None else memory_bytes - _needed_bytes(healthy.recording)
+    record = record_blocks(path, rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    if _fits(record, left_bytes):
+        return analyze(record.whole(), reference=healthy, torque_nm=torque_nm, on_stage=on_stage)
     announce("levels over time")
-    overview = long_overview(head, n_samples, read)
-    n_part = _part_samples(memory_bytes - reference_bytes, n_channels)
-    parts = []
-    for first, reason in _chosen(overview, n_part, n_samples, head.sampling_rate_hz):
+    overview = long_overview(record.head, record.n_samples, record.read)
+    parts, rate = [], record.head.sampling_rate_hz
+    for part, reason in _chosen(record, overview, left_bytes):
         announce(reason)
-        recording = read(slice(first, first + n_part))
+        recording = record.read(part)
         found = analyze(recording, reference=healthy, torque_nm=torque_nm)
-        rate = recording.sampling_rate_hz
-        parts.append(AnalysedPart(first / rate, first / rate + recording.duration_s, reason, found))
-    return LongAnalysis(head.name, n_samples / head.sampling_rate_hz, overview, tuple(parts))
+        parts.append(AnalysedPart(part.start / rate, part.start / rate + recording.duration_s, reason, found))
+    return LongAnalysis(record.head.name, record.n_samples / rate, overview, tuple(parts))
 
 
 def read_reference(
@@ -289,21 +274,11 @@ def read_usual_part(
     speed: SpeedSource | None = None,
 ) -> Recording:
     """Return a recording whole where its analysis fits into memory, else a part of usual level."""
-
-    def read(part: slice | None) -> Recording:
-        return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed, part=part)
-
-    n_samples = n_samples_of(path)
-    if n_samples is None:
-        recording = read(None)
-        _check_fits(recording, analysis_bytes(recording.n_samples, len(recording.channels)), memory_bytes)
-        return recording
-    head = read(slice(0, min(n_samples, N_PER_SPECTRUM)))
-    if analysis_bytes(n_samples, len(head.channels)) <= memory_bytes:
-        return read(None)
-    n_part = _part_samples(memory_bytes, len(head.channels))
-    parts = _chosen(long_overview(head, n_samples, read), n_part, n_samples, head.sampling_rate_hz, (USUAL,))
-    return read(slice(parts[0][0], parts[0][0] + n_part))
+    record = record_blocks(path, rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    if _fits(record, memory_bytes):
+        return record.whole()
+    overview = long_overview(record.head, record.n_samples, record.read)
+    return record.read(_chosen(record, overview, memory_bytes, (USUAL,))[0][0])
 
 
 def read_whole(
@@ -320,28 +295,28 @@ def read_whole(
     InputError
         As `read_recording`, and where `analysis_bytes` is more than half of the memory that is free.
     """
-    n_samples = n_samples_of(path)
-    if n_samples is not None:
-        given: dict[str, Any] = {"rig": rig, "sampling_rate_hz": sampling_rate_hz, "speed": speed}
-        n_channels = len(read_recording(path, **given, part=slice(0, min(n_samples, N_PER_SPECTRUM))).channels)
-        check_memory(int(analysis_bytes(n_samples, n_channels)), file_label(path))
-    return read_recording(path, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    record = record_blocks(path, rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
+    if record.is_parted:
+        check_memory(int(_needed_bytes(record.head, record.n_samples)), file_label(path))
+    return record.whole()
 
 
-def _part_samples(memory_bytes: float, n_channels: int) -> int:
-    return max(1, int(min(PART_SAMPLES, memory_bytes / analysis_bytes(1, n_channels))))
+def _needed_bytes(recording: Recording, n_samples: int | None = None) -> float:
+    return analysis_bytes(recording.n_samples if n_samples is None else n_samples, len(recording.channels))
 
 
-def _check_fits(recording: Recording, needed_bytes: float, memory_bytes: float) -> None:
-    """Raise for a recording that does not fit, and is of a format that is only read whole."""
-    if needed_bytes > memory_bytes:
-        n_channels = len(recording.vibration_names())
+def _fits(record: RecordBlocks, memory_bytes: float) -> bool:
+    """Whether all of a record may be analysed at once; refuse one that may not and is only read whole."""
+    needed_bytes = _needed_bytes(record.head, record.n_samples)
+    if needed_bytes > memory_bytes and not record.is_parted:
+        n_channels = len(record.head.channels)
         raise InputError(
-            f"{recording.n_samples} samples × {n_channels} channels take {needed_bytes / 1e9:.3g} GB to analyse",
-            where=recording.name,
+            f"{record.n_samples} samples × {n_channels} channels take {needed_bytes / 1e9:.3g} GB to analyse",
+            where=record.head.name,
             allowed=f"up to {memory_bytes / 1e9:.3g} GB",
             remedy="give more with --memory, or convert it to HDF5, Parquet, TDMS or WAV, which are read in parts",
         )
+    return needed_bytes <= memory_bytes
 
 
 def long_overview(head: Recording, n_samples: int, read: Callable[[slice], Recording]) -> LongOverview:
@@ -430,9 +405,10 @@ USUAL = "the usual level"
 
 
 def _chosen(
-    overview: LongOverview, n_part: int, n_samples: int, rate_hz: float, reasons: tuple[str, ...] = ()
-) -> list[tuple[int, str]]:
-    """Return first samples of the parts to look at closely, in the order of time, and why; of these reasons, if any."""
+    record: RecordBlocks, overview: LongOverview, memory_bytes: float, reasons: tuple[str, ...] = ()
+) -> list[tuple[slice, str]]:
+    """Return the parts to look at closely, in the order of time, and why; of these reasons, if any."""
+    n_part = max(1, int(min(PART_SAMPLES, memory_bytes / _needed_bytes(record.head, 1))))
     level = np.log(np.maximum(overview.rms, 1e-300)).mean(axis=0)
     impulsive = overview.kurtosis.max(axis=0)
     usual = int(np.argmin(np.abs(level - np.median(level))))
@@ -445,8 +421,8 @@ def _chosen(
     for second, reason in wanted:
         if reasons and reason not in reasons:
             continue
-        middle = round((overview.time_s[second] + INTERVAL_S / 2) * rate_hz)
-        first = min(max(0, middle - n_part // 2), max(0, n_samples - n_part))
+        middle = round((overview.time_s[second] + INTERVAL_S / 2) * record.head.sampling_rate_hz)
+        first = min(max(0, middle - n_part // 2), max(0, record.n_samples - n_part))
         if all(abs(first - other) >= n_part // 2 for other, _ in found):
             found.append((first, reason))
-    return sorted(found)
+    return [(slice(first, first + n_part), reason) for first, reason in sorted(found)]

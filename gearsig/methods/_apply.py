@@ -18,7 +18,7 @@ from gearsig.methods._spectra import RHYTHMS, WHOLE
 from gearsig.methods._table import Method, MethodAnswer, part_of, usual_channel
 from gearsig.methods._timefreq import MAPS
 from gearsig.prepared import PreparedRecording, prepare
-from gearsig.recording import Recording, n_samples_of, read_recording
+from gearsig.recording import Recording
 from gearsig.rig import Rig, SpeedSource
 
 METHODS: dict[str, Method] = {**WHOLE, **ALONG, **RHYTHMS, **MAPS, **PARTS, **IN_PHASE}
@@ -128,36 +128,29 @@ def apply_method_to_file(
     method, settings = _method(name, options)
     allowed = positive(memory_bytes - PROGRAM_BYTES, "memory less 0.2 GB", "bytes", remedy="allow more than 0.2 GB")
     given: dict[str, Any] = {"rig": rig, "sampling_rate_hz": sampling_rate_hz, "speed": speed}
-    n_samples, blocks = n_samples_of(path), None
-    if n_samples is None:
-        recording = read_recording(path, **given)
-        n_samples, head = recording.n_samples, recording
-    else:
-        blocks = record_blocks(path, **given)
-        head = blocks.head
-    rate = head.sampling_rate_hz
+    record = record_blocks(path, **given)
+    n_samples, rate = record.n_samples, record.head.sampling_rate_hz
     first = min(n_samples - 1, max(0, round((start_s or 0.0) * rate)))
     last = n_samples if end_s is None else max(first + 1, min(n_samples, round(end_s * rate)))
     per_sample = method.bytes_per_sample(settings) if callable(method.bytes_per_sample) else method.bytes_per_sample
-    reading, is_part = READING_BYTES * len(head.channels), last - first < n_samples
+    reading, is_part = READING_BYTES * len(record.head.channels), last - first < n_samples
     whole_bytes = n_samples * (reading + (ANGLE_BYTES if is_part else 0.0)) + (last - first) * per_sample
     if whole_bytes <= allowed:
-        whole = head if blocks is None else read_recording(path, **given)
-        return apply_method(name, whole, channel, start_s=start_s, end_s=end_s, **options)
+        return apply_method(name, record.whole(), channel, start_s=start_s, end_s=end_s, **options)
     part_bytes = (last - first) * (reading + per_sample)
-    if blocks is not None and part_bytes <= allowed:
-        return apply_method(name, read_recording(path, **given, part=slice(first, last)), channel, **options)
-    if blocks is not None and method.in_blocks is not None:
+    if record.is_parted and part_bytes <= allowed:
+        return apply_method(name, record.read(slice(first, last)), channel, **options)
+    if record.is_parted and method.in_blocks is not None:
         return _in_blocks(name, method, record_blocks(path, **given, part=slice(first, last)), channel, settings)
     longest_s = float(f"{0.9 * allowed / (reading + per_sample) / rate:.2g}")
     begin_s = start_s or 0.0
     remedy = f"look at a part, e.g. --from {begin_s:g}s --to {begin_s + longest_s:g}s, or give more with --memory"
-    if blocks is None:
+    if not record.is_parted:
         remedy += ", or convert it to HDF5, Parquet, TDMS or WAV, which are read in parts"
     elif method.in_blocks is None:
         all_of_it = ", ".join(other for other, m in METHODS.items() if m.in_blocks is not None)
         remedy += f"; all of it is looked at by: {all_of_it}"
-    needed = whole_bytes if blocks is None else part_bytes
+    needed = part_bytes if record.is_parted else whole_bytes
     raise InputError(
         f"{name} of {last - first} samples takes {needed / 1e9:.3g} GB",
         where=file_label(path),

@@ -8,7 +8,7 @@ import pytest
 from app.cli.main import main
 from gearsig.errors import InputError
 from gearsig.methods import METHODS, apply_method, apply_method_to_file
-from gearsig.recording import Channel, Recording, write_recording
+from gearsig.recording import Channel, Recording, read_recording, write_recording
 from gearsig.rig import ConstantSpeed, GearPair, Rig, Shaft
 
 RATE_HZ, N = 4096.0, 200_000
@@ -40,9 +40,18 @@ def little(monkeypatch):
         monkeypatch.setitem(METHODS, name, replace(method, bytes_per_sample=40_000.0))
 
 
-def test_what_fits_is_as_if_it_had_been_read_before(path):
-    from gearsig.recording import read_recording
+def read_parts_only(monkeypatch):
+    """Let nothing read all of a recording."""
 
+    def read(path, *, part, **given):
+        assert part is not None
+        assert part.stop - part.start < N
+        return read_recording(path, part=part, **given)
+
+    monkeypatch.setattr("gearsig.diagnosis._blocks.read_recording", read)
+
+
+def test_what_fits_is_as_if_it_had_been_read_before(path):
     found = apply_method_to_file("density", path, RIG, start_s=10.0, end_s=30.0)
     whole = apply_method("density", read_recording(path, rig=RIG), start_s=10.0, end_s=30.0)
     for title, column in whole.table.items():
@@ -54,7 +63,7 @@ def test_what_fits_is_as_if_it_had_been_read_before(path):
 def test_in_blocks_a_method_shows_the_same(name, path, monkeypatch):
     monkeypatch.setattr("gearsig.diagnosis._blocks.BLOCK_SAMPLES", 50_000)
     options = {"band_hz": BAND_HZ} if name == "envelope" else {}
-    monkeypatch.setattr("gearsig.methods._apply.read_recording", None)  # nothing reads all of it
+    read_parts_only(monkeypatch)
     found = apply_method_to_file(name, path, RIG, **options)
     assert found.method == name
     assert any("in blocks" in note for note in found.notes)
@@ -86,7 +95,7 @@ def test_of_what_does_not_fit_a_part_is_looked_at(path):
 
 @pytest.mark.usefixtures("little")
 def test_without_blocks_it_is_refused_before_anything_is_read(path, monkeypatch, capsys):
-    monkeypatch.setattr("gearsig.methods._apply.read_recording", None)
+    read_parts_only(monkeypatch)
     for name in ("spectrum", "kurtogram", "modes"):
         with pytest.raises(InputError, match=r"GB.*--from 0s --to [\d.]+s.*--memory.*density"):
             apply_method_to_file(name, path, RIG)
@@ -100,8 +109,6 @@ def test_without_blocks_it_is_refused_before_anything_is_read(path, monkeypatch,
 
 @pytest.mark.usefixtures("little")
 def test_text_is_read_whole_and_then_refused(path, tmp_path):
-    from gearsig.recording import read_recording
-
     text = write_recording(read_recording(path), tmp_path / "long.csv")
     with pytest.raises(InputError, match="convert it to HDF5"):
         apply_method_to_file("density", text, RIG)
