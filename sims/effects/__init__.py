@@ -52,7 +52,7 @@ from sims.effects._shared import (
     with_mesh_field,
     with_tooth_fault,
 )
-from sims.effects.pitch_error import cumulative_pitch
+from sims.effects.pitch_error import ONE_TOOTH_SHARE, cumulative_pitch, pitch_of_all_teeth
 
 __all__ = [
     "ANGLE_OPTION",
@@ -60,6 +60,7 @@ __all__ = [
     "GEARS",
     "GEAR_OPTION",
     "GROUPS",
+    "ONE_TOOTH_SHARE",
     "SHOWS_IN",
     "TOOTH_OPTION",
     "VARIABLE",
@@ -89,6 +90,7 @@ __all__ = [
     "gear_index",
     "is_own",
     "own_files",
+    "pitch_of_all_teeth",
     "tooth_number",
     "vector_sum",
     "with_bearing",

@@ -1,4 +1,4 @@
-"""Effect: pitch errors of one gear."""
+"""Effect: pitch errors of one gear: of all its teeth, or of one that stands ahead or behind."""
 
 from __future__ import annotations
 
@@ -8,19 +8,46 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from sims.effects import _shared as shared
-from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Options, PlausibleRange, Severity
-from sims.effects.textbook import MAX_ADVANCE, UP, Signature, SyntheticScene, Textbook, balance, draw_side
+from sims.effects._effect import (
+    GEAR_OPTION,
+    TOOTH_OPTION,
+    Effect,
+    MachineFacts,
+    Option,
+    Options,
+    PlausibleRange,
+    Severity,
+)
+from sims.effects.textbook import (
+    MAX_ADVANCE,
+    UP,
+    Signature,
+    SyntheticScene,
+    Textbook,
+    balance,
+    draw_side,
+    late_tooth,
+    sign,
+    swollen,
+    tooth_window,
+)
 from sims.machine import Machine, pitch_tolerance_um
 from sims.mesh import FlankDeviation
 
+ONE_TOOTH_SHARE = 1.0 / 3.0
+"""Of drawn pitch errors: one tooth alone is out of its place, as after a dent, a repair or a slip of the indexing.
+
+ISO 1328-1:2013 judges the single deviation by the worst tooth and the cumulative one by all of them; either occurs."""
+
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with pitch errors added to those it has: of all teeth, or of one that stands behind."""
+    """Return the machine with pitch errors added to those it has: of all teeth, or of one."""
     index = shared.gear_index(options)
     flank: FlankDeviation = shared.mesh_field(machine, "flank", index)
     n_teeth = shared.gear_geometry(machine, index).teeth
     if "tooth" in options:
-        pattern: FloatArray = np.eye(n_teeth)[shared.tooth_number(machine, options)]
+        behind = 1.0 if options["stands"] == "behind" else -1.0
+        pattern: FloatArray = behind * np.eye(n_teeth)[shared.tooth_number(machine, options)]
     else:
         pattern = cumulative_pitch(n_teeth, rng)
     added = severity * pattern
@@ -42,6 +69,21 @@ def cumulative_pitch(n_teeth: int, rng: np.random.Generator) -> FloatArray:
 
 
 def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """Each tooth comes early or late by its own amount: lines at all orders of its shaft; or one tooth does."""
+    if rng.uniform() < ONE_TOOTH_SHARE:
+        return _pitch_of_one_tooth(scene, size, rng)
+    return pitch_of_all_teeth(scene, size, rng)
+
+
+def _pitch_of_one_tooth(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+    """One tooth comes early or late, and takes more or less of the load than its neighbours."""
+    side = draw_side(rng)
+    window, _ = tooth_window(scene, side, float(rng.uniform(1.0, 2.5)), rng)
+    late, gain, _ = balance(rng, 3)
+    return Signature(swollen(0.6 * sign(rng) * gain * size, window), late_tooth(scene, late * size, window, rng))
+
+
+def pitch_of_all_teeth(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """Each tooth comes early or late by its own amount: lines at all orders of its shaft."""
     side = draw_side(rng)
     teeth, turn = scene.teeth[side], scene.revolutions * scene.shaft_orders[side]
@@ -59,6 +101,15 @@ def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) ->
         (0.5 * slow * size * low,),
     )
 
+
+def _drawn(machine: MachineFacts, rng: np.random.Generator) -> Options:
+    """Return a gear, or one tooth of it."""
+    if rng.uniform() >= ONE_TOOTH_SHARE:
+        return shared.any_gear(machine, rng)
+    return {**shared.any_tooth(machine, rng), "stands": str(rng.choice(STANDS))}
+
+
+STANDS = ("behind", "ahead")
 
 EFFECT = Effect(
     name="pitch_error",
@@ -78,7 +129,8 @@ EFFECT = Effect(
     change=change,
     options=(
         GEAR_OPTION,
-        replace(TOOTH_OPTION, default=None, meaning="the only tooth that is out, behind by that much; none: all are"),
+        replace(TOOTH_OPTION, default=None, meaning="the only tooth that is out, by that much; none: all are"),
+        Option("stands", "behind", "where that tooth is, seen the way the gear turns", choices=STANDS),
     ),
     plausible=PlausibleRange(
         0.4,
@@ -86,7 +138,7 @@ EFFECT = Effect(
         "standard deviation over the pitch tolerance of class 5, which is a limit: of classes 5 to 11",
         shared.tolerance_of(pitch_tolerance_um),
         shared.either_gear,
-        shared.any_gear,
+        _drawn,
         # The teeth's deviations are drawn; what one of them changes, each changes, as long as no tooth parts.
         courses=lambda machine: [(options, (0,)) for options in shared.first_teeth(machine)],
     ),

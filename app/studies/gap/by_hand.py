@@ -165,8 +165,49 @@ def _inverter(scene: textbook.SyntheticScene, rng: np.random.Generator) -> Float
     return wave
 
 
+def _own_clock(scene: textbook.SyntheticScene, turn_hz: float, rng: np.random.Generator) -> FloatArray:
+    """Return the revolutions of a neighbour's shaft, whose speed wanders a little."""
+    unsteady = rng.uniform(0.0, 0.004) * np.sin(2 * np.pi * rng.uniform(0.05, 1.0) * scene.time_s + rng.uniform(0, 6))
+    return np.asarray(np.cumsum(turn_hz * (1.0 + unsteady)) * (scene.time_s[1] - scene.time_s[0]))
+
+
+def _other_gear(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """A neighbour's gear, pump or fan: multiples of its teeth or blades, modulated by its shaft, and that shaft."""
+    turns = _own_clock(scene, log_uniform(rng, 4.0, 60.0), rng)
+    teeth, steep = float(rng.integers(3, 60)), rng.uniform(0.5, 2.0)
+    waves = [np.cos(2 * np.pi * k * teeth * turns + rng.uniform(0, 6)) / k**steep for k in range(1, 5)]
+    swell = 1.0 + rng.uniform(0.0, 0.8) * np.cos(2 * np.pi * turns + rng.uniform(0, 6))
+    return np.asarray(swell * np.sum(waves, axis=0) + log_uniform(rng, 0.03, 1.0) * np.cos(2 * np.pi * turns))
+
+
+def _loose_foot(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """A foot or a pedestal that lifts: many multiples of a shaft, of its half as often as not."""
+    first = scene.shaft_orders[textbook.draw_side(rng)] * float(rng.choice((0.5, 1.0)))
+    steep = rng.uniform(0.3, 1.2)
+    waves = [textbook.tone(k * first, scene, rng) / k**steep * rng.uniform(0.3, 1.0) for k in range(1, 13)]
+    return np.asarray(np.sum(waves, axis=0))
+
+
+def _belt(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """Slaps by a clock of their own, nearly regular, each nearly as hard."""
+    passed = _own_clock(scene, log_uniform(rng, 3.0, 60.0), rng)
+    at = np.flatnonzero(np.diff(np.floor(passed)) > 0).astype(np.float64)
+    scatter = rng.uniform(0.0, 0.02) * float(np.median(np.diff(at))) if len(at) > 1 else 0.0
+    at = at + scatter * rng.standard_normal(len(at))
+    return textbook.struck(at, rng.normal(1.0, 0.2, len(at)), scene, textbook.ring(scene, rng))
+
+
+def _motor_field(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    """A motor's field: twice the line's frequency and its multiples, beating with twice the slip."""
+    line_hz, slip_hz = float(rng.choice((50.0, 60.0))) * rng.uniform(0.998, 1.002), rng.uniform(0.3, 4.0)
+    waves = [np.cos(4 * np.pi * k * line_hz * scene.time_s + rng.uniform(0, 6)) / k**1.5 for k in (1, 2, 3)]
+    beat = 1.0 + rng.uniform(0.2, 0.9) * np.cos(2 * np.pi * slip_hz * scene.time_s + rng.uniform(0, 6))
+    return np.asarray(beat * np.sum(waves, axis=0))
+
+
 def _random_knocks(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    n = max(3, int(scene.time_s[-1] * rng.uniform(1.0, 20.0)))
+    """Now and then, as of loose parts, or in great number, as of bubbles that collapse."""
+    n = max(3, int(scene.time_s[-1] * log_uniform(rng, 1.0, 400.0)))
     places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
     return textbook.struck(places, np.abs(rng.standard_normal(n)) + 0.2, scene, textbook.ring(scene, rng))
 
@@ -202,6 +243,10 @@ FOREIGN: dict[str, Callable[[textbook.SyntheticScene, np.random.Generator], Floa
     "whirl": _whirl,
     "another machine": _other_machine,
     "inverter": _inverter,
+    "gear of another machine": _other_gear,
+    "loose foot": _loose_foot,
+    "belt": _belt,
+    "motor field": _motor_field,
     "random knocks": _random_knocks,
     "swelling noise": _swelling_noise,
     "steady noise": _steady_noise,

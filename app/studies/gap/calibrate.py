@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import typer
 
+from app.studies.gap.lumped import LUMPED
 from gearsig.checks import FloatArray
 from gearsig.gap import (
     CALIBRATION_FILE,
@@ -154,6 +155,7 @@ def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:
 
 
 SEED = 9203
+AT_TWO_POINTS = (INDEPENDENT, LUMPED)
 PER_EFFECT, PER_NO_EFFECT = 24, 96
 """Rows of each simulator: of each effect, and of healthy machines and of unknown changes; a case in five is either."""
 
@@ -161,7 +163,7 @@ PER_EFFECT, PER_NO_EFFECT = 24, 96
 def cases_of(population: Population, simulator: str, *, with_reference: bool) -> tuple[list[WeighedCase], ...]:
     """Return the cases of one simulator's machines, by forests without it: of one condition, and of two.
 
-    Only the independent rig's machines were recorded at two operating points with the same effect.
+    Only machines of some simulators were recorded at two operating points with the same effect.
     """
     rng = np.random.default_rng(SEED)
     rows_of_simulator = np.flatnonzero((population.simulators == simulator) & ~population.by_hand)
@@ -170,7 +172,7 @@ def cases_of(population: Population, simulator: str, *, with_reference: bool) ->
         rows = rows_of_simulator[population.causes[rows_of_simulator] == cause]
         n = PER_NO_EFFECT if cause in (NONE, UNKNOWN) else PER_EFFECT
         drawn += rng.permutation(rows)[:n].tolist()
-    pairs = two_conditions(population, rng.permutation(rows_of_simulator)) if simulator == INDEPENDENT else []
+    pairs = two_conditions(population, rng.permutation(rows_of_simulator)) if simulator in AT_TWO_POINTS else []
     with without_machines_of(simulator):
         single = [_weighed(population, (row,), simulator, with_reference=with_reference) for row in drawn]
         both = [_weighed(population, rows, simulator, with_reference=with_reference) for rows in pairs]
@@ -301,7 +303,7 @@ def main() -> None:
         n_cases += len(single) + len(several)
         typer.echo(f"{name.replace('_', ' ')}, one condition, the simulator left out:")
         typer.echo("\n".join(table(fitted, single)))
-        typer.echo(f"two conditions of it:\n{_line(INDEPENDENT, fitted, several)}")
+        typer.echo("two conditions:\n" + "\n".join(table(fitted, several)))
     values["provenance"] = {"made_by": "python -m app.studies.gap.calibrate", "seed": SEED, "n_cases": n_cases}
     given.to.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 

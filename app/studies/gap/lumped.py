@@ -1,21 +1,19 @@
-"""How the gap diagnosis does on the lumped rig, from which nothing was learned and on which nothing was calibrated.
+"""Rows of the population from drawn machines of the lumped rig, at two operating points each.
 
-`python -m app.studies.gap.lumped 6` draws six machines; each is recorded healthy, with every effect, and with something
-from outside the catalogue, at two operating points, and diagnosed by the forests that ship, against a healthy
-reference of another day. One machine in four is hardly loaded, so that flanks part.
+Each machine is recorded healthy, with every effect as its author understands them, and with vibration from outside the
+catalogue, at both points, against a healthy reference of another day. One machine in four is hardly loaded, so that
+flanks part.
 """
 
 from __future__ import annotations
 
-import argparse
-from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import partial
 from math import pi
 
 import numpy as np
-import typer
 
-from app.studies.gap.calibrate import STRONG, WeighedCase, table, weighed_case
+from app.studies.gap.by_hand import made_by_hand, rig_of, with_foreign_vibration, with_signature
 from app.studies.gap.lumped_rig import (
     N_PATH,
     LumpedDay,
@@ -24,22 +22,22 @@ from app.studies.gap.lumped_rig import (
     LumpedRig,
     record,
 )
-from app.studies.pool import answers_of
+from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, reduced, samples_of
 from gearsig.checks import FloatArray
 from gearsig.gap import (
+    BY_HAND,
     NONE,
     UNKNOWN,
-    ReducedRecording,
-    change_features,
-    load_gap_calibration,
-    load_learned,
+    OperatingCondition,
     reduce_recording,
-    tooth_load_n_per_mm,
+    run_length_s,
+    with_channels_of,
 )
-from sims.machine import log_uniform
+from sims.cracked import CrackedTwin
+from sims.effects import ONE_TOOTH_SHARE
+from sims.machine import log_uniform, nominal_of
 
 LUMPED = "lumped"
-SEED = 515
 
 # --------------------
 # The effects, each as this rig's author understands it; severities from hardly visible to strong.
@@ -106,10 +104,16 @@ def _tooth_wear(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault
 
 
 def _pitch_error(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    """One tooth stands ahead or behind."""
+    """One tooth stands ahead or behind, or all of them do as they were badly cut."""
     side, tooth = _side_and_tooth(rig, rng)
     error = log_uniform(rng, 6e-6, 45e-6) * rng.choice([-1.0, 1.0])
-    return LumpedFault(gaps_m=[(side, tooth, np.full(len(shape.path), error))])
+    if rng.uniform() < ONE_TOOTH_SHARE:
+        return LumpedFault(gaps_m=[(side, tooth, np.full(len(shape.path), error))])
+    single = rng.standard_normal(rig.teeth[side])
+    adding = np.cumsum(single - single.mean())
+    pattern = rng.uniform(0.3, 1.0) * single + rng.uniform(0.0, 0.6) * (adding - adding.mean())
+    spread = 0.5 * abs(error) * pattern / np.diff(pattern).std()
+    return LumpedFault(gaps_m=[(side, None, np.tile(spread[:, None], (1, len(shape.path))))])
 
 
 def _surface_roughness(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
@@ -318,72 +322,68 @@ def outside(rig: LumpedRig, rng: Draw) -> tuple[str, LumpedFault]:
 
 
 # --------------------
-# The diagnosis of it.
+# Rows of the population.
 # --------------------
 
 
+FIRST_RIG = 300_000
+"""Number of the first machine's first point; the second's is the next."""
 POINTS = (0, 1)
-N_HEALTHY, N_OUTSIDE = 3, 4
+N_HEALTHY, N_OUTSIDE, N_FOREIGN, N_BY_HAND = 2, 3, 1, 2
+TOUCHED = 1.8
+"""By how much more than usual sensors were touched between healthy recordings."""
 LIGHT = 4
 """Every so many machines one that is hardly loaded."""
 
 
-def cases_of_machine(index: int) -> list[tuple[str, WeighedCase]]:
-    """Return what is recorded of one machine, in words, with what the forests say: each point alone, then both."""
-    rng = np.random.default_rng([SEED, index])
+def one_lumped(index: int) -> list[PopulationSample]:
+    """Return the samples of one drawn machine, the same faults at both of its points."""
+    rng = np.random.default_rng([SEED, 4, index])
     rig = LumpedRig.drawn(rng, light=index % LIGHT == LIGHT - 1)
     levels = record(rig, 0, LumpedDay.drawn(rig, rng), LumpedFault(), rng).samples[:-1].std(axis=1).astype(np.float64)
-
-    def reduced(point: int, fault: LumpedFault, touched: float = 1.0) -> ReducedRecording:
-        day = LumpedDay.drawn(rig, rng, touched)
-        return reduce_recording(record(rig, point, day, fault, rng, healthy_levels=levels))
-
-    references = [reduced(point, LumpedFault()) for point in POINTS]
-    pair = references[0].frame.pair
-    loads = [tooth_load_n_per_mm(pair, rig.torque_nm(point)) for point in POINTS]
-    recogniser, cases = load_learned().recognisers[True], []
-    for cause, words, fault in _faults(rig, rng):
-        touched = 1.8 if cause == NONE else 1.0
-        changes = [change_features(reduced(point, fault, touched), references[point]) for point in POINTS]
-        points = (slice(0, 1), slice(1, 2), slice(0, 2))
-        cases += [(words, weighed_case(cause, changes[p], loads[p], recogniser, LUMPED)) for p in points]
-    return cases
+    faults = list(_faults(rig, rng))
+    return [
+        sample
+        for point in POINTS
+        for sample in samples_of(LUMPED, FIRST_RIG + 2 * index + point, partial(_at, rig, point, levels, faults, index))
+    ]
 
 
 def _faults(rig: LumpedRig, rng: Draw) -> Iterator[tuple[str, str, LumpedFault]]:
+    """Yield cause, words, and what is changed."""
     for _ in range(N_HEALTHY):
         yield NONE, NONE, LumpedFault()
     for name, effect in EFFECTS.items():
-        yield name, name, effect(rig, LumpedGeometry.of(rig), rng)
+        yield name, "", effect(rig, LumpedGeometry.of(rig), rng)
     for _ in range(N_OUTSIDE):
         yield UNKNOWN, *outside(rig, rng)
 
 
-def main() -> None:
-    """Draw machines, diagnose them, print how good that is."""
-    from app.studies.gap.lumped import cases_of_machine
+def _at(rig: LumpedRig, point: int, levels: FloatArray, faults: list[tuple[str, str, LumpedFault]], index: int) -> Made:
+    """Return the reference at a point, the twin there, and what is compared."""
+    number, torque_nm = FIRST_RIG + 2 * index + point, rig.torque_nm(point)
+    rng = np.random.default_rng([SEED, 4, index, point])
+    reference = record(rig, point, LumpedDay.drawn(rig, rng), LumpedFault(), rng, healthy_levels=levels)
+    here, known = reduced(reference, number), rig_of(reference)
+    run = CrackedTwin(known, nominal_of(known)).run(
+        OperatingCondition(60.0 * here.speed_hz, torque_nm),
+        seed=number,
+        duration_s=run_length_s(here),
+        sampling_rate_hz=reference.sampling_rate_hz,
+        noise=1,
+    )
 
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("machines", type=int, nargs="?", default=6)
-    parser.add_argument("--first", type=int, default=0, help="number of the first")
-    parser.add_argument("--processes", type=int, default=2)
-    given = parser.parse_args()
-    jobs = range(given.first, given.first + given.machines)
-    cases = [case for _, of_machine in answers_of(cases_of_machine, jobs, given.processes) for case in of_machine]
-    calibration = load_gap_calibration(with_reference=True)
-    for n, title in ((1, "one operating condition"), (2, "two conditions")):
-        chosen = [(words, case) for words, case in cases if case.n_conditions == n]
-        typer.echo(f"{title}: {table(calibration, [case for _, case in chosen])[0]}")
-        middling = [case for words, case in chosen if words in EFFECTS and 1.0 <= case.size < STRONG]
-        ranks = [list(case.by(calibration)).index(case.truths[0]) for case in middling]
-        first, two = (np.mean([rank < n_first for rank in ranks]) for n_first in (1, 2))
-        typer.echo(f"  one to three floors {len(ranks)}: likeliest {first:.2f}, two {two:.2f}")
-        for name in dict.fromkeys(words for words, _ in chosen):
-            likeliest = [next(iter(case.by(calibration))) for words, case in chosen if words == name]
-            typer.echo(
-                f"  {name}: {', '.join(f'{said} {n_said}' for said, n_said in Counter(likeliest).most_common())}"
-            )
+    def compared() -> Iterator[Recorded]:
+        healthy = reference
+        for cause, words, fault in faults:
+            day = LumpedDay.drawn(rig, rng, TOUCHED if cause == NONE else 1.0)
+            recording = record(rig, point, day, fault, rng, healthy_levels=levels)
+            healthy = recording if cause == NONE else healthy
+            yield cause, words, 0.0, recording, torque_nm
+        for _ in range(N_FOREIGN):
+            recording, foreign = with_foreign_vibration(healthy, rng)
+            yield UNKNOWN, foreign, 0.0, recording, torque_nm
+        for name in map(str, rng.choice(made_by_hand(healthy, torque_nm), N_BY_HAND, replace=False)):
+            yield name, BY_HAND, 0.0, with_signature(healthy, name, rng)[0], torque_nm
 
-
-if __name__ == "__main__":
-    main()
+    return reference, with_channels_of(reduce_recording(run, known), here), compared()

@@ -1,4 +1,4 @@
-"""A fifth simulator of a gear pair, for measuring only: eleven degrees of freedom, every tooth a spring of its own.
+"""A fifth simulator of a gear pair: eleven degrees of freedom, every tooth a spring of its own.
 
 It was written from the literature by somebody who had seen nothing of the others, so that its effects are what another
 engineer takes them for; one tooth out of its place is its pitch error, for example. Rotations of motor, pinion, gear

@@ -11,7 +11,7 @@ from app.studies.drawn_rigs import DrawnHousingMode, DrawnRig, draw_rig
 from app.studies.gap.by_hand import SIGNATURES, scene_of, vibrations
 from gearsig.checks import FloatArray
 from gearsig.recording import Recording
-from sims.effects import EffectSetting, textbook
+from sims.effects import EffectSetting, pitch_of_all_teeth, textbook
 from sims.gear_pair import BODY_SHAPES, body_gain
 from sims.machine import log_uniform
 
@@ -306,5 +306,5 @@ def _tolerances(scene: textbook.SyntheticScene, rng: np.random.Generator) -> lis
                 tuple(lines),
             )
         )
-    tolerances += [SIGNATURES["pitch_error"](scene, log_uniform(rng, *PITCH), rng) for _ in scene.shaft_orders]
+    tolerances += [pitch_of_all_teeth(scene, log_uniform(rng, *PITCH), rng) for _ in scene.shaft_orders]
     return [*tolerances, SIGNATURES["torque_ripple"](scene, log_uniform(rng, *PULLS), rng)]

@@ -6,13 +6,14 @@ machines and records them; `… pack RAW…` packs one or several such tables in
 
 Each drawn gearbox is recorded healthy as the reference, healthy again on other days, with each effect, with foreign
 vibration, and with each effect's signature by hand; what differs goes into the table, with its label. Gearboxes are
-those of both models of a pair, of the quasi-static simulator, and the independent rig's with development gears.
+those of both models of a pair, of the quasi-static simulator, of the lumped rig, and the independent rig's with
+development gears.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,12 +22,13 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from app.studies.gap.lumped import LUMPED, one_lumped
 from app.studies.gap.quasi_static import QUASI_STATIC, one_static
 from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
 from app.studies.pool import answers_of
 from gearsig.gap import BY_HAND, INDEPENDENT, LEARNED_FILE, learn, load_population, population_file, write_learned
 
-MACHINES = {CRACKED.name: 80, REDUCED.name: 45, INDEPENDENT: 400, QUASI_STATIC: 150}
+MACHINES = {CRACKED.name: 44, REDUCED.name: 26, INDEPENDENT: 240, QUASI_STATIC: 150, LUMPED: 56}
 """Of each simulator, unless asked for otherwise."""
 
 _SAMPLES_OF: dict[str, Callable[[int], list[PopulationSample]]] = {
@@ -34,6 +36,7 @@ _SAMPLES_OF: dict[str, Callable[[int], list[PopulationSample]]] = {
     REDUCED.name: partial(one_rig, REDUCED),
     INDEPENDENT: one_case,
     QUASI_STATIC: one_static,
+    LUMPED: one_lumped,
 }
 """What a machine's number makes, by simulator."""
 
@@ -61,14 +64,19 @@ def main() -> None:
         write_learned(learn(load_population()), given["to"])
         typer.echo(f"{given['to'].stat().st_size / 1e6:.2f} MB")
     elif given["step"] == "simulate":
-        jobs = [(name, i) for name in MACHINES for i in range(given[name.replace("-", "_")])]
-        simulate(jobs, given["processes"], given["to"])
+        simulate(jobs_of({name: given[name.replace("-", "_")] for name in MACHINES}), given["processes"], given["to"])
     else:
         with TemporaryDirectory() as folder:
             raw = Path(folder) / "raw.npz"
-            simulate([(name, i) for name, n in MACHINES.items() for i in range(n)], given["processes"], raw)
+            simulate(jobs_of(MACHINES), given["processes"], raw)
             pack([raw], population_file())
         write_learned(learn(load_population()), LEARNED_FILE)
+
+
+def jobs_of(machines: Mapping[str, int]) -> list[tuple[str, int]]:
+    """Return simulator and number of each machine, all simulators at an even pace: a part is a smaller population."""
+    paced = [((i + 0.5) / n, name, i) for name, n in machines.items() for i in range(n)]
+    return [(name, i) for _, name, i in sorted(paced)]
 
 
 def simulate(jobs: Sequence[tuple[str, int]], n_processes: int, to: Path) -> None:

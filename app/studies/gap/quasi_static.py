@@ -28,7 +28,7 @@ from gearsig.gap import BY_HAND, NONE, UNKNOWN, OperatingCondition
 from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, Rig
 from sims.cracked import CrackedPair, CrackedTwin
-from sims.effects import textbook
+from sims.effects import ONE_TOOTH_SHARE, textbook
 from sims.gear_pair import build_rig
 from sims.machine import Nominal, Operation, log_uniform, nominal_of
 from sims.measure import Tachometer, pulse_voltage
@@ -515,9 +515,13 @@ def _tooth_wear(machine: StaticMachine, state: QuasiStaticState, rng: np.random.
 
 
 def _pitch_error(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """Teeth off their places: each by itself, adding up, or in a wave."""
+    """Teeth off their places: one alone, or each by itself, adding up, or in a wave."""
     side = textbook.draw_side(rng)
     teeth = machine.drawn.teeth[side]
+    if rng.uniform() < ONE_TOOTH_SHARE:
+        out = log_uniform(rng, 0.1, 6.0) * machine.rated_m * textbook.sign(rng)
+        state.gaps_m[side][int(rng.integers(teeth))] += out
+        return
     kind = rng.uniform()
     if kind < 0.5:
         error = rng.standard_normal(teeth)
