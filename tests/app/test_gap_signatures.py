@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from app.studies.gap.by_hand import SIGNATURES, with_foreign_vibration, with_signature
+from app.studies.gap.by_hand import FOREIGN, SIGNATURES, scene_of, with_foreign_vibration, with_signature
 from gearsig.gap import ReducedRecording, change_once, reduce_recording
 from tests.gap.synthetic import RIG, record
 
@@ -52,6 +54,25 @@ def test_strong_ones_move_their_own_features(name: str, reference: ReducedRecord
         change = dict(zip(*change_once(reduce_recording(now, RIG), reference), strict=True))
         changes.append(max(change[feature] for feature in EXPECTED[name]))
     assert np.median(changes) > 3.0
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_foreign_vibration_lasts_as_long_as_the_recording(name: str) -> None:
+    scene = scene_of(HEALTHY)
+    for seed in range(3):
+        vibration = FOREIGN[name](scene, np.random.default_rng(seed))
+        assert vibration.shape == scene.time_s.shape
+        assert np.isfinite(vibration).all()
+        assert vibration.std() > 0.0
+
+
+def test_a_neighbours_gear_is_at_no_order_of_this_one() -> None:
+    """Its clock is its own: at another speed of the machine it has the same frequencies, and so other orders."""
+    scene = scene_of(HEALTHY)
+    faster = replace(scene, revolutions=1.37 * scene.revolutions)
+    for name in ("gear of another machine", "belt", "motor field"):
+        one, other = (FOREIGN[name](s, np.random.default_rng(4)) for s in (scene, faster))
+        np.testing.assert_array_equal(one, other)
 
 
 def test_foreign_vibration_has_a_name_and_is_no_effect() -> None:

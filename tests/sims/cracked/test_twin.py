@@ -237,6 +237,14 @@ def test_candidates_name_the_rigs_bearings_only() -> None:
         none.draw("bearing_clearance", np.random.default_rng(0))
 
 
+def test_drawn_pitch_errors_are_of_all_teeth_or_of_one_either_way() -> None:
+    rng, made = np.random.default_rng(3), twin()
+    drawn = [dict(made.draw("pitch_error", rng).options) for _ in range(300)]
+    assert len([one for one in drawn if "tooth" in one]) == pytest.approx(100, abs=25)
+    assert {one["stands"] for one in drawn if "tooth" in one} == {"behind", "ahead"}
+    assert {one["gear"] for one in drawn} == {"driver", "driven"}
+
+
 def test_cracks_scale_with_the_tooth() -> None:
     large = twin(replace(RIG, pairs=(replace(RIG.pairs[0], module_mm=3.0, face_width_mm=27.0),)))
     small = [a.severity for a in twin().candidates("root_crack")]

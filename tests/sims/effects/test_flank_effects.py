@@ -109,6 +109,8 @@ def test_one_tooth_alone_may_be_out() -> None:
     pitch = np.array(apply(spur_pair_machine(), "pitch_error", 8.0, gear="driven", tooth=7).mesh.flank_2.pitch_um)
     assert np.flatnonzero(pitch).tolist() == [6]
     assert pitch[6] == 8.0
+    ahead = apply(spur_pair_machine(), "pitch_error", 8.0, gear="driven", tooth=7, stands="ahead").mesh.flank_2.pitch_um
+    assert ahead[6] == -8.0
 
 
 def test_pitch_errors_add_and_grow_in_proportion() -> None:
