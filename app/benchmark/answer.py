@@ -19,6 +19,7 @@ class AnsweredShrinkage:
     placebo: float
     held_out: str
     n_placebos: int
+    of_all: float | None = None
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,7 @@ def _shrinkage(shrinkage: Shrinkage | None) -> AnsweredShrinkage | None:
         float(shrinkage.placebo),
         shrinkage.held_out,
         shrinkage.n_placebos,
+        shrinkage.of_all,
     )
 
 

@@ -516,8 +516,46 @@ def own_features(fit: Fit, observed: ObservedChange) -> FloatArray:
     return used
 
 
+def fold_fits(paths: Sequence[EffectPath], folds: Sequence[Fold]) -> list[Fit]:
+    """Return an effect's fit to the part of each fold that it is not scored on."""
+    return [fit_effect(paths, fold.fitted) for fold in folds]
+
+
+def closed_shares(fits: Mapping[str, Sequence[Fit]], folds: Sequence[Fold]) -> dict[str, float]:
+    """Return each effect's shrink, as in `shrinkage`, on the features that any of the effects changes; mean over folds.
+
+    On its own features a flexible wrong effect shrinks a gap as far as the true one does: what it leaves of the rest
+    of the gap counts here as well, so that effects can be compared.
+
+    Parameters
+    ----------
+    fits : mapping
+        Effect → its fit to each fold, see `fold_fits`.
+    folds : sequence of Fold
+    """
+    shares: dict[str, list[float]] = {name: [] for name in fits}
+    for i, fold in enumerate(folds):
+        one_fold = {name: of_effect[i] for name, of_effect in fits.items()}
+        shown = [fit for fit in one_fold.values() if _largest_predicted(fit, fold.scored) >= MIN_PREDICTED]
+        if not shown:
+            continue
+        used = np.max([own_features(fit, fold.scored) for fit in shown], axis=0)
+        for name, fit in one_fold.items():
+            shares[name].append(_before_and_after(fit, fold.scored, used)[2])
+    return {name: float(np.mean(values)) for name, values in shares.items() if values}
+
+
+def _largest_predicted(fit: Fit, scored: ObservedChange) -> float:
+    """Return the largest change that a fit predicts, in floors."""
+    return float(np.abs(fit.at(scored.condition) / scored.floors).max())
+
+
 def shrinkage(
-    paths: Sequence[EffectPath], folds: Sequence[Fold], held_out: str, excluded: Sequence[EffectPath] = ()
+    paths: Sequence[EffectPath],
+    folds: Sequence[Fold],
+    held_out: str,
+    excluded: Sequence[EffectPath] = (),
+    fits: Sequence[Fit] = (),
 ) -> Shrinkage:
     """Return the shrinkage of the gap by an effect, mean over folds.
 
@@ -537,8 +575,13 @@ def shrinkage(
     held_out : str
     excluded : sequence of EffectPath
         Of the effect where the recordings tell that it is not: on the other shaft, say. They serve as placebos.
+    fits : sequence of Fit
+        As `fold_fits` returns them, where they are known.
     """
-    folds, scores = _telling(folds, [_score(paths, fold, excluded) for fold in folds])
+    known = fits or fold_fits(paths, folds)
+    folds, scores = _telling(
+        folds, [_score(paths, fold, excluded, fit) for fold, fit in zip(folds, known, strict=True)]
+    )
     before, after, shrink = np.mean([score.sizes for score in scores], axis=0).tolist()
     n_blocks = min((len(group) for fold in folds for group in fold.again), default=2)
     variances = np.mean([score.variances for score in scores], axis=0)
@@ -582,8 +625,7 @@ def _elsewhere(paths: Sequence[EffectPath], fold: Fold) -> float | None:
     return _before_and_after(fit, fold.scored, own_features(fit, fold.scored))[2]
 
 
-def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPath]) -> _Score:
-    fit = fit_effect(paths, fold.fitted)
+def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPath], fit: Fit) -> _Score:
     used = own_features(fit, fold.scored)
     wrong = [fit_path(path, fold.fitted) for path in (*paths, *excluded) if path.options != fit.path.options]
     placebos = [
@@ -599,7 +641,7 @@ def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPat
         _slope(fit, fold.scored, used),
         max(placebos, default=0.0),
         len(placebos),
-        float(np.abs(fit.at(fold.scored.condition) / fold.scored.floors).max()),
+        _largest_predicted(fit, fold.scored),
     )
 
 

@@ -28,7 +28,9 @@ from gearsig.gap._prediction import (
     Fit,
     Fold,
     ObservedChange,
+    closed_shares,
     fit_effect,
+    fold_fits,
     paths_of,
     shrinkage,
     transplanted,
@@ -559,16 +561,21 @@ def try_effects(
         fresh=fresh,
         on_progress=lambda done, of: on_progress(f"simulating {len(told)} effects at the point of {where}", done / of),
     )
-    found = {}
+    found, fits = {}, {}
     for effect in effects:
         name = effect.name
         every = _paths([at[name] for at in banks], candidates[name], conditions, effect.shows_in)
         if every:
             paths, excluded = on_shaft(every, told[name])
-            shrink = shrinkage(paths, folds, HELD_OUT, excluded)
+            fits[name] = fold_fits(paths, folds)
+            shrink = shrinkage(paths, folds, HELD_OUT, excluded, fits[name])
             match = _match([at[name] for at in banks], conditions, effect) if name in TOOTH_FAULTS else None
             found[name] = TriedEffect(name, paths, fit_effect(paths, observed_changes(conditions)), shrink, match)
-    return found
+    shares = closed_shares(fits, folds)
+    return {
+        name: replace(tried, shrinkage=replace(tried.shrinkage, of_all=shares.get(name)))
+        for name, tried in found.items()
+    }
 
 
 def worth_simulating(candidates: Sequence[Added], told: Mapping[str, str]) -> list[Added]:

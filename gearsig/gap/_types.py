@@ -246,6 +246,9 @@ class Shrinkage:
         the others; None with one condition.
     predicted : float or None
         The largest change that the simulator predicts of the fitted effect, in floors; None where it is not known.
+    of_all : float or None
+        The shrink on the features that any of the tried effects changes, by which they can be compared; None where it
+        is not known.
     """
 
     before: Interval
@@ -257,6 +260,7 @@ class Shrinkage:
     n_placebos: int = 1
     elsewhere: float | None = None
     predicted: float | None = None
+    of_all: float | None = None
 
     @property
     def is_predicted(self) -> bool:

@@ -233,9 +233,18 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
         if shrink.value < 0.0
         else f"It takes away {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
         *elsewhere,
+        *_of_all(shrinkage.of_all),
         f"In a wrong place (placebo) it {placebo}.",
         f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 is right.",
     )
+
+
+def _of_all(share: float | None) -> tuple[str, ...]:
+    """Say how much of the gap an effect closes that any of the tried ones speaks of; nothing where it is not known."""
+    if share is None:
+        return ()
+    taken = percent(share) if share >= MIN_SHOWN else "nothing"
+    return (f"Of what exceeds the floor on the features of all effects tried, it takes away {taken}.",)
 
 
 def _evidence_row(evidence: Evidence) -> EvidenceRow:

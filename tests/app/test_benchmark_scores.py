@@ -140,6 +140,16 @@ def test_regret_counts_what_the_named_effect_shrinks_less():
     assert found["shrink_named"].value == pytest.approx(0.3)
 
 
+def test_what_the_true_effect_closes_counts_beyond_the_best_wrong_one():
+    def cause(name, share):
+        return AnsweredCause(name, 0.3, shrinkage=AnsweredShrinkage(0.9, 1.0, 0.0, "other revolutions", 1, share))
+
+    both = Answer("effect", (cause("tooth_spall", 0.25), cause("root_crack", 0.6), cause("unbalance", -0.2)))
+    alone = Answer("effect", (cause("root_crack", 0.6), AnsweredCause("tooth_spall", 0.2)))
+    found = scores([row("single", ["root_crack"], said) for said in (both, alone)], 1)["closed"]
+    assert (found.value, found.n) == (pytest.approx(0.35), 1)
+
+
 def test_an_effect_without_placebos_has_none_that_shrinks_by_nothing():
     def said(placebo, n_placebos):
         shrinkage = AnsweredShrinkage(0.8, 1.0, placebo, "other revolutions", n_placebos)

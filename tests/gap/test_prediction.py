@@ -15,8 +15,10 @@ from gearsig.gap import (
     EffectPath,
     Fold,
     ObservedChange,
+    closed_shares,
     fit_effect,
     fit_path,
+    fold_fits,
     paths_of,
     shrinkage,
 )
@@ -90,6 +92,23 @@ def test_a_true_effect_shrinks_the_gap_and_its_placebo_does_not() -> None:
     assert result.placebo < 0.1
     assert result.after.value < 1.0 < result.before.value
     assert result.shrink.low <= result.shrink.value <= result.shrink.high
+
+
+def test_on_all_features_a_flexible_wrong_effect_closes_less_than_the_true_one() -> None:
+    """It has the same course on part of what changes, and fits that as well."""
+    part = np.where(np.abs(SHAPE) == np.abs(SHAPE).max(), SHAPE, 0.0)
+    shapes = {"true": SHAPE, "wrong": part, "idle": 0.01 * SHAPE}
+    true, wrong, idle = (replace(path(shape), name=name) for name, shape in shapes.items())
+    now = seen(predicted(true, 3.0))
+    folds = [Fold((now,), now)]
+    fits = {one.name: fold_fits([one], folds) for one in (true, wrong, idle)}
+    own = {one.name: shrinkage([one], folds, "", fits=fits[one.name]).shrink.value for one in (true, wrong)}
+    shares = closed_shares(fits, folds)
+    assert own["true"] == pytest.approx(own["wrong"], abs=0.05)
+    assert shares["true"] > 0.95
+    assert shares["wrong"] < shares["true"] - 0.2
+    assert shares["idle"] < 0.1
+    assert closed_shares({"idle": fits["idle"]}, folds) == {}
 
 
 def test_an_effect_that_was_fitted_to_one_condition_and_fails_at_the_other_does_not_shrink_the_gap() -> None:

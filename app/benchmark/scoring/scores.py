@@ -280,6 +280,20 @@ def _shrink_named(row: Row) -> float:
     return shrink_of(row, row.named) if row.named and row.is_mechanical else float("nan")
 
 
+def _closed_beyond_wrong(row: Row) -> float:
+    """Return the share of the gap that the true effect closes, less the best wrong one's, on all tried features.
+
+    nan where the true effect, or no other one, was tried.
+    """
+    shares = {
+        cause.name: cause.shrinkage.of_all
+        for cause in row.answer.causes
+        if cause.shrinkage is not None and cause.shrinkage.of_all is not None
+    }
+    true = shares.pop(row.effects[0], None) if row.is_mechanical else None
+    return float("nan") if true is None or not shares else true - max(shares.values())
+
+
 def _placebo(row: Row) -> float:
     shrinkage = _of_true(row)
     return shrinkage.placebo if shrinkage is not None and shrinkage.n_placebos else float("nan")
@@ -407,6 +421,13 @@ FIGURES: tuple[Figure, ...] = (
         is_share=False,
         targets=(0.08, 0.05),
         is_least=False,
+    ),
+    Figure(
+        "closed",
+        "share closed on all tried features, held out: true less best wrong effect, median",
+        _median(_closed_beyond_wrong),
+        is_share=False,
+        targets=(0.20, 0.20),
     ),
     Figure("slope", "observed over predicted change, median", _median(_slope), is_share=False),
     Figure("answered", "answered at all", counted(lambda _: True, lambda r: bool(r.answer.outcome))),
