@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
@@ -78,7 +78,7 @@ def report_many(
     executor: Executor | None = None,
     on_progress: Progress | None = None,
     command: str = "",
-    reference: str | Path | None = None,
+    reference: str | Path | Mapping[Path, Path] | None = None,
     torque_nm: float | None = None,
     pdf: bool = False,
     methods: Sequence[str] | None = None,
@@ -112,8 +112,9 @@ def report_many(
         Called as ``on_progress(n_done, n_total, result)`` with an `Entry` or a `Failure`, in the order of completion.
     command : str
         The command that makes the report again, for the pages.
-    reference : str, Path or None
-        Recording of the same machine when it was healthy; all are compared with it but itself.
+    reference : str, Path, mapping or None
+        Recording of the same machine when it was healthy; all are compared with it but itself. Of several machines a
+        mapping of recordings to theirs.
     torque_nm : float or None
         For the depth of cracks, instead of the rig's operating point.
     pdf : bool
@@ -154,7 +155,9 @@ def report_many(
         check_pdf()
     workers = min(len(files), n_processors()) if n_processes is None else count(n_processes, "n_processes")
     folder = made_folder(Path(output_folder))
-    healthy = Path(reference) if reference is not None else None
+    given = reference if isinstance(reference, Mapping) else dict.fromkeys(files, Path(reference)) if reference else {}
+    healthy = {file.resolve(): path for file, path in given.items()}
+    healthy_files = {path.resolve() for path in healthy.values()}
     names = [file.name for file in files]
     chosen = None if methods is None else tuple(methods)
     for method in chosen or ():
@@ -163,8 +166,8 @@ def report_many(
     for file, page in zip(files, page_names(files), strict=True):
         # Files of the same name are told apart by their folders.
         name = file_label(file, whole=not file.name or names.count(file.name) > 1)
-        is_healthy = healthy is not None and file.exists() and healthy.exists() and file.samefile(healthy)
-        compared = None if is_healthy else healthy
+        is_healthy = file.resolve() in healthy_files
+        compared = None if is_healthy else healthy.get(file.resolve())
         path = folder / f"{page}.html"
         facts = (rig, sampling_rate_hz, speed, command)
         jobs.append(

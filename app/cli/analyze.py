@@ -124,6 +124,19 @@ def demo(
     first = next((s for s in chosen if "damaged" in s.recording.stem), chosen[0])
     typer.echo(f"$ gearsig analyze {first.recording}\n")
     typer.echo(analysis_text(analyze(options.open_recording(first.recording, options.open_rig(first.rig), None))))
-    typer.echo(f"\nThe same for all {len(chosen)} samples (they are simulated; {first.recording.parent} says how):")
-    make_report([s.recording for s in chosen], output, None, None, None, None, command=f"gearsig demo -o {output}")
+    typer.echo(
+        f"\nThe same for all {len(chosen)} samples (they are simulated; {first.recording.parent} says how), "
+        "beside their healthy machine where there is one:"
+    )
+    healthy = {s.recording: s.reference for s in chosen if s.reference is not None}
+    make_report(
+        [s.recording for s in chosen],
+        output,
+        None,
+        None,
+        None,
+        None,
+        command=f"gearsig demo -o {output}",
+        reference=healthy,
+    )
     typer.echo("Next: `gearsig rig example` for a rig file of your own, `gearsig dashboard` to explore.")

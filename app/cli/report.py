@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -79,7 +80,7 @@ def make_report(
     speed: SpeedSource | None,
     jobs: int | None,
     command: str,
-    reference: Path | None = None,
+    reference: Path | Mapping[Path, Path] | None = None,
     torque_nm: float | None = None,
     cluster: str = "",
     *,

@@ -85,6 +85,23 @@ def test_any_executor_does(recordings, tmp_path, monkeypatch):
     assert [entry.page for entry in result.entries] == ["one.html", "two.html"]
 
 
+def test_each_machine_is_compared_with_its_own_reference(recordings, tmp_path, monkeypatch):
+    one, two = recordings
+    third = tmp_path / "three.csv"
+    third.write_bytes(one.read_bytes())
+    jobs = {}
+
+    def seen(job):
+        jobs[job.name] = job.reference, job.is_reference
+        return _page_for(job)
+
+    monkeypatch.setattr(batch, "_report_one", seen)
+    report_many([*recordings, third], tmp_path / "a", n_processes=1, reference={two: one})
+    assert jobs == {"one.csv": (None, True), "two.csv": (one, False), "three.csv": (None, False)}
+    report_many([*recordings, third], tmp_path / "b", n_processes=1, reference=one)
+    assert jobs == {"one.csv": (None, True), "two.csv": (one, False), "three.csv": (one, False)}
+
+
 def test_unexpected_errors_ask_for_a_report(recordings, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise ZeroDivisionError("by\nnothing")
