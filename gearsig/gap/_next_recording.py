@@ -71,8 +71,8 @@ def next_recordings(
     tasks = [Task(run, SEED, tried.fit.added, tuple(places)) for run in runs for tried in (first, second)]
     rows = simulate(tasks, PROCESSES, lambda *_: None, n_together=2)
     at = {
-        point: _distances(conditions, one, other)
-        for point, one, other in zip(points, rows[::2], rows[1::2], strict=True)
+        point: _distances(conditions, of_first, of_second)
+        for point, of_first, of_second in zip(points, rows[::2], rows[1::2], strict=True)
     }
     known = [distances for point, distances in at.items() if point in here and distances]
     if not known:
@@ -85,7 +85,7 @@ def next_recordings(
             place = places.get(channel, "")
             text = _text(point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in here)
             recordings.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
-    return tuple(sorted(recordings, key=lambda one: -one.standard_deviations)[:5])
+    return tuple(sorted(recordings, key=lambda of_first: -of_first.standard_deviations)[:5])
 
 
 def _rounded(speed_rpm: float, torque_nm: float) -> OperatingCondition:

@@ -530,8 +530,8 @@ def _both(comparison: ComparedPair, side: int, *, relative: bool) -> tuple[_Line
     return now.first(n), before.first(n)
 
 
-def _lines(gathered: ReducedRecording, names: Sequence[str], side: int, *, relative: bool) -> _Lines:
-    averages = [gathered.average(name, side) for name in names]
+def _lines(reduced: ReducedRecording, names: Sequence[str], side: int, *, relative: bool) -> _Lines:
+    averages = [reduced.average(name, side) for name in names]
     n, rows = averages[0].highest + 1, []
     for average in averages:
         synchronous = np.where(average.is_synchronous, average.excess, 0.0)

@@ -105,8 +105,8 @@ class EffectPath:
         first = np.minimum(place.astype(np.intp), max(len(self.severities) - 2, 0))
         second = np.minimum(first + 1, len(self.severities) - 1)
         between = table[:, first] + (place - first)[:, None] * (table[:, second] - table[:, first])
-        found: FloatArray = between * np.minimum(severities / self.severities[0], 1.0)[:, None]
-        return found
+        predicted: FloatArray = between * np.minimum(severities / self.severities[0], 1.0)[:, None]
+        return predicted
 
     def tried(self) -> FloatArray:
         """Return the severities that a fit looks at."""
@@ -141,15 +141,15 @@ class Fit:
         """Return the predicted distances; at a condition that it was not fitted to, at the level of the others."""
         by_level = sorted(self.ways.values(), key=lambda way: self.path.levels_db[way])
         way = self.ways.get(condition, by_level[len(by_level) // 2])
-        found: FloatArray = self.path.at(np.array([self.severity.value]), condition)[way, 0]
-        return found
+        predicted: FloatArray = self.path.at(np.array([self.severity.value]), condition)[way, 0]
+        return predicted
 
-    def at_level_of(self, one: ObservedChange) -> Fit:
+    def at_level_of(self, observed: ObservedChange) -> Fit:
         """Return the fit with the level that suits another condition best; severity and options stay."""
-        predicted = self.path.at(np.array([self.severity.value]), one.condition)[:, 0]
-        costs = _squares(one.distances - predicted, one.floors) @ _family_weights(self.path.names)
+        predicted = self.path.at(np.array([self.severity.value]), observed.condition)[:, 0]
+        costs = _squares(observed.distances - predicted, observed.floors) @ _family_weights(self.path.names)
         way = int(np.argmin(costs + _unusual(self.path)))
-        return replace(self, ways={**self.ways, one.condition: way})
+        return replace(self, ways={**self.ways, observed.condition: way})
 
     def level_db(self, condition: int) -> float:
         """Return by how much louder than on the twin the effect is."""
@@ -176,11 +176,11 @@ def paths_of(
     groups: dict[tuple[tuple[str, float | str], ...], list[int]] = {}
     for i, added in enumerate(candidates):
         groups.setdefault(tuple(sorted(added.options.items())), []).append(i)
-    found = []
+    paths = []
     for options, rows in groups.items():
         order = sorted(rows, key=lambda i: candidates[i].severity)
         severities = np.array([candidates[i].severity for i in order])
-        found.append(
+        paths.append(
             EffectPath(
                 candidates[rows[0]].name,
                 dict(options),
@@ -190,7 +190,7 @@ def paths_of(
                 levels_db,
             )
         )
-    return tuple(found)
+    return tuple(paths)
 
 
 def fit_effect(paths: Iterable[EffectPath], observed: Sequence[ObservedChange]) -> Fit:
@@ -232,7 +232,7 @@ def fit_path(path: EffectPath, observed: Sequence[ObservedChange]) -> Fit:
         high = math.inf
     likelihood = np.exp(-0.5 * (costs - costs.min()))
     best = round(float(likelihood @ np.arange(len(tried)) / likelihood.sum()))  # they are even in ln s
-    fitted = {one.condition: int(row[best]) for one, row in zip(observed, ways, strict=True)}
+    fitted = {change.condition: int(row[best]) for change, row in zip(observed, ways, strict=True)}
     return Fit(path, Interval(float(tried[best]), low, high), float(costs.min()), fitted)
 
 
@@ -261,9 +261,9 @@ def _costs(
     """
     weights = _family_weights(path.names)
     costs, ways = [], []
-    for one in observed:
-        left = one.distances - path.at(severities, one.condition)
-        each = _squares(left, one.floors) @ weights + _unusual(path)[:, None]
+    for change in observed:
+        misses = change.distances - path.at(severities, change.condition)
+        each = _squares(misses, change.floors) @ weights + _unusual(path)[:, None]
         ways.append(each.argmin(axis=0))
         costs.append(each.min(axis=0))
     return np.mean(costs, axis=0), np.array(ways)
@@ -275,12 +275,12 @@ def _unusual(path: EffectPath) -> FloatArray:
     return squares
 
 
-def _squares(left: FloatArray, floors: FloatArray) -> FloatArray:
-    """Return ρ(u), u = left/floor, in squared standard deviations: u² up to 6, from there 36 (1 + ln(u²/36)).
+def _squares(misses: FloatArray, floors: FloatArray) -> FloatArray:
+    """Return ρ(u), u = miss/floor, in squared standard deviations: u² up to 6, from there 36 (1 + ln(u²/36)).
 
     It never ceases to rise: a fit must find its way to a change that is larger than anything that it starts from.
     """
-    distances = np.abs(left / floors)
+    distances = np.abs(misses / floors)
     near = np.minimum(distances, LARGEST_DISTANCE)
     further = np.maximum(distances / LARGEST_DISTANCE, 1.0)
     squares: FloatArray = (near * FLOOR_IN_DEVIATIONS) ** 2 * (1.0 + 2.0 * np.log(further))
@@ -295,9 +295,9 @@ def _family_weights(names: tuple[str, ...]) -> FloatArray:
     return weights
 
 
-def family_square(names: tuple[str, ...], left: FloatArray, observed: ObservedChange, used: FloatArray) -> float:
-    """Return Σ_f mean_{i∈f} ρ(u_i), u = left/floor in standard deviations; `used` is 1 for what counts."""
-    squares, total = _squares(left, observed.floors), 0.0
+def family_square(names: tuple[str, ...], misses: FloatArray, observed: ObservedChange, used: FloatArray) -> float:
+    """Return Σ_f mean_{i∈f} ρ(u_i), u = miss/floor in standard deviations; `used` is 1 for what counts."""
+    squares, total = _squares(misses, observed.floors), 0.0
     for rows in family_members(names).values():
         if used[rows].sum() > 0:
             total += float(used[rows] @ squares[rows] / used[rows].sum())
@@ -355,31 +355,33 @@ def transplanted(
         dB; `change.…` from what repetition gives.
     """
     given = dict(zip(names, change.tolist(), strict=True))
-    found = dict(given)
+    moved = dict(given)
     gain_db = real["mesh.total"] - simulated["mesh.total"]
     floor_db = real["floor.total"] - simulated["floor.total"] - gain_db
     for name in names:
         feature = Feature.of(name)
-        own_db = level_db + (ground_db - gain_db if feature.is_of_the_body else 0.0)
+        gain_of_effect_db = level_db + (ground_db - gain_db if feature.is_of_the_body else 0.0)
         if (feature.is_relative and feature.family != "change") or name == "mesh.half":
-            found[name] = _added(given[name], simulated[name], real[name], own_db)
+            moved[name] = _added(given[name], simulated[name], real[name], gain_of_effect_db)
         elif feature.is_shaft_level or name == "floor.total" or name.startswith(_BANDS):
-            found[name] = _added(given[name], simulated[name], real[name], gain_db + own_db)
+            moved[name] = _added(given[name], simulated[name], real[name], gain_db + gain_of_effect_db)
         elif feature.family in ("envelope", "line") and name != "envelope.depth":
-            found[name] = _added(given[name], simulated[name], real[name], level_db - floor_db)
-    found |= _mesh(given, real, level_db)
+            moved[name] = _added(given[name], simulated[name], real[name], level_db - floor_db)
+    moved |= _mesh(given, real, level_db)
     for name in names:
         if name.startswith(_KURTOSIS):
-            part = _part(found[name.replace(_KURTOSIS, _BANDS)])
-            found[name] = part * (simulated[name] + given[name] - real[name])
+            part = _part(moved[name.replace(_KURTOSIS, _BANDS)])
+            moved[name] = part * (simulated[name] + given[name] - real[name])
     for side in SIDES:
         for name, rose in _STRONGEST.items():
-            own = name.format(side)
-            found[own] = _risen(real[own], simulated[own] + given[own], found[rose.format(side)])
-        found |= _tooth(f"tooth.{side}", found, given, simulated, real)
+            strongest = name.format(side)
+            moved[strongest] = _risen(
+                real[strongest], simulated[strongest] + given[strongest], moved[rose.format(side)]
+            )
+        moved |= _tooth(f"tooth.{side}", moved, given, simulated, real)
         if f"change.{side}.level" in given:
-            found |= _pattern(f"change.{side}", given, usual, real[f"tooth.{side}.level"], level_db)
-    return np.array([found[name] for name in names])
+            moved |= _pattern(f"change.{side}", given, usual, real[f"tooth.{side}.level"], level_db)
+    return np.array([moved[name] for name in names])
 
 
 def _power(decibels: float) -> float:
@@ -413,21 +415,21 @@ def _part(change_db: float) -> float:
     return 1.0 - 1.0 / _power(change_db) if change_db > 0.0 else 0.0
 
 
-def _risen(born_db: float, own_db: float, more_db: float) -> float:
+def _risen(born_db: float, alone_db: float, more_db: float) -> float:
     """Return by how much the strongest stands out further: as much as it rose, no further than by itself alone."""
-    return min(born_db + max(more_db, 0.0), max(own_db, born_db)) - born_db
+    return min(born_db + max(more_db, 0.0), max(alone_db, born_db)) - born_db
 
 
 def _tooth(
     name: str,
-    found: Mapping[str, float],
+    moved: Mapping[str, float],
     given: Mapping[str, float],
     simulated: Mapping[str, float],
     real: Mapping[str, float],
 ) -> dict[str, float]:
     """Return the shape of a shaft's pattern where the effect's own is added to what the real teeth are born with."""
-    peak, elsewhere = found[f"{name}.peak"], found[f"{name}.elsewhere"]
-    part = _part(found[f"{name}.level"])
+    peak, elsewhere = moved[f"{name}.peak"], moved[f"{name}.elsewhere"]
+    part = _part(moved[f"{name}.level"])
     shapes = {
         f"{name}.{what}": part * (simulated[f"{name}.{what}"] + given[f"{name}.{what}"] - real[f"{name}.{what}"])
         for what in ("kurtosis", "width", "below_mesh", "centroid")
@@ -437,20 +439,20 @@ def _tooth(
 
 
 def _pattern(
-    name: str, given: Mapping[str, float], usual: Mapping[str, float], own_db: float, level_db: float
+    name: str, given: Mapping[str, float], usual: Mapping[str, float], pattern_db: float, level_db: float
 ) -> dict[str, float]:
     """Return how far the pattern of the difference lies from what mere repetition gives."""
-    found = {}
+    moved = {}
     for what in ("level", "elsewhere", "peak"):
         key = f"{name}.{what}"
-        found[key] = float(10.0 * np.log10(1.0 + _power(given[key] + level_db) / _power(usual[key])))
-    part = _part(found[f"{name}.level"])
+        moved[key] = float(10.0 * np.log10(1.0 + _power(given[key] + level_db) / _power(usual[key])))
+    part = _part(moved[f"{name}.level"])
     for what in _OF_A_PATTERN:
         key = f"{name}.{what}"
-        found[key] = part * (given[key] - usual[key])
-    agreement = (1.0 + _power(given[f"{name}.level"] + level_db - own_db)) ** -0.5
-    found[f"{name}.agreement"] = 10.0 * (agreement - 1.0)
-    return found
+        moved[key] = part * (given[key] - usual[key])
+    agreement = (1.0 + _power(given[f"{name}.level"] + level_db - pattern_db)) ** -0.5
+    moved[f"{name}.agreement"] = 10.0 * (agreement - 1.0)
+    return moved
 
 
 # --------------------
@@ -615,13 +617,13 @@ def _elsewhere(paths: Sequence[EffectPath], fold: Fold) -> float | None:
 
     The level comes from the condition's own other revolutions: no other condition knows the path at this speed.
     """
-    others = [one for one in fold.fitted if one.condition != fold.scored.condition]
+    others = [change for change in fold.fitted if change.condition != fold.scored.condition]
     if not others:
         return None
     fit = fit_effect(paths, others)
-    for one in fold.fitted:
-        if one.condition == fold.scored.condition:
-            fit = fit.at_level_of(one)
+    for change in fold.fitted:
+        if change.condition == fold.scored.condition:
+            fit = fit.at_level_of(change)
     return _before_and_after(fit, fold.scored, own_features(fit, fold.scored))[2]
 
 
@@ -656,8 +658,8 @@ def _before_and_after(fit: Fit, scored: ObservedChange, used: FloatArray) -> tup
     """Return before and after in floors, and the shrink of what exceeds them."""
     names = fit.path.names
     n_families = family_square(names, np.ones_like(used) * scored.floors, scored, used) / FLOOR_IN_DEVIATIONS**2
-    left = scored.distances - fit.at(scored.condition)
-    squares = [family_square(names, d, scored, used) / n_families for d in (scored.distances, left)]
+    misses = scored.distances - fit.at(scored.condition)
+    squares = [family_square(names, d, scored, used) / n_families for d in (scored.distances, misses)]
     excess = max(squares[0] - 1.0, 0.1)
     shrink = (max(squares[0], 1.0) - max(squares[1], 1.0)) / excess  # where there was no gap, none can shrink
     before, after = (float(np.sqrt(s)) / FLOOR_IN_DEVIATIONS for s in squares)

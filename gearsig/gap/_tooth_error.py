@@ -322,7 +322,7 @@ def tooth_error_evidence(recording: Recording, reference: Recording) -> ToothErr
     if not (has_encoders(recording) and has_encoders(reference)):
         return None
     try:
-        now, healthy = (transmission_error(one, pair=_first_pair(one)) for one in (recording, reference))
+        now, healthy = (transmission_error(measured, pair=_first_pair(measured)) for measured in (recording, reference))
     except GearsigError:
         return None
     changes = [change for change in tooth_error_changes(now, healthy) if change.is_clear]
@@ -330,6 +330,6 @@ def tooth_error_evidence(recording: Recording, reference: Recording) -> ToothErr
         return None
     weight = 1.0 / (1.0 + now.mesh_hz / STATIC_MESH_HZ)
     said = [load_known_courses().log_likelihoods(course_descriptors(change)) for change in changes]
-    told = {name: weight * log(float(np.mean([exp(one[name]) for one in said]))) for name in TOOTH_FAULTS}
+    told = {name: weight * log(float(np.mean([exp(measured[name]) for measured in said]))) for name in TOOTH_FAULTS}
     gear = SIDES[changes[0].side] if len(changes) == 1 else ""
     return ToothErrorEvidence(told, max(change.rms_um for change in changes), gear)

@@ -185,22 +185,22 @@ def finished_runs(
     So many tasks on end go to one process: those that share a healthy run then simulate it once. A twin that other
     processes could not know, as it is defined in the caller's script, runs in this one.
     """
-    found: list[Reduced | str] = [""] * len(tasks)
+    answers: list[Reduced | str] = [""] * len(tasks)
     if (processes == 1 and active_cluster() is None) or not can_be_sent(tasks[:1]):
         known: Known = {}
         for i, task in enumerate(tasks):
-            found[i] = _reduced(task, known)
+            answers[i] = _reduced(task, known)
             on_progress(i + 1, len(tasks))
-        return found
+        return answers
     batches = [tasks[i : i + n_together] for i in range(0, len(tasks), n_together)]
     # A cluster's workers outlive a twin: what they know of its healthy runs is forgotten after each batch.
     work = reduced_in_worker if active_cluster() is None else reduced_apart
     done = 0
     for number, rows in run_jobs(work, batches, n_workers=processes, if_killed=_killed_batch):
-        found[number * n_together : number * n_together + len(rows)] = rows
+        answers[number * n_together : number * n_together + len(rows)] = rows
         done += len(rows)
         on_progress(done, len(tasks))
-    return found
+    return answers
 
 
 def _killed_batch(tasks: Sequence[Task]) -> list[Reduced | str]:
@@ -243,8 +243,8 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
         alone = {}
         if task.further:
             alone = {name: change_once(_of(now, name), _of(healthy, name))[1] for name in healthy.channels}
-            own = [name for name in healthy.channels if name not in task.further]
-            now, healthy = _of(now, *own), _of(healthy, *own)
+            of_the_rig = [name for name in healthy.channels if name not in task.further]
+            now, healthy = _of(now, *of_the_rig), _of(healthy, *of_the_rig)
         names, values = once(healthy) if task.added is None else ((), np.empty(0))
         sidebands = mesh_sidebands(now, healthy, is_turned=False)
         return Reduced(names, values, *change_once(now, healthy), sidebands, alone)
@@ -252,8 +252,8 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
         return str(error)
 
 
-def _of(gathered: ReducedRecording, *channels: str) -> ReducedRecording:
-    return gathered.with_channels({name: gathered.channels[name] for name in channels})
+def _of(reduced: ReducedRecording, *channels: str) -> ReducedRecording:
+    return reduced.with_channels({name: reduced.channels[name] for name in channels})
 
 
 def _gathered(run: TwinRun, seed: int, added: Added | None, noise: int) -> ReducedRecording:
@@ -378,22 +378,24 @@ def banks_of(
         If the healthy machine cannot be simulated or its recording is too short for the features.
     """
     within = seeds[: min(count(n_change_seeds, "n_change_seeds"), len(seeds))]
-    wanted = [
+    requests = [
         _BankRequest.of(run, tuple(added), seeds, within, folder) for run in runs for added in candidates.values()
     ]
-    found = {w: read_bank(w.path, w.key) if w.path is not None and not fresh else None for w in wanted}
-    missing = [w for w in wanted if found[w] is None]
+    banks_by_request = {w: read_bank(w.path, w.key) if w.path is not None and not fresh else None for w in requests}
+    missing = [w for w in requests if banks_by_request[w] is None]
     healthy = {w.run.healthy_key: w.run for w in missing}
     tasks = [Task(run, seed, None) for run in healthy.values() for seed in seeds]
     tasks += [Task(w.run, seed, added) for w in missing for added in w.candidates for seed in within]
     rows = iter(finished_runs(tasks, processes, on_progress) if tasks else ())
     healthy_rows = {key: list(islice(rows, len(seeds))) for key in healthy}
     for w in missing:
-        own = list(islice(rows, len(w.candidates) * len(within)))
-        found[w] = bank = _assembled(w.run.point, w.candidates, len(within), healthy_rows[w.run.healthy_key], own)
+        of_request = list(islice(rows, len(w.candidates) * len(within)))
+        banks_by_request[w] = bank = _assembled(
+            w.run.point, w.candidates, len(within), healthy_rows[w.run.healthy_key], of_request
+        )
         if w.path is not None:
             write_bank(w.path, w.key, bank)
-    banks = iter(found[w] for w in wanted)
+    banks = iter(banks_by_request[w] for w in requests)
     return [{name: bank for name, bank in zip(candidates, banks, strict=False) if bank is not None} for _ in runs]
 
 
@@ -460,14 +462,14 @@ def _assembled(
     first = healthy[0]
     kept, changes, sidebands, left_out = [], [], [], []
     for i, added in enumerate(candidates):
-        own = rows[i * n_seeds : (i + 1) * n_seeds]
-        whole = [row for row in own if isinstance(row, Reduced) and row.change_names == first.change_names]
+        of_setting = rows[i * n_seeds : (i + 1) * n_seeds]
+        whole = [row for row in of_setting if isinstance(row, Reduced) and row.change_names == first.change_names]
         if len(whole) == n_seeds:
             kept.append(added)
             changes.append([row.change for row in whole])
             sidebands.append(np.mean([row.sidebands for row in whole], axis=0))
         else:
-            left_out.append((added, next((r for r in own if isinstance(r, str)), "it has other features")))
+            left_out.append((added, next((r for r in of_setting if isinstance(r, str)), "it has other features")))
     return Bank(
         point,
         first.names,
@@ -561,7 +563,7 @@ def try_effects(
         fresh=fresh,
         on_progress=lambda done, of: on_progress(f"simulating {len(told)} effects at the point of {where}", done / of),
     )
-    found, fits = {}, {}
+    tried_effects, fits = {}, {}
     for effect in effects:
         name = effect.name
         every = _paths([at[name] for at in banks], candidates[name], conditions, effect.shows_in)
@@ -570,11 +572,13 @@ def try_effects(
             fits[name] = fold_fits(paths, folds)
             shrink = shrinkage(paths, folds, HELD_OUT, excluded, fits[name])
             match = _match([at[name] for at in banks], conditions, effect) if name in TOOTH_FAULTS else None
-            found[name] = TriedEffect(name, paths, fit_effect(paths, observed_changes(conditions)), shrink, match)
+            tried_effects[name] = TriedEffect(
+                name, paths, fit_effect(paths, observed_changes(conditions)), shrink, match
+            )
     shares = closed_shares(fits, folds)
     return {
         name: replace(tried, shrinkage=replace(tried.shrinkage, of_all=shares.get(name)))
-        for name, tried in found.items()
+        for name, tried in tried_effects.items()
     }
 
 
@@ -594,7 +598,7 @@ def worth_simulating(candidates: Sequence[Added], told: Mapping[str, str]) -> li
 
 def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEffect) -> WaveformMatch | None:
     """Return what an effect's waveforms say at the conditions that have a reference."""
-    found = []
+    courses = []
     for bank, condition in zip(banks, conditions, strict=True):
         if condition.reference is None:
             continue
@@ -619,9 +623,9 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
             for added, sidebands in zip(bank.added, bank.sidebands, strict=True)
             if (side := _side(added)) is not None and ("tooth" in added.options or not effect.is_on_every_tooth)
         ]
-        found.append([course for course in compared if course is not None])
+        courses.append([course for course in compared if course is not None])
     severities = [added.severity for bank in banks for added in bank.added]
-    return waveform_match(joined_courses(found), min(severities), max(severities)) if severities else None
+    return waveform_match(joined_courses(courses), min(severities), max(severities)) if severities else None
 
 
 def _side(added: Added) -> int | None:
@@ -683,17 +687,17 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     floor, names = condition.floor, bank.feature_names
     usual = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
     simulated = dict(zip(names, bank.healthy.mean(axis=0).tolist(), strict=True))
-    own_names, own = whole_and_parts(condition.other)
+    base_names, base = whole_and_parts(condition.other)
     if condition.reference is not None:
-        compared, baseline = bank.change_names, own[0]
+        compared, baseline = bank.change_names, base[0]
     else:
-        compared, baseline = names, condition.learned.credibility * own[0] + usual
-    real = dict(zip(own_names, baseline.tolist(), strict=True))
+        compared, baseline = names, condition.learned.credibility * base[0] + usual
+    real = dict(zip(base_names, baseline.tolist(), strict=True))
     repeated = dict(zip(floor.names, usual.tolist(), strict=True))
     again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
     again[: len(names)] = bank.healthy_changes.mean(axis=0)[: len(names)]
     given = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]
-    rows = [[transplanted(compared, one, simulated, real, repeated, *way) for one in given] for way in WAYS_DB]
+    rows = [[transplanted(compared, change, simulated, real, repeated, *way) for change in given] for way in WAYS_DB]
     table = np.array(rows).reshape(len(WAYS_DB), len(kept), len(compared))
     return np.where(shown_in(compared, shows_in), table, 0.0)
 
@@ -701,13 +705,13 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
 def folds_of(conditions: Sequence[Condition]) -> list[Fold]:
     """Return what to fit to and what to score on: half of the revolutions at a condition, and all but that half."""
     n, whole = n_compared(conditions), observed_changes(conditions)
-    found = []
+    folds = []
     for k, condition in enumerate(conditions):
         others, again = [one for one in whole if one.condition != k], _again(condition, k, n)
         changes = [condition.change_of(part) for part in halves(condition.now)]
         first, second = (observed(condition, k, n, change) for change in changes)
-        found += [Fold((*others, first), second, again), Fold((*others, second), first, again)]
-    return found
+        folds += [Fold((*others, first), second, again), Fold((*others, second), first, again)]
+    return folds
 
 
 def _again(condition: Condition, index: int, n: int) -> tuple[tuple[ObservedChange, ...], ...]:
@@ -748,12 +752,12 @@ def steps_of(
     steps = [GapStep("before", _left(conditions, folds, []))]
     added: list[TriedEffect] = []
     for name in names:
-        left = _left(conditions, folds, [*added, tried[name]])
-        if added and left.value > (1.0 - WORTH_IT) * steps[-1].left.value:
+        remaining = _left(conditions, folds, [*added, tried[name]])
+        if added and remaining.value > (1.0 - WORTH_IT) * steps[-1].left.value:
             break
         added.append(tried[name])
         title = next(c.title for c in causes if c.name == name)
-        steps.append(GapStep(title, left))
+        steps.append(GapStep(title, remaining))
     return tuple(steps)
 
 
@@ -764,19 +768,19 @@ def _left(conditions: Sequence[Condition], folds: Sequence[Fold], added: Sequenc
         condition = conditions[fold.scored.condition]
         total: FloatArray = np.zeros(len(condition.change.names))
         fits: list[Fit] = []
-        for one in added:
-            fits.append(fit_effect(one.paths, [_without(o, fits) for o in fold.fitted]))
+        for effect in added:
+            fits.append(fit_effect(effect.paths, [_without(o, fits) for o in fold.fitted]))
             total[: n_compared(conditions)] += fits[-1].at(fold.scored.condition)
         sizes.append(_size(condition, fold.scored, total, n_compared(conditions)))
     low, value, high = np.mean([[s.low, s.value, s.high] for s in sizes], axis=0)
     return Interval(float(value), float(low), float(high))
 
 
-def _without(one: ObservedChange, fits: Sequence[Fit]) -> ObservedChange:
-    left = one.distances.copy()
+def _without(change: ObservedChange, fits: Sequence[Fit]) -> ObservedChange:
+    distances = change.distances.copy()
     for fit in fits:
-        left = left - fit.at(one.condition)
-    return replace(one, distances=left)
+        distances = distances - fit.at(change.condition)
+    return replace(change, distances=distances)
 
 
 def _size(condition: Condition, scored: ObservedChange, taken: FloatArray, n: int) -> Interval:
@@ -820,11 +824,11 @@ def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
     words = shaft_words(frame, SIDES.index(str(side)))
     if "tooth" not in options:
         return f"the gear on {words}" if "gear" in options else words
-    found = _tooth_place(shaft, places)
-    if found is None or (found.tooth is None and found.angle_deg is None):
+    tooth_place = _tooth_place(shaft, places)
+    if tooth_place is None or (tooth_place.tooth is None and tooth_place.angle_deg is None):
         return f"one tooth of the gear on {words}"
-    tooth = f"tooth {found.tooth} of the gear on"
-    return f"{tooth} {words}" if found.tooth is not None else f"{found.angle_deg:.0f}° of {words}"
+    tooth = f"tooth {tooth_place.tooth} of the gear on"
+    return f"{tooth} {words}" if tooth_place.tooth is not None else f"{tooth_place.angle_deg:.0f}° of {words}"
 
 
 def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlace]) -> list[str]:
@@ -834,8 +838,8 @@ def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlac
         return [fitted]
     orders = {bearing.name: float(getattr(bearing, race)) for bearing in frame.bearings}
     seen = [place.orders[0] for place in places if place.kind is PlaceKind.ENVELOPE and place.orders]
-    for one in (*seen, orders.get(fitted, np.nan)):
-        if alike := [other for other, order in orders.items() if abs(one / order - 1.0) < SAME_ORDER]:
+    for seen_order in (*seen, orders.get(fitted, np.nan)):
+        if alike := [other for other, order in orders.items() if abs(seen_order / order - 1.0) < SAME_ORDER]:
             return alike
     return [fitted]
 
@@ -882,10 +886,10 @@ def at_its_tooth(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> 
     """Return the setting with the recording's tooth in place of the simulated one, where a mark gives it a number."""
     if "tooth" not in added.options:
         return added
-    found = _tooth_place(frame.shafts[SIDES.index(str(added.options["gear"]))], places)
-    if found is None or found.tooth is None:
+    tooth_place = _tooth_place(frame.shafts[SIDES.index(str(added.options["gear"]))], places)
+    if tooth_place is None or tooth_place.tooth is None:
         return added
-    return replace(added, options={**added.options, "tooth": float(found.tooth)})
+    return replace(added, options={**added.options, "tooth": float(tooth_place.tooth)})
 
 
 def _tooth_place(shaft: str, places: Sequence[GapPlace]) -> GapPlace | None:

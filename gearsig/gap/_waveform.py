@@ -78,7 +78,7 @@ def mesh_sidebands(now: ReducedRecording, healthy: ReducedRecording, *, is_turne
     is_turned : bool
         Whether the shafts' angles begin elsewhere in the healthy recording; of two runs of a simulation they do not.
     """
-    found = np.zeros((len(now.channels), len(SIDES), N_HARMONICS, len(OFFSETS)), dtype=np.complex128)
+    sidebands = np.zeros((len(now.channels), len(SIDES), N_HARMONICS, len(OFFSETS)), dtype=np.complex128)
     for side in range(len(SIDES)):
         here = lines_of_shaft(now, side)
         if is_turned:
@@ -90,8 +90,8 @@ def mesh_sidebands(now: ReducedRecording, healthy: ReducedRecording, *, is_turne
         for k, mesh in _harmonics(here.teeth, difference.shape[1]):
             carrier = here.lines[:, mesh] - difference[:, mesh]
             there = carrier != 0.0
-            found[there, side, k] = difference[there][:, mesh + OFFSETS] / carrier[there, None]
-    return found
+            sidebands[there, side, k] = difference[there][:, mesh + OFFSETS] / carrier[there, None]
+    return sidebands
 
 
 def sideband_noise(now: ReducedRecording, healthy: ReducedRecording) -> FloatArray:
@@ -102,15 +102,15 @@ def sideband_noise(now: ReducedRecording, healthy: ReducedRecording) -> FloatArr
     now, healthy : ReducedRecording
         As of `mesh_sidebands`.
     """
-    found = np.zeros((len(now.channels), len(SIDES), N_HARMONICS, len(OFFSETS)))
+    noise = np.zeros((len(now.channels), len(SIDES), N_HARMONICS, len(OFFSETS)))
     for side in range(len(SIDES)):
         pairs = zip(now.averages(side), healthy.averages(side), strict=True)
         for channel, (here, before) in enumerate(pairs):
             n = min(len(here.noise), len(before.noise))
             for k, mesh in _harmonics(now.frame.teeth[side], n):
                 carrier = max(float(np.abs(before.lines[mesh]) ** 2), 1e-300)
-                found[channel, side, k] = (here.noise[mesh + OFFSETS] + before.noise[mesh + OFFSETS]) / carrier
-    return found
+                noise[channel, side, k] = (here.noise[mesh + OFFSETS] + before.noise[mesh + OFFSETS]) / carrier
+    return noise
 
 
 def _harmonics(teeth: int, n_lines: int) -> Iterator[tuple[int, int]]:
@@ -201,15 +201,15 @@ def compared_course(
         variance = np.minimum(noise, (1.0 - misfit) * power) + misfit * power
         explained = float(np.sum(np.where(seen, 1.0 + np.log(power / variance) - np.abs(o) ** 2 / variance, 0.0)))
         products: ComplexArray = counted * np.conj(t) * o / variance
-        own: FloatArray = counted * np.abs(t) ** 2 / variance
+        simulated_power: FloatArray = counted * np.abs(t) ** 2 / variance
         whole = counted * float(np.sum(np.abs(o) ** 2 / variance))
         scales = (1.0 - misfit) ** 0.5 * np.exp(LOG_SCALES)
         if n_teeth:
-            level, product = _of_all_teeth(products, own, scales, n_teeth)
+            level, product = _of_all_teeth(products, simulated_power, scales, n_teeth)
         else:
-            level, product = _of_one_tooth(products, own, scales, moved, gain_scatter)
+            level, product = _of_one_tooth(products, simulated_power, scales, moved, gain_scatter)
         rows.append(counted * explained + level)
-        correlations.append(product / (whole * float(own.sum())) ** 0.5)
+        correlations.append(product / (whole * float(simulated_power.sum())) ** 0.5)
     levels = np.stack(rows, axis=1).reshape(len(LOG_SCALES), -1)
     best = int(np.argmax([row.max() for row in rows]))
     size = 0.5 * float(np.log(np.sum(np.abs(t) ** 2 / power) / np.sum(np.abs(o) ** 2 / power)))
@@ -224,7 +224,7 @@ def _moved(moves_pitches: float, n_harmonics: int) -> ComplexArray:
 
 
 def _of_one_tooth(
-    products: ComplexArray, own: FloatArray, scales: FloatArray, moved: ComplexArray, gain_scatter: float
+    products: ComplexArray, simulated_power: FloatArray, scales: FloatArray, moved: ComplexArray, gain_scatter: float
 ) -> tuple[FloatArray, float]:
     """Return ln L beyond that of no change, (n_scales, n_places × n_turns), and the largest Re Σ.
 
@@ -234,7 +234,7 @@ def _of_one_tooth(
     turns = np.exp(1j * np.outer(OFFSETS, 2.0 * pi * np.arange(_N_TURNS) / _N_TURNS))
     sums = (products.sum(axis=0) @ turns)[None] * moved[:, :, None]  # (n_places, n_harmonics, n_turns)
     in_phase, square = np.real(sums), np.abs(sums) ** 2
-    whole = own.sum(axis=(0, 2))
+    whole = simulated_power.sum(axis=(0, 2))
     rows = []
     for h in scales:
         v = (h * gain_scatter) ** 2
@@ -248,26 +248,26 @@ def _of_one_tooth(
 
 
 def _of_all_teeth(
-    products: ComplexArray, own: FloatArray, scales: FloatArray, n_teeth: int
+    products: ComplexArray, simulated_power: FloatArray, scales: FloatArray, n_teeth: int
 ) -> tuple[FloatArray, float]:
     """Return ln L beyond that of no change, (n_scales, 1), and the largest Re Σ; each order has a factor of its own.
 
     Σ_i v |S_i|²/(1 + v T_i) − ln(1 + v T_i), v = h² E|b_i|², S_i and T_i over harmonics, channels and both sides.
     """
     half = len(OFFSETS) // 2
-    each, size = products.sum(axis=(0, 1)), own.sum(axis=(0, 1))
+    each, size = products.sum(axis=(0, 1)), simulated_power.sum(axis=(0, 1))
     sums, whole = each[half:] + np.conj(each[:half][::-1]), size[half:] + size[:half][::-1]
     v = scales[:, None] ** 2 * n_teeth / (4.0 * np.sin(pi * OFFSETS[half:] / n_teeth) ** 2)
     level = v * np.abs(sums) ** 2 / (1.0 + v * whole) - np.log1p(v * whole)
     reached = float(np.sum(np.abs(sums) ** 2 / np.maximum(whole, 1e-300)))
-    return level.sum(axis=1, keepdims=True), (reached * float(own.sum())) ** 0.5
+    return level.sum(axis=1, keepdims=True), (reached * float(simulated_power.sum())) ** 0.5
 
 
 def _log_mean(values: FloatArray, axis: int | None = None) -> FloatArray:
     """Return ln of the mean of exp(values)."""
     top = values.max(axis=axis, keepdims=True)
-    found: FloatArray = np.squeeze(np.log(np.mean(np.exp(values - top), axis=axis, keepdims=True)) + top, axis)
-    return found
+    log_mean: FloatArray = np.squeeze(np.log(np.mean(np.exp(values - top), axis=axis, keepdims=True)) + top, axis)
+    return log_mean
 
 
 # --------------------
@@ -357,8 +357,8 @@ def _over_severity(
     likely = (weights.reshape(len(size), len(group), -1) * np.exp(levels - top)[None]).sum(axis=2)
     place = np.interp(log_severity, at, np.arange(len(at)))
     nearness = np.maximum(1.0 - np.abs(place[:, None] - np.arange(len(at))[None, :]), 0.0)
-    found: FloatArray = np.log(np.maximum((nearness * likely).sum(axis=1), 1e-300)) + top
-    return found
+    log_likelihood: FloatArray = np.log(np.maximum((nearness * likely).sum(axis=1), 1e-300)) + top
+    return log_likelihood
 
 
 def _straight(log_severity: FloatArray, shape: Sequence[SimulatedCourse]) -> FloatArray:
@@ -366,10 +366,10 @@ def _straight(log_severity: FloatArray, shape: Sequence[SimulatedCourse]) -> Flo
     at, size = (np.array(v) for v in zip(*((np.log(c.added.severity), c.log_size) for c in shape), strict=True))
     if len(at) == 1:
         return np.asarray(size[0] + (log_severity - at[0]))
-    found: FloatArray = np.interp(log_severity, at, size)
+    log_size: FloatArray = np.interp(log_severity, at, size)
     slopes = np.diff(size) / np.diff(at)
-    found += slopes[0] * np.minimum(log_severity - at[0], 0.0) + slopes[-1] * np.maximum(log_severity - at[-1], 0.0)
-    return found
+    log_size += slopes[0] * np.minimum(log_severity - at[0], 0.0) + slopes[-1] * np.maximum(log_severity - at[-1], 0.0)
+    return log_size
 
 
 def _interval(severities: FloatArray, density: FloatArray) -> Interval:
