@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from math import floor, isfinite, log10
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 N_DIGITS = 9
 """Significant digits kept in JSON: more than any measurement has, and free of rounding noise."""
@@ -18,6 +22,28 @@ def file_label(path: str | Path, *, whole: bool = False) -> str:
     'monday?.csv'
     """
     return (str(path) if whole else Path(path).name).encode("utf-8", "replace").decode()
+
+
+Cell = TypeVar("Cell")
+
+
+def spreadsheet_cell(value: Cell) -> Cell | str:
+    """Return a value of a table; text that a spreadsheet would run as a formula gets a quote before it.
+
+    Examples
+    --------
+    >>> spreadsheet_cell("=1+1"), spreadsheet_cell("a1"), spreadsheet_cell(-2.0)
+    ("'=1+1", 'a1', -2.0)
+    """
+    is_formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{value}" if is_formula else value
+
+
+def csv_text(table: DataFrame) -> str:
+    """Return a table as CSV, its texts as `spreadsheet_cell` leaves them."""
+    texts = table.select_dtypes(exclude="number").columns
+    safe = table.assign(**{name: table[name].map(spreadsheet_cell) for name in texts})
+    return str(safe.to_csv(index=False))
 
 
 def rounded(value: float, n_digits: int = N_DIGITS) -> float | None:

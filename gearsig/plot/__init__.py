@@ -69,7 +69,7 @@ from gearsig.plot._methods import (
     vmd,
 )
 from gearsig.plot._modes import modes_figure
-from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, panels_figure, panels_of, pooled_levels
+from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, figure_table, panels_figure, panels_of, pooled_levels
 from gearsig.plot._phase import (
     bifurcation_figure,
     chaos_test_figure,
@@ -160,6 +160,7 @@ __all__ = [
     "envelope",
     "envelope_spectrum",
     "figure_of",
+    "figure_table",
     "fleet_trend_picture",
     "font_folder",
     "force_figure",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True)
@@ -344,3 +345,85 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
         is_plane,
         _words_of(axes),
     )
+
+
+# --------------------
+# And as a table: what a figure draws, whatever its axes are.
+# --------------------
+
+
+def figure_table(figure: Figure) -> DataFrame:
+    """Return what a figure draws: panel, series, x, y, and the level of what is coloured by one.
+
+    Lines and points by their places, images and meshes by the middles of their cells, bars by middle and height, filled
+    areas and surfaces by their corners; of polar panels x is the angle in rad and y the radius. Panels and series are
+    called as titles, axes and legends call them.
+    """
+    import pandas as pd
+
+    rows = [
+        pd.DataFrame({"panel": _panel_name(axes, number), "series": series_name, "x": x, "y": y, "level": level})
+        for number, axes in enumerate(figure.axes, 1)
+        if axes.get_label() != "<colorbar>" and axes.get_visible()
+        for series_name, x, y, level in _drawn_series(axes)
+        if len(x)
+    ]
+    return pd.concat(rows, ignore_index=True) if rows else pd.DataFrame(columns=["panel", "series", "x", "y", "level"])
+
+
+def _panel_name(axes: Axes, number: int) -> str:
+    over = " over ".join(filter(None, [axes.get_ylabel(), _x_label(axes)]))
+    words = [axes.get_title(loc="left"), axes.get_title(), over]
+    return next(filter(None, words), f"panel {number}")
+
+
+_Series = tuple[str, FloatArray, FloatArray, FloatArray]
+
+
+def _drawn_series(axes: Axes) -> Iterator[_Series]:
+    """Yield name, places and levels of everything that is drawn in data's coordinates."""
+    from matplotlib.collections import Collection, PathCollection, QuadMesh
+
+    def named(artist: Any, kind: str) -> str:
+        label = str(artist.get_label() or "")
+        return kind if not label or label.startswith("_") else label
+
+    def row(name: str, x: Any, y: Any, level: Any = np.nan) -> _Series:
+        at = np.ravel(np.asarray(x, dtype=np.float64))
+        return name, at, np.ravel(np.asarray(y, dtype=np.float64)), np.broadcast_to(np.ravel(level), at.shape)
+
+    for i, line in enumerate(axes.lines, 1):
+        if line.get_transform() == axes.transData:
+            yield row(named(line, f"line {i}"), line.get_xdata(orig=False), line.get_ydata(orig=False))
+    for bars in axes.containers:
+        patches = [bar for bar in bars if hasattr(bar, "get_width")]
+        ends = [bar.get_y() + bar.get_height() for bar in patches]
+        yield row(named(bars, "bars"), [bar.get_x() + bar.get_width() / 2.0 for bar in patches], ends)
+    for i, image in enumerate(axes.images, 1):
+        values = np.ma.filled(np.ma.asarray(image.get_array(), dtype=np.float64), np.nan)
+        if values.ndim == 2:  # not a photograph
+            (left, right, low, high), (n_rows, n_columns) = image.get_extent(), values.shape
+            at = left + (np.arange(n_columns) + 0.5) * (right - left) / n_columns
+            upwards = low + (np.arange(n_rows) + 0.5) * (high - low) / n_rows
+            x, y = np.meshgrid(at, upwards if image.origin == "lower" else upwards[::-1])
+            yield row(f"image {i}", x, y, values)
+    drawn: list[Collection] = list(axes.collections)
+    for i, collection in enumerate(drawn, 1):
+        levels = collection.get_array()
+        name = named(collection, f"area {i}")
+        if isinstance(collection, QuadMesh):
+            edges = np.asarray(collection.get_coordinates(), dtype=np.float64)
+            middles = (edges[:-1, :-1] + edges[1:, :-1] + edges[:-1, 1:] + edges[1:, 1:]) / 4.0
+            yield row(name, middles[..., 0], middles[..., 1], np.ma.filled(np.ma.asarray(levels, float), np.nan))
+            continue
+        if isinstance(collection, PathCollection):
+            places = np.ma.filled(np.ma.asarray(collection.get_offsets(), dtype=np.float64), np.nan)
+            known = levels is not None and np.size(levels) == len(places)
+            yield row(name, places[:, 0], places[:, 1], np.asarray(levels, dtype=np.float64) if known else np.nan)
+            continue
+        corners = [np.asarray(path.vertices, dtype=np.float64) for path in collection.get_paths()]
+        known = levels is not None and np.size(levels) == len(corners)
+        each = np.ravel(np.asarray(levels, dtype=np.float64)) if known else np.full(len(corners), np.nan)
+        repeated = np.repeat(each, [len(places) for places in corners])
+        joined = np.concatenate([np.empty((0, 2)), *corners])
+        yield row(name, joined[:, 0], joined[:, 1], repeated)

@@ -24,7 +24,7 @@ from gearsig.comparison import (
     mesh_lines,
     missing_words,
 )
-from gearsig.formatting import readable, rounded
+from gearsig.formatting import readable, rounded, spreadsheet_cell
 from gearsig.plot import Captioned, Cursor, Picture, embed, unit_text
 from gearsig.report._files import render
 from gearsig.report._json import Layout, document, plain
@@ -203,7 +203,7 @@ def orders_csv(comparison: Comparison) -> str:
     table.writerow(ORDER_COLUMNS)
     for channel in comparison.channels:
         for line in (*channel.lines, *channel.other_lines):
-            table.writerow([_harmless(channel.name), *_row(line)])
+            table.writerow([spreadsheet_cell(channel.name), *_row(line)])
     return buffer.getvalue()
 
 
@@ -211,18 +211,13 @@ def _row(line: LineLevel) -> list[object]:
     numbers = [line.level.simulated_db, line.level.recorded_db, line.level.difference_db, line.level.repeatability_db]
     return [
         line.kind,
-        _harmless(line.label),
+        spreadsheet_cell(line.label),
         rounded(line.order),
-        _harmless(line.shaft),
+        spreadsheet_cell(line.shaft),
         *(round(number, 3) for number in numbers),
         str(line.simulated_is_seen).lower(),
         str(line.recorded_is_seen).lower(),
     ]
-
-
-def _harmless(text: str) -> str:
-    """Return a name from a file so that no spreadsheet takes it for a formula."""
-    return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
 
 
 def _record(facts: RecordFacts) -> str:

@@ -17,7 +17,7 @@ from urllib.parse import quote
 from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.diagnosis import Analysis, Kind, Outcome
-from gearsig.formatting import readable
+from gearsig.formatting import readable, spreadsheet_cell
 from gearsig.indicators import Indicator
 from gearsig.plot import unit_text, with_unit
 from gearsig.report._files import render
@@ -288,13 +288,8 @@ def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ())
     columns = list(records[0]) if index.rows else ["recording", "outcome", "reason"]
     table = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
     table.writeheader()
-    table.writerows({name: _in_cell(value) for name, value in record.items()} for record in records)
+    table.writerows({name: spreadsheet_cell(value) for name, value in record.items()} for record in records)
     write_text(folder / "batch.csv", text.getvalue())
-
-
-def _in_cell(value: Any) -> Any:
-    """Return a value of a table; what a spreadsheet would run as a formula gets a quote before it."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
 def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:

@@ -10,6 +10,7 @@ from time import perf_counter
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 from gearsig.angle import ShaftAngle
@@ -24,6 +25,7 @@ from gearsig.plot import (
     LevelPanel,
     LinePanel,
     average_figure,
+    figure_table,
     new_figure,
     order_map_figure,
     panels_of,
@@ -245,3 +247,34 @@ def test_a_figure_is_taken_apart_into_panels_that_zoom(average_of) -> None:
     assert np.nanmax(bar.x) == pytest.approx(0.2)
     np.testing.assert_array_equal(twin.lines[0].y, [0.0, 1.0, np.nan, 0.0, 2.0, np.nan])
     assert panels_of(polar_figure(average_of(np.zeros(64)))) == []
+
+
+def test_a_figures_table_holds_what_it_draws() -> None:
+    figure = Figure()
+    lines, image = figure.add_subplot(2, 2, 1), figure.add_subplot(2, 2, 2)
+    polar = figure.add_subplot(2, 2, 3, projection="polar")
+    lines.set_title("first", loc="left")
+    lines.plot([0.0, 1.0, 2.0], [5.0, 6.0, 7.0], label="level")
+    lines.axhline(3.0)  # no data of its own
+    lines.bar([1.0, 3.0], [2.0, 4.0], width=0.5, label="counts")
+    lines.scatter([8.0], [9.0], c=[0.5], label="dots")
+    lines.fill_between([0.0, 1.0], [0.0, 0.0], [1.0, 1.0], label="band")
+    image.imshow(np.array([[1.0, 2.0], [3.0, 4.0]]), origin="lower", extent=(0.0, 2.0, 10.0, 30.0))
+    image.pcolormesh([0.0, 2.0, 4.0], [0.0, 1.0], np.array([[7.0, 8.0]]))
+    image.set_xlabel("x")
+    image.set_ylabel("y")
+    polar.plot([0.0, np.pi], [1.0, 2.0])
+    table = figure_table(figure)
+
+    def rows(panel: str, series: str) -> list[list[float]]:
+        kept = table[(table.panel == panel) & (table.series == series)]
+        return [[float(v) for v in row] for row in kept[["x", "y", "level"]].to_numpy()]
+
+    assert [row[:2] for row in rows("first", "level")] == [[0.0, 5.0], [1.0, 6.0], [2.0, 7.0]]
+    assert [row[:2] for row in rows("first", "counts")] == [[1.0, 2.0], [3.0, 4.0]]
+    assert rows("first", "dots") == [[8.0, 9.0, 0.5]]
+    assert len(rows("first", "band")) >= 4
+    assert rows("y over x", "image 1") == [[0.5, 15.0, 1.0], [1.5, 15.0, 2.0], [0.5, 25.0, 3.0], [1.5, 25.0, 4.0]]
+    assert rows("y over x", "area 1") == [[1.0, 0.5, 7.0], [3.0, 0.5, 8.0]]
+    assert [row[:2] for row in rows("panel 3", "line 1")] == [[0.0, 1.0], [np.pi, 2.0]]
+    assert figure_table(Figure()).empty

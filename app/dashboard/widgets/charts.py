@@ -21,7 +21,18 @@ from app.dashboard.components import component_of
 from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
-from gearsig.plot import LONGEST, ChartLine, Cursor, LevelPanel, LinePanel, panels_of, plain, pooled_levels
+from gearsig.formatting import csv_text
+from gearsig.plot import (
+    LONGEST,
+    ChartLine,
+    Cursor,
+    LevelPanel,
+    LinePanel,
+    figure_table,
+    panels_of,
+    plain,
+    pooled_levels,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as PictureFigure
@@ -419,7 +430,7 @@ def show_picture(png: bytes, figure: PictureFigure, words: str, key: str) -> Non
         figure.savefig(buffer, format="svg")
         return buffer.getvalue()
 
-    offer_picture({"png": png, "svg": svg}, key)
+    offer_picture({"png": png, "svg": svg, "csv": lambda: csv_text(figure_table(figure)).encode()}, key)
 
 
 def offer_picture(files: Mapping[str, bytes | str | Callable[[], bytes]], key: str) -> None:
@@ -430,7 +441,7 @@ def offer_picture(files: Mapping[str, bytes | str | Callable[[], bytes]], key: s
                 ending.upper(),
                 data,
                 file_name=f"{file_stem(key)}.{ending}",
-                mime={"svg": "image/svg+xml"}.get(ending, f"image/{ending}"),
+                mime={"svg": "image/svg+xml", "csv": "text/csv"}.get(ending, f"image/{ending}"),
                 on_click="ignore",
                 type="tertiary",
                 key=f"{ending} of {key}",

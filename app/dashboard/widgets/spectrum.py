@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.theme import as_typed, palette
-from app.dashboard.widgets.charts import N_COLUMNS, Axes, looked_at, offer_picture, show_lines
+from app.dashboard.theme import as_typed, is_dark, palette
+from app.dashboard.widgets.charts import (
+    N_COLUMNS,
+    Axes,
+    looked_at,
+    offer_picture,
+    picture_bytes,
+    show_lines,
+)
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
-from gearsig.formatting import readable
+from gearsig.formatting import csv_text, readable
 from gearsig.orders import SynchronousAverage
 from gearsig.plot import (
     AngleMark,
@@ -22,7 +29,9 @@ from gearsig.plot import (
     Scale,
     above_zero,
     decibels,
+    figure_table,
     marks_of,
+    polar_figure,
     svg_ring,
     unit_text,
     with_unit,
@@ -231,7 +240,13 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) 
         ring = ring_of(average, n_teeth, marks)
         with polar:
             st.image(ring, width="stretch", alt=as_typed(words))
-            offer_picture({"svg": ring}, f"ring-{average.shaft} of {average.channel} {average.kind}")
+            dark = is_dark()  # files are made in another thread, which knows no page
+            files: dict[str, str | Callable[[], bytes]] = {
+                "png": lambda: picture_bytes(polar_figure(average, n_teeth=n_teeth, marks=marks), dark=dark),
+                "svg": ring,
+                "csv": lambda: csv_text(figure_table(polar_figure(average, n_teeth=n_teeth, marks=marks))).encode(),
+            }
+            offer_picture(files, f"ring-{average.shaft} of {average.channel} {average.kind}")
         with unrolled:
             _show_unrolled(analysis, average, n_teeth, [Cursor(m.angle_deg, "finding", m.label) for m in marks])
 

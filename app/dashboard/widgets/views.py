@@ -26,6 +26,7 @@ from gearsig import plot
 from gearsig.angle import resample_to_angle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
 from gearsig.errors import GearsigError
+from gearsig.formatting import csv_text
 from gearsig.indicators import Indicator
 from gearsig.methods import METHODS
 from gearsig.orders import OrderMap, frequency_map, order_map
@@ -239,16 +240,6 @@ def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[Indicator
         table.insert(2, "reference", then)
         table.insert(3, "change (dB)", moved)
     return table
-
-
-def csv_text(table: DataFrame) -> str:
-    """Return the table as CSV; a name that a spreadsheet would run as a formula gets a quote before it."""
-    formula_starts = ("=", "+", "-", "@", "\t", "\r")
-    texts = table.select_dtypes(exclude="number").columns
-    safe = table.copy()
-    for name in texts:
-        safe[name] = [f"'{v}" if str(v).startswith(formula_starts) else v for v in table[name]]
-    return safe.to_csv(index=False)
 
 
 order_map_of = cached(6, "Computing the map …")(order_map)
