@@ -18,7 +18,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from gearsig.gap._conditions import Condition
-from gearsig.gap._evidence import DISPLACED, ONE_TOOTH, TOOTH_FAULTS
+from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._labelled import LabelledChange, LabelledEvidence, labelled_evidence, with_labelled
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
@@ -29,11 +29,6 @@ CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
 
 SIZES = (0.3, 6.0)
 """Structural floors that a gap's size counts from and to."""
-
-DISPLACED_SHARE = 1.0 / 7.0
-"""Of what looks like one damaged tooth, how much is a tooth out of its place: forests know errors of pitch on all
-teeth of a gear only. Reasoned, not fitted: crack, spall, chip and error of pitch alike, half of the latter of one
-tooth."""
 
 _NUMBERS = ("sharpness", "shrink_weight", "neutral_shrink", "none_bias", "unknown_bias", "named_from", "apart")
 _FURTHER = {"sharper": 0.0, "none_slope": 0.0, "several": 1.0}
@@ -119,12 +114,7 @@ class GapCalibration:
         top = max(levels.values())
         weights = {name: float(np.exp(level - top)) for name, level in levels.items()}
         total = sum(weights.values())
-        probabilities = {name: w / total for name, w in weights.items()}
-        if DISPLACED in probabilities:
-            moved = {name: DISPLACED_SHARE * probabilities[name] for name in ONE_TOOTH if name in probabilities}
-            probabilities |= {name: probabilities[name] - share for name, share in moved.items()}
-            probabilities[DISPLACED] += sum(moved.values())
-        return dict(sorted(probabilities.items(), key=lambda item: -item[1]))
+        return dict(sorted(((name, w / total) for name, w in weights.items()), key=lambda item: -item[1]))
 
     def outcome(
         self, probabilities: Mapping[str, float], groups: Mapping[str, str] = MappingProxyType({})

@@ -12,7 +12,7 @@ from numba import njit
 from sims.compiled import copy
 from sims.gear_pair import carried_part, element_forces, foot
 from sims.machine import profile_value, set_speed, torque_ripple
-from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, height_now, pair_force
+from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, height_now, out_of_place, pair_force
 
 # Compiled contact of the gear pair: forces of all tooth pairs that touch, on either flank.
 #
@@ -232,6 +232,7 @@ def accelerations(  # noqa: PLR0915  one machine, one set of equations
     tilt, tilt_rate = tilted(k, q), tilted(k, v)
     delta, late = error + dy + tilt, late_entry(k, dx, dy)
     delta_rate += tilt_rate
+    cycles = k.cycles_per_rad * q[1] - k.turn_x * dx
     normal, along, friction, moment_1, moment_2 = contact_forces(
         k,
         curves,
@@ -240,7 +241,7 @@ def accelerations(  # noqa: PLR0915  one machine, one set of equations
         delta,
         delta_rate,
         late,
-        k.cycles_per_rad * q[1] - k.turn_x * dx,
+        cycles,
         k.cycles_per_rad * v[1],
         v[1],
         v[2],
@@ -249,19 +250,21 @@ def accelerations(  # noqa: PLR0915  one machine, one set of equations
         rough_rate,
     )
     back = 0.0
-    depth = -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough - tilt
+    off, off_slope = out_of_place(cycles, 0.5 * k.contact_ratio, k.teeth, pitch)
+    depth = -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough - tilt + off
     if depth > 0.0:  # also while the driving flanks touch: run-out may take up all play
         # Velocities of the pitch circles' centres: θ̇ times their places turned by a quarter.
         vx = v[4] - cy1 * v[1] - v[6] - cy2 * v[2]
         vy = v[5] + cx1 * v[1] - v[7] + cx2 * v[2]
         rate = -rb1 * v[1] + rb2 * v[2] - k.cos_back * vy + k.sin_back * vx - rough_rate - tilt_rate
+        rate += off_slope * k.cycles_per_rad * v[1]
         back, _ = back_flank_force(k, depth, rate)
     fx1, fy1 = -friction - k.sin_back * back, -normal + k.cos_back * back
     fx2, fy2 = friction + k.sin_back * back, normal - k.cos_back * back
     t1 = -arm1 * normal + k.cycles_per_rad * along + moment_1
     t2 = arm2 * normal - moment_2
     if back > 0.0:
-        t1 += back * (rb1 + k.cos_back * cx1 + k.sin_back * cy1)
+        t1 += back * (rb1 + k.cos_back * cx1 + k.sin_back * cy1 - off_slope * k.cycles_per_rad)
         t2 += back * (-rb2 + k.cos_back * cx2 + k.sin_back * cy2)
 
     # Shafts: bending to the mean of the two bearings, torsion to the rotors.
@@ -331,8 +334,10 @@ def potential_energy(k, curves, rows, pitch, q, late, turned, rough):
     error = k.base_radius[0] * q[1] - k.base_radius[1] * q[2]
     dx, dy = q[4] + cx1 - q[6] - cx2, q[5] + cy1 - q[7] - cy2
     tilt = tilted(k, q)
-    total = stored_energy(k, curves, rows, pitch, error + dy + tilt, late, k.cycles_per_rad * q[1] - turned, rough)
-    total += back_flank_force(k, -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough - tilt, 0.0)[1]
+    cycles = k.cycles_per_rad * q[1] - turned
+    total = stored_energy(k, curves, rows, pitch, error + dy + tilt, late, cycles, rough)
+    off = out_of_place(cycles, 0.5 * k.contact_ratio, k.teeth, pitch)[0]
+    total += back_flank_force(k, -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough - tilt + off, 0.0)[1]
     for side in range(2):
         g, b1, b2 = 4 + 2 * side, 8 + 4 * side, 10 + 4 * side
         theta, rotor = q[1 + side], q[3 * side]

@@ -52,6 +52,7 @@ from sims.effects._shared import (
     with_mesh_field,
     with_tooth_fault,
 )
+from sims.effects.eccentricity import largest_um as largest_runout_um
 from sims.effects.pitch_error import ONE_TOOTH_SHARE, cumulative_pitch, pitch_of_all_teeth
 
 __all__ = [
@@ -89,6 +90,7 @@ __all__ = [
     "gear_geometry",
     "gear_index",
     "is_own",
+    "largest_runout_um",
     "own_files",
     "pitch_of_all_teeth",
     "tooth_number",

@@ -126,12 +126,15 @@ class MachineFacts:
         That the rig names, with geometry.
     vibration_mps2 : float
         Rms of the healthy machine at its nominal point.
+    play_um : float
+        Between the flanks, along the line of action.
     """
 
     nominal: Nominal
     gears: tuple[GearGeometry, GearGeometry]
     bearings: tuple[Bearing, ...]
     vibration_mps2: float
+    play_um: float
 
     def diameter_mm(self, side: int) -> float:
         """Pitch diameter of the driver (0) or the driven gear (1)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import radians, sin
 
 import numpy as np
 
@@ -44,6 +45,18 @@ def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) ->
     return modulated(scene, order, (gain * size, late * size), (size * first, size * second), rng)
 
 
+PLAY_SHARE = 0.5
+"""Of the play, that a run-out takes away where gears still turn freely: once a turn the axes are nearer by it."""
+
+
+def largest_um(play_um: float, pressure_angle_deg: float) -> float:
+    """Return the run-out that leaves half of the play, e = s j/(2 sin α): axes nearer by e take 2 e sin α of it.
+
+    Beyond j/(2 sin α) both flanks of a tooth touch and the pair jams: the whole machine rattles, and nobody runs it.
+    """
+    return PLAY_SHARE * play_um / (2.0 * sin(radians(pressure_angle_deg)))
+
+
 EFFECT = Effect(
     name="eccentricity",
     group="shaft",
@@ -66,6 +79,7 @@ EFFECT = Effect(
         shared.tolerance_of(runout_tolerance_um),
         shared.either_gear,
         shared.any_gear,
+        lambda machine, _options: largest_um(machine.play_um, machine.nominal.pressure_angle_deg),
     ),
     textbook=Textbook(
         (("sideband.{side}.1", UP), ("shaft.{side}.1", UP)),

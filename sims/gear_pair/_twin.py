@@ -355,12 +355,14 @@ class PairTwin:
 
     @cached_property
     def _facts(self) -> MachineFacts:
-        pair = self.pair_geometry()
+        machine = self._prepared(self.preset(self.point), np.random.default_rng(0)).machine
+        pair = machine.mesh.pair
         shafts = (self.rig.pairs[0].driver, self.rig.pairs[0].driven)
         bearings = tuple(completed(b, self.nominal.size) for b in self.rig.bearings if b.shaft in shafts)
         healthy = self.run(self.point, seed=0, duration_s=VIBRATION_S, sampling_rate_hz=20480.0)
         rms = np.mean([np.std(healthy.values(name)) for name in healthy.vibration_names()])
-        return MachineFacts(self.nominal, (pair.driver, pair.driven), bearings, float(rms))
+        play_um = 2.0 * machine.half_backlash_um
+        return MachineFacts(self.nominal, (pair.driver, pair.driven), bearings, float(rms), play_um)
 
     def _prepared(self, preset: Preset, rng: np.random.Generator, sampling_rate_hz: float = 20480.0) -> ReadyPair:
         ready: ReadyPair = self.pair_model.prepare(SimulationSetup(preset), rng, sampling_rate_hz=sampling_rate_hz)

@@ -449,6 +449,24 @@ def _smooth(t: float) -> tuple[float, float]:
     return t * t * t * (t * (6.0 * t - 15.0) + 10.0), 30.0 * t * t * (t - 1.0) * (t - 1.0)
 
 
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def out_of_place(cycles, middle, teeth, pitch):  # type: ignore[no-untyped-def]
+    """How far the pair in mid-engagement stands behind, m, and its slope per base pitch: both flanks of a tooth do.
+
+    By as much as its driving flanks are further apart, the flanks behind are nearer; smooth from one pair to the next.
+
+    cycles : base pitches; middle : of a pair's engagement, from its entry.
+    teeth : (z1, z2); pitch : (2, z), m, above 0 where a tooth stands behind.
+    """
+    past = np.floor(cycles - middle)
+    z1, z2 = float(teeth[0]), float(teeth[1])
+    coming = past + 1.0
+    here = pitch[0, int(past - z1 * np.floor(past / z1))] + pitch[1, int(past - z2 * np.floor(past / z2))]
+    later = pitch[0, int(coming - z1 * np.floor(coming / z1))] + pitch[1, int(coming - z2 * np.floor(coming / z2))]
+    part, slope = _smooth(cycles - middle - past)
+    return here + part * (later - here), slope * (later - here)
+
+
 @njit(cache=True)
 def cubic(row: FloatArray, start: float, step: float, progress: float) -> float:
     """Lagrange interpolation through the four nearest columns; beyond the ends the last cubic goes on."""

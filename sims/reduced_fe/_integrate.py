@@ -29,7 +29,7 @@ from gearsig.checks import FloatArray, one_of, positive
 from sims.compiled import UNCOUNTED
 from sims.gear_pair import foot
 from sims.machine import profile_value, set_speed, torque_ripple
-from sims.mesh import contact_friction_n
+from sims.mesh import contact_friction_n, out_of_place
 from sims.reduced_fe._contact import (
     FAST,
     back_substituted,
@@ -357,8 +357,12 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             depth = product(back_row, q1) + k.damping_time * product(back_row, v1) - k.backlash
             depth += k.sin_back * (across_1 - across_2) - k.cos_back * (off_1 + off_2)
             depth -= k.damping_time * (arm_1 + arm_2 / k.ratio) * w1
+            # A tooth that is out of its place is so with both flanks.
+            behind, behind_slope = out_of_place(cycles, 0.5 * k.contact_ratio, k.teeth, pitch)
+            depth += behind + k.damping_time * behind_slope * k.cycles_per_rad * w1
             back = k.back_stiffness * depth if depth > 0.0 else 0.0
             torque_1, torque_2 = torque_1 + back * arm_1, torque_2 + back * arm_2
+            torque_1 -= back * behind_slope * k.cycles_per_rad
             # All forces as modal ones; the reference repeats the pass until the contact's stay.
             for side in range(2):
                 pull, across = (torque_1, -rubbing) if side == 0 else (torque_2, rubbing)

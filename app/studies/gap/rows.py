@@ -34,7 +34,7 @@ from gearsig.gap import (
 from gearsig.recording import Recording
 from sims.blind import CATALOGUE, draw_case, record_case
 from sims.cracked import STEP_ANGLE_RAD, CrackedTwin
-from sims.effects import EffectSetting, effects, textbook
+from sims.effects import EffectSetting, effects, largest_runout_um, textbook
 from sims.machine import nominal_of
 
 # --------------------
@@ -228,13 +228,21 @@ def _recordings(
         day = another_day(drawn, rng)
         try:
             added = twin.draw(name, rng, above=above)
-            setting = EffectSetting(name, added.severity, dict(added.options))
+            setting = EffectSetting(name, _turning(name, added.severity, drawn, twin), dict(added.options))
             recording = ordinary.on(_record(model, day, run, setting), turns_before(drawn, run), rng)
         except (InputError, RefusalError) as error:
             typer.echo(f"{name}: {error}")
             continue
         detail = ", ".join(f"{k}={v}" for k, v in setting.options.items())
         yield name, detail, setting.severity, recording, drawn.torque_nm * day.torque_factor
+
+
+def _turning(name: str, severity: float, drawn: DrawnRig, twin: CrackedTwin) -> float:
+    """Return a severity with which this machine, whose play the twin does not know, still turns."""
+    if name != "eccentricity":
+        return severity
+    play_um = 2.0 * float(drawn.parameters["half_backlash_um"])
+    return min(severity, largest_runout_um(play_um, twin.nominal.pressure_angle_deg))
 
 
 def _chance(rig: int, name: str, i: int) -> np.random.Generator:

@@ -51,9 +51,10 @@ def mass_matrix(machine: Machine, q: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("contact_law", ["linear", "load-dependent"])
 @pytest.mark.parametrize("delta_m", [2e-5, -6e-5])
 @pytest.mark.parametrize("lead", [STRAIGHT, Lead(20.0, 5.0, 3.0, 4)])
-def test_forces_are_the_slope_of_the_energy(contact_law: str, delta_m: float, lead: Lead) -> None:
-    """M a = −∂U/∂q at rest, on both flanks, with cracks, run-out and unbalance, spur and helical."""
-    base = cracked(spur_pair_machine(), 2.0)
+@pytest.mark.parametrize("pitch_um", [0.0, 6.0])
+def test_forces_are_the_slope_of_the_energy(contact_law: str, delta_m: float, lead: Lead, pitch_um: float) -> None:
+    """M a = −∂U/∂q at rest, on both flanks, with cracks, run-out, unbalance and uneven pitch, spur and helical."""
+    base = with_pitch(cracked(spur_pair_machine(), 2.0), pitch_um * np.random.default_rng(9).standard_normal(55))
     base = replace(base, mesh=replace(base.mesh, contact_law=contact_law, lead=lead))
     machine = conservative(base, runout_um=25.0, runout_angle_deg=30.0, unbalance_g_mm=3000.0, unbalance_angle_deg=70.0)
     machine = replace(machine, line_of_action_deg=35.0)
@@ -75,6 +76,28 @@ def test_forces_are_the_slope_of_the_energy(contact_law: str, delta_m: float, le
             ) / (2 * h)
         # The governor's share at rest: g ω on the input rotor, 1e-12 of it.
         np.testing.assert_allclose(inertial, -slope, atol=2e-4 * np.abs(slope).max(), rtol=2e-4)
+
+
+def with_pitch(machine: Machine, pitch_um: np.ndarray) -> Machine:
+    """All teeth of the driver out of their places."""
+    flank = replace(machine.mesh.flank_1, pitch_um=tuple(pitch_um.tolist()))
+    return replace(machine, mesh=replace(machine.mesh, flank_1=flank))
+
+
+def test_teeth_that_all_stand_behind_are_a_gear_that_is_turned_with_its_play() -> None:
+    """Both flanks of a tooth are out of place: a gear turned ahead by as much carries the same on either side."""
+    machine, behind_m = spur_pair_machine(), 30e-6
+    behind = with_pitch(machine, np.full(55, 1e6 * behind_m))
+    rb1 = float(prepare(machine, FREE, np.random.default_rng(0)).constants.record["base_radius"][0])
+    for delta_m in (2e-5, -6e-5):  # driving flanks, flanks behind
+        q = moving_state(np.random.default_rng(5), delta_m=delta_m, base_radii_m=(rb1, rb1 * machine.ratio))
+        ahead = q.copy()
+        ahead[1] += behind_m / rb1
+        ahead[0] += behind_m / rb1  # the rotor goes along
+        forces = [mass_matrix(m, x) @ accelerations(m, x, np.zeros(16)) for m, x in ((machine, q), (behind, ahead))]
+        size = np.abs(forces[0][4:8]).max()
+        assert size > 100.0
+        np.testing.assert_allclose(forces[1][4:8], forces[0][4:8], atol=0.01 * size)
 
 
 def test_inner_forces_cancel() -> None:

@@ -188,6 +188,18 @@ def test_runout_takes_up_the_play_by_twice_the_sine_of_what_it_brings_the_gears_
     assert np.any(run["back_force_n"] > 0.0) == is_wedged
 
 
+def test_uneven_pitch_takes_up_no_play_for_both_flanks_of_a_tooth_are_out_of_place():
+    pair = pair_of(half_backlash_um=40.0)
+    late_um = 60.0 * np.sin(2.0 * np.pi * np.arange(50) / 50)  # neighbours differ by 7.5 µm, teeth across by 120 µm
+    mesh = pair.machine.mesh
+    flank = replace(mesh.flank_1, pitch_um=tuple(late_um.tolist()))
+    uneven = replace(pair, machine=replace(pair.machine, mesh=replace(mesh, flank_1=flank)))
+    slow, names = Operation.steady(600.0, 170.0), ("back_force_n", TRANSMISSION_ERROR)
+    run = respond(uneven, slow, duration_s=0.12, step_s=8e-6, signals=names, ready=constants(uneven, slow))
+    assert np.ptp(run[TRANSMISSION_ERROR]) > 100e-6
+    assert not np.any(run["back_force_n"] > 0.0)
+
+
 def test_runs_go_on_where_others_ended():
     pair = synthetic_pair()
     whole = respond(pair, STEADY, duration_s=0.004)[TRANSMISSION_ERROR]
