@@ -1,7 +1,6 @@
 """Figures of results; no arithmetic beyond display units."""
 
 from gearsig.plot._average import average_figure, polar_figure
-from gearsig.plot._benchmark import calibration_figure, confusion_figure
 from gearsig.plot._comparison import average_overlay_figure, band_levels_figure, order_overlay_figure
 from gearsig.plot._cursors import (
     LONGEST,
@@ -14,8 +13,6 @@ from gearsig.plot._cursors import (
     place,
     rhythm_cursors,
 )
-from gearsig.plot._curves import CurvePanel, curves_figure
-from gearsig.plot._embed import Captioned, Picture, embed
 from gearsig.plot._fe_gear import (
     draw_shaded,
     gear_mesh_figure,
@@ -23,7 +20,6 @@ from gearsig.plot._fe_gear import (
     gear_stress_figure,
     stress_maps_figure,
 )
-from gearsig.plot._fleet import fleet_trend_picture
 from gearsig.plot._flexible import (
     contact_spreading_figure,
     frequency_curves_figure,
@@ -34,6 +30,8 @@ from gearsig.plot._flexible import (
 from gearsig.plot._gap import (
     INNER,
     OUTER,
+    calibration_figure,
+    confusion_figure,
     gap_averages_figure,
     gap_evidence_figure,
     gap_lines_figure,
@@ -68,8 +66,17 @@ from gearsig.plot._methods import (
     synchronous_average,
     vmd,
 )
-from gearsig.plot._modes import modes_figure
-from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, figure_table, panels_figure, panels_of, pooled_levels
+from gearsig.plot._panels import (
+    ChartLine,
+    CurvePanel,
+    LevelPanel,
+    LinePanel,
+    curves_figure,
+    figure_table,
+    panels_figure,
+    panels_of,
+    pooled_levels,
+)
 from gearsig.plot._phase import (
     bifurcation_figure,
     chaos_test_figure,
@@ -78,14 +85,16 @@ from gearsig.plot._phase import (
     phase_portrait_figure,
     recurrence_figure,
 )
+from gearsig.plot._pictures import Captioned, Picture, embed, fleet_trend_picture, svg_panel, svg_ring
 from gearsig.plot._response import ResponseCase, crack_comparison_figure, response_figure
 from gearsig.plot._series import envelope, series_colours, thin
 from gearsig.plot._spectrum import (
     METHODS,
-    MIN_SPEED_SPAN,
+    modes_figure,
     order_levels_figure,
     spectrum_figure,
     speed_figure,
+    speed_panel,
     time_figure,
     trend_figure,
 )
@@ -111,7 +120,6 @@ from gearsig.plot._style import (
     unit_text,
     with_unit,
 )
-from gearsig.plot._svg import Curve, svg_lines, svg_panel, svg_ring
 
 __all__ = [
     "FAULT",
@@ -120,14 +128,12 @@ __all__ = [
     "INNER",
     "LONGEST",
     "METHODS",
-    "MIN_SPEED_SPAN",
     "OUTER",
     "PRIORITY",
     "AngleMark",
     "Captioned",
     "ChartLine",
     "Cursor",
-    "Curve",
     "CurvePanel",
     "LevelPanel",
     "LinePanel",
@@ -209,6 +215,7 @@ __all__ = [
     "spectral_coherence",
     "spectrum_figure",
     "speed_figure",
+    "speed_panel",
     "speed_spectra_figure",
     "speed_sweep_figure",
     "squeezed_cwt",
@@ -217,7 +224,6 @@ __all__ = [
     "start_stop_pair_figure",
     "stft",
     "stress_maps_figure",
-    "svg_lines",
     "svg_panel",
     "svg_ring",
     "synchronous_average",

@@ -12,9 +12,8 @@ from gearsig import angle, decompose, orders, phase, recording, spectra, timefre
 from gearsig.errors import InputError
 from gearsig.plot._average import average_figure
 from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_figure, time_frequency_figure
-from gearsig.plot._modes import modes_figure
 from gearsig.plot._phase import bifurcation_figure, divergence_figure, phase_portrait_figure, recurrence_figure
-from gearsig.plot._spectrum import spectrum_figure, speed_figure, time_figure
+from gearsig.plot._spectrum import modes_figure, spectrum_figure, speed_figure, time_figure
 
 Asked = ParamSpec("Asked")
 

@@ -19,7 +19,7 @@ from gearsig.errors import RefusalError
 from gearsig.formatting import readable
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
-from gearsig.plot import Captioned, Cursor, Picture, embed, order_cursors, unit_text
+from gearsig.plot import Captioned, ChartLine, Cursor, LinePanel, Picture, embed, order_cursors, unit_text
 from gearsig.plot import _style as style
 from gearsig.recording import SI_FACTORS
 from gearsig.report._files import render
@@ -220,11 +220,11 @@ def crack_picture(analysis: Analysis) -> Picture | None:
     entry = (crack.angle_deg / 360.0 - 0.5 / teeth) % 1.0
     turned = round((entry - 0.5) * len(now))
     angle = (np.arange(len(now)) + turned) * 360.0 / len(now)
-    curves = [plot.Curve(angle, np.roll(now, -turned), "now")]
+    lines = [ChartLine(angle, np.roll(now, -turned), "now")]
     if then is not None:
         healthy = np.roll(then, -turned)
-        curves = [plot.Curve(angle, healthy, "reference", style.QUIET), *curves]
-        curves.append(plot.Curve(angle, curves[1].y - healthy, "change", style.FAULT))
+        lines = [ChartLine(angle, healthy, "reference", style.QUIET), *lines]
+        lines.append(ChartLine(angle, lines[1].y - healthy, "change", style.FAULT))
     reach = min(0.5, 8.0 / teeth)  # of a revolution: the blow and a few healthy teeth on either side
     beside = " beside the reference" if then is not None else ""
     caption = (
@@ -233,14 +233,16 @@ def crack_picture(analysis: Analysis) -> Picture | None:
         if then is not None
         else "A crack swings the few mesh cycles after its tooth enters out of the pattern of the others."
     )
-    svg = plot.svg_lines(
-        curves,
-        x=f"angle of {crack.shaft} (deg)",
-        y=f"{name} (m/s²)",
-        x_limits=((entry - reach) * 360.0, (entry + reach) * 360.0),
+    panel = LinePanel(
+        lines,
+        f"angle of {crack.shaft} (deg)",
+        f"{name} (m/s²)",
         cursors=[Cursor(entry * 360.0, "finding", "the tooth enters", 0)],
+        x_limits=((entry - reach) * 360.0, (entry + reach) * 360.0),
     )
-    return Picture.of_svg(svg, caption, f"Average of {name} over {crack.shaft}{beside}; marked: {crack.text}")
+    return Picture.of_svg(
+        plot.svg_panel(panel), caption, f"Average of {name} over {crack.shaft}{beside}; marked: {crack.text}"
+    )
 
 
 def _on_angles_of(values: FloatArray, reference: FloatArray, *, turn: bool) -> FloatArray:
@@ -387,29 +389,21 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
     time = np.arange(recording.n_samples) / recording.sampling_rate_hz
     for name in names:
         channel = recording.channels[recording.index(name)]
-        svg = plot.svg_lines(
-            [plot.Curve(time, recording.values(name))],
-            x="time (s)",
-            y=plot.with_unit(name, channel.unit),
+        panel = LinePanel(
+            [ChartLine(time, recording.values(name))],
+            "time (s)",
+            plot.with_unit(name, channel.unit),
             x_limits=(0.0, max(recording.duration_s, 1.0 / recording.sampling_rate_hz)),
-            height=70,
         )
         last = name == names[-1]
         caption = f"Steps, spikes and clipped tops are the recording's, not the machine's.{more}" if last else ""
-        yield Picture.of_svg(svg, caption, f"Signal of {name} over {recording.duration_s:.4g} s.")
+        yield Picture.of_svg(
+            plot.svg_panel(panel, height=70), caption, f"Signal of {name} over {recording.duration_s:.4g} s."
+        )
     angle = analysis.shaft_angle
     if isinstance(angle, ShaftAngle):
         low, high = angle.speed_range_rpm
-        least = plot.MIN_SPEED_SPAN * max(abs(angle.mean_speed_rpm), 1.0)
-        margin = max(0.06 * (high - low), (least - (high - low)) / 2)
-        svg = plot.svg_lines(
-            [plot.Curve(angle.time_s, 60.0 * angle.speed_rev_per_s)],
-            x="time (s)",
-            y="speed (rpm)",
-            x_limits=(angle.start_s, angle.end_s),
-            y_limits=(low - margin, high + margin),
-            height=70,
-        )
+        svg = plot.svg_panel(plot.speed_panel(angle), height=70)
         caption = "Look whether the speed held still: where it changes, only orders keep their lines sharp."
         yield Picture.of_svg(svg, caption, f"Speed over time, {low:.6g} to {high:.6g} rpm.")
 
@@ -436,16 +430,15 @@ def spectrum_svg(
     start = 3 if limits[0] <= spectrum.positions[0] and len(spectrum.values) > 9 else 0
     values = spectrum.values[start:]
     points = [(p, spectrum.largest_near(p, 2.0 * spectrum.resolution)[1]) for p in marked]
-    return plot.svg_lines(
-        [plot.Curve(spectrum.positions[start:], values if linear else plot.above_zero(values), peaks=True)],
-        x=spectrum.axis_label,
-        y=plot.with_unit("" if spectrum.scaling == "dimensionless" else spectrum.scaling, spectrum.unit),
-        x_limits=limits,
+    panel = LinePanel(
+        [ChartLine(spectrum.positions[start:], values if linear else plot.above_zero(values), peaks=True)],
+        spectrum.axis_label,
+        plot.with_unit("" if spectrum.scaling == "dimensionless" else spectrum.scaling, spectrum.unit),
         logarithmic=not linear and bool((values > 0).any()),
         cursors=cursors,
-        marked=points,
-        height=height,
+        x_limits=limits,
     )
+    return plot.svg_panel(panel, marked=points, height=height)
 
 
 def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
@@ -534,23 +527,23 @@ def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Pict
         amplitude, rpm, hertz = level.largest
         unit = f" {unit_text(level.unit)}" if level.unit else ""
         largest.append(f"{level.name} {readable(amplitude, 3)}{unit} at {rpm:.0f} rpm ({hertz:.4g} Hz)")
-    svg = plot.svg_lines(
+    panel = LinePanel(
         [
-            plot.Curve(level.speed_rpm, level.amplitude, level.name, colour)
+            ChartLine(level.speed_rpm, level.amplitude, level.name, colour)
             for level, colour in zip(levels, plot.series_colours(len(levels)), strict=True)
         ],
-        x="speed (rpm)",
-        y=plot.with_unit("amplitude", levels[0].unit),
-        x_limits=(float(levels[0].speed_rpm[0]), float(levels[0].speed_rpm[-1])),
+        "speed (rpm)",
+        plot.with_unit("amplitude", levels[0].unit),
         logarithmic=True,
-        marked=[
-            (60.0 * hertz / level.order, float(np.interp(60.0 * hertz / level.order, level.speed_rpm, level.amplitude)))
-            for hertz in resonances
-            for level in levels
-        ],
+        x_limits=(float(levels[0].speed_rpm[0]), float(levels[0].speed_rpm[-1])),
     )
+    marked = [
+        (60.0 * hertz / level.order, float(np.interp(60.0 * hertz / level.order, level.speed_rpm, level.amplitude)))
+        for hertz in resonances
+        for level in levels
+    ]
     yield Picture.of_svg(
-        svg,
+        plot.svg_panel(panel, marked=marked),
         "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance. "
         f"Largest: {'; '.join(largest)}.",
         f"Amplitudes of {len(levels)} orders of {channel.channel} over speed.",

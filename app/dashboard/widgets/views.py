@@ -17,7 +17,7 @@ from app.dashboard.methods.form import MethodPage
 from app.dashboard.methods.page import cached, show_method
 from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import Axes, show_figure, show_lines, show_map
+from app.dashboard.widgets.charts import Axes, show_figure, show_lines, show_map, show_panel
 from app.dashboard.widgets.machine import show_machine
 from app.dashboard.widgets.messages import show_error, show_facts, show_unknown_speed
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
@@ -53,12 +53,7 @@ def show_speed(analysis: Analysis) -> None:
     }
     show_facts(st.columns(len(numbers)), numbers)
     st.caption(f"Shaft {as_typed(angle.shaft or 'of reference')}, {plot.METHODS[angle.method]}.")
-    time, speed = angle.time_s, 60 * angle.speed_rev_per_s
-    low, high = float(speed.min()), float(speed.max())
-    # rounding at constant speed must not look like a fluctuation
-    margin = max(0.06 * (high - low), (plot.MIN_SPEED_SPAN * max(abs(angle.mean_speed_rpm), 1) - (high - low)) / 2)
-    axes = Axes("time (s)", "speed (rpm)", (angle.start_s, angle.end_s), (low - margin, high + margin))
-    show_lines([ChartLine(time, speed, "speed")], axes, state.view_key("speed chart", analysis))
+    show_panel(plot.speed_panel(angle), state.view_key("speed chart", analysis), 60.0)
     if angle.notes:
         st.markdown("\n".join(f"- {as_typed(note)}" for note in angle.notes))
 

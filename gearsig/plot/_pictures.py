@@ -1,26 +1,140 @@
-"""Figures as small SVG without matplotlib: for pages that many recordings get one of, and for the dashboard.
+"""Figures as pictures of a page that is one file: small SVG without matplotlib, and matplotlib's as data URIs.
 
-Text and axes take the colour of the text around them, so that one figure serves light and dark pages.
+Text and axes of the small SVG take the colour of the text around them, so that one serves light and dark pages.
 """
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from html import escape
 from io import BytesIO
 from itertools import pairwise
 from math import ceil, floor, log10
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gearsig.checks import FloatArray
+from gearsig.fleet import Trend
+from gearsig.formatting import readable
 from gearsig.orders import SynchronousAverage
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import AngleMark, Cursor
-from gearsig.plot._panels import LevelPanel, LinePanel, line_colour, pooled_levels
+from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, line_colour, pooled_levels
 from gearsig.plot._style import unit_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from PIL import Image
+
+PNG_DOTS_PER_INCH = 160  # 1440 pixels for 900 on the page: sharp on dense screens and on paper
+N_BLENDS = 12  # steps from each of the style's colours to white, for smoothed edges
+N_LEVELS = 124  # steps of the colours of maps
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure ready for a page.
+
+    Parameters
+    ----------
+    uri : str
+    width_px, height_px : int
+        On the page.
+    caption : str
+        One sentence on what to look at.
+    alternative : str
+        What the picture shows, for those who do not see it.
+    svg : str
+        An <svg> element that stands in the page itself instead of an address.
+    """
+
+    uri: str
+    width_px: int
+    height_px: int
+    caption: str
+    alternative: str
+    svg: str = ""
+
+    @classmethod
+    def of_svg(cls, svg: str, caption: str, alternative: str) -> Picture:
+        """Return a picture of an <svg> element with a viewBox from 0 0."""
+        width, height = re.findall(r'viewBox="0 0 (\d+)[\d.]* (\d+)', svg)[0]
+        inline = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)  # within HTML the namespace is known
+        return cls("", int(width), int(height), caption, alternative, inline)
+
+
+@dataclass(frozen=True)
+class Captioned:
+    """A figure with the words that belong to it; see `Picture`."""
+
+    figure: Figure
+    caption: str
+    alternative: str
+
+
+def embed(figure: Figure, caption: str, alternative: str, *, vector: bool = False) -> Picture:
+    """Turn a figure into a picture: PNG, or SVG where `vector` says that it has few lines."""
+    width, height = figure.get_size_inches()
+    uri = _svg_uri(figure) if vector else _png(figure)
+    return Picture(uri, round(100 * width), round(100 * height), caption, alternative)
+
+
+def _svg_uri(figure: Figure) -> str:
+    buffer = BytesIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return "data:image/svg+xml;base64," + b64encode(buffer.getvalue()).decode("ascii")
+
+
+def _png(figure: Figure) -> str:
+    from PIL import Image
+
+    pixels, buffer = BytesIO(), BytesIO()
+    figure.savefig(pixels, format="png", dpi=PNG_DOTS_PER_INCH, pil_kwargs={"compress_level": 0})
+    image = Image.open(pixels).convert("RGB")
+    # A palette is a third of the size; a fixed one keeps a small mark's colour, which a counted one would blend away.
+    image.quantize(palette=_palette(), dither=Image.Dither.NONE).save(buffer, format="png", compress_level=6)
+    return "data:image/png;base64," + b64encode(buffer.getvalue()).decode("ascii")
+
+
+@cache
+def _palette() -> Image.Image:
+    """Return the colours that figures are made of."""
+    from matplotlib.colors import to_rgb
+    from PIL import Image
+
+    named = {
+        *style.CURSOR_COLOURS.values(),
+        style.MEASURED,
+        style.SIMULATED,
+        style.FAULT,
+        style.FLOOR,
+        style.INK,
+        style.QUIET,
+        style.RULE,
+    }
+    blends = [
+        [1 - share * (1 - part) for part in to_rgb(colour)]
+        for colour in sorted(named)
+        for share in (step / N_BLENDS for step in range(1, N_BLENDS + 1))
+    ]
+    levels = [style.colours()(step / (N_LEVELS - 1))[:3] for step in range(N_LEVELS)]
+    # Pillow looks colours up in steps of 4 of 255: nothing else may lie so near to the white of the paper.
+    tinted = [colour for colour in [*blends, *levels] if min(colour) < 0.965]
+    numbers = [round(255 * part) for colour in [(1.0, 1.0, 1.0), *tinted] for part in colour]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(numbers)
+    return palette
+
+
+# --------------------
+# Panels and rings as small SVG, for pages that many recordings get one of, and for the dashboard.
+# --------------------
+
 
 LEFT, RIGHT, BOTTOM, ROW, BAR = 62, 12, 38, 14, 46
 N_COLUMNS, N_ROWS = 420, 160
@@ -32,108 +146,49 @@ LETTER = 6.2
 """Width of a letter in units of the drawing, for keeping labels apart."""
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A line of an SVG figure.
-
-    Parameters
-    ----------
-    x, y : array, (n,)
-        Ascending `x`; thinned where there are more points than columns.
-    name : str
-        Named above the figure where there are several; empty: not named.
-    colour : str
-    peaks : bool
-        Join the highest point of each column, else lowest and highest.
-    """
-
-    x: FloatArray
-    y: FloatArray
-    name: str = ""
-    colour: str = style.MEASURED
-    peaks: bool = False
-
-
-def svg_lines(
-    curves: Sequence[Curve],
+def svg_panel(
+    panel: LinePanel | LevelPanel,
     *,
-    x: str,
-    y: str,
-    x_limits: tuple[float, float],
-    y_limits: tuple[float, float] | None = None,
-    logarithmic: bool = False,
-    cursors: Sequence[Cursor] = (),
     marked: Sequence[tuple[float, float]] = (),
     width: int = 760,
-    height: int = 170,
+    height: int | None = None,
 ) -> str:
-    """Draw lines over one axis.
+    """Draw a panel of lines or of levels; of levels the largest in each pixel, with the bar of their colours.
+
+    Labels of cursors that find no room are left out, families keep their first. Several lines are named above.
 
     Parameters
     ----------
-    curves : sequence of Curve
-    x, y : str
-        Names of the axes with units.
-    x_limits, y_limits : (float, float)
-        None: about what is shown.
-    logarithmic : bool
-        The value axis.
-    cursors : sequence of Cursor
-        Lines that the machine implies; labels that find no room are left out, families keep their first.
+    panel : LinePanel or LevelPanel
     marked : sequence of (x, y)
-        Points that findings name.
+        Points on lines that findings name.
     width, height : int
-        Of the drawing, and of its panel.
+        Of the drawing, and of its panel; None: 170 of lines, 230 of levels.
 
     Returns
     -------
     str
         An <svg> element.
     """
-    shown = [_columns(curve, x_limits) for curve in curves]
-    low, high = y_limits or _about([y for _, y in shown], logarithmic=logarithmic)
-    labels, n_rows = _placed(cursors, x_limits, width)
-    top = 8 + ROW * n_rows + (16 if any(curve.name for curve in curves) else 0)
-    panel = _Panel(LEFT, top, width - LEFT - RIGHT, height, x_limits, (low, high), logarithmic)
-    parts = [panel.axes(x, y), panel.cursors(cursors, labels)]
-    for curve, (at, values) in zip(curves, shown, strict=True):
-        parts.append(f'<path d="{panel.path(at, values)}" fill="none" stroke="{curve.colour}" stroke-width="1.1"/>')
+    if isinstance(panel, LevelPanel):
+        return _svg_levels(panel, width, height or 230)
+    ends = [end for line in panel.lines for end in (float(line.x[0]), float(line.x[-1]))]
+    limits = panel.x_limits or (min(ends), max(ends))
+    shown = [_columns(line, limits) for line in panel.lines]
+    low, high = panel.limits or _about([y for _, y in shown], logarithmic=panel.logarithmic)
+    labels, n_rows = _placed(panel.cursors, limits, width)
+    top, height = 8 + ROW * n_rows + (16 if len(panel.lines) > 1 else 0), height or 170
+    frame = _Panel(LEFT, top, width - LEFT - RIGHT, height, limits, (low, high), panel.logarithmic)
+    parts = [frame.axes(panel.x, panel.y), frame.cursors(panel.cursors, labels)]
+    parts += [frame.line(line, *places) for line, places in zip(panel.lines, shown, strict=True)]
     parts += [
-        f'<circle cx="{panel.across(at):.1f}" cy="{panel.up(value):.1f}" r="6" fill="none" stroke="{style.FAULT}" '
+        f'<circle cx="{frame.across(at):.1f}" cy="{frame.up(value):.1f}" r="6" fill="none" stroke="{style.FAULT}" '
         'stroke-width="1.8"/>'
         for at, value in marked
-        if x_limits[0] <= at <= x_limits[1]
+        if limits[0] <= at <= limits[1]
     ]
-    parts += _names(curves)
+    parts += _names(panel.lines) if len(panel.lines) > 1 else []
     return _svg(width, top + height + BOTTOM, parts)
-
-
-def svg_panel(panel: LinePanel | LevelPanel, *, width: int = 760) -> str:
-    """Draw a panel of lines or of levels; of levels the largest in each pixel, with the bar of their colours.
-
-    Parameters
-    ----------
-    panel : LinePanel or LevelPanel
-    width : int
-        Of the drawing.
-    """
-    curves = [
-        Curve(line.x, line.y, line.name if len(panel.lines) > 1 else "", line_colour(line.colour), line.peaks)
-        for line in panel.lines
-    ]
-    if isinstance(panel, LevelPanel):
-        return _svg_levels(panel, curves, width)
-    limits = min(float(c.x[0]) for c in curves), max(float(c.x[-1]) for c in curves)
-    return svg_lines(
-        curves,
-        x=panel.x,
-        y=panel.y,
-        x_limits=limits,
-        y_limits=panel.limits,
-        logarithmic=panel.logarithmic,
-        cursors=panel.cursors,
-        width=width,
-    )
 
 
 def _image_of_levels(panel: LevelPanel, n_columns: int, n_rows: int) -> bytes:
@@ -154,7 +209,7 @@ def _range_of(panel: LevelPanel) -> tuple[float, float]:
     return float(panel.levels.max()), 60.0 if panel.span is None else panel.span
 
 
-def _svg_levels(panel: LevelPanel, lines: Sequence[Curve], width: int, height: int = 230) -> str:
+def _svg_levels(panel: LevelPanel, width: int, height: int) -> str:
     image = _image_of_levels(panel, N_COLUMNS, N_ROWS)
     if len(image) > MAX_IMAGE_BYTES:
         image = _image_of_levels(panel, N_COLUMNS // 2, N_ROWS // 2)
@@ -170,9 +225,7 @@ def _svg_levels(panel: LevelPanel, lines: Sequence[Curve], width: int, height: i
         'preserveAspectRatio="none"/>'
     )
     parts = [picture, frame.axes(panel.x, panel.y, grid=False), frame.cursors(panel.cursors, labels, through=False)]
-    for line in lines:
-        path = frame.path(*_columns(line, x_limits))
-        parts.append(f'<path d="{path}" fill="none" stroke="{line.colour}" stroke-width="1.1"/>')
+    parts += [frame.line(line, *_columns(line, x_limits)) for line in panel.lines]
     left, n = width - RIGHT - BAR + 12, 32
     for k in range(n):
         red, green, blue = colours[255 - 255 * k // (n - 1)]
@@ -212,7 +265,9 @@ def svg_ring(
     full = float(np.max(np.abs(average.values), initial=0.0)) or 1.0
     n = len(average.values)
     turn = np.arange(n + 1) * (2 * np.pi / n)
-    at, values = _columns(Curve(turn, np.append(average.values, average.values[0])), (0.0, 2 * np.pi), n_columns=480)
+    at, values = _columns(
+        ChartLine(turn, np.append(average.values, average.values[0])), (0.0, 2 * np.pi), n_columns=480
+    )
     round_value = 10 ** floor(log10(full)) * next(m for m in (5, 2, 1) if m * 10 ** floor(log10(full)) <= full)
     parts = [
         f'<circle r="{zero + swing * k * round_value / full:.1f}" fill="none" stroke="currentColor" '
@@ -283,6 +338,11 @@ class _Panel:
         stops = np.flatnonzero(np.diff(known, append=False) & known) + 1
         return "".join(_path(self.across(x[a:b]), self.up(y[a:b])) for a, b in zip(starts, stops, strict=True))
 
+    def line(self, line: ChartLine, x: FloatArray, y: FloatArray) -> str:
+        """Draw the points of a line that are shown."""
+        stroke = line_colour(line.colour)
+        return f'<path d="{self.path(x, y)}" fill="none" stroke="{stroke}" stroke-width="1.1"/>'
+
     def axes(self, x: str, y: str, *, grid: bool = True) -> str:
         bottom, right = self.top + self.height, self.left + self.width
         values = _decades(*self.y) if self.logarithmic else _ticks(*self.y, max(2, round(self.height / 45)))
@@ -352,28 +412,28 @@ def _placed(cursors: Sequence[Cursor], limits: tuple[float, float], width: int) 
     return placed, sum(bool(row) for row in rows)
 
 
-def _names(curves: Sequence[Curve]) -> list[str]:
+def _names(lines: Sequence[ChartLine]) -> list[str]:
     parts, x = [], float(LEFT)
-    for curve in curves:
-        if curve.name:
+    for line in lines:
+        if line.name:
             parts.append(
-                f'<path d="M{x} 10h16" stroke="{curve.colour}" stroke-width="3"/>'
-                f'<text x="{x + 21}" y="14">{escape(curve.name)}</text>'
+                f'<path d="M{x} 10h16" stroke="{line_colour(line.colour)}" stroke-width="3"/>'
+                f'<text x="{x + 21}" y="14">{escape(line.name)}</text>'
             )
-            x += 21 + LETTER * len(curve.name) + 18
+            x += 21 + LETTER * len(line.name) + 18
     return parts
 
 
-def _columns(curve: Curve, limits: tuple[float, float], n_columns: int = N_COLUMNS) -> tuple[FloatArray, FloatArray]:
-    """Return what is shown of a curve, with the extremes of each column at their own places."""
-    start = max(int(np.searchsorted(curve.x, limits[0])), 0)
-    stop = max(int(np.searchsorted(curve.x, limits[1], side="right")), start + 1)
-    x, y = np.asarray(curve.x[start:stop]), np.asarray(curve.y[start:stop])
+def _columns(line: ChartLine, limits: tuple[float, float], n_columns: int = N_COLUMNS) -> tuple[FloatArray, FloatArray]:
+    """Return what is shown of a line, with the extremes of each column at their own places."""
+    start = max(int(np.searchsorted(line.x, limits[0])), 0)
+    stop = max(int(np.searchsorted(line.x, limits[1], side="right")), start + 1)
+    x, y = np.asarray(line.x[start:stop]), np.asarray(line.y[start:stop])
     if len(x) <= 2 * n_columns:
         return x, y
     borders = list(pairwise(np.linspace(0, len(x), n_columns + 1).astype(int)))
     chosen = [a + int(np.argmax(y[a:b])) for a, b in borders]  # of gaps the first: nan is the largest to argmax
-    if not curve.peaks:
+    if not line.peaks:
         chosen += [a + int(np.argmin(y[a:b])) for a, b in borders]
     at = np.unique(chosen)
     return x[at], y[at]
@@ -416,3 +476,100 @@ def _svg(width: float, height: float, parts: Sequence[str], *, ink: str = "") ->
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-size="11" '
         f'font-family="system-ui, DejaVu Sans, sans-serif" fill="currentColor"{colour}>{"".join(parts)}</svg>'
     )
+
+
+# --------------------
+# An indicator over months with its limits: a fleet's report holds many.
+# --------------------
+
+
+N_SHOWN = 1500
+"""Recordings that are drawn, the latest: more than there are columns."""
+
+LEVEL_COLOURS = {"ok": style.MEASURED, "warning": style.SIMULATED, "alarm": style.FAULT}
+
+
+def fleet_trend_picture(trend: Trend) -> Picture:
+    """Draw values, expected value, limits and baseline of a trend over its dates.
+
+    On a logarithmic axis where all values are above zero: a rise is then as high wherever it begins.
+    """
+    table = trend.table.tail(N_SHOWN)
+    days = table["date"].to_numpy("datetime64[s]").astype(np.float64) / 86400.0
+    values, expected, high, alarm = (
+        table[name].to_numpy(np.float64) for name in ("value", "expected", "high", "alarm")
+    )
+    shown = np.concatenate([values, *(part[np.isfinite(part)] for part in (expected, high))])
+    is_log = bool(values.min() > 0)
+    low_x, high_x = days.min(), max(days.max(), days.min() + 1e-3)
+    frame = _Panel(64, 10, 824, 154, (low_x, high_x), _trend_range(shown, is_log=is_log), is_log)
+    left, right, bottom = frame.left, frame.left + frame.width, frame.top + frame.height
+
+    def line(y: FloatArray, colour: str, more: str = "") -> str:
+        known = np.isfinite(y)
+        return f'<path d="{frame.path(days[known], y[known])}" fill="none" stroke="{colour}" {more}/>'
+
+    parts = []
+    baseline = days[table["in_baseline"].to_numpy(np.bool_)]
+    if len(baseline):
+        a, b = frame.across(baseline[[0, -1]])
+        parts.append(
+            f'<rect x="{a:.1f}" y="{frame.top}" width="{max(b - a, 2):.1f}" height="{frame.height}" '
+            f'fill="{style.RULE}" fill-opacity="0.5"/>'
+        )
+    for tick in _trend_ticks(*frame.y, is_log=is_log):
+        y = float(frame.up(tick))
+        parts.append(f'<path d="M{left} {y:.1f}H{right}" stroke="{style.RULE}"/>')
+        parts.append(_text(left - 6, y + 4, readable(tick, 3), "end"))
+    parts += [
+        line(expected, style.QUIET, 'stroke-dasharray="2 4"'),
+        line(high, style.SIMULATED, 'stroke-dasharray="6 3"'),
+        line(alarm, style.FAULT, 'stroke-dasharray="6 3"') if np.nanmin(alarm, initial=np.inf) <= frame.y[1] else "",
+        line(values, style.MEASURED, 'stroke-width="1.2"'),
+    ]
+    for x, y, level in zip(frame.across(days), frame.up(values), table["level"], strict=True):
+        if level != "ok":
+            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{LEVEL_COLOURS[level]}"/>')
+    if trend.changed is not None:
+        moment = np.datetime64(trend.changed, "s").astype(np.float64) / 86400.0
+        if low_x <= moment <= high_x:
+            x = float(frame.across(moment))
+            parts.append(f'<path d="M{x:.1f} {frame.top}V{bottom}" stroke="{style.INK}" stroke-dasharray="1 3"/>')
+    first, last = (f"{date:%Y-%m-%d}" for date in (table["date"].iloc[0], table["date"].iloc[-1]))
+    parts += [_text(left, bottom + 18, first, "start"), _text(right, bottom + 18, last, "end")]
+    width, height = 900, 190
+    drawing = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+        f'font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#fff"/>{"".join(parts)}</svg>'
+    )
+    unit = f" in {unit_text(trend.unit)}" if trend.unit else ""
+    of = ", ".join(part for part in (trend.place, trend.channel, trend.computed_on, trend.band) if part)
+    return Picture(
+        "data:image/svg+xml;base64," + b64encode(drawing.encode()).decode("ascii"),
+        width,
+        height,
+        f"{trend.name}{unit} ({of}). Dotted: expected; dashed: limits ({trend.basis}); grey: baseline.",
+        f"{trend.name} of {trend.machine} {trend.point} from {first} to {last}: {trend.level}.",
+    )
+
+
+def _text(x: float, y: float, text: str, anchor: str) -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{style.QUIET}">{escape(text)}</text>'
+
+
+def _trend_range(shown: FloatArray, *, is_log: bool) -> tuple[float, float]:
+    low, high = float(shown.min()), float(shown.max())
+    if is_log:
+        return low / 1.15, high * 1.15
+    margin = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
+    return low - margin, high + margin
+
+
+def _trend_ticks(low: float, high: float, *, is_log: bool) -> list[float]:
+    """Return three to six round numbers."""
+    if is_log and high > 8 * low:
+        decades = range(floor(log10(low)), ceil(log10(high)) + 1)
+        ticks = [m * 10.0**d for d in decades for m in ((1, 2, 5) if high < 300 * low else (1,))]
+    else:
+        ticks = _ticks(low, high, 5)
+    return [tick for tick in ticks if low <= tick <= high]
