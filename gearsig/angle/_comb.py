@@ -183,7 +183,11 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) 
     height = np.maximum(peaks[:-1], peaks[1:])
     high = height > 0
     positive = height[high]
-    rank = (len(positive) - np.searchsorted(np.sort(positive), positive, side="left")) / len(height)
+    order = np.argsort(positive)
+    ascending = positive[order]
+    first = np.maximum.accumulate(np.where(np.diff(ascending, prepend=-1.0) > 0.0, np.arange(len(order)), 0))
+    rank = np.empty(len(order))
+    rank[order] = (len(order) - first) / len(height)
     # A line that is there stands among the top ranks q: density a·q^(a-1), a = 0.3. ln(1 - p + p·a·q^(a-1)): a line
     # missing costs little, a line of high rank gives a lot, none decides alone.
     density = 0.3 * rank ** (0.3 - 1.0)

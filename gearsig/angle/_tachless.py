@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -89,11 +90,12 @@ _PER_WIDTH = 4  # points per reciprocal half width; two would do by the sampling
 
 @dataclass(frozen=True)
 class _Harmonic:
-    """Baseband of one mesh harmonic in all channels, (n_channels, n), and how far it stands out."""
+    """Baseband of one mesh harmonic in all channels, (n_channels, n), how far it stands out, and its sampling step."""
 
     order: float
     baseband: FloatArray
     ratio: float
+    step_rev: float
 
 
 def refine_by_phase(
@@ -122,6 +124,8 @@ def refine_by_phase(
     order to perform angular resampling*, Mech. Syst. Signal Process. 19 (2005); J. Urbanek, T. Barszcz, J. Antoni, *A
     two-step procedure for estimation of instantaneous rotational speed with large fluctuations*, ibid. 38 (2013).
     """
+    if orders:
+        recording = _thinned(recording, channels, (max(orders) + 2.0) * angle.speed_range_rpm[1] / 60.0)
     # Around the mesh order, in orders of the shaft: below one, so that the shaft's sidebands stay outside.
     for half_width in (0.45, 0.45, 0.3, 0.2):
         refined = _refined_once(recording, channels, angle, orders, half_width)
@@ -131,10 +135,29 @@ def refine_by_phase(
     return angle
 
 
+def _thinned(recording: Recording, channels: tuple[str, ...], highest_hz: float) -> Recording:
+    """Return the channels at 3.5 times the highest frequency of interest, where that is less than half their rate."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    n, rate = recording.n_samples, recording.sampling_rate_hz
+    n_padded = next_fast_len(n, real=True)
+    n_thin = next_fast_len(math.ceil(3.5 * highest_hz / rate * n_padded), real=True)
+    if n_thin > n_padded / 2:
+        return recording
+    hertz = np.arange(n_thin // 2 + 1) * rate / n_padded
+    kept = np.clip((hertz[-1] - hertz) / (hertz[-1] - 1.2 * highest_hz), 0.0, 1.0)
+    response = n_thin / n_padded * np.sin(np.pi / 2 * kept) ** 2
+    thin = np.empty((len(channels), n * n_thin // n_padded))
+    for name, row in zip(channels, thin, strict=True):
+        lines = rfft(recording.values(name).astype(np.float64), n_padded, overwrite_x=True)[: len(response)]
+        row[:] = irfft(lines * response, n_thin, overwrite_x=True)[: len(row)]
+    return replace(recording.select(channels), samples=thin, sampling_rate_hz=rate * n_thin / n_padded)
+
+
 def _refined_once(
     recording: Recording, channels: tuple[str, ...], angle: ShaftAngle, orders: tuple[float, ...], half_width: float
 ) -> ShaftAngle | None:
-    from scipy.fft import rfft
+    from scipy.fft import next_fast_len, rfft
 
     top_speed = angle.speed_range_rpm[1] / 60.0
     usable = [o for o in orders if (o + 1) * top_speed < 0.4 * recording.sampling_rate_hz]
@@ -144,16 +167,17 @@ def _refined_once(
         signal = resample_to_angle(recording, angle, channels=channels, highest_order=max(usable) + 2.0)
     except RefusalError:
         return None
-    n_per_rev = signal.samples_per_revolution
-    spectra = rfft(signal.samples, axis=1)
-    harmonics = [_demodulate(spectra, signal.samples.shape[1], n_per_rev, o, half_width) for o in usable]
+    n_per_rev, n_samples = signal.samples_per_revolution, signal.samples.shape[1]
+    n_padded = next_fast_len(n_samples, real=True)
+    spectra = rfft(signal.samples, n_padded, axis=1)
+    harmonics = [_demodulate(spectra, n_samples, n_padded, n_per_rev, o, half_width) for o in usable]
     best = sorted((h for h in harmonics if h is not None), key=lambda h: -h.ratio)[:3]
     # Power of the band over its median line: noise has 0.5. A band of noise must not be bent into a line.
     best = [h for h in best if h.ratio > max(2.0, 0.05 * best[0].ratio)]
     if not best or best[0].baseband.shape[1] < 8:
         return None
     n = best[0].baseband.shape[1]
-    revolutions = signal.start_revolution + np.arange(n) * (signal.samples.shape[1] / n_per_rev / n)
+    revolutions = signal.start_revolution + np.arange(n) * best[0].step_rev
     times = np.empty(n)
     knots, values, slopes = (
         read_only(np.ascontiguousarray(a, np.float64)) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
@@ -168,16 +192,19 @@ def _tachless(shaft: str, time_s: FloatArray, revolutions: FloatArray) -> ShaftA
 
 
 def _demodulate(
-    spectra: NDArray[np.complexfloating], n_samples: int, n_per_rev: int, order: float, half_width: float
+    spectra: NDArray[np.complexfloating], n_samples: int, n_padded: int, n_per_rev: int, order: float, half_width: float
 ) -> _Harmonic | None:
-    """Shift one order to zero and keep ± half_width around it, sampled accordingly."""
-    from scipy.fft import ifft
+    """Shift one order to zero and keep ± half_width around it, sampled accordingly, over the samples without padding.
 
-    per_order = n_samples / n_per_rev  # bins per order
+    `spectra` are transforms of `n_padded` samples, the last of which are zeros.
+    """
+    from scipy.fft import ifft, next_fast_len
+
+    per_order = n_padded / n_per_rev  # bins per order
     reach = int(half_width * per_order)
     middle = round(order * per_order)
-    n = int(per_order * _PER_WIDTH * half_width)
-    if reach < 4 or middle + reach >= n_samples // 2 or middle <= reach:
+    n = next_fast_len(max(int(per_order * _PER_WIDTH * half_width), 2 * reach + 1))
+    if reach < 4 or middle + reach >= n_padded // 2 or middle <= reach:
         return None
     taper = 0.5 + 0.5 * np.cos(np.pi * np.arange(-reach, reach + 1) / (reach + 1))
     basebands = []
@@ -185,17 +212,15 @@ def _demodulate(
         lines = row[middle - reach : middle + reach + 1]
         # In units of its own neighbourhood, so that no channel drowns the others.
         floor = float(np.median(np.abs(lines))) or 1.0
-        spread = np.zeros(max(n, 2 * reach + 1), dtype=complex)
+        spread = np.zeros(n, dtype=complex)
         spread[np.arange(-reach, reach + 1)] = lines * taper / floor
-        basebands.append(ifft(spread) * len(spread))
+        basebands.append(ifft(spread)[: n * n_samples // n_padded] * n)
     baseband = np.array(basebands)
     # The middle is a whole number of bins; the rest of the shift is a slow turn.
-    turn = np.exp(
-        2j * np.pi * (middle / per_order - order) * per_order * np.arange(baseband.shape[1]) / baseband.shape[1]
-    )
+    turn = np.exp(2j * np.pi * (middle / per_order - order) * per_order * np.arange(baseband.shape[1]) / n)
     z = baseband * turn
     power = np.square(np.abs(z)).sum() / (z.size * (2 * reach + 1))
-    return _Harmonic(order, z, float(power))
+    return _Harmonic(order, z, float(power), n_padded / n_per_rev / n)
 
 
 def _common_shift(harmonics: list[_Harmonic]) -> FloatArray:
