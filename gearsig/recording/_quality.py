@@ -270,13 +270,19 @@ def _clipped(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelPr
     return ChannelProblem(channel.name, "clipped", share, evidence, remedy)
 
 
+SHORTEST_STUCK = 16
+"""Equal samples in a row."""
+
+
 def _stuck(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProblem | None:
     ends = np.flatnonzero(np.diff(x) != 0)
     lengths = np.diff(np.concatenate(([-1], ends, [len(x) - 1])))
+    if lengths.max() < SHORTEST_STUCK:
+        return None
     starts = np.concatenate(([0], ends + 1))
     inside = (x[starts] != x.min()) & (x[starts] != x.max())
     usual = float(np.percentile(lengths, 99))
-    long = inside & (lengths >= max(16, 10 * usual))
+    long = inside & (lengths >= max(SHORTEST_STUCK, 10 * usual))
     step = levels.step or float(np.finfo(x.dtype).eps * np.abs(x).max())
     before, after = starts - CORNER_DISTANCE, starts + lengths - 1 + CORNER_DISTANCE
     long &= (before >= 0) & (after < len(x))
