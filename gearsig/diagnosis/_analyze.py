@@ -242,7 +242,10 @@ def _indicators(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> 
         values, rate_hz = signals.recording.values(name), signals.recording.sampling_rate_hz
         yield from indicators.time_indicators(values, name, unit)
         speed_rpm = None if signals.angle is None else signals.angle.mean_speed_rpm
-        yield from indicators.overall_indicators(values, rate_hz, channel, speed_rpm)
+        spectrum, transform = signals.spectra[name], signals.prepared.transform(name)
+        yield from indicators.overall_indicators(
+            values, rate_hz, channel, speed_rpm, spectrum=spectrum, transform=transform
+        )
         if name in signals.order_excess:
             spectrum = signals.order_excess[name].spectrum
             for pair in rig.pairs:

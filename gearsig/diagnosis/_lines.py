@@ -236,9 +236,9 @@ def detect_lines(signals: AnalysisSignals, trains: Sequence[float] = ()) -> list
 def _mains(signals: AnalysisSignals) -> Finding | None:
     """Look for lines at the mains frequency and its first multiples that no shaft explains."""
     for name, spectrum in signals.spectra.items():
-        excess = floor_of(spectrum)
         if spectrum.resolution > 0.5:
             continue  # a mains line is then not told from a shaft's
+        excess = floor_of(spectrum, 4.0 * max(MAINS_HZ))
         for mains in MAINS_HZ:
             lines = [line_at(excess, k * mains, 0.1) for k in (1, 2, 3)]
             near = [line for k, line in enumerate(lines, 1) if line and abs(line.position - k * mains) <= 0.1]

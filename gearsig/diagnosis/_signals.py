@@ -56,6 +56,8 @@ class AnalysisSignals:
 
     Parameters
     ----------
+    prepared : PreparedRecording
+        What they were computed of.
     recording : Recording
         Only the channels that are analysed.
     rig : Rig
@@ -77,6 +79,7 @@ class AnalysisSignals:
         The channels over the reference shaft's angle; None where `order_excess` is empty.
     """
 
+    prepared: PreparedRecording
     recording: Recording
     rig: Rig
     angle: ShaftAngle | None
@@ -211,9 +214,9 @@ def compute_signals(
             )
         except RefusalError:  # too few samples per revolution or too short: the detectors say that nothing is known
             excess, shafts, over_angle = {}, (), None
-    recording = prepared.recording.select(names)
+    recording = prepared.fast_part.select(names)
     signals = AnalysisSignals(
-        recording, prepared.rig, angle, settings, spectra, excess, shafts, {}, has_reference, over_angle
+        prepared, recording, prepared.rig, angle, settings, spectra, excess, shafts, {}, has_reference, over_angle
     )
     if not (excess and signals.speed_varies):
         return signals
@@ -272,10 +275,8 @@ class BandEnvelope:
 
 def band_envelopes(signals: AnalysisSignals) -> Iterator[BandEnvelope]:
     """Yield the envelope spectra of all channels and bands."""
-    from scipy.fft import rfft
-
     recording = signals.recording
-    transforms = {name: rfft(recording.values(name).astype(np.float64)) for name in recording.vibration_names()}
+    transforms = {name: signals.prepared.transform(name) for name in recording.vibration_names()}
     for band in envelope_bands(recording.sampling_rate_hz):
         yield from envelopes_in(signals, recording, band, transforms)
 
@@ -294,13 +295,16 @@ def envelopes_in(
     from gearsig.orders import order_spectrum
     from gearsig.spectra import amplitude_spectrum, envelope_recording
 
+    highest_hz = None
+    fastest = max(signals.known_shaft_orders.values(), default=1.0)
+    if signals.angle is not None:
+        highest_hz = signals.settings.highest_modulation_order * fastest * signals.angle.speed_range_rpm[1] / 60
     try:
-        envelopes = envelope_recording(recording, band, kind="magnitude", transforms=transforms)
+        envelopes = envelope_recording(recording, band, kind="magnitude", transforms=transforms, highest_hz=highest_hz)
     except InputError:
         return  # the record is too short for so narrow a band
     over_angle = None
     if signals.angle is not None:
-        fastest = max(signals.known_shaft_orders.values(), default=1.0)
         highest = min(
             signals.settings.highest_modulation_order * fastest,
             0.4 * envelopes.sampling_rate_hz / signals.frequency_per_order_hz,
@@ -402,11 +406,11 @@ def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float)
 
     fs = signals.recording.sampling_rate_hz
     recorded = signals.recording.values(channel)
-    x = prepared_signal(recorded, fs, "tones removed")
+    x = prepared_signal(recorded, fs, "tones removed", transform=signals.prepared.transform(channel))
     if np.std(x) < 1e-9 * np.std(recorded):
         return None  # a model's tones are all there is: what is left of them are the rounding errors of their removal
     try:
-        grid = kurtogram(x, fs, source=f"{channel}, tones removed")
+        grid = kurtogram(x, fs, narrowest_hz=narrowest_hz, source=f"{channel}, tones removed")
         band = grid.best_band(narrowest_hz=narrowest_hz)
     except RefusalError:  # the record is too short, or the races too fast for the sampling rate
         return None
@@ -428,8 +432,6 @@ def channel_analysis(
     The envelope shown is the one in which the surest family of impacts was found, else the one whose lines stand out
     most; the channel's own band is shown where it bears out a damage that is claimed of a bearing.
     """
-    from gearsig.spectra import power_density
-
     own = next((band for band in kurtogram_bands if band.envelope.channel == name), None)
     candidates = [e for e in (*envelopes, *([own.envelope] if own else [])) if e.channel == name]
     named = (e for f in findings for e in candidates if f.where.band_hz == e.band_hz and name in f.where.channels)
@@ -451,7 +453,7 @@ def channel_analysis(
     return ChannelAnalysis(
         channel=name,
         spectrum=signals.spectra[name],
-        power_density=power_density(signals.recording, name),
+        power_density=signals.prepared.power_density(name),
         envelope_spectrum=envelope.excess.spectrum if envelope else None,
         envelope_band_hz=envelope.band_hz if envelope else None,
         order_spectrum=signals.order_excess[name].spectrum if name in signals.order_excess else None,

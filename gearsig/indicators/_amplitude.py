@@ -9,10 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from math import sqrt
 
 import numpy as np
+from numba import njit
 
-from gearsig.checks import FloatArray, frozen_array
+from gearsig.checks import FloatArray, frozen_array, read_only
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from gearsig.results import Result
@@ -26,11 +29,15 @@ def checked_values(values: FloatArray, name: str = "values") -> FloatArray:
     return x.astype(np.float64, copy=False)
 
 
+CONSTANT = 1e-12
+"""Scatter over size that is only rounding."""
+
+
 def is_constant(x: FloatArray, size: float | None = None) -> bool:
     """Whether the scatter of `x` is only rounding against `size` (default: its own largest magnitude)."""
     scale = float(np.abs(x).max()) if size is None else size
     largest_deviation = float(np.abs(x - x.mean()).max())
-    return largest_deviation <= 1e-12 * scale or largest_deviation == 0.0
+    return largest_deviation <= CONSTANT * scale
 
 
 def standardised_moment(x: FloatArray, order: int, size: float | None = None) -> float:
@@ -82,56 +89,110 @@ class Indicator(Result):
     bearing: str = ""
 
 
-def rms(values: FloatArray) -> float:
+class Amplitudes:
+    """What the indicators of a signal's amplitudes share: the signal is looked at twice, whatever is asked.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    """
+
+    def __init__(self, values: FloatArray) -> None:
+        self.x = checked_values(values)
+        self.mean, low, high = (float(f()) for f in (self.x.mean, self.x.min, self.x.max))
+        self.peak, self.peak_to_peak = max(-low, high), high - low
+        self.largest_deviation = max(high - self.mean, self.mean - low)
+
+    @cached_property
+    def means(self) -> tuple[float, ...]:
+        """Means of |y|, √|y|, y² and d², d³, d⁴: y over the peak, d from the mean, over the largest deviation.
+
+        Powers of values up to one neither overflow nor vanish.
+        """
+        scales = (1.0 / s if s > 1e-300 else 0.0 for s in (self.peak, self.largest_deviation))
+        sums: tuple[float, ...] = _power_sums(read_only(self.x), self.mean, *scales)
+        return tuple(s / len(self.x) for s in sums)
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})  # type: ignore[untyped-decorator,unused-ignore]
+def _power_sums(x, mean, per_peak, per_deviation):  # type: ignore[no-untyped-def]
+    size, root, square, second, third, fourth = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(x.shape[0]):
+        y, d = abs(x[i]) * per_peak, (x[i] - mean) * per_deviation
+        size += y
+        root += np.sqrt(y)
+        square += y * y
+        second += d * d
+        third += d * d * d
+        fourth += (d * d) * (d * d)
+    return size, root, square, second, third, fourth
+
+
+Values = FloatArray | Amplitudes
+
+
+def _of(values: Values) -> Amplitudes:
+    return values if isinstance(values, Amplitudes) else Amplitudes(values)
+
+
+def rms(values: Values) -> float:
     """√(mean x²), in the signal's unit."""
-    x = checked_values(values)
-    scale = float(np.abs(x).max())
-    return scale * float(np.sqrt(np.mean((x / scale) ** 2))) if scale > 0 else 0.0
+    a = _of(values)
+    return a.peak * sqrt(a.means[2])
 
 
-def peak(values: FloatArray) -> float:
+def peak(values: Values) -> float:
     """Largest |x|, in the signal's unit."""
-    return float(np.abs(checked_values(values)).max())
+    return _of(values).peak
 
 
-def peak_to_peak(values: FloatArray) -> float:
+def peak_to_peak(values: Values) -> float:
     """Largest minus smallest value, in the signal's unit."""
-    x = checked_values(values)
-    return float(x.max() - x.min())
+    return _of(values).peak_to_peak
 
 
-def crest_factor(values: FloatArray) -> float:
+def crest_factor(values: Values) -> float:
     """Peak over rms; √2 for a sine, nan for zeros."""
-    return _ratio(peak(values), rms(values))
+    a = _of(values)
+    return _ratio(a.peak, rms(a))
 
 
-def skewness(values: FloatArray) -> float:
+def skewness(values: Values) -> float:
     """Third central moment over σ³; 0 for a symmetric distribution, nan for a constant."""
-    return standardised_moment(checked_values(values), 3)
+    return _standardised(_of(values), 3)
 
 
-def kurtosis(values: FloatArray) -> float:
+def kurtosis(values: Values) -> float:
     """Fourth central moment over σ⁴; 3 for a normal distribution, 1.5 for a sine, nan for a constant.
 
     Not the excess kurtosis, which is this minus 3.
     """
-    return standardised_moment(checked_values(values), 4)
+    return _standardised(_of(values), 4)
 
 
-def shape_factor(values: FloatArray) -> float:
+def shape_factor(values: Values) -> float:
     """Rms over mean |x|; π/(2√2) for a sine, nan for zeros."""
-    return _ratio(rms(values), _mean_magnitude(values))
+    a = _of(values)
+    return _ratio(rms(a), a.peak * a.means[0])
 
 
-def impulse_factor(values: FloatArray) -> float:
+def impulse_factor(values: Values) -> float:
     """Peak over mean |x|; π/2 for a sine, nan for zeros."""
-    return _ratio(peak(values), _mean_magnitude(values))
+    a = _of(values)
+    return _ratio(a.peak, a.peak * a.means[0])
 
 
-def clearance_factor(values: FloatArray) -> float:
+def clearance_factor(values: Values) -> float:
     """Peak over (mean √|x|)²; nan for zeros. Also called margin factor."""
-    x = np.abs(checked_values(values))
-    return _ratio(float(x.max()), float(np.mean(np.sqrt(x))) ** 2)
+    a = _of(values)
+    return _ratio(a.peak, a.peak * a.means[1] ** 2)
+
+
+def _standardised(a: Amplitudes, order: int) -> float:
+    """Return the central moment of order 3 or 4 over that power of σ."""
+    if a.largest_deviation <= CONSTANT * a.peak:
+        return float("nan")
+    return a.means[order + 1] / a.means[3] ** (order / 2)
 
 
 def time_indicators(
@@ -166,14 +227,13 @@ def time_indicators(
     if isinstance(signal, Recording):
         unit = unit or signal.channels[signal.index(channel)].unit
         signal = signal.values(channel)
-    x = checked_values(signal)
-    mean = float(x.mean())
+    amplitudes = Amplitudes(signal)
     offset = ""
-    if abs(mean) > 0.1 * rms(x):  # then amplitudes say more about the offset than about the vibration
-        offset = f"the signal has a mean of {mean:.4g} {unit}, which is included".replace(" ,", ",")
+    if abs(amplitudes.mean) > 0.1 * rms(amplitudes):  # then they say more about the offset than about the vibration
+        offset = f"the signal has a mean of {amplitudes.mean:.4g} {unit}, which is included".replace(" ,", ",")
     indicators = []
     for name, function in _OF_AMPLITUDE.items():
-        value = function(x)
+        value = function(amplitudes)
         note = "undefined: the signal is constant" if np.isnan(value) else offset
         if name in ("skewness", "kurtosis") and note == offset:
             note = ""  # of central moments
@@ -182,7 +242,7 @@ def time_indicators(
     return tuple(indicators)
 
 
-_OF_AMPLITUDE: dict[str, Callable[[FloatArray], float]] = {
+_OF_AMPLITUDE: dict[str, Callable[[Values], float]] = {
     "rms": rms,
     "peak": peak,
     "peak-to-peak": peak_to_peak,
@@ -193,10 +253,6 @@ _OF_AMPLITUDE: dict[str, Callable[[FloatArray], float]] = {
     "impulse factor": impulse_factor,
     "clearance factor": clearance_factor,
 }
-
-
-def _mean_magnitude(values: FloatArray) -> float:
-    return float(np.mean(np.abs(checked_values(values))))
 
 
 def _ratio(numerator: float, denominator: float) -> float:

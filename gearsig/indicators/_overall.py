@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import ceil, floor
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.indicators._amplitude import Indicator, checked_values, crest_factor, kurtosis, rms
+from gearsig.indicators._amplitude import Amplitudes, Indicator, checked_values, crest_factor, kurtosis, rms
 from gearsig.recording import SI_FACTORS, Channel
+from gearsig.spectra import Spectrum, amplitude_spectrum
 
 VELOCITY_BAND_HZ = (10.0, 1000.0)
 """Of the overall velocity, ISO 20816-1."""
@@ -33,13 +36,18 @@ ZONE_LIMITS_MM_PER_S = {
 
 
 def overall_velocity_mm_per_s(
-    values: FloatArray, sampling_rate_hz: float, channel: Channel, band_hz: tuple[float, float] = VELOCITY_BAND_HZ
+    values: FloatArray,
+    sampling_rate_hz: float,
+    channel: Channel,
+    band_hz: tuple[float, float] = VELOCITY_BAND_HZ,
+    *,
+    spectrum: Spectrum | None = None,
 ) -> float:
     r"""Return the rms vibration velocity in a band, in mm/s.
 
-    From the Hann-windowed Fourier transform X of acceleration, with window energy Σw²:
+    From the Hann-windowed amplitude spectrum A of acceleration, of noise bandwidth 1.5 lines:
 
-    .. math:: v_{rms}^2 = \frac{2}{N \sum w^2} \sum_{f \in band} \frac{|X(f)|^2}{(2 \pi f)^2}
+    .. math:: v_{rms}^2 = \frac{1}{1.5} \sum_{f \in band} \frac{A(f)^2}{2 (2 \pi f)^2}
 
     Parameters
     ----------
@@ -49,6 +57,8 @@ def overall_velocity_mm_per_s(
     channel : Channel
         An acceleration or a velocity in a known unit.
     band_hz : (float, float)
+    spectrum : Spectrum or None
+        The values' `amplitude_spectrum`, where it is known.
 
     Raises
     ------
@@ -73,13 +83,13 @@ def overall_velocity_mm_per_s(
         raise InputError(
             f"it is {len(x) / sampling_rate_hz:.3g} s long", where=where, allowed=f"{MIN_PERIODS / low_hz:g} s or more"
         )
-    window = np.hanning(len(x))
-    hertz = np.fft.rfftfreq(len(x), 1 / sampling_rate_hz)
-    inside = (hertz >= low_hz) & (hertz <= high_hz)
-    power = np.square(np.abs(np.fft.rfft((x - x.mean()) * window)[inside]))
+    spectrum = spectrum or amplitude_spectrum(x, sampling_rate_hz)
+    inside = slice(*np.searchsorted(spectrum.positions, (low_hz, np.nextafter(high_hz, np.inf))))
+    amplitude, hertz = spectrum.values[inside], spectrum.positions[inside]
     if quantity == "acceleration":
-        power /= np.square(2 * np.pi * hertz[inside])
-    return 1e3 * factor * float(np.sqrt(2.0 * power.sum() / (len(x) * np.square(window).sum())))
+        amplitude = amplitude / (2 * np.pi * hertz)
+    mean_square = 0.5 * float(np.square(amplitude).sum()) * spectrum.resolution / spectrum.noise_bandwidth
+    return 1e3 * factor * float(np.sqrt(mean_square))
 
 
 def vibration_zone(velocity_mm_per_s: float, group: int, mounting: str) -> str:
@@ -108,7 +118,13 @@ def vibration_zone(velocity_mm_per_s: float, group: int, mounting: str) -> str:
 
 
 def overall_indicators(
-    values: FloatArray, sampling_rate_hz: float, channel: Channel, speed_rpm: float | None = None
+    values: FloatArray,
+    sampling_rate_hz: float,
+    channel: Channel,
+    speed_rpm: float | None = None,
+    *,
+    spectrum: Spectrum | None = None,
+    transform: NDArray[np.complexfloating] | None = None,
 ) -> Iterator[Indicator]:
     """Yield the overall velocity, and rms, crest factor and kurtosis of the high frequencies, where they are defined.
 
@@ -119,21 +135,26 @@ def overall_indicators(
     channel : Channel
     speed_rpm : float or None
         Slow machines have a band from 2 Hz.
+    spectrum, transform
+        The values' `amplitude_spectrum` and `rfft`, where they are known.
     """
+    from scipy.fft import irfft, rfft
+
     low_hz = SLOW_LOWEST_HZ if speed_rpm is not None and speed_rpm < SLOW_RPM else VELOCITY_BAND_HZ[0]
     band_hz = (low_hz, VELOCITY_BAND_HZ[1])
     try:
-        velocity = overall_velocity_mm_per_s(values, sampling_rate_hz, channel, band_hz)
+        velocity = overall_velocity_mm_per_s(values, sampling_rate_hz, channel, band_hz, spectrum=spectrum)
     except InputError:
         pass
     else:
         yield Indicator("overall velocity", velocity, "mm/s", channel.name, "velocity", band=_band_text(band_hz))
     low_hz, high_hz = HIGH_BAND_HZ[0], min(HIGH_BAND_HZ[1], 0.45 * sampling_rate_hz)
     if channel.quantity in ("acceleration", "unknown") and high_hz > 2 * low_hz:
-        lines = np.fft.rfft(checked_values(values))
-        hertz = np.fft.rfftfreq(len(values), 1 / sampling_rate_hz)
-        lines[(hertz < low_hz) | (hertz > high_hz)] = 0.0
-        high = np.fft.irfft(lines, len(values))
+        n, known = len(values), rfft(checked_values(values)) if transform is None else transform
+        inside = slice(ceil(low_hz * n / sampling_rate_hz), floor(high_hz * n / sampling_rate_hz) + 1)
+        lines = np.zeros(len(known), dtype=np.complex128)
+        lines[inside] = known[inside]
+        high = Amplitudes(irfft(lines, n, overwrite_x=True))
         for name, value, unit in (
             ("high-frequency rms", rms(high), channel.unit),
             ("high-frequency crest factor", crest_factor(high), ""),

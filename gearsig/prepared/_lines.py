@@ -70,10 +70,9 @@ class LineExcess:
         reach = max(half_width, FOOT_LINES * self.spectrum.resolution)
         if fundamental < 4 * reach:
             return self
-        positions = self.spectrum.positions
-        offset = (positions - start) / fundamental
-        near = np.abs(offset - np.rint(offset)) * fundamental <= np.maximum(reach, skirt * positions)
-        return replace(self, masked=self.masked | near)
+        masked = self.masked.copy()
+        _mask_multiples(self.spectrum.positions, fundamental, start, reach, skirt, masked)
+        return replace(self, masked=masked)
 
     def scores(self) -> FloatArray:
         """Log ratios with the masked lines at 0."""
@@ -98,6 +97,14 @@ class LineExcess:
         while len(self._densities) < n_terms:
             self._densities.append(np.convolve(self._densities[-1], self._densities[0]))
         return self._densities[max(n_terms, 1) - 1]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _mask_multiples(positions, fundamental, start, reach, skirt, masked):  # type: ignore[no-untyped-def]
+    for i in range(positions.shape[0]):
+        offset = (positions[i] - start) / fundamental
+        if abs(offset - np.rint(offset)) * fundamental <= max(reach, skirt * positions[i]):
+            masked[i] = True
 
 
 @dataclass(frozen=True)
@@ -136,18 +143,21 @@ def over_floor_db(amplitude: float, floor: float) -> float:
 def line_excess(spectrum: Spectrum, floor: FloatArray) -> LineExcess:
     """Return the excess of each line of an amplitude spectrum over its floor."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        log_ratio = 2.0 * np.log(spectrum.values / floor)
-    log_ratio = np.clip(np.nan_to_num(log_ratio, nan=0.0, posinf=LOG_RATIO_LIMIT, neginf=0.0), 0.0, LOG_RATIO_LIMIT)
-    padded = np.pad(log_ratio, 1)
-    widened = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+        log_ratio = spectrum.values / floor
+        np.fmax(log_ratio, 1.0, out=log_ratio)  # nothing over nothing counts as 1
+        log_ratio = np.minimum(2.0 * np.log(log_ratio, out=log_ratio), LOG_RATIO_LIMIT, out=log_ratio)
+    widened = log_ratio.copy()
+    np.maximum(widened[1:], log_ratio[:-1], out=widened[1:])
+    np.maximum(widened[:-1], log_ratio[1:], out=widened[:-1])
     return LineExcess(spectrum, np.asarray(floor), widened, np.zeros(len(widened), dtype=np.bool_))
 
 
-def floor_of(spectrum: Spectrum) -> LineExcess:
-    """Return an amplitude spectrum's lines against its local noise floor."""
+def floor_of(spectrum: Spectrum, highest: float | None = None) -> LineExcess:
+    """Return an amplitude spectrum's lines, up to `highest`, against its local noise floor."""
     from gearsig.spectra import noise_floor
 
-    return line_excess(spectrum, noise_floor(spectrum).values)
+    floor = noise_floor(spectrum, highest=highest).values
+    return line_excess(spectrum.head(len(floor)), floor)
 
 
 def best_comb(

@@ -297,6 +297,7 @@ def kurtogram(
     channel_or_rate_hz: str | float,
     *,
     n_levels: int | None = None,
+    narrowest_hz: float = 0.0,
     preparation: Preparation = "none",
     source: str = "",
 ) -> Kurtogram:
@@ -313,6 +314,8 @@ def kurtogram(
     n_levels : int or None
         L, the number of halvings. None is 7 (128 and 192 bands), or what the length allows: envelopes have at
         least 512 samples.
+    narrowest_hz : float
+        Where the number of halvings is None: none that leaves narrower bands is made.
     preparation : str
         "none", "tones removed" or "whitened", see `prepared_signal`.
     source : str
@@ -351,13 +354,15 @@ def kurtogram(
     True
     """
     x, fs, _, source = named_signal(signal, channel_or_rate_hz, "", source, minimum=64)
-    n_levels = _checked_levels(len(x), n_levels)
+    levels = _checked_levels(len(x), n_levels)
+    if n_levels is None and not_negative(narrowest_hz, "narrowest_hz", "Hz") > 0.0:
+        levels = max(1, min(levels, int(np.log2(max(fs / 2.0 / narrowest_hz * (1.0 + 1e-9), 1.0)))))
     x = prepared_signal(x, fs, preparation)
     low, high, mean = float(x.min()), float(x.max()), float(np.mean(x, dtype=np.float64))
     spread = max(high - mean, mean - low)
     if spread <= 1e-7 * max(-low, high) or spread == 0.0:
         raise RefusalError("the signal is constant: it has no impulses", remedy="check the channel")
-    rows = [_row_of_bands(fs, *row) for row in tree_moments(x, n_levels, mean, spread)]
+    rows = [_row_of_bands(fs, *row) for row in tree_moments(x, levels, mean, spread)]
     lows, highs, level, kurtosis, error, share, n = (np.concatenate(column) for column in zip(*rows, strict=True))
     return Kurtogram(lows, highs, level, kurtosis, error, share, n, preparation, source or "signal")
 

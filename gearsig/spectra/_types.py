@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, closest_match_hint, count, freeze, frozen_array, not_negative, positive, within
+from gearsig.checks import (
+    FloatArray,
+    closest_match_hint,
+    count,
+    freeze,
+    frozen_array,
+    not_negative,
+    positive,
+    read_only,
+    within,
+)
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from gearsig.results import Result
@@ -81,6 +92,12 @@ class Spectrum(Result, columns=("positions", "values")):
         nearest = round((float(position) - float(self.positions[0])) / self.resolution)
         return min(max(nearest, 0), len(self.values) - 1)
 
+    def head(self, n_lines: int) -> Spectrum:
+        """Return the first lines alone; itself where there are no more."""
+        if n_lines >= len(self.values):
+            return self
+        return replace(self, values=self.values[:n_lines], positions=self.positions[:n_lines])
+
     def largest_near(self, position: float, half_width: float) -> tuple[float, float]:
         """Return (position, value) of the largest line within `half_width` of `position`."""
         low, high = self.index_of(position - half_width), self.index_of(position + half_width)
@@ -106,17 +123,36 @@ class Window:
     Parameters
     ----------
     name : str
-    values : array, (n,)
-    coherent_gain : float
-        Mean of the values: what a bin-centred sine is multiplied by.
-    noise_bandwidth_bins : float
-        Equivalent noise bandwidth in lines, n Σw² / (Σw)²: 1 for rectangular, 1.5 for Hann.
+    n_samples : int
     """
 
     name: str
-    values: FloatArray
-    coherent_gain: float
-    noise_bandwidth_bins: float
+    n_samples: int
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Its samples, (n_samples,)."""
+        return frozen_array(_window_values(self.name, self.n_samples), "window", ndim=1)
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        """The a_m of `COSINE_SUMS`; empty for other windows, and for so few samples that cosines are not orthogonal."""
+        sums = COSINE_SUMS.get(self.name, ())
+        return sums if self.n_samples > 2 * len(sums) else ()
+
+    @cached_property
+    def coherent_gain(self) -> float:
+        """Mean of the values: what a bin-centred sine is multiplied by."""
+        return self.coefficients[0] if self.coefficients else float(self.values.mean())
+
+    @cached_property
+    def noise_bandwidth_bins(self) -> float:
+        """Equivalent noise bandwidth in lines, n Σw² / (Σw)²: 1 for rectangular, 1.5 for Hann."""
+        if self.coefficients:
+            first, *others = self.coefficients
+            return round(1.0 + sum((a / first) ** 2 for a in others) / 2.0, 12)
+        w = self.values
+        return round(float(self.n_samples * np.dot(w, w) / w.sum() ** 2), 12)
 
 
 def make_window(name: str, n_samples: int) -> Window:
@@ -163,10 +199,7 @@ def checked_window_name(name: str) -> str:
 
 @lru_cache(maxsize=8)
 def _make_window(name: str, n: int) -> Window:
-    w = _window_values(name, n)
-    gain = float(w.mean())
-    bandwidth = float(n * np.dot(w, w) / w.sum() ** 2)
-    return Window(name, frozen_array(w, "window", ndim=1), gain, round(bandwidth, 12))
+    return Window(name, n)
 
 
 def _window_values(name: str, n: int) -> FloatArray:
@@ -214,6 +247,27 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 BATCH_SAMPLES = 1 << 19
 """Samples transformed at once: 4 MB of float64, which stays near the caches and bounds the memory."""
+
+
+@lru_cache(maxsize=64)
+def fast_length(n: int) -> int:
+    """Return the largest number up to n without prime factors above 31: its transform is up to ten times quicker.
+
+    Of 500 and more, 1.2 % less at most; of a quarter of a million and more, some 0.01 %.
+
+    Examples
+    --------
+    >>> fast_length(4000), fast_length(3931)
+    (4000, 3927)
+    """
+    for length in range(n, 0, -1):
+        rest = length
+        for prime in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31):
+            while rest % prime == 0:
+                rest //= prime
+        if rest == 1:
+            return length
+    return n
 
 
 @dataclass(frozen=True)
@@ -271,7 +325,7 @@ def plan_blocks(n_samples: int, n_per_block: int | None, overlap: float, window:
     step = max(1, round(n * (1.0 - overlap)))
     w = make_window(window, n)
     n_blocks = 1 + (n_samples - n) // step
-    return BlockPlan(w, n, step, n_blocks, independent_averages(w.values, step, n_blocks))
+    return BlockPlan(w, n, step, n_blocks, independent_averages(w.values, step, n_blocks) if n_blocks > 1 else 1)
 
 
 def independent_averages(w: FloatArray, step: int, n_blocks: int) -> int:
@@ -283,8 +337,6 @@ def independent_averages(w: FloatArray, step: int, n_blocks: int) -> int:
     ----------
     P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", 1967.
     """
-    if n_blocks == 1:
-        return 1
     energy = float(np.dot(w, w))
     inflation = 1.0
     for m in range(1, min(n_blocks, (len(w) - 1) // step + 1)):
@@ -293,16 +345,49 @@ def independent_averages(w: FloatArray, step: int, n_blocks: int) -> int:
     return max(1, int(n_blocks / inflation + 1e-9))
 
 
-def mean_power(x: FloatArray, plan: BlockPlan) -> FloatArray:
+def mean_power(x: FloatArray, plan: BlockPlan, transform: ComplexArray | None = None) -> FloatArray:
     """Return the one-sided mean power per line, averaged over the blocks: a bin-centred sine reads A²/2.
 
     P_k = c_k |X_k|² / (Σw)², c_k = 2 but for DC and, where the block length is even, Nyquist, which have no mirror
-    image. Computed in double precision whatever the input.
+    image. Computed in double precision whatever the input. `transform` is x's `rfft`, where it is known.
     """
+    coefficients = plan.window.coefficients
+    if plan.n_blocks == 1 and coefficients:
+        from scipy.fft import rfft
+
+        n = plan.n_per_block
+        lines = rfft(x[:n].astype(np.float64), overwrite_x=True) if transform is None else transform
+        power = np.empty(len(lines))
+        _windowed_power(read_only(lines), np.array(coefficients), n, power)
+        return power
     total = np.zeros(plan.n_per_block // 2 + 1)
     for power in block_powers(x, plan):
         total += power.sum(axis=0)
     return total / plan.n_blocks
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _windowed_power(lines, a, n, power):  # type: ignore[no-untyped-def]
+    """One-sided power per line of a signal under a cosine sum, of the lines without it.
+
+    w[j] = Σ (-1)^m a_m cos(2πmj/n) makes X_k into Σ (-1)^m a_m (X_{k-m} + X_{k+m})/2: a window costs neither its own
+    cosines nor a transform of its own.
+    """
+    n_lines, n_side = lines.shape[0], a.shape[0] - 1
+    scale = 2.0 / (n * a[0]) ** 2
+    for k in range(n_lines):
+        total = a[0] * lines[k]
+        sign = -0.5
+        for m in range(1, n_side + 1):
+            below, above = k - m, k + m
+            left = lines[below] if below >= 0 else np.conj(lines[-below])
+            right = lines[above] if above < n_lines else np.conj(lines[n - above])
+            total += sign * a[m] * (left + right)
+            sign = -sign
+        power[k] = scale * (total.real**2 + total.imag**2)
+    power[0] /= 2.0
+    if n % 2 == 0:
+        power[n_lines - 1] /= 2.0
 
 
 def block_powers(x: FloatArray, plan: BlockPlan, n_lines: int | None = None) -> Iterator[FloatArray]:

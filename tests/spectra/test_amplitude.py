@@ -49,6 +49,20 @@ def test_parseval_for_even_and_odd_lengths(n, seed, window, single):
     assert total == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("window", ["rectangular", "hann", "hamming", "blackman-harris", "flat top"])
+@pytest.mark.parametrize("n", [4000, 4001])
+def test_a_window_over_lines_is_the_window_over_samples(window, n):
+    x = 1e3 + np.random.default_rng(6).normal(size=n)
+    w = make_window(window, n).values
+    expected = 2 * np.abs(np.fft.rfft(x * w)) / w.sum()
+    expected[0] /= 2
+    if n % 2 == 0:
+        expected[-1] /= 2
+    for transform in (None, np.fft.rfft(x)):
+        spectrum = amplitude_spectrum(x, 1.0, window=window, transform=transform)
+        assert spectrum.values == pytest.approx(expected, rel=1e-9, abs=1e-11)
+
+
 def test_single_precision_gives_the_same_answer():
     x = np.random.default_rng(3).normal(size=5000).astype(np.float32)
     single, double = amplitude_spectrum(x, 100.0), amplitude_spectrum(x.astype(np.float64), 100.0)

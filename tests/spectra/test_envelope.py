@@ -69,3 +69,26 @@ def test_envelope_recording_keeps_names_and_says_what_was_done():
 def test_impossible_bands_are_refused(band):
     with pytest.raises(InputError, match="band"):
         band_envelope(MODULATED, FS, band)
+
+
+def test_slow_modulations_are_the_same_by_overlapping_blocks_and_all_at_once():
+    rate_hz, n = 25_600.0, 1 << 20
+    time_s = np.arange(n) / rate_hz
+    x = np.random.default_rng(2).normal(size=n) * (1 + 0.5 * np.cos(2 * np.pi * 87.5 * time_s))
+    band_hz, highest_hz = (1859.0, 11520.0), 1500.0
+    whole = band_envelope(x, rate_hz, band_hz, kind="magnitude")
+    blocks = band_envelope(x, rate_hz, band_hz, kind="magnitude", highest_hz=highest_hz)
+    assert 3 * highest_hz <= blocks.sampling_rate_hz < whole.sampling_rate_hz / 4
+    assert len(blocks.values) == round(n * blocks.sampling_rate_hz / rate_hz)
+    ours, theirs = (np.fft.rfft(e.values)[: int(highest_hz * n / rate_hz)] / len(e.values) for e in (blocks, whole))
+    # A magnitude's spectrum has no end: what lies beyond half the rate of either is mirrored, 49 dB lower.
+    assert np.linalg.norm(ours - theirs) < 0.007 * np.linalg.norm(theirs[1:])
+    assert ours[0] == pytest.approx(theirs[0], rel=1e-5)
+
+
+def test_short_records_and_narrow_bands_keep_all_of_the_envelope():
+    x = np.random.default_rng(2).normal(size=40_000)
+    whole, asked = (
+        band_envelope(x, FS, (1000.0, 4000.0), kind="magnitude", highest_hz=highest) for highest in (None, 100.0)
+    )
+    assert np.array_equal(whole.values, asked.values)
