@@ -316,7 +316,8 @@ class _Blocks:
 
     def pay(self, n_samples: int, has_transform: bool) -> bool:
         """Whether blocks cost less than transforms of all samples; a narrow band of a known transform does not."""
-        return 8 * self.n <= n_samples and self.n_band > (2 if has_transform else 1) * self.n_out
+        is_slow = self.n_band > (2 if has_transform else 1) * self.n_out and 2 * self.n_out <= self.n
+        return is_slow and 8 * self.n <= n_samples
 
     def magnitude(self, x: FloatArray) -> FloatArray:
         """Return the low-passed magnitude, `n_out` samples for `n` of the signal, computed in the signal's precision.

@@ -356,9 +356,10 @@ def mean_power(x: FloatArray, plan: BlockPlan, transform: ComplexArray | None = 
         from scipy.fft import rfft
 
         n = plan.n_per_block
-        lines = rfft(x[:n].astype(np.float64), overwrite_x=True) if transform is None else transform
-        power = np.empty(len(lines))
-        _windowed_power(read_only(lines), np.array(coefficients), n, power)
+        if transform is None or n < len(x):
+            transform = rfft(x[:n].astype(np.float64), overwrite_x=True)
+        power = np.empty(len(transform))
+        _windowed_power(read_only(transform), np.array(coefficients), n, power)
         return power
     total = np.zeros(plan.n_per_block // 2 + 1)
     for power in block_powers(x, plan):
