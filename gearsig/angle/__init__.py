@@ -11,7 +11,7 @@ from gearsig.angle._resample import (
     resample_to_angle,
     times_at,
 )
-from gearsig.angle._source import constant_speed_angle, find_shaft_angle
+from gearsig.angle._source import constant_speed_angle, find_shaft_angle, tachometer_edges
 from gearsig.angle._tachless import CombElsewhere, comb_elsewhere, estimate_shaft_angle, refine_by_phase
 from gearsig.angle._types import AngleSignal, ShaftAngle
 
@@ -36,5 +36,6 @@ __all__ = [
     "refine_by_phase",
     "resample_to_angle",
     "speed_channel_angle",
+    "tachometer_edges",
     "times_at",
 ]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.angle._encoder import encoder_angle, speed_channel_angle
-from gearsig.angle._pulses import find_pulse_edges, pulse_train_angle
+from gearsig.angle._pulses import PulseEdges, find_pulse_edges, pulse_train_angle
 from gearsig.angle._tachless import estimate_shaft_angle
 from gearsig.angle._types import ShaftAngle
 from gearsig.checks import not_negative, positive
@@ -71,14 +71,19 @@ def _from_source(recording: Recording, source: SpeedSource) -> ShaftAngle:
             return speed_channel_angle(recording.values(source.channel), rate, source.rpm_per_unit)
 
 
-def _from_tachometer(recording: Recording, source: TachometerChannel) -> ShaftAngle:
-    edges = find_pulse_edges(
+def tachometer_edges(recording: Recording, source: TachometerChannel) -> PulseEdges:
+    """Return the pulses of a tachometer that a rig or recording names, by its threshold, hysteresis and edge."""
+    return find_pulse_edges(
         recording.values(source.channel),
         recording.sampling_rate_hz,
         threshold=source.threshold,
         hysteresis=source.hysteresis,
         edge=source.edge,
     )
+
+
+def _from_tachometer(recording: Recording, source: TachometerChannel) -> ShaftAngle:
+    edges = tachometer_edges(recording, source)
     if len(edges.times_s) < 2:
         raise InputError(
             f"the tachometer has {len(edges.times_s)} pulse(s) in {recording.duration_s:.4g} s",

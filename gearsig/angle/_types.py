@@ -82,6 +82,11 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
         """Lowest and highest speed at the knots."""
         return 60.0 * float(self.speed_rev_per_s.min()), 60.0 * float(self.speed_rev_per_s.max())
 
+    def is_steady(self, share: float = 0.01) -> bool:
+        """Whether the speed varies by no more than that share of its mean; by 1 %, lines stay sharp over frequency."""
+        low, high = self.speed_range_rpm
+        return high - low <= share * self.mean_speed_rpm
+
     def revolutions_at(self, time_s: FloatArray) -> FloatArray:
         """Shaft angle in revolutions at `time_s`; beyond the knots it goes on at the last speed."""
         return self._evaluate(time_s, 0)

@@ -202,11 +202,11 @@ def notes_of(
 
 def _speed_texts(simulated_side: ComparedSide, recorded_side: ComparedSide) -> list[str]:
     """Return one text on both speeds: a run-up has no speed of its own that could be compared with another."""
-    if not (_is_steady(simulated_side) and _is_steady(recorded_side)):
+    if not (simulated_side.angle.is_steady(STEADY) and recorded_side.angle.is_steady(STEADY)):
         unsteady = [
             name
             for side, name in ((simulated_side, "simulation"), (recorded_side, "recording"))
-            if not _is_steady(side)
+            if not side.angle.is_steady(STEADY)
         ]
         text = (
             f"{_speed_words(simulated_side, 'The simulation')}, {_speed_words(recorded_side, 'the recording')}: levels "
@@ -232,13 +232,8 @@ def _speed_texts(simulated_side: ComparedSide, recorded_side: ComparedSide) -> l
     return []
 
 
-def _is_steady(side: ComparedSide) -> bool:
-    low, high = side.angle.speed_range_rpm
-    return high - low <= STEADY * side.angle.mean_speed_rpm
-
-
 def _speed_words(side: ComparedSide, name: str) -> str:
-    if _is_steady(side):
+    if side.angle.is_steady(STEADY):
         return f"{name} turns at {side.angle.mean_speed_rpm:.5g} rpm"
     low, high = side.angle.speed_range_rpm
     return f"{name} runs between {low:.5g} and {high:.5g} rpm"

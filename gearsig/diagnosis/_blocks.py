@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearsig.angle import REACH, ShaftAngle, find_pulse_edges, find_shaft_angle, resample_to_angle
+from gearsig.angle import REACH, ShaftAngle, find_shaft_angle, resample_to_angle, tachometer_edges
 from gearsig.checks import FloatArray, count, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import OrderMap, SynchronousAverage
@@ -267,10 +267,7 @@ class RecordBlocks:
             begin = max(0, first - reach)
             part = self.read(slice(begin, min(self.n_samples, first + BLOCK_SAMPLES + reach)))
             if isinstance(speed, TachometerChannel):
-                edges = find_pulse_edges(
-                    part.values(speed.channel), rate, threshold=speed.threshold, hysteresis=speed.hysteresis,
-                    edge=speed.edge,
-                )  # fmt: skip
+                edges = tachometer_edges(part, speed)
                 found = edges.times_s
                 # By the levels of the first block, where they are not given.
                 speed = replace(speed, threshold=edges.threshold, hysteresis=edges.hysteresis)

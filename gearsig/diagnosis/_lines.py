@@ -38,12 +38,11 @@ def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
         why = "The machine is at rest" if "at rest" in angle.reason else "The speed is not known"
         title = f"{why}: orders, synchronous averages and everything that rests on them are left out."
         return cannot_tell("speed-unknown", title, evidence=(angle.reason,), surer=angle.remedy)
-    low, high = angle.speed_range_rpm
     uncertainty = angle.relative_speed_uncertainty
     plus_minus = f" ± {uncertainty * angle.mean_speed_rpm:.2g}" if isfinite(uncertainty) else ""
     text = f"Shaft {angle.shaft or 'of reference'} turns at {angle.mean_speed_rpm:.6g}{plus_minus} rpm"
-    if high - low > 0.001 * angle.mean_speed_rpm:
-        text += f", between {low:.5g} and {high:.5g} rpm"
+    if not angle.is_steady(0.001):
+        text += ", between {:.5g} and {:.5g} rpm".format(*angle.speed_range_rpm)
     return Finding(
         "speed",
         Kind.INFORMATION,

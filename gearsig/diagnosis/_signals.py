@@ -121,10 +121,7 @@ class AnalysisSignals:
     @property
     def speed_varies(self) -> bool:
         """Whether the speed changes by more than 1 %: a spectrum over frequency smears, a map along speed is made."""
-        if self.angle is None:
-            return False
-        low, high = self.angle.speed_range_rpm
-        return (high - low) > 0.01 * self.angle.mean_speed_rpm
+        return self.angle is not None and not self.angle.is_steady()
 
     def where(self, order: float, channel: str = "", *, shaft: str = "", gear: str = "", bearing: str = "") -> Where:
         """Return the place of what is at an order of the reference shaft, with its mean frequency."""

@@ -18,7 +18,6 @@ from gearsig.methods._table import (
     Method,
     MethodAnswer,
     MethodOption,
-    is_steady,
     signal_of,
     unit_of,
     waveforms_of,
@@ -173,7 +172,7 @@ def _vold_kalman(
         lambda: track_vold_kalman(recording, channel, values, shaft_angle=angle, coupled=coupled, **filters),
     )
     unit, time_s = unit_of(prepared, channel), separation.time_s()
-    over_speed = over == "speed" or (over == "automatic" and not is_steady(angle))
+    over_speed = over == "speed" or (over == "automatic" and not angle.is_steady())
     width = bandwidth if bandwidth_in == "orders" else 60.0 * bandwidth / max(angle.mean_speed_rpm, 1e-9)
     tracks, reason = _tracks(prepared, channel, values, width)
     step, lines, table = max(1, len(time_s) // 2000), [], {"time (s)": time_s}

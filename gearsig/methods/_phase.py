@@ -10,7 +10,7 @@ import numpy as np
 from gearsig import phase, plot
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
-from gearsig.methods._table import SHAFT, Method, MethodAnswer, MethodOption, angle_or_none, is_steady, unit_of
+from gearsig.methods._table import SHAFT, Method, MethodAnswer, MethodOption, angle_or_none, unit_of
 from gearsig.plot import with_unit
 from gearsig.prepared import PreparedRecording
 
@@ -59,7 +59,7 @@ def _lock(prepared: PreparedRecording, pair: str, shaft: str) -> phase.CycleLock
 def _unsteady(prepared: PreparedRecording) -> tuple[str, ...]:
     angle = angle_or_none(prepared)
     # a section is one of one motion only while the speed varies by less than 5 %
-    if angle is None or is_steady(angle, 0.05):
+    if angle is None or angle.is_steady(0.05):
         return ()
     low, high = angle.speed_range_rpm
     return (

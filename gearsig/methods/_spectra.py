@@ -19,7 +19,6 @@ from gearsig.methods._table import (
     MethodAnswer,
     MethodOption,
     angle_or_none,
-    is_steady,
     signal_of,
     top_hz,
     unit_of,
@@ -39,7 +38,7 @@ SLIP_SHARE = 0.01
 def cursors_of(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> tuple[Cursor, ...]:
     """Return the lines that the rig implies, where the speed is known and they are sharp."""
     angle = angle_or_none(prepared)
-    if angle is None or (shown.axis == "frequency" and not is_steady(angle)):
+    if angle is None or (shown.axis == "frequency" and not angle.is_steady()):
         return ()
     scale = angle.mean_speed_rpm / 60.0 if shown.axis == "frequency" else 1.0
     rig = prepared.rig
@@ -159,7 +158,7 @@ HIGHEST_MODULATION = MethodOption(
 def _over_orders(prepared: PreparedRecording, over: str) -> bool:
     """Whether lines are orders: as asked, by default where the speed is known and changes."""
     angle = angle_or_none(prepared)
-    return over == "order" or (over == "automatic" and angle is not None and not is_steady(angle))
+    return over == "order" or (over == "automatic" and angle is not None and not angle.is_steady())
 
 
 def _rhythm_over(default: str = "automatic") -> MethodOption:
@@ -245,7 +244,7 @@ def _kurtogram(
     }
     warnings = list(chosen.warnings)
     angle = angle_or_none(prepared)
-    if angle is not None and not is_steady(angle):
+    if angle is not None and not angle.is_steady():
         warnings.append(
             "the speed changes: mesh harmonics that pass resonances raise the kurtosis too, without any impact. Trust "
             "a rhythm of the envelope over order, or choose a part of even speed"

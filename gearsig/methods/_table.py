@@ -269,14 +269,6 @@ def angle_or_none(prepared: PreparedRecording) -> ShaftAngle | None:
         return None
 
 
-def is_steady(angle: ShaftAngle | None, share: float = 0.01) -> bool:
-    """Whether the speed is known and varies by less than that share of its mean."""
-    if angle is None:
-        return False
-    low, high = angle.speed_range_rpm
-    return bool(high - low <= share * angle.mean_speed_rpm)
-
-
 def unit_of(prepared: PreparedRecording, channel: str) -> str:
     """Return the unit of a channel."""
     recording = prepared.recording

@@ -9,7 +9,7 @@ from math import cos, gcd, lcm, pi, radians, sqrt
 
 import numpy as np
 
-from gearsig.angle import AngleSignal, ShaftAngle, find_pulse_edges, pulse_train_angle
+from gearsig.angle import AngleSignal, ShaftAngle, find_pulse_edges, pulse_train_angle, tachometer_edges
 from gearsig.checks import FloatArray, freeze
 from gearsig.errors import InputError, RefusalError
 from gearsig.motion._measure import SIDES, find_roles, role_values, side_of
@@ -369,13 +369,7 @@ def _stated_pulses(recording: Recording, rig: Rig, shaft: str) -> Angle | None:
     if isinstance(source, PulseTimes | TachometerChannel) and (source.shaft or rig.reference_shaft) == shaft:
         if isinstance(source, PulseTimes):
             return _from_pulses(source.times_s, source.pulses_per_revolution, "", 0.0)
-        edges = find_pulse_edges(
-            recording.values(source.channel),
-            recording.sampling_rate_hz,
-            threshold=source.threshold,
-            hysteresis=source.hysteresis,
-            edge=source.edge,
-        )
+        edges = tachometer_edges(recording, source)
         if len(edges.times_s) > 1:
             return _from_pulses(edges.times_s, source.pulses_per_revolution, source.channel, edges.tick_s)
     return None

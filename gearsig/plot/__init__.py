@@ -90,6 +90,7 @@ from gearsig.plot._response import ResponseCase, crack_comparison_figure, respon
 from gearsig.plot._series import envelope, series_colours, thin
 from gearsig.plot._spectrum import (
     METHODS,
+    displayed_values,
     modes_figure,
     order_levels_figure,
     spectrum_figure,
@@ -97,6 +98,7 @@ from gearsig.plot._spectrum import (
     speed_panel,
     time_figure,
     trend_figure,
+    value_limits,
 )
 from gearsig.plot._start_stop import (
     FAULTY,
@@ -159,6 +161,7 @@ __all__ = [
     "cwt",
     "decibels",
     "delay_embedding",
+    "displayed_values",
     "divergence_figure",
     "draw_shaded",
     "embed",
@@ -233,6 +236,7 @@ __all__ = [
     "tooth_figure",
     "trend_figure",
     "unit_text",
+    "value_limits",
     "vmd",
     "with_unit",
 ]

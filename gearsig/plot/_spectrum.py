@@ -22,7 +22,7 @@ from gearsig.plot._panels import ChartLine, LinePanel
 from gearsig.plot._series import N_POINTS, envelope, thin
 from gearsig.plot._style import Scale, above_zero, decibels, plain, unit_text, with_unit
 from gearsig.recording import Recording
-from gearsig.spectra import Spectrum
+from gearsig.spectra import Scaling, Spectrum
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,10 +103,10 @@ def _draw_lines(
     shown = y[n_zero:] if start == 0 and len(y) > 2 * n_zero else y
     logarithmic = scale == "log" and bool(np.any(shown > 0))
 
+    drawn_as: Scale = "linear" if scale == "log" and not logarithmic else scale
+
     def displayed(values: FloatArray) -> FloatArray:
-        if scale == "decibel":
-            return decibels(values, spectrum.scaling)
-        return above_zero(values) if logarithmic else values
+        return displayed_values(values, spectrum.scaling, drawn_as)
 
     if floor is not None:
         axes.plot(*thin(x, displayed(floor[start:stop]), N_POINTS // 2), color=style.FLOOR, linewidth=1.2, zorder=2.5)
@@ -130,12 +130,19 @@ def _draw_lines(
     axes.set_xlim(*limits)
     if logarithmic:
         axes.set_yscale("log")
-    axes.set_ylim(*_value_limits(displayed(shown), "linear" if scale == "log" and not logarithmic else scale))
+    axes.set_ylim(*value_limits(displayed(shown), drawn_as))
     if not logarithmic:
         style.no_offset(axes)
 
 
-def _value_limits(values: FloatArray, scale: Scale) -> tuple[float, float]:
+def displayed_values(values: FloatArray, scaling: Scaling, scale: Scale) -> FloatArray:
+    """Return what a scale draws of values: decibels, what has a logarithm, or the values themselves."""
+    if scale == "decibel":
+        return decibels(values, scaling)
+    return above_zero(values) if scale == "log" else values
+
+
+def value_limits(values: FloatArray, scale: Scale) -> tuple[float, float]:
     """Return limits that show the peaks and the floor, without the bottomless notches between the lines."""
     high = float(values.max())
     if scale == "linear":

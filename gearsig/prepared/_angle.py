@@ -126,8 +126,7 @@ def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngl
 
     Speed channels are right to a part in a hundred or a thousand, which is revolutions in a long record.
     """
-    low, high = measured.speed_range_rpm
-    if not rig.pairs or high - low > STEADY * measured.mean_speed_rpm:
+    if not rig.pairs or not measured.is_steady(STEADY):
         return measured
     by_lines = _from_meshes(recording, rig, measured)
     if by_lines is None:

@@ -1,6 +1,6 @@
 """Results as JSON and self-contained HTML."""
 
-from gearsig.report._analysis_json import analysis_to_dict, analysis_to_json, write_json
+from gearsig.report._analysis_json import analysis_to_dict, analysis_to_json, long_analysis_to_json, write_json
 from gearsig.report._benchmark import Section, benchmark_html
 from gearsig.report._comparison import (
     alignment_texts,
@@ -41,7 +41,6 @@ from gearsig.report._gap_page import (
 )
 from gearsig.report._index import Entry, Failure, entry_of, write_index
 from gearsig.report._json import from_plain, plain
-from gearsig.report._long import long_analysis_text, long_analysis_to_json
 from gearsig.report._methods import (
     answer_json,
     fitting_methods,
@@ -72,7 +71,14 @@ from gearsig.report._page import (
     write_page,
 )
 from gearsig.report._pdf import check_pdf, page_pdf, write_pdf
-from gearsig.report._sections import FindingCard, analysis_text, change_rows, finding_card, reference_text
+from gearsig.report._sections import (
+    FindingCard,
+    analysis_text,
+    change_rows,
+    finding_card,
+    long_analysis_text,
+    reference_text,
+)
 
 __all__ = [
     "CHECK_FIRST",

@@ -37,7 +37,7 @@ from pathlib import Path
 from gearsig import __version__
 from gearsig.angle import ShaftAngle
 from gearsig.cache import write_text
-from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, changes
+from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, LongAnalysis, changes
 from gearsig.formatting import rounded
 from gearsig.recording import Recording
 from gearsig.report._json import Json, plain
@@ -170,3 +170,24 @@ def _channel(channel: ChannelAnalysis, *, arrays: bool) -> Json:
         for level in channel.order_levels
     ]
     return result
+
+
+def long_analysis_to_json(analysis: LongAnalysis) -> str:
+    """Return a long analysis as JSON text; each part as `analysis_to_dict` gives it."""
+    overview = analysis.overview
+    levels: Json = {
+        name: plain(getattr(overview, name), arrays=True)
+        for name in ("channel_names", "units", "time_s", "rms", "peak", "crest_factor", "kurtosis")
+    }
+    parts = [
+        {"start_s": p.start_s, "end_s": p.end_s, "reason": p.reason, "analysis": analysis_to_dict(p.analysis)}
+        for p in analysis.parts
+    ]
+    content = {
+        "outcome": analysis.outcome.value,
+        "verdict": analysis.verdict,
+        "duration_s": analysis.duration_s,
+        "overview": levels,
+        "parts": parts,
+    }
+    return json.dumps(content, ensure_ascii=False, allow_nan=False)

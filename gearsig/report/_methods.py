@@ -112,7 +112,7 @@ def fitting_methods(
     bearing: the kurtogram. A simulated motion at a steady speed: its Poincaré section in the phase plane.
     """
     names: list[str] = []
-    sweeps = angle is not None and bool(np.ptp(angle.speed_range_rpm) > 0.1 * angle.mean_speed_rpm)
+    sweeps = angle is not None and not angle.is_steady(0.1)
     if sweeps:
         names.append("frequency-map")
     if suspects_crack:

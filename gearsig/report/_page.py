@@ -46,10 +46,7 @@ WITHOUT_MESH = 50.0  # highest order shown where no mesh is known
 def speed_is_constant(analysis: Analysis) -> bool:
     """Whether the speed is known and changes so little that its lines stay sharp over frequency."""
     angle = analysis.shaft_angle
-    if not isinstance(angle, ShaftAngle) or angle.mean_speed_rpm == 0:
-        return False
-    low, high = angle.speed_range_rpm
-    return high - low <= 0.01 * angle.mean_speed_rpm
+    return isinstance(angle, ShaftAngle) and angle.mean_speed_rpm != 0 and angle.is_steady()
 
 
 def line_cursors(analysis: Analysis, spectrum: Spectrum | OrderMap, *, n_sidebands: int = 2) -> tuple[Cursor, ...]:

@@ -9,9 +9,22 @@ from datetime import datetime
 from importlib.metadata import version
 from textwrap import fill
 
+import numpy as np
+
 from gearsig import __version__
 from gearsig.angle import ShaftAngle
-from gearsig.diagnosis import Analysis, CannotTell, Finding, IndicatorChange, Kind, Outcome, Strength, Where, changes
+from gearsig.diagnosis import (
+    Analysis,
+    CannotTell,
+    Finding,
+    IndicatorChange,
+    Kind,
+    LongAnalysis,
+    Outcome,
+    Strength,
+    Where,
+    changes,
+)
 from gearsig.formatting import named, readable
 from gearsig.indicators import Indicator
 from gearsig.plot import unit_text
@@ -361,3 +374,21 @@ def _change_text(change: IndicatorChange | None) -> str:
     if change is None:
         return ""
     return f"{change.reference_value:>12.5g} " + (f"{change.change_db:>+6.1f}" if change.change_db is not None else "")
+
+
+def long_analysis_text(analysis: LongAnalysis, *, with_indicators: bool = False) -> str:
+    """Return the verdict, the levels over time, and what each part shows."""
+    overview = analysis.overview
+    lines = [analysis.verdict, "", f"{analysis.name}: {analysis.duration_s:.5g} s, in intervals of a second:"]
+    for i, (name, unit) in enumerate(zip(overview.channel_names, overview.units, strict=True)):
+        low, usual, high = np.percentile(overview.rms[i], (0, 50, 100))
+        last = int(np.argmax(overview.rms[i]))
+        lines.append(
+            f"  {name}: rms {low:.4g} to {high:.4g} {unit}, usually {usual:.4g}; "
+            f"highest at {overview.time_s[last]:.4g} s; kurtosis "
+            f"{overview.kurtosis[i].min():.3g} to {overview.kurtosis[i].max():.3g}"
+        )
+    for part in analysis.parts:
+        lines += ["", f"From {part.start_s:.5g} to {part.end_s:.5g} s, {part.reason}:", ""]
+        lines.append(analysis_text(part.analysis, with_indicators=with_indicators))
+    return "\n".join(lines)

@@ -18,7 +18,6 @@ from app.dashboard.widgets.charts import (
     picture_bytes,
     show_lines,
 )
-from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.formatting import csv_text, readable
 from gearsig.orders import SynchronousAverage
@@ -27,13 +26,13 @@ from gearsig.plot import (
     ChartLine,
     Cursor,
     Scale,
-    above_zero,
-    decibels,
+    displayed_values,
     figure_table,
     marks_of,
     polar_figure,
     svg_ring,
     unit_text,
+    value_limits,
     with_unit,
 )
 from gearsig.spectra import Spectrum
@@ -102,7 +101,7 @@ def show_spectrum(
     low, high = looked_at(chart, whole, shown)
     lines, shown_values = [], []
     for i, spectrum in enumerate(spectra):
-        values = _displayed(spectrum, scaled)
+        values = displayed_values(spectrum.values, spectrum.scaling, scaled)
         # of several spectra, a band would hide the other lines
         line_name = names[i] if names else spectrum.source
         lines.append(ChartLine(spectrum.positions, values, line_name, i, peaks=len(spectra) == 1))
@@ -116,10 +115,10 @@ def show_spectrum(
         first.axis_label,
         in_db if scaled == "decibel" else with_unit(text, first.unit),
         shown or whole,
-        _value_limits(np.concatenate(shown_values), scaled),
+        value_limits(np.concatenate(shown_values), scaled),
         logarithmic=scaled == "log",
     )
-    values = _displayed(first, scaled)
+    values = displayed_values(first.values, first.scaling, scaled)
     # a finding names an order to less than a line: the tallest beside it is meant
     places = [(p, max(first.index_of(p) - 2, 0)) for p in marked]
     shafts = [cursor.position for cursor in cursors if cursor.kind == "shaft"]
@@ -170,22 +169,6 @@ def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:
     """Give the cursor of a finding the first right to its label."""
     found = any(abs(cursor.position - position) <= SLIP_SHARE * position for position in marked)
     return replace(cursor, number=0) if found else cursor
-
-
-def _displayed(spectrum: Spectrum, scale: Scale) -> FloatArray:
-    if scale == "decibel":
-        return decibels(spectrum.values, spectrum.scaling)
-    return above_zero(spectrum.values) if scale == "log" else spectrum.values
-
-
-def _value_limits(values: FloatArray, scale: Scale) -> tuple[float, float]:
-    """Return limits that show the peaks and the floor, without the bottomless notches between the lines."""
-    high, low = float(values.max()), float(np.percentile(values, 5))
-    if scale == "linear":
-        return min(0.0, float(values.min())), high * 1.06 or 1.0
-    if scale == "log":
-        return max(low, high * 1e-8) / 2, high * 2
-    return max(low, high - 160) - 6, high + 6
 
 
 KINDS = {

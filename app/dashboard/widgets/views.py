@@ -250,11 +250,10 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
         show_unknown_speed(angle)
         return
     left, right = st.columns(2)
-    low, high = angle.speed_range_rpm
     lines = left.segmented_control(
         "Lines over", ("Order", "Frequency"), default="Order", key=state.view_key("map lines", analysis), required=True
     )
-    ways = ("Time", "Speed") if high - low > RUN_SHARE * angle.mean_speed_rpm else ("Time",)
+    ways = ("Time",) if angle.is_steady(RUN_SHARE) else ("Time", "Speed")
     along = right.segmented_control(
         "Along", ways, default="Time", key=state.view_key(f"map along {ways}", analysis), required=True
     )
@@ -266,7 +265,7 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
     highest = float(shown_map.positions[-1])
     if channel.order_spectrum is not None:
         of_interest = highest_order_of_interest(analysis, channel.order_spectrum)
-        highest = min(highest, of_interest * (1.0 if lines == "Order" else high / 60.0))
+        highest = min(highest, of_interest * (1.0 if lines == "Order" else angle.speed_range_rpm[1] / 60.0))
     cursors = [c for c in line_cursors(analysis, shown_map) if c.kind == "mesh"]
     # over frequency and speed an order is a ray
     rays = [] if lines == "Order" else [ChartLine(c / 60.0 * y, y, "mesh", 2) for c in _mesh_orders(analysis)]
