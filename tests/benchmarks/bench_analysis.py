@@ -43,7 +43,7 @@ def recording(n: int, n_channels: int, *, has_tachometer: bool) -> Recording:
         return Recording(np.stack(rows), RATE_HZ, channels, ConstantSpeed(1500.0), rig=RIG)
     pulses = np.convolve(turns % 1.0 < 0.1, np.ones(5) / 5, "same").astype(np.float32)
     channels = (*channels, Channel("tacho", "tachometer", "V"))
-    return Recording(np.stack([*rows, pulses]), RATE_HZ, channels, TachometerChannel("tacho", 1, "input"), rig=RIG)
+    return Recording(np.stack([*rows, pulses]), RATE_HZ, channels, TachometerChannel("tacho", shaft="input"), rig=RIG)
 
 
 def by_scipy(record: Recording) -> list[np.ndarray]:
