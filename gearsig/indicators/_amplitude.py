@@ -192,7 +192,7 @@ def _standardised(a: Amplitudes, order: int) -> float:
     """Return the central moment of order 3 or 4 over that power of σ."""
     if a.largest_deviation <= CONSTANT * a.peak:
         return float("nan")
-    return a.means[order + 1] / a.means[3] ** (order / 2)
+    return a.means[order + 1] / float(a.means[3] ** (order / 2))
 
 
 def time_indicators(

@@ -332,7 +332,7 @@ class _Blocks:
         inner = slice(self.n_out // 8, 7 * self.n_out // 8)
         values = np.empty((len(blocks), 3 * self.n_out // 4))
         at_once = max(4, BATCH_SAMPLES // self.n // 4)  # transforms go four abreast
-        precision = np.float32 if x.dtype == np.float32 else np.float64
+        precision = np.result_type(x.dtype, np.float32)
         response = self.response.astype(precision)
         low_pass = (self.low_pass * (2.0 * self.n_out / self.n)).astype(precision)
         for start in range(0, len(blocks), at_once):

@@ -358,9 +358,9 @@ def mean_power(x: FloatArray, plan: BlockPlan, transform: ComplexArray | None = 
         n = plan.n_per_block
         if transform is None or n < len(x):
             transform = rfft(x[:n].astype(np.float64), overwrite_x=True)
-        power = np.empty(len(transform))
-        _windowed_power(read_only(transform), np.array(coefficients), n, power)
-        return power
+        single = np.empty(len(transform))
+        _windowed_power(read_only(transform), np.array(coefficients), n, single)
+        return single
     total = np.zeros(plan.n_per_block // 2 + 1)
     for power in block_powers(x, plan):
         total += power.sum(axis=0)
