@@ -44,7 +44,9 @@ def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generato
         paths_scatter=1.4 * mesh * limited,
         around=book.partly(rng),
         uneven=book.partly(rng) * book.uneven(scene, rng),
-        paths=book.draw_path_changes(2, limited * book.partly(rng), scene.sampling_rate_hz, rng, everywhere=True),
+        paths=book.draw_path_changes(
+            scene.n_channels, limited * book.partly(rng), scene.sampling_rate_hz, rng, everywhere=True
+        ),
     )
 
 

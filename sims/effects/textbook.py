@@ -63,6 +63,8 @@ class SyntheticScene:
     bearings : tuple of mapping
         Orders BPFO, BPFI, BSF, FTF of each bearing, in cycles per revolution of the driver; and "shaft", that of its
         own shaft.
+    n_channels : int
+        Of vibration.
     """
 
     revolutions: FloatArray
@@ -70,6 +72,7 @@ class SyntheticScene:
     sampling_rate_hz: float
     teeth: tuple[int, int]
     bearings: tuple[dict[str, float], ...]
+    n_channels: int = 2
 
     @property
     def shaft_orders(self) -> tuple[float, float]:

@@ -40,6 +40,7 @@ def scene_of(recording: Recording) -> textbook.SyntheticScene:
         recording.sampling_rate_hz,
         teeth,
         tuple(bearings),
+        len(vibrations(recording)),
     )
 
 
