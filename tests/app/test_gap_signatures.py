@@ -45,6 +45,19 @@ def test_only_the_vibration_changes_and_a_seed_repeats_it(name: str) -> None:
         assert np.array_equal(row, before) is not channel.is_vibration
 
 
+@pytest.mark.parametrize("n_channels", [1, 3])
+def test_a_machine_may_have_any_number_of_sensors(n_channels: int) -> None:
+    kept = [i for i, channel in enumerate(HEALTHY.channels) if not channel.is_vibration]
+    heard = next(i for i, channel in enumerate(HEALTHY.channels) if channel.is_vibration)
+    rows = [*([heard] * n_channels), *kept]
+    channels = [replace(HEALTHY.channels[row], name=f"c{i}") for i, row in enumerate(rows)]
+    channels[n_channels:] = [HEALTHY.channels[row] for row in kept]
+    recording = replace(HEALTHY, samples=HEALTHY.samples[rows], channels=tuple(channels))
+    for name in SIGNATURES:
+        now, _ = with_signature(recording, name, np.random.default_rng(5))
+        assert np.isfinite(now.samples).all()
+
+
 @pytest.mark.parametrize("name", EXPECTED)
 def test_strong_ones_move_their_own_features(name: str, reference: ReducedRecording) -> None:
     changes = []
