@@ -28,7 +28,7 @@ from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, o
 from app.studies.pool import answers_of
 from gearsig.gap import BY_HAND, INDEPENDENT, LEARNED_FILE, learn, load_population, population_file, write_learned
 
-MACHINES = {CRACKED.name: 44, REDUCED.name: 26, INDEPENDENT: 240, QUASI_STATIC: 150, LUMPED: 56}
+MACHINES = {CRACKED.name: 36, REDUCED.name: 21, INDEPENDENT: 195, QUASI_STATIC: 122, LUMPED: 46}
 """Of each simulator, unless asked for otherwise."""
 
 _SAMPLES_OF: dict[str, Callable[[int], list[PopulationSample]]] = {
