@@ -45,16 +45,16 @@ def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) ->
     return modulated(scene, order, (gain * size, late * size), (size * first, size * second), rng)
 
 
-PLAY_SHARE = 0.5
-"""Of the play, that a run-out takes away where gears still turn freely: once a turn the axes are nearer by it."""
+MAX_PLAY_SHARE = 0.9
+"""Of the play, that a run-out may take away once a turn: beyond, tolerances and load make the pair jam."""
 
 
-def largest_um(play_um: float, pressure_angle_deg: float) -> float:
-    """Return the run-out that leaves half of the play, e = s j/(2 sin α): axes nearer by e take 2 e sin α of it.
+def largest_um(play_um: float, pressure_angle_deg: float, share: float = MAX_PLAY_SHARE) -> float:
+    """Return the run-out that takes a share of the play, e = s j/(2 sin α): axes nearer by e take 2 e sin α of it.
 
-    Beyond j/(2 sin α) both flanks of a tooth touch and the pair jams: the whole machine rattles, and nobody runs it.
+    From j/(2 sin α) on both flanks of a tooth touch and the pair jams: the whole machine rattles, and nobody runs it.
     """
-    return PLAY_SHARE * play_um / (2.0 * sin(radians(pressure_angle_deg)))
+    return share * play_um / (2.0 * sin(radians(pressure_angle_deg)))
 
 
 EFFECT = Effect(

@@ -167,6 +167,8 @@ class PopulationModel:
 
 CRACKED = PopulationModel("cracked", 0, 4, 7, 3, (0.3, 0.6))
 REDUCED = PopulationModel("reduced-fe", 50_000, 3, 4, 1, (0.3, 0.6))
+PLAY_SHARE = 0.5
+"""That a run-out may take away: others, and pitch errors, need some as well."""
 N_HEALTHY = 3
 N_PATHS = 2
 """Changed paths for each signature: nothing else shows them."""
@@ -238,11 +240,11 @@ def _recordings(
 
 
 def _turning(name: str, severity: float, drawn: DrawnRig, twin: CrackedTwin) -> float:
-    """Return a severity with which this machine, whose play the twin does not know, still turns."""
+    """Return a severity with which this machine, whose play the twin does not know, turns freely at any load."""
     if name != "eccentricity":
         return severity
     play_um = 2.0 * float(drawn.parameters["half_backlash_um"])
-    return min(severity, largest_runout_um(play_um, twin.nominal.pressure_angle_deg))
+    return min(severity, largest_runout_um(play_um, twin.nominal.pressure_angle_deg, PLAY_SHARE))
 
 
 def _chance(rig: int, name: str, i: int) -> np.random.Generator:

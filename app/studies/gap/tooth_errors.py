@@ -41,7 +41,7 @@ from gearsig.gap import (
     tooth_error_evidence,
 )
 from sims.blind import draw_case, record_case
-from sims.effects import cumulative_pitch
+from sims.effects import ONE_TOOTH_SHARE, cumulative_pitch
 from sims.machine import log_uniform
 from sims.mesh import (
     FlankDeviation,
@@ -112,7 +112,10 @@ def _fault(
     if name == "chipped_tooth":
         part = float(rng.choice((0.3, 0.6, 0.85, 1.0)))
         return {f"chips_{number}": (ToothChip(module * rng.uniform(0.2, 0.9), width * part, FAULTY_TOOTH),)}
-    pitch = rng.uniform(3.0, 20.0) * cumulative_pitch(gear.teeth, rng)
+    if rng.uniform() < ONE_TOOTH_SHARE:
+        pitch = rng.uniform(3.0, 30.0) * float(rng.choice((-1.0, 1.0))) * np.eye(gear.teeth)[FAULTY_TOOTH]
+    else:
+        pitch = rng.uniform(3.0, 20.0) * cumulative_pitch(gear.teeth, rng)
     return {f"flank_{number}": replace(flank, pitch_um=tuple(pitch.tolist()))}
 
 
@@ -229,7 +232,7 @@ def blind(n_each: int) -> None:
 def main() -> None:
     """Draw, print, write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--each", type=int, default=150, help="faults of each kind and simulator")
+    parser.add_argument("--each", type=int, default=600, help="faults of each kind and simulator")
     parser.add_argument("--blind", type=int, default=0, help="faults of each kind on the independent rig")
     parser.add_argument("--to", type=Path, default=TOOTH_ERRORS_FILE)
     given = parser.parse_args()
