@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from threading import Thread
@@ -19,11 +19,14 @@ pytest.importorskip("duckdb", reason="the extra fleet is not installed")
 
 from distributed import Client
 
+from app.bifurcation import BifurcationRequest, run_folder
 from app.cli.main import main
 from gearsig.batch import report_many
 from gearsig.errors import InputError
 from gearsig.fleet import open_fleet
 from gearsig.processes import cluster, run_jobs
+from sims.cracked import Branch
+from sims.sweep import Axis, Sweep, run_sweep
 from tests.fleet.recordings import PATTERN, write_recording_file
 
 ROOT = Path(__file__).parents[1]
@@ -101,37 +104,68 @@ def test_a_killed_worker_loses_nothing_and_doubles_nothing(scheduler, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-def test_jobs_of_a_block_run_on_its_cluster(scheduler, tmp_path):
-    from app.bifurcation import BifurcationRequest, run_folder
-    from sims.cracked import Branch
-    from sims.sweep import Axis, Sweep, run_sweep
-
-    def sweep(speeds: tuple[float, ...]) -> Sweep:
-        return Sweep(
-            axes=(Axis("speed_rpm", speeds),),
-            common_seed=True,
-            extension=".h5",
-            model="cracked",
-            preset="symmetric_50_50",
-            parameters={},
-            effects=(),
-            speed_rpm=None,
-            torque_nm=None,
-            duration_s=0.2,
-            sampling_rate_hz=20480.0,
-            seed=0,
-        )
-
+def test_jobs_of_a_block_run_on_its_cluster(scheduler):
     address, workers = scheduler
     with cluster(address):
         found = [result for _, result in run_jobs(process_of, [3, 4, 5], n_workers=1, if_killed=lambda job: (job, 0))]
         assert sorted(job for job, _ in found) == [3, 4, 5]
         assert {process for _, process in found} <= {worker.pid for worker in workers}
-        made = run_sweep(sweep((600.0, 900.0)), tmp_path / "sweep")
-        assert [outcome.reason for outcome in made.outcomes] == ["", ""]
-        branch = Branch(sweep((600.0, 900.0)), "transmission_error_m", "mesh", 20)
-        values = run_folder(BifurcationRequest(branch, "rest", 0.0, False), tmp_path / "jump")
-        assert [value.reason for value in values["rest"]] == ["", ""]
+
+
+SPEEDS_RPM = (600.0, 700.0, 800.0, 900.0, 1000.0, 1100.0)
+
+
+def sweep() -> Sweep:
+    return Sweep(
+        axes=(Axis("speed_rpm", SPEEDS_RPM),),
+        common_seed=True,
+        extension=".h5",
+        model="cracked",
+        preset="symmetric_50_50",
+        parameters={},
+        effects=(),
+        speed_rpm=None,
+        torque_nm=None,
+        duration_s=0.2,
+        sampling_rate_hz=20480.0,
+        seed=0,
+    )
+
+
+def report_on(folder: Path, on_progress: Callable[..., object]) -> list[str]:
+    rng = np.random.default_rng(0)
+    for day in range(1, 7):
+        write_recording_file(folder / "data" / f"DE_202601{day:02d}.csv", 1.0, rng)
+    made = report_many([folder / "data"], folder / "report", n_processes=2, on_progress=on_progress)
+    assert len({entry.page for entry in made.entries}) == len(made.entries)
+    return [failure.reason for failure in made.failures] + [""] * len(made.entries)
+
+
+def sweep_over(folder: Path, on_progress: Callable[..., object]) -> list[str]:
+    return [outcome.reason for outcome in run_sweep(sweep(), folder / "sweep", on_progress=on_progress).outcomes]
+
+
+def branches_over(folder: Path, on_progress: Callable[..., object]) -> list[str]:
+    request = BifurcationRequest(Branch(sweep(), "transmission_error_m", "mesh", 20), "rest", 0.0, False)
+    return [value.reason for value in run_folder(request, folder / "jump", on_progress=on_progress)["rest"]]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("work", [report_on, sweep_over, branches_over])
+def test_reports_sweeps_and_bifurcations_lose_a_worker_and_nothing_else(scheduler, tmp_path, work):
+    address, workers = scheduler
+
+    def kill_one(n_done: int, *_: object) -> None:
+        if n_done == 1:
+            os.kill(workers[0].pid, signal.SIGKILL)
+
+    with cluster(address) as opened:
+        assert work(tmp_path, kill_one) == [""] * 6
+        limit = time.monotonic() + 30
+        while not opened.lost() and time.monotonic() < limit:
+            time.sleep(0.1)
+        assert len(opened.lost()) == 1
 
 
 @pytest.mark.slow
