@@ -19,6 +19,7 @@ from sims.mesh import (
     engagement,
     mesh_stiffness,
     mesh_table,
+    out_of_place,
     pair_force,
     pair_states,
     share_torque,
@@ -284,3 +285,20 @@ def test_loads_that_cannot_be() -> None:
             share_torque(CRACKED_PAIR, torque)
     with pytest.raises(InputError, match="mesh_cycles"):
         share_torque(CRACKED_PAIR, 10.0, np.array([[0.0]]))
+
+
+def test_where_a_pair_stands_passes_smoothly_from_tooth_to_tooth():
+    teeth, pitch = np.array([3, 4]), np.array([[1.0, 2.0, 4.0, 0.0], [0.5, 0.0, -0.5, 0.0]])
+    middle = 0.8
+    at = [out_of_place(middle + k + 1e-12, middle, teeth, pitch) for k in (0, 1, 2, 13, -1)]
+    assert [round(value, 12) for value, _ in at] == [1.5, 2.0, 3.5, 2.0, 4.0]  # pair k: teeth k mod 3 and k mod 4
+    assert np.abs([slope for _, slope in at]).max() < 1e-20
+    half = out_of_place(middle + 0.5, middle, teeth, pitch)
+    assert half[0] == pytest.approx(1.75)
+    step = 1e-6
+    before, after = (out_of_place(middle + 0.3 + h, middle, teeth, pitch)[0] for h in (-step, step))
+    assert out_of_place(middle + 0.3, middle, teeth, pitch)[1] == pytest.approx(
+        (after - before) / (2.0 * step), rel=1e-5
+    )
+    for lost in (np.nan, np.inf, -1e30):
+        assert np.isnan(out_of_place(lost, middle, teeth, pitch)).all()
