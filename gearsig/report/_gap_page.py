@@ -225,26 +225,26 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
         placebo = "could not be tried, as the machine has no other place for it that would look different"
     elsewhere: tuple[str, ...] = ()
     if shrinkage.elsewhere is not None:
-        part = percent(shrinkage.elsewhere) if shrinkage.elsewhere >= MIN_SHOWN else "nothing"
+        part = _taken(shrinkage.elsewhere)
         elsewhere = (f"At an operating condition of which only its level was fitted it takes away {part}.",)
+    of_all: tuple[str, ...] = ()
+    if shrinkage.of_all is not None:
+        part = _taken(shrinkage.of_all)
+        of_all = (f"Of what exceeds the floor on the features of all effects tried, it takes away {part}.",)
     return (
         f"Gap on its own features: {before} structural floors without it, {after} with it.",
         f"It takes away nothing: with it the gap grows, {checked}."
         if shrink.value < 0.0
         else f"It takes away {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
         *elsewhere,
-        *_of_all(shrinkage.of_all),
+        *of_all,
         f"In a wrong place (placebo) it {placebo}.",
         f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 is right.",
     )
 
 
-def _of_all(share: float | None) -> tuple[str, ...]:
-    """Say how much of the gap an effect closes that any of the tried ones speaks of; nothing where it is not known."""
-    if share is None:
-        return ()
-    taken = percent(share) if share >= MIN_SHOWN else "nothing"
-    return (f"Of what exceeds the floor on the features of all effects tried, it takes away {taken}.",)
+def _taken(share: float) -> str:
+    return percent(share) if share >= MIN_SHOWN else "nothing"
 
 
 def _evidence_row(evidence: Evidence) -> EvidenceRow:

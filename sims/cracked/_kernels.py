@@ -12,7 +12,16 @@ from numba import njit
 from sims.compiled import copy
 from sims.gear_pair import carried_part, element_forces, foot
 from sims.machine import profile_value, set_speed, torque_ripple
-from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, height_now, out_of_place, pair_force
+from sims.mesh import (
+    MAX_CYCLES,
+    advance,
+    contact_friction_n,
+    cubic,
+    engagement_and_slope,
+    height_now,
+    out_of_place,
+    pair_force,
+)
 
 # Compiled contact of the gear pair: forces of all tooth pairs that touch, on either flank.
 #
@@ -32,8 +41,6 @@ from sims.mesh import advance, contact_friction_n, cubic, engagement_and_slope, 
 # Along the face the flanks are cut into slices: slice s of a pair touches `slice_late` base pitches after the end that
 # enters first and lies `slice_gap` apart (`sims.mesh.Lead`); a straight, even face is one slice.
 
-MAX_CYCLES = 1e12
-"""Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
 MAX_LATE = 0.12
 """Base pitches by which an entry may be late or early; the places of gears that move further count as that far."""
 

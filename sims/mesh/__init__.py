@@ -52,6 +52,7 @@ from sims.mesh._lead import (
     transverse_section,
 )
 from sims.mesh._mesh_stiffness import (
+    MAX_CYCLES,
     LoadSharing,
     MeshStiffness,
     MeshTable,
@@ -91,6 +92,7 @@ __all__ = [
     "COEFFICIENTS",
     "CRACK_LAWS",
     "HEALTHY",
+    "MAX_CYCLES",
     "MAX_FRICTION",
     "MAX_SLICES",
     "STEEL",

@@ -449,8 +449,8 @@ def _smooth(t: float) -> tuple[float, float]:
     return t * t * t * (t * (6.0 * t - 15.0) + 10.0), 30.0 * t * t * (t - 1.0) * (t - 1.0)
 
 
-MAX_PLACE = 1e12
-"""Mesh cycles beyond which there is no telling which tooth is in mesh."""
+MAX_CYCLES = 1e12
+"""Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
@@ -462,7 +462,7 @@ def out_of_place(cycles, middle, teeth, pitch):  # type: ignore[no-untyped-def]
     cycles : base pitches; middle : of a pair's engagement, from its entry.
     teeth : (z1, z2); pitch : (2, z), m, above 0 where a tooth stands behind.
     """
-    if not abs(cycles) < MAX_PLACE:  # a solution that bursts, or NaN, must not be taken for a tooth's number
+    if not abs(cycles) < MAX_CYCLES:  # a solution that bursts, or NaN, must not be taken for a tooth's number
         return np.nan, np.nan
     past = np.floor(cycles - middle)
     z1, z2 = float(teeth[0]), float(teeth[1])

@@ -19,6 +19,7 @@ from sims.compiled import UNCOUNTED
 from sims.fe_gear import ReducedGear, crack_added_m_per_n
 from sims.mesh import (
     HEALTHY,
+    MAX_CYCLES,
     GearMesh,
     Lead,
     PairGeometry,
@@ -520,9 +521,6 @@ def hertz_energy(force, hertz, small):
 
 
 # Compiled: which tooth pairs are near contact, how far apart their flanks are, how compliant their points.
-
-MAX_CYCLES = 1e12
-"""Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)

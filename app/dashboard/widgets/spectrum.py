@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import streamlit as st
@@ -224,10 +225,11 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) 
         with polar:
             st.image(ring, width="stretch", alt=as_typed(words))
             dark = is_dark()  # files are made in another thread, which knows no page
+            drawn = partial(polar_figure, average, n_teeth=n_teeth, marks=marks)
             files: dict[str, str | Callable[[], bytes]] = {
-                "png": lambda: picture_bytes(polar_figure(average, n_teeth=n_teeth, marks=marks), dark=dark),
+                "png": lambda: picture_bytes(drawn(), dark=dark),
                 "svg": ring,
-                "csv": lambda: csv_text(figure_table(polar_figure(average, n_teeth=n_teeth, marks=marks))).encode(),
+                "csv": lambda: csv_text(figure_table(drawn())).encode(),
             }
             offer_picture(files, f"ring-{average.shaft} of {average.channel} {average.kind}")
         with unrolled:
