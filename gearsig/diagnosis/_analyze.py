@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -32,7 +32,16 @@ from gearsig.diagnosis._signals import (
 )
 from gearsig.diagnosis._start_stop import start_stop_analysis
 from gearsig.diagnosis._tooth import detect_tooth_damage
-from gearsig.diagnosis._types import Analysis, AnalysisSettings, CannotTell, Finding, LevelChange, cannot_tell
+from gearsig.diagnosis._types import (
+    Analysis,
+    AnalysisSettings,
+    CannotTell,
+    Finding,
+    Kind,
+    LevelChange,
+    Where,
+    cannot_tell,
+)
 from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import SeparatedAverage, band_passed_mesh
@@ -84,15 +93,19 @@ def analyze(
     ------
     InputError
         If there is no vibration channel, the record is shorter than 256 samples, or the reference has none of its
-        channels or is the recording itself. Names that differ by a record's number only are one channel's.
+        channels or is the recording itself. Names that differ by a record's number only are one channel's, and so
+        are those of the only vibration channels of both.
     """
     prepared = prepare(recording, rig)
     _check_size(prepared.recording)
     healthy = None if reference is None else prepare(reference, prepared.recording.rig)
+    renamed: list[Finding] = []
     if healthy is not None:
-        healthy = _named_alike(prepared.recording, healthy)
+        given, healthy = healthy.recording, _named_alike(prepared.recording, healthy)
+        renamed = _only_channel_taken(given, healthy.recording)
         _check_reference(prepared.recording, healthy.recording)
-    return _examined(prepared, settings or AnalysisSettings(), healthy, torque_nm, on_stage or (lambda _: None))[0]
+    analysis, _ = _examined(prepared, settings or AnalysisSettings(), healthy, torque_nm, on_stage or (lambda _: None))
+    return replace(analysis, findings=(*analysis.findings, *renamed)) if renamed else analysis
 
 
 Shown = tuple[AnalysisSignals, Sequence[BandEnvelope]]
@@ -315,21 +328,38 @@ def _check_vibration(recording: Recording) -> None:
 def _named_alike(recording: Recording, healthy: PreparedRecording) -> PreparedRecording:
     """Return the reference with the recording's names of channels that differ by a record's number only.
 
-    It has three digits or more: fewer tell sensors apart. The renamed one is kept with the other, and what is found in
-    it as well.
+    It has three digits or more: fewer tell sensors apart. Where both have only one vibration channel, it is taken for
+    the same one, whatever it is called. The renamed one is kept with the other, and what is found in it as well.
     """
     reference = healthy.recording
+    theirs, ours = reference.vibration_names(), recording.vibration_names()
+    if len(theirs) == len(ours) == 1 and ours[0] not in reference.channel_names:
+        return _renamed(healthy, {theirs[0]: ours[0]})
 
     def without_number(name: str) -> str:
         return re.sub(r"\d{3,}", "", name)
 
     names = {without_number(name): name for name in recording.channel_names}
-    keys = [without_number(name) for name in reference.channel_names]
-    is_unique = len(names) == len(recording.channel_names) and len(set(keys)) == len(keys)
-    if not is_unique or set(recording.vibration_names()) <= set(reference.channel_names):
+    keys = {name: without_number(name) for name in reference.channel_names}
+    is_unique = len(names) == len(recording.channel_names) and len(set(keys.values())) == len(keys)
+    if not is_unique or set(ours) <= set(reference.channel_names):
         return healthy
-    channels = tuple(replace(c, name=names.get(key, c.name)) for c, key in zip(reference.channels, keys, strict=True))
-    return healthy.keep(("diagnosis", "renamed", channels), lambda: prepare(replace(reference, channels=channels)))
+    return _renamed(healthy, {name: names[key] for name, key in keys.items() if key in names})
+
+
+def _renamed(prepared: PreparedRecording, names: Mapping[str, str]) -> PreparedRecording:
+    recording = prepared.recording
+    channels = tuple(replace(c, name=names.get(c.name, c.name)) for c in recording.channels)
+    return prepared.keep(("diagnosis", "renamed", channels), lambda: prepare(replace(recording, channels=channels)))
+
+
+def _only_channel_taken(reference: Recording, renamed: Recording) -> list[Finding]:
+    """Say that a reference's only vibration channel was taken for the recording's, where their names differ."""
+    before, after = reference.vibration_names(), renamed.vibration_names()
+    if before == after or len(before) != 1:
+        return []
+    title = f"The reference's only vibration channel, {before[0]}, is compared with {after[0]}."
+    return [Finding("reference-channel-renamed", Kind.INFORMATION, title, Where(channels=(after[0],)))]
 
 
 def _check_reference(recording: Recording, reference: Recording) -> None:

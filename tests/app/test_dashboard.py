@@ -224,7 +224,8 @@ def test_an_uploaded_reference_that_does_not_fit_is_one_message() -> None:
     next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("Own file").run()
     assert not page.error
     healthy = page.sidebar.file_uploader[0]
-    healthy.upload("other.csv", b"time (s);b\n" + b"\n".join(b"%g;%d" % (i / 1000, i * 37 % 101) for i in range(3000)))
+    rows = (b"%g;%d;%d" % (i / 1000, i * 37 % 101, i * 41 % 101) for i in range(3000))
+    healthy.upload("other.csv", b"time (s);b;c\n" + b"\n".join(rows))
     page.run()
     assert not page.exception
     assert len(page.error) == 1

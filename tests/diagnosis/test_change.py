@@ -54,6 +54,16 @@ def test_what_changed_is_the_first_finding_and_its_likeliest_cause_the_second(
     assert analysis.outcome is Outcome.SUSPICION
 
 
+def test_the_only_channels_of_both_are_compared_whatever_they_are_called() -> None:
+    now, healthy = rotor(HEALTHY | {1.0: 0.5}, seed=1), rotor(HEALTHY, seed=2)
+    as_named = analyze(now, reference=healthy)
+    renamed = replace(healthy, channels=tuple(replace(c, name="ch1") for c in healthy.channels))
+    analysis = analyze(now, reference=renamed)
+    assert analysis.level_changes == as_named.level_changes
+    assert codes(analysis) == [*codes(as_named), "reference-channel-renamed"]
+    assert "ch1" in analysis.findings[-1].title
+
+
 def test_levels_change_by_the_ratio_of_amplitudes() -> None:
     analysis = beside_healthy(HEALTHY | {1.0: 0.5})
     once = level(analysis, "1× rotor")
