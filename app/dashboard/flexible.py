@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import streamlit as st
+from pandas import DataFrame
 
 from app import flexible as pair_study
 from app import gear_body
@@ -186,16 +188,17 @@ def show_publications() -> None:
     for item in found.figures:
         st.subheader(f"{item.answers}: {item.title}")
         show_figure(item.figure, item.title, f"publication {name} {item.answers}")
-        rows = [
+        _show_sentences(
             {"the publication says": c.statement, "the model gives": c.found, "verdict": c.judgement}
             for c in item.claims
-        ]
-        if rows:
-            st.dataframe(rows, hide_index=True, width="stretch")
+        )
     if found.unanswered:
         st.subheader("Figures without an answer")
-        st.dataframe(
-            [{"figure": figure, "why": why} for figure, why in found.unanswered.items()],
-            hide_index=True,
-            width="stretch",
-        )
+        _show_sentences({"figure": figure, "why": why} for figure, why in found.unanswered.items())
+
+
+def _show_sentences(rows: Iterable[Mapping[str, str]]) -> None:
+    """Show a table whose cells wrap, each row named by its first cell; nothing where there are no rows."""
+    table = DataFrame([{title: as_typed(text) for title, text in row.items()} for row in rows])
+    if len(table):
+        st.table(table.set_index(table.columns[0]))

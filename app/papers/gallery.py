@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Verdict = Literal["agrees", "agrees in part", "does not"]
+SIGNS: Mapping[Verdict, str] = {"agrees": "✓", "agrees in part": "≈", "does not": "✗"}
 Progress = Callable[[str, float], object]
 
 PAPERS: Mapping[str, str] = {
@@ -49,9 +50,9 @@ class Claim:
 
     @property
     def judgement(self) -> str:
-        """The verdict with its reason."""
-        joint = ", because " if self.verdict == "does not" else ": "
-        return f"{self.verdict}{joint}{self.because}" if self.because and self.verdict != "agrees" else self.verdict
+        """The verdict with its sign and its reason."""
+        said, joint = f"{SIGNS[self.verdict]} {self.verdict}", ", because " if self.verdict == "does not" else ": "
+        return f"{said}{joint}{self.because}" if self.because and self.verdict != "agrees" else said
 
 
 def judged(statement: str, found: str, *, agrees: bool, partly: bool = False, because: str = "") -> Claim:
@@ -152,12 +153,13 @@ def write_paper(found: Paper, folder: Path, *, command: str = "") -> tuple[Path,
             f"{item.answers}: {item.title}",
             header=header,
             rows=tuple((claim.statement, claim.found, claim.judgement) for claim in item.claims),
-            pictures=(embed(item.figure, item.title, f"{item.title}, as the model gives it"),),
+            pictures=(embed(item.figure, "", f"{item.title}, as the model gives it"),),
+            is_prose=True,
         )
         for item in found.figures
     ]
     rows = tuple(found.unanswered.items())
-    sections.append(Section("Figures without an answer", header=("figure", "why"), rows=rows))
+    sections.append(Section("Figures without an answer", header=("figure", "why"), rows=rows, is_prose=True))
     facts = [("publication", found.source), ("machine", found.machine), *([("command", command)] if command else [])]
     page = benchmark_html(found.title, found.summary, sections, facts, datetime.now().astimezone())
     paths.append(write_text(folder / "index.html", page))

@@ -22,6 +22,8 @@ class Section:
     rows : tuple of tuple of str
         The first cell of a row names it.
     pictures : tuple of Picture
+    is_prose : bool
+        Whether the cells are sentences, which wrap in columns of one width; else numbers, which do not.
     """
 
     title: str
@@ -29,6 +31,7 @@ class Section:
     header: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
     pictures: tuple[Picture, ...] = ()
+    is_prose: bool = False
 
 
 def benchmark_html(
