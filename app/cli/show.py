@@ -174,6 +174,7 @@ def _value(option: MethodOption, given: Any) -> Any:
 def _answer(
     name: str,
     method: Method,
+    /,  # lyapunov has an option of that name
     *,
     recording: Path,
     channel: str,

@@ -223,6 +223,10 @@ def _trials(trials: Any) -> dict[str, Any]:
 # Denoising.
 
 
+MOST_NOISE = 0.5
+"""Share of a signal's energy that may be noise without a word."""
+
+
 def _denoising(
     prepared: PreparedRecording,
     channel: str,
@@ -257,6 +261,13 @@ def _denoising(
         with_unit("threshold", unit): np.array([level.threshold for level in denoised.levels]),
         "kept (%)": np.array([100.0 * level.kept_share for level in denoised.levels]),
     }
+    finest, warnings = denoised.levels[0].band_hz, list[str]()
+    if denoised.removed_share > MOST_NOISE:
+        warnings.append(
+            f"{100.0 * denoised.removed_share:.3g} % of the energy was taken for noise: what is loud from "
+            f"{finest[0]:.4g} to {finest[1]:.4g} Hz, where the noise is measured, is rather lines or impacts. Take the "
+            "threshold bayes, which keeps most; of steady lines a spectrum or a synchronous average"
+        )
     return MethodAnswer(
         channel,
         "signal without its noise, by wavelet thresholds",
@@ -276,6 +287,7 @@ def _denoising(
                 "extracted by a spectrum or a synchronous average."
             ),
         ),
+        warnings=warnings,
         waveforms=waveforms,
     )
 

@@ -48,6 +48,23 @@ def cursors_of(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> tuple
     return order_cursors(order_lines(rig, base, n_sidebands=1), scale)
 
 
+def periods_of(prepared: PreparedRecording) -> tuple[Cursor, ...]:
+    """Return where a cepstrum shows what turns: one turn of each shaft and one mesh cycle; none where speed changes."""
+    angle = angle_or_none(prepared)
+    if angle is None or not angle.is_steady() or not prepared.rig.shafts:
+        return ()
+    lines = order_lines(prepared.rig, angle.shaft, n_mesh_harmonics=1, n_shaft_harmonics=1, n_sidebands=0)
+    return tuple(
+        replace(cursor, position=1.0 / cursor.position, label=f"period of {cursor.label.removeprefix('1× ')}")
+        for cursor in order_cursors(lines, angle.mean_speed_rpm / 60.0)
+        if cursor.kind in ("shaft", "mesh") and cursor.number == 1
+    )
+
+
+LONGEST_ECHO_S = 0.005
+"""Below this quefrency a cepstrum shows the path and the floor's shape, a hundred times as large as any family."""
+
+
 def highest_order(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> float:
     """Return an order past the third harmonic of the fastest mesh; 50 orders where none is known."""
     meshes = [cursor.position for cursor in cursors_of(prepared, shown) if cursor.kind == "mesh"]
@@ -83,14 +100,20 @@ def _spectrum_answer(
     high = float(spectrum.positions[-1]) if highest is None else highest
     limits = (low, min(high, float(spectrum.positions[-1])))
     is_quefrency = spectrum.axis == "quefrency"
-    cursors = () if is_quefrency else cursors_of(prepared, spectrum)
+    cursors = periods_of(prepared) if is_quefrency else cursors_of(prepared, spectrum)
     inside = (spectrum.positions >= low) & (spectrum.positions <= high)
     numbers = {"resolution": spectrum.resolution, "scaling": spectrum.scaling, "unit": spectrum.unit}
     part = {name: column[inside] for name, column in columns_of(spectrum).items()}
     return MethodAnswer(
         channel,
         caption,
-        lambda: plot.spectrum_figure(spectrum, cursors, limits=limits, title=f"{channel}: {caption}"),
+        lambda: plot.spectrum_figure(
+            spectrum,
+            cursors,
+            scale="linear" if is_quefrency else "log",
+            limits=limits,
+            title=f"{channel}: {caption}",
+        ),
         part,
         numbers=numbers,
         panels=(_panel(spectrum, cursors, linear=is_quefrency),),
@@ -111,9 +134,13 @@ def _density_in_blocks(
     return _spectrum_answer(prepared, channel, blocks.power_density(channel), "power spectral density", **lines)
 
 
-def _cepstrum(prepared: PreparedRecording, channel: str, **lines: float | None) -> MethodAnswer:
+def _cepstrum(prepared: PreparedRecording, channel: str, lowest: float | None, highest: float | None) -> MethodAnswer:
     spectrum = spectra.cepstrum(prepared.recording, channel)
-    return _spectrum_answer(prepared, channel, spectrum, "real cepstrum: families of lines as one peak", **lines)
+    end = float(spectrum.positions[-1])
+    longest = max((cursor.position for cursor in periods_of(prepared)), default=end)
+    low = min(LONGEST_ECHO_S, end / 8.0) if lowest is None else lowest
+    high = max(min(3.5 * longest, end), 2.0 * low) if highest is None else highest
+    return _spectrum_answer(prepared, channel, spectrum, "real cepstrum: families of lines as one peak", low, high)
 
 
 def _order_spectrum(
@@ -176,10 +203,13 @@ def _envelope(
     lowest: float | None,
     highest: float | None,
 ) -> MethodAnswer:
-    banded = spectra.kurtogram_envelope(prepared.recording, channel, band_hz=band_hz)
+    usual_hz = _usual_modulation_hz(prepared)
+    banded = spectra.kurtogram_envelope(  # three times as wide, as in the kurtogram: what turns must fit into the band
+        prepared.recording, channel, narrowest_hz=3.0 * usual_hz, band_hz=band_hz
+    )
     low, high = banded.envelope.band_hz
     text = f"spectrum of the envelope of {low:.4g} to {high:.4g} Hz"
-    top = highest if highest is not None else min(float(banded.spectrum.positions[-1]), (high - low) / 2)
+    top = min(float(banded.spectrum.positions[-1]), (high - low) / 2, usual_hz) if highest is None else highest
     answer = _spectrum_answer(prepared, channel, banded.spectrum, text, lowest, top)
     numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}
     return replace(answer, numbers={**answer.numbers, **numbers}, warnings=banded.warnings)
@@ -253,7 +283,7 @@ def _kurtogram(
     columns = {envelope.source: envelope.values}
     return MethodAnswer(
         channel,
-        "kurtogram: spectral kurtosis of bands; the outlined one is the most impulsive",
+        "kurtogram: spectral kurtosis of bands; outlined is the most impulsive one that is wide enough",
         lambda: plot.kurtogram_figure(grid, band),
         bands,
         tables={"envelope spectrum": columns_of(spectrum)},
@@ -267,8 +297,8 @@ def _kurtogram(
                 f"{'The kurtogram’s' if band_hz is None else 'Your'} band: **{band.low_hz:.5g} to {band.high_hz:.5g} "
                 f"Hz**, spectral kurtosis **{band.kurtosis:.3g}** (of noise alone: 0 ± {band.standard_error:.2g})"
             ),
+            *([chosen.reason] if chosen.reason else []),
         ),
-        notes=(chosen.reason,) if chosen.reason else (),
         warnings=warnings,
         waveforms=waveforms_of(
             prepared, channel, replace(signal, unit=envelope.unit, source=envelope.source), columns, envelope.source

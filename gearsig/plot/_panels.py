@@ -182,7 +182,15 @@ def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") 
             ends = [end for line in panel.lines for end in (float(line.x[0]), float(line.x[-1]))]
             place.set_xlim(min(ends), max(ends))
             if len(panel.lines) > 1:
-                place.legend(fontsize=style.SMALL_PT - 1, frameon=False, labelcolor=style.INK, loc="upper right")
+                place.legend(  # above the panel: it never covers data
+                    fontsize=style.SMALL_PT - 1,
+                    frameon=False,
+                    labelcolor=style.INK,
+                    loc="lower right",
+                    bbox_to_anchor=(1.0, 1.0),
+                    ncols=len(panel.lines),
+                    borderaxespad=0.0,
+                )
         style.label_axes(place, panel.x, panel.y)
     series.headline(figure, title)
     return figure

@@ -1,6 +1,7 @@
 """Methods by name: figure, table and arrays of one channel, and which of them a recording calls for."""
 
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -51,6 +52,41 @@ def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> N
             assert file["matrices"][matrix].ndim == 2
     about = json.loads(numbers.read_text(encoding="utf-8"))
     assert (about["method"], about["channel"]) == (name, "a1")
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_each_method_is_a_command_that_hands_its_options_on(name, tmp_path, monkeypatch, capsys) -> None:
+    path = tmp_path / "bursts.h5"
+    write_recording(recording(), path)
+    handed: dict[str, object] = {}
+
+    def answer(method, *_args, **given):
+        handed.update(given, asked=method)
+        return apply_method("waveform", recording())
+
+    monkeypatch.setattr("gearsig.methods.apply_method_to_file", answer)
+    with pytest.raises(SystemExit) as ended:
+        main(["show", name, str(path), "--json"])
+    assert not ended.value.code
+    assert json.loads(capsys.readouterr().out)["channel"] == "a1"
+    assert handed["asked"] == name
+    assert {option.name for option in METHODS[name].options} <= set(handed)
+
+
+def test_the_cepstrum_peaks_at_the_period_of_a_family() -> None:
+    answer = apply_method("cepstrum", recording())
+    table = pd.DataFrame(answer.table)
+    top = table.loc[table.iloc[:, 1].idxmax()].iloc[0]
+    assert top == pytest.approx(0.1, rel=0.01)  # bursts ten times a second
+    turns = {cursor.label: cursor.position for cursor in answer.panels[0].cursors}
+    assert turns["period of input"] == pytest.approx(0.04)
+    assert turns["period of output"] == pytest.approx(0.08)
+    assert "taken for noise" not in "".join(apply_method("denoising", recording()).warnings)
+
+
+def test_a_signal_of_lines_that_denoising_takes_away_is_said() -> None:
+    lines = replace(recording(), samples=np.cos(2 * np.pi * 3000.0 * T)[None])
+    assert "taken for noise" in "".join(apply_method("denoising", lines).warnings)
 
 
 def test_the_spectrum_reads_the_tone_and_the_map_its_order() -> None:
