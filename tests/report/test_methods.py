@@ -60,8 +60,8 @@ def test_each_method_is_a_command_that_hands_its_options_on(name, tmp_path, monk
     write_recording(recording(), path)
     handed: dict[str, object] = {}
 
-    def answer(method, *_args, **given):
-        handed.update(given, asked=method)
+    def answer(asked, /, *_args, **given):
+        handed.update(given, asked=asked)
         return apply_method("waveform", recording())
 
     monkeypatch.setattr("gearsig.methods.apply_method_to_file", answer)
