@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import floor, isfinite, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -90,6 +91,22 @@ def signed(value: float, n_decimals: int = 1) -> str:
         return "–"
     rounded = round(value, n_decimals) + 0.0
     return f"{rounded:+.{n_decimals}f}".replace("-", "−") if rounded else f"{0.0:.{n_decimals}f}"
+
+
+def with_minus(text: str) -> str:
+    """Return a text whose negative numbers have a minus sign, which a hyphen is not.
+
+    Examples
+    --------
+    >>> with_minus("-54.4 to -10.2 dB by a 2-stage gearbox")
+    '−54.4 to −10.2 dB by a 2-stage gearbox'
+    """
+    return re.sub(r"(?<![\w.])-(?=\d)", "−", text)
+
+
+def axis_label(axis: str, shaft: str) -> str:
+    """Name an axis of frequencies, of orders, that is cycles per revolution of a shaft, or of quefrencies."""
+    return {"order": f"order (of {shaft or 'the shaft'})", "quefrency": "quefrency (s)"}.get(axis, "frequency (Hz)")
 
 
 def named(what: str, name: str) -> str:

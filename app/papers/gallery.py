@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from gearsig.checks import one_of
+from gearsig.formatting import with_minus
 from gearsig.plot import embed
 
 if TYPE_CHECKING:
@@ -57,7 +58,9 @@ class Claim:
 
 def judged(statement: str, found: str, *, agrees: bool, partly: bool = False, because: str = "") -> Claim:
     """Return a claim with the verdict that two comparisons of numbers give."""
-    return Claim(statement, found, "agrees" if agrees else "agrees in part" if partly else "does not", because)
+    return Claim(
+        statement, with_minus(found), "agrees" if agrees else "agrees in part" if partly else "does not", because
+    )
 
 
 def within_part(statement: str, published: float, found: float, unit: str, *, part: float, because: str = "") -> Claim:

@@ -73,9 +73,7 @@ def highest_order(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> fl
 
 def columns_of(spectrum: Spectrum) -> dict[str, Any]:
     """Return a spectrum as a table."""
-    axis = {"frequency": "frequency (Hz)", "order": f"order (of {spectrum.shaft or 'the shaft'})"}
-    title = axis.get(spectrum.axis, "quefrency (s)")
-    return {title: spectrum.positions, with_unit(spectrum.scaling, spectrum.unit): spectrum.values}
+    return {spectrum.axis_label: spectrum.positions, with_unit(spectrum.scaling, spectrum.unit): spectrum.values}
 
 
 def _panel(spectrum: Spectrum, cursors: Sequence[Cursor], *, linear: bool = False, name: str = "") -> LinePanel:

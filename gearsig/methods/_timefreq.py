@@ -10,6 +10,7 @@ import numpy as np
 from gearsig import plot, timefreq
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from gearsig.formatting import axis_label
 from gearsig.methods._spectra import cursors_of
 from gearsig.methods._table import (
     LINES,
@@ -198,7 +199,7 @@ def _ridges(
     profiles = [
         LinePanel([ChartLine(first.at, y, n, k) for k, (n, y) in enumerate(zip(names, values, strict=True))], at, label)
         for label, values in (
-            (timefreq.axis_label(first.axis, first.shaft), [ridge.positions for ridge in ridges]),
+            (axis_label(first.axis, first.shaft), [ridge.positions for ridge in ridges]),
             (peak, [ridge.amplitude for ridge in ridges]),
         )
     ]

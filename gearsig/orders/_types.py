@@ -9,6 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, freeze
 from gearsig.errors import InputError
+from gearsig.formatting import axis_label
 from gearsig.results import Result
 from gearsig.spectra import ComplexArray, Scaling
 
@@ -54,7 +55,7 @@ class OrderMap(Result, matrix=("values", "time_s", "positions")):
     @property
     def axis_label(self) -> str:
         """Name of the axis of lines, with its unit."""
-        return f"order (of {self.shaft or 'the shaft'})" if self.axis == "order" else "frequency (Hz)"
+        return axis_label(self.axis, self.shaft)
 
 
 @dataclass(frozen=True)

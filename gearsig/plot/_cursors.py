@@ -131,7 +131,7 @@ def place(
     drawn: list[float] = []
     taken: list[LabelPlace] = []
     result: list[tuple[Cursor, LabelPlace | None]] = []
-    for cursor in sorted(cursors, key=_importance):
+    for cursor in sorted(cursors, key=importance):
         at = (cursor.position - limits[0]) * scale
         if not limits[0] <= cursor.position <= limits[1] or any(abs(at - other) < MIN_DISTANCE_IN for other in drawn):
             continue
@@ -184,8 +184,11 @@ def _cursor(line: OrderLine, scale: float, *, only_one: bool) -> Cursor:
     return Cursor(line.order * scale, line.kind, label, number)
 
 
-def _importance(cursor: Cursor) -> tuple[int, int, float]:
+def importance(cursor: Cursor) -> tuple[int, int, float]:
+    """Return what cursors are sorted by, the most important first: whose label finds a place before others'."""
     rank = PRIORITY.index(cursor.kind) if cursor.kind in PRIORITY else len(PRIORITY)
+    if cursor.kind == "shaft" and cursor.number == 1:  # one turn is known to everybody; its harmonics come later
+        rank = PRIORITY.index("mesh")
     return rank, cursor.number, cursor.position
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import with_minus
 from gearsig.results import Result
 from gearsig.severity._features import FEATURES, IN_WORDS, RELIEF, RISING, SHAPE, SHAPED
 
@@ -151,9 +152,8 @@ class DepthModel:
         if beyond[i] > 0:
             phrase, unit, scale = IN_WORDS.get(FEATURES[i], (FEATURES[i].replace("_", " "), "", 1.0))
             value, lowest, highest = scale * features[i], scale * self.lowest[i], scale * self.highest[i]
-            return (
-                f"{phrase} is {value:.1f} {unit}".rstrip() + f"; theirs {lowest:.1f} to {highest:.1f} {unit}".rstrip()
-            )
+            theirs = f"theirs {lowest:.1f} to {highest:.1f} {unit}".rstrip()
+            return with_minus(f"{phrase} is {value:.1f} {unit}".rstrip() + f"; {theirs}")
         z = self.standardised(features)
         distance = float(np.sqrt(z @ self.precision @ z))  # Mahalanobis
         if distance > self.largest_distance:

@@ -23,6 +23,7 @@ from gearsig.checks import (
     within,
 )
 from gearsig.errors import InputError
+from gearsig.formatting import axis_label
 from gearsig.recording import Recording
 from gearsig.results import Result
 
@@ -83,9 +84,7 @@ class Spectrum(Result, columns=("positions", "values")):
     @property
     def axis_label(self) -> str:
         """Axis with unit, for figures and tables."""
-        if self.axis == "order":
-            return f"order (cycles per revolution of {self.shaft or 'the shaft'})"
-        return {"frequency": "frequency (Hz)", "quefrency": "quefrency (s)"}[self.axis]
+        return axis_label(self.axis, self.shaft)
 
     def index_of(self, position: float) -> int:
         """Index of the line nearest to `position`."""

@@ -13,7 +13,7 @@ from gearsig.timefreq._packets import (
 from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, tops_beside, untangled
 from gearsig.timefreq._squeezing import SqueezeEngine, squeeze_lines
 from gearsig.timefreq._stft import squeezed_stft, squeezed_stft_map, stft, stft_map
-from gearsig.timefreq._types import Axis, Reduction, Ridge, TimeFrequencyMap, at_label, axis_label
+from gearsig.timefreq._types import Axis, Reduction, Ridge, TimeFrequencyMap, at_label
 from gearsig.timefreq._uniform import Source, UniformSignal, uniform
 from gearsig.timefreq._wavelets import (
     Morlet,
@@ -41,7 +41,6 @@ __all__ = [
     "WaveletPackets",
     "admissibility",
     "at_label",
-    "axis_label",
     "band",
     "best_path",
     "component",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, freeze
 from gearsig.errors import InputError
+from gearsig.formatting import axis_label
 from gearsig.results import Result
 from gearsig.spectra import Scaling
 
@@ -196,8 +197,3 @@ class Ridge(Result, columns=("at", "positions", "amplitude", "shared")):
 def at_label(axis: Axis, shaft: str) -> str:
     """Name the direction in which the signal runs."""
     return "time (s)" if axis == "frequency" else f"angle (revolutions of {shaft or 'the shaft'})"
-
-
-def axis_label(axis: Axis, shaft: str) -> str:
-    """Name the direction of the lines."""
-    return "frequency (Hz)" if axis == "frequency" else f"order (of {shaft or 'the shaft'})"

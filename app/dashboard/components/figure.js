@@ -276,14 +276,15 @@ class Figure {
     add(inside, "path", { d: parts.join(""), fill: "none", stroke: line.colour, "stroke-width": line.dots ? 4 : plane ? 0.8 : 1.2, opacity: plane && !line.dots ? 0.6 : null, "stroke-linecap": line.dots ? "round" : null, "stroke-linejoin": "round", "stroke-dasharray": line.dotted ? "2 3" : null });
   }
 
-  // Cursors that the machine implies, and the rows of their labels: the first of a family finds a place first.
+  // Cursors that the machine implies, and the rows of their labels: they come most important first. A sideband has its
+  // label in the row of the mesh lines only, so that none is named unless the others are.
   placed() {
     const rows = Array.from({ length: MAX_ROWS }, () => []), labels = [];
     const seen = this.data.cursors.filter((cursor) => cursor.at >= this.view[0] && cursor.at <= this.view[1]);
-    for (const cursor of [...seen].sort((a, b) => a.number - b.number)) {
+    for (const cursor of seen) {
       const x = this.scale(cursor.at), half = cursor.label.length * 3.4 + 4;
       const row = rows.findIndex((taken) => taken.every(([low, high]) => x + half < low || x - half > high));
-      if (row < 0 || x + half > this.width || x - half < 0) continue;
+      if (row < 0 || (cursor.is_sideband && row > 0) || x + half > this.width || x - half < 0) continue;
       rows[row].push([x - half, x + half]);
       labels.push({ ...cursor, x, row });
     }

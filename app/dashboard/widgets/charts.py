@@ -29,6 +29,7 @@ from gearsig.plot import (
     LevelPanel,
     LinePanel,
     figure_table,
+    importance,
     panels_of,
     plain,
     pooled_levels,
@@ -393,11 +394,11 @@ def _cursor_rows(cursors: Sequence[Cursor], colours: Palette) -> list[dict[str, 
         {
             "at": float(cursor.position),
             "label": plain(cursor.label, LONGEST),
-            "number": cursor.number,
+            "is_sideband": cursor.kind == "sideband",
             "colour": colours.cursors.get(cursor.kind, colours.quiet),
             "dash": dashes[DASHES.get(cursor.kind, "dot")],
         }
-        for cursor in cursors
+        for cursor in sorted(cursors, key=importance)
     ]
 
 
