@@ -36,7 +36,7 @@ from gearsig.methods._table import (
     waveforms_of,
 )
 from gearsig.methods._timefreq import NAMES, levels_answer, levels_of
-from gearsig.plot import ChartLine, Cursor, LinePanel, above_zero, unit_text, with_unit
+from gearsig.plot import ChartLine, Cursor, LinePanel, above_zero, series_colours, unit_text, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.spectra import band_envelope
 from gearsig.timefreq import UniformSignal
@@ -195,14 +195,15 @@ def by_centre(modes: Modes) -> Modes:
 def _spectra_panel(modes: Modes, names: list[str]) -> LinePanel:
     """All modes' spectra on one logarithmic axis, so that their sizes compare."""
     spectra = mode_spectra(modes)
+    colours: tuple[int | str, ...] = (*series_colours(modes.n_modes), -1)
     lines = [
-        ChartLine(s.positions, above_zero(s.values), name, -1 if k == modes.n_modes else k, peaks=True)
-        for k, (name, s) in enumerate(zip((*names, "residual"), spectra, strict=True))
+        ChartLine(s.positions, above_zero(s.values), name, colour, peaks=True)
+        for name, s, colour in zip((*names, "residual"), spectra, colours, strict=True)
     ]
     highest = max(float(line.y[1:].max()) for line in lines)
     cursors = [Cursor(float(c), "mode", str(k), k) for k, c in enumerate(modes.centres, start=1)]
     label = with_unit("amplitude peak", modes.unit)
-    return LinePanel(lines[::-1], spectra[0].axis_label, label, (1e-5 * highest, 3.0 * highest), True, cursors)
+    return LinePanel(lines[::-1], spectra[0].axis_label, label, (1e-3 * highest, 3.0 * highest), True, cursors)
 
 
 def _trials(trials: Any) -> dict[str, Any]:

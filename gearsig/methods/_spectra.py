@@ -287,7 +287,7 @@ def _kurtogram(
         tables={"envelope spectrum": columns_of(spectrum)},
         numbers={"band_hz": [band.low_hz, band.high_hz], "kurtosis": band.kurtosis, "reason": chosen.reason},
         panels=(
-            _kurtosis_panel(grid, recording.sampling_rate_hz),
+            _kurtosis_panel(grid, band, recording.sampling_rate_hz),
             _panel(spectrum, rhythm_cursors(cursors_of(prepared, spectrum)), linear=True),
         ),
         facts=(
@@ -304,16 +304,27 @@ def _kurtogram(
     )
 
 
-def _kurtosis_panel(grid: spectra.Kurtogram, rate_hz: float) -> LevelPanel:
-    """Spectral kurtosis over frequency, a row for each level of the tree."""
+def _kurtosis_panel(grid: spectra.Kurtogram, band: spectra.BandCandidate, rate_hz: float) -> LevelPanel:
+    """Spectral kurtosis over frequency, a row for each level of the tree; the band that was chosen is outlined."""
     rows = np.unique(grid.level)
     n = 3 * 2 ** int(np.ceil(rows.max()))
     at = (np.arange(n) + 0.5) * rate_hz / 2.0 / n
     values = np.zeros((len(rows), n))
     for low, high, level, kurtosis in zip(grid.low_hz, grid.high_hz, grid.level, grid.kurtosis, strict=True):
         values[np.searchsorted(rows, level), (at >= low) & (at < high)] = kurtosis
-    label, span = "level: 2 to the power of it bands", float(np.ptp(values)) or 1.0
-    return LevelPanel(values, at, rows.astype(np.float64), "frequency (Hz)", label, "kurtosis", span=span)
+    # Levels are a third apart, but for the first ones; the row of each reaches halfway to its neighbours.
+    level = float(np.log2(rate_hz / 2.0 / (band.high_hz - band.low_hz)))
+    below, above = level - 0.5 if level <= 1.0 else level - 0.25, level + 0.25
+    ends = np.array([band.low_hz, band.high_hz])
+    outline = (
+        ChartLine(np.repeat(ends, 2), np.array([below, above, above, below]), "the band chosen", 1),
+        ChartLine(ends, np.array([below, below]), "the band chosen", 1),
+    )
+    span = float(np.ptp(values)) or 1.0
+    positions = rows.astype(np.float64)
+    return LevelPanel(
+        values, at, positions, "frequency (Hz)", "level (2^level bands)", "kurtosis", lines=outline, span=span
+    )
 
 
 def _envelope_orders(prepared: PreparedRecording, chosen: spectra.ChosenBand, highest_hz: float) -> Spectrum:

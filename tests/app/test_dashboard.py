@@ -87,7 +87,7 @@ def test_the_machine_can_be_changed_as_text_and_a_wrong_one_is_mended() -> None:
     press(page, "Use this text")
     assert not page.error
     page.session_state[state.TAB] = "Machine"
-    orders = page.run().dataframe[-1].value
+    orders = next(table.value for table in page.run().dataframe if "order of input" in table.value)
     assert 31.0 in set(orders["order of input"])
 
 

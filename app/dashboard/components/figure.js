@@ -3,7 +3,8 @@
 // whole and zoomed along both axes.
 
 const NS = "http://www.w3.org/2000/svg";
-const LEFT = 74, RIGHT = 16, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12;
+const LEFT = 74, RIGHT = 16, SCALE = 70, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12;
+const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 const TOOLS = { cursor: "Cursor", harmonics: "Harmonics", sidebands: "Sidebands" };
 
 export default function ({ data, parentElement, setStateValue }) {
@@ -192,7 +193,7 @@ class Figure {
     const { data, root } = this, style = getComputedStyle(root);
     this.width = root.clientWidth;
     if (!this.width) return;
-    this.plotWidth = Math.max(this.width - LEFT - (data.map ? 70 : RIGHT), 60);
+    this.plotWidth = Math.max(this.width - LEFT - (data.map ? SCALE : RIGHT), 60);
     this.plotHeight = data.height;
     const named = this.placed();
     this.top = 10 + ROW * named.rows;
@@ -239,10 +240,11 @@ class Figure {
   drawAxes() {
     const { svg, data, plotWidth, plotHeight, top } = this, [low, high] = this.limits, bottom = top + plotHeight;
     const quiet = { fill: this.ink, opacity: 0.75 };
+    const powers = data.log && decades(low, high).some((value) => value < 0.001 || value >= 10000);
     for (const value of data.log ? decades(low, high) : ticks(low, high, plotHeight / 45)) {
       const y = this.rise(value);
       add(svg, "line", { x1: LEFT, x2: LEFT + plotWidth, y1: y, y2: y, stroke: this.rule });
-      text(svg, LEFT - 7, y + 4, data.log ? short(value) : plain(value, low, high), { ...quiet, "text-anchor": "end" });
+      text(svg, LEFT - 7, y + 4, data.log ? short(value, powers) : plain(value, low, high), { ...quiet, "text-anchor": "end" });
     }
     for (const value of data.dates ? days(...this.view, plotWidth / 95) : ticks(...this.view, plotWidth / 95)) {
       const x = this.scale(value);
@@ -273,7 +275,7 @@ class Figure {
       for (let i = to - 1; i >= from; i--) band.push(`${this.scale(x[i]).toFixed(1)},${this.rise(low[i]).toFixed(1)}`);
       add(inside, "polygon", { points: band.join(" "), fill: line.colour, opacity: 0.22 });
     }
-    add(inside, "path", { d: parts.join(""), fill: "none", stroke: line.colour, "stroke-width": line.dots ? 4 : plane ? 0.8 : 1.2, opacity: plane && !line.dots ? 0.6 : null, "stroke-linecap": line.dots ? "round" : null, "stroke-linejoin": "round", "stroke-dasharray": line.dotted ? "2 3" : null });
+    add(inside, "path", { d: parts.join(""), fill: "none", stroke: line.colour, "stroke-width": line.dots ? (plane && this.lines.length > 1 ? 2.5 : 4) : plane ? 0.8 : 1.2, opacity: plane && !line.dots ? 0.6 : null, "stroke-linecap": line.dots ? "round" : null, "stroke-linejoin": "round", "stroke-dasharray": line.dotted ? "2 3" : null });
   }
 
   // Cursors that the machine implies, and the rows of their labels: they come most important first. A sideband has its
@@ -338,7 +340,8 @@ class Figure {
     }
     for (const [share, value] of [[1, map.low], [0, map.high]])
       text(this.svg, x + 14, this.top + share * this.plotHeight + (share ? 0 : 9), plain(value, map.low, map.high), { fill: this.ink, opacity: 0.75 });
-    text(this.svg, x + 14, this.top + this.plotHeight / 2, map.unit.startsWith("dB") ? "dB" : map.unit, { fill: this.ink, opacity: 0.75 });
+    const unit = text(this.svg, 0, 0, map.unit, { fill: this.ink, opacity: 0.75, "text-anchor": "middle" });
+    unit.setAttribute("transform", `translate(${x + 26},${this.top + this.plotHeight / 2}) rotate(-90)`);
   }
 
   band(from, to, tall = null) {
@@ -505,7 +508,12 @@ const html = (name, kind = "") => Object.assign(document.createElement(name), { 
 const range = (low, high) => Array.from({ length: high - low + 1 }, (_, i) => low + i);
 const same = (a, b) => Math.abs(a[0] - b[0]) + Math.abs(a[1] - b[1]) < 1e-9 * Math.abs(a[1] - a[0]) + 1e-15;
 const figure = (value) => String(Number(value.toPrecision(6)));
-const short = (value) => (value >= 0.001 && value < 10000 ? String(Number(value.toPrecision(2))) : value.toExponential(0).replace("e", "e"));
+// A number beside a logarithmic axis; as a power of ten where some of them are far from one, then all of them.
+function short(value, powers) {
+  const exponent = Math.round(Math.log10(value));
+  if (!powers || Math.abs(Math.log10(value) - exponent) > 1e-9) return String(Number(value.toPrecision(2)));
+  return `10${[...String(exponent)].map((digit) => SUPERSCRIPTS[digit]).join("")}`;
+}
 
 function set(made, looks) {
   for (const [name, value] of Object.entries(looks)) if (value !== null && value !== undefined) made.setAttribute(name, value);

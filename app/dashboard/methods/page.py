@@ -158,8 +158,7 @@ def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | Cann
         _show_space(page, answer.path)
     elif not answer.panels and answer.waveforms is None:
         charts.show_figure(answer.draw(), f"{answer.caption}, {answer.channel}", page.key("figure"))
-    for note in answer.notes:
-        st.caption(as_typed(note))
+    st.caption(" ".join(as_typed(note) for note in answer.notes))
     if answer.waveforms is not None and "signal" in answer.waveforms.columns:
         _show_waveforms(page, answer.waveforms, angle)
     for what, table in answer.tables.items():

@@ -20,6 +20,7 @@ from gearsig.rig import QUANTITIES, Rig, bearing_catalogue, order_lines, rig_fro
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+    from streamlit.delta_generator import DeltaGenerator
 
 Table = dict[str, Any]
 COLUMNS: dict[str, tuple[str, ...]] = {
@@ -78,9 +79,8 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
     if is_unknown:  # the speed alone says most, and takes one number
         show_stated(file)
     with st.container(key="machine"):
-        form, follows = st.columns((7, 5), gap="medium")
-        with form:
-            edited = _form(file, table, text, channels)
+        first, follows = st.columns((5, 8), gap="medium")
+        edited = _form(file, table, text, channels, first)
         with follows:
             _show_consequences(edited, is_told=is_told and edited == table)
     if _rig_of(edited) != _rig_of(table):
@@ -137,19 +137,23 @@ def _take(file: ChosenFile, text: str) -> None:
     st.session_state[version] = st.session_state.get(version, 0) + 1
 
 
-def _form(file: ChosenFile, table: Table, text: str, channels: Sequence[str]) -> Table:
-    """Return the rig's table with what the form says; keys that the form does not show stay."""
+def _form(file: ChosenFile, table: Table, text: str, channels: Sequence[str], first: DeltaGenerator) -> Table:
+    """Return the rig's table with what the form says; keys that the form does not show stay.
+
+    Name and shafts go into the place `first`, the wider tables below it.
+    """
     version = st.session_state.get(state.source_key("machine version", file.sha256), 0)
 
     def key(name: str) -> str:
         return state.source_key(f"{name} {version}", f"{file.sha256} {len(text)}")
 
     edited: Table = dict(table)
-    name = st.text_input("Machine", table.get("name", ""), key=key("machine name"))
+    name = first.text_input("Machine", table.get("name", ""), key=key("machine name"))
     edited |= {"name": name} if name else {}
     for kind in COLUMNS:
-        st.markdown(f"**{TITLES[kind]}**")
-        edited[kind] = _edit(kind, list(table.get(kind, [])), edited, key(kind), channels)
+        with first if kind == "shaft" else st.container():
+            st.markdown(f"**{TITLES[kind]}**")
+            edited[kind] = _edit(kind, list(table.get(kind, [])), edited, key(kind), channels)
     speed = _edit_speed(dict(table.get("speed", {})), edited, key, channels)
     edited = {name: value for name, value in edited.items() if value not in ([], {})}
     edited.pop("speed", None)
@@ -164,7 +168,13 @@ def _edit(kind: str, rows: list[Table], rig: Table, key: str, channels: Sequence
     numbers = [c for c in columns if c.endswith(("_teeth", "_mm", "elements")) or c == "scale"]
     frame = frame.astype(dict.fromkeys(numbers, "float64") | {c: "object" for c in columns if c not in numbers})
     result = st.data_editor(
-        frame, key=key, num_rows="dynamic", hide_index=True, width="stretch", column_config=_config(kind, rig, channels)
+        frame,
+        key=key,
+        num_rows="dynamic",
+        hide_index=True,
+        width="stretch",
+        placeholder="",
+        column_config=_config(kind, rig, channels),
     )
     return [row for row in _rows(result, rows) if row]
 
@@ -254,14 +264,15 @@ def _show_consequences(table: Table, *, is_told: bool) -> None:
     if not rig.shafts:
         st.caption(":material/account_tree: Name a shaft: its orders follow, and with teeth those of the mesh.")
         return
-    st.image(train_svg(rig, palette().quiet), width="stretch", alt="Drawing of the gear train")
+    drawing, orders = st.columns((3, 4))
+    drawing.image(train_svg(rig, palette().quiet), width="stretch", alt="Drawing of the gear train")
     lines = [line for line in order_lines(rig, rig.reference_shaft, n_sidebands=0) if line.kind != "sideband"]
     turns = (rig.nominal_speed_rpm() or 0.0) / 60.0
     table = {"line": [line.label for line in lines], f"order of {rig.reference_shaft}": [line.order for line in lines]}
     if turns:
-        table["Hz, nominal"] = [line.order * turns for line in lines]
+        table["Hz"] = [line.order * turns for line in lines]
     number = st.column_config.NumberColumn(format="%.5g")
-    st.dataframe(table, hide_index=True, height=300, column_config=dict.fromkeys(list(table)[1:], number))
+    orders.dataframe(table, hide_index=True, height=300, column_config=dict.fromkeys(list(table)[1:], number))
 
 
 def train_svg(rig: Rig, ink: str) -> str:
