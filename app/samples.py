@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import date, timedelta
 from functools import cache
 from pathlib import Path
+from shutil import copyfile
 
 import gearsig
 from gearsig.errors import InputError
@@ -70,3 +72,29 @@ def samples() -> tuple[SampleRecording, ...]:
         found += [SampleRecording(path, rig, title, about, healthy) for path in recordings]
     order = list(_SHOWN)
     return tuple(sorted(found, key=lambda s: order.index(s.rig.stem) if s.rig.stem in order else len(order)))
+
+
+_MACHINES = {"Mixer 1": "damaged_tooth", "Mixer 2": "outer_race", "Mixer 3": "healthy"}
+"""Of the example of a fleet: machine → the sample that it becomes like."""
+N_HEALTHY, N_LATER, PIECE_S = 10, 3, 2.0
+EXAMPLE_PATTERN = "{machine}/{point}_{date:%Y%m%d}.h5"
+
+
+def write_example_fleet(folder: Path) -> None:
+    """Write three gearboxes' recordings over half a year into a folder for each, named by `EXAMPLE_PATTERN`.
+
+    They are pieces of the samples, which overlap, at invented dates: all machines are healthy at first.
+    """
+    from gearsig.recording import read_recording, write_recording
+
+    known = {sample.rig.stem: sample for sample in samples()}
+    for k, (machine, later) in enumerate(_MACHINES.items()):
+        (folder / machine).mkdir(parents=True)
+        for stem, n, first in (("healthy", N_HEALTHY, 0), (later, N_LATER, N_HEALTHY)):
+            whole = read_recording(known[stem].recording)
+            for i in range(n):
+                start_s = 0.02 * (k + first / N_HEALTHY) + (whole.duration_s - PIECE_S - 0.1) * i / n
+                day = date(2026, 1, 5) + timedelta(weeks=2 * (first + i))
+                path = folder / machine / f"gearbox_{day:%Y%m%d}.h5"
+                write_recording(whole.between(start_s, start_s + PIECE_S), path)
+                copyfile(known[stem].rig, path.with_suffix(".toml"))

@@ -34,6 +34,7 @@ from gearsig.comparison import (
     missing_words,
 )
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import axis_label
 from gearsig.gap import OperatingCondition
 from gearsig.plot import ChartLine, unit_text, with_unit
 from gearsig.prepared import refined_angle
@@ -346,7 +347,7 @@ def _show_orders(comparison: Comparison, channel: ChannelComparison) -> None:
     at = np.array([line.order for line in lines])
     off = np.array([line.level.difference_db for line in lines])
     beyond = np.array([line.level.is_beyond for line in lines], dtype=bool)
-    name = f"order of {comparison.reference_shaft or 'the shaft'}"
+    name = axis_label("order", comparison.reference_shaft)
     show_differences(at, off, beyond, name, f"lines of {source}", shown, "simulated − recorded")
     st.caption(
         "Simulated less recorded, line by line; grey is within the records' own scatter. Zooming above zooms here."

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,18 +18,22 @@ from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import QUIET, Axes, padded_limits, show_lines
 from app.dashboard.widgets.chooser import open_file
 from app.dashboard.widgets.verdict import COLOURS
+from app.dashboard.work import kept
+from app.samples import EXAMPLE_PATTERN, write_example_fleet
 from gearsig.diagnosis import Outcome
 from gearsig.errors import InputError
-from gearsig.fleet import Fleet, Trend, change_text, open_fleet, trends_text
-from gearsig.plot import ChartLine
+from gearsig.fleet import Fleet, Trend, TrendSettings, change_text, open_fleet, trends_text
+from gearsig.formatting import with_minus
+from gearsig.plot import ChartLine, with_unit
 from gearsig.recording import sha256_of
 from gearsig.rig import rig_file_beside
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-STORE, SEARCHED, MACHINE, POINT, SERIES = (
+STORE, EXAMPLE, SEARCHED, MACHINE, POINT, SERIES = (
     "fleet store",
+    "fleet example",
     "fleet search",
     "fleet machine",
     "fleet point",
@@ -59,6 +66,8 @@ gearsig fleet watch incoming --pattern '{machine}/{point}_{date:%Y%m%d-%H%M}.csv
 
 def show() -> None:
     """Choose a store, a machine and an indicator, show it over time; worst first throughout."""
+    if EXAMPLE in st.session_state:  # a widget's value is set before it is drawn
+        st.session_state[STORE] = st.session_state.pop(EXAMPLE)
     with st.sidebar:
         folder = st.text_input(
             "Folder of the fleet",
@@ -76,11 +85,11 @@ def show() -> None:
     except InputError as error:
         if (path / "store.json").exists() or "gearsig[fleet]" in str(error):
             raise
-        st.markdown(HOW_TO_FILL)
+        _show_how_to_begin()
         st.caption(as_typed(f"Looked for in {path.absolute()}."))
         return
     if status.empty:
-        st.markdown(HOW_TO_FILL)
+        _show_how_to_begin()
         return
     _show_counts(status)
     left, right = st.container(key="fleet").columns((3, 8), gap="medium")
@@ -90,6 +99,25 @@ def show() -> None:
         _show_point(fleet, status[(status["machine"] == machine) & (status["point"] == point)].iloc[0].to_dict())
     for text in messages:
         st.caption(f":material/info: {as_typed(text)}")
+
+
+@kept(1, "Analysing half a year of three gearboxes …")
+def example_store() -> str:
+    """Return the folder of a store of the samples' own, which lasts as long as the dashboard."""
+    folder = Path(mkdtemp(prefix="gearsig-fleet-"))
+    atexit.register(rmtree, folder, ignore_errors=True)
+    write_example_fleet(folder / "recordings")
+    fleet = open_fleet(folder / "store", create=True)
+    fleet.set(TrendSettings(n_baseline=8))
+    fleet.add([folder / "recordings"], pattern=EXAMPLE_PATTERN)
+    return str(folder / "store")
+
+
+def _show_how_to_begin() -> None:
+    st.markdown(HOW_TO_FILL)
+    if st.button("See an example", icon=":material/play_arrow:", help="Three gearboxes made of the samples; 10 s."):
+        st.session_state[EXAMPLE] = example_store()
+        st.rerun()
 
 
 def _show_counts(status: DataFrame) -> None:
@@ -213,10 +241,9 @@ def _show_trend(fleet: Fleet, row: Row) -> None:
     beyond = (table["level"] != "ok").to_numpy() & np.isfinite(value)
     marked = list(zip(days[beyond], value[beyond], strict=True))
     margin = max(0.02 * float(np.ptp(days)), 0.5)
-    unit = f" ({trend.unit})" if trend.unit else ""
     limits = padded_limits([value, *([high] if np.isfinite(high).any() else [])])
     span = (float(days[0]) - margin, float(days[-1]) + margin)
-    axes = Axes("date", f"{trend.name}{unit}", span, limits, dates=True)
+    axes = Axes("date", with_minus(with_unit(trend.name, trend.unit)), span, limits, dates=True)
     show_lines(
         lines, axes, f"trend of {row['machine']} {row['point']} {_series_words(row)}", marked=marked, legend=True
     )

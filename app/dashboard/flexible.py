@@ -162,7 +162,10 @@ def show_pair() -> None:
         said = {way: row[f"jump_{way}_hz"] for way in ("up", "down")}
         jumps = ", ".join(f"{way}: {'no jump' if hz is None else f'jump at {hz:.0f} Hz'}" for way, hz in said.items())
         st.caption(f"Torsional mode {row['torsional_mode_hz']:.0f} Hz. Sweep {jumps}. {row['n_steps']} steps.")
-    st.caption("Short sweeps load the teeth by the rotors' inertia, more on the way up than on the way down.")
+    st.caption(
+        "Full: sweep up; dotted: sweep down. Short sweeps load the teeth by the rotors' inertia, more on the way up "
+        "than on the way down."
+    )
     download("Sweeps as CSV", pair_study.sweeps_csv(study).encode(), "sweeps.csv", "text/csv")
 
 

@@ -92,7 +92,7 @@ OF_THE_WAVEFORM = (
 )
 
 OF_THE_DEPTH = (
-    "The crack's depth is that of `gearsig crack`, {depth:.2g} mm ({low:.2g} to {high:.2g} mm): of the machines that "
+    "The crack's depth is that of gearsig crack, {depth:.2g} mm ({low:.2g} to {high:.2g} mm): of the machines that "
     "it was calibrated on, the interval holds nine in ten. How likely a crack is, is said here from all features and "
     "from trials on the twin, and there from the shape of one tooth's event alone: the two can differ."
 )

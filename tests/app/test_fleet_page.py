@@ -57,6 +57,21 @@ def test_an_empty_store_says_how_to_fill_it(tmp_path):
     assert "gearsig fleet add" in shown_text(opened(tmp_path / "empty"))
 
 
+def test_an_empty_page_shows_an_example_whose_damaged_machines_are_alarms(tmp_path):
+    page = opened(tmp_path / "nothing")
+    next(button for button in page.button if button.label == "See an example").click().run()
+    assert not page.exception
+    assert "3 machines, 3 measuring points" in shown_text(page)
+    assert "alarm" in {level for name in ("Mixer 1", "Mixer 2") for level in _levels(page, name)}
+    assert _levels(page, "Mixer 3") == ["ok"]
+    assert not (tmp_path / "nothing").exists()
+
+
+def _levels(page: AppTest, machine: str) -> list[str]:
+    status = open_fleet(Path(page.session_state[STORE])).status()
+    return list(status.loc[status["machine"] == machine, "level"])
+
+
 def test_without_the_extra_the_page_says_what_to_install(tmp_path, monkeypatch):
     open_fleet(tmp_path / "store", create=True)
     monkeypatch.setitem(__import__("sys").modules, "duckdb", None)

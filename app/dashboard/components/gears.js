@@ -1,6 +1,6 @@
 // A gear pair that turns in step with a cursor in its signal: play, or drag the cursor.
 
-const MODULE = 13, CYCLES_PER_S = 2.5;
+const MODULE = 22, RIM = 5 * MODULE, CYCLES_PER_S = 2.5;
 const APPROACH = 0.8; // mesh cycles from a tooth's entry to its middle on the line of centres, at a contact ratio of 1.6
 
 export default function ({ data, parentElement }) {
@@ -87,12 +87,18 @@ class Gears {
   drawWheels() {
     const [context, width, height] = ready(this.wheels), { teeth, cracked, colours } = this.data;
     const radii = teeth.map((n) => (n * MODULE) / 2), turned = this.at - APPROACH;
+    context.fillStyle = this.ink;
+    context.font = "12px system-ui, sans-serif";
+    context.fillText(`driver, ${teeth[0]} teeth`, 10, 18);
+    context.fillText(`driven, ${teeth[1]} teeth`, 10, 0.64 * height);
+    // the driver is above the driven gear: the mesh lies along the width
     context.translate(width / 2, height / 2);
+    context.rotate(Math.PI / 2);
     wheel(context, -radii[0], radii[0], teeth[0], (k) => ((turned - k) * 2 * Math.PI) / teeth[0], cracked.driver, colours, this.ink);
     wheel(context, radii[1], radii[1], teeth[1], (k) => Math.PI - ((turned - k - 0.5) * 2 * Math.PI) / teeth[1], cracked.driven, colours, this.ink);
     // the force of the line in front, along the line of action
     const line = this.lines[this.lines.length - 1], force = value(line, line.force, this.at);
-    const length = (90 * force) / this.data.force, angle = ((90 - 20) * Math.PI) / 180;
+    const length = (110 * force) / this.data.force, angle = ((90 - 20) * Math.PI) / 180;
     const tip = [length * Math.cos(angle), -length * Math.sin(angle)];
     context.strokeStyle = context.fillStyle = line.colour;
     context.lineWidth = 4;
@@ -133,7 +139,7 @@ function wheel(context, x, radius, n, angleOf, cracked, colours, ink) {
     const middle = angleOf(k), isCracked = k + 1 === cracked;
     context.beginPath();
     for (const [r, share] of profile) context.lineTo(r * Math.cos(middle + share * step), -r * Math.sin(middle + share * step));
-    const inner = root - 60;
+    const inner = root - RIM;
     context.lineTo(inner * Math.cos(middle + step / 2), -inner * Math.sin(middle + step / 2));
     context.lineTo(inner * Math.cos(middle - step / 2), -inner * Math.sin(middle - step / 2));
     context.closePath();
