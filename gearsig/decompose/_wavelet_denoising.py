@@ -78,7 +78,10 @@ def apply(d: FloatArray, threshold: float, rule: str) -> FloatArray:
 
 ThresholdName = Literal["universal", "sure", "bayes"]
 RuleName = Literal["soft", "hard", "garrote"]
-NoiseScope = Literal["finest level", "each level"]
+NoiseScope = Literal["quietest level", "finest level", "each level"]
+MIN_QUIET, QUIETER = 500, 0.8
+"""Coefficients that a level must have to count as the quietest, and by which factor it must be quieter than the finest:
+of white noise, levels of so many scatter by 5 %."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +102,10 @@ class DenoiseSettings:
     n_levels : int or None
         None: as many as leave eight filter lengths on the coarsest one, `deepest_level` at most.
     noise : str
-        Where the noise's standard deviation is estimated: "finest level" (white noise), or "each level" by itself
-        (coloured noise; steady tones that fill a level are then taken for noise).
+        Where the noise's standard deviation is estimated. White noise has the same on all levels, a signal only adds to
+        it: "quietest level" takes the least of all, "finest level" the usual one, which must be free of signal: that of
+        gears, whose mesh harmonics reach up to it, seldom is. "each level" by itself is for coloured noise; steady
+        tones that fill a level are then taken for noise.
     noise_rms : float or None
         The noise's standard deviation where it is known, in the signal's unit; white. None: estimated.
     n_shifts : int
@@ -117,7 +122,7 @@ class DenoiseSettings:
     rule: RuleName = "soft"
     wavelet: str = "sym8"
     n_levels: int | None = None
-    noise: NoiseScope = "finest level"
+    noise: NoiseScope = "quietest level"
     noise_rms: float | None = None
     n_shifts: int = 8
 
@@ -176,7 +181,7 @@ class Denoised(Result, columns=("time_s", "values", "removed")):
     levels : tuple of DenoisedLevel
         Finest first. What is coarser than the last one is kept as it is.
     noise_rms : float
-        Estimated standard deviation of the noise: of the finest level, in the signal's unit.
+        Estimated standard deviation of the noise, in the signal's unit; of the finest level, where each has its own.
     settings : DenoiseSettings
         With the number of levels used.
     unit, source : str
@@ -311,6 +316,9 @@ def _denoise_shifted(
     moved = np.pad(x, (shift, 0), mode="symmetric")
     approximation, *details = pywt.wavedec(moved, settings.wavelet, mode="symmetric", level=n_levels)
     noise = noise_rms if noise_rms is not None else noise_level(details[-1])
+    if noise_rms is None and settings.noise == "quietest level":
+        quietest = min((noise_level(d) for d in details if len(d) >= MIN_QUIET), default=noise)
+        noise = quietest if quietest < QUIETER * noise else noise
     numbers = np.empty((n_levels, 3))
     for i, d in enumerate(details):
         level = n_levels - i

@@ -262,12 +262,12 @@ def _denoising(
         with_unit("threshold", unit): np.array([level.threshold for level in denoised.levels]),
         "kept (%)": np.array([100.0 * level.kept_share for level in denoised.levels]),
     }
-    finest, warnings = denoised.levels[0].band_hz, list[str]()
+    warnings = list[str]()
     if denoised.removed_share > MOST_NOISE:
         warnings.append(
-            f"{100.0 * denoised.removed_share:.3g} % of the energy was taken for noise: what is loud from "
-            f"{finest[0]:.4g} to {finest[1]:.4g} Hz, where the noise is measured, is rather lines or impacts. Take the "
-            "threshold bayes, which keeps most; of steady lines a spectrum or a synchronous average"
+            f"{100.0 * denoised.removed_share:.3g} % of the energy was taken for noise: lines or impacts may fill the "
+            "levels on which it is measured. Take white noise of the quietest level; of steady lines a spectrum or a "
+            "synchronous average"
         )
     return MethodAnswer(
         channel,
@@ -278,8 +278,8 @@ def _denoising(
         numbers={"removed_share": denoised.removed_share, "noise_rms": denoised.noise_rms},
         facts=(
             (
-                f"Removed: **{100.0 * denoised.removed_share:.3g} %** of the energy. Estimated noise on the finest "
-                f"level: **{readable(denoised.noise_rms)} {unit_text(unit)}** rms."
+                f"Removed: **{100.0 * denoised.removed_share:.3g} %** of the energy. Estimated noise: "
+                f"**{readable(denoised.noise_rms)} {unit_text(unit)}** rms."
             ),
         ),
         notes=(
@@ -381,9 +381,9 @@ PARTS = {
                 choices=_same("soft", "hard", "garrote"),
             ),
             MethodOption(
-                "noise", "Noise", "choice", "finest level",
-                "White: one size of noise for all levels, from the finest. Coloured: each level has its own.",
-                choices={"finest level": "White", "each level": "Coloured"},
+                "noise", "Noise", "choice", "quietest level",
+                "White: one size of noise for all levels, of the quietest or of the finest. Coloured: one of each.",
+                choices={"quietest level": "White", "finest level": "White, finest level", "each level": "Coloured"},
             ),
             MethodOption(
                 "wavelet", "Wavelet", "choice", "sym8", choices=_same("sym8", "sym4", "db4", "db8", "coif3", "haar"),

@@ -225,3 +225,14 @@ def test_settings_that_do_not_do(wrong):
 
 def test_deepest_level_is_pywts():
     assert deepest_level(1000, "sym8") == pywt.dwt_max_level(1000, pywt.Wavelet("sym8").dec_len)
+
+
+def test_lines_that_fill_the_finest_level_are_no_noise() -> None:
+    rng = np.random.default_rng(3)
+    noise = 0.1 * rng.standard_normal(1 << 15)
+    lines = 5.0 * np.cos(2.3 * np.arange(1 << 15)) + 3.0 * np.cos(2.6 * np.arange(1 << 15))
+    kept = denoise(lines + noise, 1.0)
+    taken = denoise(lines + noise, 1.0, DenoiseSettings(noise="finest level"))
+    assert kept.noise_rms == pytest.approx(0.1, rel=0.15)
+    assert kept.removed_share < 0.01
+    assert taken.removed_share > 0.9
