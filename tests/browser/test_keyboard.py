@@ -105,4 +105,10 @@ def test_a_plane_is_zoomed_by_keys_along_both_axes(page: playwright.Page) -> Non
     page.mouse.down()
     page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.5 * box["height"], steps=3)
     page.mouse.up()
-    assert figure.evaluate(numbers) != whole
+    near = figure.evaluate(numbers)
+    assert near != whole
+    page.wait_for_function("new URL(location).searchParams.get('zoom')?.split('_').length === 5")
+    page.reload()  # the address keeps both axes
+    figure.wait_for()
+    settle(page)
+    assert figure.evaluate(numbers) == near

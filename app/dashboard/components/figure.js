@@ -32,7 +32,7 @@ class Figure {
     this.svg.addEventListener("pointerdown", (event) => this.press(event));
     this.svg.addEventListener("pointermove", (event) => this.hover(event));
     this.svg.addEventListener("pointerleave", () => this.showTip(null));
-    this.svg.addEventListener("dblclick", () => this.look(this.whole));
+    this.svg.addEventListener("dblclick", () => this.look(this.whole, null));
     this.svg.addEventListener("keydown", (event) => this.type(event));
     new ResizeObserver(() => this.data && this.root.clientWidth !== this.width && this.draw()).observe(root);
   }
@@ -46,7 +46,8 @@ class Figure {
     // An answer to an earlier question does not undo a zoom that is under way.
     if (!stays && (!asked || same(asked, data.shown))) {
       this.view = data.shown;
-      this.asked = this.across = null;
+      this.asked = null;
+      this.across = data.across ?? null;
     }
     this.drawBar();
     this.draw();
@@ -61,12 +62,11 @@ class Figure {
     const span = Math.min(high - low, this.whole[1] - this.whole[0]);
     low = Math.max(this.whole[0], Math.min(low, this.whole[1] - span));
     this.view = [low, low + span];
-    this.across = same(this.view, this.whole) ? null : across; // of a plane: the values shown
+    this.across = across; // of a plane: the values shown
     this.asked = this.data.plane ? null : this.view;
     this.draw();
-    if (this.data.plane) return;
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => this.tell(this.view), 200);
+    this.timer = setTimeout(() => this.tell([...this.view, ...(this.across ?? [])]), 200);
   }
 
   type(event) {
@@ -88,7 +88,7 @@ class Figure {
       ArrowRight: () => push(1),
       "+": () => this.look([middle - span / 4, middle + span / 4]),
       "-": () => this.look([middle - span, middle + span]),
-      0: () => this.look(this.whole),
+      0: () => this.look(this.whole, null),
       Escape: () => this.choose(""),
     }[event.key];
     if (next) {
@@ -461,7 +461,7 @@ class Figure {
       if (this.lines.length)
         right.append(button("Peaks", () => { this.peaks = !this.peaks; this.drawBar(); this.draw(); }, "Table of the highest peaks shown", this.peaks));
     }
-    right.append(button("Whole", () => this.look(this.whole), "Show all of it (double click, or key 0)"));
+    right.append(button("Whole", () => this.look(this.whole, null), "Show all of it (double click, or key 0)"));
     for (const kind of ["PNG", "SVG", "CSV"]) right.append(button(kind, () => this.save(kind), `Save what is shown as ${kind}`));
     this.bar.replaceChildren(left, right);
   }

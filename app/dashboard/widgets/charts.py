@@ -164,19 +164,36 @@ def looked_at(key: str, whole: tuple[float, float], first: tuple[float, float] |
 
     The page's address keeps the last one, so that a view can be sent.
     """
-    name = f"{crc32(key.encode()):x}"
-    try:
-        low, high = (float(end) for end in st.session_state[key]["range"])
-        is_whole = low <= whole[0] and high >= whole[1]
-        state.address(ZOOM, "" if is_whole else f"{name}_{low:.7g}_{high:.7g}")
-    except (KeyError, TypeError, ValueError):
-        named, *ends = st.query_params.get(ZOOM, "").split("_")
-        low, high = first or whole
-        if named == name and len(ends) == 2:
-            with suppress(ValueError):
-                low, high = map(float, ends)
+    ends, is_new = _zoomed(key)
+    if is_new:
+        is_whole = ends[0] <= whole[0] and ends[1] >= whole[1] and len(ends) == 2
+        state.address(ZOOM, "" if is_whole else "_".join([_name(key), *(f"{end:.7g}" for end in ends)]))
+    low, high = ends[:2] or first or whole
     low, high = max(low, whole[0]), min(high, whole[1])
     return (low, high) if low < high else whole
+
+
+def _zoomed(key: str) -> tuple[list[float], bool]:
+    """Return what a figure was zoomed to, low and high, of a plane those of its values as well; empty where it was not.
+
+    And whether the figure says so, which the address does not yet.
+    """
+    with suppress(KeyError, TypeError, ValueError):
+        ends = [float(end) for end in st.session_state[key]["range"]]
+        if len(ends) in (2, 4):
+            return ends, True
+    named, *words = st.query_params.get(ZOOM, "").split("_")
+    if named == _name(key) and len(words) in (2, 4):
+        with suppress(ValueError):
+            ends = [float(word) for word in words]
+            if np.all(np.isfinite(ends)) and ends[-2] < ends[-1]:
+                return ends, False
+    return [], False
+
+
+def _name(key: str) -> str:
+    """Return what the address calls a figure."""
+    return f"{crc32(key.encode()):x}"
 
 
 def show_lines(
@@ -235,6 +252,7 @@ def show_lines(
         "step": step,
         "spans": list(spans),
         "plane": is_plane,
+        "across": _zoomed(key)[0][2:] or None if is_plane else None,
     }
     _figure(key=key, data=data, on_range_change=_ignore, default={"range": None})
 
