@@ -207,20 +207,6 @@ def _copies(n_values: float, kind: type = np.float64) -> Run:
     return run
 
 
-def _transforms(n: int, n_inverse: float = 0) -> Run:
-    """Return a run of one real transform forth, and so many complex ones back."""
-    from scipy.fft import ifft, rfft
-
-    x, z = trial_signal(n), np.ones(n, dtype=np.complex128)
-
-    def run() -> None:
-        rfft(x)
-        for _ in range(int(n_inverse)):
-            ifft(z)
-
-    return run
-
-
 def _power_density(n: int) -> TimedCase:
     from scipy import fft, signal
 

@@ -20,7 +20,7 @@ Recordings that depend on each other (minutes apart), or scatter with long tails
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, log
+from math import exp
 from typing import Any
 
 import numpy as np
@@ -312,8 +312,3 @@ def decibels(values: FloatArray, baseline: BoolArray) -> tuple[FloatArray, BoolA
     with np.errstate(invalid="ignore", divide="ignore"):
         levels = 20.0 * np.log10(np.maximum(values, floor))
     return np.where(in_db, levels, values), in_db
-
-
-def false_alarm_text(rate: float) -> str:
-    """Say a rate as people count: once in so many recordings."""
-    return f"once in {round(1 / rate, -int(log(1 / rate) / log(10)) + 1):,.0f} recordings".replace(",", " ")

@@ -140,11 +140,6 @@ class Window:
         return sums if self.n_samples > 2 * len(sums) else ()
 
     @cached_property
-    def coherent_gain(self) -> float:
-        """Mean of the values: what a bin-centred sine is multiplied by."""
-        return self.coefficients[0] if self.coefficients else float(self.values.mean())
-
-    @cached_property
     def noise_bandwidth_bins(self) -> float:
         """Equivalent noise bandwidth in lines, n Σw² / (Σw)²: 1 for rectangular, 1.5 for Hann."""
         if self.coefficients:
