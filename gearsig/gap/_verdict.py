@@ -201,7 +201,8 @@ def _how_far(report: GapReport) -> str:
     if not shrinkage.is_predicted:
         return f"How far: not known; {report.causes[0].title} {hardly_predicted(shrinkage)}."
     s, both = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
-    percent = f"{100 * s.value:.0f} % ({100 * s.low:.0f} to {100 * s.high:.0f} %)"
+    low, high = (f"{100 * end:.0f}" for end in (s.low, s.high))
+    percent = f"{100 * s.value:.0f} %" + (f" ({low} to {high} %)" if low != high else "")
     shrinks = f"shrinks {both}, by {percent} of what exceeds one,"
     if s.value <= 0.0:
         shrinks = "does not shrink"

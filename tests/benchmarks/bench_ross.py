@@ -1,8 +1,8 @@
 """ROSS's gear element and this package on the same pairs, side by side: mesh stiffness, contact ratio, speed.
 
-`python tests/benchmarks/bench_ross.py` prints the table. It needs `ross-rotordynamics` 2.3 in an environment of its
-own, whose interpreter is given as ROSS_PYTHON: ROSS asks for other versions of libraries than gearsig, and no part of
-gearsig imports it. Seconds are those of the processor.
+`python tests/benchmarks/bench_ross.py` prints the table. It needs `ross-rotordynamics` 2.3 with `plotly<6` in an
+environment of its own, whose interpreter is given as ROSS_PYTHON: ROSS asks for other versions of libraries than
+gearsig, and no part of gearsig imports it. Seconds are those of the processor.
 """
 
 import json

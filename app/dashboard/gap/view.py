@@ -228,7 +228,7 @@ def _show_verdict(report: GapReport) -> None:
     st.markdown(f"### {as_typed(capitalised(kind.title))}{as_typed(place)} :gray[{_percent(kind.probability)}]")
     likely = [c for c in report.causes if c.group == kind.group and c.probability >= LIKELY]
     words = (f":{colour}-badge[{as_typed(c.title)} {_percent(c.probability)}]" for c in likely)
-    st.markdown(f"{'It is' if len(likely) == 1 else 'It may be'} {' '.join(words)}")
+    st.markdown(f"{'Cause' if len(likely) == 1 else 'Possible causes'}: {' '.join(words)}")
 
 
 LIKELY = 0.05
