@@ -94,7 +94,7 @@ def analyze(
     InputError
         If there is no vibration channel, the record is shorter than 256 samples, or the reference has none of its
         channels or is the recording itself. Names that differ by a record's number only are one channel's, and so
-        are those of the only vibration channels of both.
+        are those of the only vibration channels of both, unless only a sensor's number differs.
     """
     prepared = prepare(recording, rig)
     _check_size(prepared.recording)
@@ -328,12 +328,13 @@ def _check_vibration(recording: Recording) -> None:
 def _named_alike(recording: Recording, healthy: PreparedRecording) -> PreparedRecording:
     """Return the reference with the recording's names of channels that differ by a record's number only.
 
-    It has three digits or more: fewer tell sensors apart. Where both have only one vibration channel, it is taken for
-    the same one, whatever it is called. The renamed one is kept with the other, and what is found in it as well.
+    It has three digits or more: fewer tell sensors apart, a1 from a2. Where both have only one vibration channel, it is
+    taken for the same one under any other name. The renamed one is kept with the other, and what is found in it too.
     """
     reference = healthy.recording
     theirs, ours = reference.vibration_names(), recording.vibration_names()
-    if len(theirs) == len(ours) == 1 and ours[0] not in reference.channel_names:
+    is_other_name = len({re.sub(r"\d+", "", name) for name in (*theirs, *ours)}) > 1
+    if len(theirs) == len(ours) == 1 and is_other_name and ours[0] not in reference.channel_names:
         return _renamed(healthy, {theirs[0]: ours[0]})
 
     def without_number(name: str) -> str:

@@ -136,7 +136,7 @@ def _cepstrum(prepared: PreparedRecording, channel: str, lowest: float | None, h
     spectrum = spectra.cepstrum(prepared.recording, channel)
     end = float(spectrum.positions[-1])
     longest = max((cursor.position for cursor in periods_of(prepared)), default=end)
-    low = min(LONGEST_ECHO_S, end / 8.0) if lowest is None else lowest
+    low = min(LONGEST_ECHO_S, (highest or end) / 8.0) if lowest is None else lowest
     high = max(min(3.5 * longest, end), 2.0 * low) if highest is None else highest
     return _spectrum_answer(prepared, channel, spectrum, "real cepstrum: families of lines as one peak", low, high)
 

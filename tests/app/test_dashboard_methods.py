@@ -286,7 +286,10 @@ def test_denoised_and_removed_make_the_signal() -> None:
     choose(page, "Threshold", "bayes")
     choose(page, "Noise", "Coloured")
     assert not page.error
-    assert np.std(curves(page)["removed"]) < np.std(shown["removed"])
+    assert np.std(curves(page)["without noise"]) > 0.0
+    choose(page, "Threshold", "universal")
+    choose(page, "Noise", "White, finest level")
+    assert np.std(curves(page)["removed"]) > np.std(shown["removed"])
     labelled(page, "selectbox", "Levels").set_value(3).run()
     assert len(page.dataframe[0].value) == 3
     labelled(page, "selectbox", "Levels").set_value(14).run()
