@@ -161,7 +161,7 @@ def show_pair() -> None:
     for row in pair_study.summary(study)["sweeps"]:  # type: ignore[attr-defined]  # a list of mappings
         said = {way: row[f"jump_{way}_hz"] for way in ("up", "down")}
         jumps = ", ".join(f"{way}: {'no jump' if hz is None else f'jump at {hz:.0f} Hz'}" for way, hz in said.items())
-        st.caption(f"Torsional mode {row['torsional_mode_hz']:.0f} Hz. Sweep {jumps}. {row['n_steps']} steps.")
+        st.caption(f"Torsional mode {row['torsional_mode_hz']:.0f} Hz. Sweep {jumps}. {row['n_steps']:,} steps.")
     st.caption(
         "Full: sweep up; dotted: sweep down. Short sweeps load the teeth by the rotors' inertia, more on the way up "
         "than on the way down."

@@ -64,7 +64,7 @@ def phase_portrait_figure(
         raise InputError(f"the section's axes are {section.axis_names}", allowed=f"{portrait.axis_names}")
     figure, (path, points) = _two_panels()
     shown = [display_unit(portrait.units[axis], float(portrait.extent[axis])) for axis in axes]
-    x, y = (portrait.points[-n_points:, axis] * factor for axis, (factor, _) in zip(axes, shown, strict=True))
+    x, y = _path(portrait, axes, n_points).T * [[factor] for factor, _ in shown]
     path.plot(x, y, color=style.MEASURED, linewidth=0.5, alpha=0.6 if len(x) < 5000 else 0.3)
     names = [with_unit(portrait.axis_names[axis], unit) for axis, (_, unit) in zip(axes, shown, strict=True)]
     factors = (shown[0][0], shown[1][0])
@@ -90,6 +90,27 @@ def phase_portrait_figure(
         style.no_offset(panel)
         panel.locator_params(nbins=5)
     return figure
+
+
+_DRAWN_PER_PERIOD, _MARGIN, _FILTER_REACH = 20.0, 64, 10
+
+
+def _path(portrait: PhasePortrait, axes: tuple[int, int], n_points: int) -> FloatArray:
+    """Return the last points of two axes, (n, 2): between samples of a filtered path as its band demands, not straight.
+
+    Samples that lie wide apart in the highest period would make chords of what is a curve.
+    """
+    points = portrait.points[-n_points - _MARGIN :][:, axes]
+    highest = portrait.band_hz[1]
+    factor = round(_DRAWN_PER_PERIOD * highest / portrait.sampling_rate_hz) if highest < np.inf else 1
+    if factor > 1 and highest < 0.45 * portrait.sampling_rate_hz and len(points) > 2 * _MARGIN:
+        from scipy.signal import resample_poly
+
+        first = max(len(points) - n_points, 0)
+        # The filter knows nothing beyond the last sample: what it reaches there is left out.
+        dense = resample_poly(points, factor, 1, axis=0, padtype="line")
+        return dense[factor * first : factor * (len(points) - 1 - _FILTER_REACH) + 1]
+    return points[-n_points:]
 
 
 def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None = None, *, title: str = "") -> Figure:

@@ -64,7 +64,7 @@ def start_stop_figure(examined: motions.StartStop, *, title: str = "") -> Figure
     _draw_loops(loop, drawn)
     if examined.loop is not None and examined.loop.n_cycles:
         lost, work = examined.loop.loss_per_cycle_j, examined.loop.work_per_cycle_j
-        style.note(loop, f"{lost:.3g} J lost of {work:.4g} J per cycle")
+        style.note(loop, f"{lost:.3g} of {work:.3g} J lost a cycle")
     return figure
 
 

@@ -71,6 +71,18 @@ def test_long_paths_are_cut_and_say_so():
     assert {"last 10 s", "T"} <= set(_texts(figure))
 
 
+def test_a_filtered_path_of_few_samples_a_period_is_drawn_as_the_curve_it_is():
+    angle = 2 * np.pi * np.arange(4000) / 2.7  # 2.7 samples a period: straight lines would cut to cos(π/2.7) = 0.4
+    circle = np.column_stack([np.sin(angle), np.cos(angle)])
+    portrait = PhasePortrait(circle, 2700.0, ("x", "v"), ("m", "m/s"), "phase plane", "a1", band_hz=(50.0, 1100.0))
+    (line,) = phase_portrait_figure(portrait, n_points=500).axes[0].lines
+    radius = np.hypot(*line.get_xydata().T)
+    assert len(radius) > 8 * 480
+    assert radius == pytest.approx(np.full(len(radius), radius.mean()), rel=0.01)
+    chord = np.hypot(*(0.5 * (line.get_xydata()[1:] + line.get_xydata()[:-1])).T)
+    assert np.all(chord > 0.95 * radius.mean())
+
+
 def test_portrait_refuses_other_axes():
     with pytest.raises(InputError, match="axes is"):
         phase_portrait_figure(PORTRAIT, axes=(0, 2))
