@@ -30,6 +30,7 @@ from gearsig.phase._section import (
     constant_period_lock,
     find_lock,
     poincare_section,
+    points_between,
     section_period,
 )
 from gearsig.phase._types import (
@@ -73,6 +74,7 @@ __all__ = [
     "nearest_apart",
     "phase_plane",
     "poincare_section",
+    "points_between",
     "recurrence_measures",
     "recurrence_plot",
     "section_period",

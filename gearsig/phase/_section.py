@@ -188,7 +188,7 @@ def _locked_section(portrait: PhasePortrait, lock: CycleLock, phase_cycles: floa
             f"the {lock.name} is faster than two samples per cycle at {rate:g} Hz",
             remedy="lock to a slower shaft or sample faster",
         )
-    points = _interpolated(portrait.points, (times - portrait.start_s) * rate)
+    points = points_between(portrait.points, (times - portrait.start_s) * rate)
     names, units, extent = portrait.axis_names, portrait.units, portrait.extent
     return PoincareSection(points, times, names, units, extent, "locked", lock.name, portrait.source)
 
@@ -248,7 +248,16 @@ def _return_distance(x: FloatArray, lag: int) -> float:
     return float(np.median(np.linalg.norm(x[lag:] - x[:-lag], axis=1)))
 
 
-def _interpolated(points: FloatArray, positions: FloatArray) -> FloatArray:
+def points_between(points: FloatArray, positions: FloatArray) -> FloatArray:
+    """Return the points of a path of limited band between its samples, (n, n_axes).
+
+    Parameters
+    ----------
+    points : array, (n_points, n_axes)
+        Its band ends below 0.4 of the sampling rate.
+    positions : array, (n,)
+        In samples, sorted, at least `gearsig.angle.REACH` from either end.
+    """
     from gearsig.angle import delay_table, doubling_filter, interpolate
 
     points_at = np.empty((len(positions), points.shape[1]))

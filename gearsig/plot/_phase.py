@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearsig.angle import REACH
 from gearsig.checks import FloatArray, count
 from gearsig.errors import InputError
 from gearsig.phase import (
@@ -19,6 +20,7 @@ from gearsig.phase import (
     RecurrenceMeasures,
     RecurrencePlot,
     coexistence_ranges,
+    points_between,
     step_of,
 )
 from gearsig.plot import _series as series
@@ -65,7 +67,7 @@ def phase_portrait_figure(
     figure, (path, points) = _two_panels()
     shown = [display_unit(portrait.units[axis], float(portrait.extent[axis])) for axis in axes]
     x, y = _path(portrait, axes, n_points).T * [[factor] for factor, _ in shown]
-    path.plot(x, y, color=style.MEASURED, linewidth=0.5, alpha=0.6 if len(x) < 5000 else 0.3)
+    path.plot(x, y, color=style.MEASURED, linewidth=0.5, alpha=0.6 if min(n_points, portrait.n_points) < 5000 else 0.3)
     names = [with_unit(portrait.axis_names[axis], unit) for axis, (_, unit) in zip(axes, shown, strict=True)]
     factors = (shown[0][0], shown[1][0])
     style.label_axes(path, names[0], names[1], title or portrait.source)
@@ -92,7 +94,7 @@ def phase_portrait_figure(
     return figure
 
 
-_DRAWN_PER_PERIOD, _MARGIN, _FILTER_REACH = 20.0, 64, 10
+_DRAWN_PER_PERIOD = 20.0
 
 
 def _path(portrait: PhasePortrait, axes: tuple[int, int], n_points: int) -> FloatArray:
@@ -100,17 +102,12 @@ def _path(portrait: PhasePortrait, axes: tuple[int, int], n_points: int) -> Floa
 
     Samples that lie wide apart in the highest period would make chords of what is a curve.
     """
-    points = portrait.points[-n_points - _MARGIN :][:, axes]
-    highest = portrait.band_hz[1]
-    factor = round(_DRAWN_PER_PERIOD * highest / portrait.sampling_rate_hz) if highest < np.inf else 1
-    if factor > 1 and highest < 0.45 * portrait.sampling_rate_hz and len(points) > 2 * _MARGIN:
-        from scipy.signal import resample_poly
-
-        first = max(len(points) - n_points, 0)
-        # The filter knows nothing beyond the last sample: what it reaches there is left out.
-        dense = resample_poly(points, factor, 1, axis=0, padtype="line")
-        return dense[factor * first : factor * (len(points) - 1 - _FILTER_REACH) + 1]
-    return points[-n_points:]
+    points = portrait.points[:, axes]
+    part = portrait.band_hz[1] / portrait.sampling_rate_hz
+    first, last = max(len(points) - n_points, REACH), len(points) - 1 - REACH
+    if part >= 0.45 or _DRAWN_PER_PERIOD * part <= 1.0 or first >= last:
+        return points[-n_points:]
+    return points_between(points, np.arange(first, last, 1.0 / (_DRAWN_PER_PERIOD * part)))
 
 
 def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None = None, *, title: str = "") -> Figure:

@@ -129,7 +129,7 @@ def method_pictures(
 ) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
     """Return the pictures of several methods of one channel, and why others have none.
 
-    Maps over time show the first twelve revolutions, or what is there; paths in the phase plane one, which can be read.
+    Maps over time show the first twelve revolutions, or what is there.
     """
     pictures: list[Picture] = []
     reasons: list[str] = []
@@ -137,9 +137,7 @@ def method_pictures(
         name, options = named_method(text)
         end_s = None
         try:
-            if name in ("phase-plane", "poincare"):
-                options = {"revolutions": 1}
-            elif options:
+            if options:
                 turns = prepared.shaft_angle.mean_speed_rpm / 60.0
                 end_s = min(prepared.recording.duration_s, _REVOLUTIONS_SHOWN / turns)
             answer = apply_method(name, prepared, channel, end_s=end_s, **options)
