@@ -86,7 +86,7 @@ from gearsig.plot._phase import (
     phase_portrait_figure,
     recurrence_figure,
 )
-from gearsig.plot._pictures import Captioned, Picture, embed, fleet_trend_picture, svg_panel, svg_ring
+from gearsig.plot._pictures import Captioned, Picture, embed, figure_svg, fleet_trend_picture, svg_panel, svg_ring
 from gearsig.plot._response import ResponseCase, crack_comparison_figure, response_figure
 from gearsig.plot._series import envelope, series_colours, thin
 from gearsig.plot._spectrum import (
@@ -170,6 +170,7 @@ __all__ = [
     "envelope",
     "envelope_spectrum",
     "figure_of",
+    "figure_svg",
     "figure_table",
     "fleet_trend_picture",
     "font_folder",

@@ -80,14 +80,26 @@ class Captioned:
 def embed(figure: Figure, caption: str, alternative: str, *, vector: bool = False) -> Picture:
     """Turn a figure into a picture: PNG, or SVG where `vector` says that it has few lines."""
     width, height = figure.get_size_inches()
-    uri = _svg_uri(figure) if vector else _png(figure)
+    uri = "data:image/svg+xml;base64," + b64encode(figure_svg(figure).encode()).decode() if vector else _png(figure)
     return Picture(uri, round(100 * width), round(100 * height), caption, alternative)
 
 
-def _svg_uri(figure: Figure) -> str:
+def figure_svg(figure: Figure, *, transparent: bool = False) -> str:
+    """Draw a figure as SVG in the typeface of the page around it.
+
+    Parameters
+    ----------
+    figure : Figure
+    transparent : bool
+        Without its paper.
+    """
+    from matplotlib import rc_context
+
     buffer = BytesIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return "data:image/svg+xml;base64," + b64encode(buffer.getvalue()).decode("ascii")
+    with rc_context({"svg.fonttype": "none"}):
+        metadata = {"Date": None, "Creator": None}
+        figure.savefig(buffer, format="svg", metadata=metadata, transparent=transparent)
+    return buffer.getvalue().decode().replace("'DejaVu Sans'", "system-ui, 'DejaVu Sans'")
 
 
 def _png(figure: Figure) -> str:

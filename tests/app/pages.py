@@ -138,15 +138,19 @@ def bars(page: AppTest) -> np.ndarray:
     return np.frombuffer(b64decode(values["bdata"]), values["dtype"]) if isinstance(values, dict) else np.array(values)
 
 
-def pictures(page: AppTest) -> list[Any]:
-    """Return the pictures of the page; without the ring of teeth beside the verdict."""
-    return [part for part in page.get("image") if not part.proto.imgs[0].alt.endswith("stands out")]
+def pictures(page: AppTest) -> list[dict[str, Any]]:
+    """Return what was sent to the pictures of the page that zoom; without the ring of teeth beside the verdict."""
+    return [picture for picture in _sent_to(page, "picture") if not picture["words"].endswith("stands out")]
+
+
+def _sent_to(page: AppTest, component: str) -> list[dict[str, Any]]:
+    protos = [part.proto for part in page.get("bidi_component")]
+    return [json.loads(proto.json) for proto in protos if proto.component_name == f"gearsig.{component}"]
 
 
 def figures(page: AppTest, *, of_verdict: bool = False) -> list[dict[str, Any]]:
     """Return what was sent to the figures of the page that zoom; without the one beside the verdict."""
-    sent = [part.proto for part in page.get("bidi_component")]
-    known = [json.loads(proto.json) for proto in sent if proto.component_name == "gearsig.figure"]
+    known = _sent_to(page, "figure")
     return known if of_verdict else [figure for figure in known if not figure["name"].startswith("verdict")]
 
 

@@ -45,7 +45,7 @@ def test_views_draw_what_they_promise() -> None:
     assert drawn["Speed"] == drawn["Spectrum"] == drawn["Order spectrum"] == drawn["Envelope"] == (1, 0, 0)
     assert drawn["Map"] == (1, 0, 0)
     assert drawn["Average"] == (1, 1, 0)
-    assert drawn["Machine"] == (0, 1, 5)
+    assert drawn["Machine"] == (0, 0, 5)
     assert drawn["Indicators"] == (0, 0, 1)
 
 
@@ -230,3 +230,18 @@ def test_an_uploaded_reference_that_does_not_fit_is_one_message() -> None:
     assert not page.exception
     assert len(page.error) == 1
     assert "the reference has no channel" in shown_text(page)
+
+
+def test_a_zoomed_ring_of_teeth_is_kept_in_the_address_and_reads_off_its_values() -> None:
+    page = opened(tab="Average")
+    (ring,) = pictures(page)
+    assert ring["shown"] is None
+    assert ring["ring"]["teeth"] == 29
+    values = numbers(ring["ring"]["values"])
+    tooth = 1 + int(29 * np.argmax(np.abs(values)) / len(values))
+    assert tooth == 12
+    key = next(key for key in page.session_state.filtered_state if str(key).startswith("ring of "))
+    page.session_state[key] = {"range": [200.0, 300.0, 100.0, 200.0]}
+    page.run()
+    assert pictures(page)[0]["shown"] == [200.0, 300.0, 100.0, 200.0]
+    assert page.query_params["zoom"][0].endswith("_200_300_100_200")

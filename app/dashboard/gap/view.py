@@ -13,13 +13,12 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard.gap.choice import Choice, files_of
-from app.dashboard.theme import as_typed, capitalised, is_dark, one_line
+from app.dashboard.theme import as_typed, capitalised, one_line
 from app.dashboard.widgets.charts import (
     QUIET,
     Axes,
     download,
     looked_at,
-    picture_bytes,
     show_differences,
     show_lines,
     show_picture,
@@ -38,7 +37,7 @@ from gearsig.gap import (
     gap_by_order,
     is_beyond,
 )
-from gearsig.plot import ChartLine, with_unit
+from gearsig.plot import ChartLine, figure_svg, with_unit
 from gearsig.report import (
     CHECK_FIRST,
     CauseRow,
@@ -79,14 +78,13 @@ class Finished:
     page: bytes
     json: bytes
     twin: bytes | None
-    _drawn: dict[tuple[int, bool], bytes] = field(default_factory=dict, repr=False, compare=False)
+    _drawn: dict[int, str] = field(default_factory=dict, repr=False, compare=False)
 
-    def picture(self, one: GapFigure, *, dark: bool) -> bytes:
-        """Return one of the figures as PNG, drawn once for light and once for dark pages."""
-        key = (self.figures.index(one), dark)
-        if key not in self._drawn:
-            self._drawn[key] = picture_bytes(one.figure, dark=dark)
-        return self._drawn[key]
+    def picture(self, number: int) -> str:
+        """Return one of the figures as SVG, drawn once."""
+        if number not in self._drawn:
+            self._drawn[number] = figure_svg(self.figures[number].figure, transparent=True)
+        return self._drawn[number]
 
 
 @dataclass
@@ -480,7 +478,7 @@ def _show_figures(finished: Finished, question: Question) -> None:
 
 def _show_figure(finished: Finished, one: GapFigure) -> None:
     number = finished.figures.index(one)
-    show_picture(finished.picture(one, dark=is_dark()), one.figure, one.shows, f"gap-{number} of {finished.key}")
+    show_picture(finished.picture(number), one.figure, one.shows, f"gap-{number} of {finished.key}")
     st.caption(as_typed(one.look))
 
 

@@ -28,6 +28,7 @@ from gearsig.plot import (
     Cursor,
     LevelPanel,
     LinePanel,
+    figure_svg,
     figure_table,
     importance,
     panels_of,
@@ -140,7 +141,7 @@ def show_figure(figure: PictureFigure, words: str, key: str) -> None:
     """
     rows = panels_of(figure)
     if not rows:
-        show_picture(picture_bytes(figure, dark=is_dark()), figure, words, key)
+        show_picture(figure_svg(figure, transparent=True), figure, words, key)
     place = st.container(key=f"panels {key}")
     for i, row in enumerate(rows):
         columns = place.columns(len(row)) if len(row) > 1 else [place.container()]
@@ -428,13 +429,13 @@ BRIGHTEST = 0.93
 HALF_TURN = np.array([[-0.574, 1.430, 0.144], [0.426, 0.430, 0.144], [0.426, 1.430, -0.856]])
 
 
-def show_picture(png: bytes, figure: PictureFigure, words: str, key: str) -> None:
-    """Show a figure that does not zoom, and offer it as files.
+def show_picture(svg: str, figure: PictureFigure, words: str, key: str) -> None:
+    """Show a figure that no panel can show, to be zoomed, and offer it as files.
 
     Parameters
     ----------
-    png : bytes
-        The figure in the page's colours.
+    svg : str
+        See `gearsig.plot.figure_svg`.
     figure : Figure
         Of matplotlib.
     words : str
@@ -442,14 +443,57 @@ def show_picture(png: bytes, figure: PictureFigure, words: str, key: str) -> Non
     key : str
         Unique on the page.
     """
-    st.image(png, width="stretch", alt=as_typed(words))
+    dark = is_dark()  # files are made in another thread, which knows no page
+    show_svg(svg, words, key, turned=dark)
+    files: dict[str, str | Callable[[], bytes]] = {
+        "png": lambda: picture_bytes(figure, dark=dark),
+        "svg": svg,
+        "csv": lambda: csv_text(figure_table(figure)).encode(),
+    }
+    offer_picture(files, key)
 
-    def svg() -> bytes:
-        buffer = BytesIO()
-        figure.savefig(buffer, format="svg")
-        return buffer.getvalue()
 
-    offer_picture({"png": png, "svg": svg, "csv": lambda: csv_text(figure_table(figure)).encode()}, key)
+_picture = component_of("picture")
+
+
+def show_svg(svg: str, words: str, key: str, *, turned: bool = False, ring: Ring | None = None) -> None:
+    """Show a vector picture that is zoomed by dragging.
+
+    Parameters
+    ----------
+    svg : str
+        With a viewBox; shown as an image, in which nothing runs.
+    words : str
+        What it shows, for those who do not see it.
+    key : str
+        Of the widget, unique on the page.
+    turned : bool
+        Whether dark and light change places.
+    ring : Ring or None
+        What is read off around the picture's middle.
+    """
+    left, _, width, _ = (float(number) for number in _VIEW_BOX.findall(svg)[0].split())
+    looked_at(key, (left, left + width))
+    data = {
+        "svg": svg,
+        "words": one_line(words),
+        "turned": turned,
+        "shown": _zoomed(key)[0] if len(_zoomed(key)[0]) == 4 else None,
+        "ring": None if ring is None else {"values": packed(ring.values), "teeth": ring.teeth, "unit": ring.unit},
+    }
+    _picture(key=key, data=data, on_range_change=_ignore, default={"range": None})
+
+
+_VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Values over one revolution, clockwise from the top; `teeth` is 0 where they are not known."""
+
+    values: FloatArray
+    teeth: int
+    unit: str
 
 
 def offer_picture(files: Mapping[str, bytes | str | Callable[[], bytes]], key: str) -> None:

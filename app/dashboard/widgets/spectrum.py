@@ -14,10 +14,12 @@ from app.dashboard.theme import as_typed, is_dark, palette
 from app.dashboard.widgets.charts import (
     N_COLUMNS,
     Axes,
+    Ring,
     looked_at,
     offer_picture,
     picture_bytes,
     show_lines,
+    show_svg,
 )
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.formatting import csv_text, readable
@@ -221,9 +223,9 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) 
     words = f"Polar picture: {average.kind} of {average.channel} over one revolution of {average.shaft}{seen}"
     with st.container(key="average"):
         polar, unrolled = st.columns((6, 7), vertical_alignment="center")
-        ring = ring_of(average, n_teeth, marks)
         with polar:
-            st.image(ring, width="stretch", alt=as_typed(words))
+            key = f"ring of {average.channel} {average.shaft} {average.kind}"
+            ring = show_ring(average, n_teeth, marks, words, state.view_key(key, analysis))
             dark = is_dark()  # files are made in another thread, which knows no page
             drawn = partial(polar_figure, average, n_teeth=n_teeth, marks=marks)
             files: dict[str, str | Callable[[], bytes]] = {
@@ -236,10 +238,16 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) 
             _show_unrolled(analysis, average, n_teeth, [Cursor(m.angle_deg, "finding", m.label) for m in marks])
 
 
-def ring_of(average: SynchronousAverage, n_teeth: int | None, marks: Sequence[AngleMark]) -> str:
-    """Return the ring of teeth in the page's colours."""
+def show_ring(
+    average: SynchronousAverage, n_teeth: int | None, marks: Sequence[AngleMark], words: str, key: str
+) -> str:
+    """Show the ring of teeth in the page's colours, to be zoomed and read off; return it as SVG."""
     colours = palette()
-    return svg_ring(average, n_teeth=n_teeth, marks=marks, ink=colours.quiet, line=colours.measured)
+    svg = svg_ring(average, n_teeth=n_teeth, marks=marks, ink=colours.quiet, line=colours.measured)
+    # a place for each pixel of the ring, not for each sample
+    values = average.values[:: max(len(average.values) // N_COLUMNS, 1)]
+    show_svg(svg, words, key, ring=Ring(values, n_teeth or 0, unit_text(average.unit)))
+    return svg
 
 
 def _show_unrolled(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, marks: list[Cursor]) -> None:

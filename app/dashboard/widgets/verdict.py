@@ -12,7 +12,7 @@ from app.dashboard import state
 from app.dashboard.theme import as_typed, one_line
 from app.dashboard.widgets.charts import Axes, show_lines
 from app.dashboard.widgets.messages import in_page_words
-from app.dashboard.widgets.spectrum import SLIP_SHARE, ring_of, show_spectrum
+from app.dashboard.widgets.spectrum import SLIP_SHARE, show_ring, show_spectrum
 from gearsig.diagnosis import Analysis, Finding, Kind, Outcome
 from gearsig.plot import ChartLine, marks_of, with_unit
 from gearsig.report import (
@@ -129,7 +129,7 @@ def show_verdict_picture(analysis: Analysis) -> None:
         teeth = teeth_of_shaft(analysis, picture.shaft)
         marks = marks_of(analysis.findings, picture.shaft, teeth)
         words = f"Mean revolution of {picture.shaft}: {', '.join(mark.label for mark in marks)} stands out"
-        st.image(ring_of(picture.average, teeth, marks), width="stretch", alt=as_typed(words))
+        show_ring(picture.average, teeth, marks, words, state.view_key(place, analysis))
         return
     if picture.about == "resonance":
         levels = channel.order_levels
