@@ -70,6 +70,12 @@ def _key_of(sample: str) -> tuple[str, float]:
     return sha256_of(chosen.recording), rate_hz
 
 
+def key_of(name: str, sample: str = "damaged_tooth") -> str:
+    """Return the key of a widget that shows a sample, see `state.view_key`."""
+    digest, rate_hz = _key_of(sample)
+    return f"{name} of {digest} at {rate_hz!r}"
+
+
 def opened_at(method: str, sample: str = "damaged_tooth") -> AppTest:
     """Open a sample at a method, in one run."""
     page = opened(sample, tab=view_of(method), **{method_key(method, *_key_of(sample)): method})
