@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,7 +65,9 @@ def phase_portrait_figure(
         raise InputError(f"axes is {axes}", allowed=f"two of 0 to {portrait.n_axes - 1}")
     if section is not None and section.axis_names != portrait.axis_names:
         raise InputError(f"the section's axes are {section.axis_names}", allowed=f"{portrait.axis_names}")
-    figure, (path, points) = _two_panels()
+    # beside a path alone half the figure would be empty
+    figure, panels = style.panels((3.5,), top_in=0.42, width_in=5.2) if section is None else _two_panels()
+    path = panels[0]
     shown = [display_unit(portrait.units[axis], float(portrait.extent[axis])) for axis in axes]
     x, y = _path(portrait, axes, n_points).T * [[factor] for factor, _ in shown]
     path.plot(x, y, color=style.MEASURED, linewidth=0.5, alpha=0.6 if min(n_points, portrait.n_points) < 5000 else 0.3)
@@ -73,9 +76,8 @@ def phase_portrait_figure(
     style.label_axes(path, names[0], names[1], title or portrait.source)
     if portrait.n_points > n_points:
         style.note(path, f"last {n_points / portrait.sampling_rate_hz:.4g} s")
-    if section is None:
-        points.set_axis_off()
-    else:
+    if section is not None:
+        points = panels[1]
         dots = [section.points[:, axis] * factor for axis, factor in zip(axes, factors, strict=True)]
         for panel, size in ((path, 2.2), (points, 2.8)):
             panel.plot(*dots, "o", color=style.FAULT, markersize=size, markeredgewidth=0.0, zorder=3)
@@ -88,7 +90,7 @@ def phase_portrait_figure(
             half = max(half, 0.05 * factor * float(section.extent[axis])) or 1.0
             limits.append((middle - half, middle + half))
         points.set(xlim=limits[0], ylim=limits[1])
-    for panel in (path, points):
+    for panel in panels:
         style.no_offset(panel)
         panel.locator_params(nbins=5)
     return figure
@@ -212,12 +214,27 @@ def _two_panels() -> tuple[Figure, list[Axes]]:
 
 
 def display_unit(unit: str, size: float) -> tuple[float, str]:
-    """Return the factor and unit in which a length or velocity of that size is read without powers of ten."""
+    """Return the factor and unit in which values of that size have few digits: a power of a thousand where none is.
+
+    Examples
+    --------
+    >>> display_unit("m/s", 2e-4), display_unit("", 2e-4), display_unit("rad", 3.0)
+    ((1000000.0, 'µm/s'), (1000000.0, '10^-6'), (1.0, 'rad'))
+    """
     base, _, rest = unit.partition("/")
-    if base != "m" or size >= 0.5:
+    if not size or not isfinite(size) or (base != "m" and FEW_DIGITS[0] <= size < FEW_DIGITS[1]):
+        return 1.0, unit
+    if base != "m":
+        exponent = 3 * floor(log10(size) / 3)
+        return 10.0**-exponent, f"10^{exponent} {unit}".strip()
+    if size >= 0.5:
         return 1.0, unit
     prefix, factor = ("m", 1e3) if size >= 5e-4 else ("µ", 1e6)
     return factor, prefix + "m" + (f"/{rest}" if rest else "")
+
+
+FEW_DIGITS = 0.02, 1e5
+"""Between these values are written out."""
 
 
 BRANCHES = (("rising", style.MEASURED, 2.6, True, 1.02), ("falling", style.FAULT, 5.0, False, 1.08))
