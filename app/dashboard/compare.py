@@ -14,7 +14,6 @@ from app.dashboard.laboratory.setup import MODEL, Setup, shown_name
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import (
-    Axes,
     download,
     looked_at,
     padded_limits,
@@ -36,7 +35,7 @@ from gearsig.comparison import (
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import axis_label
 from gearsig.gap import OperatingCondition
-from gearsig.plot import ChartLine, unit_text, with_unit
+from gearsig.plot import ChartLine, LinePanel, unit_text, with_unit
 from gearsig.prepared import refined_angle
 from gearsig.recording import Recording
 from gearsig.report import (
@@ -368,8 +367,8 @@ def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
         unit = with_unit("acceleration" if channel.quantity == "acceleration" else "value", channel.unit)
         key = f"average of {name} comparison {channel.name}"
         whole = (0.0, 360.0)
-        axes = Axes(f"angle of {name} (deg)", unit, whole)
-        show_lines(lines, axes, key, height_px=260, legend=True)
+        panel = LinePanel(lines, f"angle of {name} (deg)", unit, x_limits=whole)
+        show_lines(panel, key, height_px=260, legend=True)
         if not shaft.tooth_levels:
             continue
         middle = (np.arange(len(shaft.tooth_levels)) + 0.5) * 360.0 / len(shaft.tooth_levels)
@@ -399,8 +398,8 @@ def _show_bands(comparison: Comparison, channel: ChannelComparison) -> None:
         edges = np.array([edge for band in bands for edge in (band.low, band.high)])
         sides = [np.repeat([getattr(band.level, f"{side}_db") for band in bands], 2) for side in NAMES]
         lines = [ChartLine(edges, levels, side, i) for i, (levels, side) in enumerate(zip(sides, NAMES, strict=True))]
-        axes = Axes(name, unit, (float(edges[0]), float(edges[-1])), padded_limits(sides))
-        show_lines(lines, axes, f"bands over {name} comparison {channel.name}", height_px=240, legend=True)
+        panel = LinePanel(lines, name, unit, padded_limits(sides), x_limits=(float(edges[0]), float(edges[-1])))
+        show_lines(panel, f"bands over {name} comparison {channel.name}", height_px=240, legend=True)
 
 
 def show_downloads(comparison: Comparison, command: str) -> None:

@@ -15,7 +15,7 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.state import ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import QUIET, Axes, padded_limits, show_lines
+from app.dashboard.widgets.charts import QUIET, padded_limits, show_lines
 from app.dashboard.widgets.chooser import open_file
 from app.dashboard.widgets.verdict import COLOURS
 from app.dashboard.work import kept
@@ -24,7 +24,7 @@ from gearsig.diagnosis import Outcome
 from gearsig.errors import InputError
 from gearsig.fleet import Fleet, Trend, TrendSettings, change_text, open_fleet, trends_text
 from gearsig.formatting import with_minus
-from gearsig.plot import ChartLine, with_unit
+from gearsig.plot import ChartLine, LinePanel, with_unit
 from gearsig.recording import sha256_of
 from gearsig.rig import rig_file_beside
 
@@ -243,10 +243,9 @@ def _show_trend(fleet: Fleet, row: Row) -> None:
     margin = max(0.02 * float(np.ptp(days)), 0.5)
     limits = padded_limits([value, *([high] if np.isfinite(high).any() else [])])
     span = (float(days[0]) - margin, float(days[-1]) + margin)
-    axes = Axes("date", with_minus(with_unit(trend.name, trend.unit)), span, limits, dates=True)
-    show_lines(
-        lines, axes, f"trend of {row['machine']} {row['point']} {_series_words(row)}", marked=marked, legend=True
-    )
+    panel = LinePanel(lines, "date", with_minus(with_unit(trend.name, trend.unit)), limits, x_limits=span)
+    key = f"trend of {row['machine']} {row['point']} {_series_words(row)}"
+    show_lines(panel, key, marked=marked, legend=True, dates=True)
     st.caption(as_typed(_about(trend)))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from hashlib import sha256
@@ -611,21 +611,39 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
         scatter = gain_scatter(condition.reference, condition.simulated)
         compared = [
             compared_course(
-                # One tooth was simulated of an effect that sits on all.
-                Added(added.name, added.severity, {"gear": SIDES[side]}) if effect.is_on_every_tooth else added,
+                setting,
                 sidebands[channels, side],
                 observed[:, side],
                 noise[:, side],
                 moves_pitches=effect.moves_pitches,
-                n_teeth=condition.now.frame.teeth[side] if effect.is_on_every_tooth else 0,
+                n_teeth=condition.now.frame.teeth[side]
+                if effect.is_on_every_tooth and "tooth" not in setting.options
+                else 0,
                 gain_scatter=scatter,
             )
-            for added, sidebands in zip(bank.added, bank.sidebands, strict=True)
-            if (side := _side(added)) is not None and ("tooth" in added.options or not effect.is_on_every_tooth)
+            for setting, sidebands in _settings(bank, effect)
+            if (side := _side(setting)) is not None
         ]
         courses.append([course for course in compared if course is not None])
     severities = [added.severity for bank in banks for added in bank.added]
     return waveform_match(joined_courses(courses), min(severities), max(severities)) if severities else None
+
+
+def _settings(bank: Bank, effect: GapEffect) -> Iterator[tuple[Added, ComplexArray]]:
+    """Yield the settings that waveforms are compared with, and the sidebands simulated for them.
+
+    An effect that may sit on every tooth, each by itself, was simulated on one: that stands for itself and, the first
+    of each gear, for all.
+    """
+    gears: set[object] = set()
+    for added, sidebands in zip(bank.added, bank.sidebands, strict=True):
+        if not effect.is_on_every_tooth:
+            yield added, sidebands
+        elif "tooth" in added.options:
+            yield added, sidebands
+            if (gear := added.options.get("gear")) not in gears:
+                gears.add(gear)
+                yield Added(added.name, added.severity, {"gear": str(gear)}), sidebands
 
 
 def _side(added: Added) -> int | None:

@@ -140,7 +140,9 @@ EFFECT = Effect(
         shared.either_gear,
         _drawn,
         # The teeth's deviations are drawn; what one of them changes, each changes, as long as no tooth parts.
-        courses=lambda machine: [(options, (0,)) for options in shared.first_teeth(machine)],
+        courses=lambda machine: [
+            (options, (0,)) for stands in STANDS for options in shared.first_teeth(machine, stands=stands)
+        ],
     ),
     textbook=Textbook(
         (("tooth.{side}.elsewhere", UP), ("shaft.{side}.low", UP), ("sideband.{side}.3to5", UP)),

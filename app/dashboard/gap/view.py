@@ -16,7 +16,6 @@ from app.dashboard.gap.choice import Choice, files_of
 from app.dashboard.theme import as_typed, capitalised, one_line
 from app.dashboard.widgets.charts import (
     QUIET,
-    Axes,
     download,
     looked_at,
     show_differences,
@@ -37,7 +36,7 @@ from gearsig.gap import (
     gap_by_order,
     is_beyond,
 )
-from gearsig.plot import ChartLine, figure_svg, with_unit
+from gearsig.plot import ChartLine, LinePanel, figure_svg, with_unit
 from gearsig.report import (
     CHECK_FIRST,
     CauseRow,
@@ -363,8 +362,9 @@ def _show_spectra(curves: SpectrumCurves, beside: str, *, scored: bool) -> None:
     whole = (float(x[0]), float(x[-1]))
     key = f"gap spectrum {curves.label} {beside}"
     order = "order of the driver's shaft"
-    axes = Axes(order, with_unit("peak amplitude", curves.unit), whole, (bottom, 2.0 * top), logarithmic=True)
-    show_lines(lines, axes, key, legend=True, height_px=280)
+    unit = with_unit("peak amplitude", curves.unit)
+    panel = LinePanel(lines, order, unit, (bottom, 2.0 * top), logarithmic=True, x_limits=whole)
+    show_lines(panel, key, legend=True, height_px=280)
     if not len(curves.before):
         return
     gap = gap_by_order(curves, curves.before)
@@ -384,8 +384,9 @@ def _show_average(average: AverageCurves) -> None:
     )
     both = (average.measured, "measured", 0), (average.reference, "reference", 1)
     lines = [ChartLine(average.angle_deg, values, name, colour) for values, name, colour in both if len(values)]
-    axes = Axes(f"angle of {average.shaft} (deg)", with_unit("amplitude", average.unit), (0.0, 360.0))
-    show_lines(lines, axes, f"gap average {average.shaft} {average.channel}", legend=True, height_px=240)
+    unit = with_unit("amplitude", average.unit)
+    panel = LinePanel(lines, f"angle of {average.shaft} (deg)", unit, x_limits=(0.0, 360.0))
+    show_lines(panel, f"gap average {average.shaft} {average.channel}", legend=True, height_px=240)
 
 
 def _show_which(finished: Finished) -> None:

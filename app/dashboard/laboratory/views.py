@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
-from typing import Any
 
 import numpy as np
 import streamlit as st
@@ -15,12 +14,12 @@ from app.dashboard.laboratory.bifurcation import show_bifurcation
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import Setup, effect_text
 from app.dashboard.theme import as_typed, capitalised, palette
-from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, Axes, packed, padded_limits, show_lines
+from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, packed, padded_limits, show_lines
 from app.dashboard.widgets.spectrum import show_spectrum
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.indicators import crest_factor, kurtosis, rms
-from gearsig.plot import ChartLine, Cursor
+from gearsig.plot import ChartLine, Cursor, LinePanel
 from gearsig.recording import Recording
 from gearsig.spectra import Spectrum, amplitude_spectrum, band_envelope, envelope_spectrum
 from sims.effects import effect
@@ -51,24 +50,34 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     end = _end_s(healthy, SEGMENTS[shown or "3 revolutions"])
     healthy_line, label = signal_of(healthy, name, end)
     if faulty is None:
-        _show_line(healthy_line, "healthy", Axes("time (s)", label, (0.0, end)))
+        _show_line(healthy_line, "healthy", label, end)
         return
     faulty_line, _ = signal_of(faulty, name, end)
-    axes = Axes("time (s)", label, (0.0, end), padded_limits([healthy_line[1], faulty_line[1]]))
+    limits = padded_limits([healthy_line[1], faulty_line[1]])
     left, right = st.columns(2)
     with left:
-        _show_line(healthy_line, "healthy", axes, height_px=HEIGHT_PX)
+        _show_line(healthy_line, "healthy", label, end, limits, height_px=HEIGHT_PX)
     with right:
-        _show_line(faulty_line, "faulty", axes, height_px=HEIGHT_PX)
+        _show_line(faulty_line, "faulty", label, end, limits, height_px=HEIGHT_PX)
     st.markdown("**What the effect adds**: faulty less healthy")
     difference = faulty_line[1] - healthy_line[1]
-    axes = Axes("time (s)", label, (0.0, end), padded_limits([difference]))
-    _show_line((healthy_line[0], difference), "difference", axes, cursors=runs.entries(faulty), height_px=HEIGHT_PX)
+    limits, line = padded_limits([difference]), (healthy_line[0], difference)
+    _show_line(line, "difference", label, end, limits, cursors=runs.entries(faulty), height_px=HEIGHT_PX)
 
 
-def _show_line(line: tuple[FloatArray, FloatArray], name: str, axes: Axes, **looks: Any) -> None:
-    colour = MEASURED if name == "healthy" else FAULT
-    show_lines([ChartLine(*line, name, colour)], axes, f"time of {name}", **looks)
+def _show_line(
+    line: tuple[FloatArray, FloatArray],
+    name: str,
+    label: str,
+    end_s: float,
+    limits: tuple[float, float] | None = None,
+    *,
+    cursors: Sequence[Cursor] = (),
+    height_px: int = 340,
+) -> None:
+    lines = [ChartLine(*line, name, MEASURED if name == "healthy" else FAULT)]
+    panel = LinePanel(lines, "time (s)", label, limits, cursors=cursors, x_limits=(0.0, end_s))
+    show_lines(panel, f"time of {name}", height_px=height_px)
 
 
 def signal_of(run: LaboratoryRun, name: str, end_s: float) -> tuple[tuple[FloatArray, FloatArray], str]:
@@ -194,20 +203,26 @@ def show_mesh(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     both = [healthy] if faulty is None else [healthy, faulty]
     shown, marks = _segment(both[-1])
     cycles = np.linspace(*shown, round((shown[1] - shown[0]) * POINTS_PER_CYCLE) + 1)
-    x = "mesh cycles (tooth k of the driver enters at k − 1)"
     st.markdown("**Mesh stiffness** of the tooth pairs in contact")
     if both[0].setup.torque_nm > 0:
         curves = [stiffness(run, cycles) * 1e-8 for run in both]
-        axes = Axes(x, "mesh stiffness (10⁸ N/m)", shown, padded_limits(curves, flat=0.1))
-        show_lines(_lines(cycles, curves), axes, "stiffness of the laboratory", cursors=marks, height_px=HEIGHT_PX)
+        _show_over_cycles(cycles, curves, "mesh stiffness (10⁸ N/m)", marks, "stiffness of the laboratory")
         if len(curves) > 1 and np.allclose(curves[0], curves[1], rtol=1e-6):
             st.caption("What is switched on leaves the stiffness as it is.")
     else:
         st.info("Without a load no tooth is pressed on another: there is no stiffness to show.")
     st.markdown("**Dynamic mesh force** over the same teeth")
     forces = [_force_kn(run, cycles) for run in both]
-    axes = Axes(x, "mesh force (kN)", shown, padded_limits(forces, flat=0.1))
-    show_lines(_lines(cycles, forces), axes, "force of the laboratory", cursors=marks, height_px=HEIGHT_PX)
+    _show_over_cycles(cycles, forces, "mesh force (kN)", marks, "force of the laboratory")
+
+
+def _show_over_cycles(
+    cycles: FloatArray, curves: list[FloatArray], y: str, marks: Sequence[Cursor], key: str
+) -> None:
+    x, shown = "mesh cycles (tooth k of the driver enters at k − 1)", (float(cycles[0]), float(cycles[-1]))
+    limits = padded_limits(curves, flat=0.1)
+    panel = LinePanel(_lines(cycles, curves), x, y, limits, cursors=marks, x_limits=shown)
+    show_lines(panel, key, height_px=HEIGHT_PX)
 
 
 def stiffness(run: LaboratoryRun, cycles: FloatArray) -> FloatArray:
@@ -276,12 +291,14 @@ def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     both = [healthy] if faulty is None else [healthy, faulty]
     portraits = [portrait(run, GEARS[gear or "Driver"], n) for run in both]
     limits = [padded_limits([p[axis] for p in portraits]) for axis in (0, 1)]
-    axes = Axes("displacement (µm)", "velocity (mm/s)", limits[0], limits[1])
     for column, (y, v, y_points, v_points), name in zip(st.columns(2), portraits, ("healthy", "faulty"), strict=False):
         path = ChartLine(y, v, name, MEASURED if name == "healthy" else FAULT)
         dots = ChartLine(y_points, v_points, "Poincaré points", SHAFT, dots=True)
         with column:
-            show_lines([path, dots], axes, f"phase of {name}", legend=True, is_plane=True)
+            panel = LinePanel(
+                [path, dots], "displacement (µm)", "velocity (mm/s)", limits[1], x_limits=limits[0], is_plane=True
+            )
+            show_lines(panel, f"phase of {name}", legend=True)
     st.caption(
         "Along the line of action. A closed curve repeats every mesh period, and its points fall together; "
         "scattered points mean a motion that does not repeat."

@@ -26,7 +26,7 @@ from gearsig.angle import ShaftAngle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, with_known_angle
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.methods import METHODS, MethodAnswer, Waveforms, angle_or_none, apply_method, part_of
-from gearsig.plot import ChartLine, LevelPanel, with_unit
+from gearsig.plot import ChartLine, LevelPanel, LinePanel, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording, write_recording
 from gearsig.timefreq import at_label
@@ -228,8 +228,9 @@ def _show_waveforms(page: MethodPage, waveforms: Waveforms, angle: ShaftAngle | 
         rows.append(("residual", {waveforms.residual: charts.FAULT}, 180))
     for label, colours, height_px in rows:
         lines = [ChartLine(at, waveforms.columns[c][part], c, colours[c]) for c in colours]
-        axes = charts.Axes(axis if label == rows[-1][0] else "", with_unit(label, waveforms.unit), limits)
-        charts.show_lines(lines, axes, page.key(f"waveforms {label}"), height_px=height_px, legend=True)
+        below = axis if label == rows[-1][0] else ""
+        panel = LinePanel(lines, below, with_unit(label, waveforms.unit), x_limits=limits)
+        charts.show_lines(panel, page.key(f"waveforms {label}"), height_px=height_px, legend=True)
 
 
 # What is taken along: whole, not thinned as on the page.

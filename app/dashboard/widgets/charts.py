@@ -43,18 +43,6 @@ MEASURED, FAULT, SHAFT, QUIET = 0, 1, 4, -1
 """Colours of lines by meaning; further numbers are further colours."""
 
 
-@dataclass(frozen=True)
-class Axes:
-    """Names, limits and scale; texts may come from files. Dates are days since 1970."""
-
-    x: str
-    y: str
-    x_limits: tuple[float, float]
-    y_limits: tuple[float, float] | None = None
-    logarithmic: bool = False
-    dates: bool = False
-
-
 def show_differences(
     at: FloatArray,
     off: FloatArray,
@@ -83,9 +71,9 @@ def show_differences(
         for chosen, said, colour in ((~beyond, "within the floor", QUIET), (beyond, "beyond it", FAULT))
         if chosen.any()
     ]
-    axes = Axes(name, f"{words} (dB)", shown, padded_limits([off, np.zeros(1)]))
+    panel = LinePanel(lines, name, f"{words} (dB)", padded_limits([off, np.zeros(1)]), x_limits=shown)
     # its own zoom gives way to that of the figure above
-    show_lines(lines, axes, f"{key} {shown[0]:.4g} {shown[1]:.4g}", height_px=180, legend=True)
+    show_lines(panel, f"{key} {shown[0]:.4g} {shown[1]:.4g}", height_px=180, legend=True)
 
 
 def stems(x: FloatArray, y: FloatArray, name: str, colour: int) -> ChartLine:
@@ -109,23 +97,9 @@ def show_panel(panel: LinePanel | LevelPanel, key: str, span_db: float) -> None:
     if panel.title:
         st.caption(as_typed(panel.title))
     if isinstance(panel, LevelPanel):
-        show_map(
-            panel.levels,
-            panel.at,
-            panel.positions,
-            Axes(panel.x, panel.y, (float(panel.at[0]), float(panel.at[-1])), logarithmic=panel.logarithmic),
-            key,
-            unit=panel.unit,
-            dynamic_range_db=span_db if panel.span is None else panel.span,
-            cursors=panel.cursors,
-            lines=panel.lines,
-        )
-        return
-    ends = [float(end) for line in panel.lines for end in (line.x.min(), line.x.max())]
-    limits = panel.x_limits or (min(ends), max(ends))
-    axes = Axes(panel.x, panel.y, limits, panel.limits, logarithmic=panel.logarithmic)
-    many = len({line.name for line in panel.lines if line.name}) > 1
-    show_lines(panel.lines, axes, key, cursors=panel.cursors, legend=many, spans=panel.spans, is_plane=panel.is_plane)
+        show_map(panel, key, dynamic_range_db=span_db)
+    else:
+        show_lines(panel, key, legend=len({line.name for line in panel.lines if line.name}) > 1)
 
 
 def show_figure(figure: PictureFigure, words: str, key: str) -> None:
@@ -198,31 +172,25 @@ def _name(key: str) -> str:
 
 
 def show_lines(
-    lines: Sequence[ChartLine],
-    axes: Axes,
+    panel: LinePanel,
     key: str,
     *,
-    cursors: Sequence[Cursor] = (),
     marked: Sequence[tuple[float, float]] = (),
     height_px: int = 340,
     legend: bool = False,
     whole: tuple[float, float] | None = None,
     per_unit: tuple[float, str] | None = None,
     step: float | None = None,
-    spans: Sequence[tuple[float, float, str]] = (),
-    is_plane: bool = False,
+    dates: bool = False,
 ) -> None:
     """Show lines with cursors and marked points; of long lines the extremes of each pixel column of what is shown.
 
     Parameters
     ----------
-    lines : sequence of ChartLine
-        At full length: zooming sends their detail.
-    axes : Axes
+    panel : LinePanel
+        Its lines at full length: zooming sends their detail. Those of a plane are sent whole.
     key : str
         Of the widget, unique on the page.
-    cursors : sequence of Cursor
-        In the unit of the x axis.
     marked : sequence of (x, y)
         Points that findings name.
     height_px : int
@@ -235,23 +203,23 @@ def show_lines(
         What one unit of the x axis is in another unit, for the readout of cursors.
     step : float or None
         Distance of the sidebands that are offered first.
-    spans : sequence of (low, high, colour)
-        Shaded parts of the x axis.
-    is_plane : bool
-        Of paths and points in a plane, which are sent whole.
+    dates : bool
+        Whether x is days since 1970.
     """
-    colours, ends = palette(), whole or axes.x_limits
-    shown = looked_at(key, ends, axes.x_limits)
-    data = _described(axes, key, shown, ends, height_px, is_plane=is_plane) | {
+    lines, is_plane = panel.lines, panel.is_plane
+    limits = panel.x_limits or (min(float(line.x.min()) for line in lines), max(float(line.x.max()) for line in lines))
+    ends = whole or limits
+    shown = looked_at(key, ends, limits)
+    data = _described(panel, key, shown, ends, height_px, has_tools=not is_plane) | {
         "lines": [_sent(line, None if is_plane else shown, alone=len(lines) == 1) for line in lines],
-        "cursors": _cursor_rows(cursors, colours),
+        "cursors": _cursor_rows(panel.cursors, palette()),
+        "dates": dates,
         "marked": [[float(x), float(y)] for x, y in marked],
         "legend": legend,
-        "log": axes.logarithmic,
-        "limits": axes.y_limits,
+        "limits": panel.limits,
         "per_unit": per_unit,
         "step": step,
-        "spans": list(spans),
+        "spans": list(panel.spans),
         "plane": is_plane,
         "across": _zoomed(key)[0][2:] or None if is_plane else None,
     }
@@ -259,16 +227,10 @@ def show_lines(
 
 
 def show_map(
-    values: FloatArray,
-    x: FloatArray,
-    y: FloatArray,
-    axes: Axes,
+    panel: LevelPanel,
     key: str,
     *,
-    unit: str,
     dynamic_range_db: float = 60.0,
-    cursors: Sequence[Cursor] = (),
-    lines: Sequence[ChartLine] = (),
     also: tuple[FloatArray, str] | None = None,
     height_px: int = 420,
     shown: tuple[float, float] | None = None,
@@ -277,21 +239,11 @@ def show_map(
 
     Parameters
     ----------
-    values : array, (n_y, n_x)
-        Levels in dB.
-    x, y : array
-        Ascending; `x` in equal steps.
-    axes : Axes
+    panel : LevelPanel
     key : str
         Of the widget, unique on the page.
-    unit : str
-        Of the levels.
     dynamic_range_db : float
-        Shown below the largest level.
-    cursors : sequence of Cursor
-        In the unit of the x axis.
-    lines : sequence of ChartLine
-        Drawn over the map.
+        Shown below the largest level, where the panel does not say.
     also : (array of (n_y,), str) or None
         A second value of each row with its unit, e.g. the speed.
     height_px : int
@@ -300,6 +252,7 @@ def show_map(
     """
     from gearsig.plot import level_colours
 
+    values, x, y = panel.levels, panel.at, panel.positions
     half = (x[-1] - x[0]) / max(len(x) - 1, 1) / 2
     ends = (float(x[0] - half), float(x[-1] + half))
     span = looked_at(key, ends, shown)
@@ -307,15 +260,14 @@ def show_map(
     stop = max(int(np.searchsorted(x, span[1] + half)), start + 2)
     part = values[:, start:stop]
     # rows of the picture lie at equal steps of y, those of the map need not
-    pooled, at = pooled_levels(part, y, MAP_COLUMNS, MAP_ROWS, logarithmic=axes.logarithmic)
+    pooled, at = pooled_levels(part, y, MAP_COLUMNS, MAP_ROWS, logarithmic=panel.logarithmic)
     high = float(values.max())
-    low = high - dynamic_range_db
+    low = high - (dynamic_range_db if panel.span is None else panel.span)
     levels = np.clip(255 * (pooled - low) / (high - low), 0, 255).astype(np.uint8)
     first, last = float(x[start] - half), float(x[min(stop, len(x)) - 1] + half)
-    data = _described(axes, key, span, ends, height_px) | {
-        "lines": [_sent(line, span) for line in lines],
-        "log": axes.logarithmic,
-        "cursors": _cursor_rows(cursors, palette()),
+    data = _described(panel, key, span, ends, height_px) | {
+        "lines": [_sent(line, span) for line in panel.lines],
+        "cursors": _cursor_rows(panel.cursors, palette()),
         "marked": [],
         "map": {
             "levels": b64encode(levels.tobytes()).decode("ascii"),
@@ -325,7 +277,7 @@ def show_map(
             "limits": [float(y[0]), float(y[-1])],
             "low": low,
             "high": high,
-            "unit": unit,
+            "unit": panel.unit,
             "colours": b64encode(level_colours(dark=is_dark()).tobytes()).decode("ascii"),
             "also": None if also is None else [float(also[0][i]) for i in at],
             "also_unit": "" if also is None else also[1],
@@ -339,27 +291,27 @@ def _ignore() -> None:
 
 
 def _described(
-    axes: Axes,
+    panel: LinePanel | LevelPanel,
     key: str,
     shown: tuple[float, float],
     whole: tuple[float, float],
     height_px: int,
     *,
-    is_plane: bool = False,
+    has_tools: bool = True,
 ) -> dict[str, object]:
     return {
-        "x": one_line(axes.x),
-        "y": one_line(axes.y),
-        "x_unit": _unit_of(axes.x),
-        "y_unit": _unit_of(axes.y),
+        "x": one_line(panel.x),
+        "y": one_line(panel.y),
+        "x_unit": _unit_of(panel.x),
+        "y_unit": _unit_of(panel.y),
+        "log": panel.logarithmic,
         "shown": list(shown),
         "whole": list(whole),
         "height": height_px,
         "fault": palette().fault,
-        "dates": axes.dates,
-        "alternative": one_line(f"{axes.y} over {axes.x}"),
+        "alternative": one_line(f"{panel.y} over {panel.x}"),
         "name": file_stem(key),
-        "has_tools": height_px >= 200 and not is_plane,
+        "has_tools": height_px >= 200 and has_tools,
     }
 
 

@@ -13,7 +13,6 @@ from app.dashboard import state
 from app.dashboard.theme import as_typed, is_dark, palette
 from app.dashboard.widgets.charts import (
     N_COLUMNS,
-    Axes,
     Ring,
     looked_at,
     offer_picture,
@@ -28,6 +27,7 @@ from gearsig.plot import (
     AngleMark,
     ChartLine,
     Cursor,
+    LinePanel,
     Scale,
     displayed_values,
     figure_table,
@@ -114,22 +114,22 @@ def show_spectrum(
         shown_values.append(values[start + n_offset : stop])
     text = quantity or ("value" if first.scaling == "dimensionless" else first.scaling)
     in_db = f"{text} (dB re 1 {unit_text(first.unit)}".rstrip() + ")"
-    axes = Axes(
-        first.axis_label,
-        in_db if scaled == "decibel" else with_unit(text, first.unit),
-        shown or whole,
-        value_limits(np.concatenate(shown_values), scaled),
-        logarithmic=scaled == "log",
-    )
     values = displayed_values(first.values, first.scaling, scaled)
     # a finding names an order to less than a line: the tallest beside it is meant
     places = [(p, max(first.index_of(p) - 2, 0)) for p in marked]
     shafts = [cursor.position for cursor in cursors if cursor.kind == "shaft"]
-    show_lines(
+    panel = LinePanel(
         lines[::-1],
-        axes,
-        chart,
+        first.axis_label,
+        in_db if scaled == "decibel" else with_unit(text, first.unit),
+        value_limits(np.concatenate(shown_values), scaled),
+        logarithmic=scaled == "log",
         cursors=[_first_if_found(cursor, marked) for cursor in cursors if cursor.kind in chosen],
+        x_limits=shown or whole,
+    )
+    show_lines(
+        panel,
+        chart,
         marked=[(p, float(values[start : start + 5].max())) for p, start in places],
         height_px=270 if plain else 340,
         legend=bool(names),
@@ -254,10 +254,10 @@ def _show_unrolled(analysis: Analysis, average: SynchronousAverage, n_teeth: int
     """Show the same over the angle, with its largest swing in words."""
     values, error = average.values, 2 * average.standard_error
     angle = np.arange(len(values)) * 360 / len(values)
-    axes = Axes(f"angle of {average.shaft or 'the shaft'} (deg)", with_unit(average.kind, average.unit), (0.0, 360.0))
     line = ChartLine(angle, values, average.kind, band=(values - error, values + error))
     key = state.view_key(f"average {average.channel} {average.shaft} {average.kind}", analysis)
-    show_lines([line], axes, key, cursors=marks, height_px=360)
+    x, y = f"angle of {average.shaft or 'the shaft'} (deg)", with_unit(average.kind, average.unit)
+    show_lines(LinePanel([line], x, y, cursors=marks, x_limits=(0.0, 360.0)), key, height_px=360)
     largest = int(np.argmax(np.abs(average.values)))
     degrees = 360 * largest / len(average.values)
     value = f"{readable(average.values[largest])} {unit_text(average.unit)}".strip()

@@ -10,11 +10,11 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.theme import as_typed, one_line
-from app.dashboard.widgets.charts import Axes, show_lines
+from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.spectrum import SLIP_SHARE, show_ring, show_spectrum
 from gearsig.diagnosis import Analysis, Finding, Kind, Outcome
-from gearsig.plot import ChartLine, marks_of, with_unit
+from gearsig.plot import ChartLine, LinePanel, marks_of, with_unit
 from gearsig.report import (
     FindingCard,
     bearing_cursors,
@@ -135,9 +135,9 @@ def show_verdict_picture(analysis: Analysis) -> None:
         levels = channel.order_levels
         lines = [ChartLine(level.speed_rpm, level.amplitude, level.name, i) for i, level in enumerate(levels)]
         low, high = float(levels[0].speed_rpm[0]), float(levels[0].speed_rpm[-1])
-        axes = Axes("speed (rpm)", with_unit("amplitude", levels[0].unit), (low, high))
+        panel = LinePanel(lines, "speed (rpm)", with_unit("amplitude", levels[0].unit), x_limits=(low, high))
         found = [(level.largest[1], level.largest[0]) for level in levels]
-        show_lines(lines, axes, state.view_key(place, analysis), marked=found, legend=True, height_px=260)
+        show_lines(panel, state.view_key(place, analysis), marked=found, legend=True, height_px=260)
         if picture.finding is not None:
             st.caption(as_typed(picture.finding.title))
         return

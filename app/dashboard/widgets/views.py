@@ -17,7 +17,7 @@ from app.dashboard.methods.form import MethodPage
 from app.dashboard.methods.page import cached, show_method
 from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import Axes, show_figure, show_lines, show_map, show_panel
+from app.dashboard.widgets.charts import show_figure, show_lines, show_map, show_panel
 from app.dashboard.widgets.machine import show_machine
 from app.dashboard.widgets.messages import show_error, show_facts, show_unknown_speed
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
@@ -147,12 +147,9 @@ def show_channels(analysis: Analysis) -> None:
         channel = recording.channels[recording.index(name)]
         quantity = channel.quantity.replace("_", " ") if channel.quantity != "unknown" else "value"
         st.markdown(f"**{as_typed(name)}** {as_typed(channel.position)}")
-        show_lines(
-            [ChartLine(time, recording.values(name), name)],
-            Axes("time (s)", plot.with_unit(quantity, channel.unit), (0.0, recording.duration_s)),
-            state.view_key(f"time of {name}", analysis),
-            height_px=200,
-        )
+        lines, whole = [ChartLine(time, recording.values(name), name)], (0.0, recording.duration_s)
+        panel = plot.LinePanel(lines, "time (s)", plot.with_unit(quantity, channel.unit), x_limits=whole)
+        show_lines(panel, state.view_key(f"time of {name}", analysis), height_px=200)
 
 
 def _show_quality(analysis: Analysis) -> None:
@@ -269,18 +266,18 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
     cursors = [c for c in line_cursors(analysis, shown_map) if c.kind == "mesh"]
     # over frequency and speed an order is a ray
     rays = [] if lines == "Order" else [ChartLine(c / 60.0 * y, y, "mesh", 2) for c in _mesh_orders(analysis)]
-    show_map(
+    panel = plot.LevelPanel(
         plot.decibels(shown_map.values[rows], shown_map.scaling),
         shown_map.positions,
         y,
-        Axes(shown_map.axis_label, "time (s)" if along == "Time" else "speed (rpm)", (0.0, highest)),
-        state.view_key(f"map of {channel.channel} {lines} {along}", analysis),
-        unit=f"dB re 1 {plot.unit_text(shown_map.unit)}",
-        cursors=cursors if lines == "Order" else (),
+        shown_map.axis_label,
+        "time (s)" if along == "Time" else "speed (rpm)",
+        f"dB re 1 {plot.unit_text(shown_map.unit)}",
         lines=rays if along == "Speed" else (),
-        also=also,
-        shown=(0.0, highest),
+        cursors=cursors if lines == "Order" else (),
     )
+    key = state.view_key(f"map of {channel.channel} {lines} {along}", analysis)
+    show_map(panel, key, also=also, shown=(0.0, highest))
     st.caption(
         "Lines of the machine stand upright over order and lean over frequency and speed (a Campbell diagram, with "
         "the mesh as rays); resonances stay at their frequency. Read level, speed and time under the pointer."
