@@ -142,6 +142,17 @@ def test_uneven_pitch_is_the_course_of_one_tooth_with_any_pattern() -> None:
     assert likely(local, course(0.0, 0.05)) > float(as_pattern.levels.max()) + 5.0
 
 
+def test_a_pitch_error_of_one_tooth_tells_behind_from_ahead_and_one_tooth_from_all() -> None:
+    seen = -2.0 * course(0.7, 0.05)  # a tooth that stands ahead, elsewhere on the gear
+    hypotheses = {"behind": (course(0.0, 0.05), 0), "ahead": (-course(0.0, 0.05), 0), "all": (course(0.0, 0.05), 29)}
+    levels = {}
+    for name, (simulated, n_teeth) in hypotheses.items():
+        compared = compared_course(Added("pitch_error", 1.0, {}), simulated, seen, NOISE, n_teeth=n_teeth)
+        assert compared is not None
+        levels[name] = float(compared.levels.max())
+    assert levels["ahead"] > max(levels["behind"], levels["all"]) + 3.0
+
+
 def test_waveforms_part_what_faults_of_a_tooth_have_together() -> None:
     before = {"tooth_spall": 0.5, "root_crack": 0.3, "none": 0.2}
     after = told_apart(before, {"tooth_spall": 0.0, "root_crack": 2.0})
