@@ -53,8 +53,8 @@ MISFITS = (0.1, 0.2, 0.4, 0.7, 1.0)
 LOG_SCALES = np.linspace(-3.0, 3.0, 25)
 """ln g."""
 
-SCALE_SCATTER = 0.5
-"""Of ln g where the severity is right: mesh lines of deviating flanks, cracks at other angles."""
+SCALE_SCATTER = 0.7
+"""Of ln g where the severity is right: mesh lines of deviating flanks, cracks at other angles, chips of other widths."""
 
 GOOD = 0.6
 """Correlation from which a twin is believed to show the course of a fault."""
