@@ -139,9 +139,9 @@ EFFECT = Effect(
         shared.tolerance_of(pitch_tolerance_um),
         shared.either_gear,
         _drawn,
-        # The teeth's deviations are drawn; what one of them changes, each changes, as long as no tooth parts.
+        # The teeth's deviations are drawn; what a small one of them changes, each changes. A large one parts its tooth.
         courses=lambda machine: [
-            (options, (0,)) for stands in STANDS for options in shared.first_teeth(machine, stands=stands)
+            (options, (0, 2)) for stands in STANDS for options in shared.first_teeth(machine, stands=stands)
         ],
     ),
     textbook=Textbook(
