@@ -1,0 +1,95 @@
+"""Every page in a real browser: in a narrow window, light and dark, empty, with a broken file, with two users."""
+
+from __future__ import annotations
+
+import re
+from urllib.parse import unquote
+
+import pytest
+
+from tests.browser.conftest import CHROMIUM, settle
+
+PAGES = ("", "analysis?sample=damaged_tooth", "laboratory", "flexible", "compare", "gap", "fleet")
+BROKEN = {"name": "broken.mat", "mimeType": "", "buffer": b"\x80\x04\x95 pickle"}
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine"),
+]
+playwright = pytest.importorskip("playwright.sync_api")
+
+
+def opened(page: playwright.Page, address: str) -> str:
+    page.goto(address)
+    page.get_by_test_id("stMain").wait_for()
+    settle(page)
+    text = page.get_by_test_id("stMain").inner_text()
+    assert isinstance(text, str)
+    return text
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_a_page_fits_a_narrow_window_in_light_and_dark(page: playwright.Page, address: str, path: str) -> None:
+    page.set_viewport_size({"width": 800, "height": 900})
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        assert len(opened(page, address + path)) > 100
+        assert page.evaluate("document.documentElement.scrollWidth") <= 800
+        paper = page.evaluate("getComputedStyle(document.querySelector('[data-testid=stApp]')).backgroundColor")
+        lightness = sum(map(float, paper.removeprefix("rgb(").removesuffix(")").split(",")[:3])) / (3 * 255)
+        assert (lightness > 0.8) == (scheme == "light")
+
+
+@pytest.mark.parametrize("path", ["compare", "gap"])
+def test_a_broken_file_is_one_message_on_the_other_pages(page: playwright.Page, address: str, path: str) -> None:
+    opened(page, address + path)
+    page.get_by_text("Own file").first.click()
+    settle(page)
+    page.locator("[data-testid=stFileUploader] input[type=file]").first.set_input_files(BROKEN)
+    settle(page)
+    if path == "gap":
+        page.get_by_role("button", name="Diagnose").click()
+    message = page.get_by_test_id("stAlert").filter(has_text="broken.mat").first
+    message.wait_for()
+    assert "Traceback" not in page.get_by_test_id("stMain").inner_text()
+
+
+@pytest.mark.parametrize("path", PAGES[2:])
+def test_two_users_at_once_see_the_same_page_each(page: playwright.Page, address: str, path: str) -> None:
+    other = page.context.browser.new_context().new_page()
+    other.goto(address + path)
+    mine = opened(page, address + path)
+    other.get_by_test_id("stMain").wait_for()
+    settle(other)
+    assert len(other.get_by_test_id("stMain").inner_text()) > 0.8 * len(mine) > 80
+    assert other.get_by_test_id("stException").count() == 0
+
+
+def part_shown(picture: playwright.Locator) -> list[float]:
+    """Return left, top, width and height of what a picture shows."""
+    box = re.search(r'viewBox="([^"]*)"', unquote(picture.get_attribute("src")))
+    assert box is not None
+    return [float(number) for number in box[1].split()]
+
+
+def test_the_ring_of_teeth_zooms_is_read_off_and_sent_as_an_address(page: playwright.Page, address: str) -> None:
+    opened(page, address + "analysis?sample=damaged_tooth")
+    ring = page.locator(".st-key-verdict .picture .frame")
+    ring.scroll_into_view_if_needed()
+    box, shown = ring.bounding_box(), ring.locator("img")
+    whole = part_shown(shown)
+    page.mouse.move(box["x"] + 0.55 * box["width"], box["y"] + 0.55 * box["height"])
+    page.get_by_text("tooth 1").first.wait_for()  # the tip
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 0.9 * box["height"], steps=4)
+    page.mouse.up()
+    page.wait_for_function("location.search.includes('zoom=')")
+    settle(page)
+    near = part_shown(shown)
+    assert near[2] < 0.5 * whole[2]
+    opened(page, page.url)
+    assert part_shown(shown) == pytest.approx(near, rel=1e-5)
+    ring.focus()
+    page.keyboard.press("0")
+    page.wait_for_function("!location.search.includes('zoom=')")
+    assert part_shown(shown) == whole
