@@ -14,7 +14,7 @@ show. φ, δ and f are averaged over: whatever has more freedom does not win by 
 machine leaves f near 1, where all faults are as likely as each other. How good a witness the twin is shows with the
 fault itself, then, and before that on the healthy machine: α is by how much its mesh lines miss the reference's.
 
-Uneven pitch stands on every tooth. Its change is that of one tooth, once for each and as much as that tooth is out:
+Uneven pitch stands on one tooth, ahead or behind, or on every tooth. Of all of them its change is that of one tooth, once for each and as much as that tooth is out:
 order i beside all harmonics and on all channels has one unknown factor, u_k[i] = h b_i t_k[i] + r, b_−i = b_i*. With
 single deviations that are independent of each other, Σ f = 0, cumulative ones have b_i ~ CN(0, z/(4 sin²(πi/z))).
 """
