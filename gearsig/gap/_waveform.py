@@ -14,9 +14,10 @@ show. φ, δ and f are averaged over: whatever has more freedom does not win by 
 machine leaves f near 1, where all faults are as likely as each other. How good a witness the twin is shows with the
 fault itself, then, and before that on the healthy machine: α is by how much its mesh lines miss the reference's.
 
-Uneven pitch stands on one tooth, ahead or behind, or on every tooth. Of all of them its change is that of one tooth, once for each and as much as that tooth is out:
-order i beside all harmonics and on all channels has one unknown factor, u_k[i] = h b_i t_k[i] + r, b_−i = b_i*. With
-single deviations that are independent of each other, Σ f = 0, cumulative ones have b_i ~ CN(0, z/(4 sin²(πi/z))).
+Uneven pitch stands on one tooth, ahead or behind, or on every tooth. Of all of them its change is that of one tooth,
+once for each and as much as that tooth is out: order i beside all harmonics and on all channels has one unknown factor,
+u_k[i] = h b_i t_k[i] + r, b_−i = b_i*. With single deviations that are independent of each other, Σ f = 0, cumulative
+ones have b_i ~ CN(0, z/(4 sin²(πi/z))).
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ LOG_SCALES = np.linspace(-3.0, 3.0, 25)
 """ln g."""
 
 SCALE_SCATTER = 0.7
-"""Of ln g where the severity is right: mesh lines of deviating flanks, cracks at other angles, chips of other widths."""
+"""Of ln g where the severity is right: mesh lines of deviating flanks, cracks at other angles, wider chips."""
 
 GOOD = 0.6
 """Correlation from which a twin is believed to show the course of a fault."""
