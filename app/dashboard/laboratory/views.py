@@ -216,9 +216,7 @@ def show_mesh(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     _show_over_cycles(cycles, forces, "mesh force (kN)", marks, "force of the laboratory")
 
 
-def _show_over_cycles(
-    cycles: FloatArray, curves: list[FloatArray], y: str, marks: Sequence[Cursor], key: str
-) -> None:
+def _show_over_cycles(cycles: FloatArray, curves: list[FloatArray], y: str, marks: Sequence[Cursor], key: str) -> None:
     x, shown = "mesh cycles (tooth k of the driver enters at k − 1)", (float(cycles[0]), float(cycles[-1]))
     limits = padded_limits(curves, flat=0.1)
     panel = LinePanel(_lines(cycles, curves), x, y, limits, cursors=marks, x_limits=shown)
