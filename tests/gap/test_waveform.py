@@ -74,7 +74,9 @@ def test_the_severity_is_that_of_the_right_size_and_its_interval_holds_it() -> N
     match = waveform_match(trials, 0.5, 4.0)
     assert match is not None
     assert match.severity.value == pytest.approx(1.7, rel=0.1)
-    assert 1.0 < match.severity.low < 1.7 < match.severity.high < 2.8
+    # ln g scatters by 0.7 about its severity's, ln s by half of that: 90 % from 0.96 to 3.0
+    assert 0.8 < match.severity.low < 1.2
+    assert 2.5 < match.severity.high < 3.5
     assert match.added.options == {"gear": "driver"}
 
 
