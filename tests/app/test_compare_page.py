@@ -6,7 +6,7 @@ from app.dashboard import state
 from app.dashboard.compare import MACHINE, ORIGIN, TWIN, SimulationToCompare, command_of, teeth_of
 from app.dashboard.state import AnalysisRequest
 from gearsig.rig import GearPair, Rig, Shaft
-from tests.app.pages import FOLDER, SAMPLES, figures, shown_text
+from tests.app.pages import FOLDER, SAMPLES, figures, pictures, shown_text
 
 
 def opened(recording: str = "root_crack_3mm", simulation: str = "root_crack_0mm") -> AppTest:
@@ -33,6 +33,7 @@ def test_two_samples_are_compared_in_every_view() -> None:
         page.run()
         assert not page.exception
         assert not page.get("image")
+        assert not pictures(page)
         drawn[tab] = (len(figures(page)), len(page.dataframe))
     assert drawn == {"Orders": (2, 1), "Angle": (4, 1), "Bands": (2, 1), "Lines": (0, 2)}
     assert "gearsig compare root_crack_0mm.h5 root_crack_3mm.h5" in page.code[0].value

@@ -58,6 +58,9 @@ def test_views_draw_what_they_promise() -> None:
     assert drawn["Map"] == (1, 0, 0)
     assert drawn["Average"] == (1, 1, 0)
     assert drawn["Machine"] == (0, 0, 5)
+    page.session_state[state.TAB] = "Machine"
+    page.run()
+    assert len(page.get("image")) == 1  # the train
     assert drawn["Indicators"] == (0, 0, 1)
 
 
