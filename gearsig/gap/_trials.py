@@ -616,12 +616,10 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
                 observed[:, side],
                 noise[:, side],
                 moves_pitches=effect.moves_pitches,
-                n_teeth=condition.now.frame.teeth[side]
-                if effect.is_on_every_tooth and "tooth" not in setting.options
-                else 0,
+                n_teeth=condition.now.frame.teeth[side] if on_all else 0,
                 gain_scatter=scatter,
             )
-            for setting, sidebands in _settings(bank, effect)
+            for setting, sidebands, on_all in _settings(bank, effect)
             if (side := _side(setting)) is not None
         ]
         courses.append([course for course in compared if course is not None])
@@ -629,8 +627,8 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
     return waveform_match(joined_courses(courses), min(severities), max(severities)) if severities else None
 
 
-def _settings(bank: Bank, effect: GapEffect) -> Iterator[tuple[Added, ComplexArray]]:
-    """Yield the settings that waveforms are compared with, and the sidebands simulated for them.
+def _settings(bank: Bank, effect: GapEffect) -> Iterator[tuple[Added, ComplexArray, bool]]:
+    """Yield the settings that waveforms are compared with, the sidebands simulated for them, and if all teeth have it.
 
     An effect that may sit on every tooth, each by itself, was simulated on one: that stands for itself and, the first
     of each gear, for all.
@@ -638,12 +636,12 @@ def _settings(bank: Bank, effect: GapEffect) -> Iterator[tuple[Added, ComplexArr
     gears: set[object] = set()
     for added, sidebands in zip(bank.added, bank.sidebands, strict=True):
         if not effect.is_on_every_tooth:
-            yield added, sidebands
+            yield added, sidebands, False
         elif "tooth" in added.options:
-            yield added, sidebands
+            yield added, sidebands, False
             if (gear := added.options.get("gear")) not in gears:
                 gears.add(gear)
-                yield Added(added.name, added.severity, {"gear": str(gear)}), sidebands
+                yield Added(added.name, added.severity, {"gear": str(gear)}), sidebands, True
 
 
 def _side(added: Added) -> int | None:

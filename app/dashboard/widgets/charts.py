@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from io import BytesIO
@@ -395,14 +395,8 @@ def show_picture(svg: str, figure: PictureFigure, words: str, key: str) -> None:
     key : str
         Unique on the page.
     """
-    dark = is_dark()  # files are made in another thread, which knows no page
-    show_svg(svg, words, key, turned=dark)
-    files: dict[str, str | Callable[[], bytes]] = {
-        "png": lambda: picture_bytes(figure, dark=dark),
-        "svg": svg,
-        "csv": lambda: csv_text(figure_table(figure)).encode(),
-    }
-    offer_picture(files, key)
+    show_svg(svg, words, key, turned=is_dark())
+    offer_picture(svg, lambda: figure, key)
 
 
 _picture = component_of("picture")
@@ -425,12 +419,13 @@ def show_svg(svg: str, words: str, key: str, *, turned: bool = False, ring: Ring
         What is read off around the picture's middle.
     """
     left, _, width, _ = (float(number) for number in _VIEW_BOX.findall(svg)[0].split())
-    looked_at(key, (left, left + width))
+    looked_at(key, (left, left + width))  # which keeps it in the address
+    ends, _ = _zoomed(key)
     data = {
         "svg": svg,
         "words": one_line(words),
         "turned": turned,
-        "shown": _zoomed(key)[0] if len(_zoomed(key)[0]) == 4 else None,
+        "shown": ends if len(ends) == 4 else None,
         "ring": None if ring is None else {"values": packed(ring.values), "teeth": ring.teeth, "unit": ring.unit},
     }
     _picture(key=key, data=data, on_range_change=_ignore, default={"range": None})
@@ -448,8 +443,14 @@ class Ring:
     unit: str
 
 
-def offer_picture(files: Mapping[str, bytes | str | Callable[[], bytes]], key: str) -> None:
-    """Offer a picture as files, by their ending; `key` is unique on the page."""
+def offer_picture(svg: str, drawn: Callable[[], PictureFigure], key: str) -> None:
+    """Offer a picture as files: its SVG, and what `drawn` draws as PNG and CSV; `key` is unique on the page."""
+    dark = is_dark()  # files are made in another thread, which knows no page
+    files: dict[str, str | Callable[[], bytes]] = {
+        "png": lambda: picture_bytes(drawn(), dark=dark),
+        "svg": svg,
+        "csv": lambda: csv_text(figure_table(drawn())).encode(),
+    }
     with st.container(horizontal=True, horizontal_alignment="right"):
         for ending, data in files.items():
             st.download_button(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -10,18 +10,17 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.theme import as_typed, is_dark, palette
+from app.dashboard.theme import as_typed, palette
 from app.dashboard.widgets.charts import (
     N_COLUMNS,
     Ring,
     looked_at,
     offer_picture,
-    picture_bytes,
     show_lines,
     show_svg,
 )
 from gearsig.diagnosis import Analysis, ChannelAnalysis
-from gearsig.formatting import csv_text, readable
+from gearsig.formatting import readable
 from gearsig.orders import SynchronousAverage
 from gearsig.plot import (
     AngleMark,
@@ -30,7 +29,6 @@ from gearsig.plot import (
     LinePanel,
     Scale,
     displayed_values,
-    figure_table,
     marks_of,
     polar_figure,
     svg_ring,
@@ -226,14 +224,8 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) 
         with polar:
             key = f"ring of {average.channel} {average.shaft} {average.kind}"
             ring = show_ring(average, n_teeth, marks, words, state.view_key(key, analysis))
-            dark = is_dark()  # files are made in another thread, which knows no page
             drawn = partial(polar_figure, average, n_teeth=n_teeth, marks=marks)
-            files: dict[str, str | Callable[[], bytes]] = {
-                "png": lambda: picture_bytes(drawn(), dark=dark),
-                "svg": ring,
-                "csv": lambda: csv_text(figure_table(drawn())).encode(),
-            }
-            offer_picture(files, f"ring-{average.shaft} of {average.channel} {average.kind}")
+            offer_picture(ring, drawn, f"ring-{average.shaft} of {average.channel} {average.kind}")
         with unrolled:
             _show_unrolled(analysis, average, n_teeth, [Cursor(m.angle_deg, "finding", m.label) for m in marks])
 
