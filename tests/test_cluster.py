@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 pytest.importorskip("distributed", reason="the extra cluster is not installed")
-pytest.importorskip("duckdb", reason="the extra fleet is not installed")
 
 from distributed import Client
 

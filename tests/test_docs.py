@@ -53,8 +53,6 @@ def name_of(page: Path) -> str:
 
 @pytest.mark.parametrize("page", RUN, ids=name_of)
 def test_python_of_the_pages_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if "open_fleet" in text_of(page):
-        pytest.importorskip("duckdb", reason="the extra fleet is not installed")
     (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
@@ -148,7 +146,7 @@ def test_constraints_pin_what_is_needed_and_name_no_place_to_get_it_from() -> No
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     needed = [
         *project["dependencies"],
-        *(line for name in ("fleet", "pdf") for line in project["optional-dependencies"][name]),
+        *project["optional-dependencies"]["pdf"],
     ]
     lines = (ROOT / "docs" / "constraints.txt").read_text(encoding="utf-8").splitlines()
     pins = dict(line.lower().replace("_", "-").split("==") for line in lines if not line.startswith("#"))

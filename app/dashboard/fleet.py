@@ -82,8 +82,8 @@ def show() -> None:
         messages: list[str] = []
         fleet = open_fleet(path, on_message=messages.append)
         status = fleet.status()
-    except InputError as error:
-        if (path / "store.json").exists() or "gearsig[fleet]" in str(error):
+    except InputError:
+        if (path / "store.json").exists():
             raise
         _show_how_to_begin()
         st.caption(as_typed(f"Looked for in {path.absolute()}."))

@@ -35,6 +35,7 @@ from gearsig.diagnosis._resonance import detect_resonances
 from gearsig.diagnosis._signals import BandEnvelope
 from gearsig.diagnosis._tooth import localise
 from gearsig.diagnosis._types import (
+    CHANGED,
     Analysis,
     AnalysisSettings,
     CannotTell,
@@ -53,6 +54,7 @@ from gearsig.diagnosis._verdict import ranked, verdict_of
 
 __all__ = [
     "BEARING_PARTS",
+    "CHANGED",
     "MEMORY_BYTES",
     "SAME_BEARING_ORDER",
     "AnalysedPart",

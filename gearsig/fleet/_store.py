@@ -103,14 +103,13 @@ class Store:
     Raises
     ------
     InputError
-        If there is no store, the folder holds other things, or DuckDB is not installed.
+        If there is no store, or the folder holds other things.
     """
 
     def __init__(self, folder: Path, on_message: Callable[[str], object], *, create: bool = False) -> None:
         self.folder, self.on_message = folder, on_message
         self._loose_known: frozenset[str] = frozenset()
         self._segments_known: tuple[str, ...] | None = None
-        required()
         if not (folder / MANIFEST).exists() and not (folder / SEGMENTS).is_dir():
             if not create:
                 raise InputError(
@@ -423,24 +422,6 @@ def _alike(sizes: dict[str, int]) -> list[str]:
     tiers = {name: int(log(max(size, 1), TIER)) for name, size in sizes.items()}
     full = [tier for tier in set(tiers.values()) if list(tiers.values()).count(tier) >= TIER]
     return [name for name, tier in tiers.items() if full and tier <= min(full)]
-
-
-def required() -> None:
-    """Check that what a fleet needs is installed.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
-    from importlib.util import find_spec
-
-    missing = [name for name in ("duckdb", "filelock") if find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"a fleet needs the package{'s' * (len(missing) > 1)} {' and '.join(missing)}",
-            remedy="install with: pip install 'gearsig[fleet]'",
-        )
 
 
 def _text(value: str) -> str:

@@ -76,8 +76,10 @@ from gearsig.report._sections import (
     analysis_text,
     change_rows,
     finding_card,
+    headline_of,
     long_analysis_text,
     reference_text,
+    split_verdict,
 )
 
 __all__ = [
@@ -125,6 +127,7 @@ __all__ = [
     "gap_to_dict",
     "gap_to_json",
     "group_texts",
+    "headline_of",
     "highest_order_of_interest",
     "identify_json",
     "identify_text",
@@ -152,6 +155,7 @@ __all__ = [
     "shown_orders",
     "size_text",
     "speed_is_constant",
+    "split_verdict",
     "start_stop_figures",
     "start_stop_json",
     "start_stop_text",

@@ -22,7 +22,7 @@ from gearsig.indicators import Indicator
 from gearsig.plot import unit_text, with_unit
 from gearsig.report._files import render
 from gearsig.report._pdf import compiled, write_pdf
-from gearsig.report._sections import css_class
+from gearsig.report._sections import css_class, headline_of
 from gearsig.severity import CrackEstimate
 
 
@@ -38,6 +38,8 @@ class Entry:
         Address of its page, relative to the index; empty: no page.
     outcome : Outcome
     verdict : str
+    headline : str
+        Its sentence that the index shows.
     confidence : float or None
         Of the fault or suspicion in the verdict; None without one.
     ratio_db : float or None
@@ -55,6 +57,7 @@ class Entry:
     page: str
     outcome: Outcome
     verdict: str
+    headline: str = ""
     confidence: float | None = None
     ratio_db: float | None = None
     indicators: tuple[Indicator, ...] = ()
@@ -84,6 +87,7 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         page,
         analysis.outcome,
         analysis.verdict,
+        headline_of(analysis)[0],
         top.confidence if top is not None else None,
         top.strength.ratio_db if top is not None and top.strength is not None else None,
         analysis.indicators,
@@ -299,7 +303,7 @@ def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
             "machine": row.entry.machine,
             "outcome": row.entry.outcome.value,
             "css_class": row.css_class,
-            "verdict": row.entry.verdict,
+            "headline": row.entry.headline,
             "confidence": row.confidence,
             "ratio": row.ratio,
             "cells": [cell.text for cell in row.cells],

@@ -14,7 +14,7 @@ from gearsig import plot
 from gearsig.angle import ShaftAngle
 from gearsig.cache import write_text
 from gearsig.checks import FloatArray
-from gearsig.diagnosis import Analysis, ChannelAnalysis, Finding, Kind, Where, changes, with_known_angle
+from gearsig.diagnosis import CHANGED, Analysis, ChannelAnalysis, Finding, Kind, Where, changes, with_known_angle
 from gearsig.errors import RefusalError
 from gearsig.formatting import readable
 from gearsig.motion import StartStop
@@ -28,6 +28,7 @@ from gearsig.report._sections import (
     change_rows,
     css_class,
     finding_card,
+    headline_of,
     indicator_tables,
     machine_rows,
     provenance_rows,
@@ -175,7 +176,7 @@ def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
     if analysis.motion is not None:
         return VerdictPicture("motion", next(iter(channels.values())))
     claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION) or f.code == "resonance"]
-    for finding in sorted(claims, key=lambda f: (f.kind is not Kind.FAULT, f.code == "changed-since-reference")):
+    for finding in sorted(claims, key=lambda f: (f.kind is not Kind.FAULT, f.code == CHANGED)):
         where = finding.where
         channel = next((channels[name] for name in where.channels if name in channels), next(iter(channels.values())))
         shaft = where.gear.rpartition("/")[2] or where.shaft
@@ -675,10 +676,12 @@ def page_parts(
 ) -> dict[str, Any]:
     """Return what the page says, in HTML as in PDF."""
     recording = analysis.recording
+    headline, explanation = headline_of(analysis)
     return {
         "title": recording.provenance.source or "recording made in memory",
         "machine_name": analysis.rig.name if analysis.rig is not None else "",
-        "verdict": analysis.verdict,
+        "headline": headline,
+        "explanation": explanation,
         "verdict_picture": picture_of_verdict(analysis),
         "changes": change_rows(analysis),
         "outcome_class": css_class(analysis.outcome),

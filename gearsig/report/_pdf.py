@@ -52,7 +52,8 @@ def page_pdf(
     data = {
         "title": parts["title"],
         "machine": parts["machine_name"],
-        "verdict": parts["verdict"],
+        "headline": parts["headline"],
+        "explanation": parts["explanation"],
         "outcome": parts["outcome"],
         "css_class": parts["outcome_class"],
         "reference": parts["reference"],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -14,6 +15,7 @@ import numpy as np
 from gearsig import __version__
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis import (
+    CHANGED,
     Analysis,
     CannotTell,
     Finding,
@@ -134,6 +136,31 @@ def change_rows(analysis: Analysis, most: int = 8) -> tuple[ChangeRow, ...]:
         ChangeRow(c.label, c.change_db, c.repeatability_db, 100 * abs(c.change_db) / abs(changed[0].change_db))
         for c in changed
     )
+
+
+LONGEST_HEADLINE = 120
+
+
+def headline_of(analysis: Analysis) -> tuple[str, str]:
+    """Return what the verdict comes to, and what else it says; what has changed is left to `change_rows`."""
+    changed = next((f.title for f in analysis.findings if f.code == CHANGED), "")
+    return split_verdict(analysis.verdict.removeprefix(changed).strip() or analysis.verdict)
+
+
+def split_verdict(verdict: str) -> tuple[str, str]:
+    """Split a long verdict after its first sentence and how sure it is; a short one stays whole.
+
+    Examples
+    --------
+    >>> split_verdict("No fault shows. " + "No damage shows on any tooth or bearing that could be examined. " * 2)[0]
+    'No fault shows.'
+    >>> split_verdict("Fault: Damage at a tooth (at most 86 % sure). " + "Its depth cannot be told. " * 5)[0]
+    'Fault: Damage at a tooth (at most 86 % sure).'
+    """
+    if len(verdict) <= LONGEST_HEADLINE:
+        return verdict, ""
+    found = re.match(r"(.+?\.) +(.+)", verdict)
+    return (found[1], found[2].strip()) if found else (verdict, "")
 
 
 def machine_rows(rig: Rig | None) -> Rows:

@@ -212,7 +212,7 @@ def test_names_from_files_are_shown_as_typed() -> None:
 def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> None:
     from app.dashboard.cached import read_and_analyze
     from app.dashboard.state import AnalysisRequest
-    from app.dashboard.widgets.verdict import headline_of
+    from gearsig.report import headline_of
 
     page = opened("root_crack_1mm", tab="Indicators")
     assert "reference" in page.dataframe[0].value.columns  # its own healthy reference is chosen at first
@@ -231,7 +231,7 @@ def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> 
     same = read_and_analyze(
         request, memoryview(sample.recording.read_bytes()), memoryview(healthy.recording.read_bytes())
     )
-    assert headline_of(same.verdict)[0] in shown_text(page)
+    assert headline_of(same)[0] in shown_text(page)
 
 
 def test_an_uploaded_reference_that_does_not_fit_is_one_message() -> None:

@@ -14,11 +14,11 @@ from app.dashboard.cached import command_of, read_and_analyze, read_content, rea
 from app.dashboard.state import AnalysisRequest
 from app.dashboard.theme import as_typed, one_line
 from app.dashboard.widgets.charts import csv_text, picture_bytes
-from app.dashboard.widgets.verdict import headline_of
 from app.dashboard.widgets.views import indicator_frame
 from app.samples import samples
 from gearsig.errors import InputError
 from gearsig.indicators import Indicator
+from gearsig.report import split_verdict
 
 CSV = b"time (s),a1 (m/s^2)\n" + b"".join(b"%.3f,%d\n" % (i / 1000, (i * 37) % 101) for i in range(2000))
 
@@ -76,7 +76,7 @@ def test_markdown_shows_names_as_typed(name: str) -> None:
 
 @given(st.text(alphabet="ab .()", max_size=300))
 def test_a_headline_and_its_rest_are_the_verdict(words: str) -> None:
-    headline, rest = headline_of(words)
+    headline, rest = split_verdict(words)
     assert f"{headline} {rest}".split() == words.split()
     assert len(words) > 120 or headline == words
 

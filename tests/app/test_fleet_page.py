@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard.fleet import STORE
@@ -10,9 +9,6 @@ from gearsig.fleet import TrendSettings, open_fleet
 from tests.app.pages import FOLDER, figures, labelled, numbers, shown_text
 from tests.fleet.conftest import make_recordings  # noqa: F401 - a fixture
 from tests.fleet.recordings import PATTERN
-
-pytest.importorskip("duckdb", reason="the extra fleet is not installed")
-pytest.importorskip("filelock", reason="the extra fleet is not installed")
 
 
 def opened(folder: Path) -> AppTest:
@@ -70,11 +66,3 @@ def test_an_empty_page_shows_an_example_whose_damaged_machines_are_alarms(tmp_pa
 def _levels(page: AppTest, machine: str) -> list[str]:
     status = open_fleet(Path(page.session_state[STORE])).status()
     return list(status.loc[status["machine"] == machine, "level"])
-
-
-def test_without_the_extra_the_page_says_what_to_install(tmp_path, monkeypatch):
-    open_fleet(tmp_path / "store", create=True)
-    monkeypatch.setitem(__import__("sys").modules, "duckdb", None)
-    page = opened(tmp_path / "store")
-    assert not page.exception
-    assert "gearsig[fleet]" in page.error[0].value.replace("\\", "")

@@ -254,7 +254,6 @@ def test_a_long_record_is_compared_part_by_part_with_a_part_of_a_long_reference(
 
 @pytest.mark.usefixtures("short_memory")
 def test_reports_and_fleets_of_long_records_stay_in_memory(tmp_path, monkeypatch):
-    pytest.importorskip("duckdb", reason="the extra fleet is not installed")
     from gearsig.batch import report_many
     from gearsig.fleet import open_fleet
 

@@ -17,9 +17,6 @@ from gearsig.errors import InputError
 from gearsig.fleet import FilePattern, TrendSettings, date_in_name, find_recordings, open_fleet, origins
 from tests.fleet.recordings import PATTERN, write_recording_file
 
-pytest.importorskip("duckdb", reason="the extra fleet is not installed")
-pytest.importorskip("filelock", reason="the extra fleet is not installed")
-
 
 def test_what_is_known_is_passed_over_by_content_and_place(make_recordings, tmp_path):
     data = make_recordings("pump 1", [1.0, 1.1, 0.9])

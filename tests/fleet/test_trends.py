@@ -11,9 +11,6 @@ from gearsig.report import fleet_page_html, fleet_page_pdf
 from gearsig.rig import MachineSize, OperatingPoint, Rig, Sensor, Shaft
 from tests.fleet.recordings import PATTERN
 
-pytest.importorskip("duckdb", reason="the extra fleet is not installed")
-pytest.importorskip("filelock", reason="the extra fleet is not installed")
-
 
 @pytest.fixture
 def fleet(make_recordings, tmp_path) -> Fleet:

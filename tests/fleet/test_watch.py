@@ -14,9 +14,6 @@ from app.cli.main import app
 from gearsig.fleet import WatchEvent, open_fleet, watch
 from tests.fleet.recordings import PATTERN, write_recording_file
 
-pytest.importorskip("duckdb", reason="the extra fleet is not installed")
-pytest.importorskip("filelock", reason="the extra fleet is not installed")
-
 
 class Watching:
     """A watch in a thread, with its events."""

@@ -12,7 +12,7 @@ from gearsig.report import Entry, Failure, entry_of, write_index
 
 def _entry(name, outcome, fm4=3.0, **more):
     return Entry(
-        name, f"{name}.html", outcome, f"verdict of {name}", indicators=(Indicator("FM4", fm4, "", "a1"),), **more
+        name, f"{name}.html", outcome, "", f"verdict of {name}", indicators=(Indicator("FM4", fm4, "", "a1"),), **more
     )
 
 

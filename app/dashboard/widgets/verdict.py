@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from html import escape
 from typing import Literal
 
@@ -13,13 +12,14 @@ from app.dashboard.theme import as_typed, one_line
 from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.spectrum import SLIP_SHARE, show_ring, show_spectrum
-from gearsig.diagnosis import Analysis, Finding, Kind, Outcome
+from gearsig.diagnosis import CHANGED, Analysis, Finding, Kind, Outcome
 from gearsig.plot import ChartLine, LinePanel, marks_of, with_unit
 from gearsig.report import (
     FindingCard,
     bearing_cursors,
     change_rows,
     finding_card,
+    headline_of,
     highest_order_of_interest,
     line_cursors,
     marked_positions,
@@ -55,9 +55,6 @@ ICONS: dict[Kind | Outcome, str] = {
 }
 
 
-LONGEST_HEADLINE = 120
-
-
 def show_verdict(analysis: Analysis) -> None:
     """Show the verdict and beside it the picture that it rests on; below, folded, all findings with their evidence."""
     with st.container(key="verdict"):
@@ -77,8 +74,8 @@ def _show_words(analysis: Analysis) -> None:
     recording = analysis.recording
     machine = analysis.rig.name if analysis.rig is not None else ""
     n = len(recording.channels)
-    changed = next((f.title for f in analysis.findings if f.code == "changed-since-reference"), "")
-    headline, rest = headline_of(analysis.verdict.removeprefix(changed).strip() or analysis.verdict)
+    changed = next((f.title for f in analysis.findings if f.code == CHANGED), "")
+    headline, rest = headline_of(analysis)
     facts = [
         f"**{as_typed(recording.provenance.source)}**",
         as_typed(machine) or "machine not described",
@@ -163,22 +160,6 @@ def show_verdict_picture(analysis: Analysis) -> None:
         scale="Linear" if families else "Logarithmic",
         plain=True,
     )
-
-
-def headline_of(verdict: str) -> tuple[str, str]:
-    """Split a long verdict after its first sentence and how sure it is; a short one stays whole.
-
-    Examples
-    --------
-    >>> headline_of("No fault shows. " + "No damage shows on any tooth or bearing that could be examined. " * 2)[0]
-    'No fault shows.'
-    >>> headline_of("Fault: Damage at a tooth (at most 86 % sure). " + "Its depth cannot be told. " * 5)[0]
-    'Fault: Damage at a tooth (at most 86 % sure).'
-    """
-    if len(verdict) <= LONGEST_HEADLINE:
-        return verdict, ""
-    found = re.match(r"(.+?\.) +(.+)", verdict)
-    return (found[1], found[2].strip()) if found else (verdict, "")
 
 
 def show_kind(kind: Kind | Outcome) -> None:
