@@ -122,9 +122,13 @@ def _show_how_to_begin() -> None:
 
 def _show_counts(status: DataFrame) -> None:
     counts = status["level"].value_counts()
-    words = [f":{BADGES[name]}-badge[{counts[name]} {name}]" for name in BADGES if name in counts]
+    words = [f":{BADGES[name]}-badge[{_counted(counts[name], name)}]" for name in BADGES if name in counts]
     n_machines = status["machine"].nunique()
     st.markdown(f"{n_machines} machines, {len(status)} measuring points, {' '.join(words)}")
+
+
+def _counted(n: int, level: str) -> str:
+    return f"{n} {level}" if n == 1 or level == "ok" else f"{n} {level}s"
 
 
 def _choose_point(status: DataFrame) -> tuple[str, str]:

@@ -88,7 +88,7 @@ def draw_level_map(axes: Axes, at: FloatArray, positions: FloatArray, level: Flo
     y = np.exp(_cell_borders(np.log(positions))) if logarithmic else np.maximum(_cell_borders(positions), 0.0)
     _draw_levels(axes, _cell_borders(at), y, level, unit)
     if logarithmic:
-        _plain_ticks(axes)
+        style.number_decades(axes.yaxis)
 
 
 def _spare_the_right_end(axes: Axes) -> None:
@@ -173,19 +173,10 @@ def time_frequency_figure(
     style.label_axes(axes, levels.at_label, levels.axis_label, levels.source)
     style.note(axes, f"{levels.method}; {'mean power' if levels.reduction == 'mean' else 'largest'} per column")
     if logarithmic:
-        _plain_ticks(axes)
+        style.number_decades(axes.yaxis)
     else:
         style.no_offset(axes)
     return figure
-
-
-def _plain_ticks(axes: Axes, n_digits: int = 6) -> None:
-    """Label 1, 2 and 5 of each decade in full, whole powers of ten included."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.{n_digits}g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def kurtogram_figure(kurtogram: Kurtogram, band: BandCandidate | None = None, *, height_in: float = 4.2) -> Figure:
@@ -281,7 +272,7 @@ def coherence_figure(
     below.grid(visible=False)
     below.set_xlim(float(x[0]), float(x[-1]))
     below.set_ylim(float(y[0]), float(y[-1]))
-    _plain_ticks(style.colour_bar(below, mesh, "squared coherence γ²"), n_digits=4)
+    style.number_decades(style.colour_bar(below, mesh, "squared coherence γ²").yaxis, n_digits=4)
     at, _, high = series.envelope(mean.spectrum.positions[shown], mean.spectrum.values[shown], 1200)
     above.plot(at, high, color=style.MEASURED, linewidth=0.9)
     above.axhline(mean.level, color=style.FLOOR, linewidth=1.0, linestyle=(0, (4, 3)))

@@ -296,8 +296,6 @@ def backlash_figure(
     -------
     Figure
     """
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     t = series.checked_axis(time_s, "time_s")
     f = series.checked_axis(frequency_hz, "frequency_hz")
     curves = series.checked_curves(backlash_m, len(t), "backlash_m")
@@ -316,9 +314,7 @@ def backlash_figure(
         if values.max() > 0.0:
             lower.plot(*thin(f, values * MICRO), color=colour, linewidth=1.1, zorder=3 - 0.01 * i)
     lower.set_xscale("log")
-    lower.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    lower.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    lower.xaxis.set_minor_formatter(NullFormatter())
+    style.number_decades(lower.xaxis)
     lower.set_xlim(float(f[0]), float(f[-1]))
     lower.set_ylim(0.0, 1.08 * MICRO * max(float(values.max()) for values in spectra.values()) or 1.0)
     for line in (line for line in lines_hz if f[0] <= line <= f[-1]):

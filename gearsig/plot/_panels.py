@@ -168,7 +168,9 @@ def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") 
     figure, axes = style.panels(heights, right_in=right_in, top_in=0.45, row_gap_in=0.62)
     for place, panel in zip(axes, panels, strict=True):
         if isinstance(panel, LevelPanel):
-            place.set_yscale("log" if panel.logarithmic else "linear")
+            if panel.logarithmic:
+                place.set_yscale("log")
+                style.number_decades(place.yaxis)
             draw_level_map(place, panel.at, panel.positions, panel.levels, panel.unit)
         elif panel.logarithmic:
             place.set_yscale("log")

@@ -19,6 +19,7 @@ from gearsig.spectra import Scaling
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
@@ -284,6 +285,15 @@ def no_offset(axes: Axes) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         if isinstance(axis.get_major_formatter(), ScalarFormatter):
             axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.8g}".replace("-", "−")))
+
+
+def number_decades(axis: Axis, n_digits: int = 6) -> None:
+    """Label 1, 2 and 5 of each decade of a logarithmic axis in full, whole powers of ten included."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.{n_digits}g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def note(axes: Axes, text: str) -> None:

@@ -456,7 +456,7 @@ class Figure {
         left.append(entry);
       }
     if (this.data.has_tools) {
-      for (const [tool, label] of Object.entries(TOOLS))
+      for (const [tool, label] of Object.entries(TOOLS).slice(0, this.data.dates ? 1 : 3)) // no harmonics of a date
         right.append(button(label, () => this.choose(tool), `${label}: drag it along, or use the arrow keys${tool === "sidebands" ? ", with Shift for their distance" : ""}`, this.tool === tool));
       if (this.lines.length)
         right.append(button("Peaks", () => { this.peaks = !this.peaks; this.drawBar(); this.draw(); }, "Table of the highest peaks shown", this.peaks));

@@ -25,6 +25,7 @@ _PLACES = {
     "highest_order": "the highest cyclic order",
     "window_length": "the window",
     "half_width": "the band around the ridge",
+    "; `gearsig rig example` prints one to start from": ", or the same in the form under Machine",
     "set lowest to": "set the lowest line shown to",
 }
 """What the page calls the options of the command line and of functions that messages name."""
