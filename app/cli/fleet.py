@@ -136,7 +136,7 @@ def status(
     json: options.JsonOption = False,
 ) -> None:
     """Show every measuring point, the worst first: diagnosis of the last recording, alarms, what rose most."""
-    from gearsig.fleet import trends_text
+    from gearsig.fleet import counts_text, trends_text
 
     table = _open(store).status()
     if machine:
@@ -158,10 +158,8 @@ def status(
         for row in shown.to_dict("records")
     ]
     _table(("", "machine", "point", "last", "recordings", "diagnosis", "trends"), rows, styles=_STYLES)
-    counts = table["level"].value_counts()
-    text = ", ".join(f"{counts[name]} {name}" for name in ("alarm", "warning", "ok") if name in counts)
     more = f"; {len(table) - len(shown)} more with --all" if len(shown) < len(table) else ""
-    typer.echo(f"{len(table)} measuring points: {text}{more}")
+    typer.echo(f"{counts_text(table)}{more}")
 
 
 @fleet_app.command()
@@ -347,7 +345,7 @@ def watch(
 # How results are shown.
 # --------------------
 
-_STYLES = {"alarm": "bold red", "warning": "yellow", "ok": "green"}
+_STYLES = {"alarm": "bold red", "warning": "yellow", "unknown": "bold", "ok": "green"}
 
 
 def _open(store: Path) -> Fleet:

@@ -22,7 +22,7 @@ from app.dashboard.work import kept
 from app.samples import EXAMPLE_PATTERN, write_example_fleet
 from gearsig.diagnosis import Outcome
 from gearsig.errors import InputError
-from gearsig.fleet import Fleet, Trend, TrendSettings, change_text, open_fleet, trends_text
+from gearsig.fleet import LEVEL_NAMES, Fleet, Trend, TrendSettings, change_text, level_counts, open_fleet, trends_text
 from gearsig.formatting import with_minus
 from gearsig.plot import ChartLine, LinePanel, with_unit
 from gearsig.recording import sha256_of
@@ -45,11 +45,11 @@ Row = dict[Any, Any]
 MARKS = {
     "alarm": ":red[:material/error:]",
     "warning": ":orange[:material/warning:]",
+    "unknown": ":gray[:material/help:]",
     "ok": ":green[:material/check_circle:]",
 }
 """Told apart by shape as well as by colour."""
-LEVELS = ("ok", "warning", "alarm")
-BADGES = {"alarm": "red", "warning": "orange", "ok": "green"}
+BADGES = {"alarm": "red", "warning": "orange", "unknown": "gray", "ok": "green"}
 HOW_TO_FILL = """
 There are no results in this folder yet. Recordings are added from the command line, as often as you like; what is
 known already is passed over:
@@ -121,14 +121,9 @@ def _show_how_to_begin() -> None:
 
 
 def _show_counts(status: DataFrame) -> None:
-    counts = status["level"].value_counts()
-    words = [f":{BADGES[name]}-badge[{_counted(counts[name], name)}]" for name in BADGES if name in counts]
+    words = [f":{BADGES[name]}-badge[{text}]" for name, text in level_counts(status).items()]
     n_machines = status["machine"].nunique()
     st.markdown(f"{n_machines} machines, {len(status)} measuring points, {' '.join(words)}")
-
-
-def _counted(n: int, level: str) -> str:
-    return f"{n} {level}" if n == 1 or level == "ok" else f"{n} {level}s"
 
 
 def _choose_point(status: DataFrame) -> tuple[str, str]:
@@ -206,14 +201,14 @@ def _choose_series(series: DataFrame, machine: str, point: str) -> Row:
 def _series_words(row: Row) -> str:
     of = ", ".join(part for part in (row["place"], row["channel"], row["computed_on"], row["band"]) if part)
     change = change_text(row["change"], in_db=bool(row["in_db"]))
-    level = LEVELS[int(row["level"])]
+    level = LEVEL_NAMES[int(row["level"])]
     return f"{row['name']} ({of}): {level}{', ' + change if change else ''}"
 
 
 def _series_table(series: DataFrame) -> dict[str, list[Any]]:
     rows = series.to_dict("records")
     return {
-        "": [LEVELS[int(row["level"])] for row in rows],
+        "": [LEVEL_NAMES[int(row["level"])] for row in rows],
         "indicator": [_series_words(row).partition(":")[0] for row in rows],
         "last": [row["value"] for row in rows],
         "expected": [row["expected"] for row in rows],

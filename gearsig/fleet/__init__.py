@@ -6,12 +6,14 @@ from gearsig.fleet._changes import (
     DiagnosisChange,
     FleetChanges,
     change_text,
+    counts_text,
     fleet_changes,
     last_report,
+    level_counts,
     mark_reported,
     trends_text,
 )
-from gearsig.fleet._fleet import LEVEL_NAMES, TABLES, Fleet, Trend, open_fleet
+from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, TABLES, Fleet, Trend, open_fleet
 from gearsig.fleet._origin import FilePattern, Origin, date_in_name, find_recordings, origin_rows, origins
 from gearsig.fleet._statistics import (
     ALARM,
@@ -33,6 +35,7 @@ __all__ = [
     "FAILED",
     "LEVEL_NAMES",
     "OK",
+    "STATUS_LEVELS",
     "TABLES",
     "WARNING",
     "AddResult",
@@ -54,12 +57,14 @@ __all__ = [
     "alarm_levels",
     "change_points",
     "change_text",
+    "counts_text",
     "cusum_threshold",
     "date_in_name",
     "events_of",
     "find_recordings",
     "fleet_changes",
     "last_report",
+    "level_counts",
     "mark_reported",
     "open_fleet",
     "origin_rows",

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from gearsig.cache import write_whole
-from gearsig.fleet._fleet import LEVEL_NAMES, Fleet
+from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, Fleet
 from gearsig.fleet._trends import events_of
 from gearsig.formatting import readable, signed
 
@@ -143,6 +143,26 @@ def _alarm(row: dict[Any, Any], level: str, raised: datetime, cleared: datetime 
 
 def _sorted(changes: list[AlarmChange]) -> tuple[AlarmChange, ...]:
     return tuple(sorted(changes, key=lambda c: (c.cleared is not None, c.level != "alarm", -abs(c.change), c.machine)))
+
+
+def level_counts(status: DataFrame) -> dict[str, str]:
+    """Say how many measuring points stand at each level that any stands at: a table of `Fleet.status`.
+
+    Examples
+    --------
+    >>> from pandas import DataFrame
+    >>> level_counts(DataFrame({"level": ["ok", "alarm", "alarm", "unknown"]}))
+    {'alarm': '2 alarms', 'unknown': '1 unknown', 'ok': '1 ok'}
+    """
+    counts = {name: int((status["level"] == name).sum()) for name in STATUS_LEVELS}
+    plural = {"alarm": "alarms", "warning": "warnings"}
+    return {name: f"{n} {plural.get(name, name) if n > 1 else name}" for name, n in counts.items() if n}
+
+
+def counts_text(status: DataFrame) -> str:
+    """Return `level_counts` in one sentence."""
+    n = len(status)
+    return f"{n} measuring point{'s' * (n != 1)}: {', '.join(level_counts(status).values())}"
 
 
 def trends_text(row: Mapping[Any, Any]) -> str:

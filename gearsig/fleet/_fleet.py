@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from gearsig.rig import Rig, SpeedSource
 
 LEVEL_NAMES = {OK: "ok", WARNING: "warning", ALARM: "alarm"}
+STATUS_LEVELS = ("alarm", "warning", "unknown", "ok")
+"""Of a measuring point, the worst first; unknown: the last recording allowed no answer, and there is no baseline."""
 TRENDS = "trends.parquet"
 TABLES = ("recordings", "indicators", "trends", "status")
 
@@ -258,9 +260,9 @@ class Fleet:
         """Return a row per measuring point, the worst first.
 
         Columns: machine, point, n_recordings, n_failed, first, last, outcome and verdict of the last recording, level
-        ("alarm", "warning" or "ok": the worse of diagnosis and trends), n_alarms, n_warnings, since, worst (indicator),
-        change (of that one against what is expected, in dB where change_in_db), changed (since when the level of some
-        indicator is another one).
+        (of `STATUS_LEVELS`: the worse of diagnosis and trends, "unknown" where neither says anything), n_alarms,
+        n_warnings, since, worst (indicator), change (of that one against what is expected, in dB where change_in_db),
+        changed (since when the level of some indicator is another one).
         """
         self._refreshed()
         sql = f"""
@@ -284,10 +286,12 @@ class Fleet:
                     j.* EXCLUDE (machine, point, level)
                 FROM latest l LEFT JOIN judged j USING (machine, point)
             )
-            SELECT machine, point, CASE number WHEN {ALARM} THEN 'alarm' WHEN {WARNING} THEN 'warning' ELSE 'ok' END
+            SELECT machine, point, CASE number WHEN {ALARM} THEN 'alarm' WHEN {WARNING} THEN 'warning'
+                ELSE CASE WHEN outcome = 'no fault' OR n_baseline > 0 THEN 'ok' ELSE 'unknown' END END
                 AS level, * EXCLUDE (machine, point, number)
             FROM joined
-            ORDER BY number DESC, n_alarms DESC, n_warnings DESC, abs(change) DESC NULLS LAST, machine, point
+            ORDER BY number DESC, level = 'unknown' DESC, n_alarms DESC, n_warnings DESC, abs(change) DESC NULLS LAST,
+                machine, point
         """
         return self._frame(sql, [])
 

@@ -11,13 +11,13 @@ from typing import Any
 from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.errors import InputError
-from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, fleet_changes, trends_text
+from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, counts_text, fleet_changes, trends_text
 from gearsig.formatting import readable
 from gearsig.plot import Picture, fleet_trend_picture, unit_text
 from gearsig.report._files import render
 from gearsig.report._pdf import compiled, put_picture, write_pdf
 
-LEVEL_CLASSES = {"alarm": "fault", "warning": "suspicion", "ok": "no-fault"}
+LEVEL_CLASSES = {"alarm": "fault", "warning": "suspicion", "unknown": "cannot-tell", "ok": "no-fault"}
 MAX_ROWS, MAX_POINTS, MAX_PICTURES = 60, 200, 8
 
 
@@ -69,14 +69,12 @@ def _page_values(fleet: Fleet, since: datetime | None, date: datetime | None) ->
     changes = fleet_changes(fleet, since)
     status = changes.status.head(MAX_POINTS).to_dict("records")
     n_points = len(changes.status)
-    levels = changes.status["level"].value_counts()
-    standing = ", ".join(f"{levels[name]} {name}" for name in ("alarm", "warning", "ok") if name in levels)
     return {
         "since": f"since {since:%Y-%m-%d %H:%M} UTC" if since is not None else "since the beginning",
         "date": (date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip(),
         "version": __version__,
         "summary": _summary(changes),
-        "counts": f"{n_points} measuring points: {standing}." if n_points else "",
+        "counts": f"{counts_text(changes.status)}." if n_points else "",
         "diagnoses": changes.diagnoses[:MAX_ROWS],
         "raised": [_row(change) for change in changes.raised[:MAX_ROWS]],
         "cleared": [_row(change) for change in changes.cleared[:MAX_ROWS]],

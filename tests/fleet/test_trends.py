@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.fleet import Fleet, TrendSettings, fleet_changes, last_report, mark_reported, open_fleet
+from gearsig.fleet import Fleet, TrendSettings, counts_text, fleet_changes, last_report, mark_reported, open_fleet
 from gearsig.report import fleet_page_html, fleet_page_pdf
 from gearsig.rig import MachineSize, OperatingPoint, Rig, Sensor, Shaft
 from tests.fleet.recordings import PATTERN
@@ -47,6 +47,16 @@ def test_status_has_the_worst_first(fleet, make_recordings, tmp_path):
     assert again.equals(status)
     (tmp_path / "store" / "trends.parquet").write_bytes(b"damaged")
     assert fleet.status().equals(status)
+
+
+def test_a_point_of_which_nothing_can_be_said_is_not_ok(make_recordings, tmp_path):
+    """Two recordings are no baseline, and without a rig nothing is found or ruled out in either."""
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(make_recordings("new", [1.0, 1.0]), pattern=PATTERN, n_processes=1)
+    status = fleet.status()
+    assert list(status["outcome"]) == ["cannot tell"]
+    assert list(status["level"]) == ["unknown"]
+    assert counts_text(status) == "1 measuring point: 1 unknown"
 
 
 def test_a_stated_baseline_replaces_the_first_recordings(fleet):
