@@ -17,6 +17,7 @@ from urllib.parse import quote
 from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.diagnosis import Analysis, Kind, Outcome
+from gearsig.fleet import date_in_name
 from gearsig.formatting import readable, spreadsheet_cell
 from gearsig.indicators import Indicator
 from gearsig.plot import unit_text, with_unit
@@ -64,6 +65,11 @@ class Entry:
     crack_mm: float | None = None
     is_reference: bool = False
     machine: str = ""
+
+    @property
+    def date(self) -> datetime | None:
+        """As the name states it: when a file was written last says little of when it was recorded."""
+        return date_in_name(self.name)
 
 
 @dataclass(frozen=True)
@@ -139,6 +145,7 @@ class IndexRow:
     entry: Entry
     css_class: str
     href: str
+    date: str
     confidence: str
     ratio: str
     cells: tuple[IndexCell, ...]
@@ -152,6 +159,7 @@ class Index:
     rows: tuple[IndexRow, ...]
     columns: tuple[str, ...]
     orders: tuple[str, ...]
+    has_dates: bool
     summary: str
     outcomes: tuple[tuple[str, str, int], ...]
     machines: tuple[str, ...]
@@ -163,21 +171,27 @@ def index_of(entries: Sequence[Entry], failures: Sequence[Failure] = ()) -> Inde
     present = {i.name for entry in ordered for i in entry.indicators if isfinite(i.value)}
     names = [name for name in KEY_INDICATORS if name in present][:3]
     columns = [_column(ordered, name) for name in names]
-    places = [
-        list(range(len(ordered))),
-        _places([(entry.name.lower(), entry.name) for entry in ordered]),
-        _places([(entry.machine.lower(), i) for i, entry in enumerate(ordered)]),
-        *(_places([(-_largest(entry, name), i) for i, entry in enumerate(ordered)]) for name in names),
-    ]
+    orders = {
+        "worst first": list(range(len(ordered))),
+        "name": _places([(entry.name.lower(), entry.name) for entry in ordered]),
+        "machine": _places([(entry.machine.lower(), i) for i, entry in enumerate(ordered)]),
+    }
+    has_dates = any(entry.date is not None for entry in ordered)
+    if has_dates:
+        ages = [-entry.date.timestamp() if entry.date is not None else inf for entry in ordered]
+        orders["latest first"] = _places([(age, i) for i, age in enumerate(ages)])
+    for name in names:
+        orders[name] = _places([(-_largest(entry, name), i) for i, entry in enumerate(ordered)])
     rows = tuple(
         IndexRow(
             entry,
             css_class(entry.outcome),
             quote(entry.page),
+            f"{entry.date:%Y-%m-%d %H:%M}".removesuffix(" 00:00") if entry.date is not None else "",
             f"{100 * entry.confidence:.0f} %" if entry.confidence is not None else "",
             _size_text(entry),
             tuple(cells[i] for _, cells in columns),
-            tuple(place[i] for place in places),
+            tuple(place[i] for place in orders.values()),
         )
         for i, entry in enumerate(ordered)
     )
@@ -188,7 +202,8 @@ def index_of(entries: Sequence[Entry], failures: Sequence[Failure] = ()) -> Inde
     return Index(
         rows,
         tuple(heading for heading, _ in columns),
-        ("worst first", "name", "machine", *names),
+        tuple(orders),
+        has_dates,
         f"{n_files} recording{'s' * (n_files != 1)}: {', '.join(parts)}" if parts else "No recordings",
         tuple((css_class(outcome), outcome.value, n) for outcome, n in counts.items()),
         tuple(dict.fromkeys(entry.machine for entry in ordered if entry.machine)),
@@ -273,6 +288,7 @@ def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ())
             {
                 "recording": entry.name,
                 "machine": entry.machine,
+                "date": entry.date.isoformat(sep=" ") if entry.date is not None else "",
                 "outcome": entry.outcome.value,
                 "verdict": entry.verdict,
                 "confidence": entry.confidence,
@@ -301,6 +317,7 @@ def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
         {
             "name": row.entry.name,
             "machine": row.entry.machine,
+            "date": row.date,
             "outcome": row.entry.outcome.value,
             "css_class": row.css_class,
             "headline": row.entry.headline,
@@ -313,6 +330,7 @@ def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
     data = {
         "summary": index.summary,
         "columns": index.columns,
+        "has_dates": index.has_dates,
         "rows": rows,
         "failures": [[failure.name, failure.reason] for failure in failures],
         "date": f"{date}, gearsig {__version__}",

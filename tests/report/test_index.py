@@ -100,6 +100,25 @@ def test_the_index_as_pdf(write, tmp_path):
     assert (tmp_path / "index.pdf").read_bytes().startswith(b"%PDF-")
 
 
+def test_dates_of_names_are_a_column_and_an_order(write, tmp_path):
+    """The names state them; where none does, there is no column."""
+    names = ("fan_2026-03-02", "fan_2026-03-01T0605", "fan")
+    html = write([_entry(name, Outcome.NO_FAULT) for name in names], pdf=True)
+    assert '<td class="small">2026-03-02</td>' in html
+    assert '<td class="small">2026-03-01 06:05</td>' in html
+    kept = json.loads((tmp_path / "batch.json").read_text(encoding="utf-8"))["recordings"]
+    assert {row["recording"]: row["date"] for row in kept} == {
+        "fan_2026-03-02": "2026-03-02 00:00:00",
+        "fan_2026-03-01T0605": "2026-03-01 06:05:00",
+        "fan": "",
+    }
+    order = re.findall(r'id="order(\d)"[^>]*> ([a-z ]+)', html)
+    column = next(number for number, words in order if words.strip() == "latest first")
+    places = re.findall(rf'--place{column}: (\d);[^>]*>\s*<th scope="row"><a href="([^"]+)"', html)
+    assert [page for _, page in sorted(places)] == [f"{name}.html" for name in names]
+    assert "latest first" not in write([_entry("fan", Outcome.NO_FAULT)])
+
+
 def test_index_is_strict_html5_and_loads_nothing(write):
     html5lib = pytest.importorskip("html5lib")
     html = write(
