@@ -413,12 +413,12 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
 def _series_row(row: dict[Any, Any]) -> tuple[str, ...]:
     from pandas import isna
 
-    from gearsig.fleet import LEVEL_NAMES, change_text
+    from gearsig.fleet import change_text, series_level
 
     unit = f" {row['unit']}" if row["unit"] else ""
     of = " ".join(part for part in (row["point"], row["place"], row["channel"], row["computed_on"]) if part)
     return (
-        LEVEL_NAMES[row["level"]],
+        series_level(row),
         row["name"],
         of,
         _number(row["value"]) + unit,

@@ -22,7 +22,7 @@ from app.dashboard.work import kept
 from app.samples import EXAMPLE_PATTERN, write_example_fleet
 from gearsig.diagnosis import Outcome
 from gearsig.errors import InputError
-from gearsig.fleet import LEVEL_NAMES, Fleet, Trend, TrendSettings, change_text, level_counts, open_fleet, trends_text
+from gearsig.fleet import Fleet, Trend, TrendSettings, change_text, level_counts, open_fleet, series_level, trends_text
 from gearsig.formatting import with_minus
 from gearsig.plot import ChartLine, LinePanel, with_unit
 from gearsig.recording import sha256_of
@@ -201,14 +201,13 @@ def _choose_series(series: DataFrame, machine: str, point: str) -> Row:
 def _series_words(row: Row) -> str:
     of = ", ".join(part for part in (row["place"], row["channel"], row["computed_on"], row["band"]) if part)
     change = change_text(row["change"], in_db=bool(row["in_db"]))
-    level = LEVEL_NAMES[int(row["level"])]
-    return f"{row['name']} ({of}): {level}{', ' + change if change else ''}"
+    return f"{row['name']} ({of}): {series_level(row)}{', ' + change if change else ''}"
 
 
 def _series_table(series: DataFrame) -> dict[str, list[Any]]:
     rows = series.to_dict("records")
     return {
-        "": [LEVEL_NAMES[int(row["level"])] for row in rows],
+        "": [series_level(row) for row in rows],
         "indicator": [_series_words(row).partition(":")[0] for row in rows],
         "last": [row["value"] for row in rows],
         "expected": [row["expected"] for row in rows],

@@ -11,6 +11,7 @@ from gearsig.fleet._changes import (
     last_report,
     level_counts,
     mark_reported,
+    series_level,
     trends_text,
 )
 from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, TABLES, Fleet, Trend, open_fleet
@@ -71,6 +72,7 @@ __all__ = [
     "origins",
     "prediction_limits",
     "regressors",
+    "series_level",
     "standardised_innovations",
     "trends_text",
     "watch",

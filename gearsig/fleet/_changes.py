@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from gearsig.cache import write_whole
 from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, Fleet
-from gearsig.fleet._trends import events_of
+from gearsig.fleet._trends import NONE, events_of
 from gearsig.formatting import readable, signed
 
 if TYPE_CHECKING:
@@ -163,6 +163,11 @@ def counts_text(status: DataFrame) -> str:
     """Return `level_counts` in one sentence."""
     n = len(status)
     return f"{n} measuring point{'s' * (n != 1)}: {', '.join(level_counts(status).values())}"
+
+
+def series_level(row: Mapping[Any, Any]) -> str:
+    """Return the level of a row of `Fleet.series` by name, "unknown" where there are no limits to judge it by."""
+    return "unknown" if row["basis"] == NONE else LEVEL_NAMES[int(row["level"])]
 
 
 def trends_text(row: Mapping[Any, Any]) -> str:

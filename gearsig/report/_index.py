@@ -39,8 +39,8 @@ class Entry:
         Address of its page, relative to the index; empty: no page.
     outcome : Outcome
     verdict : str
-    headline : str
-        Its sentence that the index shows.
+    conclusion : str
+        The verdict without what has changed: what the index shows.
     confidence : float or None
         Of the fault or suspicion in the verdict; None without one.
     ratio_db : float or None
@@ -58,7 +58,7 @@ class Entry:
     page: str
     outcome: Outcome
     verdict: str
-    headline: str = ""
+    conclusion: str = ""
     confidence: float | None = None
     ratio_db: float | None = None
     indicators: tuple[Indicator, ...] = ()
@@ -93,7 +93,7 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         page,
         analysis.outcome,
         analysis.verdict,
-        headline_of(analysis)[0],
+        " ".join(headline_of(analysis)).strip(),
         top.confidence if top is not None else None,
         top.strength.ratio_db if top is not None and top.strength is not None else None,
         analysis.indicators,
@@ -320,7 +320,7 @@ def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
             "date": row.date,
             "outcome": row.entry.outcome.value,
             "css_class": row.css_class,
-            "headline": row.entry.headline,
+            "conclusion": row.entry.conclusion,
             "confidence": row.confidence,
             "ratio": row.ratio,
             "cells": [cell.text for cell in row.cells],
