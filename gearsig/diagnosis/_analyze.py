@@ -44,7 +44,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders import SeparatedAverage, band_passed_mesh
+from gearsig.orders import SeparatedAverage, SynchronousAverage, band_passed_mesh
 from gearsig.prepared import MEMORY_LIMIT_MB, PreparedRecording, prepare
 from gearsig.recording import Recording
 from gearsig.rig import EncoderChannel, Rig, TachometerChannel
@@ -150,19 +150,15 @@ def _examined(
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
         order = ranked(findings)  # all orders are wrong, and what they would say
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
-    found = tuple(_indicators(signals, envelopes))
+    if healthy is not None:
+        announce("the reference")
+    reference_analysis, then = _of_reference(healthy, settings)
+    found = tuple(_indicators(signals, envelopes, then[0] if then is not None else None))
     findings += [*_of_machine(signals, envelopes, own_bands), *detect_resonances(levels)]
     findings += detect_vibration_zone(signals, found)
 
-    reference_analysis: Analysis | None = None
     compared: tuple[LevelChange, ...] = ()
-    if healthy is not None:
-        announce("the reference")
-        _check_size(healthy.recording)
-        # Kept: a batch, a page and a comparison come with the same reference again and again.
-        reference_analysis, then = healthy.keep(
-            ("diagnosis", settings), lambda: _examined(healthy, settings, None, None, lambda _: None)
-        )
+    if healthy is not None and reference_analysis is not None:
         if then is None:
             findings = beside_reference(findings, reference_analysis)
         else:
@@ -191,6 +187,16 @@ def _examined(
         level_changes=compared,
     )
     return analysis, (signals, envelopes)
+
+
+def _of_reference(
+    healthy: PreparedRecording | None, settings: AnalysisSettings
+) -> tuple[Analysis | None, Shown | None]:
+    """Return the reference's analysis and what it looked at, kept: many recordings come with the same reference."""
+    if healthy is None:
+        return None, None
+    _check_size(healthy.recording)
+    return healthy.keep(("diagnosis", settings), lambda: _examined(healthy, settings, None, None, lambda _: None))
 
 
 def _of_machine(
@@ -247,9 +253,15 @@ def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:
         raise InputError(error.what, where=where, allowed=error.allowed, remedy=remedy) from None
 
 
-def _indicators(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Iterator[indicators.Indicator]:
-    """Yield every indicator that the recording and the rig allow: per channel, per gear, per shaft, per bearing."""
+def _indicators(
+    signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], reference: AnalysisSignals | None
+) -> Iterator[indicators.Indicator]:
+    """Yield every indicator that the recording and the rig allow: per channel, per gear, per shaft, per bearing.
+
+    The reference is the healthy earlier record of those that need one.
+    """
     rig = signals.rig
+    earlier = {turning.shaft: turning.separated for turning in reference.shafts} if reference is not None else {}
     for channel in signals.recording.channels:
         name, unit = channel.name, channel.unit
         values, rate_hz = signals.recording.values(name), signals.recording.sampling_rate_hz
@@ -269,24 +281,39 @@ def _indicators(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> 
         for turning in signals.shafts:
             values, on = turning.averages[name].values, "synchronous average"
             yield from indicators.time_indicators(values, name, unit, computed_on=on, shaft=turning.shaft)
-            yield from _of_gears(rig, turning.shaft, turning.separated.get(name))
+            before = earlier.get(turning.shaft, {}).get(name)
+            yield from _of_gears(rig, turning.shaft, turning.separated.get(name), before)
         if signals.angle is not None:
             yield from _of_bearings(signals, name, envelopes)
 
 
-def _of_gears(rig: Rig, shaft: str, parts: SeparatedAverage | None) -> Iterator[indicators.Indicator]:
+def _of_gears(
+    rig: Rig, shaft: str, parts: SeparatedAverage | None, before: SeparatedAverage | None
+) -> Iterator[indicators.Indicator]:
+    if parts is not None and before is not None and before.average.unit != parts.average.unit:
+        before = None
     for pair in rig.pairs:
         teeth = pair.teeth(shaft) if shaft in (pair.driver, pair.driven) else None
         if parts is None or teeth is None:
             continue
-        try:
-            band = band_passed_mesh(parts.average, teeth)
-        except RefusalError:  # the band reaches beyond the sampling rate
-            band = None
-        gear = f"{pair.name}/{shaft}"
+        band, band_before = _mesh_band(parts, teeth), None if before is None else _mesh_band(before, teeth)
         yield from indicators.gear_indicators(
-            parts.average, parts.residual, parts.difference, band, teeth=teeth, gear=gear
+            parts.average,
+            parts.residual,
+            parts.difference,
+            band,
+            teeth=teeth,
+            gear=f"{pair.name}/{shaft}",
+            history=() if before is None else (before.residual,),
+            band_history=() if band_before is None else (band_before,),
         )
+
+
+def _mesh_band(parts: SeparatedAverage, teeth: int) -> SynchronousAverage | None:
+    try:
+        return band_passed_mesh(parts.average, teeth)
+    except RefusalError:  # the band reaches beyond the sampling rate
+        return None
 
 
 def _of_bearings(

@@ -49,6 +49,18 @@ def test_levels_in_db_change_by_their_difference(louder: Analysis) -> None:
     assert all(c.change_db == pytest.approx(i.value - c.reference_value) for i, c in pairs)
 
 
+def test_the_reference_is_the_earlier_record_of_trend_indicators(louder: Analysis) -> None:
+    """Twice the residual r: m₄ is 16 times r's, the mean variance of both records 5/2 of it, that of the healthy 1."""
+    assert louder.reference is not None
+    for name in ("NA4", "NB4"):
+        alone = {(i.channel, i.gear): i.value for i in louder.reference.indicators if i.name == name}
+        now = {(i.name, i.channel, i.gear): i.value for i in louder.indicators}
+        assert alone
+        for key, kurtosis in alone.items():
+            assert now[name, *key] == pytest.approx(16.0 / 2.5**2 * kurtosis)
+            assert now[f"{name}*", *key] == pytest.approx(16.0 * kurtosis)
+
+
 def test_without_a_reference_nothing_is_compared() -> None:
     analysis = good_analysis()
     assert set(changes(analysis)) == {None}
