@@ -46,7 +46,8 @@ ReferenceOption = Annotated[
     typer.Option(
         "--reference",
         metavar="FILE",
-        help="Recording of the same machine when it was healthy: same sensors, speed and load.",
+        help="Recording of the same machine when it was healthy: same sensors, speed and load. --fs holds for it as "
+        "well, unless a rig file beside it (NAME.toml) states a sampling rate.",
     ),
 ]
 TorqueOption = Annotated[
@@ -141,9 +142,10 @@ def open_reference(
     """Read the recording of the healthy machine, if one is given; pulse times belong to the other recording."""
     if path is None:
         return None
-    from gearsig.diagnosis import rig_of_reference
+    from gearsig.diagnosis import rate_of_reference, rig_of_reference
 
-    return open_recording(path, rig_of_reference(path, rig), sampling_rate_hz, stated_speed(speed_rpm, None, 1))
+    rate_hz = rate_of_reference(path, sampling_rate_hz)
+    return open_recording(path, rig_of_reference(path, rig), rate_hz, stated_speed(speed_rpm, None, 1))
 
 
 def torque_of(text: str | None) -> float | None:

@@ -48,9 +48,11 @@ def find_shaft_angle(recording: Recording, rig: Rig | None = None) -> ShaftAngle
             raise RefusalError("the machine is at rest: the shaft angle does not move", remedy="record while it turns")
         return _to_reference_shaft(angle, source.shaft, rig)
     if rig is None or not rig.pairs:
+        nominal_rpm = rig.nominal_speed_rpm() if rig is not None else None
+        as_stated = f" (--speed-rpm {nominal_rpm:g}, the nominal one, if it is right within 3 %)" if nominal_rpm else ""
         raise RefusalError(
             "there is no speed source, and no gear is described whose mesh lines would tell the speed",
-            remedy="give a tachometer, a speed channel or a constant speed, or the teeth in a rig file",
+            remedy=f"give a tachometer, a speed channel or a constant speed{as_stated}, or the teeth in a rig file",
         )
     return estimate_shaft_angle(recording, rig)
 

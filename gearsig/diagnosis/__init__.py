@@ -29,6 +29,7 @@ from gearsig.diagnosis._reference import (
     beside_reference,
     changes,
     in_reference,
+    rate_of_reference,
     rig_of_reference,
 )
 from gearsig.diagnosis._resonance import detect_resonances
@@ -90,6 +91,7 @@ __all__ = [
     "modulation_of",
     "outcome_of",
     "ranked",
+    "rate_of_reference",
     "read_reference",
     "read_usual_part",
     "read_whole",

@@ -17,7 +17,7 @@ from gearsig.diagnosis._doubts import lowered, speed_doubts, spoiled, withheld_c
 from gearsig.diagnosis._lines import detect_lines, detect_mesh, speed_finding
 from gearsig.diagnosis._modulation import detect_sidebands
 from gearsig.diagnosis._overall import detect_vibration_zone
-from gearsig.diagnosis._reference import beside_reference
+from gearsig.diagnosis._reference import beside_reference, reference_unfit
 from gearsig.diagnosis._resonance import detect_resonances, order_levels
 from gearsig.diagnosis._sampling_rate import detect_sampling_rate
 from gearsig.diagnosis._signals import (
@@ -153,21 +153,21 @@ def _examined(
     if healthy is not None:
         announce("the reference")
     reference_analysis, then = _of_reference(healthy, settings)
+    if reference_analysis is not None and then is None:
+        findings.append(reference_unfit(reference_analysis))
+        reference_analysis = healthy = None
     found = tuple(_indicators(signals, envelopes, then[0] if then is not None else None))
     findings += [*_of_machine(signals, envelopes, own_bands), *detect_resonances(levels)]
     findings += detect_vibration_zone(signals, found)
 
     compared: tuple[LevelChange, ...] = ()
-    if healthy is not None and reference_analysis is not None:
-        if then is None:
-            findings = beside_reference(findings, reference_analysis)
-        else:
-            now, before = in_common_bands(signals, envelopes, *then, healthy)
-            beside = (signals, now, then[0], before)
-            findings = beside_reference(findings, reference_analysis, lambda f: family_change(f, *beside))
-            findings = with_clearest_band(findings, signals, then[0])
-            compared = level_changes(*beside)
-            findings += change_findings(compared, signals, then[0], findings)
+    if healthy is not None and reference_analysis is not None and then is not None:
+        now, before = in_common_bands(signals, envelopes, *then, healthy)
+        beside = (signals, now, then[0], before)
+        findings = beside_reference(findings, reference_analysis, lambda f: family_change(f, *beside))
+        findings = with_clearest_band(findings, signals, then[0])
+        compared = level_changes(*beside)
+        findings += change_findings(compared, signals, then[0], findings)
     findings, unfit = lowered(findings, names), dead | spoiled(findings, names)
     crack: Answer | None = withheld_crack(findings, asked=healthy is not None)
     if not unfit.issuperset(names):

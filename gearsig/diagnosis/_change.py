@@ -532,7 +532,7 @@ def _changed(changes: Sequence[LevelChange], off: float) -> Finding:
     texts += [f"{rest} more up" if risen else f"{rest} more down"] if rest > 0 else []
     texts += [f"{len(fallen)} level{'s' if len(fallen) > 1 else ''} down"] if risen and fallen else []
     repeats = max(0.1, *(c.repeatability_db for c in (risen or fallen)[:4]))
-    first = max(changes, key=lambda c: abs(c.change_db))
+    first = max(risen or fallen, key=lambda c: abs(c.change_db))
     value, floor = (10 ** (level / 20) for level in (first.level_db, first.reference_db))
     evidence = [
         f"{c.label} in {c.where.channels[0]}: {signed(c.change_db)} dB; the halves of a recording differ by "
@@ -700,4 +700,4 @@ def _of_noise(risen: Sequence[LevelChange], *, has_bearings: bool) -> Finding:
 
 
 def _told(changes: Sequence[LevelChange]) -> tuple[str, ...]:
-    return tuple(f"{c.label}: {signed(c.change_db)} dB." for c in changes)
+    return tuple(f"{c.label} in {c.where.channels[0]}: {signed(c.change_db)} dB." for c in changes)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from gearsig.angle import ShaftAngle
+from gearsig.diagnosis._lines import MESH_ELSEWHERE
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Strength, Where
 from gearsig.rig import Rig
@@ -18,6 +19,7 @@ TRUST = {
     NEAR_ZERO: 0.5,
     "mesh-above-sampling": 0.5,
     "mesh-absent": 0.75,
+    MESH_ELSEWHERE: 0.5,
     "channel-clipped": 0.7,
     "channel-wrapped": 0.0,
     "channel-stepped": 0.75,

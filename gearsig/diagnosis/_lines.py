@@ -28,6 +28,9 @@ at once, always on the same side; the second where the first harmonic alone is t
 UNEXPLAINED_DB = 15.0
 """Power over mean floor that noise exceeds in one line of 10¹³: also over a million lines, a chance of 10⁻⁷."""
 
+MESH_ELSEWHERE = "mesh-elsewhere"
+"""Code of the finding that mesh lines lie at another multiple of the stated speed."""
+
 _OVER_FLOOR = "height over the noise floor"
 _UNKNOWN_CAUSE = f"{_OVER_FLOOR}; what causes it is not known"
 
@@ -40,7 +43,8 @@ def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
         return cannot_tell("speed-unknown", title, evidence=(angle.reason,), surer=angle.remedy)
     uncertainty = angle.relative_speed_uncertainty
     plus_minus = f" ± {uncertainty * angle.mean_speed_rpm:.2g}" if isfinite(uncertainty) else ""
-    text = f"Shaft {angle.shaft or 'of reference'} turns at {angle.mean_speed_rpm:.6g}{plus_minus} rpm"
+    named = f"Shaft {angle.shaft}" if angle.shaft else "The shaft"
+    text = f"{named} turns at {angle.mean_speed_rpm:.6g}{plus_minus} rpm"
     if not angle.is_steady(0.001):
         text += ", between {:.5g} and {:.5g} rpm".format(*angle.speed_range_rpm)
     return Finding(
@@ -139,16 +143,18 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
         title = f"The mesh of {pair.name} shows at order {line.position:.6g} ({where.frequency_hz:.6g} Hz, "
         title += f"harmonic {harmonic})."
         return Finding("mesh-found", Kind.INFORMATION, title, where, strength, 0.99, _OVER_FLOOR)
-    # At which multiple of the stated speed the mesh lines do lie, if anywhere.
-    elsewhere = signals.comb_elsewhere
     near = f"The best of {N_HARMONICS} harmonics is {line.ratio_db:.1f} dB over the floor."
     if not line.is_highest:
         near = f"Near harmonic {harmonic} a line stands beside its place: the speed may be off by little, and small "
         near += "errors smear all averages."
+    elsewhere = signals.comb_elsewhere  # at which multiple of the stated speed the mesh lines do lie, if anywhere
+    title = f"No mesh line of {pair.name} where speed and teeth put it (order {mesh:.6g}, {hertz:.6g} Hz)"
+    if elsewhere is not None:
+        title += f", but at {elsewhere.factor:.4g} times: sampling rate, speed or teeth are wrong"
     return Finding(
-        "mesh-absent",
-        Kind.CANNOT_TELL,
-        f"No mesh line of {pair.name} where speed and teeth put it (order {mesh:.6g}, {hertz:.6g} Hz).",
+        "mesh-absent" if elsewhere is None else MESH_ELSEWHERE,
+        Kind.CANNOT_TELL if elsewhere is None else Kind.DATA_PROBLEM,
+        f"{title}.",
         where,
         strength,
         evidence=(near,) if elsewhere is None else (elsewhere.text, near),

@@ -17,7 +17,7 @@ import numpy as np
 from gearsig.checks import FloatArray, freeze, positive
 from gearsig.diagnosis._analyze import analyze
 from gearsig.diagnosis._blocks import RecordBlocks, record_blocks
-from gearsig.diagnosis._reference import rig_of_reference
+from gearsig.diagnosis._reference import rate_of_reference, rig_of_reference
 from gearsig.diagnosis._types import Analysis, Finding, Kind, Outcome
 from gearsig.diagnosis._verdict import ranked
 from gearsig.errors import InputError
@@ -246,7 +246,12 @@ def read_reference(
     modified_ns = file.stat().st_mtime_ns if file.is_file() else 0
     own_speed = None if isinstance(speed, PulseTimes) else speed
     return _read_reference(
-        file, rig_of_reference(file, rig), memory_bytes / 2, sampling_rate_hz, own_speed, modified_ns
+        file,
+        rig_of_reference(file, rig),
+        memory_bytes / 2,
+        rate_of_reference(file, sampling_rate_hz),
+        own_speed,
+        modified_ns,
     )
 
 

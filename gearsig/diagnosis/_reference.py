@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import isfinite, log10
 from pathlib import Path
 
-from gearsig.diagnosis._types import MIN_CHANGE_DB, Analysis, Finding, Kind, LevelChange, Where
+from gearsig.diagnosis._types import MIN_CHANGE_DB, REFERENCE_UNFIT, Analysis, Finding, Kind, LevelChange, Where
 from gearsig.errors import InputError
 from gearsig.formatting import signed
 from gearsig.indicators import Indicator
@@ -83,6 +83,31 @@ def changes(analysis: Analysis) -> tuple[IndicatorChange | None, ...]:
     """
     then = {_key(i): i for i in analysis.reference.indicators} if analysis.reference is not None else {}
     return tuple(_change(now, then.get(_key(now))) for now in analysis.indicators)
+
+
+def rate_of_reference(path: str | Path, stated_hz: float | None) -> float | None:
+    """Return the sampling rate that is stated for a recording and holds for its reference as well.
+
+    None where the rig file beside the reference states one of its own: then that holds.
+    """
+    from gearsig.rig import read_rig, rig_file_beside
+
+    beside = rig_file_beside(path)
+    return stated_hz if beside is None or read_rig(beside).sampling_rate_hz is None else None
+
+
+def reference_unfit(reference: Analysis) -> Finding:
+    """Say that a reference is not compared, since nothing could be analysed in it, with its own reason."""
+    name = reference.recording.provenance.source or "the reference"
+    reason = next((f for f in reference.findings if f.kind is Kind.DATA_PROBLEM), None)
+    return Finding(
+        REFERENCE_UNFIT,
+        Kind.DATA_PROBLEM,
+        f"Not compared with {name}: {reason.title if reason is not None else reference.verdict}",
+        confidence_basis="what the reference's own analysis says",
+        evidence=reason.evidence if reason is not None else (),
+        surer="State the reference's sampling rate and speed in a rig file beside it (NAME.toml), or take another one.",
+    )
 
 
 def beside_reference(

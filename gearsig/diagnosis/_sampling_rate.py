@@ -362,12 +362,13 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
             return None
     close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
     factor = min(close, key=lambda f: evidence(f, highest, CLOSE_TOLERANCE))
+    as_well_rpm = 60.0 * signals.frequency_per_order_hz / factor
     return _finding(
         signals.recording,
         factor,
         f"The strongest lines of {len(spectra)} spectra then lie at orders of shafts and races (lg p "
         f"{explained:.0f} in sum); at the stated rate they do not ({stated:.0f}).",
-        "Check the sampling rate, and whether another shaft turns that much slower or faster.",
+        f"Check sampling rate and speed: {as_well_rpm:.5g} rpm at the stated rate would explain the lines as well.",
         others[:2],
     )
 

@@ -49,6 +49,9 @@ MIN_CHANGE_DB = 6.0
 CHANGED, UNCHANGED = "changed-since-reference", "unchanged-since-reference"
 """Codes of the findings that levels have changed since the reference, or not."""
 
+REFERENCE_UNFIT = "reference-unfit"
+"""Code of the finding that a given reference is not compared, and why."""
+
 HINDERING = (
     *("channel-clipped", "channel-stuck", "channel-dead", "channel-wrapped", "channel-stepped", "channel-reversed"),
     *("channel-hum", "speed-near-zero"),

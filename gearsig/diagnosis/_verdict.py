@@ -7,7 +7,18 @@ from collections.abc import Iterable
 from gearsig.diagnosis._doubts import said_first
 from gearsig.diagnosis._overall import VIBRATION_ZONE
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
-from gearsig.diagnosis._types import CHANGED, EXAMINED, HINDERING, UNCHANGED, Finding, Kind, Outcome, Where, outcome_of
+from gearsig.diagnosis._types import (
+    CHANGED,
+    EXAMINED,
+    HINDERING,
+    REFERENCE_UNFIT,
+    UNCHANGED,
+    Finding,
+    Kind,
+    Outcome,
+    Where,
+    outcome_of,
+)
 from gearsig.recording import Recording
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
@@ -36,18 +47,19 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     Why a given reference did not help is always part of it.
     """
     doubt = said_first(findings, claims=outcome_of(findings) in (Outcome.FAULT, Outcome.SUSPICION))
+    unfit = next((f.title for f in findings if f.code == REFERENCE_UNFIT), "")
     zone = next((f.title for f in findings if f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE), "")
     changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
     others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED))
     claims = [f for f in others if f.kind in (Kind.FAULT, Kind.SUSPICION)]
     # A change that no pattern explains is a suspicion by itself, and said already.
     if not claims and outcome_of(findings) is Outcome.SUSPICION:
-        return " ".join(filter(None, (doubt, changed, zone)))
+        return " ".join(filter(None, (doubt, changed, zone)))  # with a change, the reference was compared
     said = _said(others, has_reference=has_reference)
     if zone and said.startswith(NO_FAULT):
         said = f"{zone} What causes it does not show.{said.removeprefix(NO_FAULT)}"
         zone = ""
-    return " ".join(filter(None, (doubt, changed, said, zone, unchanged)))
+    return " ".join(filter(None, (doubt, changed, said, zone, unchanged, unfit)))
 
 
 def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:

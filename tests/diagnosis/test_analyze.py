@@ -122,8 +122,9 @@ def test_a_rig_that_disagrees_with_the_sampling_rate() -> None:
         speed=ConstantSpeed(1320.0 * 0.6, "in"),
     )
     analysis = analyze(wrong)
-    assert "mesh-absent" in codes(analysis, Kind.CANNOT_TELL)
-    assert any("1.66" in text for text in finding(analysis, "mesh-absent").evidence)
+    assert "mesh-elsewhere" in codes(analysis, Kind.DATA_PROBLEM)
+    assert any("1.66" in text for text in finding(analysis, "mesh-elsewhere").evidence)
+    assert "at 1.66" in analysis.verdict
 
 
 def test_a_mesh_above_half_the_sampling_rate() -> None:

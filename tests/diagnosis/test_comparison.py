@@ -16,6 +16,7 @@ from gearsig.diagnosis import (
     analyze,
     beside_reference,
     changes,
+    rate_of_reference,
     rig_of_reference,
 )
 from gearsig.errors import InputError
@@ -59,6 +60,29 @@ def test_the_reference_is_the_earlier_record_of_trend_indicators(louder: Analysi
         for key, kurtosis in alone.items():
             assert now[name, *key] == pytest.approx(16.0 / 2.5**2 * kurtosis)
             assert now[f"{name}*", *key] == pytest.approx(16.0 * kurtosis)
+
+
+def test_a_reference_that_cannot_be_analysed_is_not_compared_and_the_verdict_says_why() -> None:
+    """A record at rest says nothing of a bearing: "the reference does not show it" would be no evidence."""
+    damaged = replace(GOOD, bearing_faults=(BearingFault("front", "outer", 12.0, 3000.0, 0.04, 0.01, 0.2),))
+    healthy = record(seed=1)
+    dead = replace(
+        healthy,
+        samples=np.where(np.isin(healthy.channel_names, healthy.vibration_names())[:, None], 0.0, healthy.samples),
+    )
+    analysis = analyze(record(damaged), reference=dead)
+    assert finding(analysis, "bearing-outer-race").kind is Kind.FAULT
+    assert not any("reference" in text for text in finding(analysis, "bearing-outer-race").evidence)
+    assert finding(analysis, "reference-unfit").title in analysis.verdict
+    assert analysis.reference is None
+    assert set(changes(analysis)) == {None}
+
+
+def test_the_rate_of_a_rig_file_beside_the_reference_holds_for_it(tmp_path: Path) -> None:
+    path = tmp_path / "healthy.csv"
+    assert rate_of_reference(path, 12000.0) == 12000.0
+    write_rig(replace(RIG, sampling_rate_hz=48000.0), tmp_path / "healthy.toml")
+    assert rate_of_reference(path, 12000.0) is None
 
 
 def test_without_a_reference_nothing_is_compared() -> None:
