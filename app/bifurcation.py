@@ -19,7 +19,7 @@ from gearsig import phase
 from gearsig.cache import read_arrays, remove_parts, write_text, write_whole
 from gearsig.checks import FloatArray, count, one_of, within
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.processes import active_cluster, n_processors, run_jobs
+from gearsig.processes import active_cluster, killed_text, n_processors, run_jobs
 from sims.cracked import DECAYS, SIGNALS, TRANSMISSION_ERROR, Branch, End, PairState, SteadyRun
 from sims.gear_pair import COORDINATES
 from sims.sweep import claimed
@@ -306,7 +306,7 @@ def _run_job(job: BranchJob) -> None:
 
 def _killed(job: BranchJob) -> None:
     raise RefusalError(
-        f"the process that ran the branch {NAMES[job[2]]!r} was killed: perhaps it ran out of memory",
+        killed_text(f"ran the branch {NAMES[job[2]]!r}"),
         remedy="the same command goes on from what is complete",
     )
 

@@ -313,6 +313,17 @@ def _collect(
             future.cancel()
 
 
+def killed_text(job: str) -> str:
+    """Say why a job whose process was killed has no result: for what `if_killed` of `run_jobs` returns.
+
+    Parameters
+    ----------
+    job : str
+        What the process did, e.g. "analysed it".
+    """
+    return f"the process that {job} was killed: perhaps it ran out of memory"
+
+
 class Cluster:
     """Workers of a Dask cluster as one executor, and what became of them.
 

@@ -1,4 +1,4 @@
-"""Simulators and signal models; they use only gearsig.rig and gearsig.recording."""
+"""Simulators and signal models: of gearsig's rooms they use rig, recording and the gap diagnosis's protocol."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from gearsig.cache import part_beside
 from gearsig.errors import InputError
-from gearsig.recording import WRITERS, Recording, write_recording
+from gearsig.recording import Recording, recording_target, write_recording
 from gearsig.rig import write_rig
 
 
@@ -31,19 +31,13 @@ def file_set(path: str | Path, *, replace: bool = False) -> FileSet:
         If the format is not known, the folder is missing, the name holds a dot more than its extension's (the rig file
         beside it could not be found), or one of the files exists and `replace` is false.
     """
-    target = Path(path)
-    if target.suffix.lower() not in WRITERS:
-        raise InputError(
-            f"extension {target.suffix or '(none)'!r} cannot be written", where=target.name, allowed=" ".join(WRITERS)
-        )
+    target = recording_target(path)
     if "." in target.stem:
         raise InputError(
             "the name has more than one dot",
             where=target.name,
             remedy=f"take {target.stem.replace('.', '_')}{target.suffix}",
         )
-    if not target.parent.is_dir():
-        raise InputError(f"folder {str(target.parent)!r} does not exist", where=target.name, remedy="make it first")
     names = FileSet(target, target.with_suffix(".toml"), target.with_name(f"{target.stem}.truth.json"))
     for name in names:
         if name.is_dir():

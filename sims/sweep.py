@@ -11,21 +11,18 @@ from io import StringIO
 from itertools import product
 from math import isfinite, prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gearsig.cache import remove_parts, write_text
 from gearsig.checks import count, one_of, positive, within
 from gearsig.errors import GearsigError, InputError
-from gearsig.processes import n_processors, run_jobs
-from gearsig.recording import WRITERS
-from sims.effects import EffectSetting, OptionValue
+from gearsig.processes import killed_text, n_processors, run_jobs
+from gearsig.recording import WRITERS, Recording
+from sims.effects import EffectSetting, OptionValue, effect
+from sims.effects import effects as all_effects
 from sims.files import file_set, write_set
 from sims.machine import Operation, Profile
-from sims.simulator import ParameterValue
-
-if TYPE_CHECKING:
-    from gearsig.recording import Recording
-
+from sims.simulator import ParameterValue, checked_value, parameter
 
 MAX_POINTS = 100_000
 """Each a file of its own: more is a mistyped number."""
@@ -179,8 +176,6 @@ class Sweep:
 
     def at(self, point: SweepPoint) -> Sweep:
         """Return the same with a point's values in place."""
-        from sims.effects import effects as known_effects
-
         parameters, settings = dict(self.parameters), list(self.effects)
         speed, torque = self.speed_rpm, self.torque_nm
         for axis, value in zip(self.axes, point.values, strict=True):
@@ -188,7 +183,7 @@ class Sweep:
                 speed = Profile.constant(value)
             elif axis.name == "torque_nm":
                 torque = Profile.constant(value)
-            elif axis.name in known_effects():
+            elif axis.name in all_effects():
                 settings.append(EffectSetting(axis.name, value, axis.options))
             else:
                 parameters[axis.name] = value
@@ -196,9 +191,7 @@ class Sweep:
 
     def _check_axes(self) -> None:
         """Refuse names that do not exist and values out of their ranges; what the machine allows, each point tells."""
-        from sims.effects import effect
         from sims.registry import simulator
-        from sims.simulator import checked_value, parameter
 
         model = simulator(self.model)
         for axis in self.axes:
@@ -369,7 +362,7 @@ SweepJob = tuple[Sweep, SweepPoint, Path]
 
 
 def _killed(job: SweepJob) -> SweepOutcome:
-    return SweepOutcome(job[1], None, "the process that simulated it was killed: perhaps it ran out of memory")
+    return SweepOutcome(job[1], None, killed_text("simulated it"))
 
 
 def _run_one(job: SweepJob) -> SweepOutcome:

@@ -15,7 +15,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.plot import LevelPanel, LinePanel
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Channel, Provenance, Recording
-from gearsig.timefreq import Axis, UniformSignal, at_label
+from gearsig.timefreq import Axis, UniformSignal, at_label, uniform
 
 Table = Mapping[str, NDArray[Any]]
 """Title with unit → column; all of one length."""
@@ -277,8 +277,6 @@ def unit_of(prepared: PreparedRecording, channel: str) -> str:
 
 def signal_of(prepared: PreparedRecording, channel: str, *, over_angle: bool = False, shaft: str = "") -> UniformSignal:
     """Return a channel over time, or over a shaft's angle."""
-    from gearsig.timefreq import uniform
-
     if over_angle:
         return uniform(prepared.over_angle(shaft, [channel]), channel)
     return uniform(prepared.recording, channel)

@@ -18,13 +18,13 @@ from gearsig.angle import (
     speed_channel_angle,
     times_at,
 )
-from gearsig.checks import FloatArray, count, one_of, positive
+from gearsig.checks import FloatArray, count, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._types import AverageLines, LineScaling, SynchronousAverage, lines_of_revolution
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
-from gearsig.rig import Rig
-from gearsig.spectra import checked_signal
+from gearsig.rig import known_ratio
+from gearsig.spectra import array_rate_hz, checked_signal
 
 
 def first_whole_sample(signal: AngleSignal) -> tuple[int, int]:
@@ -114,7 +114,7 @@ def over_angle(
     recording, name = as_recording(signal, channel)
     angle = angle_of(recording, shaft_angle, speed_rpm)
     if shaft not in ("", angle.shaft):
-        angle = angle.of_shaft(shaft, _ratio(recording.rig, shaft, angle.shaft))
+        angle = angle.of_shaft(shaft, known_ratio(recording.rig, shaft, to=angle.shaft))
     return resample_to_angle(recording, angle, channels=[name]), name
 
 
@@ -122,10 +122,8 @@ def as_recording(signal: Recording | FloatArray, channel: str | float) -> tuple[
     """Return (a recording, the channel's name) of a recording and its channel, or of an array and its rate in Hz."""
     if isinstance(signal, Recording):
         return signal, str(channel)
-    if isinstance(channel, str):
-        raise InputError(f"an array has no channel {channel!r}", allowed="its sampling rate in Hz")
-    rate = positive(channel, "sampling_rate_hz", "Hz")
-    return Recording(checked_signal(signal)[None], rate, (Channel("signal"),)), "signal"
+    rate_hz = array_rate_hz(channel, "channel")
+    return Recording(checked_signal(signal)[None], rate_hz, (Channel("signal"),)), "signal"
 
 
 def angle_of(recording: Recording, shaft_angle: ShaftAngle | None, speed_rpm: float | FloatArray | None) -> ShaftAngle:
@@ -148,13 +146,6 @@ def angle_of(recording: Recording, shaft_angle: ShaftAngle | None, speed_rpm: fl
             allowed=f"one number, or one for each of {recording.n_samples} samples",
         )
     return speed_channel_angle(np.asarray(speed_rpm), recording.sampling_rate_hz)
-
-
-def _ratio(rig: Rig | None, shaft: str, reference: str) -> float:
-    ratio = None if rig is None else rig.ratio(shaft, to=reference)
-    if ratio is None:
-        raise RefusalError(f"the speed of shaft {shaft!r} does not follow from the teeth", remedy="complete the rig")
-    return ratio
 
 
 def synchronous_average(

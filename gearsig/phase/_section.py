@@ -6,7 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearsig.angle import ShaftAngle
+from gearsig.angle import (
+    REACH,
+    ShaftAngle,
+    delay_table,
+    doubling_filter,
+    find_shaft_angle,
+    interpolate,
+    times_at,
+)
 from gearsig.checks import FloatArray, count, frozen_array, positive, read_only
 from gearsig.errors import InputError, RefusalError
 from gearsig.phase._types import PhasePortrait, PoincareSection
@@ -44,8 +52,6 @@ class CycleLock:
         RefusalError
             If the angle is known in no part of that time.
         """
-        from gearsig.angle import times_at
-
         part = self.angle.between(start_s, end_s)
         cycles = part.revolutions * self.cycles_per_revolution - phase_cycles
         first, last = np.ceil(cycles[0]), np.floor(cycles[-1])
@@ -79,8 +85,6 @@ def find_lock(
         If there is no shaft angle, or the teeth that lead to the pair or shaft are not known: a section without a
         period means nothing.
     """
-    from gearsig.angle import find_shaft_angle
-
     rig = rig if rig is not None else recording.rig
     if pair and shaft:
         raise InputError(f"both pair {pair!r} and shaft {shaft!r} are given", allowed="one of them")
@@ -170,8 +174,6 @@ def poincare_section(
 
 
 def _locked_section(portrait: PhasePortrait, lock: CycleLock, phase_cycles: float) -> PoincareSection:
-    from gearsig.angle import REACH
-
     rate = portrait.sampling_rate_hz
     start = portrait.start_s + (REACH + 1) / rate
     end = portrait.end_s - (REACH + 1) / rate
@@ -258,8 +260,6 @@ def points_between(points: FloatArray, positions: FloatArray) -> FloatArray:
     positions : array, (n,)
         In samples, sorted, at least `gearsig.angle.REACH` from either end.
     """
-    from gearsig.angle import delay_table, doubling_filter, interpolate
-
     points_at = np.empty((len(positions), points.shape[1]))
     for axis in range(points.shape[1]):
         x = np.ascontiguousarray(points[:, axis], dtype=np.float64)

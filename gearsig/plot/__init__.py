@@ -112,7 +112,10 @@ from gearsig.plot._start_stop import (
     start_stop_pair_figure,
 )
 from gearsig.plot._style import (
+    CURSOR_COLOURS,
     FAULT,
+    MEASURED,
+    QUIET,
     Scale,
     above_zero,
     decibels,
@@ -125,14 +128,17 @@ from gearsig.plot._style import (
 )
 
 __all__ = [
+    "CURSOR_COLOURS",
     "FAULT",
     "FAULTY",
     "HEALTHY",
     "INNER",
     "LONGEST",
+    "MEASURED",
     "METHODS",
     "OUTER",
     "PRIORITY",
+    "QUIET",
     "AngleMark",
     "Captioned",
     "ChartLine",

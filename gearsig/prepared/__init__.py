@@ -7,7 +7,6 @@
 """
 
 from gearsig.prepared._angle import (
-    MAINS_HZ,
     MAINS_TOLERANCE,
     STATED_SPEED_TOLERANCE,
     envelope_bands,
@@ -32,6 +31,7 @@ from gearsig.prepared._lines import (
 )
 from gearsig.prepared._recording import MEMORY_LIMIT_MB, PreparedRecording, has_mark, prepare
 from gearsig.prepared._revolution import shift_scores, sliding_mean, strongest_window, turned_lines
+from gearsig.recording import MAINS_HZ
 
 __all__ = [
     "INNER_LINES",

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gearsig.angle import ShaftAngle
+from gearsig.angle import ShaftAngle, estimate_shaft_angle, find_shaft_angle, refine_by_phase
 from gearsig.errors import InputError, RefusalError
 from gearsig.prepared._lines import (
     CLEAR_LINE_DB,
@@ -21,7 +21,7 @@ from gearsig.prepared._lines import (
     over_floor_db,
     peak_position,
 )
-from gearsig.recording import Recording
+from gearsig.recording import MAINS_HZ, Recording
 from gearsig.rig import ConstantSpeed, Rig, SpeedChannel
 
 STATED_SPEED_TOLERANCE = 0.03
@@ -37,11 +37,10 @@ N_SHAFT_HARMONICS = 8
 N_PHASE_HARMONICS = 3
 """Of the mesh, whose phase an angle may follow."""
 
-MAINS_HZ = (50.0, 60.0)
-"""Supplies put their own harmonics, and those of motors, within the slip of a motor's speed."""
-
 MAINS_TOLERANCE = 0.002
-"""How far a supply's frequency wanders."""
+"""How far a supply's frequency wanders at most; its harmonics, and those of motors, lie within a motor's slip.
+
+Twice what the quality of a recording allows a hum: these lines are only left out, or said to confirm nothing."""
 
 
 def refined_angle(recording: Recording, rig: Rig) -> ShaftAngle:
@@ -63,8 +62,6 @@ def refined_angle(recording: Recording, rig: Rig) -> ShaftAngle:
     InputError
         If the speed source is malformed, or names a channel or shaft that is not there.
     """
-    from gearsig.angle import find_shaft_angle
-
     angle = find_shaft_angle(recording, rig)
     hertz, limit_hz = angle.mean_speed_rpm / 60, recording.sampling_rate_hz / 2
     if hertz >= limit_hz:
@@ -92,8 +89,6 @@ def phase_followed_angle(recording: Recording, rig: Rig, estimated: ShaftAngle) 
     estimated : ShaftAngle
         Of the reference shaft; one that was not estimated from the vibration is returned as it is.
     """
-    from gearsig.angle import refine_by_phase
-
     if estimated.method != "tachless":
         return estimated
     meshes = [order for pair in rig.pairs if (order := rig.mesh_order(pair, estimated.shaft)) is not None]
@@ -140,8 +135,6 @@ def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngl
 
 
 def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle | None:
-    from gearsig.angle import estimate_shaft_angle
-
     speed = stated.mean_speed_rpm
     limits = (speed * (1 - STATED_SPEED_TOLERANCE), speed * (1 + STATED_SPEED_TOLERANCE))
     try:

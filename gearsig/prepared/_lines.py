@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.spectra import Spectrum
+from gearsig.spectra import Spectrum, noise_floor
 
 LOG_RATIO_LIMIT = 6.0
 """Natural log of power over floor at which a harmonic counts in full: 26 dB, far above what noise reaches."""
@@ -154,8 +154,6 @@ def line_excess(spectrum: Spectrum, floor: FloatArray) -> LineExcess:
 
 def floor_of(spectrum: Spectrum, highest: float | None = None) -> LineExcess:
     """Return an amplitude spectrum's lines, up to `highest`, against its local noise floor."""
-    from gearsig.spectra import noise_floor
-
     floor = noise_floor(spectrum, highest=highest).values
     return line_excess(spectrum.head(len(floor)), floor)
 

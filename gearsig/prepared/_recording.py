@@ -11,15 +11,23 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.angle import AngleSignal, ShaftAngle, resample_to_angle
 from gearsig.checks import positive, read_only
-from gearsig.errors import GearsigError, RefusalError
-from gearsig.orders import AverageLines, OrderMap, SynchronousAverage
+from gearsig.errors import GearsigError
+from gearsig.orders import (
+    AverageLines,
+    OrderMap,
+    SynchronousAverage,
+    average_lines,
+    order_map,
+    order_spectrum,
+    synchronous_average,
+)
 from gearsig.prepared._angle import phase_followed_angle, refined_angle
 from gearsig.prepared._lines import LineExcess, floor_of
 from gearsig.recording import Recording
-from gearsig.rig import PulseTimes, Rig, TachometerChannel
-from gearsig.spectra import Spectrum, fast_length
+from gearsig.rig import PulseTimes, Rig, TachometerChannel, known_ratio
+from gearsig.spectra import Spectrum, amplitude_spectrum, fast_length, power_density
 
 T = TypeVar("T")
 
@@ -157,12 +165,7 @@ class PreparedRecording:
         RefusalError
             If the teeth on the way to it are not known.
         """
-        ratio = self.rig.ratio(shaft) if shaft and self.rig.shafts else 1.0
-        if ratio is None:
-            raise RefusalError(
-                f"the speed of shaft {shaft!r} does not follow from the teeth", remedy="complete the rig"
-            )
-        return ratio
+        return known_ratio(self.rig, shaft) if shaft and self.rig.shafts else 1.0
 
     def angle_of(self, shaft: str = "", *, followed: bool = False, ratio: float | None = None) -> ShaftAngle:
         """Return the angle of a shaft.
@@ -210,8 +213,6 @@ class PreparedRecording:
         AngleSignal
             In the channels' units, with the whole bandwidth on most revolutions.
         """
-        from gearsig.angle import resample_to_angle
-
         names = tuple(channels) if channels is not None else self.recording.vibration_names()
         turns = self.ratio(shaft) if ratio is None else ratio
         angle = self.angle_of(shaft, followed=followed, ratio=turns)
@@ -228,8 +229,6 @@ class PreparedRecording:
 
     def average(self, shaft: str, channel: str, *, followed: bool = False) -> SynchronousAverage:
         """Return the synchronous average of a channel over a shaft's whole revolutions, with its standard error."""
-        from gearsig.orders import synchronous_average
-
         return self.keep(
             ("average", shaft, channel, self._is_followed(followed)),
             lambda: synchronous_average(self.over_angle(shaft, [channel], followed=followed), channel),
@@ -239,8 +238,6 @@ class PreparedRecording:
         self, shaft: str = "", channels: Sequence[str] | None = None, *, followed: bool = False
     ) -> AverageLines:
         """Return the complex lines (amplitude, peak) of the synchronous averages of several channels."""
-        from gearsig.orders import average_lines
-
         names = tuple(channels) if channels is not None else self.recording.vibration_names()
         return self.keep(
             ("average lines", shaft, names, self._is_followed(followed)),
@@ -265,8 +262,6 @@ class PreparedRecording:
 
     def spectrum(self, channel: str) -> Spectrum:
         """Return the amplitude spectrum (peak) over frequency, of `fast_part`."""
-        from gearsig.spectra import amplitude_spectrum
-
         return self.keep(
             ("spectrum", channel),
             lambda: amplitude_spectrum(self.fast_part, channel, transform=self.transform(channel)),
@@ -274,22 +269,16 @@ class PreparedRecording:
 
     def power_density(self, channel: str) -> Spectrum:
         """Return Welch's power spectral density over frequency."""
-        from gearsig.spectra import power_density
-
         return self.keep(("density", channel), lambda: power_density(self.recording, channel))
 
     def order_lines(self, channel: str) -> LineExcess:
         """Return the amplitude spectrum (peak) over order of the reference shaft, with its noise floor."""
-        from gearsig.orders import order_spectrum
-
         return self.keep(
             ("order lines", channel), lambda: floor_of(order_spectrum(self.over_angle("", [channel]), channel))
         )
 
     def order_map(self, channel: str) -> OrderMap:
         """Return amplitudes over order of the reference shaft, along the record."""
-        from gearsig.orders import order_map
-
         return self.keep(("order map", channel), lambda: order_map(self.over_angle("", [channel]), channel))
 
     def with_rig(self, rig: Rig) -> PreparedRecording:

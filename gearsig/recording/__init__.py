@@ -1,7 +1,7 @@
 """Recordings: channels over time, readers, quality of the data."""
 
 from gearsig.recording._limits import check_memory, container_free_bytes, free_memory_bytes
-from gearsig.recording._quality import ChannelProblem, find_problems
+from gearsig.recording._quality import MAINS_HZ, ChannelProblem, find_problems
 from gearsig.recording._read import (
     FORMAT_NAMES,
     FORMAT_OF_EXTENSION,
@@ -9,6 +9,7 @@ from gearsig.recording._read import (
     n_samples_of,
     read_pulse_times,
     read_recording,
+    recording_target,
     sha256_of,
     write_recording,
 )
@@ -19,6 +20,7 @@ from gearsig.recording.formats._wav import parse_lea
 __all__ = [
     "FORMAT_NAMES",
     "FORMAT_OF_EXTENSION",
+    "MAINS_HZ",
     "SI_FACTORS",
     "WRITERS",
     "Channel",
@@ -34,6 +36,7 @@ __all__ = [
     "parse_lea",
     "read_pulse_times",
     "read_recording",
+    "recording_target",
     "sha256_of",
     "variables",
     "write_recording",

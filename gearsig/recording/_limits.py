@@ -97,23 +97,39 @@ def available_memory_bytes() -> int:
     return UNTOLD_BYTES if free is None else int(free)
 
 
-def check_memory(needed_bytes: int, where: str, free_bytes: float | None = None) -> None:
-    """Raise if decoding needs more than half of the available memory; the other half is for the analysis.
+def check_memory(
+    needed_bytes: float,
+    where: str,
+    free_bytes: float | None = None,
+    *,
+    part: float = 0.5,
+    remedy: str = "split the file or export fewer channels",
+) -> None:
+    """Raise if something needs more than a part of the available memory.
 
     Parameters
     ----------
-    needed_bytes : int
+    needed_bytes : float
     where : str
+        File, or what is computed.
     free_bytes : float or None
         None: what can be had without swapping.
+    part : float
+        Of the free memory. Default: half for decoding, the other half is for the analysis.
+    remedy : str
+
+    Raises
+    ------
+    InputError
+        With what is needed and what is allowed.
     """
-    allowed = int(available_memory_bytes() if free_bytes is None else free_bytes) // 2
+    allowed = part * (available_memory_bytes() if free_bytes is None else free_bytes)
     if needed_bytes > allowed:
         raise InputError(
             f"takes about {needed_bytes / 1e9:.3g} GB of memory",
             where=where,
             allowed=f"up to {allowed / 1e9:.3g} GB on this machine now",
-            remedy="split the file or export fewer channels",
+            remedy=remedy,
         )
 
 

@@ -329,8 +329,12 @@ N_BLOCKS = 64
 STEP_DB = 4.0
 LEAST_SAMPLES = 4096
 MAINS_HZ = (50.0, 60.0)
+"""Frequencies of electric supplies."""
 MAINS_WANDER = 1e-3
-"""How far a supply's frequency may be off; induction motors slip by more."""
+"""How far a line that is called hum may be from a supply's multiple: half of `gearsig.prepared.MAINS_TOLERANCE`.
+
+This one accuses a channel, and a motor of little slip turns close by; that one only leaves lines out of a search, where
+one that is missed does harm."""
 LONGEST_TURNED = 1 << 18
 """Samples in which the direction of time is looked for."""
 

@@ -285,19 +285,8 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
         If the extension is not known, the folder is missing, or the format cannot hold the recording. Nothing is
         written then: the file is written beside its place and moved there when complete.
     """
-    target = Path(path)
-    writer = WRITERS.get(target.suffix.lower())
-    if writer is None:
-        raise InputError(
-            f"extension {target.suffix or '(none)'!r} cannot be written",
-            where=target.name,
-            allowed=" ".join(WRITERS),
-            remedy="choose one of these",
-        )
-    if not target.parent.is_dir():
-        raise InputError(
-            f"folder {str(target.parent)!r} does not exist", where=target.name, remedy="make the folder first"
-        )
+    target = recording_target(path)
+    writer = WRITERS[target.suffix.lower()]
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem[:32]}-", suffix=target.suffix)
     except OSError as error:
@@ -316,6 +305,29 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
         raise InputError(f"cannot be written ({error})", where=target.name, remedy="check the disk") from error
     finally:
         unfinished.unlink(missing_ok=True)
+    return target
+
+
+def recording_target(path: str | Path) -> Path:
+    """Return the path of a recording that is to be written, after checking that `write_recording` takes it.
+
+    Raises
+    ------
+    InputError
+        If the extension is not known, or the folder is missing.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in WRITERS:
+        raise InputError(
+            f"extension {target.suffix or '(none)'!r} cannot be written",
+            where=target.name,
+            allowed=" ".join(WRITERS),
+            remedy="choose one of these",
+        )
+    if not target.parent.is_dir():
+        raise InputError(
+            f"folder {str(target.parent)!r} does not exist", where=target.name, remedy="make the folder first"
+        )
     return target
 
 

@@ -38,6 +38,7 @@ from gearsig.rig._types import (
     SpeedChannel,
     SpeedSource,
     TachometerChannel,
+    known_ratio,
     shaft_ratios,
 )
 
@@ -69,6 +70,7 @@ __all__ = [
     "from_table",
     "hertz_stiffness_n_per_m1p5",
     "hunting_tooth_order",
+    "known_ratio",
     "order_lines",
     "path_of_contact",
     "read_rig",

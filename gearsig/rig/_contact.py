@@ -170,8 +170,6 @@ def hertz_stiffness_n_per_m1p5(
     >>> f"{hertz_stiffness_n_per_m1p5(5.0, 0.05, radians(20.0)):.4e}"
     '1.8366e+10'
     """
-    from math import sin
-
     u = positive(ratio, "ratio")
     radius = u * positive(reference_radius_m, "reference_radius_m", "m") * sin(pressure_angle_rad) / (1.0 + u)
     modulus = positive(youngs_modulus_pa, "youngs_modulus_pa", "Pa") / (2.0 * (1.0 - poisson_ratio**2))

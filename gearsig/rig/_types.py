@@ -17,13 +17,27 @@ from gearsig.checks import (
     positive,
     within,
 )
-from gearsig.errors import InputError
+from gearsig.errors import InputError, RefusalError
 from gearsig.rig._catalogue import catalogue_bearing
 from gearsig.rig._contact import ToothContact
 
 # --------------------
 # Speed ratios of all shafts, from the teeth along the gear train.
 # --------------------
+
+
+def known_ratio(rig: Rig | None, shaft: str, to: str = "") -> float:
+    """Return revolutions of `shaft` per revolution of `to` (default: the reference shaft), see `Rig.ratio`.
+
+    Raises
+    ------
+    RefusalError
+        If the teeth on the way, or the whole rig, are not known.
+    """
+    ratio = None if rig is None else rig.ratio(shaft, to=to)
+    if ratio is None:
+        raise RefusalError(f"the speed of shaft {shaft!r} does not follow from the teeth", remedy="complete the rig")
+    return ratio
 
 
 def shaft_ratios(rig: Rig) -> dict[str, float]:

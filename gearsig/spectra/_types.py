@@ -302,10 +302,27 @@ def named_signal(
             unit or row.unit,
             source or row.name,
         )
-    if isinstance(channel_or_rate_hz, str):
-        raise InputError(f"an array has no channel {channel_or_rate_hz!r}", allowed="its sampling rate in Hz")
-    rate = positive(channel_or_rate_hz, "sampling_rate_hz", "Hz")
-    return checked_signal(signal, minimum=minimum), rate, unit, source
+    rate_hz = array_rate_hz(channel_or_rate_hz, "channel_or_rate_hz")
+    return checked_signal(signal, minimum=minimum), rate_hz, unit, source
+
+
+def array_rate_hz(given: str | float, parameter: str) -> float:
+    """Return an array's sampling rate in Hz, which stands where a recording's channel would be named.
+
+    Parameters
+    ----------
+    given : str or float
+    parameter : str
+        Under which the caller gave it, for the errors.
+
+    Raises
+    ------
+    InputError
+        If it is a name, or not above zero.
+    """
+    if isinstance(given, str):
+        raise InputError(f"an array has no channel {given!r}", where=parameter, allowed="its sampling rate in Hz")
+    return positive(given, f"{parameter}, an array's sampling rate,", "Hz")
 
 
 def plan_blocks(n_samples: int, n_per_block: int | None, overlap: float, window: str) -> BlockPlan:

@@ -4,7 +4,6 @@ from gearsig.timefreq._cwt import cwt, cwt_map, squeezed_cwt, squeezed_cwt_map
 from gearsig.timefreq._inverse import component, inverse
 from gearsig.timefreq._packets import (
     WaveletPackets,
-    natural_order,
     node_path,
     packet_inverse,
     wavelet_packet_map,
@@ -51,7 +50,6 @@ __all__ = [
     "inverse",
     "lowest_possible",
     "meetings",
-    "natural_order",
     "node_path",
     "packet_inverse",
     "pieces",

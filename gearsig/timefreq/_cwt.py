@@ -12,7 +12,7 @@ from gearsig.checks import FloatArray, one_of
 from gearsig.timefreq._squeezing import (
     MIN_SHARE,
     SqueezeEngine,
-    check_memory,
+    check_ssqueezepy_bytes,
     is_ssqueezepy,
     squeeze,
     squeeze_lines,
@@ -361,7 +361,7 @@ def _by_ssqueezepy(x: UniformSignal, plan: SqueezingWavelets, wavelet: Wavelet, 
     ratio = analysed[1] / analysed[0]
     grid = np.concatenate([[analysed[0] / ratio], analysed, [analysed[-1] * ratio]])
     # Wavelets, their derivatives, a copy, the result, and two of these padded to the next power of two.
-    check_memory(len(grid) * 8 * (4 * x.n_samples + 2 * (4 << (x.n_samples - 1).bit_length() - 1)))
+    check_ssqueezepy_bytes(len(grid) * 8 * (4 * x.n_samples + 2 * (4 << (x.n_samples - 1).bit_length() - 1)))
     scaled, rms = unit_rms(x)
     with ssqueezepy() as ssq:
         T = ssq.ssq_cwt(

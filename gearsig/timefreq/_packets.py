@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, freeze, one_of
 from gearsig.errors import InputError, RefusalError
@@ -94,23 +93,6 @@ def node_path(band: int, level: int) -> str:
     if not 0 <= band < 1 << count(level, "level"):
         raise InputError(f"band {band} is not there", where="band", allowed=f"0 to {(1 << level) - 1}")
     return f"{band ^ (band >> 1):0{level}b}".replace("0", "a").replace("1", "d")
-
-
-def natural_order(n_bands: int) -> NDArray[np.int64]:
-    """Return the bands in the order of the filter tree (Paley's): by path, "a" before "d".
-
-    Parameters
-    ----------
-    n_bands : int
-        2^level.
-
-    Returns
-    -------
-    array, (n_bands,)
-        Indices into rows that run upwards in frequency.
-    """
-    bands = np.arange(n_bands, dtype=np.int64)
-    return np.argsort(bands ^ (bands >> 1), kind="stable").astype(np.int64)
 
 
 def wavelet_packets(

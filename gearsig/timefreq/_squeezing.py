@@ -64,13 +64,19 @@ def unit_rms(x: UniformSignal) -> tuple[FloatArray, float]:
     return np.asarray(x.values / rms), rms
 
 
-def check_memory(n_bytes: int) -> None:
-    """Raise where ssqueezepy's matrices, all held at once, would push a usual machine into swapping."""
-    if n_bytes > 4 << 30:
+MOST_BYTES = 4 << 30
+"""Of ssqueezepy's matrices, all held at once: more would push a usual machine into swapping.
+
+It is the same whatever is free now: a comparison of engines runs on all machines or on none."""
+
+
+def check_ssqueezepy_bytes(n_bytes: int) -> None:
+    """Raise where ssqueezepy would hold more than `MOST_BYTES`."""
+    if n_bytes > MOST_BYTES:
         raise InputError(
             f"ssqueezepy would take about {n_bytes / 1e9:.3g} GB for this signal",
             where="engine",
-            allowed=f"at most {(4 << 30) / 1e9:.2g} GB",
+            allowed=f"at most {MOST_BYTES / 1e9:.2g} GB",
             remedy='choose engine="gearsig", a shorter signal, fewer lines, or a larger step of the STFT',
         )
 

@@ -13,7 +13,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._squeezing import (
     MIN_SHARE,
     SqueezeEngine,
-    check_memory,
+    check_ssqueezepy_bytes,
     is_ssqueezepy,
     squeeze,
     squeeze_lines,
@@ -396,7 +396,7 @@ def _by_ssqueezepy(plan: FramePlan, step: int) -> ComplexArray:
     x, n = plan.signal, len(plan.window)
     n_frames = -(-x.n_samples // step)
     # Spectra and their derivatives, a copy and the result, complex; frames of both windows before, real.
-    check_memory((plan.n_fft // 2 + 1) * n_frames * 8 * 6)
+    check_ssqueezepy_bytes((plan.n_fft // 2 + 1) * n_frames * 8 * 6)
     window = np.zeros(plan.n_fft)
     start = plan.n_fft // 2 - n // 2
     window[start : start + n] = plan.window

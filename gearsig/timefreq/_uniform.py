@@ -13,7 +13,7 @@ from gearsig.angle import AngleSignal
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
-from gearsig.spectra import Scaling, scaled_unit
+from gearsig.spectra import Scaling, array_rate_hz, scaled_unit
 from gearsig.timefreq._types import Axis, Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap
 
 SMALLEST, LARGEST = 1e-12, 1e15
@@ -122,7 +122,7 @@ def uniform(signal: Source, channel: str | float | None = None) -> UniformSignal
                 f"signal is a {type(signal).__name__}, and its sampling rate is {channel!r}",
                 allowed="a Recording or AngleSignal and its channel, a UniformSignal, or an array and its rate in Hz",
             )
-        return UniformSignal(signal, positive(channel, "sampling_rate_hz", "Hz"))
+        return UniformSignal(signal, array_rate_hz(channel, "channel"))
     names = signal.channel_names
     if channel is None and len(names) != 1:
         raise InputError("no channel is named", where="channel", allowed=", ".join(names))

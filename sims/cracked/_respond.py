@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, known_name
 from gearsig.errors import InputError
-from sims.cracked._kernels import MAX_LATE
+from sims.cracked._kernels import MAX_LATE, integrate
 from sims.gear_pair import (
     BEARING_FIELDS,
     COORDINATES,
@@ -208,9 +208,7 @@ def mesh_mass_kg(machine: Machine) -> float:
 
 def mean_stiffness_n_per_m(machine: Machine, force_n: float) -> float:
     """Mean mesh stiffness over a cycle of healthy teeth, at the set force where contact stiffens with the load."""
-    from dataclasses import replace
-
-    healthy = replace(machine.mesh, cracks_1=(), cracks_2=(), spalls_1=(), spalls_2=(), chips_1=(), chips_2=())
+    healthy = machine.mesh.healthy
     if healthy.contact_law == "linear":
         return mesh_stiffness(healthy).mean_n_per_m
     return mesh_stiffness(healthy, force_n=max(force_n, 1.0)).mean_n_per_m
@@ -477,8 +475,6 @@ def respond(
     Classic Runge–Kutta method, fourth order. Where a tooth pair loses contact its force has a kink, and the order drops
     for that step.
     """
-    from sims.cracked._kernels import integrate
-
     step = default_step_s(machine, operation) if step_s is None else step_s
     plan = RunPlan(start_s, duration_s, step, stride, steps_per_call)
     ready = prepare(machine, operation, rng, start_s)

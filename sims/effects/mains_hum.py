@@ -9,6 +9,7 @@ from math import pi
 import numpy as np
 
 from gearsig.errors import InputError
+from gearsig.recording import MAINS_HZ
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
 from sims.effects._shared import with_each_channel
 from sims.effects.textbook import UP, Textbook
@@ -63,7 +64,7 @@ EFFECT = Effect(
         lambda machine, _options: machine.vibration_mps2,
         lambda _machine: [{"frequency_hz": 50.0}],
         lambda _machine, rng: {
-            "frequency_hz": float(rng.choice((50.0, 60.0))),
+            "frequency_hz": float(rng.choice(MAINS_HZ)),
             "harmonics_percent": float(rng.uniform(0.0, 80.0)),
         },
     ),

@@ -14,6 +14,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, positive, within
 from gearsig.errors import InputError
+from gearsig.recording import check_memory as check_part_of_memory
 from gearsig.recording import free_memory_bytes
 from sims.mesh import STEEL, GearGeometry, Material, Outline, fillet_outline, involute_outline, root_half_angle_rad
 
@@ -496,7 +497,7 @@ def craig_bampton_bytes(blank: GearBlank, size: MeshSize, n_compared: int) -> fl
 
 
 def check_memory(needed_bytes: float, free_bytes: float | None = None) -> None:
-    """Refuse a computation that will not fit.
+    """Refuse a computation that will not fit into `MAX_PART` of the free memory.
 
     Parameters
     ----------
@@ -507,15 +508,12 @@ def check_memory(needed_bytes: float, free_bytes: float | None = None) -> None:
     Raises
     ------
     InputError
-        With both numbers.
+        See `gearsig.recording.check_memory`.
     """
     free = free_memory_bytes() if free_bytes is None else free_bytes
-    if free is not None and needed_bytes > MAX_PART * free:
-        raise InputError(
-            f"about {needed_bytes / 1e9:.2g} GB of memory are needed, {free / 1e9:.2g} GB are free",
-            allowed=f"at most {MAX_PART:.0%} of the free memory",
-            remedy="take a coarser mesh, or close other programs",
-        )
+    if free is not None:
+        remedy = "take a coarser mesh, or close other programs"
+        check_part_of_memory(needed_bytes, "mesh", free, part=MAX_PART, remedy=remedy)
 
 
 # One thread for linear algebra on small matrices, where more threads wait for each other longer than they work.

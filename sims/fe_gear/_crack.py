@@ -147,7 +147,21 @@ def crack_meshes(blank: GearBlank, crack: RootCrack, size: MeshSize = CRACK_SIZE
 
 
 def tooth_compliance_with(mesh: SectorMesh, chain: FloatArray, grid: FlankGrid, spread: Spread) -> FloatArray:
-    """Compliance between the flank points of the tooth of a sector that is closed to a ring by others."""
+    """Compliance between the flank points of the tooth of a sector that is closed to a ring by others, m/N, (n, n).
+
+    The direct solution, for any one sector; `open_crack` solves once for all widths of a crack.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+        E.g. a cracked one of `crack_meshes`.
+    chain : array
+        Of `other_sectors`, N/m.
+    grid : FlankGrid
+        The n points.
+    spread : str
+        See `ReducedGear.spread`.
+    """
     stiffness, kept = _ring(mesh, chain)
     rows = flank_rows(mesh, grid, spread, np.arange(mesh.n_nodes), 3 * mesh.n_nodes)[:, kept]
     compliance: FloatArray = rows @ factorised(stiffness)(rows.T)

@@ -27,6 +27,7 @@ from sims.fe_gear._blank import (
     mesh_size_for,
     one_thread,
     row_places,
+    sector_bytes,
     side_curve,
 )
 from sims.fe_gear._cyclic import (
@@ -510,8 +511,6 @@ def reduce_gear(blank: GearBlank, plan: ReductionPlan) -> ReducedGear:
     attachment modes; D. L. Thomas, International Journal for Numerical Methods in Engineering 14 (1979), for cyclic
     symmetry.
     """
-    from sims.fe_gear._blank import sector_bytes
-
     if plan.n_offsets > blank.n_teeth // 2:
         raise InputError(f"n_offsets is {plan.n_offsets}", allowed=f"at most {blank.n_teeth // 2}, half of the teeth")
     check_reducible(blank, plan.size)

@@ -12,7 +12,7 @@ from gearsig.checks import FloatArray
 from gearsig.recording import Channel, Provenance, Recording
 from gearsig.rig import EncoderChannel, Rig, Sensor
 from sims.forging._drive import CONTINUOUS, SAMPLINGS, ForgingDrive, Schedule
-from sims.forging._respond import DriveResponse, respond
+from sims.forging._respond import CONTACT_COLUMNS, DriveResponse, respond
 from sims.measure import (
     Accelerometer,
     AntiAlias,
@@ -211,7 +211,5 @@ def _channel(values: ParameterValues) -> MeasuredChannel:
 
 
 def _truth(motion: DriveResponse) -> dict[str, Any]:
-    from sims.forging._respond import CONTACT_COLUMNS
-
     rows = [[None if np.isnan(value) else float(value) for value in row] for row in motion.contacts]
     return {"contacts": {"columns": list(CONTACT_COLUMNS), "rows": rows}, "solver": {"n_steps": motion.n_steps}}

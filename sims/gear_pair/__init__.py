@@ -2,7 +2,6 @@
 
 from sims.gear_pair._bearing import (
     BEARING_FIELDS,
-    axial_loads_n,
     bearing_fields,
     bearing_loads_n,
     carried_part,
@@ -59,7 +58,6 @@ __all__ = [
     "RunPlan",
     "SimulationRequest",
     "StepConvergence",
-    "axial_loads_n",
     "bearing_fields",
     "bearing_loads_n",
     "body_gain",

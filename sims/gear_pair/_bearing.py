@@ -120,15 +120,6 @@ def tilting_shares(machine: Machine) -> FloatArray:
     return result
 
 
-def axial_loads_n(machine: Machine, torque_nm: float) -> FloatArray:
-    """Axial force on driver and driven gear, along +z, that each shaft's locating bearing takes, (2,).
-
-    F_a = (T1/r_b1) tan β_b = F_t tan β; shafts are stiff along their axis.
-    """
-    force = torque_nm / (machine.mesh.pair.driver.base_radius_mm * 1e-3) * machine.mesh.axial_share
-    return np.array([force, -force])
-
-
 def _defect(support: BearingSupport) -> tuple[int, float, float, float]:
     """(race, order, length in element spacings, spacing in m)."""
     defect, bearing = support.defect, support.bearing

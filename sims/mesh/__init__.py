@@ -1,4 +1,4 @@
-"""Shared gear physics: involute geometry and mesh stiffness of spur pairs."""
+"""Shared gear physics: involute geometry, flanks, faults, friction and mesh stiffness of spur and helical pairs."""
 
 from sims.mesh._body import BODIES, arc_compliance, body_compliance
 from sims.mesh._deviation import FlankDeviation, wear_profile

@@ -1,4 +1,4 @@
-"""A crack at the tooth root: where it runs, what it leaves of each section, how deep it may be."""
+"""Faults of single teeth: a crack at the root, a spall on the flank, a tip chipped off; what each leaves."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -362,11 +362,7 @@ def back_stiffness_n_per_m(mesh: GearMesh) -> float:
     off a tip would be missing on both flanks; a constant for the whole gear leaves it out, as it does roughness and
     wear.
     """
-    from dataclasses import replace
-
-    faults = {"cracks_1": (), "cracks_2": (), "spalls_1": (), "spalls_2": (), "chips_1": (), "chips_2": ()}
-    healthy = replace(mesh, contact_law="linear", **faults)  # type: ignore[arg-type]  # all of them are tuples of faults
-    return mesh_stiffness(healthy).mean_n_per_m
+    return mesh_stiffness(replace(mesh.healthy, contact_law="linear")).mean_n_per_m
 
 
 def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

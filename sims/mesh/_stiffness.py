@@ -457,6 +457,11 @@ class GearMesh:
         return self.pair.face_width_mm * 1e-3
 
     @property
+    def healthy(self) -> GearMesh:
+        """The same without cracks, spalls and chips; flanks and roughness stay."""
+        return replace(self, cracks_1=(), cracks_2=(), spalls_1=(), spalls_2=(), chips_1=(), chips_2=())
+
+    @property
     def n_slots(self) -> int:
         """Most pairs that carry load at once, ramps included."""
         return floor(self.pair.contact_ratio + self.overlap_ratio + self.ramp) + 1

@@ -32,6 +32,7 @@ from sims.reduced_fe._contact import (
     contact_state,
     contact_table,
     folded,
+    force_map,
     mesh_maps,
     mirror_groups,
     mirrors,
@@ -700,10 +701,7 @@ def back_rows(machine: Machine, sides: tuple[FlexibleSide, FlexibleSide]) -> Flo
 
 def mean_stiffness_n_per_m(pair: FlexiblePair, force_n: float) -> float:
     """Tangent stiffness of the healthy mesh at a force, mean over a mesh cycle."""
-    from dataclasses import replace
-
-    faults: dict[str, Any] = {f"{kind}_{i}": () for kind in ("cracks", "spalls", "chips") for i in (1, 2)}
-    healthy = replace(pair.machine.mesh, **faults)
+    healthy = pair.machine.mesh.healthy
     torque = np.array([force_n * healthy.pair.driver.base_radius_mm * 1e-3])
     table = static_table(pair.gears, healthy)
     return float(mesh_maps(pair.gears, healthy, torque, table=table).tangent_stiffness_n_per_m.mean())
@@ -790,11 +788,7 @@ def start_state(
 
 def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: FlexState, force: float) -> FlexState:
     """Turn the driven side as a whole until the flanks carry `force` at ζ = 0."""
-    from dataclasses import replace
-
     from scipy.optimize import brentq
-
-    from sims.reduced_fe._contact import force_map
 
     table = pair_constants.table
     rigid = pair_constants.sides[1]

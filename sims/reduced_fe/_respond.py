@@ -17,7 +17,7 @@ from sims.fe_gear import one_thread
 from sims.gear_pair import COORDINATES, YIELDS, PairResponse, RunPlan, StepConvergence, profile_points
 from sims.machine import Operation, Profile
 from sims.mesh import one_mesh_cycle
-from sims.reduced_fe._integrate import Method, step_coefficients
+from sims.reduced_fe._integrate import Method, march, room, step_coefficients
 from sims.reduced_fe._pair import (
     FlexiblePair,
     FlexiblePairConstants,
@@ -220,8 +220,6 @@ def respond(
     RefusalError
         If the solution grows beyond all bounds.
     """
-    from sims.reduced_fe._integrate import march, room
-
     step = positive(step_s, "step_s", "s")
     plan = RunPlan(start_s, duration_s, step, stride, steps_per_call)
     pair_constants = constants(pair, operation) if ready is None else ready

@@ -199,6 +199,15 @@ def test_shafts_with_close_orders_are_told_apart():
     assert np.abs(found.residual.samples).max() < 0.1
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [(0.0, "channel, an array's sampling rate, is 0 Hz"), ("a1", "channel: an array has no channel 'a1'")],
+)
+def test_a_wrong_rate_of_an_array_is_named_by_the_parameter_that_holds_it(given, said):
+    with pytest.raises(InputError, match=said):
+        synchronous_average(np.ones(1000), given, speed_rpm=600.0)
+
+
 def test_average_and_spectrum_of_a_recording_and_of_an_array():
     rate, speed = 5000.0, 7.0
     x = _gear(speed * np.arange(50000) / rate)

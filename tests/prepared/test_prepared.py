@@ -1,11 +1,11 @@
 """A prepared recording computes each result once, bounded in memory, and says the same as the single functions."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import gearsig.angle
 from gearsig.angle import find_shaft_angle, resample_to_angle
 from gearsig.errors import RefusalError
 from gearsig.orders import synchronous_average
@@ -35,7 +35,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
         made.append(tuple(options["channels"]))
         return resample_to_angle(*args, **options)
 
-    monkeypatch.setattr(gearsig.angle, "resample_to_angle", counted)
+    monkeypatch.setattr(sys.modules[PreparedRecording.__module__], "resample_to_angle", counted)
     return made
 
 

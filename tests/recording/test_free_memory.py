@@ -50,7 +50,7 @@ def test_version_1_with_its_limit_at_the_root_of_what_is_seen(tmp_path: Path, pa
 def test_a_reduction_that_the_container_cannot_hold_is_refused(tmp_path: Path) -> None:
     group(tmp_path, V2, 400_000_000, 0.3e9, 0.0)
     needed = fe_gear.sector_bytes(PAPER, mesh_size_for(PAPER, 947_000))
-    with pytest.raises(InputError, match=r"about 0\.\d+ GB of memory are needed, 0\.1 GB are free"):
+    with pytest.raises(InputError, match=r"mesh: takes about 0\.\d+ GB of memory \(allowed: up to 0\.09 GB"):
         fe_gear.check_memory(needed, container_free_bytes(own(tmp_path, "0::/\n"), tmp_path))
 
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.errors import InputError
-from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Shaft, hunting_tooth_order, order_lines
+from gearsig.errors import InputError, RefusalError
+from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Shaft, hunting_tooth_order, known_ratio, order_lines
 
 TEETH = st.integers(3, 200)
 
@@ -51,6 +51,14 @@ def test_unknown_teeth_leave_out_what_rests_on_them() -> None:
     assert rig.mesh_order(rig.pairs[0]) == 23
     assert rig.ratio("out") is None
     assert {line.element for line in order_lines(rig)} == {"in", "p"}
+
+
+def test_a_ratio_that_must_be_known_is_refused_without_the_teeth_or_the_rig() -> None:
+    rig = Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("pair", "in", "out", 20, None),))
+    for known in (rig, None):
+        with pytest.raises(RefusalError, match="shaft 'out' does not follow from the teeth"):
+            known_ratio(known, "out", to="in")
+    assert known_ratio(two_stages(20, 40, 10, 30), "out") == pytest.approx(1 / 6)
 
 
 def test_speed_follows_the_ratio() -> None:

@@ -148,7 +148,7 @@ def test_wrong_arguments_name_what_is_allowed(wrong, named):
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan])
 def test_wrong_rates_are_refused(rate):
-    with pytest.raises(InputError, match="sampling_rate_hz"):
+    with pytest.raises(InputError, match="channel_or_rate_hz, an array's sampling rate, is"):
         amplitude_spectrum(np.ones(100), rate)
 
 

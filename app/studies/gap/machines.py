@@ -10,7 +10,7 @@ import numpy as np
 from app.studies.drawn_rigs import DrawnHousingMode, DrawnRig, draw_rig
 from app.studies.gap.by_hand import SIGNATURES, scene_of, vibrations
 from gearsig.checks import FloatArray
-from gearsig.recording import Recording
+from gearsig.recording import MAINS_HZ, Recording
 from sims.effects import EffectSetting, pitch_of_all_teeth, textbook
 from sims.gear_pair import BODY_SHAPES, body_gain
 from sims.machine import log_uniform
@@ -152,8 +152,6 @@ CORNER_MESH_ORDERS, STEEPEST, FLAT_SHARE = (0.4, 4.0), 3, 0.2
 
 NOISE, HUM = (0.0004, 0.1), (0.0005, 0.05)
 """Of a sensor, over the vibration."""
-
-MAINS_HZ = (50.0, 60.0)
 
 MOUNTING_GAIN, MOUNTING_CORNER, MOUNTING_LINES = 0.12, 0.05, 0.08
 """Standard deviations of the logarithms of what a sensor that was mounted anew changes: its gain, its path's corner,
