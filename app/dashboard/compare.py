@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import streamlit as st
 
-from app.dashboard import state
+from app.dashboard import address, state
 from app.dashboard.cached import recorded, stated_options
 from app.dashboard.laboratory.setup import MODEL, Setup, shown_name
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
@@ -198,13 +198,14 @@ def choose_simulation() -> tuple[Simulation, Content | None] | None:
         st.divider()
         made = state.simulated()
         origins = (NOW, SAMPLE, FILE) if made is None else (NOW, SAMPLE, FILE, state.OF_LABORATORY)
-        origin = st.radio("Simulation", origins, horizontal=True, key=ORIGIN, persist_state="session")
+        looks = {"horizontal": True, "key": ORIGIN, "persist_state": "session"}
+        origin = address.ask_one(st.radio, "Simulation", origins, name="simulation", **looks)
         if origin == NOW:
             return _choose_run(), None
         if origin == state.OF_LABORATORY and made is not None:
             file: ChosenFile | None = simulated_file(made)
         elif origin == SAMPLE:
-            file = choose_sample("Simulated sample", "simulation sample", first="healthy")
+            file = choose_sample("Simulated sample", "simulation sample", first="healthy", name="simulated")
         else:
             file = choose_file(
                 "Simulated signals",
@@ -219,10 +220,12 @@ def choose_alignment(simulation: Simulation | None) -> str:
     """Return how averages are aligned: by correlation where the simulation is made here, whose mark sits anywhere."""
     source = "made here" if isinstance(simulation, SimulationToCompare) else "of files"
     with st.sidebar:
-        chosen = st.selectbox(
+        chosen = address.ask_one(
+            st.selectbox,
             "Align by",
             ALIGN,
-            index=ALIGN.index("correlation" if source == "made here" else "auto"),
+            first="correlation" if source == "made here" else "auto",
+            name="align",
             key=state.source_key("comparison alignment", source),
             persist_state="session",
             help="Marks: angle 0 is the same tooth in both. Correlation: the simulation is turned to where the "
@@ -241,16 +244,20 @@ def choose_pairs(simulated: Recording, recorded: Recording) -> Pairs:
         return ()  # the comparison says what is missing
     source = f"{recorded.provenance.sha256} {' '.join(ours)}"
     left, right = st.columns(2)
-    chosen = left.selectbox(
+    chosen = address.ask_one(
+        left.selectbox,
         "Channel of the recording",
         measured,
-        index=measured.index(common[0]) if common else 0,
+        first=common[0] if common else measured[0],
+        name="recorded_channel",
         key=state.source_key("recorded channel", source),
     )
-    mate = right.selectbox(
+    mate = address.ask_one(
+        right.selectbox,
         "Channel of the simulation",
         ours,
-        index=ours.index(chosen) if chosen in ours else 0,
+        first=chosen if chosen in ours else ours[0],
+        name="simulated_channel",
         key=state.source_key(f"simulated channel for {chosen}", source),
     )
     return ((str(mate), str(chosen)),)
@@ -262,24 +269,37 @@ def _choose_run() -> SimulationToCompare:
     def title(name: str) -> str:
         return name if name == TWIN else f"Preset {shown_name(name)}"
 
-    machine = st.selectbox(
+    machine = address.ask_one(
+        st.selectbox,
         "Machine",
         [TWIN, *known],
         format_func=title,
         key=MACHINE,
+        name="machine",
         persist_state="session",
         help="Set to the rig: its teeth, module and face width, all else usual for its size. A preset keeps its own "
         "geometry but takes the rig's teeth.",
     )
     if machine != TWIN:
         st.caption(known[machine].title)
-    speed = choose_number("Speed of the driver (rpm)", "simulation speed", "the recording's", minimum=1.0)
-    torque = choose_number("Torque on the driver (N·m)", "simulation torque", "the rig's or the preset's", minimum=0.0)
-    length = st.segmented_control(
-        "Length (s)", (2.0, 5.0, 10.0), default=5.0, key="simulation length", persist_state="session"
+    speed = choose_number("Speed of the driver (rpm)", "simulation speed", "the recording's", minimum=1.0, name="speed")
+    torque = choose_number(
+        "Torque on the driver (N·m)", "simulation torque", "the rig's or the preset's", minimum=0.0, name="torque"
     )
-    seed = st.number_input("Seed", min_value=0, value=0, key="simulation seed", persist_state="session")
-    return SimulationToCompare(str(machine), speed, torque, float(length or 5.0), int(seed))
+    looks = {"key": "simulation length", "name": "length", "first": 5.0, "persist_state": "session"}
+    length = address.ask_one(st.segmented_control, "Length (s)", (2.0, 5.0, 10.0), **looks)
+    seed = address.ask(
+        st.number_input,
+        "Seed",
+        min_value=0,
+        step=1,
+        key="simulation seed",
+        name="seed",
+        first=0,
+        read=address.number(0, whole=True),
+        persist_state="session",
+    )
+    return SimulationToCompare(str(machine), speed, torque, float(length), int(seed))
 
 
 VIEWS = ("Orders", "Angle", "Bands", "Lines")
@@ -294,14 +314,13 @@ def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
     if comparison.findings:
         st.markdown("\n".join(f"- {as_typed(text)}" for text in comparison.findings))
     channels = {channel.name: channel for channel in comparison.channels}
-    name: str | None = next(iter(channels))
+    name = next(iter(channels))
     if len(channels) > 1:
-        name = st.segmented_control(
-            "Channel", list(channels), default=name, key="comparison channel", label_visibility="collapsed"
-        )
-    channel = channels.get(name or "", comparison.channels[0])
+        looks = {"key": "comparison channel", "name": "channel", "label_visibility": "collapsed"}
+        name = address.ask_one(st.segmented_control, "Channel", list(channels), **looks)
+    channel = channels.get(name, comparison.channels[0])
     views = dict(zip(VIEWS, (_show_orders, _show_angle, _show_bands, _show_lines), strict=True))
-    for tab, view in zip(st.tabs(VIEWS, key="comparison tab", on_change="rerun"), views.values(), strict=True):
+    for tab, view in zip(address.tabs(VIEWS, key="comparison tab"), views.values(), strict=True):
         if tab.open:
             with tab:
                 view(comparison, channel)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import streamlit as st
 
-from app.dashboard import state
+from app.dashboard import address, state
 from app.dashboard.state import ChosenFile
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import QUIET, padded_limits, show_lines
@@ -128,15 +128,16 @@ def _show_counts(status: DataFrame) -> None:
 
 def _choose_point(status: DataFrame) -> tuple[str, str]:
     """Show machines with their measuring points, the worst first; return the one that is looked at."""
-    searched = st.text_input("Machine", key=SEARCHED, placeholder="Part of a name", persist_state="session")
-    shown = status[status["machine"].str.contains(searched or "", case=False, regex=False)]
+    looks = {"key": SEARCHED, "placeholder": "Part of a name", "persist_state": "session"}
+    searched = address.ask(st.text_input, "Machine", name="search", first="", read=address.words, **looks)
+    shown = status[status["machine"].str.contains(searched, case=False, regex=False)]
     of_machine = {name: rows.to_dict("records") for name, rows in shown.groupby("machine", sort=False)}
     known = [(row["machine"], row["point"]) for rows in of_machine.values() for row in rows]
     everywhere = list(zip(status["machine"], status["point"], strict=True))
     first = (known or everywhere)[0]
-    chosen = (state.addressed(MACHINE, "machine", first[0]), state.addressed(POINT, "point", first[1]))
-    if chosen not in everywhere:
-        chosen = first
+    machine = address.chosen(MACHINE, "machine", {name for name, _ in everywhere}, first[0])
+    points = [point for name, point in everywhere if name == machine]
+    chosen = (machine, address.chosen(POINT, "point", points, first[1] if machine == first[0] else points[0]))
     with st.container(height=620 if len(of_machine) > 6 else "content", border=False):
         for name, rows in list(of_machine.items())[:N_MACHINES]:
             worst = rows[0]["level"]
@@ -164,7 +165,6 @@ def _point_button(row: Row, *, is_chosen: bool) -> None:
 
 def _look_at(machine: str, point: str) -> None:
     st.session_state[MACHINE], st.session_state[POINT] = machine, point
-    st.query_params["machine"], st.query_params["point"] = machine, point
 
 
 def _show_point(fleet: Fleet, row: Row) -> None:
@@ -194,21 +194,28 @@ def _choose_series(series: DataFrame, machine: str, point: str) -> Row:
     rows = series.to_dict("records")
     key = state.source_key(SERIES, f"{machine!r} {point!r}")
     label = "Indicator, the worst first"
-    place = st.selectbox(label, range(len(rows)), format_func=lambda i: _series_words(rows[i]), key=key)
-    return rows[place or 0]
+    names = [_series_name(row) for row in rows]
+    address.begin(key, "indicator", 0, address.one_of({name: i for i, name in enumerate(names)}))
+    place = st.selectbox(label, range(len(rows)), format_func=lambda i: _series_words(rows[i]), key=key) or 0
+    address.put("indicator", names[place])  # by name: tomorrow another one may be the worst
+    return rows[place]
+
+
+def _series_name(row: Row) -> str:
+    of = ", ".join(part for part in (row["place"], row["channel"], row["computed_on"], row["band"]) if part)
+    return f"{row['name']} ({of})"
 
 
 def _series_words(row: Row) -> str:
-    of = ", ".join(part for part in (row["place"], row["channel"], row["computed_on"], row["band"]) if part)
     change = change_text(row["change"], in_db=bool(row["in_db"]))
-    return f"{row['name']} ({of}): {series_level(row)}{', ' + change if change else ''}"
+    return f"{_series_name(row)}: {series_level(row)}{', ' + change if change else ''}"
 
 
 def _series_table(series: DataFrame) -> dict[str, list[Any]]:
     rows = series.to_dict("records")
     return {
         "": [series_level(row) for row in rows],
-        "indicator": [_series_words(row).partition(":")[0] for row in rows],
+        "indicator": [_series_name(row) for row in rows],
         "last": [row["value"] for row in rows],
         "expected": [row["expected"] for row in rows],
         "limit": [row["upper_limit"] for row in rows],

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import streamlit as st
 
+from app.dashboard import address
+
 PAGES = Path(__file__).parent / "pages"
 
 st.set_page_config(page_title="gearsig", page_icon=str(PAGES.parent / "icon.svg"), layout="wide")
 st.html(PAGES.parent / "page.css")
 st.logo(str(PAGES.parent / "logo.svg"), size="large")
-st.navigation(
+page = st.navigation(
     [
         st.Page(PAGES / "start.py", title="Start", icon=":material/home:", default=True),
         st.Page(PAGES / "analysis.py", title="Analysis", icon=":material/troubleshoot:"),
@@ -22,4 +24,6 @@ st.navigation(
         st.Page(PAGES / "fleet.py", title="Fleet", icon=":material/factory:"),
     ],
     position="top",
-).run()
+)
+with address.of_page(page.url_path):
+    page.run()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 
 import streamlit as st
@@ -137,47 +136,6 @@ def carry_over(key: str, default: object = None) -> None:
     """
     if key in st.session_state or default is not None:
         st.session_state[key] = st.session_state.get(key, default)
-
-
-def addressed(key: str, name: str, first: str) -> str:
-    """Return a choice of the session, at first that of the page's address, which is then kept up with it.
-
-    Parameters
-    ----------
-    key : str
-        Of the session.
-    name : str
-        In the address.
-    first : str
-        Where neither says anything.
-    """
-    chosen = str(st.session_state.get(key) or st.query_params.get(name) or first)
-    st.session_state[key] = chosen
-    if st.query_params.get(name) != chosen:
-        st.query_params[name] = chosen
-    return chosen
-
-
-def address_number(name: str, value: float, default: float) -> None:
-    """Keep a number in the page's address while it differs from what the page starts with."""
-    address(name, "" if value == default else f"{value:g}")
-
-
-def addressed_number(name: str) -> float | None:
-    """Return the number of that name in the page's address, None where there is none."""
-    try:
-        value = float(st.query_params.get(name, ""))
-    except ValueError:
-        return None
-    return value if isfinite(value) else None
-
-
-def address(name: str, text: str) -> None:
-    """Keep a text in the page's address; an empty one takes it out."""
-    if text and st.query_params.get(name) != text:
-        st.query_params[name] = text
-    elif not text and name in st.query_params:
-        del st.query_params[name]
 
 
 def keep_files(kind: str, files: tuple[ChosenFile, ...]) -> None:

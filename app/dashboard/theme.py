@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import streamlit as st
 
-from gearsig.plot import _style as style
+from gearsig.plot import CURSOR_COLOURS, FAULT, MEASURED, QUIET
 
 DARK_PAPER = "#15171B"
 """Ground of the dark page; figures that are turned over end on it."""
@@ -42,7 +42,7 @@ _CURSORS_ON_DARK = {
     "hunting": "#A2A8B1",
     "finding": "#FF9A57",
 }
-LIGHT = Palette(style.MEASURED, style.FAULT, style.QUIET, style.CURSOR_COLOURS | {"finding": style.FAULT})
+LIGHT = Palette(MEASURED, FAULT, QUIET, CURSOR_COLOURS | {"finding": FAULT})
 DARK = Palette("#6CB8F0", "#FF9A57", "#A2A8B1", _CURSORS_ON_DARK)
 DASHES = {"mesh": "solid", "sideband": "dot", "shaft": "dash", "bearing": "dashdot", "finding": "dash"}
 

@@ -123,6 +123,25 @@ def test_a_view_can_be_sent_as_its_address_and_an_own_file_survives_a_reload(pag
     assert verdict(page) == said
 
 
+def test_what_is_chosen_in_a_view_is_in_its_address_and_leaves_it_with_the_view(page: playwright.Page) -> None:
+    open_sample(page)
+    view = open_view(page, "Envelope")
+    for name in ("Kurtogram", "Tones removed"):
+        view.get_by_text(name, exact=True).first.click()
+        settle(page)
+    assert soon(page, lambda: "show=Kurtogram" in page.url and "preparation=tones" in page.url)
+    sent = page.url
+    page.reload()
+    page.locator(".strip button[aria-pressed=true]").filter(has_text="Envelope").first.wait_for()
+    settle(page)
+    view.get_by_text("Tones removed", exact=True).first.wait_for()
+    assert page.url == sent
+    open_view(page, "Spectrum")
+    assert soon(page, lambda: "show=" not in page.url and "preparation=" not in page.url)
+    page.get_by_role("link", name="Fault laboratory").click()
+    assert soon(page, lambda: "laboratory" in page.url and "sample=" not in page.url)
+
+
 def test_another_user_sees_nothing_of_the_first(page: playwright.Page, address: str) -> None:
     name = "confidential.csv"
     rows = "\n".join(f"{i / 1000:g},{(i * 37) % 101}" for i in range(3000))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import streamlit as st
 
+from app.dashboard import address
 from app.dashboard.cached import read_rig_text, safe_file_name
 from app.dashboard.state import ChosenFile
 from app.dashboard.widgets.chooser import SIMULATED, choose_files, choose_number, sample_file, sample_name
@@ -176,33 +177,42 @@ def choose() -> Choice:
     with st.sidebar:
         origin = st.radio("Recordings", (SAMPLES, FILES), horizontal=True, key="gap origin", persist_state="session")
         recordings, references, rigs = _choose_samples() if origin == SAMPLES else _choose_files()
-        model = st.selectbox("Simulator", tuple(gap_simulators()), key="gap simulator", persist_state="session")
+        looks = {"key": "gap simulator", "name": "simulator", "persist_state": "session"}
+        model = address.ask_one(st.selectbox, "Simulator", tuple(gap_simulators()), **looks)
         with st.expander("Not in the files?", icon=":material/tune:"):
             about = "Of the input shaft, for all recordings."
-            torque = choose_number("Torque (N·m)", "gap torque", "from the rig", about=about, minimum=0.0)
-            rate = choose_number("Sampling rate (Hz)", "gap rate", "from the files or the rig", minimum=0.0)
+            torque = choose_number(
+                "Torque (N·m)", "gap torque", "from the rig", about=about, minimum=0.0, name="torque"
+            )
+            rate = choose_number(
+                "Sampling rate (Hz)", "gap rate", "from the files or the rig", minimum=0.0, name="rate"
+            )
     return Choice(recordings, references, rigs, model, torque or None, rate or None)
 
 
 def _choose_samples() -> ChosenFiles:
     known = {sample.rig.stem: sample for sample in samples()}
 
-    def choose(label: str, key: str, without: list[str], first: str, about: str) -> list[str]:
-        names = [name for name in known if name not in without]
-        return st.multiselect(
+    def choose(label: str, key: str, without: list[str], first: str, about: str, name: str) -> list[str]:
+        names = [stem for stem in known if stem not in without]
+        chosen: list[str] = address.ask(
+            st.multiselect,
             label,
             names,
-            default=[first] if first in names else [],
-            format_func=lambda name: sample_name(known[name]),
+            format_func=lambda stem: sample_name(known[stem]),
             key=key,
+            name=name,
+            first=[first] if first in names else [],
+            read=address.some_of(names),
             persist_state="session",
             help=about,
         )
+        return chosen
 
     about = "Several operating conditions (speeds, loads) of one rig tell more than one."
-    recordings = choose("Recordings of one rig", "gap samples", [], FIRST_SAMPLE, about)
+    recordings = choose("Recordings of one rig", "gap samples", [], FIRST_SAMPLE, about, "recordings")
     about = "The same rig when it was healthy. The answer becomes much surer."
-    references = choose("Healthy references", "gap sample references", recordings, FIRST_REFERENCE, about)
+    references = choose("Healthy references", "gap sample references", recordings, FIRST_REFERENCE, about, "references")
     st.caption(SIMULATED)
     chosen, healthy = (tuple(sample_file(known[name]) for name in names) for names in (recordings, references))
     return chosen, healthy, ()

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import streamlit as st
 
+from app.dashboard import address
 from app.dashboard.gap.choice import Choice, files_of
 from app.dashboard.theme import as_typed, capitalised, one_line
 from app.dashboard.widgets.charts import (
@@ -208,7 +209,7 @@ def show_finished(finished: Finished) -> None:
     _show_remarks(report)
     _show_downloads(finished)
     views = (_show_where, _show_which, _show_how_far, _show_next)
-    for tab, view in zip(st.tabs(TABS, key=TAB, on_change="rerun"), views, strict=True):
+    for tab, view in zip(address.tabs(TABS, key=TAB), views, strict=True):
         if tab.open:
             with tab:
                 view(finished)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import streamlit as st
 
+from app.dashboard import address
 from app.dashboard.laboratory.run import faulty_of, show_saving
 from app.dashboard.laboratory.setup import (
     DRIVE_MODEL,
@@ -67,17 +68,20 @@ FAULTS = {
 def choose_drive(chosen: Preset) -> Setup:
     """Return what the user set; what is not offered is the preset's."""
     with st.sidebar:
-        mode = st.segmented_control("Mode", MODES, default=MODES[0], key="mode of the drive", persist_state="session")
+        looks = {"key": "mode of the drive", "name": "mode", "persist_state": "session"}
+        mode = address.ask_one(st.segmented_control, "Mode", MODES, **looks)
         torque = choose_number("Torque of the motor (N·m)", "torque of the drive", chosen.torque_nm, 300.0)
         speed = choose_number(
             "Speed that the flow allows (rpm)", "speed of the drive", chosen.speed_rpm, 300.0, low=10.0
         )
         with st.expander("Teeth", icon=":material/settings:"):
-            law = st.selectbox(
+            law = address.ask_one(
+                st.selectbox,
                 "Damping law",
                 DAMPING_LAWS,
-                index=DAMPING_LAWS.index(str(chosen.parameters.get("damping_law", DAMPING_LAWS[0]))),
+                first=str(chosen.parameters.get("damping_law", DAMPING_LAWS[0])),
                 key=f"law of {chosen.name}",
+                name="law",
                 persist_state="session",
                 help="What they really give: 0.947, 0.954 and 0.952 for a restitution of 0.95; 0.470, 0.725 and 0.663 "
                 "for 0.5.",
@@ -101,17 +105,26 @@ def choose_drive(chosen: Preset) -> Setup:
         with st.expander("Measurement", icon=":material/sensors:"):
             duration = choose_number("Length (s)", "length of the drive", 6.0, 30.0, low=3.5)
             rates = (1000.0, 4000.0, 10000.0)
-            rate = st.selectbox("Sampling rate (Hz)", rates, format_func="{:g}".format, key="rate of the drive")
-            counts = st.select_slider(
+            rate = address.ask_one(
+                st.selectbox,
+                "Sampling rate (Hz)",
+                rates,
+                format_func="{:g}".format,
+                key="rate of the drive",
+                name="rate",
+            )
+            counts = address.ask_one(
+                st.select_slider,
                 "Counts of the encoders",
                 [2**bits for bits in range(10, 25, 2)],
-                value=2**20,
+                first=2**20,
                 key="counts of the drive",
+                name="counts",
                 persist_state="session",
             )
             noise = choose_parameter(chosen, "angle_noise_urad", "Noise of the angles (µrad rms)", 200.0)
         show_typed_toggle()
-    values += [("encoder_counts", float(counts)), noise, ("mode", mode or MODES[0])]
+    values += [("encoder_counts", float(counts)), noise, ("mode", mode)]
     return Setup(
         chosen.name,
         speed,
@@ -136,8 +149,18 @@ def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
     if not fault.option or severity == 0.0:
         return EffectSetting(name, severity)
     default = next(int(float(o.default or 1)) for o in chosen_effect.options if o.name == fault.option)
-    key = f"{fault.option} of {name} of the drive"
-    place = st.number_input(fault.label, 1, last, min(default, last), key=key, persist_state="session")
+    place = address.ask(
+        st.number_input,
+        fault.label,
+        1,
+        last,
+        step=1,
+        key=f"{fault.option} of {name} of the drive",
+        name=f"{name}-{fault.option}",
+        first=min(default, last),
+        read=address.number(1, last, whole=True),
+        persist_state="session",
+    )
     return EffectSetting(name, severity, {fault.option: float(place)})
 
 
@@ -204,16 +227,19 @@ VIEWS = ("Motion", "Force between the teeth", "Impacts", "Indicators")
 def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
     """Show one of the views, of either drive."""
     with st.container(horizontal=True, horizontal_alignment="distribute", vertical_alignment="center"):
-        view = st.segmented_control(
-            "View", VIEWS if faulty is None else (TOGETHER, *VIEWS), default=VIEWS[0] if faulty is None else TOGETHER,
-            key=f"view of the {'healthy' if faulty is None else 'faulty'} drive", label_visibility="collapsed",
+        view = address.ask_one(
+            st.segmented_control,
+            "View",
+            VIEWS if faulty is None else (TOGETHER, *VIEWS),
+            key=f"view of the {'healthy' if faulty is None else 'faulty'} drive",
+            name="view",
+            label_visibility="collapsed",
             persist_state="session",
-        )  # fmt: skip
+        )
         which = "Faulty"
         if faulty is not None and view != TOGETHER:
-            which = st.segmented_control(
-                "Drive", ("Faulty", "Healthy"), default="Faulty", key="side of the drive", label_visibility="collapsed"
-            ) or "Faulty"  # fmt: skip
+            looks = {"key": "side of the drive", "name": "side", "label_visibility": "collapsed"}
+            which = address.ask_one(st.segmented_control, "Drive", ("Faulty", "Healthy"), **looks)
     run = healthy if faulty is None or which == "Healthy" else faulty
     if view == TOGETHER and faulty is not None:
         curves = None if healthy.curve_um is None or faulty.curve_um is None else (healthy.curve_um, faulty.curve_um)

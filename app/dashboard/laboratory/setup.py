@@ -12,7 +12,7 @@ import numpy as np
 import streamlit as st
 
 import sims
-from app.dashboard import state
+from app.dashboard import address
 from app.dashboard.theme import capitalised
 from gearsig.errors import InputError
 from gearsig.recording import Recording
@@ -152,15 +152,15 @@ def choose_number(label: str, name: str, default: float, high: float, *, low: fl
     typed = bool(st.session_state.get(TYPED, False))
     if typed:
         key += SUFFIX
-    asked = state.addressed_number(in_address) if key not in st.session_state else None
-    value = float(st.session_state.setdefault(key, float(default) if asked is None else asked))
+    address.begin(key, in_address, float(default), address.number(min(low, 0.0)))
+    value = float(st.session_state[key])
     looks: dict[str, Any] = {"step": step, "format": "%g", "key": key, "help": about or None}
     if typed:
         number = float(st.number_input(label, persist_state="session", **looks))
     else:
         ends = min(low, value), max(high, value)
         number = float(st.slider(label, *ends, persist_state="session", **looks))
-    state.address_number(in_address, number, float(default))
+    address.keep(in_address, number, float(default))
     return number
 
 
@@ -296,9 +296,7 @@ def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSe
     """
     crack = _choose_severity(effect(CRACK), preset, start=0.0)
     others = {name: known for name, known in effects().items() if name in meaningful and name != CRACK}
-    asked = st.query_params.get("effects", "").split(",")
-    if EFFECTS not in st.session_state and any(name in asked for name in others):
-        st.session_state[EFFECTS] = [name for name in others if name in asked]
+    address.begin(EFFECTS, "effects", [], lambda texts: [name for name in others if name in texts[0].split(",")])
     names = st.multiselect(
         "More effects",
         list(others),
@@ -308,7 +306,7 @@ def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSe
         persist_state="session",
         help="Any number at once. Each gets a slider of its own.",
     )
-    state.address("effects", ",".join(names))
+    address.keep("effects", ",".join(names), "")
     chosen = [
         _choose_severity(other, preset, start=other.severity.typical)
         for other in others.values()
@@ -333,7 +331,7 @@ def _choose_severity(chosen: Effect, preset: Preset, *, start: float) -> EffectS
     options: dict[str, float | str] = {}
     if chosen.options and severity != 0:
         with st.expander("Where and how", icon=":material/tune:"):
-            values = {option.name: _choose_option(option, _option_key(chosen, option)) for option in chosen.options}
+            values = {option.name: _choose_option(chosen, option) for option in chosen.options}
         options = {name: value for name, value in values.items() if value is not None}
     return EffectSetting(chosen.name, severity, options)
 
@@ -348,21 +346,24 @@ def _option_key(of: Effect, option: Option) -> str:
     return f"{option.name} of {of.name}"
 
 
-def _choose_option(option: Option, key: str) -> float | str | None:
+def _choose_option(of: Effect, option: Option) -> float | str | None:
     """Return the value of an option; None where it is left to be drawn."""
     unit = shown_unit(option.unit)
     words = option.name.removesuffix("_deg").removesuffix("_percent").removesuffix("_um").removesuffix("_hz")
     label = words.replace("_", " ").capitalize() + (f" ({unit})" if unit else "")
+    looks: dict[str, Any] = {"key": _option_key(of, option), "help": option.meaning, "persist_state": "session"}
+    looks["name"] = f"{of.name}-{option.name}"
     if isinstance(option.default, str):
         choices = option.choices or tuple(f"bearing {i + 1}" for i in range(4))
-        index = choices.index(option.default) if option.default in choices else 0
-        return st.selectbox(label, choices, index=index, key=key, help=option.meaning, persist_state="session")
-    looks = {"key": key, "help": option.meaning, "persist_state": "session"}
+        first = option.default if option.default in choices else choices[0]
+        return str(address.ask_one(st.selectbox, label, choices, first=first, **looks))
     if option.whole:
-        value = None if option.default is None else int(option.default)
-        number = st.number_input(label, min_value=int(option.low or 0), value=value, step=1, **looks)  # type: ignore[call-overload]
-        return None if number is None else float(number)
-    number = st.number_input(label, value=option.default, placeholder="drawn", format="%g", **looks)  # type: ignore[call-overload]
+        low, first_count = int(option.low or 0), None if option.default is None else int(option.default)
+        looks |= {"first": first_count, "read": address.number(low, whole=True), "step": 1, "min_value": low}
+    else:
+        looks |= {"first": option.default, "read": address.number(), "format": "%g"}
+    placeholder = "drawn" if option.default is None else address.text_of(option.default)
+    number = address.ask(st.number_input, label, value=None, placeholder=placeholder, **looks)
     return None if number is None else float(number)
 
 
@@ -371,6 +372,7 @@ Parameters = tuple[tuple[str, ParameterValue], ...]
 FIRST = "published_55_75"
 DURATIONS_S = (0.5, 1.0, 2.0, 4.0)
 AUTOMATIC, MAX_AUTOMATIC_S = "auto", 1.0
+MOST_SEEDS = 10**6
 
 
 def choose_setup(preset: Preset) -> Setup:
@@ -405,17 +407,9 @@ def choose_preset() -> Preset:
     """Return the machine: pairs that run at a steady speed, and the drive that starts and stops."""
     known = {name: preset for model in (*MODELS, DRIVE_MODEL) for name, preset in presets(model).items()}
     names = list(known)
-    asked = st.query_params.get("machine", FIRST)
+    looks = {"format_func": shown_name, "key": "machine of the laboratory", "persist_state": "session"}
     with st.sidebar:
-        name = st.selectbox(
-            "Machine",
-            names,
-            index=names.index(asked if asked in names else FIRST),
-            format_func=shown_name,
-            key="machine of the laboratory",
-            persist_state="session",
-        )
-        state.address("machine", "" if name == FIRST else name)
+        name = address.ask_one(st.selectbox, "Machine", names, name="machine", first=FIRST, **looks)
         st.caption(known[name].title)
     return known[name]
 
@@ -433,40 +427,50 @@ def _choose_flanks(preset: Preset) -> Parameters:
     if not any(p.name == "friction" for p in simulator(preset.model).parameters):
         return (rough,)
     oil = choose_parameter(preset, "viscosity_cp", "Oil viscosity at the inlet (cP)", 100.0, low=1.0)
-    friction = st.toggle(
+    friction = address.ask(
+        st.toggle,
         "Sliding friction",
-        value=preset.parameters.get("friction", "on") == "on",
         key=f"friction of {preset.name}",
+        name="friction",
+        first=preset.parameters.get("friction", "on") == "on",
+        read=address.one_of((False, True)),
         persist_state="session",
     )
     return rough, oil, ("friction", "on" if friction else "off")
 
 
 def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float, float, int]:
-    duration = st.segmented_control(
+    duration = address.ask_one(
+        st.segmented_control,
         "Length shown (s)",
         (AUTOMATIC, *DURATIONS_S),
-        default=AUTOMATIC,
         key="length of the laboratory",
+        name="length",
         persist_state="session",
         help="A longer signal has a finer spectrum and takes longer to follow the sliders. Auto: eight revolutions of "
         "the slower shaft, at most a second.",
     )
-    rate = st.selectbox(
+    rate = address.ask_one(
+        st.selectbox,
         "Sampling rate (Hz)",
         (10240.0, 20480.0, 40960.0),
-        index=1,
+        first=20480.0,
         format_func="{:g}".format,
         key="rate of the laboratory",
+        name="rate",
     )
     loudest = max(2.0, 4.0 * preset_number(preset, "noise_mps2"))
     noise = choose_parameter(preset, "noise_mps2", "Background noise, rms (m/s²)", loudest)
-    seed = st.number_input(
+    seed = address.ask(
+        st.number_input,
         "Seed",
         min_value=0,
-        max_value=10**6,
-        value=0,
+        max_value=MOST_SEEDS,
+        step=1,
         key="seed of the laboratory",
+        name="seed",
+        first=0,
+        read=address.number(0, MOST_SEEDS, whole=True),
         persist_state="session",
         help="Another one draws other roughness, other noise, other angles. Healthy and faulty always share it.",
     )

@@ -8,6 +8,7 @@ from math import isfinite
 import numpy as np
 import streamlit as st
 
+from app.dashboard import address
 from app.dashboard.components import component_of
 from app.dashboard.laboratory import run as runs
 from app.dashboard.laboratory.bifurcation import show_bifurcation
@@ -39,15 +40,11 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show a signal of both machines, and the difference."""
     left, right = st.columns(2)
     names = (*healthy.vibration_channels, *MOTION)
-    name = left.selectbox("Signal", names, format_func=_shown, key="signal of the laboratory", persist_state="session")
-    shown = right.segmented_control(
-        "Shown, of the input shaft",
-        list(SEGMENTS),
-        default="3 revolutions",
-        key="segment of the laboratory",
-        persist_state="session",
-    )
-    end = _end_s(healthy, SEGMENTS[shown or "3 revolutions"])
+    looks = {"format_func": _shown, "key": "signal of the laboratory", "persist_state": "session"}
+    name = address.ask_one(left.selectbox, "Signal", names, name="signal", **looks)
+    looks = {"first": "3 revolutions", "key": "segment of the laboratory", "persist_state": "session"}
+    shown = address.ask_one(right.segmented_control, "Shown, of the input shaft", list(SEGMENTS), name="shown", **looks)
+    end = _end_s(healthy, SEGMENTS[shown])
     healthy_line, label = signal_of(healthy, name, end)
     if faulty is None:
         _show_line(healthy_line, "healthy", label, end)
@@ -275,19 +272,13 @@ Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show the portraits of one gear along the line of action."""
     left, right = st.columns(2)
-    gear = left.segmented_control(
-        "Gear", list(GEARS), default="Driver", key="gear of the laboratory", persist_state="session"
-    )
-    strobe = right.segmented_control(
-        "A point once per",
-        list(STROBES),
-        default=MESH_PERIOD,
-        key="strobe of the laboratory",
-        persist_state="session",
-    )
-    n = STROBES[strobe or MESH_PERIOD] or healthy.machine.mesh.pair.driver.teeth
+    looks = {"key": "gear of the laboratory", "persist_state": "session"}
+    gear = address.ask_one(left.segmented_control, "Gear", list(GEARS), name="gear", **looks)
+    looks = {"key": "strobe of the laboratory", "persist_state": "session"}
+    strobe = address.ask_one(right.segmented_control, "A point once per", list(STROBES), name="strobe", **looks)
+    n = STROBES[strobe] or healthy.machine.mesh.pair.driver.teeth
     both = [healthy] if faulty is None else [healthy, faulty]
-    portraits = [portrait(run, GEARS[gear or "Driver"], n) for run in both]
+    portraits = [portrait(run, GEARS[gear], n) for run in both]
     limits = [padded_limits([p[axis] for p in portraits]) for axis in (0, 1)]
     for column, (y, v, y_points, v_points), name in zip(st.columns(2), portraits, ("healthy", "faulty"), strict=False):
         path = ChartLine(y, v, name, MEASURED if name == "healthy" else FAULT)
@@ -395,7 +386,7 @@ TAB = "tab of the laboratory"
 
 def show_views(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
     """Show the views as tabs; what the user changes in one reruns only this."""
-    for name, tab in zip(VIEWS, st.tabs(list(VIEWS), key=TAB, on_change="rerun"), strict=True):
+    for name, tab in zip(VIEWS, address.tabs(list(VIEWS), key=TAB), strict=True):
         if tab.open:
             with tab:
                 st.fragment(VIEWS[name])(healthy, faulty, channel)

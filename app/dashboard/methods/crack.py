@@ -41,7 +41,8 @@ def show_crack(page: MethodPage) -> None:
     recording = page.analysis.recording
     channels: tuple[str, ...] = ()
     if sum(c.quantity == "acceleration" for c in recording.channels) > 1:
-        channels = page.choose(st, "Channels", {"All accelerations": (), "The chosen channel": (page.channel.channel,)})
+        which = {"All accelerations": False, "The chosen channel": True}
+        channels = (page.channel.channel,) if page.choose(st, "Channels", which, name="one_channel") else ()
     chosen = state.chosen()
     torque_nm = chosen.request.torque_nm if chosen is not None else None
     torque = _torque_text(page.analysis, torque_nm)
@@ -72,7 +73,7 @@ def _choose_reference(page: MethodPage) -> Recording | None:
     left, right = st.columns(2, vertical_alignment="bottom")
     about = "The same gears, sensors, speed and load when they were healthy. Without it only deep cracks show."
     given = () if analysis.reference is None else (SIDEBAR,)
-    origin = page.choose(left, "Reference", (*given, NONE, FILE, SAMPLE), about=about)
+    origin = page.choose(left, "Reference", (*given, NONE, FILE, SAMPLE), name="beside", about=about)
     if origin == SIDEBAR and analysis.reference is not None:
         return analysis.reference.recording
     source = None
@@ -84,7 +85,9 @@ def _choose_reference(page: MethodPage) -> Recording | None:
                 st.caption("Without a reference until a file is given.")
         elif origin == SAMPLE:
             label, without = "Sample of the healthy gears", analysis.recording.provenance.source
-            source = choose_sample(label, page.key("reference sample"), first="root_crack_0mm", without=without)
+            source = choose_sample(
+                label, page.key("reference sample"), first="root_crack_0mm", without=without, name="beside_sample"
+            )
     if source is None:
         return None
     chosen = state.chosen()

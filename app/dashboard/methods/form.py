@@ -8,7 +8,7 @@ from typing import Any
 
 import streamlit as st
 
-from app.dashboard import state
+from app.dashboard import address, state
 from app.dashboard.theme import capitalised, one_line
 from app.dashboard.widgets import charts
 from gearsig.angle import ShaftAngle
@@ -17,7 +17,7 @@ from gearsig.errors import InputError
 from gearsig.methods import Method, MethodOption
 from gearsig.prepared import PreparedRecording
 
-MIN_SAMPLES = 16
+MIN_SAMPLES, MOST_NUMBERS = 16, 16
 MOST_SIDE_BY_SIDE = 3
 """Choices that are shown side by side; more are a list."""
 
@@ -37,20 +37,21 @@ class MethodPage:
     def ask(
         self, widget: Callable[..., Any], label: str, *values: Any, key: str = "", about: str = "", **looks: Any
     ) -> Any:
-        """Return what a widget of Streamlit gives, e.g. `page.ask(column.slider, "Levels", 1, 8, 4)`.
+        """Return what a widget of Streamlit gives; see `address.ask`.
 
         Parameters
         ----------
         widget : callable
         label : str
         *values, **looks
-            As the widget takes them.
+            As `address.ask` takes them.
         key : str
             Within the page, where the label is not enough to know its state by.
         about : str
             Shown on demand.
         """
-        return widget(label, *values, key=self.key(key or label), help=about or None, persist_state="session", **looks)
+        looks |= {"key": self.key(key or label), "help": about or None, "persist_state": "session"}
+        return address.ask(widget, label, *values, **looks)
 
     def choose(
         self,
@@ -58,6 +59,7 @@ class MethodPage:
         label: str,
         options: Sequence[str] | Mapping[str, Any],
         *,
+        name: str,
         default: str = "",
         key: str = "",
         about: str = "",
@@ -71,7 +73,9 @@ class MethodPage:
         place : container
         label : str
         options : sequence of str, or mapping
-            A mapping gives the value of what is chosen.
+            A mapping gives the value of what is chosen, which the address names it by.
+        name : str
+            In the address.
         default, key, about : str
             See `ask`.
         named : bool
@@ -79,26 +83,28 @@ class MethodPage:
         as_written : bool
             Show the options as they are, without a capital first letter.
         """
-        first = default or next(iter(options))
-        chosen = self.ask(
-            place.segmented_control,
+        values = options if isinstance(options, Mapping) else {option: option for option in options}
+        first, key = default or next(iter(values)), self.key(key or label)
+        address.begin(key, name, first, address.one_of({address.text_of(values[option]): option for option in values}))
+        chosen = place.segmented_control(
             label,
-            list(options),
+            list(values),
             key=key,
-            about=about,
-            default=first,
+            help=about or None,
+            persist_state="session",
             format_func=str if as_written else capitalised,
             label_visibility="visible" if named else "collapsed",
             required=True,
         )
-        return options[chosen or first] if isinstance(options, Mapping) else str(chosen or first)
+        value = values[chosen or first]
+        address.keep(name, value, values[first])
+        return value
 
     def range(
-        self, label: str, end: float, *, start: float = 0.0, shown: tuple[float, float] | None = None, name: str = ""
+        self, label: str, end: float, *, start: float = 0.0, shown: tuple[float, float] | None = None, name: str
     ) -> tuple[float, float]:
-        """Return a range of an axis that the user chooses; see `charts.choose_range`."""
-        name = f"{self.name} {name}".strip()
-        return charts.choose_range(label, self.analysis, end, start=start, shown=shown, name=name)
+        """Return a range of an axis that the user chooses, `name` in the address; see `charts.choose_range`."""
+        return charts.choose_range(label, self.analysis, end, start=start, shown=shown, name=self.name, in_address=name)
 
     def segment(self, *, n_first: int) -> tuple[int, int]:
         """Let the user choose what is analysed; return its first sample and the one after its last.
@@ -111,7 +117,7 @@ class MethodPage:
         recording = self.analysis.recording
         rate = recording.sampling_rate_hz
         shown = (0.0, min(recording.duration_s, n_first / rate))
-        low, high = self.range("Segment analysed (s)", recording.duration_s, shown=shown)
+        low, high = self.range("Segment analysed (s)", recording.duration_s, shown=shown, name="segment")
         start = min(round(low * rate), max(0, recording.n_samples - MIN_SAMPLES))
         return start, min(max(round(high * rate), start + MIN_SAMPLES), recording.n_samples)
 
@@ -151,53 +157,66 @@ def _asked(page: MethodPage, option: MethodOption, known: Any) -> Any:
 def _asked_switch(page: MethodPage, option: MethodOption, known: Any) -> bool:
     del known
     if option.name == "over_angle":
-        return bool(page.choose(st, option.label, {"Time": False, "Shaft angle": True}, about=option.about))
-    return bool(page.ask(st.toggle, option.label, option.default, about=option.about))
+        ways = {"Time": False, "Shaft angle": True}
+        return bool(page.choose(st, option.label, ways, name=option.name, about=option.about))
+    first, either = bool(option.default), address.one_of((False, True))
+    return bool(page.ask(st.toggle, option.label, name=option.name, first=first, read=either, about=option.about))
 
 
 def _asked_choice(page: MethodPage, option: MethodOption, known: Any) -> Any:
     del known
     by_text = {text: value for value, text in option.choices.items()}
-    return page.choose(st, option.label, by_text, default=option.choices[option.default], about=option.about)
+    first = option.choices[option.default]
+    return page.choose(st, option.label, by_text, name=option.name, default=first, about=option.about)
 
 
 def _asked_name(page: MethodPage, option: MethodOption, known: Any) -> Any:
+    names = ["", *known]
     return page.ask(
-        st.selectbox, option.label, ["", *known], about=option.about, key=f"{option.name} {list(known)}",
-        format_func=lambda name: one_line(name) or capitalised(option.empty),
+        st.selectbox, option.label, names, name=option.name, first="", read=address.one_of(names), about=option.about,
+        key=f"{option.name} {list(known)}", format_func=lambda name: one_line(name) or capitalised(option.empty),
     )  # fmt: skip
 
 
 def _asked_of_several(page: MethodPage, option: MethodOption) -> Any:
     """Ask for one of many: of texts, or where none may be chosen, in a list; of numbers on a scale."""
-    free = option.default is None
-    choices = [None, *option.choices] if free else list(option.choices)
+    free = option.default is None  # of which an empty text stands in the list: Streamlit takes None for no choice
+    choices = ["", *option.choices] if free else list(option.choices)
+    widget: Any = st.selectbox if option.kind == "choice" or free else st.select_slider
 
     def text(value: Any) -> str:
-        return capitalised(option.empty or "automatic") if value is None else option.choices[value]
+        return capitalised(option.empty or "automatic") if free and value == "" else option.choices[value]
 
-    if option.kind == "choice" or free:
-        return page.ask(st.selectbox, option.label, choices, choices.index(option.default), text, about=option.about)
-    return page.ask(st.select_slider, option.label, choices, option.default, text, about=option.about)
+    chosen = page.ask(
+        widget, option.label, choices, name=option.name, first="" if free else option.default,
+        read=address.one_of(choices), format_func=text, about=option.about,
+    )  # fmt: skip
+    return None if free and chosen == "" else chosen
 
 
 def _asked_number(page: MethodPage, option: MethodOption, known: Any) -> Any:
-    number = int if option.kind == "count" else float
+    whole = option.kind == "count"
+    number = int if whole else float
     low, high, first = (None if x is None else number(x) for x in (option.minimum, option.maximum, option.default))
-    low = 1 if low is None and number is int else low
-    placeholder = known if isinstance(known, str) else option.empty
+    low = 1 if low is None and whole else low
+    placeholder = (known if isinstance(known, str) else option.empty) or address.text_of(first)
+    # None: a field that is emptied stays empty, and stands for the default
     return page.ask(
-        st.number_input, option.label, low, high, first, 1 if number is int else None, "%d" if number is int else "%g",
-        about=option.about, placeholder=placeholder or None, key=f"{option.label} {placeholder}",
+        st.number_input, option.label, low, high, None, 1 if whole else None, "%d" if whole else "%g",
+        name=option.name, first=first, read=address.number(low or 0, high, whole=whole), about=option.about,
+        placeholder=placeholder or None, key=f"{option.label} {placeholder}",
     )  # fmt: skip
 
 
 def _asked_span(page: MethodPage, option: MethodOption, known: Any) -> tuple[float, float] | None:
     if not known:
-        text = page.ask(st.text_input, option.label, placeholder=option.empty, about=option.about)
+        text = page.ask(
+            st.text_input, option.label, name=option.name, first="", read=_two_numbers_in_words,
+            placeholder=option.empty, about=option.about,
+        )  # fmt: skip
         return two_numbers(text, option.label)
     label = option.label if option.empty == "all" else f"{option.label}; all: {option.empty}"
-    low, high = page.range(label, known[1], start=known[0])
+    low, high = page.range(label, known[1], start=known[0], name=option.name)
     return None if (low, high) == tuple(known) else (low, high)
 
 
@@ -212,13 +231,27 @@ def two_numbers(text: str | None, label: str) -> tuple[float, float] | None:
     return first, second
 
 
+def _two_numbers_in_words(texts: list[str]) -> str:
+    two_numbers(texts[0], "")
+    return address.words(texts)
+
+
 def _asked_numbers(page: MethodPage, option: MethodOption, known: Any) -> tuple[float, ...]:
     by_text = {text: value for value, text in known.items()}
+
+    def value_of(text: str) -> float:
+        return by_text[text] if text in by_text else _number(text, option.label)
+
+    def read(texts: list[str]) -> list[str]:
+        is_positive = address.number(0.0)
+        return [text for text in dict.fromkeys(texts) if text in by_text or is_positive([text])][:MOST_NUMBERS]
+
     chosen = page.ask(
-        st.multiselect, option.label, list(by_text), about=option.about, accept_new_options=True, max_selections=16,
-        placeholder=f"{option.empty}; choose, or type a number", key=f"{option.name} {list(by_text)}",
+        st.multiselect, option.label, list(by_text), name=option.name, first=[], read=read, about=option.about,
+        accept_new_options=True, max_selections=MOST_NUMBERS, key=f"{option.name} {list(by_text)}",
+        placeholder=f"{option.empty}; choose, or type a number",
     )  # fmt: skip
-    return tuple(by_text[text] if text in by_text else _number(text, option.label) for text in chosen)
+    return tuple(value_of(text) for text in chosen)
 
 
 def _number(text: str, label: str) -> float:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 import streamlit as st
 
+from app.dashboard import address
 from app.dashboard.cached import safe_file_name
 from app.dashboard.methods.form import MethodPage, ask_options
 from app.dashboard.theme import as_typed, capitalised, one_line, palette
@@ -151,7 +152,8 @@ def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | Cann
     show_warnings([capitalised(text) for text in answer.warnings])
     span = 60.0
     if any(isinstance(panel, LevelPanel) and panel.span is None for panel in answer.panels):
-        span = float(page.ask(st.columns(3)[0].slider, "Colours span (dB)", 20, 120, 60, step=5))
+        slider, read = st.columns(3)[0].slider, address.number(20, 120, whole=True)
+        span = float(page.ask(slider, "Colours span (dB)", 20, 120, step=5, name="colours", first=60, read=read))
     for number, panel in enumerate(answer.panels):
         charts.show_panel(panel, page.key(f"figure {number} {panel.x} {panel.y}"), span)
     if answer.path is not None:
@@ -213,13 +215,14 @@ def _show_waveforms(page: MethodPage, waveforms: Waveforms, angle: ShaftAngle | 
     left, right = st.columns((1, 2))
     chosen = names[0]
     if len(names) > 1:
-        chosen = page.ask(left.selectbox, "Waveform of", names, key=f"waveform of {names}", format_func=one_line)
+        looks: dict[str, Any] = {"key": f"waveform of {names}", "name": "waveform", "format_func": one_line}
+        chosen = page.ask(left.selectbox, "Waveform of", names, first=chosen, read=address.one_of(names), **looks)
     start, end = waveforms.start, waveforms.end
     length = min(first_length(page, waveforms, angle), end - start)
     first = (start + end - length) / 2.0
     with right if len(names) > 1 else st.container():
         label = f"Waveforms shown ({'s' if waveforms.axis == 'frequency' else 'revolutions'})"
-        limits = page.range(label, end, start=start, shown=(first, first + length))
+        limits = page.range(label, end, start=start, shown=(first, first + length), name="shown")
     low = min(max(0, int((limits[0] - start) * waveforms.rate)), max(0, waveforms.n_samples - 2))
     part = slice(low, low + max(2, int(np.ceil((limits[1] - limits[0]) * waveforms.rate)) + 1))
     at, axis = waveforms.at(part), at_label(waveforms.axis, waveforms.shaft)
@@ -245,7 +248,8 @@ def _offer(page: MethodPage, answer: MethodAnswer) -> None:
     ):
         if waveforms is not None:
             endings = OVER_TIME if waveforms.axis == "frequency" else OVER_ANGLE
-            ending = page.ask(st.selectbox, "Format", endings, key=f"format {endings[-1]}")
+            key = page.key(f"format {endings[-1]}")
+            ending = st.selectbox("Format", endings, key=key, persist_state="session")
             n = len(waveforms.columns) * waveforms.n_samples
             label = f"Waveforms: {len(waveforms.columns)} × {waveforms.n_samples} samples"
             _offer_file(page, label, partial(waveforms_file, waveforms, ending), "waveforms", ending)

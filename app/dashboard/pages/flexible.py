@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import streamlit as st
 
+from app.dashboard import address
 from app.dashboard.flexible import show_gear, show_pair, show_publications
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError
 
 TABS = {"One gear": show_gear, "Pair": show_pair, "Publications": show_publications}
-chosen = st.segmented_control(
-    "What is shown", list(TABS), default="One gear", key="flexible shown", label_visibility="collapsed"
-)
+looks = {"key": "flexible shown", "name": "view", "label_visibility": "collapsed"}
+chosen = address.ask_one(st.segmented_control, "What is shown", list(TABS), **looks)
 try:
-    TABS[chosen or "One gear"]()
+    TABS[chosen]()
 except GearsigError as error:
     show_error(error)

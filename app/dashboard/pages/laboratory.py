@@ -8,6 +8,7 @@ from time import sleep
 import streamlit as st
 
 from app.compiled import is_being_made
+from app.dashboard import address
 from app.dashboard.laboratory import views
 from app.dashboard.laboratory.drive import show_drive
 from app.dashboard.laboratory.run import (
@@ -94,18 +95,19 @@ def choose_channel(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> str:
     """Return the sensor that numbers and spectra are of; beside it stands which colour is which."""
     channels = healthy.vibration_channels
     with st.container(horizontal=True, vertical_alignment="center", horizontal_alignment="distribute"):
-        channel = st.segmented_control(
+        channel = address.ask_one(
+            st.segmented_control,
             "Sensor",
             channels,
-            default=channels[0],
             format_func="Sensor {}".format,
             key="sensor of the laboratory",
+            name="sensor",
             label_visibility="collapsed",
             persist_state="session",
         )
         if faulty is not None:
             views.show_legend()
-    return channel or channels[0]
+    return str(channel)
 
 
 try:

@@ -16,7 +16,7 @@ import numpy as np
 import streamlit as st
 from numpy.typing import NDArray
 
-from app.dashboard import state
+from app.dashboard import address, state
 from app.dashboard.components import component_of
 from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
@@ -131,18 +131,17 @@ N_COLUMNS = 1600
 MAP_COLUMNS, MAP_ROWS = 900, 360
 
 
-ZOOM = "zoom"
-
-
 def looked_at(key: str, whole: tuple[float, float], first: tuple[float, float] | None = None) -> tuple[float, float]:
     """Return the range of its axis that the figure of that key was zoomed to, `first` until then.
 
     The page's address keeps the last one, so that a view can be sent.
     """
     ends, is_new = _zoomed(key)
-    if is_new:
-        is_whole = ends[0] <= whole[0] and ends[1] >= whole[1] and len(ends) == 2
-        state.address(ZOOM, "" if is_whole else "_".join([_name(key), *(f"{end:.7g}" for end in ends)]))
+    is_whole = is_new and ends[0] <= whole[0] and ends[1] >= whole[1] and len(ends) == 2
+    if is_new and not is_whole:
+        address.put(address.ZOOM, "_".join([_name(key), *(f"{end:.7g}" for end in ends)]))
+    elif is_whole and address.now(address.ZOOM).startswith(f"{_name(key)}_"):
+        address.put(address.ZOOM)
     low, high = ends[:2] or first or whole
     low, high = max(low, whole[0]), min(high, whole[1])
     return (low, high) if low < high else whole
@@ -157,11 +156,12 @@ def _zoomed(key: str) -> tuple[list[float], bool]:
         ends = [float(end) for end in st.session_state[key]["range"]]
         if len(ends) in (2, 4):
             return ends, True
-    named, *words = st.query_params.get(ZOOM, "").split("_")
+    named, *words = address.now(address.ZOOM).split("_")
     if named == _name(key) and len(words) in (2, 4):
         with suppress(ValueError):
             ends = [float(word) for word in words]
             if np.all(np.isfinite(ends)) and ends[-2] < ends[-1]:
+                address.claim(address.ZOOM)
                 return ends, False
     return [], False
 
@@ -496,6 +496,7 @@ def choose_range(
     start: float = 0.0,
     shown: tuple[float, float] | None = None,
     name: str = "",
+    in_address: str,
 ) -> tuple[float, float]:
     """Return the chosen segment between `start` and `end`; never an empty one.
 
@@ -511,12 +512,17 @@ def choose_range(
         Chosen at first; None: all of it.
     name : str
         Of the view, where the same label occurs in several.
+    in_address : str
+        Its name there.
     """
     step = (end - start) / 1000
     first = shown if shown is not None else (start, end)
     value = (max(start, first[0]), min(end, first[1]))
     key = state.view_key(f"{name} {label} {start!r} to {end!r}", source)
-    low, high = st.slider(label, start, end, value=value, step=step, format="%.5g", key=key)
+    looks: dict[str, Any] = {"step": step, "format": "%.5g", "key": key}
+    low, high = address.ask(
+        st.slider, label, start, end, name=in_address, first=value, read=address.span(start, end), **looks
+    )
     return (low, high) if high > low else (max(start, high - step), min(end, high + step))
 
 

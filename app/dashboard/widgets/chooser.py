@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import streamlit as st
 
-from app.dashboard import state
+from app.dashboard import address, state
 from app.dashboard.cached import kept_file, remember_file, sha256_of_upload
 from app.dashboard.state import Chosen, ChosenFile
 from app.dashboard.theme import as_typed
@@ -38,7 +38,7 @@ def sample_file(sample: SampleRecording) -> ChosenFile:
     return ChosenFile(path.name, sha256_of(path), path, rig.name, rig.read_text("utf-8"))
 
 
-def choose_sample(label: str, key: str, *, first: str = "", without: str = "") -> ChosenFile:
+def choose_sample(label: str, key: str, *, first: str = "", without: str = "", name: str = "") -> ChosenFile:
     """Let the user choose a sample.
 
     Parameters
@@ -49,11 +49,17 @@ def choose_sample(label: str, key: str, *, first: str = "", without: str = "") -
         Stem of the sample that is chosen at first.
     without : str
         Name of a recording that is not offered.
+    name : str
+        In the address; empty where it is kept up elsewhere.
     """
     offered = [sample for sample in samples() if sample.recording.name != without]
-    index = next((i for i, sample in enumerate(offered) if sample.rig.stem == first), 0)
-    state.carry_over(key, offered[index])
+    at_first = next((sample for sample in offered if sample.rig.stem == first), offered[0])
+    if name:
+        address.begin(key, name, at_first, address.one_of({sample.rig.stem: sample for sample in offered}))
+    state.carry_over(key, at_first)
     sample: SampleRecording = st.selectbox(label, offered, format_func=sample_name, key=key, persist_state="session")
+    if name:
+        address.keep(name, sample.rig.stem, at_first.rig.stem)
     return sample_file(sample)
 
 
@@ -124,18 +130,23 @@ def _chosen_file(file: UploadedFile, *, is_rig: bool) -> ChosenFile:
 
 
 def choose_number(
-    label: str, key: str, placeholder: str, *, about: str = "", minimum: float | None = None
+    label: str, key: str, placeholder: str, *, name: str, about: str = "", minimum: float | None = None
 ) -> float | None:
-    """Return a number that files may not state, None where the field is empty."""
-    return st.number_input(
+    """Return a number that files may not state, None where the field is empty; `name` is its own in the address."""
+    number: float | None = address.ask(
+        st.number_input,
         label,
         min_value=minimum,
         value=None,
         placeholder=placeholder,
         key=key,
+        name=name,
+        first=None,
+        read=address.number(minimum),
         persist_state="session",
         help=about or None,
     )
+    return number
 
 
 # --------------------
@@ -187,10 +198,10 @@ def _follow_address() -> None:
     """Open what the page's address names, where this session has nothing open yet."""
     if state.ORIGIN in st.session_state or state.SAMPLE in st.session_state:
         return
-    named = {sample.rig.stem: sample for sample in samples()}.get(st.query_params.get("sample", ""))
+    named = {sample.rig.stem: sample for sample in samples()}.get(address.asked("sample"))
     if named is not None:
         st.session_state[state.SAMPLE] = named
-    token = st.query_params.get("file", "")
+    token = address.asked("file")
     kept = kept_file(token)
     if kept is not None:
         state.token_of(kept.sha256, token)
@@ -205,10 +216,10 @@ def _keep_address(file: ChosenFile, origin: str) -> None:
         named = {"file": state.token_of(file.sha256)}
         remember_file(named["file"], replace(file, rig_text=machine_text(file)))
     for name in ("sample", "file"):
-        if named.get(name) is None and name in st.query_params:
-            del st.query_params[name]
-        elif name in named and st.query_params.get(name) != named[name]:
-            st.query_params[name] = named[name]
+        text = named.get(name, "")
+        if address.asked(name) not in ("", text):  # it is not open: nor are its channels
+            address.forget_asked()
+        address.put(name, *([text] if text else []))
 
 
 def open_file(file: ChosenFile) -> None:
@@ -253,10 +264,12 @@ def _choose_comparison(file: ChosenFile) -> tuple[ChosenFile | None, float | Non
     own = next((s.reference for s in samples() if s.recording == file.content), None)
     first = next((name for name, s in offered.items() if s.recording == own), NO_REFERENCE)
     names = [NO_REFERENCE, FILE, *offered]
-    name = st.selectbox(
+    name = address.ask_one(
+        st.selectbox,
         "Compared with (healthy machine)",
         names,
-        names.index(first),
+        first=first,
+        name="reference",
         key=state.source_key("reference", source),
         persist_state="session",
         help="The same machine when it was healthy: same sensors, speed and load. Cracks of a millimetre show "
@@ -272,5 +285,6 @@ def _choose_comparison(file: ChosenFile) -> tuple[ChosenFile | None, float | Non
         about="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else "
         "of the reference shaft.",
         minimum=0.0,
+        name="torque",
     )
     return reference, torque or None

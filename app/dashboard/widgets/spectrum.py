@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import streamlit as st
 
-from app.dashboard import state
+from app.dashboard import address, state
 from app.dashboard.theme import as_typed, palette
 from app.dashboard.widgets.charts import (
     N_COLUMNS,
@@ -152,18 +152,21 @@ def _choose_looks(source: Analysis | str, cursors: Sequence[Cursor], name: str, 
     kinds = [kind for kind in KIND_NAMES if any(cursor.kind == kind for cursor in cursors)]
     row = st.container(horizontal=True, vertical_alignment="bottom")  # which wraps where it is narrow
     key = state.view_key(f"{name} scale", source)
-    label = row.segmented_control("Amplitude", list(SCALES), default=scale, key=key)
+    label = address.ask_one(row.segmented_control, "Amplitude", list(SCALES), first=scale, key=key, name="amplitude")
     if not kinds:
-        return label or scale, kinds
-    chosen = row.pills(
+        return label, kinds
+    chosen = address.ask(
+        row.pills,
         "Cursors",
         kinds,
-        default=[kind for kind in kinds if kind != "hunting"],
+        key=state.view_key(f"{name} cursors {kinds}", source),
+        name="cursors",
+        first=[kind for kind in kinds if kind != "hunting"],
+        read=address.some_of(kinds),
         selection_mode="multi",
         format_func=KIND_NAMES.__getitem__,
-        key=state.view_key(f"{name} cursors {kinds}", source),
     )
-    return label or scale, list(chosen)
+    return label, list(chosen)
 
 
 def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:
@@ -187,10 +190,12 @@ def show_average(analysis: Analysis, channel: ChannelAnalysis) -> None:
         st.info("There is no synchronous average: it takes a known speed and enough revolutions.")
         return
     left, right = st.columns((1, 2), vertical_alignment="bottom")
-    shaft = left.selectbox("Shaft", shafts, key=state.view_key("average shaft", analysis))
+    key = state.view_key("average shaft", analysis)
+    shaft = address.ask_one(left.selectbox, "Shaft", shafts, key=key, name="shaft")
     kinds = [kind for kind in KINDS if (shaft, kind) in channel.averages]
     key = state.view_key(f"average kind {kinds}", analysis)
-    kind = right.segmented_control("Signal", kinds, default=kinds[0], format_func=str.capitalize, key=key) or kinds[0]
+    looks = {"key": key, "name": "signal", "format_func": str.capitalize}
+    kind = address.ask_one(right.segmented_control, "Signal", kinds, **looks)
     n_teeth = teeth_choice(analysis, shaft)
     _show(analysis, channel.averages[shaft, kind], n_teeth)
     st.caption(f"{KINDS[kind]} Band: ± 2 standard errors of the mean, from the scatter of the revolutions.")
@@ -209,10 +214,8 @@ def teeth_choice(analysis: Analysis, shaft: str) -> int | None:
     named = [f.where.gear.rpartition("/")[0] for f in analysis.findings if f.where.gear.rpartition("/")[2] == shaft]
     first = next((list(gears).index(name) for name in named if name in gears), 0)
     key = state.view_key(f"average gear {list(gears)}", analysis)
-    chosen = st.selectbox(
-        "Gear", list(gears), index=first, format_func=lambda pair: f"{pair}: {gears[pair]} teeth", key=key
-    )
-    return gears[chosen]
+    looks = {"key": key, "name": "gear", "format_func": lambda pair: f"{pair}: {gears[pair]} teeth"}
+    return gears[address.ask_one(st.selectbox, "Gear", list(gears), first=list(gears)[first], **looks)]
 
 
 def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) -> None:

@@ -9,7 +9,7 @@ from io import BytesIO
 import numpy as np
 import streamlit as st
 
-from app.dashboard import state
+from app.dashboard import address, state
 from app.dashboard.components import component_of
 from app.dashboard.theme import is_dark
 from gearsig.checks import FloatArray
@@ -37,9 +37,7 @@ def choose_view(analysis: Analysis, names: Sequence[str]) -> str:
     first = FIRST_OF.get(picture.about if picture is not None else "", "Order spectrum")
     if isinstance(analysis.shaft_angle, CannotTell):  # the form asks for the speed, of a machine that is described too
         first = "Machine" if analysis.rig is None or not analysis.rig.shafts else "Spectrum"
-    chosen = state.addressed(state.TAB, "view", first if first in names else names[0])
-    if chosen not in names:
-        chosen = names[0]
+    chosen = address.chosen(state.TAB, "view", names, first if first in names else names[0])
     items = _tiles(state.view_key(f"tiles {is_dark()}", analysis), tuple(names), analysis)
     _strip(
         key="strip",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import streamlit as st
 
-from app.dashboard import state
+from app.dashboard import address, state
 from app.dashboard.cached import channel_problems, command_of, report_page, safe_file_name
 from app.dashboard.methods.crack import show_crack
 from app.dashboard.methods.form import MethodPage
@@ -75,10 +75,8 @@ def show_of_channel(analysis: Analysis, view: Callable[[Analysis, ChannelAnalysi
     names = list(dict.fromkeys([*named, *channels]))
     name = names[0]
     if len(names) > 1:
-        column = st.columns(3)[0]
-        name = column.selectbox(
-            "Channel", list(channels), index=list(channels).index(name), key=state.view_key(state.CHANNEL, analysis)
-        )
+        looks = {"key": state.view_key(state.CHANNEL, analysis), "name": "channel", "persist_state": "session"}
+        name = address.ask_one(st.columns(3)[0].selectbox, "Channel", list(channels), first=name, **looks)
     view(analysis, channels[name])
 
 
@@ -129,18 +127,25 @@ def show_envelope(analysis: Analysis, channel: ChannelAnalysis) -> None:
     show_spectrum(analysis, spectrum, cursors, name, marked=marked, shown=shown, scale="Linear")
 
 
+MOST_CHANNELS = 12
+"""Shown over time."""
+
+
 def show_channels(analysis: Analysis) -> None:
     """Show chosen channels over a window of time, and the table of channels with their problems."""
     recording = analysis.recording
     for warning in recording.warnings:
         st.warning(as_typed(warning), icon=":material/warning:")
     _show_quality(analysis)
-    names = st.multiselect(
+    names = address.ask(
+        st.multiselect,
         "Channels shown",
         recording.channel_names,
-        default=recording.channel_names[:4],
-        max_selections=12,
         key=state.view_key("channels shown", analysis),
+        name="channels",
+        first=list(recording.channel_names[:4]),
+        read=address.some_of(recording.channel_names, most=MOST_CHANNELS),
+        max_selections=MOST_CHANNELS,
     )
     time = np.arange(recording.n_samples) / recording.sampling_rate_hz
     for name in names:
@@ -186,11 +191,13 @@ def show_indicators(analysis: Analysis) -> None:
         return
     table = indicator_frame(analysis.indicators, changes(analysis) if analysis.reference is not None else ())
     words, *choices = st.columns(3, vertical_alignment="bottom")
-    text = words.text_input("Name contains", key=state.view_key("indicator words", analysis))
+    key = state.view_key("indicator words", analysis)
+    text = address.ask(words.text_input, "Name contains", key=key, name="contains", first="", read=address.words)
     kept = table[table["indicator"].str.contains(text, case=False, regex=False)] if text else table
     for column, (label, name) in zip(choices, (("Channels", "channel"), ("Gear, shaft or band", "of")), strict=True):
         known = [str(value) for value in table[name].unique() if value]
-        chosen = column.multiselect(label, known, key=state.view_key(f"indicator {name}", analysis))
+        key, read = state.view_key(f"indicator {name}", analysis), address.some_of(known)
+        chosen = address.ask(column.multiselect, label, known, key=key, name=name, first=[], read=read)
         kept = kept[kept[name].isin(chosen)] if chosen else kept
     number = st.column_config.NumberColumn(format="%.5g")
     config = {"value": number, "reference": number, "change (dB)": st.column_config.NumberColumn(format="%+.1f")}
@@ -247,13 +254,11 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
         show_unknown_speed(angle)
         return
     left, right = st.columns(2)
-    lines = left.segmented_control(
-        "Lines over", ("Order", "Frequency"), default="Order", key=state.view_key("map lines", analysis), required=True
-    )
+    axes, key = ("Order", "Frequency"), state.view_key("map lines", analysis)
+    lines = address.ask_one(left.segmented_control, "Lines over", axes, key=key, name="lines", required=True)
     ways = ("Time",) if angle.is_steady(RUN_SHARE) else ("Time", "Speed")
-    along = right.segmented_control(
-        "Along", ways, default="Time", key=state.view_key(f"map along {ways}", analysis), required=True
-    )
+    key = state.view_key(f"map along {ways}", analysis)
+    along = address.ask_one(right.segmented_control, "Along", ways, key=key, name="along", required=True)
     shown_map = _map_of(analysis, channel, over_order=lines == "Order")
     rows = np.argsort(shown_map.speed_rpm, kind="stable") if along == "Speed" else np.arange(len(shown_map.time_s))
     y, also = shown_map.time_s[rows], (shown_map.speed_rpm[rows], "rpm")
@@ -400,14 +405,15 @@ def show_views(analysis: Analysis, file: ChosenFile, chosen: Chosen) -> None:
 @st.fragment
 def _show(name: str, analysis: Analysis, file: ChosenFile, request: AnalysisRequest) -> None:
     """Show one view; what the user changes in it reruns only this."""
-    if name == MACHINE:
-        show_machine(file, analysis.recording.channel_names)
-    elif name in OF_RECORDING:
-        OF_RECORDING[name](analysis)
-    elif name in OF_CHANNEL:
-        show_of_channel(analysis, partial(_show_one_of, OF_CHANNEL[name], name))
-    else:
-        show_report(analysis, request)
+    with address.of_part("view"):
+        if name == MACHINE:
+            show_machine(file, analysis.recording.channel_names)
+        elif name in OF_RECORDING:
+            OF_RECORDING[name](analysis)
+        elif name in OF_CHANNEL:
+            show_of_channel(analysis, partial(_show_one_of, OF_CHANNEL[name], name))
+        else:
+            show_report(analysis, request)
 
 
 def _show_one_of(methods: dict[str, Of], view: str, analysis: Analysis, channel: ChannelAnalysis) -> None:
@@ -415,5 +421,6 @@ def _show_one_of(methods: dict[str, Of], view: str, analysis: Analysis, channel:
     name = next(iter(methods))
     if len(methods) > 1:
         page = MethodPage(analysis, channel, "")
-        name = page.choose(st, "Method", list(methods), key=f"method of {view}", named=False, as_written=True)
+        key = f"method of {view}"
+        name = page.choose(st, "Method", list(methods), name="show", key=key, named=False, as_written=True)
     methods[name](analysis, channel)
