@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import file_label
-from gearsig.processes import n_processors, run_jobs
+from gearsig.processes import killed_text, n_processors, run_jobs
 
 if TYPE_CHECKING:
     from gearsig.report import Entry, Failure
@@ -95,7 +95,8 @@ def report_many(
     paths : sequence of str or Path
         Files, folders with their sub-folders, "folder/*.csv".
     output_folder : str or Path
-        Made if it is not there; pages of the same name are replaced.
+        Made if it is not there. A recording's own page is replaced; one of the same name but of another recording, or
+        of no recording, is left, and the new one gets a number.
     rig : Rig or None
         Of all recordings; None: the rig file of the same name beside each, if there is one.
     sampling_rate_hz : float or None
@@ -163,7 +164,7 @@ def report_many(
     for method in chosen or ():
         named_method(method)  # a wrong name stops the report before its first page
     jobs = []
-    for file, page in zip(files, page_names(files), strict=True):
+    for file, page in zip(files, page_names(files, folder), strict=True):
         # Files of the same name are told apart by their folders.
         name = file_label(file, whole=not file.name or names.count(file.name) > 1)
         is_healthy = file.resolve() in healthy_files
@@ -216,11 +217,12 @@ def _made_of() -> Callable[[_Job], str]:
     from functools import cache
 
     from gearsig import __version__
+    from gearsig.recording import without_condition
     from gearsig.rig import rig_file_beside
 
     @cache
     def state(path: Path) -> tuple[str, int, int]:
-        stat = path.stat()
+        stat = without_condition(path)[0].stat()
         return str(path.absolute()), stat.st_size, stat.st_mtime_ns
 
     def made_of(job: _Job) -> str:
@@ -260,7 +262,7 @@ def _report_one(job: _Job) -> Entry | Failure:
     """Analyse one recording and write its page; every error becomes a reason."""
     from gearsig.cache import write_text
     from gearsig.diagnosis import LongAnalysis, analyze_file, read_reference
-    from gearsig.report import Entry, entry_of, from_plain, page_pdf, plain, write_page, write_pdf
+    from gearsig.report import Entry, entry_of, from_plain, page_pdf, plain, recording_mark, write_page, write_pdf
     from gearsig.rig import read_rig, rig_file_beside
 
     try:
@@ -271,7 +273,8 @@ def _report_one(job: _Job) -> Entry | Failure:
         reference = None if job.reference is None else read_reference(job.reference, rig, **given)
         found = analyze_file(job.path, rig, reference=reference, torque_nm=job.torque_nm, **given)
         analysis = found.as_one() if isinstance(found, LongAnalysis) else found
-        write_page(analysis, job.page, command=job.command, index="index.html", methods=job.methods)
+        mark = recording_mark(job.path)
+        write_page(analysis, job.page, command=job.command, index="index.html", methods=job.methods, mark=mark)
         if job.pdf:
             write_pdf(job.page.with_suffix(".pdf"), page_pdf(analysis, command=job.command, methods=job.methods))
         entry = plain(replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference))
@@ -286,7 +289,7 @@ def _report_one(job: _Job) -> Entry | Failure:
 
 
 def _killed(job: _Job) -> Failure:
-    return _failure(job, "the process that analysed it was killed: perhaps it ran out of memory")
+    return _failure(job, killed_text("analysed it"))
 
 
 def _failure(job: _Job, reason: str) -> Failure:

@@ -93,6 +93,17 @@ def signed(value: float, n_decimals: int = 1) -> str:
     return f"{rounded:+.{n_decimals}f}".replace("-", "−") if rounded else f"{0.0:.{n_decimals}f}"
 
 
+def counted(n: int, noun: str) -> str:
+    """Return a number with its noun, in the plural where it is not one.
+
+    Examples
+    --------
+    >>> counted(1, "recording"), counted(0, "recording")
+    ('1 recording', '0 recordings')
+    """
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
 def with_minus(text: str) -> str:
     """Return a text whose negative numbers have a minus sign, which a hyphen is not.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json as json_text
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +16,7 @@ from app.cli import options
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED, EXIT_SOME_FAILED, progress_bar
 
 if TYPE_CHECKING:
-    from gearsig.fleet import AddResult, Fleet, Origin
+    from gearsig.fleet import AddResult, Fleet, Origin, PassedOver
     from gearsig.processes import Cluster
 
 fleet_app = typer.Typer(
@@ -83,17 +84,21 @@ def add(
 
     Example: gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv'
     """
-    from gearsig.fleet import open_fleet, origins
+    from gearsig.fleet import PassedOver, open_fleet, origins, passed_over_text
 
     opened = options.open_rig(rig)
-    found = origins(places, pattern=pattern, machine=machine, point=point, date=date, rig=opened)
+    passed_over = list[PassedOver]()
+    stated: dict[str, Any] = {"machine": machine, "point": point, "date": date, "rig": opened}
+    found = origins(places, pattern=pattern, **stated, on_passed_over=passed_over.append)
+    if dry_run and json:
+        seen = {"recordings": [_origin_json(origin) for origin in found], "passed_over": _left_out_json(passed_over)}
+        typer.echo(json_text.dumps(seen, indent=1, ensure_ascii=False))
+    else:
+        _show_origins(found, len(found) if dry_run else N_SHOWN, err=not dry_run)
+    if passed_over:
+        _say(passed_over_text(passed_over))
     if dry_run:
-        if json:
-            typer.echo(json_text.dumps([_origin_json(origin) for origin in found], indent=1, ensure_ascii=False))
-        else:
-            _show_origins(found, len(found), err=False)
         return
-    _show_origins(found, N_SHOWN, err=True)
     fleet = open_fleet(store, create=True, on_message=_say)
     n_done = 0
 
@@ -123,7 +128,7 @@ def add(
                 f"gearsig: stopped; {n_done} results are in {store}; the same command goes on from there", err=True
             )
             raise typer.Exit(EXIT_INTERRUPTED) from None
-        _show_added(result, store, workers, json=json)
+        _show_added(replace(result, passed_over=tuple(passed_over)), store, workers, json=json)
     if result.failures:
         raise typer.Exit(EXIT_INPUT_ERROR if len(result.failures) == len(found) else EXIT_SOME_FAILED)
 
@@ -314,7 +319,9 @@ def watch(
             o = event.added.origin
             where = " ".join(part for part in (o.machine, o.point) if part)
             words = f"{where} {o.date:%Y-%m-%d %H:%M} {o.path.name}: {event.added.outcome}: {event.text}"
-        typer.echo(f"{event.time:%Y-%m-%dT%H:%M:%SZ} {event.kind}: {words}", err=event.kind == "problem")
+        typer.echo(
+            f"{event.time:%Y-%m-%dT%H:%M:%SZ} {event.kind}: {words}", err=event.kind in ("problem", "passed over")
+        )
 
     with options.open_cluster(cluster) as workers:
         try:
@@ -388,7 +395,13 @@ def _origin_json(origin: Origin) -> dict[str, Any]:
     return {name: str(value) if name in ("path", "date") else value for name, value in vars(origin).items()}
 
 
+def _left_out_json(files: Sequence[PassedOver]) -> list[dict[str, str]]:
+    return [{"file": str(each.path), "reason": each.reason} for each in files]
+
+
 def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json: bool) -> None:
+    from gearsig.formatting import counted
+
     ran = workers.text() if workers else ""
     if json:
         failures = [{"file": str(a.origin.path), "reason": a.verdict} for a in result.failures]
@@ -397,16 +410,18 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
             "known": result.n_known,
             "taken_by_others": result.n_elsewhere,
             "failures": failures,
+            "passed_over": _left_out_json(result.passed_over),
             "ran": ran,
         }
         typer.echo(json_text.dumps(summary, indent=1, ensure_ascii=False))
         return
     for failure in result.failures:
         typer.echo(f"{failure.origin.path}: not analysed: {failure.verdict}", err=True)
-    parts = [f"{len(result.added) - len(result.failures)} recordings added to {store}"]
+    parts = [f"{counted(len(result.added) - len(result.failures), 'recording')} added to {store}"]
     parts += [f"{len(result.failures)} failed"] if result.failures else []
-    parts += [f"{result.n_known} were there already"] if result.n_known else []
-    parts += [f"{result.n_elsewhere} are being analysed by another process"] if result.n_elsewhere else []
+    was, are = ("was" if result.n_known == 1 else "were"), ("is" if result.n_elsewhere == 1 else "are")
+    parts += [f"{result.n_known} {was} there already"] if result.n_known else []
+    parts += [f"{result.n_elsewhere} {are} being analysed by another process"] if result.n_elsewhere else []
     typer.echo("; ".join(parts) + (f"; {ran}" if ran else "") + ".")
 
 

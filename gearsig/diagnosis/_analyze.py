@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig import indicators
 from gearsig.angle import ShaftAngle
+from gearsig.checks import instance_of, positive
 from gearsig.diagnosis._bearing import detect_bearings
 from gearsig.diagnosis._change import change_findings, family_change, level_changes, with_clearest_band
 from gearsig.diagnosis._crack import Answer, crack_depth, with_crack
@@ -46,7 +47,7 @@ from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import SeparatedAverage, SynchronousAverage, band_passed_mesh
 from gearsig.prepared import MEMORY_LIMIT_MB, PreparedRecording, prepare
-from gearsig.recording import Recording
+from gearsig.recording import CONDITION_CHANNEL, Recording, names_without_number
 from gearsig.rig import EncoderChannel, Rig, TachometerChannel
 
 MINIMUM_SAMPLES = 256
@@ -97,8 +98,11 @@ def analyze(
         are those of the only vibration channels of both, unless only a sensor's number differs.
     """
     prepared = prepare(recording, rig)
+    instance_of(settings, AnalysisSettings | None, "settings")
+    if torque_nm is not None:
+        positive(torque_nm, "torque_nm", "N m")
     _check_size(prepared.recording)
-    healthy = None if reference is None else prepare(reference, prepared.recording.rig)
+    healthy = None if reference is None else prepare(reference, prepared.recording.rig, name="reference")
     renamed: list[Finding] = []
     if healthy is not None:
         given, healthy = healthy.recording, _named_alike(prepared.recording, healthy)
@@ -355,8 +359,8 @@ def _check_vibration(recording: Recording) -> None:
 def _named_alike(recording: Recording, healthy: PreparedRecording) -> PreparedRecording:
     """Return the reference with the recording's names of channels that differ by a record's number only.
 
-    It has three digits or more: fewer tell sensors apart, a1 from a2. Where both have only one vibration channel, it is
-    taken for the same one under any other name. The renamed one is kept with the other, and what is found in it too.
+    Where both have only one vibration channel, it is taken for the same one under any other name. The renamed one is
+    kept with the other, and what is found in it too.
     """
     reference = healthy.recording
     theirs, ours = reference.vibration_names(), recording.vibration_names()
@@ -364,15 +368,12 @@ def _named_alike(recording: Recording, healthy: PreparedRecording) -> PreparedRe
     if len(theirs) == len(ours) == 1 and is_other_name and ours[0] not in reference.channel_names:
         return _renamed(healthy, {theirs[0]: ours[0]})
 
-    def without_number(name: str) -> str:
-        return re.sub(r"\d{3,}", "", name)
-
-    names = {without_number(name): name for name in recording.channel_names}
-    keys = {name: without_number(name) for name in reference.channel_names}
-    is_unique = len(names) == len(recording.channel_names) and len(set(keys.values())) == len(keys)
-    if not is_unique or set(ours) <= set(reference.channel_names):
+    names = {key: name for name, key in names_without_number(recording.channel_names).items()}
+    keys = names_without_number(reference.channel_names)
+    alike = {name: names[key] for name, key in keys.items() if names.get(key, name) != name}
+    if not alike or set(ours) <= set(reference.channel_names):
         return healthy
-    return _renamed(healthy, {name: names[key] for name, key in keys.items() if key in names})
+    return _renamed(healthy, alike)
 
 
 def _renamed(prepared: PreparedRecording, names: Mapping[str, str]) -> PreparedRecording:
@@ -399,4 +400,24 @@ def _check_reference(recording: Recording, reference: Recording) -> None:
     missing = [name for name in names if name not in reference.channel_names]
     if names and len(missing) == len(names):
         found = ", ".join(reference.channel_names)
-        raise InputError(f"the reference has no channel {missing[0]!r}", where=where, allowed=f"same channels: {found}")
+        raise InputError(
+            f"the reference has no channel {missing[0]!r}",
+            where=where,
+            allowed=f"same channels: {found}",
+            remedy=_columns_remedy(recording, reference),
+        )
+
+
+def _columns_remedy(recording: Recording, reference: Recording) -> str:
+    """Say which columns to name where one of both records is a column of its file, "runs.mat#2", and the other all."""
+
+    def is_column(record: Recording) -> bool:
+        return record.channel_names == (CONDITION_CHANNEL,) and re.search(r"#\d+$", record.name) is not None
+
+    if is_column(recording) == is_column(reference):
+        return ""
+    whole, one, other = recording, "reference", "recording"
+    if is_column(recording):
+        whole, one, other = reference, other, one
+    columns = " or ".join(f"{whole.name}#{number}" for number in range(1, min(len(whole.channels), 8) + 1))
+    return f"the {one} is one column of its file; for one of the {other}'s give {columns}"

@@ -35,6 +35,7 @@ from gearsig.diagnosis._types import (
     from_p_value,
     p_text,
 )
+from gearsig.formatting import signed
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
 from gearsig.rig import hunting_tooth_order
 
@@ -117,7 +118,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     if is_beyond_slip:
         title = f"May be {place}: the speed is stated and not confirmed."
     evidence = [
-        f"{_family_text(candidate)}, {100 * slip:+.2f} % from the kinematic order {candidate.expected:.4f}.",
+        f"{_family_text(candidate)}, {signed(100 * slip, 2)} % from the kinematic order {candidate.expected:.4f}.",
         _modulation_text(candidate),
         *(["Bearings of the same orders cannot be told apart by their envelope."] if candidate.twins else []),
         *(f"Within its slip, {rival} would show at the same order." for rival in candidate.rivals),
@@ -170,7 +171,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     order = candidate.comb.fundamental
     where, confidence = _where(signals, candidate), from_p_value(candidate.p_value, limit=0.99)
     near = [  # a wrong speed makes the difference
-        f"Shaft {name or 'of reference'} is near (order {shaft:.4f}, {100 * (order / shaft - 1):+.2f} %): "
+        f"Shaft {name or 'of reference'} is near (order {shaft:.4f}, {signed(100 * (order / shaft - 1), 2)} %): "
         "the speed may be wrong by as much."
         for name, shaft in signals.known_shaft_orders.items()
         if abs(order / shaft - 1) <= 0.03

@@ -13,6 +13,7 @@ from gearsig.angle import AngleSignal
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._bearing import CLEAR_MODULATION
 from gearsig.diagnosis._bearing_families import (
+    SAME_BEARING_ORDER,
     SAME_FAMILY,
     expected_parts,
     part_text,
@@ -575,7 +576,14 @@ def _meanings(
         findings += _of_shaft(shaft, risen, changes, signals)
     for pair in signals.rig.pairs:
         findings += _of_pair(pair.name, risen)
-    parts = [c for c in risen if c.kind == "bearing" and c.where.bearing not in claimed]
+    of_parts = [c for c in risen if c.kind == "bearing"]
+    named = [c.where.order for c in of_parts if c.where.bearing in claimed and c.where.order]  # bearings of one size
+    parts = [
+        c
+        for c in of_parts
+        if c.where.bearing not in claimed
+        and not any(c.where.order and abs(c.where.order / order - 1.0) < SAME_BEARING_ORDER for order in named)
+    ]
     if parts:
         findings.append(_of_bearing(max(parts, key=lambda c: c.change_db)))
     if risen and all(c.kind == "noise" for c in risen) and not any(claimed):

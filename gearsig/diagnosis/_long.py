@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
-from gearsig.checks import FloatArray, freeze, positive
+from gearsig.checks import FloatArray, freeze, instance_of, positive
 from gearsig.diagnosis._analyze import analyze
 from gearsig.diagnosis._blocks import RecordBlocks, record_blocks
 from gearsig.diagnosis._reference import rate_of_reference, rig_of_reference
@@ -24,7 +25,7 @@ from gearsig.errors import InputError
 from gearsig.formatting import file_label
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording, check_memory
-from gearsig.rig import PulseTimes, Rig, SpeedSource
+from gearsig.rig import PulseTimes, Rig, SpeedSource, check_rig
 from gearsig.spectra import Spectrum, power_density
 
 MEMORY_BYTES = 2e9
@@ -204,7 +205,7 @@ def analyze_file(
     """
     positive(memory_bytes - 2e8, "memory less 0.2 GB", "bytes", remedy="allow more than 0.2 GB")
     announce = on_stage or (lambda _: None)
-    healthy = None if reference is None else prepare(reference)
+    healthy = None if reference is None else prepare(reference, name="reference")
     left_bytes = memory_bytes if healthy is None else memory_bytes - _needed_bytes(healthy.recording)
     record = record_blocks(path, rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
     if _fits(record, left_bytes):
@@ -242,7 +243,8 @@ def read_reference(
     sampling_rate_hz, speed
         As in `read_recording`; pulse times belong to the other recording.
     """
-    file = Path(path)
+    check_rig(rig)
+    file = Path(instance_of(path, str | PathLike, "path", remedy="of a recording in memory, analyze takes it itself"))
     modified_ns = file.stat().st_mtime_ns if file.is_file() else 0
     own_speed = None if isinstance(speed, PulseTimes) else speed
     return _read_reference(

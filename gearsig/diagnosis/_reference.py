@@ -172,9 +172,9 @@ def _then(finding: Finding, reference: Analysis) -> str:
         return f"The reference shows it as well, but in {seen_in}: the levels do not compare."
     change = earlier.change_db
     if finding.where.angle_deg is not None and not _names_tooth(earlier.finding, finding):
-        since = "" if change is None else f", {change:+.1f} dB since then"
+        since = "" if change is None else f", {signed(change)} dB since then"
         return f"The reference shows such an event on that shaft{since}; whether at the same tooth, no mark tells."
-    since = "." if change is None else f"; since then it has changed by {change:+.1f} dB."
+    since = "." if change is None else f"; since then it has changed by {signed(change)} dB."
     return f"The reference shows it as well{since}"
 
 

@@ -15,7 +15,16 @@ from gearsig.fleet._changes import (
     trends_text,
 )
 from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, TABLES, Fleet, Trend, open_fleet
-from gearsig.fleet._origin import FilePattern, Origin, date_in_name, find_recordings, origin_rows, origins
+from gearsig.fleet._origin import (
+    FilePattern,
+    Origin,
+    PassedOver,
+    date_in_name,
+    find_recordings,
+    origin_rows,
+    origins,
+    passed_over_text,
+)
 from gearsig.fleet._statistics import (
     ALARM,
     OK,
@@ -51,6 +60,7 @@ __all__ = [
     "FleetChanges",
     "Limits",
     "Origin",
+    "PassedOver",
     "PointTrends",
     "Trend",
     "TrendSettings",
@@ -70,6 +80,7 @@ __all__ = [
     "open_fleet",
     "origin_rows",
     "origins",
+    "passed_over_text",
     "prediction_limits",
     "regressors",
     "series_level",

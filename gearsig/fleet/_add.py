@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gearsig.errors import GearsigError, InputError
-from gearsig.fleet._origin import Origin
+from gearsig.fleet._origin import Origin, PassedOver
 from gearsig.fleet._store import Row, Store
-from gearsig.processes import n_processors, run_jobs
+from gearsig.processes import killed_text, n_processors, run_jobs
 from gearsig.rig import Rig, SpeedSource, read_rig, rig_file_beside, rig_to_dict
 
 if TYPE_CHECKING:
@@ -95,12 +95,15 @@ class AddResult:
         Those that another process took meanwhile.
     ran : str
         Where the jobs ran, and which workers were lost; empty for local processes.
+    passed_over : tuple of PassedOver
+        Recordings that the pattern leaves out.
     """
 
     added: tuple[AddedRecording, ...]
     n_known: int
     n_elsewhere: int = 0
     ran: str = ""
+    passed_over: tuple[PassedOver, ...] = ()
 
     @property
     def failures(self) -> tuple[AddedRecording, ...]:
@@ -270,12 +273,16 @@ def _measured_load_nm(analysis: Analysis, stated: float | None) -> float | None:
 def _indicators(analysis: Analysis) -> list[Row]:
     from math import isfinite
 
+    from gearsig.recording import names_without_number
+
+    # Series of the next record, whose channels bear its number, go on with these.
+    names = names_without_number(analysis.recording.channel_names)
     return [
         {
             "name": i.name,
             "value": float(i.value),
             "unit": i.unit,
-            "channel": i.channel,
+            "channel": names.get(i.channel, i.channel),
             "place": i.gear or i.bearing or i.shaft,
             "computed_on": i.computed_on,
             "band": i.band,
@@ -313,8 +320,7 @@ def _row(job: _AnalysisJob, **facts: Any) -> Row:
 
 
 def _killed(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
-    reason = "the process that analysed it was killed: perhaps it ran out of memory"
-    return _row(job, outcome=FAILED, reason=reason, key=""), [], job.origin
+    return _row(job, outcome=FAILED, reason=killed_text("analysed it"), key=""), [], job.origin
 
 
 def _known(store: Store, found: Sequence[Origin], version: str) -> set[tuple[Any, ...]]:

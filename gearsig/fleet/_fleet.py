@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearsig.cache import part_beside
-from gearsig.checks import closest_match_hint, count, one_of
+from gearsig.checks import closest_match_hint, count, known_name, one_of
 from gearsig.errors import InputError
 from gearsig.fleet._add import FAILED, AddResult, AnalysisOptions, Progress, add_recordings
-from gearsig.fleet._origin import Origin, origins
+from gearsig.fleet._origin import Origin, PassedOver, origins
 from gearsig.fleet._statistics import ALARM, OK, WARNING
 from gearsig.fleet._store import SERIES, Store
 from gearsig.fleet._trends import (
+    NONE,
     Baseline,
     PointTrends,
     TrendSettings,
@@ -26,6 +27,7 @@ from gearsig.fleet._trends import (
     state_rows,
     write_settings,
 )
+from gearsig.formatting import counted
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -106,7 +108,8 @@ class Trend:
     def __repr__(self) -> str:
         of = " ".join(part for part in (self.machine, self.point, self.place, self.channel) if part)
         since = f", changed since {self.changed:%Y-%m-%d}" if self.changed is not None else ""
-        return f"Trend {self.name!r} of {of}: {len(self.table)} recordings, {self.level} ({self.basis} limits){since}"
+        state = "no limits yet" if self.basis == NONE else f"{self.level} ({self.basis} limits)"
+        return f"Trend {self.name!r} of {of}: {counted(len(self.table), 'recording')}, {state}{since}"
 
 
 class Fleet:
@@ -119,7 +122,8 @@ class Fleet:
         n, machines, points = self._rows(
             "SELECT count(*), count(DISTINCT machine), count(DISTINCT (machine, point)) FROM recordings"
         )[0]
-        return f"Fleet {self.folder}: {n} recordings of {machines} machines at {points} measuring points"
+        counts = counted(n, "recording"), counted(machines, "machine"), counted(points, "measuring point")
+        return "Fleet {}: {} of {} at {}".format(self.folder, *counts)
 
     @property
     def folder(self) -> Path:
@@ -176,8 +180,10 @@ class Fleet:
         places = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
         found = [item for item in places if isinstance(item, Origin)]
         paths = [item for item in places if not isinstance(item, Origin)]
+        passed_over = list[PassedOver]()
         if paths or not found:
-            found += origins(paths, pattern=pattern, machine=machine, point=point, date=date, rig=rig)
+            stated: dict[str, Any] = {"machine": machine, "point": point, "date": date, "rig": rig}
+            found += origins(paths, pattern=pattern, **stated, on_passed_over=passed_over.append)
         options = AnalysisOptions(
             rig, sampling_rate_hz, speed, Path(reference) if reference is not None else None, torque_nm, memory_bytes
         )
@@ -185,7 +191,7 @@ class Fleet:
             self._store, found, options, n_processes=n_processes, executor=executor, on_progress=on_progress
         )
         self._refreshed()
-        return result
+        return replace(result, passed_over=tuple(passed_over))
 
     # ---------------- settings
 
@@ -318,23 +324,20 @@ class Fleet:
         """
         self._check_place(machine, point)
         points = [point] if point else [p for (p,) in self._rows(_POINTS, [machine])]
-        only = {"name": name, "channel": channel, "place": place, "computed_on": computed_on}
-        result: list[Trend] = []
-        known: set[str] = set()
-        for chosen in points:
-            trends = self.point_trends(machine, chosen)
-            known |= set(trends.series["name"])
-            for column, row in enumerate(trends.series.to_dict("records")):
-                if all(not value or row[key] == value for key, value in only.items()):
-                    result.append(_trend(trends, column, machine, chosen))
-        if not result:
-            what = ", ".join(f"{key} {value!r}" for key, value in only.items() if value)
-            raise InputError(
-                f"there is no indicator of {what}",
-                where=machine,
-                allowed=", ".join(sorted(known)),
-                remedy=closest_match_hint(name, known),
-            )
+        of_points = {chosen: self.point_trends(machine, chosen) for chosen in points}
+        found = [
+            (chosen, column, row)
+            for chosen, trends in of_points.items()
+            for column, row in enumerate(trends.series.to_dict("records"))
+        ]
+        asked = {"name": name, "channel": channel, "place": place, "computed_on": computed_on}
+        for key, value in asked.items():
+            if value:
+                what = "indicator" if key == "name" else f"{name} {'on' if key == 'computed_on' else f'of {key}'}"
+                known = sorted({row[key] for *_, row in found})
+                known_name(value, known, f"there is no {what} {value!r}", where=machine)
+                found = [each for each in found if each[2][key] == value]
+        result = [_trend(of_points[chosen], column, machine, chosen) for chosen, column, _ in found]
         return tuple(sorted(result, key=lambda t: -[*LEVEL_NAMES.values()].index(t.level)))
 
     def export(

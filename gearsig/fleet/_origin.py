@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 from gearsig.rig import Rig, read_rig, rig_file_beside
 
 FIELDS = ("machine", "point", "date")
@@ -67,6 +68,22 @@ class Origin:
 
 
 @dataclass(frozen=True)
+class PassedOver:
+    """A recording's file that a pattern leaves out.
+
+    Parameters
+    ----------
+    path : Path
+        Absolute.
+    reason : str
+        "does not match the pattern", or which part of its name is no date.
+    """
+
+    path: Path
+    reason: str
+
+
+@dataclass(frozen=True)
 class FilePattern:
     """A pattern of paths such as "{machine}/{point}_{date:%Y%m%d}.csv", matched from a path's end.
 
@@ -90,19 +107,30 @@ class FilePattern:
         >>> found["machine"], found["point"], found["date"].isoformat()
         ('pump 3', 'DE', '2026-01-31T00:00:00')
         """
+        named = self.examined(path, root)
+        return None if isinstance(named, PassedOver) else named
+
+    def examined(self, path: Path, root: Path | None = None) -> dict[str, str | datetime] | PassedOver:
+        """Return what `match` does, but for a path of another kind what speaks against it.
+
+        Examples
+        --------
+        >>> FilePattern("{point}_{date:%Y%m%d}.csv").examined(Path("/data/DE_20261301.csv")).reason
+        '20261301 is no date in the form %Y%m%d'
+        """
         expression, form = self._compiled()
         found = None
         if root is not None and path.is_relative_to(root):
             found = expression.fullmatch(path.relative_to(root).as_posix())
         found = found or expression.search(path.absolute().as_posix())
         if found is None:
-            return None
+            return PassedOver(path.absolute(), "does not match the pattern")
         result: dict[str, str | datetime] = {k: v for k, v in found.groupdict().items() if k != "date"}
         if form:
             try:
                 result["date"] = datetime.strptime(found["date"], form)  # noqa: DTZ007 - as the name states it
             except ValueError:  # the 31st of February
-                return None
+                return PassedOver(path.absolute(), f"{found['date']} is no date in the form {form}")
         return result
 
     def _compiled(self) -> tuple[re.Pattern[str], str]:
@@ -166,11 +194,11 @@ def date_in_name(name: str) -> datetime | None:
     return None
 
 
-def find_recordings(places: Iterable[str | Path], pattern: FilePattern | None = None) -> list[tuple[Path, Path]]:
+def find_recordings(places: Iterable[str | Path]) -> list[tuple[Path, Path]]:
     """Return the recordings that files, folders and their sub-folders hold, each with the folder it was found from.
 
-    A folder gives what has the ending of a format, hidden files and links out of it left out; with a pattern, what
-    matches it. A file that is named stands as it is.
+    A folder gives what has the ending of a format, hidden files and links out of it left out. A file that is named
+    stands as it is.
 
     Raises
     ------
@@ -182,7 +210,7 @@ def find_recordings(places: Iterable[str | Path], pattern: FilePattern | None = 
         root = Path(place)
         if root.is_dir():
             for path in _walk(root):
-                if _is_recording(path) and (pattern is None or pattern.match(path, root)):
+                if _is_recording(path):
                     found.setdefault(path, root)
         elif any(letter in root.name for letter in "*?[") and not root.exists():
             matches = sorted(root.parent.glob(root.name)) if root.parent.is_dir() else []
@@ -224,6 +252,7 @@ def origins(
     point: str = "",
     date: datetime | None = None,
     rig: Rig | None = None,
+    on_passed_over: Callable[[PassedOver], object] | None = None,
 ) -> list[Origin]:
     """Find recordings and say of which machine, point and date each is.
 
@@ -236,24 +265,60 @@ def origins(
     places : iterable of str or Path
         Files, folders with their sub-folders, "folder/*.csv".
     pattern : str
-        See `FilePattern`; files that do not match are left out.
+        See `FilePattern`; files that do not match are passed over.
     machine, point : str
     date : datetime or None
     rig : Rig or None
         Of all; None: the rig file of the same name beside each.
+    on_passed_over : callable or None
+        Called with a `PassedOver` for each recording that does not match the pattern.
 
     Raises
     ------
     InputError
         If a file is missing, the pattern is no pattern, or nothing is found.
     """
+    searched, passed_over = list(places), list[PassedOver]()
+
+    def pass_over(file: PassedOver) -> None:
+        passed_over.append(file)
+        if on_passed_over is not None:
+            on_passed_over(file)
+
+    result = matching_origins(searched, pass_over, pattern=pattern, machine=machine, point=point, date=date, rig=rig)
+    if not result:
+        from gearsig.recording import FORMAT_OF_EXTENSION
+
+        raise InputError(
+            "there are no recordings"
+            + (f" that match {pattern!r}" if pattern else "")
+            + (f"; {passed_over_text(passed_over)}" if passed_over else ""),
+            where=", ".join(str(place) for place in searched),
+            allowed=" ".join(FORMAT_OF_EXTENSION),
+            remedy="check the folder and the pattern",
+        )
+    return result
+
+
+def matching_origins(
+    places: Iterable[str | Path],
+    on_passed_over: Callable[[PassedOver], object],
+    *,
+    pattern: str = "",
+    machine: str = "",
+    point: str = "",
+    date: datetime | None = None,
+    rig: Rig | None = None,
+) -> list[Origin]:
+    """Return what `origins` does, but nothing where nothing is found."""
     wanted = FilePattern(pattern) if pattern else None
-    found = find_recordings(places, wanted)
+    found = find_recordings(places)
     rigs = _rig_names(rig)
     result = []
     for path, root in found:
-        named = wanted.match(path, root) if wanted is not None else {}
-        if named is None:
+        named = wanted.examined(path, root) if wanted is not None else {}
+        if isinstance(named, PassedOver):
+            on_passed_over(named)
             continue
         try:
             stat = path.stat()
@@ -293,16 +358,25 @@ def origins(
                 stat.st_mtime_ns,
             )
         )
-    if not result:
-        from gearsig.recording import FORMAT_OF_EXTENSION
-
-        raise InputError(
-            "there are no recordings" + (f" that match {pattern!r}" if pattern else ""),
-            where=", ".join(str(place) for place in places),
-            allowed=" ".join(FORMAT_OF_EXTENSION),
-            remedy="check the folder and the pattern",
-        )
     return result
+
+
+N_NAMED = 3
+
+
+def passed_over_text(files: Sequence[PassedOver]) -> str:
+    """Say how many recordings a pattern leaves out, and of the first ones which and why.
+
+    Examples
+    --------
+    >>> passed_over_text([PassedOver(Path("/data/pump/DE_1.csv"), "does not match the pattern")])
+    '1 recording is passed over: pump/DE_1.csv (does not match the pattern)'
+    """
+    first = [f"{_clean(Path(*file.path.parts[-2:]).as_posix())} ({file.reason})" for file in files[:N_NAMED]]
+    n_more = len(files) - len(first)
+    more = f"; and {n_more} more" if n_more else ""
+    verb = "is" if len(files) == 1 else "are"
+    return f"{counted(len(files), 'recording')} {verb} passed over: {'; '.join(first)}{more}"
 
 
 def _rig_names(rig: Rig | None) -> Callable[[Path], str]:

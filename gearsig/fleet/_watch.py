@@ -16,7 +16,7 @@ from gearsig.checks import not_negative, positive
 from gearsig.errors import GearsigError
 from gearsig.fleet._add import AddedRecording
 from gearsig.fleet._fleet import Fleet
-from gearsig.fleet._origin import FilePattern, Origin, find_recordings, origins
+from gearsig.fleet._origin import FilePattern, Origin, PassedOver, matching_origins, passed_over_text
 from gearsig.processes import n_processors, process_pool
 
 
@@ -27,17 +27,20 @@ class WatchEvent:
     Parameters
     ----------
     kind : str
-        "added", "failed", "waiting" (a file that grows) or "problem" (of folder or store; it is tried again).
+        "added", "failed", "passed over" (files that the pattern leaves out, each said once) or "problem" (of folder or
+        store; it is tried again).
     time : datetime
         In UTC.
     text : str
     added : AddedRecording or None
+    passed_over : tuple of PassedOver
     """
 
     kind: str
     time: datetime
     text: str
     added: AddedRecording | None = None
+    passed_over: tuple[PassedOver, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return what a line of JSON holds."""
@@ -51,6 +54,8 @@ class WatchEvent:
                 "date": origin.date.isoformat(),
                 "outcome": self.added.outcome,
             }
+        if self.passed_over:
+            result["passed_over"] = [{"file": str(each.path), "reason": each.reason} for each in self.passed_over]
         return result
 
 
@@ -107,6 +112,7 @@ def watch(
     FilePattern(how.get("pattern", ""))  # one that is no pattern is refused at once
     roots = [Path(place) for place in places]
     seen: dict[Path, _Seen] = {}
+    said: set[Path] = set()
     problems: set[str] = set()
     n_failed = 0
 
@@ -122,7 +128,11 @@ def watch(
         pool = executor
         while not stop():
             try:
-                ready, n_waiting = _ready(roots, seen, settle_s, how)
+                left_out = list[PassedOver]()
+                ready, n_waiting = _ready(roots, seen, settle_s, how, left_out.append)
+                if new := tuple(each for each in left_out if each.path not in said):
+                    said |= {each.path for each in new}
+                    on_event(WatchEvent("passed over", datetime.now(UTC), passed_over_text(new), passed_over=new))
                 if ready:
                     if pool is None:
                         pool = stack.enter_context(process_pool(n_processes or n_processors()))
@@ -155,17 +165,18 @@ def _options(how: dict[str, Any]) -> dict[str, Any]:
 
 
 def _ready(
-    roots: list[Path], seen: dict[Path, _Seen], settle_s: float, how: dict[str, Any]
+    roots: list[Path],
+    seen: dict[Path, _Seen],
+    settle_s: float,
+    how: dict[str, Any],
+    on_passed_over: Callable[[PassedOver], object],
 ) -> tuple[list[Origin], int]:
     """Return the recordings that stand still and were not taken yet, and how many do not stand still."""
-    pattern = FilePattern(how["pattern"]) if how.get("pattern") else None
     there = [root for root in roots if root.exists()]
-    if not find_recordings(there, pattern):
-        return [], 0
     of_origin = {name: how[name] for name in (*_OF_ORIGIN, "rig") if name in how}
     now_s, wall_s = time.monotonic(), time.time()
     ready, n_waiting = [], 0
-    for origin in origins(there, **of_origin):
+    for origin in matching_origins(there, on_passed_over, **of_origin):
         signature = origin.n_bytes, origin.mtime_ns
         known = seen.get(origin.path)
         if known is None:

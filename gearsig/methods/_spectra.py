@@ -10,8 +10,9 @@ import numpy as np
 
 from gearsig import plot, spectra
 from gearsig.angle import resample_to_angle
-from gearsig.diagnosis import RecordBlocks
+from gearsig.diagnosis import RecordBlocks, analyze
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import readable
 from gearsig.methods._table import (
     LINES,
     SHAFT,
@@ -46,6 +47,11 @@ def cursors_of(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> tuple
         return tuple(Cursor(k * scale, "shaft", f"{k}× shaft", k) for k in (1, 2, 3))
     base = shown.shaft if shown.shaft in rig.shaft_names else angle.shaft
     return order_cursors(order_lines(rig, base, n_sidebands=1), scale)
+
+
+def rhythms_of(prepared: PreparedRecording, shown: Spectrum) -> tuple[Cursor, ...]:
+    """Return the lines of shafts and bearings that the spectrum of an envelope, or a coherence, may show."""
+    return rhythm_cursors(cursors_of(prepared, shown))
 
 
 def periods_of(prepared: PreparedRecording) -> tuple[Cursor, ...]:
@@ -94,11 +100,33 @@ def _spectrum_answer(
     lowest: float | None,
     highest: float | None,
 ) -> MethodAnswer:
+    cursors = periods_of(prepared) if spectrum.axis == "quefrency" else cursors_of(prepared, spectrum)
+    return _marked_spectrum(channel, spectrum, caption, cursors, lowest, highest)
+
+
+def _envelope_answer(
+    prepared: PreparedRecording,
+    channel: str,
+    spectrum: Spectrum,
+    caption: str,
+    lowest: float | None,
+    highest: float | None,
+) -> MethodAnswer:
+    return _marked_spectrum(channel, spectrum, caption, rhythms_of(prepared, spectrum), lowest, highest)
+
+
+def _marked_spectrum(
+    channel: str,
+    spectrum: Spectrum,
+    caption: str,
+    cursors: tuple[Cursor, ...],
+    lowest: float | None,
+    highest: float | None,
+) -> MethodAnswer:
     low = lowest or 0.0
     high = float(spectrum.positions[-1]) if highest is None else highest
     limits = (low, min(high, float(spectrum.positions[-1])))
     is_quefrency = spectrum.axis == "quefrency"
-    cursors = periods_of(prepared) if is_quefrency else cursors_of(prepared, spectrum)
     inside = (spectrum.positions >= low) & (spectrum.positions <= high)
     numbers = {"resolution": spectrum.resolution, "scaling": spectrum.scaling, "unit": spectrum.unit}
     part = {name: column[inside] for name, column in columns_of(spectrum).items()}
@@ -206,9 +234,9 @@ def _envelope(
         prepared.recording, channel, narrowest_hz=3.0 * usual_hz, band_hz=band_hz
     )
     low, high = banded.envelope.band_hz
-    text = f"spectrum of the envelope of {low:.4g} to {high:.4g} Hz"
+    text = f"spectrum of the envelope of {readable(low)} to {readable(high)} Hz"
     top = min(float(banded.spectrum.positions[-1]), (high - low) / 2, usual_hz) if highest is None else highest
-    answer = _spectrum_answer(prepared, channel, banded.spectrum, text, lowest, top)
+    answer = _envelope_answer(prepared, channel, banded.spectrum, text, lowest, top)
     numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}
     return replace(answer, numbers={**answer.numbers, **numbers}, warnings=banded.warnings)
 
@@ -228,9 +256,9 @@ def _envelope_in_blocks(
             remedy="gearsig show kurtogram finds one in a part: --from 0s --to 10s",
         )
     spectrum = blocks.envelope_density(channel, band_hz)
-    text = f"power density of the squared envelope of {band_hz[0]:.4g} to {band_hz[1]:.4g} Hz"
+    text = f"power density of the squared envelope of {readable(band_hz[0])} to {readable(band_hz[1])} Hz"
     top = highest if highest is not None else min(float(spectrum.positions[-1]), (band_hz[1] - band_hz[0]) / 2)
-    answer = _spectrum_answer(prepared, channel, spectrum, text, lowest, top)
+    answer = _envelope_answer(prepared, channel, spectrum, text, lowest, top)
     return replace(answer, numbers={**answer.numbers, "band_hz": list(band_hz)})
 
 
@@ -288,7 +316,7 @@ def _kurtogram(
         numbers={"band_hz": [band.low_hz, band.high_hz], "kurtosis": band.kurtosis, "reason": chosen.reason},
         panels=(
             _kurtosis_panel(grid, band, recording.sampling_rate_hz),
-            _panel(spectrum, rhythm_cursors(cursors_of(prepared, spectrum)), linear=True),
+            _panel(spectrum, rhythms_of(prepared, spectrum), linear=True),
         ),
         facts=(
             (
@@ -304,27 +332,35 @@ def _kurtogram(
     )
 
 
+N_MAP_LINES = 144
+"""Of a kurtogram's map from its widest to its narrowest bands."""
+
+
 def _kurtosis_panel(grid: spectra.Kurtogram, band: spectra.BandCandidate, rate_hz: float) -> LevelPanel:
-    """Spectral kurtosis over frequency, a row for each level of the tree; the band that was chosen is outlined."""
-    rows = np.unique(grid.level)
-    n = 3 * 2 ** int(np.ceil(rows.max()))
+    """Spectral kurtosis over frequency, a row for each number of bands; the band that was chosen is outlined."""
+    levels = np.unique(grid.level)
+    n = 3 * 2 ** int(np.ceil(levels.max()))
     at = (np.arange(n) + 0.5) * rate_hz / 2.0 / n
-    values = np.zeros((len(rows), n))
+    rows = np.zeros((len(levels), n))
     for low, high, level, kurtosis in zip(grid.low_hz, grid.high_hz, grid.level, grid.kurtosis, strict=True):
-        values[np.searchsorted(rows, level), (at >= low) & (at < high)] = kurtosis
-    # Levels are a third apart, but for the first ones; the row of each reaches halfway to its neighbours.
-    level = float(np.log2(rate_hz / 2.0 / (band.high_hz - band.low_hz)))
-    below, above = level - 0.5 if level <= 1.0 else level - 0.25, level + 0.25
-    ends = np.array([band.low_hz, band.high_hz])
+        rows[np.searchsorted(levels, level), (at >= low) & (at < high)] = kurtosis
+    # Levels are not equally far apart: the row of each reaches halfway to its neighbours, over many lines of the map.
+    halves = np.diff(levels) / 2.0 if len(levels) > 1 else np.array([0.5])
+    edges = np.concatenate([levels[:1] - halves[:1], levels[:-1] + np.diff(levels) / 2.0, levels[-1:] + halves[-1:]])
+    middles = edges[0] + (np.arange(N_MAP_LINES) + 0.5) * (edges[-1] - edges[0]) / N_MAP_LINES
+    values = rows[np.searchsorted(edges, middles) - 1]
+    positions = np.geomspace(2.0 ** edges[0], 2.0 ** edges[-1], N_MAP_LINES)
+    chosen = int(np.argmin(np.abs(levels - band.level)))
+    below, above = 2.0 ** edges[chosen : chosen + 2]
+    ends = np.clip([band.low_hz, band.high_hz], at[0], at[-1])
     outline = (
         ChartLine(np.repeat(ends, 2), np.array([below, above, above, below]), "the band chosen", 1),
         ChartLine(ends, np.array([below, below]), "the band chosen", 1),
     )
-    span = float(np.ptp(values)) or 1.0
-    positions = rows.astype(np.float64)
     return LevelPanel(
-        values, at, positions, "frequency (Hz)", "level (2^level bands)", "kurtosis", lines=outline, span=span
-    )
+        values, at, positions, "frequency (Hz)", "number of bands", "spectral kurtosis", logarithmic=True,
+        lines=outline, span=max(float(values.max()), 1e-3),  # colours begin at 0: below, nothing is impulsive
+    )  # fmt: skip
 
 
 def _envelope_orders(prepared: PreparedRecording, chosen: spectra.ChosenBand, highest_hz: float) -> Spectrum:
@@ -375,7 +411,7 @@ def _coherence(
     coherence = prepared.keep(("methods", "coherence", channel, over_orders, preparation, top, n_bands), compute)
     mean = spectra.enhanced_envelope(coherence, band_hz, probability=1.0 / odds)
     spectrum = mean.spectrum
-    cursors = rhythm_cursors(cursors_of(prepared, spectrum))
+    cursors = rhythms_of(prepared, spectrum)
     peaks = _above_noise(mean, cursors)
     where = list(peaks)
     level = ChartLine(spectrum.positions[[0, -1]], np.full(2, mean.level), "noise", -1, dotted=True)
@@ -390,7 +426,7 @@ def _coherence(
     return MethodAnswer(
         channel,
         "spectral coherence: which carriers are modulated at which rhythm",
-        lambda: plot.coherence_figure(coherence, mean, marked=[c.position for c in where]),
+        lambda: plot.coherence_figure(coherence, mean, cursors=where),
         columns_of(spectrum),
         matrices={"squared coherence": coherence.coherence_squared},
         axes={coherence.alpha_label: coherence.alpha, "carrier (Hz)": coherence.frequency_hz},
@@ -510,8 +546,6 @@ def _average_answer(prepared: PreparedRecording, channel: str, average: Synchron
 
 
 def _indicators(prepared: PreparedRecording, channel: str) -> MethodAnswer:
-    from gearsig.diagnosis import analyze
-
     indicators = [i for i in analyze(prepared.recording).indicators if i.channel in ("", channel)]
     table = {
         name: np.array([getattr(i, name) for i in indicators], dtype=None if name == "value" else object)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count
-from gearsig.orders import SynchronousAverage
+from gearsig.checks import FloatArray, count, listed
+from gearsig.orders import SynchronousAverage, check_average
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import AngleMark
 from gearsig.plot._series import thin
@@ -38,6 +38,8 @@ def average_figure(
     -------
     Figure
     """
+    for number, average in enumerate(listed(averages, "averages", object)):
+        check_average(average, f"averages[{number}]")
     n = len(averages)
     figure, panels = style.panels((1.37,) * n, top_in=0.43, row_gap_in=0.38, share_x=True)
     for axes, average in zip(panels, averages, strict=True):
@@ -118,6 +120,7 @@ def polar_figure(
     -------
     Figure
     """
+    check_average(average)
     if n_teeth is not None:
         count(n_teeth, "n_teeth", minimum=3)
     figure = style.new_figure(size_in, size_in)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from gearsig.diagnosis import Finding, Kind
@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 PRIORITY = ("mesh", "bearing", "shaft", "hunting", "sideband")
 """Which kind keeps its place where two marks collide, first wins."""
 
-N_ROWS = 3
+N_ROWS = 4
 ROW_IN = 0.15
 OVERHANG_IN = 0.4  # a label may reach this far out of the panel
+ASIDE = 0.85  # of a label's half width: it still stands over its line
 LONGEST = 24
 MIN_DISTANCE_IN = 0.03
 CHARACTER_EM = 0.62  # mean width of the font's characters, on the safe side
@@ -111,8 +112,9 @@ def place(
 ) -> list[tuple[Cursor, LabelPlace | None]]:
     """Choose the cursors to draw and the places of their labels; None: a line without label.
 
-    A cursor nearly on top of a more important one is left out. Labels fill the rows from the lowest; one that would
-    touch another label, or a line on its way up to one, is left out; its line stays.
+    A cursor nearly on top of a more important one is left out. Labels fill the rows from the lowest, and stand aside
+    where they would be in the way of others that wait; one that would touch another label, or a line on its way up to
+    one, is left out; its line stays.
 
     Parameters
     ----------
@@ -128,19 +130,22 @@ def place(
         Most important first.
     """
     scale = width_in / (limits[1] - limits[0])
-    drawn: list[float] = []
-    taken: list[LabelPlace] = []
-    result: list[tuple[Cursor, LabelPlace | None]] = []
+    drawn: list[tuple[Cursor, float]] = []
     for cursor in sorted(cursors, key=importance):
         at = (cursor.position - limits[0]) * scale
-        if not limits[0] <= cursor.position <= limits[1] or any(abs(at - other) < MIN_DISTANCE_IN for other in drawn):
-            continue
-        drawn.append(at)
-        label = _free_place(taken, at, cursor.label, width_in) if cursor.label else None
+        on_top = any(abs(at - other) < MIN_DISTANCE_IN for _, other in drawn)
+        if limits[0] <= cursor.position <= limits[1] and not on_top:
+            drawn.append((cursor, at))
+    taken: list[LabelPlace] = []
+    result: list[tuple[Cursor, LabelPlace | None]] = []
+    for number, (cursor, at) in enumerate(drawn, start=1):
+        waiting = [other for later, other in drawn[number:] if later.label]
+        label = _free_place(taken, waiting, at, cursor.label, width_in) if cursor.label else None
         if label is not None:
             taken.append(label)
         result.append((cursor, label))
-    return result
+    used = sorted({label.row for label in taken})  # rows that stayed empty are no rows
+    return [(cursor, label and replace(label, row=used.index(label.row))) for cursor, label in result]
 
 
 def n_rows(placed: Iterable[tuple[Cursor, LabelPlace | None]]) -> int:
@@ -192,15 +197,25 @@ def importance(cursor: Cursor) -> tuple[int, int, float]:
     return rank, cursor.number, cursor.position
 
 
-def _free_place(taken: Sequence[LabelPlace], at_in: float, text: str, width_in: float) -> LabelPlace | None:
-    """Return the lowest free place of a label over the line at `at_in`, inside the figure."""
+def _free_place(
+    taken: Sequence[LabelPlace], waiting: Sequence[float], at_in: float, text: str, width_in: float
+) -> LabelPlace | None:
+    """Return the free place of a label, inside the figure, that bars the fewest lines that wait for theirs.
+
+    Of several the one in the middle over its own line at `at_in`, and of these the lowest. It bars a line by standing
+    on its way up.
+    """
     half = (len(plain(text, LONGEST)) * CHARACTER_EM + 0.8) * style.SMALL_PT / 72 / 2
-    middle = min(max(at_in, half - OVERHANG_IN), width_in + OVERHANG_IN / 2 - half)
-    for row in range(N_ROWS):
-        new = LabelPlace(row, at_in, middle - half, middle + half)
-        if not any(new.collides(other) for other in taken):
-            return new
-    return None
+    best: LabelPlace | None = None
+    fewest = len(waiting) + 1
+    for shift in (0.0, ASIDE * half, -ASIDE * half):
+        middle = min(max(at_in + shift, half - OVERHANG_IN), width_in + OVERHANG_IN / 2 - half)
+        for row in range(N_ROWS):
+            new = LabelPlace(row, at_in, middle - half, middle + half)
+            n_barred = 0 if row == N_ROWS - 1 else sum(new.low_in < other < new.high_in for other in waiting)
+            if n_barred < fewest and not any(new.collides(other) for other in taken):
+                best, fewest = new, n_barred
+    return best
 
 
 @dataclass(frozen=True)

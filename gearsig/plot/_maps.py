@@ -12,7 +12,7 @@ from gearsig.errors import InputError
 from gearsig.orders import OrderMap
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
-from gearsig.plot._cursors import Cursor, draw, place
+from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
 from gearsig.plot._style import decibels, unit_text
 from gearsig.spectra import BandCandidate, EnhancedEnvelope, Kurtogram, SpectralCoherence, enhanced_envelope
 from gearsig.timefreq import Ridge, TimeFrequencyMap
@@ -225,7 +225,7 @@ def coherence_figure(
     coherence: SpectralCoherence,
     mean: EnhancedEnvelope | None = None,
     *,
-    marked: Sequence[float] = (),
+    cursors: Sequence[Cursor] = (),
     limits: tuple[float, float] | None = None,
     height_in: float = 5.2,
 ) -> Figure:
@@ -236,8 +236,8 @@ def coherence_figure(
     coherence : SpectralCoherence
     mean : EnhancedEnvelope or None
         The upper panel; None takes the mean over all carriers. The range of its carriers is drawn beside the map.
-    marked : sequence of float
-        Cyclic frequencies or orders expected of a fault.
+    cursors : sequence of Cursor
+        Lines of shafts and bearings, in cyclic frequencies or orders; see `rhythm_cursors`.
     limits : (float, float) or None
         Cyclic frequencies or orders that are drawn; None: all.
     height_in : float
@@ -259,15 +259,21 @@ def coherence_figure(
     mean = enhanced_envelope(coherence) if mean is None else mean
     if len(mean.spectrum.positions) != len(coherence.alpha) or mean.spectrum.axis != coherence.alpha_axis:
         raise InputError("the mean does not belong to the coherence", remedy="take enhanced_envelope of the same one")
-    figure, (above, below) = style.panels(
-        (1.3, height_in - 2.52), right_in=1.0, top_in=0.55, row_gap_in=0.12, share_x=True
-    )
     shown = _between(coherence.alpha, limits)
     # Of the columns a line of one cell must be wider than a pixel to be seen.
     alpha, values = _fewer_cells(coherence.alpha[shown], coherence.coherence_squared[shown], axis=0, n_max=500)
     low = coherence.level(1e-3)
     norm = LogNorm(low, max(float(values.max()), 2.0 * low))
     x, y = _cell_borders(alpha), _cell_borders(coherence.frequency_hz)
+    right_in = 1.0
+    placed = place(cursors, (float(x[0]), float(x[-1])), style.WIDTH_IN - 0.85 - right_in)
+    figure, (above, below) = style.panels(
+        (1.3, height_in - 2.52),
+        right_in=right_in,
+        top_in=0.4 + ROW_IN * n_rows(placed),
+        row_gap_in=0.12,
+        share_x=True,
+    )
     mesh = below.pcolormesh(x, y, np.maximum(values.T, low), cmap=style.colours(), norm=norm, rasterized=True)
     below.grid(visible=False)
     below.set_xlim(float(x[0]), float(x[-1]))
@@ -281,14 +287,17 @@ def coherence_figure(
     if mean.band_hz != (float(coherence.frequency_hz[0]), float(coherence.frequency_hz[-1])):
         where = "carriers {:.5g} to {:.5g} Hz".format(*mean.band_hz)
         style.put_text(above, 0.995, 0.93, where, colour=style.INK, transform=above.transAxes, ha="right", va="top")
+    draw(above, placed)
+    draw(below, [(cursor, None) for cursor, _ in placed])
     for axes in (above, below):
-        for position in marked:
-            axes.axvline(position, color=style.BEARING, linewidth=0.8, linestyle=(0, (2, 3)))
         style.no_offset(axes)
     below.plot([1.004, 1.004], mean.band_hz, transform=below.get_yaxis_transform(), color=style.MEASURED, clip_on=False)
     style.label_axes(below, coherence.alpha_label, "carrier (Hz)")
-    style.label_axes(above, "", "mean γ²", f"spectral coherence of {coherence.source}")
-    style.note(above, f"noise: 1 line in {1 / mean.probability:.4g} above the dashed line")
+    style.label_axes(above, "", "mean γ²")
+    series.headline(figure, f"spectral coherence of {coherence.source}")
+    noise = f"noise: 1 line in {1 / mean.probability:.4g} above the dashed line"
+    right, top = 1.0 - right_in / style.WIDTH_IN, 1.0 - 0.08 / figure.get_size_inches()[1]
+    style.put_text(figure, right, top, noise, ha="right", va="top")
     return figure
 
 

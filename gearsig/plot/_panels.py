@@ -185,7 +185,7 @@ def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") 
             place.set_xlim(min(ends), max(ends))
             if len(panel.lines) > 1:
                 place.legend(  # above the panel: it never covers data
-                    fontsize=style.SMALL_PT - 1,
+                    fontsize=style.SMALL_PT,
                     frameon=False,
                     labelcolor=style.INK,
                     loc="lower right",
@@ -526,7 +526,7 @@ def curves_figure(
             place.set_yscale("log")
         style.label_axes(place, panel.x_label, panel.y_label, panel.title)
         if not shared and len(panel.curves) > 1:
-            place.legend(fontsize=style.SMALL_PT - 1, frameon=False, labelcolor=style.INK)
+            place.legend(fontsize=style.SMALL_PT, frameon=False, labelcolor=style.INK)
     for unused in axes[len(panels) :]:
         unused.set_visible(False)
     series.head(figure, title, lines if named else (), heading)

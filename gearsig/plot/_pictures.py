@@ -273,7 +273,7 @@ def svg_ring(
     line : str
         Colour of the average.
     """
-    size, zero, swing, rim = 400, 92.0, 52.0, 154.0
+    size, zero, swing, rim = 400, 84.0, 48.0, 141.0
     full = float(np.max(np.abs(average.values), initial=0.0)) or 1.0
     n = len(average.values)
     turn = np.arange(n + 1) * (2 * np.pi / n)
@@ -296,10 +296,8 @@ def svg_ring(
         parts.append(f'<path d="M{points}Z" {looks}/>')
         if fault or tooth % ceil((n_teeth or 1) / 40) == 0:
             x, y = _round(rim + 24, middle)
-            bold = (
-                f'fill="{style.FAULT}" font-weight="700" font-size="13"' if fault else 'font-size="9.5" opacity="0.7"'
-            )
-            parts.append(f'<text x="{x:.1f}" y="{y + 3.5:.1f}" text-anchor="middle" {bold}>{tooth + 1}</text>')
+            bold = f'fill="{style.FAULT}" font-weight="700" font-size="15"' if fault else 'font-size="12" opacity="0.7"'
+            parts.append(f'<text x="{x:.1f}" y="{y + 4.3:.1f}" text-anchor="middle" {bold}>{tooth + 1}</text>')
     parts.append(f'<circle r="{rim}" fill="none" stroke="currentColor" stroke-opacity="0.45"/>')
     for mark in marks:
         half = step / 2 or 0.05
@@ -311,12 +309,12 @@ def svg_ring(
     note = f"{average.kind} of {average.shaft}, {average.channel}, {average.n_revolutions} revolutions"
     scale = f"rings: ± {round_value:g} {unit_text(average.unit)}".rstrip()
     parts += [
-        f'<text x="-198" y="-186" font-size="11" opacity="0.8">{escape(note)}</text>',
-        f'<text x="-198" y="196" font-size="11" opacity="0.8">{escape(scale)}</text>',
+        f'<text x="-198" y="-185" font-size="14" opacity="0.8">{escape(style.plain(note, 50))}</text>',
+        f'<text x="-198" y="195" font-size="14" opacity="0.8">{escape(scale)}</text>',
     ]
     for i, mark in enumerate(marks):
-        looks = f'font-size="14" font-weight="700" fill="{style.FAULT}"'
-        parts.append(f'<text x="198" y="{196 - 17 * i}" text-anchor="end" {looks}>{escape(mark.label)}</text>')
+        looks = f'font-size="15" font-weight="700" fill="{style.FAULT}"'
+        parts.append(f'<text x="198" y="{195 - 17 * i}" text-anchor="end" {looks}>{escape(mark.label)}</text>')
     moved = f'<g transform="translate({size / 2} {size / 2})">{"".join(parts)}</g>'
     return _svg(size, size, [moved], ink=ink)
 
@@ -357,7 +355,8 @@ class _Panel:
 
     def axes(self, x: str, y: str, *, grid: bool = True) -> str:
         bottom, right = self.top + self.height, self.left + self.width
-        values = _decades(*self.y) if self.logarithmic else _ticks(*self.y, max(2, round(self.height / 45)))
+        n = max(2, round(self.height / 45))
+        values = _decades(*self.y, self.height / 16) if self.logarithmic else _ticks(*self.y, n)
         parts = []
         for value in values:
             at = float(self.up(value))
@@ -468,7 +467,12 @@ def _ticks(low: float, high: float, n: int) -> list[float]:
     return [k * step for k in range(ceil(low / step - 1e-9), floor(high / step + 1e-9) + 1)]
 
 
-def _decades(low: float, high: float) -> list[float]:
+def _decades(low: float, high: float, n_max: float = 8) -> list[float]:
+    """Return round numbers of a logarithmic axis: powers of ten, and two between each as far as there is room."""
+    steps = [m * 10.0**k for k in range(floor(log10(low)), ceil(log10(high)) + 1) for m in (1, 2, 5)]
+    inside = [step for step in steps if low * (1 - 1e-9) <= step <= high * (1 + 1e-9)]
+    if len(inside) <= n_max:
+        return inside
     powers = range(ceil(log10(low) - 1e-9), floor(log10(high) + 1e-9) + 1)
     return [10.0**k for k in powers[:: max(1, len(powers) // 6)]]
 
@@ -579,9 +583,5 @@ def _trend_range(shown: FloatArray, *, is_log: bool) -> tuple[float, float]:
 
 def _trend_ticks(low: float, high: float, *, is_log: bool) -> list[float]:
     """Return three to six round numbers."""
-    if is_log and high > 8 * low:
-        decades = range(floor(log10(low)), ceil(log10(high)) + 1)
-        ticks = [m * 10.0**d for d in decades for m in ((1, 2, 5) if high < 300 * low else (1,))]
-    else:
-        ticks = _ticks(low, high, 5)
+    ticks = _decades(low, high) if is_log and high > 8 * low else _ticks(low, high, 5)
     return [tick for tick in ticks if low <= tick <= high]

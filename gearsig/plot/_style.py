@@ -109,7 +109,7 @@ CURSOR_COLOURS = {"mesh": MESH, "sideband": MESH, "shaft": SHAFT, "bearing": BEA
 DOTS_PER_INCH = 100
 WIDTH_IN = 9.0
 TEXT_PT = 9.5
-SMALL_PT = 8.5
+SMALL_PT = 9.0  # 7 pt where a picture of this width is printed on A4
 LINE_PT = 0.9
 
 

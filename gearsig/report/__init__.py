@@ -12,7 +12,7 @@ from gearsig.report._comparison import (
     orders_csv,
     shown_orders,
 )
-from gearsig.report._files import check_writable, made_folder, page_names
+from gearsig.report._files import check_writable, made_folder, page_names, recording_mark
 from gearsig.report._fleet import fleet_page_html, fleet_page_pdf, write_fleet_page
 from gearsig.report._gap_json import gap_from_dict, gap_schema, gap_to_dict, gap_to_json, read_gap_json, write_gap_json
 from gearsig.report._gap_page import (
@@ -150,6 +150,7 @@ __all__ = [
     "place_rows",
     "plain",
     "read_gap_json",
+    "recording_mark",
     "reference_text",
     "references_text",
     "shown_orders",

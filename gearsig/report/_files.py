@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import secrets
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gearsig.errors import InputError
+from gearsig.recording import without_condition
+from gearsig.rig import recording_stem
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -19,19 +22,33 @@ LONGEST_NAME = 50  # a letter may take four bytes, and file systems stop at 255
 _RESERVED = {"index", "con", "prn", "aux", "nul"} | {f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10)}
 
 
-def page_names(sources: Iterable[str | Path]) -> tuple[str, ...]:
+_MARK = re.compile(rb'<meta name="gearsig-recording" content="(\w+)">')
+_HEAD_BYTES = 1024
+"""Of a page, where its mark stands."""
+
+
+def page_names(sources: Iterable[str | Path], folder: Path | None = None) -> tuple[str, ...]:
     """Return a safe and unique file name, without ending, for each source, in their order.
 
     Letters, digits, "-", "_" and "." stay; what else may steer a path or a link becomes "-". Two sources that would
-    share a name, also when only case tells them apart, get a number.
+    share a name, also when only case tells them apart, get a number. In a folder that holds pages, a recording keeps
+    the name of its own, which bears its `recording_mark`, and gets none that another page has.
 
     Examples
     --------
     >>> page_names(["a/run 1.csv", "b/run 1.csv", "../../etc/passwd", "index.mat", "…"])
     ('run-1', 'run-1-2', 'passwd', 'index-2', 'recording')
+    >>> page_names(["runs.mat#2", "runs.mat#3", "runs.mat"])
+    ('runs_2', 'runs_3', 'runs')
     """
+    there = {} if folder is None else {page.stem.lower(): (page.stem, _mark_of(page)) for page in folder.glob("*.html")}
     taken = set(_RESERVED)
-    return tuple(_unique(_safe(str(source)), taken) for source in sources)
+    return tuple(_unique(_safe(str(source)), taken, there, recording_mark(source)) for source in sources)
+
+
+def recording_mark(source: str | Path) -> str:
+    """Return what tells a recording's page from those of others of its name: a hash of its whole path."""
+    return hashlib.sha256(str(Path(source).absolute()).encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
 def check_writable(folder: Path) -> None:
@@ -77,19 +94,33 @@ def _unwritable(path: Path, error: OSError) -> InputError:
 
 
 def _safe(source: str) -> str:
-    stem = Path(source.replace("\\", "/")).name
-    for ending in (".gz", Path(stem.removesuffix(".gz")).suffix):
-        stem = stem.removesuffix(ending) or stem
-    return re.sub(r"[^\w.-]+", "-", stem).strip(".-_")[:LONGEST_NAME].strip(".-_") or "recording"
+    file, run = without_condition(Path(source.replace("\\", "/")))
+    ending = "" if run is None else f"_{run}"[:LONGEST_NAME]
+    name = re.sub(r"[^\w.-]+", "-", recording_stem(file.name)).strip(".-_")
+    return (name[: LONGEST_NAME - len(ending)].strip(".-_") or "recording") + ending
 
 
-def _unique(name: str, taken: set[str]) -> str:
-    choice, number = name, 1
-    while choice.lower() in taken:
+def _unique(name: str, taken: set[str], there: Mapping[str, tuple[str, str]], mark: str) -> str:
+    """Return the first free name, or that of the page of this mark; the names `taken` are lower case and grow."""
+    named_alike = re.compile(rf"{re.escape(name)}(-\d+)?", re.IGNORECASE)
+    own = [page for page, of in there.values() if of == mark and named_alike.fullmatch(page)]
+    choice = next((page for page in own if page.lower() not in taken), name)
+    number = 1
+    while choice.lower() in taken or (choice not in own and choice.lower() in there):
         number += 1
         choice = f"{name}-{number}"
     taken.add(choice.lower())
     return choice
+
+
+def _mark_of(page: Path) -> str:
+    """Return the mark that a page bears; empty where it has none, as pages of other makers."""
+    try:
+        with page.open("rb") as file:
+            found = _MARK.search(file.read(_HEAD_BYTES))
+    except OSError:
+        return ""
+    return found[1].decode() if found is not None else ""
 
 
 def render(template: str, **values: Any) -> str:

@@ -19,8 +19,7 @@ from gearsig.errors import RefusalError
 from gearsig.formatting import readable
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
-from gearsig.plot import Captioned, ChartLine, Cursor, LinePanel, Picture, embed, order_cursors, unit_text
-from gearsig.plot import _style as style
+from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed, order_cursors, unit_text
 from gearsig.recording import SI_FACTORS
 from gearsig.report._files import render
 from gearsig.report._methods import fitting_methods, method_pictures
@@ -37,7 +36,7 @@ from gearsig.report._sections import (
     truth_rows,
 )
 from gearsig.severity import CrackEstimate
-from gearsig.spectra import Spectrum
+from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 CLAIMED = (Kind.FAULT, Kind.SUSPICION, Kind.DATA_PROBLEM)
 """Kinds of findings that are read first; the others are a click away."""
@@ -99,18 +98,21 @@ def mesh_windows(analysis: Analysis, spectrum: Spectrum) -> list[tuple[str, floa
 def marked_positions(
     analysis: Analysis, spectrum: Spectrum, channel: str, *, of_bearings: bool = False
 ) -> tuple[float, ...]:
-    """Return where faults and suspicions of a channel lie on a spectrum's axis.
+    """Return where faults and suspicions of a channel lie on a spectrum's axis, faults first.
 
-    Bearing findings live in the envelope spectrum, all others in the spectrum itself.
+    Bearing findings live in the envelope spectrum, all others in the spectrum itself. What has changed at a part's
+    kinematic order is marked at the order that a finding measured for it, if one did.
     """
-    return tuple(
-        position
-        for finding in analysis.findings
-        if finding.kind in (Kind.FAULT, Kind.SUSPICION)
-        and bool(finding.where.bearing) == of_bearings
-        and (not finding.where.channels or channel in finding.where.channels)
-        and (position := _position(analysis, spectrum, finding.where)) is not None
-    )
+    positions: list[float] = []
+    for finding in sorted(analysis.findings, key=lambda f: (f.kind is not Kind.FAULT, f.code == CHANGED)):
+        if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or bool(finding.where.bearing) != of_bearings:
+            continue
+        if finding.where.channels and channel not in finding.where.channels:
+            continue
+        position = _position(analysis, spectrum, finding.where)
+        if position is not None and all(abs(position / known - 1.0) > LARGEST_SLIP for known in positions):
+            positions.append(position)
+    return tuple(positions)
 
 
 def _position(analysis: Analysis, spectrum: Spectrum, where: Where) -> float | None:
@@ -221,8 +223,8 @@ def crack_picture(analysis: Analysis) -> Picture | None:
     lines = [ChartLine(angle, np.roll(now, -turned), "now")]
     if then is not None:
         healthy = np.roll(then, -turned)
-        lines = [ChartLine(angle, healthy, "reference", style.QUIET), *lines]
-        lines.append(ChartLine(angle, lines[1].y - healthy, "change", style.FAULT))
+        lines = [ChartLine(angle, healthy, "reference", QUIET), *lines]
+        lines.append(ChartLine(angle, lines[1].y - healthy, "change", FAULT))
     reach = min(0.5, 8.0 / teeth)  # of a revolution: the blow and a few healthy teeth on either side
     beside = " beside the reference" if then is not None else ""
     caption = (
@@ -624,6 +626,7 @@ def write_page(
     index: str = "",
     date: datetime | None = None,
     methods: Sequence[str] | None = None,
+    mark: str = "",
 ) -> Path:
     """Write the report of one recording: verdict, findings, machine, figures, indicators, provenance.
 
@@ -642,13 +645,16 @@ def write_page(
         Of the report; None: now.
     methods : sequence of str or None
         Further methods that the page shows; None: those that the recording calls for.
+    mark : str
+        By which a folder of pages knows whose page it is, see `recording_mark`; empty: none.
 
     Returns
     -------
     Path
         Of the page.
     """
-    return write_text(Path(path), page_html(analysis, command=command, index=index, date=date, methods=methods))
+    html = page_html(analysis, command=command, index=index, date=date, methods=methods, mark=mark)
+    return write_text(Path(path), html)
 
 
 def page_html(
@@ -658,6 +664,7 @@ def page_html(
     index: str = "",
     date: datetime | None = None,
     methods: Sequence[str] | None = None,
+    mark: str = "",
 ) -> str:
     """Return the page that `write_page` writes."""
     parts = page_parts(analysis, command=command, date=date or datetime.now().astimezone(), methods=methods)
@@ -668,6 +675,7 @@ def page_html(
         tables=indicator_tables(analysis.indicators, changes(analysis)),
         truth=truth_rows(analysis.recording.truth),
         index=index,
+        mark=mark,
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from gearsig import __version__
 from gearsig.angle import ShaftAngle
+from gearsig.checks import instance_of
 from gearsig.diagnosis import (
     CHANGED,
     Analysis,
@@ -345,6 +346,7 @@ _CLAIMS = (Kind.FAULT, Kind.SUSPICION)
 
 def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
     """Return the verdict and the findings, most important first, in plain text."""
+    instance_of(analysis, Analysis, "analysis", remedy="gearsig.analyze(recording) makes one")
     recording = analysis.recording
     machine = (analysis.rig.name or "rig without a name") if analysis.rig is not None else "no rig file"
     size = f"{len(recording.channels)} channel(s), {recording.duration_s:.6g} s at {recording.sampling_rate_hz:.6g} Hz"

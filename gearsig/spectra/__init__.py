@@ -7,7 +7,7 @@ from gearsig.spectra._amplitude import (
     power_density,
     spectrum_of_blocks,
 )
-from gearsig.spectra._bands import BandChoice, coherence_band, compare_bands
+from gearsig.spectra._bands import LARGEST_SLIP, BandChoice, coherence_band, compare_bands
 from gearsig.spectra._cepstrum import cepstrum, lifter_families
 from gearsig.spectra._coherence import (
     EnhancedEnvelope,
@@ -49,6 +49,7 @@ from gearsig.spectra._types import (
     Spectrum,
     array_rate_hz,
     block_powers,
+    check_signal,
     checked_signal,
     fast_length,
     make_window,
@@ -63,6 +64,7 @@ from gearsig.spectra._types import (
 
 __all__ = [
     "BATCH_SAMPLES",
+    "LARGEST_SLIP",
     "WINDOW_NAMES",
     "BandCandidate",
     "BandChoice",
@@ -84,6 +86,7 @@ __all__ = [
     "band_envelope",
     "block_powers",
     "cepstrum",
+    "check_signal",
     "checked_signal",
     "coherence_band",
     "compare_bands",

@@ -21,6 +21,7 @@ from gearsig.diagnosis import (
 )
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
+from gearsig.report import marked_positions
 from gearsig.rig import write_rig
 from tests.diagnosis.machines import GOOD, RIG, codes, finding, good_analysis, motor, record, teeth
 from tests.kinematic.model import BearingFault
@@ -60,6 +61,22 @@ def test_the_reference_is_the_earlier_record_of_trend_indicators(louder: Analysi
         for key, kurtosis in alone.items():
             assert now[name, *key] == pytest.approx(16.0 / 2.5**2 * kurtosis)
             assert now[f"{name}*", *key] == pytest.approx(16.0 * kurtosis)
+
+
+def test_of_bearings_of_one_size_the_damage_is_said_and_marked_once() -> None:
+    """It may be in either, which the fault says; its order has changed since the reference in both."""
+    front = next(bearing for bearing in RIG.bearings if bearing.name == "front")
+    rig = replace(RIG, bearings=(*RIG.bearings, replace(front, name="rear")))
+    damaged = replace(GOOD, bearing_faults=(BearingFault("front", "outer", 12.0, 3000.0, 0.04, 0.01, 0.2),))
+    analysis = analyze(replace(record(damaged), rig=rig), reference=replace(record(seed=1), rig=rig))
+    fault = finding(analysis, "bearing-outer-race")
+    assert "front" in fault.title
+    assert "rear" in fault.title
+    assert "bearing-risen" not in codes(analysis, Kind.SUSPICION)
+    channel = next(c for c in analysis.channels if c.channel in fault.where.channels)
+    assert channel.envelope_spectrum is not None
+    marked = marked_positions(analysis, channel.envelope_spectrum, channel.channel, of_bearings=True)
+    assert marked == pytest.approx([fault.where.order])
 
 
 def test_a_reference_that_cannot_be_analysed_is_not_compared_and_the_verdict_says_why() -> None:

@@ -14,7 +14,15 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.fleet import FilePattern, TrendSettings, date_in_name, find_recordings, open_fleet, origins
+from gearsig.fleet import (
+    FilePattern,
+    TrendSettings,
+    date_in_name,
+    find_recordings,
+    open_fleet,
+    origins,
+    passed_over_text,
+)
 from tests.fleet.recordings import PATTERN, write_recording_file
 
 
@@ -207,6 +215,55 @@ def test_what_is_no_pattern_is_refused(pattern):
 def test_a_date_that_is_none_does_not_match():
     assert FilePattern("{date:%Y%m%d}.csv").match(Path("20260231.csv")) is None
     assert date_in_name("x_20260231_y") is None
+
+
+def test_what_a_pattern_leaves_out_is_said(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0, 1.1])
+    for name in ("DE_2026-02-01.csv", "DE_20261301.csv"):
+        (data / "pump 1" / name).write_text("")
+    passed_over = []
+    assert len(origins([data], pattern=PATTERN, on_passed_over=passed_over.append)) == 2
+    reasons = {each.path.name: each.reason for each in passed_over}
+    no_date = "20261301 is no date in the form %Y%m%d"
+    assert reasons == {"DE_2026-02-01.csv": "does not match the pattern", "DE_20261301.csv": no_date}
+    assert passed_over_text(passed_over * 2) == (
+        "4 recordings are passed over: pump 1/DE_2026-02-01.csv (does not match the pattern); pump 1/DE_20261301.csv "
+        f"({no_date}); pump 1/DE_2026-02-01.csv (does not match the pattern); and 1 more"
+    )
+    with pytest.raises(InputError, match=r"no recordings that match .*; 1 recording is passed over: pump 1/DE_2026"):
+        origins([data / "pump 1" / "DE_20261301.csv"], pattern=PATTERN)
+    added = open_fleet(tmp_path / "store", create=True).add(data, pattern=PATTERN, n_processes=1)
+    assert (len(added.added), {each.path.name for each in added.passed_over}) == (2, set(reasons))
+
+
+def test_channels_that_bear_a_records_number_are_one_series(tmp_path):
+    rng, folder = np.random.default_rng(0), tmp_path / "data" / "motor"
+    for number, day in ((118, 1), (130, 2), (209, 3)):
+        path = folder / f"DE_2026010{day}.csv"
+        write_recording_file(path, 1.0, rng)
+        path.write_text(path.read_text().replace("a1 (m/s^2)", f"X{number}_DE_time (m/s^2)", 1))
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(tmp_path / "data", pattern=PATTERN, n_processes=1)
+    (trend,) = fleet.trend("motor", "rms", computed_on="raw")
+    assert (trend.channel, len(trend.table)) == ("X_DE_time", 3)
+    assert repr(trend) == "Trend 'rms' of motor DE X_DE_time: 3 recordings, no limits yet"
+
+
+def test_what_is_counted_once_is_in_the_singular(make_recordings, tmp_path):
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(make_recordings("pump 1", [1.0]), pattern=PATTERN, n_processes=1)
+    assert repr(fleet).endswith("store: 1 recording of 1 machine at 1 measuring point")
+    assert "1 recording, no limits yet" in repr(fleet.trend("pump 1", "rms")[0])
+
+
+@pytest.mark.parametrize("asked", ["RMS", "rsm"])
+def test_a_misspelt_indicator_is_answered_with_the_closest(make_recordings, tmp_path, asked):
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(make_recordings("pump 1", [1.0]), pattern=PATTERN, n_processes=1)
+    with pytest.raises(InputError, match=r"did you mean rms\?"):
+        fleet.trend("pump 1", asked)
+    with pytest.raises(InputError, match=r"no rms of channel 'a2' \(allowed: a1\)"):
+        fleet.trend("pump 1", "rms", channel="a2")
 
 
 def test_without_a_pattern_folders_rigs_and_names_say_it(tmp_path):

@@ -108,6 +108,39 @@ def test_two_watches_and_a_restart_take_each_recording_once(tmp_path):
     assert third.events == []
 
 
+def test_files_that_the_pattern_leaves_out_are_said_once(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0])
+    (data / "pump 1" / "DE_2026-02-01.csv").write_text("")
+    watching = Watching(tmp_path / "store", data)
+    try:
+        watching.wait_for(2)
+        (data / "pump 1" / "DE_20261301.csv").write_text("")
+        watching.wait_for(3)
+        time.sleep(0.2)
+    finally:
+        watching.stop()
+    assert sorted(event.kind for event in watching.events) == ["added", "passed over", "passed over"]
+    said = [event.as_dict() for event in watching.events if event.kind == "passed over"]
+    assert "1 recording is passed over: pump 1/DE_2026-02-01.csv (does not match the pattern)" in said[0]["text"]
+    assert [(Path(each["file"]).name, each["reason"]) for each in said[1]["passed_over"]] == [
+        ("DE_20261301.csv", "20261301 is no date in the form %Y%m%d")
+    ]
+
+
+def test_add_says_what_the_pattern_leaves_out(make_recordings, tmp_path):
+    data = make_recordings("pump 1", [1.0])
+    (data / "pump 1" / "DE_2026-02-01.csv").write_text("")
+    words = ["fleet", "add", str(data), "--store", str(tmp_path / "store"), "--pattern", PATTERN, "--jobs", "1"]
+    for options in (["--dry-run"], ["--dry-run", "--json"], ["--json"], []):
+        done = CliRunner().invoke(app, [*words, *options])
+        assert "1 recording is passed over: pump 1/DE_2026-02-01.csv (does not match the pattern)" in done.stderr
+        if "--json" in options:
+            passed_over = json.loads(done.stdout)["passed_over"]
+            assert [(Path(each["file"]).name, each["reason"]) for each in passed_over] == [
+                ("DE_2026-02-01.csv", "does not match the pattern")
+            ]
+
+
 def test_commands_show_tables_and_json(make_recordings, tmp_path):
     data = make_recordings("pump 1", [1.0, 1.1])
     (data / "pump 1" / "DE_20260109.csv").write_text("no recording")

@@ -42,6 +42,18 @@ def test_mesh_keeps_its_place_against_a_sideband():
     assert label is not None
 
 
+def test_a_label_stands_aside_for_a_line_that_waits_for_its_own():
+    lines = ("bearing", "BPFO", 3.245), ("bearing", "BPFI", 4.755), *(("shaft", f"{k}× shaft", k) for k in (1, 2, 3))
+    cursors = [Cursor(float(at), kind, label, at if kind == "shaft" else 1) for kind, label, at in lines]
+    assert all(label is not None for _, label in place(cursors, (0.0, 15.7), 7.95))
+
+
+def test_no_row_of_labels_is_empty():
+    sides = [Cursor(50.0 + k * 0.5, "sideband", "+1× input", abs(k)) for k in (-2, -1, 1, 2)]
+    placed = place([Cursor(50.0, "mesh", "1× mesh"), *sides], (0.0, 100.0), 7.95)
+    assert {label.row for _, label in placed if label is not None} == set(range(n_rows(placed)))
+
+
 def test_no_cursors_use_no_rows():
     assert n_rows(place([], (0.0, 1.0), 8.0)) == 0
 

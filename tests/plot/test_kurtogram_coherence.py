@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.plot import coherence_figure, kurtogram_figure
+from gearsig.plot import CURSOR_COLOURS, Cursor, coherence_figure, kurtogram_figure
 from gearsig.spectra import enhanced_envelope, kurtogram, spectral_coherence
 
 FS = 10_000.0
@@ -47,8 +47,11 @@ def test_kurtogram_says_what_speaks_against_its_band():
 @pytest.mark.parametrize("n", [6001, 60_000])
 def test_coherence_draws_map_mean_and_level(n):
     c = spectral_coherence(_signal(n), FS, highest_alpha_hz=200.0, n_bands=16, source="a$1")
-    figure = coherence_figure(c, marked=(31.0,))
-    assert {"spectral coherence of a$1", "cyclic frequency (Hz)", "carrier (Hz)"} <= _texts(figure)
+    figure = coherence_figure(c, cursors=(Cursor(31.0, "shaft", "1× input"), Cursor(93.0, "bearing", "BPFO")))
+    assert {"spectral coherence of a$1", "cyclic frequency (Hz)", "carrier (Hz)", "1× input", "BPFO"} <= _texts(figure)
+    for axes in figure.axes[:2]:  # in both panels, each kind in its colour
+        colours = {line.get_color() for line in axes.lines if len(set(line.get_xdata())) == 1}
+        assert colours >= {CURSOR_COLOURS["shaft"], CURSOR_COLOURS["bearing"]}
     drawn = figure.axes[1].collections[0].get_array()
     assert drawn.max() == pytest.approx(c.coherence_squared.max())
     assert drawn.shape[0] == len(c.frequency_hz)

@@ -118,6 +118,31 @@ def test_files_of_one_name_are_told_apart(tmp_path, monkeypatch):
     assert [entry.page for entry in result.entries] == ["run.html", "run-2.html"]
 
 
+def test_a_later_report_overwrites_no_page_of_another_recording(recordings, tmp_path):
+    out, other = tmp_path / "out", tmp_path / "other" / "one.csv"
+    other.parent.mkdir()
+    other.write_bytes(recordings[1].read_bytes())
+    report_many([recordings[0]], out, n_processes=1)
+    first = (out / "one.html").read_bytes()
+    assert [entry.page for entry in report_many([other], out, n_processes=1).entries] == ["one-2.html"]
+    assert (out / "one.html").read_bytes() == first
+    again = report_many([other, recordings[0]], out, n_processes=1)
+    assert [entry.page for entry in again.entries] == ["one-2.html", "one.html"]
+
+
+def test_runs_of_one_file_have_pages_of_their_own(tmp_path):
+    from scipy.io import savemat
+
+    rng, out = np.random.default_rng(3), tmp_path / "out"
+    savemat(tmp_path / "runs.mat", {"runs": rng.normal(size=(4096, 3)), "fs": RATE_HZ})
+    for run in (2, 3):
+        made = report_many([tmp_path / f"runs.mat#{run}"], out, n_processes=1, sampling_rate_hz=RATE_HZ)
+        assert [entry.page for entry in made.entries] == [f"runs_{run}.html"]
+    both = [tmp_path / "runs.mat#3", tmp_path / "runs.mat#2"]
+    assert report_many(both, out, n_processes=1, sampling_rate_hz=RATE_HZ).n_found == 2
+    assert {path.name for path in out.glob("runs*.html")} == {"runs_2.html", "runs_3.html"}
+
+
 def test_an_interruption_leaves_whole_pages_only(recordings, tmp_path, monkeypatch):
     def interrupted(job):
         if job.path.name == "two.csv":

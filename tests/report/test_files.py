@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from gearsig.cache import write_text
 from gearsig.errors import InputError
-from gearsig.report import check_writable, page_names
+from gearsig.report import check_writable, page_names, recording_mark
 
 
 @given(st.lists(st.text(max_size=300), max_size=20))
@@ -28,6 +28,28 @@ def test_name_of_the_index_and_of_devices_are_not_taken():
 
 def test_double_endings_go():
     assert page_names(["run.csv.gz", "run.csv", "RUN.mat"]) == ("run", "run-2", "RUN-3")
+
+
+def test_runs_of_one_file_keep_their_numbers():
+    assert page_names(["runs.mat#2", "runs.mat#3", "runs.mat"]) == ("runs_2", "runs_3", "runs")
+    assert page_names(["runs.mat#3"]) == ("runs_3",)
+    long = page_names([f"{'x' * 80}.mat#2", f"{'x' * 80}.mat#3"])
+    assert [name[-3:] for name in long] == ["x_2", "x_3"]
+
+
+def test_a_recording_keeps_its_page_and_gets_none_of_another(tmp_path):
+    def page(name, mark):
+        head = f'<meta name="gearsig-recording" content="{mark}">' if mark else ""
+        (tmp_path / f"{name}.html").write_text(f"<!doctype html><head>{head}</head>")
+
+    page("run", recording_mark("a/run.csv"))
+    page("run-2", recording_mark("b/run.csv"))
+    page("notes", "")
+    page("other", recording_mark("c/run.csv"))
+    assert page_names(["b/run.csv"], tmp_path) == ("run-2",)
+    assert page_names(["c/RUN.csv", "b/run.csv", "a/run.csv"], tmp_path) == ("RUN-3", "run-2", "run")
+    assert page_names(["c/run.csv", "notes.csv"], tmp_path) == ("run-3", "notes-2")
+    assert page_names(["b/run.csv"], tmp_path / "absent") == ("run",)
 
 
 def test_a_failed_write_leaves_what_was_there(tmp_path, monkeypatch):

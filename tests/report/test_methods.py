@@ -14,7 +14,7 @@ from gearsig.methods import METHODS, apply_method
 from gearsig.prepared import prepare
 from gearsig.recording import Channel, Recording, write_recording
 from gearsig.report import fitting_methods, named_method, write_answer
-from gearsig.rig import ConstantSpeed, GearPair, Rig, Shaft
+from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft
 
 RATE_HZ, N = 8192.0, 16384
 T = np.arange(N) / RATE_HZ
@@ -52,6 +52,36 @@ def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> N
             assert file["matrices"][matrix].ndim == 2
     about = json.loads(numbers.read_text(encoding="utf-8"))
     assert (about["method"], about["channel"]) == (name, "a1")
+
+
+def test_the_kurtograms_outline_frames_the_row_of_its_band() -> None:
+    answer = apply_method("kurtogram", recording())
+    panel, (low_hz, high_hz) = answer.panels[0], answer.numbers["band_hz"]
+    assert (panel.y, panel.logarithmic) == ("number of bands", True)
+    x, y = panel.lines[0].x, panel.lines[0].y
+    assert (x.min(), x.max()) == pytest.approx((low_hz, high_hz))
+    # Lines of the map are drawn equally high, the first from the first position upwards.
+    n = len(panel.positions)
+    share = (np.arange(n) + 0.5) / n
+    drawn_at = panel.positions[0] * (panel.positions[-1] / panel.positions[0]) ** share
+    across = (panel.at > low_hz) & (panel.at < high_hz)
+    inside = panel.levels[(drawn_at > y.min()) & (drawn_at < y.max())][:, across]
+    assert inside.size
+    assert inside == pytest.approx(np.full(inside.shape, answer.numbers["kurtosis"]))
+    for beside in (panel.levels[drawn_at < y.min()][-1, across], panel.levels[drawn_at > y.max()][0, across]):
+        assert not np.allclose(beside, answer.numbers["kurtosis"])
+
+
+def test_an_envelope_has_plain_numbers_and_the_lines_of_bearings() -> None:
+    rig = replace(RIG, bearings=(Bearing("drive end", "input", bearing="6205"),))
+    answer = apply_method("envelope", replace(recording(), rig=rig), band_hz=(1000.4, 4000.0))
+    assert answer.caption == "spectrum of the envelope of 1000 to 4000 Hz"
+    fast = replace(recording(), sampling_rate_hz=65536.0, rig=None)
+    answer = apply_method("envelope", fast, band_hz=(12_207.03, 16_276.04))
+    assert answer.caption == "spectrum of the envelope of 12207 to 16276 Hz"
+    labels = [c.label for c in apply_method("envelope", replace(recording(), rig=rig)).panels[0].cursors]
+    assert {"BPFO", "2× BPFO", "3× BPFO", "1× input"} <= set(labels)
+    assert not any("mesh" in label for label in labels)
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from datetime import UTC, datetime
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import pytest
 
@@ -42,6 +43,18 @@ def parsed(html):
     structure.close()
     assert structure.open == []
     return structure
+
+
+def test_text_of_rings_can_be_read_on_a4(html):
+    rings = [svg for svg in re.findall(r"<svg.*?</svg>", html, re.DOTALL) if 'viewBox="0 0 400 400"' in svg]
+    assert rings
+    smallest = min(float(size) for svg in rings for size in re.findall(r'<text[^>]*font-size="([\d.]+)"', svg))
+    template = files("gearsig.report").joinpath("templates", "page.typ").read_text(encoding="utf-8")
+    beside_mm = float(re.findall(r"columns: \(1fr, (\d+)mm\), gutter", template)[0])
+    [(columns, gutter_mm)] = re.findall(r"columns: \(([1fr, ]+)\), gutter: (\d+)mm, \.\.group\.small", template)
+    n = columns.count("1fr")
+    for width_mm in (beside_mm, (210 - 2 * 16 - (n - 1) * float(gutter_mm)) / n):
+        assert smallest * width_mm / 25.4 * 72 / 400 >= 7.0  # pt
 
 
 @pytest.fixture(scope="module")
