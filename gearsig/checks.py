@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from contextlib import suppress
+from os import PathLike
+from pathlib import PurePath
+from types import UnionType
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +15,12 @@ from numpy.typing import NDArray
 from gearsig.errors import InputError
 
 FloatArray = NDArray[np.floating[Any]]
+T = TypeVar("T")
+
+
+def number(value: float, name: str, unit: str = "", *, remedy: str = "") -> float:
+    """Return `value` as float if it is finite."""
+    return _number(value, name, unit, remedy=remedy)
 
 
 def positive(value: float, name: str, unit: str = "", *, remedy: str = "") -> float:
@@ -32,6 +42,71 @@ def within(value: float, name: str, low: float, high: float, unit: str = "", *, 
     return number
 
 
+def instance_of(value: T, kinds: type | UnionType, name: str, *, remedy: str = "") -> T:
+    """Return `value` as it is if it is of one of the kinds.
+
+    Parameters
+    ----------
+    value : object
+    kinds : type or union of types
+        With None in it, the value may be left out.
+    name : str
+    remedy : str
+
+    Examples
+    --------
+    >>> instance_of(5, int | None, "n"), instance_of(None, int | None, "n")
+    (5, None)
+    """
+    if not isinstance(value, kinds):
+        raise InputError(f"{name} is {short(value)}", allowed=", ".join(_names(kinds)), remedy=remedy)
+    return value
+
+
+def _names(kinds: type | UnionType) -> list[str]:
+    """Return what users call kinds of values."""
+    plain = {type(None): "None", str: "text", np.ndarray: "array", PathLike: "path"}
+    return [plain.get(kind, kind.__name__) for kind in get_args(kinds) or (kinds,)]
+
+
+def listed(values: Iterable[T], name: str, of: type | UnionType, *, remedy: str = "") -> tuple[T, ...]:
+    """Return several values as a tuple if each is of one of the kinds; a text or a single value is not several.
+
+    Kind `object`: what each must be is for the caller to say.
+
+    Examples
+    --------
+    >>> listed(["a1", "a2"], "channels", str)
+    ('a1', 'a2')
+    """
+    kinds = "" if of is object else f" of {' or '.join(_names(of))}"
+    several = _several(values, name, f"a list or tuple{kinds}", of, remedy)
+    for place, value in enumerate(several):
+        instance_of(value, of, f"{name}[{place}]", remedy=remedy)
+    return several
+
+
+def listed_numbers(values: Iterable[float], name: str, *, remedy: str = "") -> tuple[float, ...]:
+    """Return several numbers as floats if each is finite; a text or a single number is not several.
+
+    Examples
+    --------
+    >>> listed_numbers([1, 2.5], "orders")
+    (1.0, 2.5)
+    """
+    several = _several(values, name, "a list, tuple or array of numbers", int | float, remedy)
+    return tuple(_number(value, f"{name}[{place}]", "", remedy=remedy) for place, value in enumerate(several))
+
+
+def _several(values: Iterable[T], name: str, allowed: str, of: type | UnionType, remedy: str) -> tuple[T, ...]:
+    if not isinstance(values, str | bytes):  # which would be taken letter by letter
+        with suppress(TypeError):
+            return tuple(values)
+    if not remedy and isinstance(values, of):
+        remedy = f"write [{short(values)}]" if isinstance(values, _SHOWN) else "put it into a list"
+    raise InputError(f"{name} is {short(values)}", allowed=allowed, remedy=remedy)
+
+
 def count(value: int, name: str, *, minimum: int = 1, remedy: str = "") -> int:
     """Return `value` as int if it is a whole number of at least `minimum`."""
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
@@ -48,7 +123,7 @@ def one_of(value: str, name: str, allowed: Iterable[str]) -> str:
 def known_name(name: str, names: Iterable[str], complaint: str, *, where: str = "", remedy: str = "") -> str:
     """Return `name` if it is among `names`; else raise with the complaint, all names, and the closest or the remedy."""
     choices = tuple(names)
-    if name not in choices:
+    if not isinstance(name, str) or name not in choices:
         shown = choices if len(choices) <= 30 else (*choices[:30], "…")
         hint = closest_match_hint(name, choices) or remedy
         raise InputError(complaint, where=where, allowed=", ".join(shown) or "none", remedy=hint)
@@ -56,13 +131,24 @@ def known_name(name: str, names: Iterable[str], complaint: str, *, where: str = 
 
 
 def short(value: object) -> str:
-    """Return a value as an error shows it, whoever wrote it: 80 characters at most.
+    """Return a value as an error shows it, whoever wrote it: 80 characters at most; what is long by its kind.
 
     Examples
     --------
     >>> short(5), len(short("x" * 5000)), short(10**5000)
     ('5', 80, 'a number of thousands of digits')
+    >>> short(np.zeros((2, 9))), short([1.0] * 20), short(object())
+    ('an array of shape (2, 9)', 'a list of 20', 'an object')
     """
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape}"
+    if isinstance(value, PurePath):
+        value = str(value)
+    if isinstance(value, list | tuple) and len(value) > 8:
+        return f"a {type(value).__name__} of {len(value)}"
+    if not isinstance(value, _SHOWN):
+        kind = type(value).__name__
+        return f"{'an' if kind[0] in 'AEIOUaeiou' else 'a'} {kind}"
     try:
         text = repr(value)
     except ValueError:
@@ -70,28 +156,41 @@ def short(value: object) -> str:
     return text if len(text) <= 80 else f"{text[:79]}…"
 
 
+_NO_NUMBERS = (str, bytes, bool, np.bool_, np.complexfloating)
+_SHOWN = (str, bytes, int, float, complex, np.generic, type(None), list, tuple, dict, type)
+"""Kinds of values that say in a few words what they are."""
+
+
 def closest_match_hint(value: object, choices: Iterable[str]) -> str:
-    """Return "did you mean …?" for a misspelt name, or nothing.
+    """Return "did you mean …?" for a misspelt name, or nothing; upper and lower case are the same to it.
 
     Examples
     --------
-    >>> closest_match_hint("teth", ["teeth", "module_mm"])
-    'did you mean teeth?'
+    >>> closest_match_hint("teth", ["teeth", "module_mm"]), closest_match_hint("RMS", ["rms", "peak"])
+    ('did you mean teeth?', 'did you mean rms?')
     """
     from difflib import get_close_matches
 
-    matches = get_close_matches(str(value)[:200], list(choices), n=1)
-    return f"did you mean {matches[0]}?" if matches else ""
+    named = {choice.casefold(): choice for choice in choices}
+    matches = get_close_matches(str(value)[:200].casefold(), list(named), n=1)
+    return f"did you mean {named[matches[0]]}?" if matches else ""
 
 
 def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> FloatArray:
     """Return a read-only float array of `ndim` dimensions; float32 and float64 are kept, others become float64."""
-    array: FloatArray = np.asarray(values)
-    if array.dtype not in (np.float32, np.float64):
-        try:
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        masked = int(np.sum(np.ma.getmaskarray(values)))
+        remedy = "fill or cut out what is masked, knowingly"
+        raise InputError(f"{name} holds {masked} masked value(s)", allowed="an array of numbers", remedy=remedy)
+    try:
+        array: FloatArray = np.asarray(values)
+        if array.dtype not in (np.float32, np.float64):
+            _check_real(array, name)
             array = array.astype(np.float64)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{name} does not hold numbers ({error})", allowed="an array of numbers") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{name} does not hold numbers ({error})", allowed="an array of numbers") from error
     if array.ndim != ndim:
         raise InputError(f"{name} has shape {array.shape}", allowed=f"an array of {ndim} dimension(s)")
     if finite and not _is_finite(array):
@@ -103,6 +202,17 @@ def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> F
             remedy="cut out the gap or interpolate it before the analysis, knowingly",
         )
     return read_only(array)
+
+
+def _check_real(array: NDArray[Any], name: str) -> None:
+    """Raise on values that numbers could be made of in silence: half of a complex one, a text, a time."""
+    if array.dtype.kind == "c":
+        remedy = "take the real part, the magnitude or each part by itself, knowingly"
+        raise InputError(f"{name} holds complex numbers", allowed="real numbers", remedy=remedy)
+    if array.dtype.kind in "USmM":
+        kind = "times" if array.dtype.kind in "mM" else "text"
+        shown = f"{name} is {short(array.item())}" if array.ndim == 0 else f"{name} holds {kind}"
+        raise InputError(shown, allowed="an array of numbers", remedy="convert it to numbers first")
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -136,7 +246,7 @@ def _is_finite(array: FloatArray) -> bool:
 
 
 def _number(
-    value: float,
+    value: Any,
     name: str,
     unit: str,
     *,
@@ -144,10 +254,13 @@ def _number(
     exclusive: bool = False,
     remedy: str = "",
 ) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{name} is {short(value)}", allowed="a number", remedy=remedy) from None
+    number = None
+    # What float() would take as well, a part of some of them lost.
+    if not isinstance(value, _NO_NUMBERS) and not (isinstance(value, np.ndarray) and value.ndim > 0):
+        with suppress(TypeError, ValueError, OverflowError):
+            number = float(value)
+    if number is None:
+        raise InputError(f"{name} is {short(value)}", allowed="a number", remedy=remedy)
     if not np.isfinite(number) or number < minimum or (exclusive and number == minimum):
         sign = ">" if exclusive else ">="
         allowed = f"a finite number {sign} {minimum:g}" if minimum > -np.inf else "a finite number"

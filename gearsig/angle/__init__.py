@@ -13,7 +13,7 @@ from gearsig.angle._resample import (
 )
 from gearsig.angle._source import constant_speed_angle, find_shaft_angle, tachometer_edges
 from gearsig.angle._tachless import CombElsewhere, comb_elsewhere, estimate_shaft_angle, refine_by_phase
-from gearsig.angle._types import AngleSignal, ShaftAngle
+from gearsig.angle._types import AngleSignal, ShaftAngle, check_shaft_angle
 
 __all__ = [
     "PASSBAND",
@@ -21,6 +21,7 @@ __all__ = [
     "AngleSignal",
     "CombElsewhere",
     "ShaftAngle",
+    "check_shaft_angle",
     "clock_tick",
     "comb_elsewhere",
     "constant_speed_angle",

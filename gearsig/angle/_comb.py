@@ -13,10 +13,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.angle._types import ShaftAngle
-from gearsig.checks import FloatArray, positive
+from gearsig.checks import FloatArray, listed, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording import Recording
-from gearsig.rig import Rig, shaft_ratios
+from gearsig.recording import Recording, check_recording
+from gearsig.rig import Rig, check_rig, shaft_ratios
 
 N_MESH_HARMONICS = 5
 N_SIDEBANDS = 2
@@ -457,13 +457,15 @@ def search_of(
     speed_range_rpm: tuple[float, float] | None,
 ) -> SpeedSearch:
     """Check what the search rests on: teeth, living channels, a range of speeds with enough revolutions."""
+    check_recording(recording)
+    check_rig(rig, needed=True)
     comb = comb_of_rig(rig)
     if comb is None:
         raise RefusalError(
             "no mesh order is known: the speed cannot be read from mesh lines",
             remedy="give the teeth of at least one gear on a shaft whose ratio is known, or a speed source",
         )
-    names = tuple(channels) if channels is not None else recording.vibration_names()
+    names = listed(channels, "channels", str) if channels is not None else recording.vibration_names()
     rows = [recording.index(name) for name in names]
     alive = [i for i in rows if float(np.ptp(recording.samples[i])) > 0.0]
     if not alive:

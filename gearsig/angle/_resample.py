@@ -11,10 +11,10 @@ from functools import lru_cache
 import numpy as np
 from numba import config, njit
 
-from gearsig.angle._types import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, count, positive, read_only
+from gearsig.angle._types import AngleSignal, ShaftAngle, check_shaft_angle
+from gearsig.checks import FloatArray, count, listed, positive, read_only
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording import Recording
+from gearsig.recording import Recording, check_recording
 
 # Bandlimited interpolation at arbitrary times, and with a lower cut-off where the result is sampled more coarsely.
 
@@ -430,7 +430,9 @@ def resample_to_angle(
     -----
     Not for statistics of amplitudes at a standstill: a standing shaft has no samples here.
     """
-    names = tuple(channels) if channels is not None else recording.vibration_names()
+    check_recording(recording)
+    check_shaft_angle(shaft_angle)
+    names = listed(channels, "channels", str) if channels is not None else recording.vibration_names()
     rows = [recording.index(name) for name in names]
     if not rows:
         raise InputError("there is no vibration channel to resample", allowed=", ".join(recording.channel_names))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import assert_never
 
 import numpy as np
 
@@ -12,8 +13,17 @@ from gearsig.angle._tachless import estimate_shaft_angle
 from gearsig.angle._types import ShaftAngle
 from gearsig.checks import not_negative, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording import Recording
-from gearsig.rig import ConstantSpeed, EncoderChannel, PulseTimes, Rig, SpeedChannel, SpeedSource, TachometerChannel
+from gearsig.recording import Recording, check_recording
+from gearsig.rig import (
+    ConstantSpeed,
+    EncoderChannel,
+    PulseTimes,
+    Rig,
+    SpeedChannel,
+    SpeedSource,
+    TachometerChannel,
+    check_rig,
+)
 
 
 def find_shaft_angle(recording: Recording, rig: Rig | None = None) -> ShaftAngle:
@@ -40,6 +50,8 @@ def find_shaft_angle(recording: Recording, rig: Rig | None = None) -> ShaftAngle
     RefusalError
         If the machine is at rest or the source does not tell the speed.
     """
+    check_recording(recording)
+    check_rig(rig)
     rig = rig if rig is not None else recording.rig
     source = recording.speed if recording.speed is not None else (rig.speed if rig is not None else None)
     if source is not None:
@@ -71,6 +83,8 @@ def _from_source(recording: Recording, source: SpeedSource) -> ShaftAngle:
             return encoder_angle(values, rate, source.units_per_revolution, wraps=source.wraps)
         case SpeedChannel():
             return speed_channel_angle(recording.values(source.channel), rate, source.rpm_per_unit)
+        case _:  # neither a Recording nor a Rig takes another
+            assert_never(source)
 
 
 def tachometer_edges(recording: Recording, source: TachometerChannel) -> PulseEdges:

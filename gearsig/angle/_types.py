@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, frozen_array, known_name, positive
+from gearsig.checks import FloatArray, frozen_array, instance_of, known_name, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
 
@@ -139,6 +139,13 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
             ends = np.where(t < inside, self.speed_rev_per_s[0], self.speed_rev_per_s[-1])
             result = result + (t - inside) * ends
         return result
+
+
+def check_shaft_angle(value: object, name: str = "shaft_angle") -> None:
+    """Raise unless the value is a shaft's angle; a number may be meant as its speed."""
+    is_number = isinstance(value, int | float)
+    remedy = "give a constant speed as speed_rpm" if is_number else "gearsig.find_shaft_angle(recording) finds one"
+    instance_of(value, ShaftAngle, name, remedy=remedy)
 
 
 @dataclass(frozen=True)

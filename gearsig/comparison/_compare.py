@@ -54,7 +54,7 @@ from gearsig.errors import RefusalError
 from gearsig.orders import SynchronousAverage, order_spectrum
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
-from gearsig.rig import Rig
+from gearsig.rig import Rig, check_rig
 from gearsig.spectra import Spectrum
 
 Sides = tuple[ComparedSide, ComparedSide]
@@ -132,7 +132,8 @@ def compare(
     W. Heylen, S. Lammens, "FRAC: a consistent way of comparing frequency response functions", 1996.
     """
     one_of(align_by, "align_by", ALIGN)
-    prepared = prepare(simulated), prepare(recorded)
+    prepared = prepare(simulated, name="simulated"), prepare(recorded, name="recorded")
+    check_rig(rig)
     simulated, recorded = (side.recording for side in prepared)
     pairs = pair_channels(simulated, recorded, channels)
     check_live(simulated, [p.simulated for p in pairs], "simulation")

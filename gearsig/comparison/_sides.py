@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray
+from gearsig.checks import FloatArray, listed, short
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import first_whole_sample
 from gearsig.prepared import PreparedRecording
@@ -178,7 +178,10 @@ def pair_channels(
     InputError
         If it is not clear which belong together, or two measure different things.
     """
-    names = dict.fromkeys(channels) if channels else _by_name(simulated, recorded)
+    for place, pair in enumerate(listed(channels, "channels", tuple | list)):
+        if len(listed(pair, f"channels[{place}]", str)) != 2:
+            raise InputError(f"channels[{place}] is {short(pair)}", allowed="a pair: (simulated, recorded)")
+    names = dict.fromkeys(map(tuple, channels)) if channels else _by_name(simulated, recorded)
     return tuple(
         _pair(simulated.channels[simulated.index(simulated_name)], recorded.channels[recorded.index(recorded_name)])
         for simulated_name, recorded_name in names

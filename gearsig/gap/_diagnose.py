@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearsig.checks import closest_match_hint
+from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.gap._attribution import Attribution, attribute, is_calibrated
 from gearsig.gap._conditions import (
@@ -61,7 +61,7 @@ from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
 from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool, start_early
-from gearsig.recording import Recording, metres_per_second_squared
+from gearsig.recording import Recording, check_recording, metres_per_second_squared
 from gearsig.rig import Rig
 from gearsig.severity import CrackEstimate, estimate_crack
 
@@ -157,10 +157,10 @@ def diagnose_gap(
         If the rig's data do not suffice, there is no speed, or too few revolutions.
     """
     tell = on_stage or (lambda _what, _done: None)
-    known = simulator.gap_effects()
+    known = _effects_of(simulator)
 
     # 1. What is given must fit together, and each recording count once.
-    _check(recordings, effects, known)
+    _check(recordings, references, effects, known)
     recordings, references = _named_apart(recordings), _named_apart(references)
     _check_distinct([*recordings, *references, *(one.recording for one in learn)])
     rig = _check_rigs([*recordings, *references, *(one.recording for one in learn)])
@@ -291,16 +291,31 @@ def diagnose_gap(
     )
 
 
-def _check(recordings: Sequence[Recording], effects: Sequence[str], known: Mapping[str, GapEffect]) -> None:
+def _check(
+    recordings: Sequence[Recording],
+    references: Sequence[Recording],
+    effects: Sequence[str],
+    known: Mapping[str, GapEffect],
+) -> None:
+    for label, given in (("recordings", recordings), ("references", references)):
+        for place, recording in enumerate(listed(given, label, object)):
+            check_recording(recording, f"{label}[{place}]")
     if not recordings:
         raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
-    strange = [name for name in effects if name not in known]
+    strange = [name for name in listed(effects, "effects", str) if name not in known]
     if strange:
         raise InputError(
             f"the simulator has no effect {strange[0]!r}",
             allowed=", ".join(known),
             remedy=closest_match_hint(strange[0], known),
         )
+
+
+def _effects_of(simulator: GapSimulator | DriveSimulator) -> Mapping[str, GapEffect]:
+    if not hasattr(simulator, "gap_effects"):
+        remedy = "sims.registry.gap_simulator(name) returns one"
+        raise InputError(f"simulator is {short(simulator)}", allowed="a GapSimulator or DriveSimulator", remedy=remedy)
+    return simulator.gap_effects()
 
 
 def _check_own(twin: Twin, names: Iterable[str]) -> None:

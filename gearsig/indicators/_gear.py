@@ -30,7 +30,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count
 from gearsig.errors import InputError
 from gearsig.indicators._amplitude import Indicator, is_constant, standardised_moment
-from gearsig.orders import SynchronousAverage
+from gearsig.orders import SynchronousAverage, check_average
 
 # Gear indicators that compare with earlier records of the same gear.
 #
@@ -160,6 +160,7 @@ def envelope(values: FloatArray) -> FloatArray:
 
 def _check(present: SynchronousAverage, history: Sequence[SynchronousAverage], *kinds: str) -> None:
     for a in (present, *history):
+        check_average(a, "a signal")
         if a.kind not in kinds:
             raise InputError(
                 f"a signal of kind {a.kind!r} was given", allowed=", ".join(kinds), remedy="see gearsig.orders"
@@ -300,6 +301,7 @@ def sideband_level_factor(average: SynchronousAverage, teeth: int) -> float:
 
     SLF = (A(z-1) + A(z+1))/σ(x). Source: Večeř et al. 2005, see `sideband_index`.
     """
+    _check(average, (), "average")
     if is_constant(average.values):
         return float("nan")
     return 2 * sideband_index(average, teeth) / float(np.std(average.values))
@@ -343,7 +345,9 @@ def gear_indicators(
     InputError
         On signals of another kind, or of different gears.
     """
+    check_average(average)
     for part in (residual, difference, *([band_passed_mesh] if band_passed_mesh else [])):
+        check_average(part, "a part of the average")
         if (part.shaft, part.channel, len(part.values)) != (average.shaft, average.channel, len(average.values)):
             raise InputError(
                 f"the {part.kind} belongs to shaft {part.shaft!r}, channel {part.channel!r}",
@@ -419,6 +423,7 @@ def line_amplitude(average: SynchronousAverage, order: int) -> float:
 
 def mesh_amplitudes(average: SynchronousAverage, teeth: int, n_harmonics: int | None = None) -> FloatArray:
     """Peak amplitudes of the mesh harmonics that the average holds, (n_harmonics,)."""
+    check_average(average)
     z = count(teeth, "teeth", minimum=3)
     highest = min(average.highest_order, len(average.values) / 2)
     n = int(highest // z) if n_harmonics is None else min(count(n_harmonics, "n_harmonics"), int(highest // z))

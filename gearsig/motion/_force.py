@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, frozen_array
+from gearsig.checks import FloatArray, count, frozen_array, number
 from gearsig.errors import InputError, RefusalError
 from gearsig.motion._measure import find_roles, measure_motion, role_values
-from gearsig.motion._types import Datum, ForceError, ForceEstimate, PairMotion
+from gearsig.motion._types import Datum, ForceError, ForceEstimate, PairMotion, check_motion
 from gearsig.recording import Recording
 from gearsig.rig import Rig, ToothContact, contact_pair, path_of_contact
 
@@ -117,13 +117,14 @@ def find_datum(motion: PairMotion, choice: str | float = "auto") -> Datum:
     RefusalError
         If there is no torque and the teeth did not touch both flanks.
     """
+    check_motion(motion)
     if isinstance(choice, str):
         if choice == "zero":
             return Datum(0.0, float("nan"), "the angles' own zero")
         if choice != "auto":
             raise InputError(f"datum is {choice!r}", allowed="auto, zero, or a compression")
         return _from_torque(motion) if motion.torque_nm is not None else _between_flanks(motion)
-    return Datum(float(choice), float("nan"), "given")
+    return Datum(number(choice, "datum", "m"), float("nan"), "given")
 
 
 def elastic_depth(motion: PairMotion, force_n: FloatArray) -> FloatArray:

@@ -8,11 +8,11 @@ from math import pi, sqrt
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, known_name, positive
+from gearsig.checks import FloatArray, count, instance_of, known_name, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.motion._types import PairMotion, stands
-from gearsig.recording import Channel, Recording
-from gearsig.rig import EncoderChannel, GearPair, PathOfContact, Rig, contact_pair, path_of_contact
+from gearsig.recording import Channel, Recording, check_recording
+from gearsig.rig import EncoderChannel, GearPair, PathOfContact, Rig, check_rig, contact_pair, path_of_contact
 
 QUANTITY_OF = {
     "angle": ("angle", "encoder"),
@@ -410,6 +410,9 @@ def measure_motion(
     RefusalError
         If the rig has no contact, or neither angle nor speed of a gear was measured.
     """
+    check_recording(recording)
+    check_rig(rig)
+    instance_of(use, Mapping | None, "use", remedy='write {"driven angle": "enc2"}')
     known = rig or recording.rig
     if known is None:
         raise RefusalError("no rig is known", remedy="give a rig file with [[pair]] and [contact]")

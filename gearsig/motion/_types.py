@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array
+from gearsig.checks import FloatArray, frozen_array, instance_of
 from gearsig.errors import RefusalError
 from gearsig.results import Result
 from gearsig.rig import PathOfContact, ToothContact
@@ -198,6 +198,11 @@ def stands(driver_angle_rad: FloatArray, path: PathOfContact, contact: ToothCont
     return float(np.ptp(driver_angle_rad)) < _play_rad(path, contact) + 2.0 * pi / path.teeth[0] * 0.25
 
 
+def check_motion(value: object) -> None:
+    """Raise unless the value is the motion of a pair."""
+    instance_of(value, PairMotion, "motion", remedy="gearsig.measure_motion(recording, rig) makes one")
+
+
 def check_turns(motion: PairMotion) -> None:
     """Refuse a record in which the driver turns by less than its play and a quarter of a tooth pitch.
 
@@ -206,6 +211,7 @@ def check_turns(motion: PairMotion) -> None:
     RefusalError
         If the machine stands.
     """
+    check_motion(motion)
     refuse_standing(motion.driver_angle_rad, motion.path, motion.contact, motion.sampling_rate_hz, motion.source)
 
 

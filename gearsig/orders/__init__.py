@@ -10,7 +10,7 @@ from gearsig.orders._average import (
     times_of_revolutions,
     whole_revolutions,
 )
-from gearsig.orders._separate import SeparatedAverage, band_passed_mesh, mesh_modulation, separate
+from gearsig.orders._separate import SeparatedAverage, band_passed_mesh, check_average, mesh_modulation, separate
 from gearsig.orders._spectrum import frequency_map, order_map, order_spectrum
 from gearsig.orders._track import amplitude_at_speeds, track_order_bands, track_orders
 from gearsig.orders._types import AverageLines, OrderMap, SynchronousAverage, TrackedOrder
@@ -31,6 +31,7 @@ __all__ = [
     "amplitude_at_speeds",
     "average_lines",
     "band_passed_mesh",
+    "check_average",
     "first_whole_sample",
     "frequency_map",
     "mean_and_error",

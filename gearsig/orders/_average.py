@@ -5,26 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from gearsig.angle import (
     AngleSignal,
     ShaftAngle,
+    check_shaft_angle,
     constant_speed_angle,
     find_shaft_angle,
     resample_to_angle,
     speed_channel_angle,
     times_at,
 )
-from gearsig.checks import FloatArray, count, one_of
+from gearsig.checks import FloatArray, count, listed, not_negative, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._types import AverageLines, LineScaling, SynchronousAverage, lines_of_revolution
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
 from gearsig.rig import known_ratio
-from gearsig.spectra import array_rate_hz, checked_signal
+from gearsig.spectra import array_rate_hz, check_signal, checked_signal
 
 
 def first_whole_sample(signal: AngleSignal) -> tuple[int, int]:
@@ -103,6 +104,7 @@ def over_angle(
     speed_rpm: float | FloatArray | None,
 ) -> tuple[AngleSignal, str]:
     """Return (a channel over a shaft's angle, its name) of what `synchronous_average` and its neighbours accept."""
+    check_signal(signal, AngleSignal | Recording)
     if isinstance(signal, AngleSignal):
         if shaft not in ("", signal.shaft_angle.shaft) or shaft_angle is not None or speed_rpm is not None:
             raise InputError(
@@ -120,8 +122,9 @@ def over_angle(
 
 def as_recording(signal: Recording | FloatArray, channel: str | float) -> tuple[Recording, str]:
     """Return (a recording, the channel's name) of a recording and its channel, or of an array and its rate in Hz."""
+    check_signal(signal)
     if isinstance(signal, Recording):
-        return signal, str(channel)
+        return signal, signal.channel_names[signal.index(str(channel))]
     rate_hz = array_rate_hz(channel, "channel")
     return Recording(checked_signal(signal)[None], rate_hz, (Channel("signal"),)), "signal"
 
@@ -131,6 +134,7 @@ def angle_of(recording: Recording, shaft_angle: ShaftAngle | None, speed_rpm: fl
     if shaft_angle is not None and speed_rpm is not None:
         raise InputError("both shaft_angle and speed_rpm are given", remedy="leave one of them out")
     if shaft_angle is not None:
+        check_shaft_angle(shaft_angle)
         return shaft_angle
     if speed_rpm is None:
         if recording.speed_source is None and recording.rig is None:
@@ -139,7 +143,8 @@ def angle_of(recording: Recording, shaft_angle: ShaftAngle | None, speed_rpm: fl
             )
         return find_shaft_angle(recording)
     if np.ndim(speed_rpm) == 0:
-        return constant_speed_angle(float(speed_rpm), recording.duration_s)
+        one: Any = speed_rpm
+        return constant_speed_angle(not_negative(one, "speed_rpm", "rpm"), recording.duration_s)
     if np.shape(speed_rpm) != (recording.n_samples,):
         raise InputError(
             f"speed_rpm has shape {np.shape(speed_rpm)}",
@@ -279,7 +284,8 @@ def average_lines(
     count(n_parts, "n_parts")
     one_of(weighting, "weighting", ("equal", "hann"))
     one_of(scaling, "scaling", ("amplitude peak", "amplitude rms"))
-    names = tuple(channels) if channels is not None else signal.channel_names
+    _check_angle_signals([signal], "signal")
+    names = listed(channels, "channels", str) if channels is not None else signal.channel_names
     per_rev = signal.samples_per_revolution
     limit = signal.highest_order if highest_order is None else highest_order
     highest = int(min(limit + 1e-9, (per_rev - 1) // 2))
@@ -356,6 +362,8 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int], *, n_p
         If a signal has no whole revolution.
     """
     count(n_passes, "n_passes")
+    signals = _check_angle_signals(signals, "signals")
+    teeth = [count(z, f"teeth[{k}]") for k, z in enumerate(listed(teeth, "teeth", object))]
     if len(signals) != len(teeth) or len({signal.channel_names for signal in signals}) != 1:
         raise InputError("signals and teeth do not belong together", allowed="one gear per signal, the same channels")
     separated = [np.array(signal.samples, dtype=np.float64) for signal in signals]
@@ -375,6 +383,11 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int], *, n_p
             residual[row] -= _at(periodic, _places(signals[0]) * teeth[0] / teeth[j])
     shaft_signals = tuple(_with_samples(signal, samples) for signal, samples in zip(signals, separated, strict=True))
     return SeparatedShafts(shaft_signals, _with_samples(signals[0], residual))
+
+
+def _check_angle_signals(signals: Sequence[AngleSignal], name: str) -> tuple[AngleSignal, ...]:
+    remedy = "gearsig.resample_to_angle(recording, shaft_angle) makes one"
+    return listed(signals, name, AngleSignal, remedy=remedy)
 
 
 def _with_samples(signal: AngleSignal, samples: FloatArray) -> AngleSignal:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, freeze
+from gearsig.checks import FloatArray, count, freeze, instance_of, listed
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._types import SynchronousAverage
 from gearsig.results import Result
@@ -158,7 +158,9 @@ def mesh_band(average: SynchronousAverage, teeth: int, harmonic: int, half_width
 
 def checked_teeth(average: SynchronousAverage, teeth: int | Iterable[int]) -> tuple[int, ...]:
     """Return the teeth as a tuple; each at least 3 and with its mesh order inside the average."""
-    numbers = (teeth,) if isinstance(teeth, (int, np.integer)) else tuple(teeth)
+    given: Any = teeth
+    is_one = isinstance(given, int | float | np.number | str)  # of which `count` says what is wrong
+    numbers = (given,) if is_one else listed(given, "teeth", object)
     if not numbers:
         raise InputError("no teeth are given", remedy="give the teeth of each gear on the shaft")
     for z in numbers:
@@ -172,8 +174,14 @@ def checked_teeth(average: SynchronousAverage, teeth: int | Iterable[int]) -> tu
 
 
 def _check_kind(average: SynchronousAverage) -> None:
+    check_average(average)
     if average.kind != "average":
         raise InputError(f"the average is of kind {average.kind!r}", allowed="average", remedy="take it before a split")
+
+
+def check_average(value: object, name: str = "average") -> None:
+    """Raise unless the value is a synchronous average."""
+    instance_of(value, SynchronousAverage, name, remedy="gearsig.synchronous_average(recording, channel) makes one")
 
 
 def _line_mask(n_angles: int, orders: Iterable[int]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.angle import AngleSignal, ShaftAngle, check_shaft_angle
 from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._average import block_times, first_whole_sample, over_angle, unit_of, whole_revolutions
@@ -235,6 +235,7 @@ def frequency_map(
         On a wrong shape, rate, window or scaling.
     """
     one_of(scaling, "scaling", ORDER_SCALINGS)
+    check_shaft_angle(shaft_angle)
     x = checked_signal(values)
     fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     plan = _plan(len(x), n_per_block, overlap, window, n_blocks_max, "n_per_block")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, frozen_array, not_negative, positive
+from gearsig.checks import FloatArray, frozen_array, instance_of, listed_numbers, not_negative, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._average import block_times, over_angle, unit_of
 from gearsig.orders._types import TrackedOrder
@@ -159,6 +159,7 @@ def amplitude_at_speeds(tracked: TrackedOrder, speeds_rpm: FloatArray) -> FloatA
     RefusalError
         If the speed rises and falls: an amplitude then belongs to a time, not to a speed.
     """
+    instance_of(tracked, TrackedOrder, "tracked", remedy="gearsig.track_orders(recording, channel, orders) makes them")
     grid = frozen_array(speeds_rpm, "speeds_rpm", ndim=1)
     rising = np.diff(tracked.speed_rpm)
     if not (np.all(rising > 0) or np.all(rising < 0)):
@@ -173,9 +174,10 @@ def amplitude_at_speeds(tracked: TrackedOrder, speeds_rpm: FloatArray) -> FloatA
 
 
 def _checked_orders(signal: AngleSignal, orders: Sequence[float], margin: float) -> FloatArray:
-    if len(orders) == 0:
+    given = listed_numbers(orders, "orders", remedy="give a list: [2, 4.5]")
+    if not given:
         raise InputError("no orders are given", remedy="name at least one")
-    numbers = np.array([not_negative(order, "order") for order in orders])
+    numbers = np.array([not_negative(order, "order") for order in given])
     if numbers.max() + margin > signal.highest_order:
         raise RefusalError(
             f"order {numbers.max():g} lies above the highest valid order {signal.highest_order:g} of the signal",
@@ -226,10 +228,10 @@ def track_order_bands(
         As `track_orders`; also on a band that is too narrow or reaches below order zero.
     """
     width = positive(bandwidth_orders, "bandwidth_orders")
-    if width * revolutions_per_block < 4.0:
+    if width * positive(revolutions_per_block, "revolutions_per_block") < 4.0:
         raise InputError(
             f"bandwidth_orders is {width:g} with blocks of {revolutions_per_block:g} revolutions",
-            allowed=f"at least {4.0 / positive(revolutions_per_block, 'revolutions_per_block'):g}",
+            allowed=f"at least {4.0 / revolutions_per_block:g}",
             remedy="widen the band or lengthen the block",
         )
     signal, channel = over_angle(signal, channel, shaft, shaft_angle, speed_rpm)

@@ -12,7 +12,7 @@ from gearsig.checks import FloatArray, count, not_negative
 from gearsig.errors import GearsigError, InputError
 from gearsig.phase._embedding import chosen_delay, delay_embedding, embedding_dimension
 from gearsig.phase._lyapunov import largest_lyapunov_exponent
-from gearsig.phase._section import CycleLock, poincare_section, section_period
+from gearsig.phase._section import CycleLock, check_lock, poincare_section, section_period
 from gearsig.phase._types import (
     ChaosTest,
     ChaosVerdict,
@@ -249,6 +249,7 @@ def kind_of_motion(
     "stochastic" says that the motion does not unfold. Clean chaos recorded over fewer than about a hundred cycles may
     not unfold either: record longer, or state `noise_free` where it is a model's, which makes it "undecided".
     """
+    check_lock(lock, needed=True)
     section = poincare_section(portrait, lock)
     period = section_period(section, tolerance=tolerance)
     if period:

@@ -11,7 +11,7 @@ from numba import njit
 from gearsig.checks import FloatArray, count, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.phase._neighbours import IndexArray, nearest_apart, spaced
-from gearsig.phase._types import LyapunovExponent, PhasePortrait, checked_series, mean_period_samples
+from gearsig.phase._types import LyapunovExponent, PhasePortrait, check_portrait, checked_series, mean_period_samples
 
 N_LIBRARY, N_REFERENCES, N_BLOCKS = 100_000, 4_000, 12
 MAX_NEIGHBOURS = 10
@@ -177,6 +177,7 @@ def largest_lyapunov_exponent(
 
     Source: M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993); H. Kantz, Physics Letters A 185 (1994).
     """
+    check_portrait(portrait)
     one_of(method, "method", ("rosenstein", "transverse", "kantz"))
     x = checked_series(np.ascontiguousarray(portrait.points[:, 0]), minimum=100, name="the portrait's first axis")
     period = mean_period_samples(x)

@@ -7,7 +7,7 @@ from numba import njit
 
 from gearsig.checks import FloatArray, count, positive, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase._types import PhasePortrait, RecurrenceMeasures, RecurrencePlot, mean_period_samples
+from gearsig.phase._types import PhasePortrait, RecurrenceMeasures, RecurrencePlot, check_portrait, mean_period_samples
 
 N_PAIRS = 200_000
 GOLDEN = 0.6180339887498949
@@ -153,6 +153,7 @@ def _lines(counts: np.ndarray, shortest: int) -> tuple[float, float, float, floa
 
 def _taken(portrait: PhasePortrait, n_points: int, stride: int | None) -> tuple[FloatArray, int]:
     """Return the first points at the stride, in standard deviations of the axes, and the stride."""
+    check_portrait(portrait)
     extent = portrait.extent
     if not bool((extent > 0.0).any()):
         raise RefusalError("the path does not move", remedy="take a channel that vibrates")

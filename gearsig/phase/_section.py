@@ -9,17 +9,18 @@ import numpy as np
 from gearsig.angle import (
     REACH,
     ShaftAngle,
+    check_shaft_angle,
     delay_table,
     doubling_filter,
     find_shaft_angle,
     interpolate,
     times_at,
 )
-from gearsig.checks import FloatArray, count, frozen_array, positive, read_only
+from gearsig.checks import FloatArray, count, frozen_array, instance_of, positive, read_only
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase._types import PhasePortrait, PoincareSection
-from gearsig.recording import Recording
-from gearsig.rig import Rig
+from gearsig.phase._types import PhasePortrait, PoincareSection, check_portrait
+from gearsig.recording import Recording, check_recording
+from gearsig.rig import Rig, check_rig
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,8 @@ def find_lock(
         If there is no shaft angle, or the teeth that lead to the pair or shaft are not known: a section without a
         period means nothing.
     """
+    check_recording(recording)
+    check_rig(rig)
     rig = rig if rig is not None else recording.rig
     if pair and shaft:
         raise InputError(f"both pair {pair!r} and shaft {shaft!r} are given", allowed="one of them")
@@ -93,6 +96,8 @@ def find_lock(
             f"the recording has no rig, so {pair or shaft!r} is not known", remedy="give rig=, or lock to angle alone"
         )
     cycles, name = _cycles(rig, pair, shaft)
+    if angle is not None:
+        check_shaft_angle(angle, "angle")
     shaft_angle = angle if angle is not None else find_shaft_angle(recording, rig)
     return CycleLock(shaft_angle, cycles, name)
 
@@ -120,6 +125,12 @@ def _cycles(rig: Rig | None, pair: str, shaft: str) -> tuple[float, str]:
             remedy="complete the teeth in the rig file",
         )
     return order, name
+
+
+def check_lock(value: object, *, needed: bool = False) -> None:
+    """Raise unless the value is a lock, or None where none is needed."""
+    remedy = "gearsig.phase.find_lock(recording) finds one"
+    instance_of(value, CycleLock if needed else CycleLock | None, "lock", remedy=remedy)
 
 
 def poincare_section(
@@ -166,6 +177,8 @@ def poincare_section(
 
     Source: F. C. Moon, *Chaotic Vibrations* (1987), ch. 2 (Poincaré maps of forced motion).
     """
+    check_portrait(portrait)
+    check_lock(lock)
     if lock is None:
         return _geometric_section(portrait, normal, offset, direction)
     if normal is not None:
@@ -237,6 +250,7 @@ def section_period(section: PoincareSection, *, longest: int = 16, tolerance: fl
     tolerance : float
         Above the scatter from noise, below the distance of the branches that are to be told apart.
     """
+    instance_of(section, PoincareSection, "section", remedy="gearsig.poincare_section(portrait) makes one")
     count(longest, "longest")
     x = section.points / np.where(section.extent > 0.0, section.extent, 1.0)
     half = section.n_points // 2

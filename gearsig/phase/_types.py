@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, freeze, frozen_array, positive
+from gearsig.checks import FloatArray, freeze, frozen_array, instance_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
 
@@ -411,6 +411,12 @@ class RecurrenceMeasures(Result):
     n_points: int
     duration_s: float
     source: str
+
+
+def check_portrait(value: object) -> None:
+    """Raise unless the value is a path in phase space."""
+    remedy = "gearsig.phase_plane and gearsig.delay_embedding(recording, channel) make one"
+    instance_of(value, PhasePortrait, "portrait", remedy=remedy)
 
 
 def checked_series(values: FloatArray, *, minimum: int, name: str = "values") -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.angle import AngleSignal, ShaftAngle, resample_to_angle
-from gearsig.checks import positive, read_only
+from gearsig.checks import listed, positive, read_only
 from gearsig.errors import GearsigError
 from gearsig.orders import (
     AverageLines,
@@ -25,8 +25,8 @@ from gearsig.orders import (
 )
 from gearsig.prepared._angle import phase_followed_angle, refined_angle
 from gearsig.prepared._lines import LineExcess, floor_of
-from gearsig.recording import Recording
-from gearsig.rig import PulseTimes, Rig, TachometerChannel, known_ratio
+from gearsig.recording import Recording, check_recording
+from gearsig.rig import PulseTimes, Rig, TachometerChannel, check_rig, known_ratio
 from gearsig.spectra import Spectrum, amplitude_spectrum, fast_length, power_density
 
 T = TypeVar("T")
@@ -77,6 +77,8 @@ class PreparedRecording:
     def __init__(
         self, recording: Recording, rig: Rig | None = None, *, memory_limit_mb: float = MEMORY_LIMIT_MB
     ) -> None:
+        check_recording(recording)
+        check_rig(rig)
         positive(memory_limit_mb, "memory_limit_mb", "MB")
         self.recording = recording.with_rig(rig) if recording.rig is None and rig is not None else recording
         self.memory_limit_mb = memory_limit_mb
@@ -213,7 +215,7 @@ class PreparedRecording:
         AngleSignal
             In the channels' units, with the whole bandwidth on most revolutions.
         """
-        names = tuple(channels) if channels is not None else self.recording.vibration_names()
+        names = listed(channels, "channels", str) if channels is not None else self.recording.vibration_names()
         turns = self.ratio(shaft) if ratio is None else ratio
         angle = self.angle_of(shaft, followed=followed, ratio=turns)
         # A shaft that turns with the reference shaft shares its signal, and the followed angle that of the other one
@@ -238,7 +240,7 @@ class PreparedRecording:
         self, shaft: str = "", channels: Sequence[str] | None = None, *, followed: bool = False
     ) -> AverageLines:
         """Return the complex lines (amplitude, peak) of the synchronous averages of several channels."""
-        names = tuple(channels) if channels is not None else self.recording.vibration_names()
+        names = listed(channels, "channels", str) if channels is not None else self.recording.vibration_names()
         return self.keep(
             ("average lines", shaft, names, self._is_followed(followed)),
             lambda: average_lines(self.over_angle(shaft, names, followed=followed)),
@@ -288,7 +290,9 @@ class PreparedRecording:
         return PreparedRecording(self.recording.with_rig(rig), memory_limit_mb=self.memory_limit_mb)
 
 
-def prepare(recording: Recording | PreparedRecording, rig: Rig | None = None) -> PreparedRecording:
+def prepare(
+    recording: Recording | PreparedRecording, rig: Rig | None = None, *, name: str = "recording"
+) -> PreparedRecording:
     """Return a recording prepared; one that is prepared already, as it is, unless it lacks the rig.
 
     Parameters
@@ -296,7 +300,11 @@ def prepare(recording: Recording | PreparedRecording, rig: Rig | None = None) ->
     recording : Recording or PreparedRecording
     rig : Rig or None
         Used where the recording carries none.
+    name : str
+        Of the caller's parameter, for the errors.
     """
+    check_recording(recording, name, Recording | PreparedRecording)
+    check_rig(rig)
     if not isinstance(recording, PreparedRecording):
         return PreparedRecording(recording, rig)
     return recording.with_rig(rig) if recording.recording.rig is None and rig is not None else recording

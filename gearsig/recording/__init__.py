@@ -11,13 +11,24 @@ from gearsig.recording._read import (
     read_recording,
     recording_target,
     sha256_of,
+    without_condition,
     write_recording,
 )
-from gearsig.recording._types import SI_FACTORS, Channel, Provenance, Recording, metres_per_second_squared
+from gearsig.recording._table import CONDITION_CHANNEL
+from gearsig.recording._types import (
+    SI_FACTORS,
+    Channel,
+    Provenance,
+    Recording,
+    check_recording,
+    metres_per_second_squared,
+    names_without_number,
+)
 from gearsig.recording.formats._mat import variables
 from gearsig.recording.formats._wav import parse_lea
 
 __all__ = [
+    "CONDITION_CHANNEL",
     "FORMAT_NAMES",
     "FORMAT_OF_EXTENSION",
     "MAINS_HZ",
@@ -28,16 +39,19 @@ __all__ = [
     "Provenance",
     "Recording",
     "check_memory",
+    "check_recording",
     "container_free_bytes",
     "find_problems",
     "free_memory_bytes",
     "metres_per_second_squared",
     "n_samples_of",
+    "names_without_number",
     "parse_lea",
     "read_pulse_times",
     "read_recording",
     "recording_target",
     "sha256_of",
     "variables",
+    "without_condition",
     "write_recording",
 ]

@@ -10,9 +10,14 @@ import numpy as np
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory
-from gearsig.recording._table import RawTable, rate_of_time, seconds_per_unit
+from gearsig.recording._table import NumberArray, RawTable, rate_of_time, seconds_per_unit
 from gearsig.recording._types import RPM_UNITS, Channel, Provenance, Recording, quantity_of
 from gearsig.rig import ConstantSpeed, Rig, SpeedChannel, SpeedSource
+
+PULSE_TIMES = (
+    "times of tachometer pulses go with the recording that they belong to: gearsig analyze RECORDING --tach-times FILE "
+    "(in Python speed=gearsig.recording.read_pulse_times(path))"
+)
 
 
 def assemble(
@@ -77,7 +82,7 @@ def _checked(table: RawTable, source: str) -> RawTable:
                 f"the only column, {time.name!r}, is a time",
                 where=source,
                 allowed="at least one channel",
-                remedy="pulse times are read as such, not as a recording",
+                remedy=PULSE_TIMES,
             )
         if time is not None:
             table = replace(table, columns=tuple(c for c in table.columns if c is not time), time=time)
@@ -147,11 +152,18 @@ def _sampling_rate(
         )
     if file_hz is None and rig_hz is None:
         remedy = "give --fs or sampling_rate_hz in the rig file"
+        if len(table.columns) == 1 and _looks_like_times(table.columns[0].values):
+            remedy = f"the only column increases all along: {PULSE_TIMES}; if it is a signal, {remedy}"
         raise InputError("states no sampling rate", where=source, allowed="above 0 Hz", remedy=remedy)
     if file_hz is not None and rig_hz is not None and differ(file_hz, rig_hz):
         text = f"the rig states a sampling rate of {rig_hz:g} Hz, the file {file_hz:.9g} Hz: the file's was taken"
         return file_hz, (text,)
     return file_hz or rig_hz or 0.0, ()
+
+
+def _looks_like_times(values: NumberArray) -> bool:
+    """Whether numbers increase from each to the next, from zero or later on, as times of pulses do and no vibration."""
+    return len(values) > 2 and bool(values[0] >= 0) and bool(np.all(np.diff(values.astype(np.float64)) > 0))
 
 
 def _stack(table: RawTable, source: str) -> FloatArray:

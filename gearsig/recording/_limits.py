@@ -230,7 +230,10 @@ def _from_utf16(path: Path) -> bytes:
 
 @contextmanager
 def foreign_errors(where: str, file_format: str) -> Iterator[None]:
-    """Raise `InputError` where reading fails inside the block; gearsig's own errors pass, with the file's name."""
+    """Raise `InputError` where reading fails inside the block; gearsig's own errors pass, with the file's name.
+
+    What the caller gave beside the file is checked before: else the file would be blamed for it.
+    """
     try:
         yield
     except InputError as error:
@@ -238,10 +241,27 @@ def foreign_errors(where: str, file_format: str) -> Iterator[None]:
             raise
         place = f"{where}: {error.where}" if error.where else where
         raise InputError(
-            error.what, where=place, allowed=error.allowed, remedy=error.remedy or "export it again"
+            error.what.removeprefix(f"{where}: "),
+            where=place,
+            allowed=error.allowed,
+            remedy=error.remedy or "export it again",
         ) from error
     except GearsigError:
         raise
+    except MemoryError as error:
+        raise InputError(
+            f"does not fit into memory as {file_format}",
+            where=where,
+            allowed=f"up to {available_memory_bytes() / 1e9:.3g} GB on this machine now",
+            remedy="split the file or export fewer channels; if it is small, it is damaged",
+        ) from error
+    except PermissionError as error:
+        raise InputError(
+            f"cannot be opened ({error.strerror or error})",
+            where=where,
+            allowed="a readable file",
+            remedy="check who may read it",
+        ) from error
     except Exception as error:  # parsers raise anything on damaged bytes, one of them bare Exception
         reason = str(error)[:200] or type(error).__name__
         raise InputError(

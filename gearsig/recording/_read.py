@@ -10,20 +10,21 @@ import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, count
+from gearsig.checks import FloatArray, closest_match_hint, count, instance_of
 from gearsig.errors import InputError
 from gearsig.formatting import file_label
 from gearsig.recording._assemble import assemble
 from gearsig.recording._limits import CHUNK_BYTES, foreign_errors, read_text_bytes
-from gearsig.recording._table import SECONDS_PER_UNIT, RawTable, one_condition, one_measurement
-from gearsig.recording._types import Recording, split_unit
+from gearsig.recording._table import SECONDS_PER_UNIT, RawTable, condition_numbers, one_condition, one_measurement
+from gearsig.recording._types import Recording, check_recording, split_unit
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
-from gearsig.rig import PulseTimes, Rig, SpeedSource
+from gearsig.rig import PulseTimes, Rig, SpeedSource, check_rig, check_speed_source
 
 
 def read_recording(
@@ -68,7 +69,10 @@ def read_recording(
         If the file is missing, empty, damaged, too large for the memory, of another kind than its extension says, or
         holds columns that make no recording; if no sampling rate is known.
     """
-    file, condition = _without_condition(Path(path))
+    check_rig(rig)
+    check_speed_source(speed)
+    instance_of(part, slice | None, "part", remedy="write slice(first, last)")
+    file, condition = without_condition(_as_path(path))
     file_format, name = identify(file), file_label(file)
     with foreign_errors(name, file_format.name):
         table = file_format.read(file) if part is None else _part_reader(file_format, name)(file, part)
@@ -79,6 +83,11 @@ def read_recording(
         sha256 = sha256_of(file) if part is None else ""
         recording = assemble(table, name, sha256, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
         return recording if part is None else _with_pulses_within(recording, part.start or 0)
+
+
+def _as_path(path: str | Path) -> Path:
+    """Return a path given as such or as text."""
+    return Path(instance_of(path, str | PathLike, "path", remedy="name one file"))
 
 
 def n_samples_of(path: str | Path) -> int | None:
@@ -93,7 +102,7 @@ def n_samples_of(path: str | Path) -> int | None:
     InputError
         As `read_recording`.
     """
-    file, condition = _without_condition(Path(path))
+    file, condition = without_condition(_as_path(path))
     file_format = identify(file)
     if file_format.length is None or condition is not None:
         return None
@@ -120,8 +129,8 @@ def _with_pulses_within(recording: Recording, first: int) -> Recording:
     return replace(recording, speed=replace(speed, times_s=speed.times_s[within] - start_s))
 
 
-def _without_condition(path: Path) -> tuple[Path, int | None]:
-    """Split "runs.mat#2"; a file that is really called so is that file."""
+def without_condition(path: Path) -> tuple[Path, int | None]:
+    """Return the file and the run in it that "runs.mat#2" names; a file that is really called so is that file."""
     name, sign, number = path.name.rpartition("#")
     if not (sign and name and number.isascii() and number.isdigit()):
         return path, None
@@ -190,7 +199,9 @@ def identify(path: Path) -> FileFormat:
     except (OSError, ValueError) as error:
         hint = ""
         if path.parent.is_dir() and path.name:
-            hint = closest_match_hint(path.name, (other.name for other in path.parent.iterdir()))
+            names = [other.name for other in path.parent.iterdir()]
+            before = path.name.rpartition("#")[0]
+            hint = _columns_hint(path.with_name(before)) if before in names else closest_match_hint(path.name, names)
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
             f"cannot be opened ({reason})", where=path.name or str(path), allowed="a readable file", remedy=hint
@@ -233,6 +244,17 @@ def identify(path: Path) -> FileFormat:
         allowed=f"content that fits {path.suffix or 'the extension'}",
         remedy=hint,
     )
+
+
+def _columns_hint(file: Path) -> str:
+    """Say which runs a file holds, where its name was given with "#" and no number of one."""
+    try:
+        file_format = identify(file)
+        with foreign_errors(file.name, file_format.name):
+            numbers = ", ".join(condition_numbers(file_format.read(file)))
+    except InputError:
+        return f"name {file.name} alone, or a column of it by its number: {file.name}#1"
+    return f"of {file.name} there are: {numbers}"
 
 
 def content_kind(head: bytes) -> str:
@@ -285,6 +307,7 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
         If the extension is not known, the folder is missing, or the format cannot hold the recording. Nothing is
         written then: the file is written beside its place and moved there when complete.
     """
+    check_recording(recording)
     target = recording_target(path)
     writer = WRITERS[target.suffix.lower()]
     try:
@@ -316,7 +339,7 @@ def recording_target(path: str | Path) -> Path:
     InputError
         If the extension is not known, or the folder is missing.
     """
-    target = Path(path)
+    target = _as_path(path)
     if target.suffix.lower() not in WRITERS:
         raise InputError(
             f"extension {target.suffix or '(none)'!r} cannot be written",
@@ -354,8 +377,9 @@ def read_pulse_times(path: str | Path, pulses_per_revolution: int = 1, shaft: st
         is named.
     """
     count(pulses_per_revolution, "pulses_per_revolution")
-    with foreign_errors(Path(path).name, "pulse times"):
-        return PulseTimes(_pulse_times_s(Path(path)), pulses_per_revolution, shaft)
+    file = _as_path(path)
+    with foreign_errors(file.name, "pulse times"):
+        return PulseTimes(_pulse_times_s(file), pulses_per_revolution, shaft)
 
 
 def _pulse_times_s(file: Path) -> FloatArray:

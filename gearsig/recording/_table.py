@@ -187,18 +187,31 @@ def one_condition(table: RawTable, number: int, where: str) -> RawTable:
     """
     if _measurements(table):
         return one_measurement(table, number, where)
-    columns = [c for c in table.columns if seconds_per_unit(c.name, c.unit) is None]
-    times = [c for c in table.columns if c not in columns]
+    columns, times = _conditions(table)
     if not 1 <= number <= len(columns):
         raise InputError(
             f"condition {number} is asked for; beside the time there are {len(columns)} column(s)",
             where=where,
-            allowed=f"#1 to #{len(columns)}",
+            allowed=", ".join(condition_numbers(table)),
             remedy="count the columns from 1, without the time",
         )
     chosen = replace(columns[number - 1], name=CONDITION_CHANNEL)
     kept = tuple(text for text in table.warnings if not text.startswith(SEPARATE_RUNS))
     return replace(table, columns=(*times, chosen), warnings=kept)
+
+
+def condition_numbers(table: RawTable) -> list[str]:
+    """Return what may stand behind a file's name to read one of its runs, e.g. "#1", "#2"."""
+    numbers = sorted(_measurements(table)) or range(1, len(_conditions(table)[0]) + 1)
+    shown = [f"#{number}" for number in numbers]
+    return shown if len(shown) <= 8 else [*shown[:3], "…", shown[-1]]
+
+
+def _conditions(table: RawTable) -> tuple[list[RawColumn], list[RawColumn]]:
+    """Return (what was measured, times) of a table whose columns may be runs."""
+    is_time = [seconds_per_unit(c.name, c.unit) is not None for c in table.columns]
+    measured = [c for c, time in zip(table.columns, is_time, strict=True) if not time]
+    return measured, [c for c, time in zip(table.columns, is_time, strict=True) if time]
 
 
 def one_measurement(table: RawTable, number: int | None, where: str) -> RawTable:
@@ -215,7 +228,7 @@ def one_measurement(table: RawTable, number: int | None, where: str) -> RawTable
     measurements = _measurements(table)
     if not measurements:
         return table
-    numbers = ", ".join(f"#{n}" for n in sorted(measurements))
+    numbers = ", ".join(condition_numbers(table))
     warnings = table.warnings
     if number is None:
         named = [int(n) for n in re.findall(r"\d+", where) if int(n) in measurements]

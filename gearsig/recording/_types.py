@@ -5,15 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from os import PathLike
+from types import MappingProxyType, UnionType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array, known_name, one_of, positive, within
+from gearsig.checks import FloatArray, frozen_array, instance_of, known_name, listed, number, one_of, positive, within
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 from gearsig.results import verdict_html
-from gearsig.rig import QUANTITIES, PulseTimes, Rig, SpeedSource
+from gearsig.rig import QUANTITIES, PulseTimes, Rig, SpeedSource, check_rig, check_speed_source
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -180,12 +182,36 @@ class Channel:
     position: str = ""
 
     def __post_init__(self) -> None:
+        instance_of(self.name, str, "name of a Channel")
         one_of(self.quantity, f"quantity of channel {self.name!r}", QUANTITIES)
+        for label in ("unit", "position"):
+            instance_of(getattr(self, label), str, f"{label} of channel {self.name!r}")
 
     @property
     def is_vibration(self) -> bool:
         """Whether the analysis chain looks at this channel for faults."""
         return self.quantity in VIBRATION_QUANTITIES
+
+
+_RECORD_NUMBER = re.compile(r"^\d{3,}[-_. ]*|[-_. ]*\d{3,}$|\d{3,}")
+
+
+def names_without_number(names: Iterable[str]) -> dict[str, str]:
+    """Return channels' names without the number of their record, by which those of another record are named alike.
+
+    It has three digits or more: fewer tell sensors apart, a1 from a2. Where names would not stay apart, or nothing
+    would be left of one, all stay as they are.
+
+    Examples
+    --------
+    >>> names_without_number(["X118_DE_time", "X118_FE_time"])
+    {'X118_DE_time': 'X_DE_time', 'X118_FE_time': 'X_FE_time'}
+    >>> names_without_number(["sensor 1001", "sensor 1002"])
+    {'sensor 1001': 'sensor 1001', 'sensor 1002': 'sensor 1002'}
+    """
+    shorter = {name: _RECORD_NUMBER.sub("", name) for name in names}
+    stay_apart = all(shorter.values()) and len(set(shorter.values())) == len(shorter)
+    return shorter if stay_apart else {name: name for name in shorter}
 
 
 @dataclass(frozen=True)
@@ -255,26 +281,38 @@ class Recording:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        instance_of(self.provenance, Provenance, "provenance of a Recording")
         where = self.name
         remedy = "give --fs or sampling_rate_hz in the rig file"
         positive(self.sampling_rate_hz, f"{where}: sampling rate", "Hz", remedy=remedy)
         within(self.sampling_rate_hz, f"{where}: sampling rate", 1e-3, 1e10, "Hz", remedy=remedy)
-        if len(np.shape(self.samples)) == 2 and np.shape(self.samples)[1] == 0:
-            raise InputError("there are no samples", where=where, remedy="check that the file was written completely")
         try:
             samples = frozen_array(self.samples, "samples (channel, time)", ndim=2)
         except InputError as error:
-            raise InputError(error.what, where=where, allowed=error.allowed, remedy=error.remedy) from None
+            is_one = isinstance(self.samples, np.ndarray) and self.samples.ndim == 1
+            hint = error.remedy or ("of one channel, give samples[None]" if is_one else "")
+            raise InputError(error.what, where=where, allowed=error.allowed, remedy=hint) from None
+        if samples.shape[1] == 0:
+            raise InputError("there are no samples", where=where, remedy="check that the file was written completely")
         object.__setattr__(self, "samples", samples)
-        object.__setattr__(self, "channels", tuple(self.channels))
+        remedy = 'e.g. gearsig.Channel("a1", "acceleration", "m/s^2")'
+        object.__setattr__(self, "channels", listed(self.channels, f"{where}: channels", Channel, remedy=remedy))
         if len(self.channels) != samples.shape[0]:
-            raise InputError(f"{len(self.channels)} channel names for {samples.shape[0]} channels", where=where)
+            raise InputError(
+                f"{counted(len(self.channels), 'channel')} for samples of shape {samples.shape}",
+                where=where,
+                allowed="one channel for each row: samples (channel, time)",
+                remedy="transpose them: samples.T" if len(self.channels) == samples.shape[1] else "",
+            )
+        check_speed_source(self.speed, f"{where}: speed")
+        check_rig(self.rig, f"{where}: rig")
         names = self.channel_names
         doubled = sorted({name for name in names if names.count(name) > 1})
         if doubled:
             raise InputError(
                 f"channel name(s) {', '.join(doubled)} occur more than once", where=where, remedy="rename the columns"
             )
+        instance_of(self.truth, Mapping | None, f"{where}: truth")
         if self.truth is not None:
             object.__setattr__(self, "truth", MappingProxyType(dict(self.truth)))
 
@@ -343,7 +381,7 @@ class Recording:
 
     def select(self, names: Iterable[str]) -> Recording:
         """Return the recording with only the named channels, in that order."""
-        rows = [self.index(name) for name in names]
+        rows = [self.index(name) for name in listed(names, "names", str)]
         return self._changed(
             "select " + ", ".join(self.channel_names[i] for i in rows),
             samples=self.samples[rows],
@@ -362,6 +400,7 @@ class Recording:
         InputError
             If sensors were applied, and the other rig has different ones.
         """
+        check_rig(rig)
         if rig is None or self.rig is rig:
             return replace(self, rig=rig)
         applied = () if self.rig is None else self.rig.sensors
@@ -403,7 +442,8 @@ class Recording:
         InputError
             If no sample lies there.
         """
-        first, last = (int(np.clip(round(t * self.sampling_rate_hz), 0, self.n_samples)) for t in (start_s, end_s))
+        times_s = number(start_s, "start_s", "s"), number(end_s, "end_s", "s")
+        first, last = (int(np.clip(round(t * self.sampling_rate_hz), 0, self.n_samples)) for t in times_s)
         if first >= last:
             raise InputError(
                 f"no sample lies from {start_s:.6g} to {end_s:.6g} s",
@@ -424,6 +464,24 @@ class Recording:
     def _changed(self, step: str, **changes: Any) -> Recording:
         provenance = replace(self.provenance, history=(*self.provenance.history, step))
         return replace(self, provenance=provenance, **changes)
+
+
+def check_recording(value: object, name: str = "recording", kinds: type | UnionType = Recording) -> None:
+    """Raise unless the value is a recording, or of other kinds that do; the remedy goes by what was given.
+
+    Parameters
+    ----------
+    value : object
+    name : str
+        Of the parameter.
+    kinds : type or union of types
+    """
+    remedy = "make one: gearsig.Recording(samples, sampling_rate_hz, channels)"
+    if isinstance(value, str | PathLike):
+        remedy = f"read the file first: gearsig.read_recording({str(value)!r})"
+    elif isinstance(getattr(value, "recording", None), Recording):  # a PreparedRecording, an Analysis
+        remedy = f"give {name}.recording"
+    instance_of(value, kinds, name, remedy=remedy)
 
 
 SI_FACTORS = {

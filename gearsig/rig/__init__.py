@@ -38,6 +38,8 @@ from gearsig.rig._types import (
     SpeedChannel,
     SpeedSource,
     TachometerChannel,
+    check_rig,
+    check_speed_source,
     known_ratio,
     shaft_ratios,
 )
@@ -64,6 +66,8 @@ __all__ = [
     "ToothContact",
     "bearing_catalogue",
     "catalogue_bearing",
+    "check_rig",
+    "check_speed_source",
     "contact_pair",
     "damping_ratio_s_per_m",
     "describe_rig",

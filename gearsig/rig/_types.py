@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from math import cos, isclose, isfinite, radians
+from math import cos, isclose, radians
+from os import PathLike
 
 from gearsig.checks import (
     FloatArray,
     closest_match_hint,
     count,
     frozen_array,
+    instance_of,
     known_name,
+    listed,
     not_negative,
+    number,
     one_of,
     positive,
+    short,
     within,
 )
 from gearsig.errors import InputError, RefusalError
@@ -109,6 +114,7 @@ class ConstantSpeed:
 
     def __post_init__(self) -> None:
         not_negative(self.speed_rpm, "speed_rpm", "rpm")
+        _check_names(self, "shaft")
 
 
 @dataclass(frozen=True)
@@ -129,6 +135,7 @@ class PulseTimes:
     def __post_init__(self) -> None:
         object.__setattr__(self, "times_s", frozen_array(self.times_s, "tachometer pulse times", ndim=1))
         count(self.pulses_per_revolution, "pulses_per_revolution")
+        _check_names(self, "shaft")
 
 
 @dataclass(frozen=True)
@@ -156,6 +163,10 @@ class TachometerChannel:
 
     def __post_init__(self) -> None:
         count(self.pulses_per_revolution, "pulses_per_revolution")
+        _check_names(self, "channel", "edge", "shaft")
+        for label, value in (("threshold", self.threshold), ("hysteresis", self.hysteresis)):
+            if value is not None:
+                number(value, f"{label} of tachometer {self.channel!r}")
 
 
 @dataclass(frozen=True)
@@ -178,6 +189,7 @@ class EncoderChannel:
 
     def __post_init__(self) -> None:
         positive(self.units_per_revolution, "units_per_revolution")
+        _check_names(self, "channel", "shaft")
 
 
 @dataclass(frozen=True)
@@ -190,10 +202,32 @@ class SpeedChannel:
 
     def __post_init__(self) -> None:
         positive(self.rpm_per_unit, "rpm_per_unit")
+        _check_names(self, "channel", "shaft")
 
 
 SpeedSource = ConstantSpeed | PulseTimes | TachometerChannel | EncoderChannel | SpeedChannel
 """Any of the ways to know the speed; None stands for none."""
+
+
+def check_speed_source(value: object, name: str = "speed") -> None:
+    """Raise unless the value is a source of speed or None; say which source is meant by a number, a name or times."""
+    remedy = ""
+    if isinstance(value, str):
+        remedy = f"a channel is named by gearsig.TachometerChannel({value!r}), SpeedChannel or EncoderChannel"
+    elif isinstance(value, PathLike):
+        remedy = "read pulse times first: gearsig.recording.read_pulse_times(path)"
+    elif isinstance(value, int | float):
+        remedy = "a constant speed is gearsig.ConstantSpeed(speed_rpm)"
+    elif not isinstance(value, SpeedSource | None):
+        remedy = "pulse times are gearsig.PulseTimes(times_s), a speed over time gearsig.SpeedChannel(channel)"
+    instance_of(value, SpeedSource | None, name, remedy=remedy)
+
+
+def _check_names(owner: object, *names: str) -> None:
+    """Raise on names in a part of a rig that are no text."""
+    for name in names:
+        instance_of(getattr(owner, name), str, f"{name} of {short(owner)}")
+
 
 MAX_TEETH = 5000
 """More than any slewing ring has."""
@@ -233,6 +267,7 @@ class Shaft:
     direction: str = ""
 
     def __post_init__(self) -> None:
+        _check_names(self, "name")
         if self.direction:
             one_of(self.direction, f"direction of shaft {self.name!r}", ("ccw", "cw"))
 
@@ -264,13 +299,11 @@ class GearPair:
     face_width_mm: float | None = None
 
     def __post_init__(self) -> None:
+        _check_names(self, "name", "driver", "driven")
         for label, teeth in (("driver", self.driver_teeth), ("driven", self.driven_teeth)):
-            if teeth is not None and teeth > MAX_TEETH:
-                raise InputError(f"{label} teeth of pair {self.name!r} is {teeth}", allowed=f"3 to {MAX_TEETH}")
-            if teeth is not None:
-                count(
-                    teeth, f"{label} teeth of pair {self.name!r}", minimum=3, remedy="leave it out if it is not known"
-                )
+            what = f"{label} teeth of pair {self.name!r}"
+            if teeth is not None and count(teeth, what, minimum=3, remedy="leave it out if unknown") > MAX_TEETH:
+                raise InputError(f"{what} is {teeth}", allowed=f"3 to {MAX_TEETH}")
         for label, value in (("module_mm", self.module_mm), ("face_width_mm", self.face_width_mm)):
             if value is not None:
                 positive(value, f"{label} of pair {self.name!r}", "mm")
@@ -310,6 +343,7 @@ class Bearing:
     bearing: str = ""
 
     def __post_init__(self) -> None:
+        _check_names(self, "name", "shaft", "bearing")
         where = f"of bearing {self.name!r}"
         if self.bearing and self.n_rolling_elements is None and not any((self.bpfo_order, self.bpfi_order)):
             known = catalogue_bearing(self.bearing)
@@ -375,13 +409,13 @@ class Sensor:
     wraps: bool = False
 
     def __post_init__(self) -> None:
+        _check_names(self, "channel", "unit", "position")
         if self.quantity:
             one_of(self.quantity, f"quantity of sensor {self.channel!r}", QUANTITIES)
         for label, value in (("scale", self.scale), ("offset", self.offset)):
-            if not isfinite(value) or (label == "scale" and value == 0.0):
-                raise InputError(
-                    f"{label} of sensor {self.channel!r} is {value:g}", allowed="a finite number, scale not 0"
-                )
+            what = f"{label} of sensor {self.channel!r}"
+            if number(value, what) == 0.0 and label == "scale":
+                raise InputError(f"{what} is 0", allowed="a finite number, scale not 0")
 
 
 MOUNTINGS = ("rigid", "flexible")
@@ -438,12 +472,9 @@ class OperatingPoint:
         if self.speed_rpm is not None:
             not_negative(self.speed_rpm, "operating_point.speed_rpm", "rpm")
         within(self.speed_tolerance_percent, "operating_point.speed_tolerance_percent", 0.01, 90, "%")
-        if self.torque_nm is not None and not isfinite(self.torque_nm):  # a sign is a direction
-            raise InputError(
-                f"operating_point.torque_nm is {self.torque_nm:g} N m",
-                allowed="a finite number",
-                remedy="give its size, or leave it out where it is not known",
-            )
+        if self.torque_nm is not None:  # a sign is a direction
+            remedy = "give its size, or leave it out where it is not known"
+            number(self.torque_nm, "operating_point.torque_nm", "N m", remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -485,6 +516,7 @@ class Rig:
     machine: MachineSize | None = None
 
     def __post_init__(self) -> None:
+        self._check_kinds()
         for kind, items in (("shaft", self.shafts), ("pair", self.pairs), ("bearing", self.bearings)):
             names = [item.name for item in items]
             doubled = sorted({n for n in names if names.count(n) > 1})
@@ -506,6 +538,17 @@ class Rig:
         if self.contact is not None and self.contact.pair:
             self.pair(self.contact.pair)  # says so where there is no such pair
         shaft_ratios(self)  # raises where the pairs do not connect or contradict each other
+
+    def _check_kinds(self) -> None:
+        """Raise on parts that are of another kind; make lists tuples."""
+        _check_names(self, "name")
+        parts = (("shafts", Shaft), ("pairs", GearPair), ("bearings", Bearing), ("sensors", Sensor))
+        for name, kind in (*parts, ("sources", str), ("assumed", str)):
+            object.__setattr__(self, name, listed(getattr(self, name), f"rig.{name}", kind))
+        instance_of(self.operating_point, OperatingPoint, "rig.operating_point")
+        instance_of(self.contact, ToothContact | None, "rig.contact")
+        instance_of(self.machine, MachineSize | None, "rig.machine")
+        check_speed_source(self.speed, "rig.speed")
 
     def _check_shaft(self, name: str, user: str) -> None:
         if name not in self.shaft_names:
@@ -578,3 +621,11 @@ class Rig:
                 f"pair {pair.name!r} gives two mesh orders, {orders[0]:g} and {orders[1]:g}", remedy="check the teeth"
             )
         return orders[0] if orders else None
+
+
+def check_rig(value: object, name: str = "rig", *, needed: bool = False) -> None:
+    """Raise unless the value is a rig, or None where none is needed; the remedy of a path is to read it."""
+    remedy = "describe the machine: gearsig.Rig(shafts=…, pairs=…), or read a rig file: gearsig.read_rig(path)"
+    if isinstance(value, str | PathLike):
+        remedy = f"read the rig file first: gearsig.read_rig({str(value)!r})"
+    instance_of(value, Rig if needed else Rig | None, name, remedy=remedy)

@@ -8,10 +8,10 @@ from math import cos, exp, log, pi, radians, sin, tan
 
 import numpy as np
 
-from gearsig.checks import FloatArray, positive, within
+from gearsig.checks import FloatArray, instance_of, listed, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.prepared import PreparedRecording, prepare
-from gearsig.recording import Recording
+from gearsig.recording import Recording, check_recording
 from gearsig.rig import GearPair, Rig
 from gearsig.severity._features import (
     FEATURES,
@@ -473,13 +473,16 @@ def estimate_crack(
     L. Wasserman, "Distribution-free predictive inference for regression", 2018 (locally weighted conformal intervals).
     """
     prepared = prepare(recording, rig)
+    if reference is not None:
+        check_recording(reference, "reference", Recording | PreparedRecording)
+    instance_of(calibration, Calibration | None, "calibration")
     facts = pair_facts(prepared.rig, torque_nm)
     used = calibration or load_calibration()
     if tip_relief_um is not None:  # beyond any in the calibration it is a wrong unit's
         most = MAX_RELIEF_SHARE * used.reach["load_mpa"][1] * used.reach["module_mm"][1] / STIFFNESS_N_PER_MM_UM
         remedy = "give what is ground off at the tips, in µm"
         within(tip_relief_um, "tip_relief_um", 0.0, round(most), "µm", remedy=remedy)
-    names = acceleration_channels(prepared.recording, tuple(channels))
+    names = acceleration_channels(prepared.recording, listed(channels, "channels", str))
     now = pair_lines(prepared, None, facts.pair, names)
     used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
     healthy = None

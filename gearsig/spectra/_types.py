@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from types import UnionType
 from typing import Any, Literal
 
 import numpy as np
@@ -24,7 +25,7 @@ from gearsig.checks import (
 )
 from gearsig.errors import InputError
 from gearsig.formatting import axis_label
-from gearsig.recording import Recording
+from gearsig.recording import Recording, check_recording
 from gearsig.results import Result
 
 Scaling = Literal["amplitude peak", "amplitude rms", "power", "power density", "dimensionless"]
@@ -290,6 +291,7 @@ def named_signal(
     signal: FloatArray | Recording, channel_or_rate_hz: str | float, unit: str, source: str, *, minimum: int = 2
 ) -> tuple[FloatArray, float, str, str]:
     """Return (values, sampling rate in Hz, unit, source) of a recording's channel, or of an array with its rate."""
+    check_signal(signal)
     if isinstance(signal, Recording):
         if not isinstance(channel_or_rate_hz, str):
             raise InputError(
@@ -304,6 +306,12 @@ def named_signal(
         )
     rate_hz = array_rate_hz(channel_or_rate_hz, "channel_or_rate_hz")
     return checked_signal(signal, minimum=minimum), rate_hz, unit, source
+
+
+def check_signal(signal: object, kinds: type | UnionType = Recording) -> None:
+    """Raise unless the value is a recording, or of other kinds that do, or may be an array of numbers."""
+    if not (isinstance(signal, list | tuple) or hasattr(signal, "__array__")):
+        check_recording(signal, "signal", kinds | np.ndarray)
 
 
 def array_rate_hz(given: str | float, parameter: str) -> float:

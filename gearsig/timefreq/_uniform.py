@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.angle import AngleSignal
-from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
+from gearsig.checks import FloatArray, count, frozen_array, one_of, positive, short
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
-from gearsig.spectra import Scaling, array_rate_hz, scaled_unit
+from gearsig.spectra import Scaling, array_rate_hz, check_signal, scaled_unit
 from gearsig.timefreq._types import Axis, Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap
 
 SMALLEST, LARGEST = 1e-12, 1e15
@@ -117,9 +117,10 @@ def uniform(signal: Source, channel: str | float | None = None) -> UniformSignal
     if isinstance(signal, UniformSignal):
         return signal
     if not isinstance(signal, (Recording, AngleSignal)):
+        check_signal(signal, Recording | AngleSignal | UniformSignal)
         if channel is None or isinstance(channel, str):
             raise InputError(
-                f"signal is a {type(signal).__name__}, and its sampling rate is {channel!r}",
+                f"signal is {short(signal)}, and its sampling rate is {channel!r}",
                 allowed="a Recording or AngleSignal and its channel, a UniformSignal, or an array and its rate in Hz",
             )
         return UniformSignal(signal, array_rate_hz(channel, "channel"))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, count, freeze, frozen_array, positive
+from gearsig.checks import FloatArray, count, freeze, frozen_array, listed, positive, short
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._average import times_of_revolutions
 from gearsig.orders._types import TrackedOrder
@@ -285,7 +285,8 @@ def tracks_over_angle(orders: Sequence[NamedOrder], signal: AngleSignal) -> Trac
 
 def named_orders(orders: Sequence[OrderLike]) -> list[NamedOrder]:
     """Return the orders, plain frequencies over time as tracks."""
-    if len(orders) == 0:
+    orders = listed(orders, "orders", object, remedy='give a list: [2, ("output", 4.5)]')
+    if not orders:
         raise InputError("no orders are given", where="orders", remedy="name at least one")
     return [
         FrequencyTrack(f"component {k}", order) if isinstance(order, np.ndarray) and order.ndim else order  # type: ignore[misc]
@@ -295,6 +296,8 @@ def named_orders(orders: Sequence[OrderLike]) -> list[NamedOrder]:
 
 def _of_shaft(order: float | tuple[str, float], angle: ShaftAngle, rig: Rig | None) -> tuple[str, float, float]:
     """Return an order's shaft, its number, and that shaft's revolutions per revolution of the angle's."""
+    if isinstance(order, tuple) and len(order) != 2:
+        raise InputError(f"an order is {short(order)}", where="orders", allowed="a number, or (shaft, number)")
     shaft, number = order if isinstance(order, tuple) else (angle.shaft, order)
     number = positive(number, f"order {number!r}")
     ratio = 1.0 if shaft == angle.shaft else rig.ratio(shaft, to=angle.shaft) if rig and rig.shafts else None
