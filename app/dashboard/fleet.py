@@ -243,7 +243,7 @@ def _show_trend(fleet: Fleet, row: Row) -> None:
         lines.insert(0, ChartLine(days[known], expected[known], "expected, within its limits", QUIET, band=band))
     if np.isfinite(alarm).any():
         lines.append(ChartLine(days, alarm, "alarm", 1, dotted=True))
-    beyond = (table["level"] != "ok").to_numpy() & np.isfinite(value)
+    beyond = table["level"].isin(["warning", "alarm"]).to_numpy() & np.isfinite(value)
     marked = list(zip(days[beyond], value[beyond], strict=True))
     margin = max(0.02 * float(np.ptp(days)), 0.5)
     limits = padded_limits([value, *([high] if np.isfinite(high).any() else [])])

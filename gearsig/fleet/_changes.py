@@ -9,8 +9,8 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from gearsig.cache import write_whole
-from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, Fleet
-from gearsig.fleet._trends import NONE, events_of
+from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, Fleet, level_name
+from gearsig.fleet._trends import events_of
 from gearsig.formatting import readable, signed
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def counts_text(status: DataFrame) -> str:
 
 def series_level(row: Mapping[Any, Any]) -> str:
     """Return the level of a row of `Fleet.series` by name, "unknown" where there are no limits to judge it by."""
-    return "unknown" if row["basis"] == NONE else LEVEL_NAMES[int(row["level"])]
+    return level_name(int(row["level"]), str(row["basis"]))
 
 
 def trends_text(row: Mapping[Any, Any]) -> str:

@@ -40,7 +40,15 @@ if TYPE_CHECKING:
 
 LEVEL_NAMES = {OK: "ok", WARNING: "warning", ALARM: "alarm"}
 STATUS_LEVELS = ("alarm", "warning", "unknown", "ok")
-"""Of a measuring point, the worst first; unknown: the last recording allowed no answer, and there is no baseline."""
+"""The worst first. Unknown is a measuring point without a baseline whose last recording allowed no answer, and an
+indicator without limits."""
+
+
+def level_name(level: int, basis: str) -> str:
+    """Return what a level is called, by what its limits rest on."""
+    return "unknown" if basis == NONE else LEVEL_NAMES[level]
+
+
 TRENDS = "trends.parquet"
 TABLES = ("recordings", "indicators", "trends", "status")
 
@@ -81,7 +89,7 @@ class Trend:
     basis : str
         "ISO 20816-3", "statistical" or "none".
     level : str
-        "ok", "warning" or "alarm" after the last recording.
+        Of `STATUS_LEVELS`, after the last recording.
     changed : datetime or None
         Since when it is another level than before.
     normalised : tuple of str
@@ -338,7 +346,7 @@ class Fleet:
                 known_name(value, known, f"there is no {what} {value!r}", where=machine)
                 found = [each for each in found if each[2][key] == value]
         result = [_trend(of_points[chosen], column, machine, chosen) for chosen, column, _ in found]
-        return tuple(sorted(result, key=lambda t: -[*LEVEL_NAMES.values()].index(t.level)))
+        return tuple(sorted(result, key=lambda t: STATUS_LEVELS.index(t.level)))
 
     def export(
         self,
@@ -638,7 +646,7 @@ def _trend(trends: PointTrends, column: int, machine: str, point: str) -> Trend:
             "low": trends.low[:, column],
             "high": trends.high[:, column],
             "alarm": trends.alarm[:, column],
-            "level": [LEVEL_NAMES[int(level)] for level in trends.levels[:, column]],
+            "level": [level_name(int(level), trends.basis[column]) for level in trends.levels[:, column]],
             "in_baseline": trends.baseline,
         }
     )[known].reset_index(drop=True)
@@ -650,7 +658,7 @@ def _trend(trends: PointTrends, column: int, machine: str, point: str) -> Trend:
         **row,
         table=table,
         basis=trends.basis[column],
-        level=LEVEL_NAMES[int(trends.levels[-1, column])],
+        level=level_name(int(trends.levels[-1, column]), trends.basis[column]),
         changed=dates.iloc[began].to_pydatetime() if began >= 0 else None,
         normalised=trends.normalised,
         false_alarm_rate=trends.false_alarm_rate,
