@@ -49,7 +49,12 @@ class MeasuredLine:
     @property
     def place(self) -> str:
         """The order in words."""
-        return f"order {self.order:.5g}"
+        return order_text(self.order)
+
+
+def order_text(order: float) -> str:
+    """Return an order in words, by which an indicator is known again: where it is expected, not where it was found."""
+    return f"order {order:.5g}"
 
 
 def over_orders(spectrum: Spectrum, speed_rev_per_s: float) -> Spectrum:
@@ -211,9 +216,9 @@ def mesh_indicators(
     indicators: list[Indicator] = []
     for h in range(1, count(n_harmonics, "n_harmonics") + 1):
         carrier = find_line(source, h * mesh_order)
-        name, note = f"mesh level {h}×", carrier.note
+        name, note, band = f"mesh level {h}×", carrier.note, order_text(h * mesh_order)
         indicators.append(
-            Indicator(name, carrier.amplitude, source.unit, channel, on, gear=pair.name, band=carrier.place, note=note)
+            Indicator(name, carrier.amplitude, source.unit, channel, on, gear=pair.name, band=band, note=note)
         )
         for modulating, spacing in spacings.items():
             if spacing is not None:
@@ -236,13 +241,14 @@ def _sidebands(
     first: list[float] = []
     for k in range(1, n_sidebands + 1):
         for sign, side in ((-1, "-"), (1, "+")):
-            line = find_line(source, harmonic * mesh_order + sign * k * spacing)
+            order = harmonic * mesh_order + sign * k * spacing
+            line = find_line(source, order)
             value = float("nan") if blurred else line.amplitude
             first += [value] if k == 1 else []
-            yield f"sideband level {harmonic}×{side}{k}", value, source.unit, line.place, blurred or line.note
+            yield f"sideband level {harmonic}×{side}{k}", value, source.unit, order_text(order), blurred or line.note
     ratio = _ratio_db(float(np.mean(first)), carrier.amplitude) if first else float("nan")
     note = blurred or ("undefined: a line is missing or zero" if isnan(ratio) else "")
-    yield f"sideband ratio {harmonic}×", ratio, "dB", carrier.place, note
+    yield f"sideband ratio {harmonic}×", ratio, "dB", order_text(harmonic * mesh_order), note
 
 
 def shaft_indicators(
@@ -270,10 +276,19 @@ def shaft_indicators(
     low = isinstance(source, Spectrum) and shaft_ratio / source.resolution < 2 * lobe_lines(source)
     leak = "so close to zero that the signal's mean leaks in" if low else ""
     harmonics = range(1, count(n_harmonics, "n_harmonics") + 1)
-    lines = [(f"shaft order {h}×", find_line(source, h * shaft_ratio), leak if h == 1 else "") for h in harmonics]
+    lines = [(h, find_line(source, h * shaft_ratio), leak if h == 1 else "") for h in harmonics]
     return tuple(
-        Indicator(name, line.amplitude, source.unit, channel, on, shaft, band=line.place, note=line.note or note)
-        for name, line, note in lines
+        Indicator(
+            f"shaft order {h}×",
+            line.amplitude,
+            source.unit,
+            channel,
+            on,
+            shaft,
+            band=order_text(h * shaft_ratio),
+            note=line.note or note,
+        )
+        for h, line, note in lines
     )
 
 

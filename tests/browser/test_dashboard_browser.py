@@ -142,6 +142,25 @@ def test_what_is_chosen_in_a_view_is_in_its_address_and_leaves_it_with_the_view(
     assert soon(page, lambda: "laboratory" in page.url and "sample=" not in page.url)
 
 
+def test_a_described_machine_is_analysed_at_once_and_survives_a_reload(page: playwright.Page, address: str) -> None:
+    sample = next(sample for sample in samples() if sample.rig.stem == "outer_race")
+    page.goto(address)
+    settle(page)
+    open_files(page, sample.recording)
+    assert "outer race" not in verdict(page)
+    open_view(page, "Machine")
+    page.get_by_text("As a rig file (TOML)").click()
+    text = page.get_by_role("textbox", name="Text", exact=True)
+    text.fill(sample.rig.read_text(encoding="utf-8"))
+    text.press("Control+Enter")
+    settle(page)
+    page.get_by_role("button", name="Use this text").click()
+    page.get_by_role("heading", level=3).filter(has_text="outer race").first.wait_for()
+    settle(page)
+    page.reload()
+    page.get_by_role("heading", level=3).filter(has_text="outer race").first.wait_for()
+
+
 def test_another_user_sees_nothing_of_the_first(page: playwright.Page, address: str) -> None:
     name = "confidential.csv"
     rows = "\n".join(f"{i / 1000:g},{(i * 37) % 101}" for i in range(3000))

@@ -1,6 +1,7 @@
 """Mesh, shaft and bearing levels from spectra and averages."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,6 +99,15 @@ def test_sidebands_belong_to_the_shaft_that_modulates(shaft):
     assert found["sideband level 1×+1", shaft] == pytest.approx(0.6, rel=0.005)
     assert found["sideband ratio 1×", shaft] == pytest.approx(20 * math.log10(0.15), abs=0.05)
     assert found["sideband ratio 1×", other] < -50
+
+
+def test_lines_are_called_by_the_order_at_which_they_are_expected():
+    """Two recordings whose lines lie on other grids have the same indicators, which can be compared."""
+    plain = spectrum(modulated(1.0, 0.3, 0.0))
+    shifted = replace(plain, positions=plain.positions * 1.0004)
+    bands = [[(i.name, i.band) for i in mesh_indicators(s, RIG, PAIR)] for s in (plain, shifted)]
+    assert bands[0] == bands[1]
+    assert ("sideband level 1×-1", "order 28") in bands[0]
 
 
 def test_amplitude_and_phase_modulation_together_lean_to_one_side():

@@ -83,7 +83,7 @@ def hdf5_bytes(folder, *, userblock=False):
 
 def hdf5_seeds(folder):
     yield hdf5_bytes(folder)
-    yield written(".h5", folder, speed=TachometerChannel("tacho", 1, ""))
+    yield written(".h5", folder, speed=TachometerChannel("tacho", 1))
 
 
 def parquet_seeds(folder):

@@ -257,8 +257,8 @@ def _show_panels(report: GapReport) -> None:
     about = {
         "Where": "Share of the gap.",
         "Which": "Probability.",
-        "How far": "Left, in structural floors. One is how far healthy machines differ from their simulation or from "
-        "their own reference.",
+        "How far": "Left of the whole gap, in structural floors. One is how far healthy machines differ from their "
+        "simulation or from their own reference.",
     }
     for column, title, rows in zip(st.columns(3), TABS, (places, causes, steps), strict=False):
         with column.container(border=True, height="stretch"):

@@ -11,7 +11,7 @@ from app.dashboard import address, state
 from app.dashboard.cached import kept_file, remember_file, sha256_of_upload
 from app.dashboard.state import Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.machine import machine_text, stated, text_of
+from app.dashboard.widgets.machine import machine_text, stated, text_as_stated, text_of
 from app.samples import SampleRecording, samples
 from gearsig.recording import FORMAT_NAMES, FORMAT_OF_EXTENSION, sha256_of
 
@@ -214,7 +214,7 @@ def _keep_address(file: ChosenFile, origin: str) -> None:
     named = {"sample": file.rig_name.removesuffix(".toml")} if origin == SAMPLE else {}
     if origin == FILE:
         named = {"file": state.token_of(file.sha256)}
-        remember_file(named["file"], replace(file, rig_text=machine_text(file)))
+        remember_file(named["file"], replace(file, rig_text=text_as_stated(file)))
     for name in ("sample", "file"):
         text = named.get(name, "")
         if address.asked(name) not in ("", text):  # it is not open: nor are its channels

@@ -46,6 +46,9 @@ WORDS = {
 }
 
 
+_CHANGED = "machine changed"
+
+
 def machine_text(file: ChosenFile) -> str:
     """Return the rig file's text as it stands in this session: the form's, else the file's."""
     return str(st.session_state.get(_key(file), file.rig_text))
@@ -55,6 +58,22 @@ def stated(file: ChosenFile, name: str) -> float | None:
     """Return a number that the user stated of a file, "rate" (Hz) or "speed" (rpm); None without one."""
     value: float | None = st.session_state.get(state.source_key(f"stated {name}", file.sha256))
     return value
+
+
+def text_as_stated(file: ChosenFile) -> str:
+    """Return the machine's text with what the user stated of the file, for whoever opens it again."""
+    rate_hz, speed_rpm = stated(file, "rate"), stated(file, "speed")
+    if rate_hz is None and speed_rpm is None:
+        return machine_text(file)
+    try:
+        table: Table = tomllib.loads(machine_text(file))
+    except tomllib.TOMLDecodeError:
+        return machine_text(file)
+    if rate_hz is not None:
+        table["sampling_rate_hz"] = rate_hz
+    if speed_rpm is not None:
+        table["speed"] = {"source": "constant", "speed_rpm": speed_rpm}
+    return tomli_w.dumps(table)
 
 
 def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: bool = False) -> None:
@@ -68,6 +87,8 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
     is_told : bool
         Whether the page already says what is wrong with the machine as it stands.
     """
+    if st.session_state.pop(_CHANGED, False):  # the verdict above rests on it, not this part of the page alone
+        st.rerun()
     text = machine_text(file)
     try:
         table = tomllib.loads(text)
@@ -124,6 +145,7 @@ def _state(file: ChosenFile, name: str) -> None:
     st.session_state[state.source_key(f"stated {name}", file.sha256)] = st.session_state[
         state.source_key(f"asked {name}", file.sha256)
     ]
+    st.session_state[_CHANGED] = True
 
 
 def _key(file: ChosenFile) -> str:
@@ -135,6 +157,7 @@ def _take(file: ChosenFile, text: str) -> None:
     # tables of the form begin anew from the text
     version = state.source_key("machine version", file.sha256)
     st.session_state[version] = st.session_state.get(version, 0) + 1
+    st.session_state[_CHANGED] = True
 
 
 def _form(file: ChosenFile, table: Table, text: str, channels: Sequence[str], first: DeltaGenerator) -> Table:

@@ -36,11 +36,9 @@ from gearsig.plot import (
     value_limits,
     with_unit,
 )
-from gearsig.spectra import Spectrum
+from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
-SLIP_SHARE = 0.01
-"""Bearings slip by a percent or so: a finding that near to a cursor is the cursor's."""
 KIND_NAMES = {
     "mesh": "mesh",
     "sideband": "sidebands",
@@ -171,7 +169,7 @@ def _choose_looks(source: Analysis | str, cursors: Sequence[Cursor], name: str, 
 
 def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:
     """Give the cursor of a finding the first right to its label."""
-    found = any(abs(cursor.position - position) <= SLIP_SHARE * position for position in marked)
+    found = any(abs(cursor.position - position) <= LARGEST_SLIP * position for position in marked)
     return replace(cursor, number=0) if found else cursor
 
 

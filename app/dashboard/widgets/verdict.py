@@ -11,8 +11,8 @@ from app.dashboard import state
 from app.dashboard.theme import as_typed, one_line
 from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.messages import in_page_words
-from app.dashboard.widgets.spectrum import SLIP_SHARE, show_ring, show_spectrum
-from gearsig.diagnosis import CHANGED, Analysis, Finding, Kind, Outcome
+from app.dashboard.widgets.spectrum import show_ring, show_spectrum
+from gearsig.diagnosis import BEARING_PARTS, CHANGED, Analysis, Finding, Kind, Outcome
 from gearsig.plot import ChartLine, LinePanel, marks_of, with_unit
 from gearsig.report import (
     FindingCard,
@@ -27,6 +27,7 @@ from gearsig.report import (
     teeth_of_shaft,
     verdict_picture,
 )
+from gearsig.spectra import LARGEST_SLIP
 
 Colour = Literal["red", "orange", "violet", "gray", "blue", "green"]
 COLOURS: dict[Kind | Outcome, Colour] = {
@@ -141,6 +142,9 @@ def show_verdict_picture(analysis: Analysis) -> None:
     if picture.about == "bearing":
         spectrum = channel.envelope_spectrum
         cursors = bearing_cursors(analysis, spectrum) if spectrum is not None else ()
+        code = picture.finding.code if picture.finding is not None else ""
+        named = next((part for part, (words, _) in BEARING_PARTS.items() if words.replace(" ", "-") in code), "")
+        cursors = tuple(cursor for cursor in cursors if named in cursor.label)
     else:
         spectrum = channel.order_spectrum or channel.spectrum
         cursors = line_cursors(analysis, spectrum, n_sidebands=1)
@@ -152,14 +156,18 @@ def show_verdict_picture(analysis: Analysis) -> None:
     show_spectrum(
         analysis,
         spectrum,
-        [c for c in cursors if not marked or abs(c.position / marked[0] - round(c.position / marked[0])) < SLIP_SHARE]
-        or cursors,
+        [cursor for cursor in cursors if not marked or _is_multiple(cursor.position, marked[0])] or cursors,
         place,
         marked=marked,
         shown=(0.0, min(end, float(spectrum.positions[-1]))),
         scale="Linear" if families else "Logarithmic",
         plain=True,
     )
+
+
+def _is_multiple(position: float, fundamental: float) -> bool:
+    """Whether a line is a multiple of a finding's order, within a bearing's slip."""
+    return abs(position / (max(round(position / fundamental), 1) * fundamental) - 1.0) <= LARGEST_SLIP
 
 
 def show_kind(kind: Kind | Outcome) -> None:

@@ -75,7 +75,12 @@ def show_of_channel(analysis: Analysis, view: Callable[[Analysis, ChannelAnalysi
     names = list(dict.fromkeys([*named, *channels]))
     name = names[0]
     if len(names) > 1:
-        looks = {"key": state.view_key(state.CHANNEL, analysis), "name": "channel", "persist_state": "session"}
+        # By what comes first: another machine is another verdict, which may rest on another channel.
+        looks = {
+            "key": state.view_key(f"{state.CHANNEL} {name}", analysis),
+            "name": "channel",
+            "persist_state": "session",
+        }
         name = address.ask_one(st.columns(3)[0].selectbox, "Channel", list(channels), first=name, **looks)
     view(analysis, channels[name])
 
