@@ -307,7 +307,7 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
         replace(where, frequency_hz=None),
         Strength(comb.amplitude, excess.spectrum.unit, comb.floor, "noise floor of the order spectrum", ratio),
         confidence=from_p_value(p_value, prior=0.3, limit=0.99),
-        confidence_basis=f"at most this; chance that noise makes such a family: {p_text(p_value)}, over all spacings "
+        confidence_basis=f"chance that noise makes such a family: {p_text(p_value)}, over all spacings "
         "and channels tried",
         evidence=tuple(evidence),
         surer=surer,

@@ -103,7 +103,7 @@ def test_assumed_data_make_no_fault() -> None:
 
 @pytest.mark.parametrize(("below_percent", "outcome"), [(20.0, Outcome.NO_FAULT), (80.0, Outcome.CANNOT_TELL)])
 def test_teeth_without_a_crack_are_settled_only_if_one_would_have_shown(below_percent: float, outcome: Outcome) -> None:
-    short = Finding("tooth-not-examined", Kind.CANNOT_TELL, "Teeth on shaft(s) out cannot be examined.")
+    short = Finding("tooth-not-examined", Kind.CANNOT_TELL, "Teeth on shaft out cannot be examined.")
     found = with_crack([UNDECIDED, short, GOOD_BEARINGS], none_seen(below_percent), PAIR)
     assert outcome_of(ranked(found)) is outcome
     assert any(f"({below_percent:.0f} % of the root)" in f.title for f in found)

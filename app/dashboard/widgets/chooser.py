@@ -210,9 +210,9 @@ def _follow_address() -> None:
 
 
 def _keep_address(file: ChosenFile, origin: str) -> None:
-    """Name what is open in the page's address; an own file by a token of this session."""
+    """Name what is open in the page's address; an own file, or one of the laboratory, by a token of this session."""
     named = {"sample": file.rig_name.removesuffix(".toml")} if origin == SAMPLE else {}
-    if origin == FILE:
+    if origin in (FILE, state.OF_LABORATORY):
         named = {"file": state.token_of(file.sha256)}
         remember_file(named["file"], replace(file, rig_text=text_as_stated(file)))
     for name in ("sample", "file"):
