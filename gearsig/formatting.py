@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from math import floor, isfinite, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -91,6 +92,18 @@ def signed(value: float, n_decimals: int = 1) -> str:
         return "–"
     rounded = round(value, n_decimals) + 0.0
     return f"{rounded:+.{n_decimals}f}".replace("-", "−") if rounded else f"{0.0:.{n_decimals}f}"
+
+
+def enumerated(names: Sequence[str]) -> str:
+    """Return names as a sentence lists them.
+
+    Examples
+    --------
+    >>> enumerated(["input"]), enumerated(["input", "middle", "output"])
+    ('input', 'input, middle and output')
+    """
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def counted(n: int, noun: str) -> str:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
-from gearsig.prepared import MAINS_HZ, MAINS_TOLERANCE, Comb, LineExcess, best_comb, comb_at
+from gearsig.prepared import MAINS_TOLERANCE, Comb, LineExcess, best_comb, comb_at
+from gearsig.recording import MAINS_HZ
 from gearsig.rig import Bearing
 
 AS_STRONG_DB = 9.0

@@ -9,6 +9,7 @@ from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._lines import MESH_ELSEWHERE
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Strength, Where
+from gearsig.recording import MAINS_HZ
 from gearsig.rig import Rig
 
 OFF_NOMINAL, NEAR_ZERO = "speed-off-nominal", "speed-near-zero"
@@ -74,7 +75,7 @@ def without_synchronous_hum(findings: Iterable[Finding], angle: ShaftAngle | Can
     if isinstance(angle, ShaftAngle):
         ratios = [rig.ratio(name) for name in rig.shaft_names] or [1.0]
         turns_hz = [angle.mean_speed_rpm / 60 * ratio for ratio in ratios if ratio is not None]
-    multiples = [h * hz / mains for hz in turns_hz for h in (1, 2, 3, 4) for mains in (50.0, 60.0)]
+    multiples = [h * hz / mains for hz in turns_hz for h in (1, 2, 3, 4) for mains in MAINS_HZ]
     synchronous = any(round(m) >= 1 and abs(m / round(m) - 1) < 1e-3 for m in multiples)
     return [f for f in findings if not (synchronous and f.code == "channel-hum")]
 

@@ -11,7 +11,8 @@ import numpy as np
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
-from gearsig.prepared import MAINS_HZ, RUN_UP_FOOT_ORDERS, LineExcess, floor_of, levels_beside
+from gearsig.prepared import RUN_UP_FOOT_ORDERS, LineExcess, floor_of, levels_beside
+from gearsig.recording import MAINS_HZ
 from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
 

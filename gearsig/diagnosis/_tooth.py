@@ -23,6 +23,7 @@ from gearsig.diagnosis._types import (
     from_p_value,
     p_text,
 )
+from gearsig.formatting import enumerated
 from gearsig.orders import whole_revolutions
 from gearsig.prepared import has_mark, sliding_mean, strongest_window
 
@@ -552,7 +553,7 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
             Finding(
                 "no-tooth-local-damage",
                 Kind.INFORMATION,
-                f"No local tooth damage shows on {shafts_text(_names(sharp))}.",
+                f"No local tooth damage shows on {_shafts_text(_names(sharp))}.",
                 Where(tuple(first.separated), shaft=first.shaft if len(sharp) == 1 else ""),
                 confidence=0.8,
                 confidence_basis="small damage may be hidden below the mesh's own variation",
@@ -587,7 +588,7 @@ def _undecided(examined: list[_Examined], reason: str) -> list[Finding]:
     more = "ore revolutions, a sensor nearer to the gears, a higher load; machine data that are not assumed."
     healthy = "A recording of the same gears when they were healthy, given with --reference: what teeth are made with"
     surer = f"M{more}" if examined[0].signals.has_reference else f"{healthy} cancels. Or m{more}"
-    title = f"Nothing shows at the teeth of {shafts_text(_names(examined))}, but {reason}."
+    title = f"Nothing shows at the teeth of {_shafts_text(_names(examined))}, but {reason}."
     where, evidence = Where(tuple(examined[0].shaft.separated)), tuple(_visible_text(e) for e in examined)
     return [cannot_tell("tooth-damage-undecided", title, where, evidence=evidence, surer=surer)]
 
@@ -596,16 +597,8 @@ def _names(examined: list[_Examined]) -> list[str]:
     return [e.shaft.shaft for e in examined]
 
 
-def shafts_text(names: Sequence[str]) -> str:
-    """Name one or several shafts.
-
-    Examples
-    --------
-    >>> shafts_text(["input"]), shafts_text(["input", "middle", "output"])
-    ('shaft input', 'shafts input, middle and output')
-    """
-    *first, last = names
-    return f"shafts {', '.join(first)} and {last}" if first else f"shaft {last}"
+def _shafts_text(names: Sequence[str]) -> str:
+    return f"shaft{'s' * (len(names) > 1)} {enumerated(names)}"
 
 
 def _visible_text(examined: _Examined) -> str:
@@ -637,7 +630,7 @@ def _not_examined(signals: AnalysisSignals, examined: set[str]) -> list[Finding]
         if shaft not in examined:
             reasons.setdefault(_reason(signals, shaft), []).append(shaft)
     surer = "A longer recording with a tachometer, the right teeth of all gears, a higher sampling rate."
-    titles = [f"Teeth on {shafts_text(shafts)} cannot be examined: {reason}." for reason, shafts in reasons.items()]
+    titles = [f"Teeth on {_shafts_text(shafts)} cannot be examined: {reason}." for reason, shafts in reasons.items()]
     return [cannot_tell("tooth-not-examined", title, surer=surer) for title in titles]
 
 

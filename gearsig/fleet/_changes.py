@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gearsig.cache import write_whole
 from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, Fleet, level_name
 from gearsig.fleet._trends import events_of
-from gearsig.formatting import readable, signed
+from gearsig.formatting import counted, readable, signed
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -155,14 +155,13 @@ def level_counts(status: DataFrame) -> dict[str, str]:
     {'alarm': '2 alarms', 'unknown': '1 unknown', 'ok': '1 ok'}
     """
     counts = {name: int((status["level"] == name).sum()) for name in STATUS_LEVELS}
-    plural = {"alarm": "alarms", "warning": "warnings"}
-    return {name: f"{n} {plural.get(name, name) if n > 1 else name}" for name, n in counts.items() if n}
+    nouns = ("alarm", "warning")
+    return {name: counted(n, name) if name in nouns else f"{n} {name}" for name, n in counts.items() if n}
 
 
 def counts_text(status: DataFrame) -> str:
     """Return `level_counts` in one sentence."""
-    n = len(status)
-    return f"{n} measuring point{'s' * (n != 1)}: {', '.join(level_counts(status).values())}"
+    return f"{counted(len(status), 'measuring point')}: {', '.join(level_counts(status).values())}"
 
 
 def series_level(row: Mapping[Any, Any]) -> str:

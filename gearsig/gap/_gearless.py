@@ -22,7 +22,7 @@ from gearsig.diagnosis import (
     in_reference,
 )
 from gearsig.errors import RefusalError
-from gearsig.formatting import named, signed
+from gearsig.formatting import enumerated, named, signed
 from gearsig.gap._conditions import Stage, readable
 from gearsig.gap._simulator import GapEffect, OperatingCondition
 from gearsig.gap._types import (
@@ -391,7 +391,7 @@ def _what(part: Standing, rig: Rig) -> str:
     parts = [*(["no gear"] if rig.pairs else []), "no shaft", *(["no bearing"] if rig.bearings else [])]
     unknown = "" if rig.bearings else ", the rig file naming no bearing"
     known = f" of known speed explains, perhaps {loose}" if loose else " explains"
-    return f"envelope lines of impacts that {', '.join(parts[:-1])} and {parts[-1]}{known}{unknown}"
+    return f"envelope lines of impacts that {enumerated(parts)}{known}{unknown}"
 
 
 NOT_SIMULATED = (

@@ -45,13 +45,13 @@ from gearsig.gap._reduction import (
     DRIVER,
     N_HARMONICS,
     N_MESH_HARMONICS,
-    SUPPLIES_HZ,
     GearFrame,
     ReducedRecording,
 )
 from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import UNKNOWN, GapPlace, PlaceKind
 from gearsig.gap._words import ComparedPair, LocatedChange, band_words, by_decibels, feature_words, hertz, shaft_words
+from gearsig.recording import MAINS_HZ
 from gearsig.severity import ShaftLines, find_event, load_calibration
 
 # --------------------
@@ -400,14 +400,14 @@ def _fundamental(level: FloatArray, line: int) -> int:
 
 def _is_the_supplys(comparison: ComparedPair, order: float) -> bool:
     speed_hz = comparison.now.speed_hz
-    lines = np.array([k * supply for supply in SUPPLIES_HZ for k in range(1, N_HARMONICS + 1)])
+    lines = np.array([k * supply for supply in MAINS_HZ for k in range(1, N_HARMONICS + 1)])
     width = np.maximum(_SUPPLY_WANDERS * lines, comparison.now.order_step * speed_hz)
     return bool((np.abs(order * speed_hz - lines) < width).any())
 
 
 def _hum(comparison: ComparedPair) -> LocatedChange:
     now = comparison.now
-    supply = SUPPLIES_HZ[int(np.argmax(now.hum))]
+    supply = MAINS_HZ[int(np.argmax(now.hum))]
     change = comparison.change_db["hum"]
     orders = tuple(k * supply / now.speed_hz for k in range(1, N_HARMONICS + 1))
     return LocatedChange(f"mains hum at {supply:g} Hz and multiples, {by_decibels(change)}", change, orders)

@@ -17,7 +17,7 @@ from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.prepared import PreparedRecording, prepare
-from gearsig.recording import Recording, metres_per_second_squared
+from gearsig.recording import MAINS_HZ, Recording, metres_per_second_squared
 from gearsig.rig import GearPair, Rig
 from gearsig.severity import orders_from_mesh
 
@@ -407,7 +407,6 @@ class ReducedRecording:
 # --------------------
 
 
-SUPPLIES_HZ = (50.0, 60.0)
 N_HARMONICS = 3
 _TOLERANCE = 0.002  # how far a supply's frequency wanders
 _NEIGHBOURHOOD_HZ = 8.0
@@ -423,7 +422,7 @@ def mains_lines(recording: Recording, names: Sequence[str], speed_hz: float, fra
     """
     return tuple(
         max(_excess(recording.values(name), recording, supply, speed_hz, frame) for name in names)
-        for supply in SUPPLIES_HZ
+        for supply in MAINS_HZ
     )
 
 

@@ -50,7 +50,7 @@ from gearsig.gap._waveform import (
     waveform_match,
 )
 from gearsig.gap._words import shaft_words
-from gearsig.processes import active_cluster, can_be_sent, run_jobs
+from gearsig.processes import active_cluster, can_be_sent, killed_text, run_jobs
 
 # --------------------
 # A bank on disk: arrays without pickles, whole or not at all; a file that does not fit is made again.
@@ -204,7 +204,7 @@ def finished_runs(
 
 
 def _killed_batch(tasks: Sequence[Task]) -> list[Reduced | str]:
-    return ["the process that simulated it was killed: perhaps it ran out of memory" for _ in tasks]
+    return [killed_text("simulated it") for _ in tasks]
 
 
 def run_for_a_moment(twin: Twin, added: Sequence[Added] = ()) -> None:

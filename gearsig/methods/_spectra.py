@@ -104,17 +104,6 @@ def _spectrum_answer(
     return _marked_spectrum(channel, spectrum, caption, cursors, lowest, highest)
 
 
-def _envelope_answer(
-    prepared: PreparedRecording,
-    channel: str,
-    spectrum: Spectrum,
-    caption: str,
-    lowest: float | None,
-    highest: float | None,
-) -> MethodAnswer:
-    return _marked_spectrum(channel, spectrum, caption, rhythms_of(prepared, spectrum), lowest, highest)
-
-
 def _marked_spectrum(
     channel: str,
     spectrum: Spectrum,
@@ -236,7 +225,7 @@ def _envelope(
     low, high = banded.envelope.band_hz
     text = f"spectrum of the envelope of {readable(low)} to {readable(high)} Hz"
     top = min(float(banded.spectrum.positions[-1]), (high - low) / 2, usual_hz) if highest is None else highest
-    answer = _envelope_answer(prepared, channel, banded.spectrum, text, lowest, top)
+    answer = _marked_spectrum(channel, banded.spectrum, text, rhythms_of(prepared, banded.spectrum), lowest, top)
     numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}
     return replace(answer, numbers={**answer.numbers, **numbers}, warnings=banded.warnings)
 
@@ -258,7 +247,7 @@ def _envelope_in_blocks(
     spectrum = blocks.envelope_density(channel, band_hz)
     text = f"power density of the squared envelope of {readable(band_hz[0])} to {readable(band_hz[1])} Hz"
     top = highest if highest is not None else min(float(spectrum.positions[-1]), (band_hz[1] - band_hz[0]) / 2)
-    answer = _envelope_answer(prepared, channel, spectrum, text, lowest, top)
+    answer = _marked_spectrum(channel, spectrum, text, rhythms_of(prepared, spectrum), lowest, top)
     return replace(answer, numbers={**answer.numbers, "band_hz": list(band_hz)})
 
 

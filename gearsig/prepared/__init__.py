@@ -31,12 +31,10 @@ from gearsig.prepared._lines import (
 )
 from gearsig.prepared._recording import MEMORY_LIMIT_MB, PreparedRecording, has_mark, prepare
 from gearsig.prepared._revolution import shift_scores, sliding_mean, strongest_window, turned_lines
-from gearsig.recording import MAINS_HZ
 
 __all__ = [
     "INNER_LINES",
     "LOG_RATIO_LIMIT",
-    "MAINS_HZ",
     "MAINS_TOLERANCE",
     "MEMORY_LIMIT_MB",
     "RUN_UP_FOOT_ORDERS",

@@ -15,7 +15,7 @@ import numpy as np
 
 from gearsig import __version__, plot
 from gearsig.cache import write_text
-from gearsig.formatting import named, readable, signed
+from gearsig.formatting import enumerated, named, readable, signed
 from gearsig.gap import (
     NONE,
     UNKNOWN,
@@ -265,8 +265,8 @@ def inseparable_text(report: GapReport) -> str:
     if report.inseparable is None:
         return ""
     titles = {cause.name: f"{cause.title} ({odds_text(cause.probability)})" for cause in report.causes}
-    *others, last = (titles.get(name, name) for name in report.inseparable)
-    return f"These recordings cannot tell {', '.join(others)} and {last} apart."
+    named = enumerated([titles.get(name, name) for name in report.inseparable])
+    return f"These recordings cannot tell {named} apart."
 
 
 def step_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:

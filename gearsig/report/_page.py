@@ -104,7 +104,7 @@ def marked_positions(
     kinematic order is marked at the order that a finding measured for it, if one did.
     """
     positions: list[float] = []
-    for finding in sorted(analysis.findings, key=lambda f: (f.kind is not Kind.FAULT, f.code == CHANGED)):
+    for finding in sorted(analysis.findings, key=_faults_first):
         if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or bool(finding.where.bearing) != of_bearings:
             continue
         if finding.where.channels and channel not in finding.where.channels:
@@ -113,6 +113,11 @@ def marked_positions(
         if position is not None and all(abs(position / known - 1.0) > LARGEST_SLIP for known in positions):
             positions.append(position)
     return tuple(positions)
+
+
+def _faults_first(finding: Finding) -> tuple[bool, bool]:
+    """Key that puts what has changed behind what explains it."""
+    return finding.kind is not Kind.FAULT, finding.code == CHANGED
 
 
 def _position(analysis: Analysis, spectrum: Spectrum, where: Where) -> float | None:
@@ -178,7 +183,7 @@ def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
     if analysis.motion is not None:
         return VerdictPicture("motion", next(iter(channels.values())))
     claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION) or f.code == "resonance"]
-    for finding in sorted(claims, key=lambda f: (f.kind is not Kind.FAULT, f.code == CHANGED)):
+    for finding in sorted(claims, key=_faults_first):
         where = finding.where
         channel = next((channels[name] for name in where.channels if name in channels), next(iter(channels.values())))
         shaft = where.gear.rpartition("/")[2] or where.shaft

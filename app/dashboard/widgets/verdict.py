@@ -75,7 +75,6 @@ def _show_words(analysis: Analysis) -> None:
     recording = analysis.recording
     machine = analysis.rig.name if analysis.rig is not None else ""
     n = len(recording.channels)
-    changed = next((f.title for f in analysis.findings if f.code == CHANGED), "")
     headline, rest = headline_of(analysis)
     facts = [
         f"**{as_typed(recording.provenance.source)}**",
@@ -91,7 +90,7 @@ def _show_words(analysis: Analysis) -> None:
         st.caption(as_typed(in_page_words(rest)))
     if analysis.reference is not None:
         _show_changes(analysis, analysis.reference)
-    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION) and f.title != changed]
+    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION) and f.code != CHANGED]
     for finding in claims[:1] or [f for f in analysis.findings if f.kind is not Kind.INFORMATION][:1]:
         card = finding_card(finding)
         if card.title.rstrip(".") not in analysis.verdict:

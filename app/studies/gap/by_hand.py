@@ -9,7 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap import LIGHT_LOAD_N_PER_MM, tooth_load_n_per_mm
-from gearsig.recording import Recording
+from gearsig.recording import MAINS_HZ, Recording
 from gearsig.rig import Rig
 from sims.effects import effects, textbook
 from sims.machine import log_uniform
@@ -200,7 +200,7 @@ def _belt(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArra
 
 def _motor_field(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """A motor's field: twice the line's frequency and its multiples, beating with twice the slip."""
-    line_hz, slip_hz = float(rng.choice((50.0, 60.0))) * rng.uniform(0.998, 1.002), rng.uniform(0.3, 4.0)
+    line_hz, slip_hz = float(rng.choice(MAINS_HZ)) * rng.uniform(0.998, 1.002), rng.uniform(0.3, 4.0)
     waves = [np.cos(4 * np.pi * k * line_hz * scene.time_s + rng.uniform(0, 6)) / k**1.5 for k in (1, 2, 3)]
     beat = 1.0 + rng.uniform(0.2, 0.9) * np.cos(2 * np.pi * slip_hz * scene.time_s + rng.uniform(0, 6))
     return np.asarray(beat * np.sum(waves, axis=0))
