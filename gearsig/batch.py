@@ -283,7 +283,7 @@ def _report_one(job: _Job) -> Entry | Failure:
         kept: Entry = from_plain(Entry, entry, "entry")  # rounded as for a later run, which must say the same
         return kept  # noqa: TRY300
     except GearsigError as error:
-        return _failure(job, str(error))
+        return _failure(job, str(error).removeprefix(f"{job.name}: "))
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
         return _failure(job, f"unexpected error, please report: {type(error).__name__}: {' '.join(str(error).split())}")
 

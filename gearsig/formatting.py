@@ -94,6 +94,30 @@ def signed(value: float, n_decimals: int = 1) -> str:
     return f"{rounded:+.{n_decimals}f}".replace("-", "−") if rounded else f"{0.0:.{n_decimals}f}"
 
 
+def percent(share: float) -> str:
+    """Write a share in percent: nothing below one is told from another.
+
+    Examples
+    --------
+    >>> percent(0.884), percent(0.003), percent(0.0), percent(float("nan")), percent(-0.1), percent(-0.001)
+    ('88 %', '< 1 %', '0 %', '–', '−10 %', '0 %')
+    """
+    if not isfinite(share):
+        return "–"
+    return "< 1 %" if 0 < share < 0.01 else f"{round(100 * share)} %".replace("-", "−")
+
+
+def odds_text(probability: float) -> str:
+    """Write a probability for people: nothing is surer than "> 99 %".
+
+    Examples
+    --------
+    >>> odds_text(0.664), odds_text(0.998), odds_text(0.003)
+    ('66 %', '> 99 %', '< 1 %')
+    """
+    return "> 99 %" if probability > 0.99 else percent(probability)
+
+
 def enumerated(names: Sequence[str]) -> str:
     """Return names as a sentence lists them.
 
@@ -126,6 +150,25 @@ def with_minus(text: str) -> str:
     '−54.4 to −10.2 dB by a 2-stage gearbox'
     """
     return re.sub(r"(?<![\w.])-(?=\d)", "−", text)
+
+
+_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+def unit_text(unit: str) -> str:
+    """Write a unit with superscripts.
+
+    Examples
+    --------
+    >>> unit_text("(m/s^2)^2/Hz")
+    '(m/s²)²/Hz'
+    """
+    parts = unit.split("^")
+    text = parts[0]
+    for part in parts[1:]:
+        digits = len(part) - len(part.lstrip("-0123456789"))
+        text += part[:digits].translate(_SUPERSCRIPTS) + part[digits:] if digits else "^" + part
+    return text
 
 
 def axis_label(axis: str, shaft: str) -> str:

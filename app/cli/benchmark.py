@@ -1,4 +1,7 @@
-"""`gearsig benchmark`: how good the gap diagnosis is on cases whose cause it cannot know, and how long methods take."""
+"""`gearsig benchmark`: how good the gap diagnosis is on cases whose cause it cannot know, and how long methods take.
+
+`gearsig papers`: how good the models are, beside what publications say.
+"""
 
 from __future__ import annotations
 
@@ -164,3 +167,36 @@ def _run(request: BenchmarkRequest, output: Path, processes: int) -> list[Done]:
             return run_benchmark(request, output, n_processes=processes, on_progress=show)
     except KeyboardInterrupt:
         raise stopped(f"{n_answered(output)} of {n_cases} cases are answered in {output}") from None
+
+
+# `gearsig papers`: the figures of three publications beside the model's own.
+
+
+def _paper_names(incomplete: str) -> list[str]:
+    from app.papers import PAPERS
+
+    return [name for name in PAPERS if name.startswith(incomplete)]
+
+
+def papers(
+    name: Annotated[str, typer.Argument(help="cracked, reduced-fe or forging.", autocompletion=_paper_names)],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for page and figures.")],
+) -> None:
+    """Draw the figures of a publication that the model can answer, and judge each statement of its text by numbers.
+
+    Every statement comes with "agrees", "agrees in part" or "does not, because …". index.html shows all of it.
+
+    Example: gearsig papers cracked -o cracked
+    """
+    from app.papers import paper, write_paper
+    from gearsig.report import check_writable
+
+    check_writable(output)
+    with progress_bar("preparing") as show:
+        publication = paper(name, lambda stage, done: show(done, stage))
+        write_paper(publication, output, command=typed_command())
+    for figure in publication.figures:
+        typer.echo(f"{figure.answers}: {figure.title}")
+        for claim in figure.claims:
+            typer.echo(f"  {claim.verdict:<15} {claim.statement}: {claim.found}")
+    typer.echo(f"{publication.summary} Open {output / 'index.html'} in a browser.")

@@ -10,6 +10,8 @@ from time import monotonic
 
 import typer
 
+from gearsig.formatting import percent
+
 EXIT_SOME_FAILED = 1
 EXIT_INPUT_ERROR = 2
 EXIT_INTERRUPTED = 130
@@ -79,7 +81,7 @@ def _progress_lines(stage: str, n: int | None) -> Callable[..., None]:
         if monotonic() - said_s < SECONDS_BETWEEN_LINES:
             return
         said_s = monotonic()
-        share = f"{100 * completed:.0f} %" if n is None else f"{completed:.0f} of {whole:.0f}"
+        share = percent(completed) if n is None else f"{completed:.0f} of {whole:.0f}"
         left_s = passed_s * (whole - completed) / completed if completed else 0.0
         rest = f", {left_s:.0f} s left" if completed else ""
         typer.echo(f"{now}: {share} after {passed_s:.0f} s{rest}", err=True)

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 
 import typer
 
-from app.cli.analyze import analyze, crack, demo
-from app.cli.benchmark import benchmark_app
+from app.cli.analyze import analyze, crack, demo, rig_app
+from app.cli.benchmark import benchmark_app, papers
 from app.cli.compare import compare
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED
 from app.cli.dashboard import dashboard
@@ -19,9 +19,7 @@ from app.cli.flexible import flexible, gear_body
 from app.cli.gap import gap
 from app.cli.growth import growth
 from app.cli.motion import force, identify, start_stop
-from app.cli.papers import papers
 from app.cli.report import report
-from app.cli.rig import rig_app
 from app.cli.show import modes, show
 from app.cli.simulate import simulate
 from app.cli.sweep import bifurcation, sweep

@@ -142,10 +142,10 @@ def open_reference(
     """Read the recording of the healthy machine, if one is given; pulse times belong to the other recording."""
     if path is None:
         return None
-    from gearsig.diagnosis import rate_of_reference, rig_of_reference
+    from gearsig.diagnosis import rig_and_rate_of_reference
 
-    rate_hz = rate_of_reference(path, sampling_rate_hz)
-    return open_recording(path, rig_of_reference(path, rig), rate_hz, stated_speed(speed_rpm, None, 1))
+    its_rig, rate_hz = rig_and_rate_of_reference(path, rig, sampling_rate_hz)
+    return open_recording(path, its_rig, rate_hz, stated_speed(speed_rpm, None, 1))
 
 
 def torque_of(text: str | None) -> float | None:

@@ -13,6 +13,7 @@ from app.cli.console import EXIT_INPUT_ERROR, EXIT_SOME_FAILED, progress_bar, st
 from app.cli.quantities import quantity, span, split_quantity
 from gearsig.checks import within
 from gearsig.errors import InputError
+from gearsig.formatting import percent
 
 if TYPE_CHECKING:
     from app.bifurcation import BifurcationRequest, Values
@@ -183,7 +184,7 @@ def _print_bifurcation(request: BifurcationRequest, values: Values, output: Path
         seen = ", ".join("none within 16 cycles" if p == 0 else str(p) for p in periods)
         most = max((one.separated_share for one in points), default=0.0)
         typer.echo(
-            f"{study.NAMES[name]}: {len(points)} values; periods in cycles: {seen}; teeth apart up to {most:.0%}"
+            f"{study.NAMES[name]}: {len(points)} values; periods in cycles: {seen}; teeth apart up to {percent(most)}"
         )
         for line in study.motion_lines(kept, unit):
             typer.echo(f"  {line}")

@@ -15,6 +15,7 @@ from app.flexible import RANGE, Study, figures, flexible_study
 from app.papers.gallery import Claim, Paper, PaperFigure, Progress, judged, within_part
 from gearsig import plot
 from gearsig.checks import FloatArray
+from gearsig.formatting import percent
 from gearsig.plot import CurvePanel, curves_figure
 from sims import fe_gear, reduced_fe
 from sims.machine import Operation
@@ -306,12 +307,14 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
             forces.append(force)
         return field, forces
 
+    # One tooth alone, all of the torque on it: only there can the modes' answer be held against the whole mesh's.
     force = torque_nm / (g.base_radius_mm * 1e-3)
     load = fe_gear.load_tooth(mesh, force)
     full = shown(load.displacement_m)
     with fe_gear.one_thread():
         modes = fe_gear.cyclic_modes(gear, N_MODES, "bore")
     modal = shown(fe_gear.modal_load(gear, modes, load))
+    # What the modes leave out, and what the reduction leaves out between the heights whose static answer it keeps.
     error = {f"{name}, full less modal": full[name] - modal[name] for name in full}
     between, body, n_heights = _between_heights(pair, mesh, force, lambda field: shown(field)["von Mises"])
     left = float(np.sqrt(np.mean(error["von Mises, full less modal"] ** 2) / np.mean(full["von Mises"] ** 2)))
@@ -323,6 +326,7 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
     rest = plot.stress_maps_figure(
         view.points_mm, view.triangles, error, near_mm=near, title=f"Full less {N_MODES} modes: {title}"
     )
+    # Four angles of a mesh cycle: two with both pairs in contact, two with one, as the contact ratio lies below two.
     moving, both = {}, []
     for row in (0, 2, 5, 7):
         field, forces = contacts(row)
@@ -336,6 +340,7 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
         near_mm=near,
         title=f"Von Mises stress of the driver as its contacts move, {torque_nm:g} N m",
     )
+    # The study's statements, each judged by one of these numbers.
     far = view.values(np.array([np.full(mesh.n_nodes, float(abs(k) == 2)) for k in NEIGHBOURS])) > 0.5
     quiet = float(np.median(full["von Mises"][far]) / full["von Mises"].max())
     no_contact = judged(
@@ -347,7 +352,7 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
     )
     patterns = judged(
         "static and modal maps show the same contact patterns",
-        f"von Mises stress differs by {100 * left:.0f} % rms",
+        f"von Mises stress differs by {percent(left)} rms",
         agrees=left < 0.1,
         partly=left < 1.0,
         because="a local contact needs the static rest besides the modes, which the reduction keeps",
@@ -356,7 +361,7 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
         "the error of the reduced model stays small",
         f"{100 * between:.1f} % rms halfway between two of the {n_heights} heights whose static answer the reduction "
         f"keeps, {100 * body:.1f} % where stress is below half the greatest; at those heights none; {N_MODES} modes "
-        f"alone: {100 * left:.0f} %",
+        f"alone: {percent(left)}",
         agrees=between < 0.1,
         partly=body < 0.1,
         because="the patch under the contact lies elsewhere than at the heights kept",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gearsig.angle._types import ShaftAngle, monotone_slopes
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import percent
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ def _check_two_levels(x: FloatArray, low: float, high: float) -> None:
     middle = float(np.mean((x > low + 0.25 * step) & (x < low + 0.75 * step)))
     if middle > 0.45:  # pulses have 0 to 0.1, a sine 0.33, uniform noise 0.5, Gaussian 0.9
         raise RefusalError(
-            f"the tachometer channel has no two levels: {100 * middle:.0f} % of its samples lie in the middle "
+            f"the tachometer channel has no two levels: {percent(middle)} of its samples lie in the middle "
             f"between {low:g} and {high:g}",
             remedy=remedy,
         )

@@ -12,7 +12,7 @@ from gearsig.checks import FloatArray
 from gearsig.comparison._types import Agreement, Alignment, LevelPair, Repeated, power_levels
 from gearsig.errors import InputError
 from gearsig.orders import average_lines
-from gearsig.prepared import shift_scores, turned_lines
+from gearsig.prepared import best_shift, shift_scores, turned_lines
 from gearsig.spectra import ComplexArray
 
 
@@ -98,9 +98,9 @@ def align(
     """
     x, y = simulated.whole, recorded.whole
     cross = _cross(x, y)
-    best = _best_shift(cross)
+    best = best_shift(cross)
     shifts = [
-        _best_shift(_cross(a, b))
+        best_shift(_cross(a, b))
         for a, b in ((simulated.first, y), (simulated.second, y), (x, recorded.first), (x, recorded.second))
     ]
     spread = np.hypot(_apart(shifts[0], shifts[1]), _apart(shifts[2], shifts[3])) / 2.0
@@ -119,24 +119,6 @@ def _cross(x: ComplexArray, y: ComplexArray) -> ComplexArray:
     cross: ComplexArray = np.divide(product, size[:, None], out=np.zeros_like(product), where=size[:, None] > 0)
     mean: ComplexArray = cross.mean(axis=0)
     return mean
-
-
-def _best_shift(cross: ComplexArray) -> float:
-    """Return the shift with the highest score, -0.5 to 0.5 revolutions."""
-    from scipy.fft import ifft, next_fast_len
-    from scipy.optimize import minimize_scalar
-
-    if not np.any(cross):
-        return 0.0
-    n = next_fast_len(16 * len(cross))  # 16 per cycle of the highest order, before the best is refined
-    start = int(np.argmax(np.real(ifft(cross, n)))) / n
-    refined = minimize_scalar(
-        lambda s: -float(shift_scores(cross, np.array([s]))[0]),
-        bounds=(start - 1.0 / n, start + 1.0 / n),
-        method="bounded",
-        options={"xatol": 1e-9},
-    )
-    return float((refined.x + 0.5) % 1.0 - 0.5)
 
 
 def _apart(a: float, b: float) -> float:

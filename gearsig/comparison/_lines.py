@@ -20,7 +20,7 @@ from gearsig.comparison._types import (
     decibel,
     power_levels,
 )
-from gearsig.prepared import line_excess
+from gearsig.prepared import lines_over_floor
 from gearsig.rig import OrderLine, Rig, order_lines
 from gearsig.spectra import Spectrum, noise_floor, power_density
 
@@ -130,7 +130,7 @@ def _strongest(
     """Return the strongest local maxima outside of the shafts' own lines that both halves show, at most five."""
     ratios_db, masked = [], None
     for half in halves:
-        excess = line_excess(half, noise_floor(half).values)
+        excess = lines_over_floor(half, noise_floor(half).values)
         for fundamental in (*ratios, *mesh_orders):
             excess = excess.without_multiples(fundamental)
         floor = np.maximum(excess.floor, 1e-300)

@@ -8,6 +8,7 @@ import numpy as np
 
 from gearsig.comparison._sides import MIN_REVOLUTIONS, ComparedSide
 from gearsig.comparison._types import Alignment, ChannelComparison, LineLevel
+from gearsig.formatting import percent
 
 WITHIN_DB = 3.0
 """Levels this close are called agreement: a factor of √2."""
@@ -149,8 +150,8 @@ def _shape_texts(channel: ChannelComparison) -> list[str]:
     return [
         *texts,
         (
-            f"{_percent(locked.recorded.value)} of the recording's energy repeats with the shafts' turns, "
-            f"{_percent(locked.simulated.value)} of the simulation's."
+            f"{percent(locked.recorded.value)} of the recording's energy repeats with the shafts' turns, "
+            f"{percent(locked.simulated.value)} of the simulation's."
         ),
     ]
 
@@ -161,10 +162,6 @@ def _number(value: float) -> str:
 
 def _decibels(value: float) -> str:
     return f"{value:+.1f} dB".replace("-", "−")
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
 
 
 SAME_SPEED, OTHER_SPEED = 0.03, 0.10
@@ -254,8 +251,9 @@ def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:
     ]
     if loose:
         texts.append(
-            f"No tooth{_of(loose)} stands out enough to tell which is which: the simulation's average is aligned to a "
-            "whole number of teeth, and differences from tooth to tooth mean nothing."
+            f"Which tooth{_of(loose)} in the simulation is which in the recording cannot be told: none stands out "
+            "alike in both. The simulation's average is aligned to a whole number of teeth, and differences from tooth "
+            "to tooth mean nothing."
         )
     return texts
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, count, within
 from gearsig.decompose._types import ModeAxis, Modes, VmdEngine, VmdSettings, mode_notes
 from gearsig.decompose._vmd import modes_of_whole
+from gearsig.formatting import percent
 from gearsig.timefreq import Source, UniformSignal, uniform
 
 IndexArray = NDArray[np.intp]
@@ -273,6 +274,6 @@ def _seam_notes(segments: list[ModeSegment], sampling_rate: float, axis: ModeAxi
         i = int(np.argmax(mismatch[:, k]))
         notes.append(
             f"Mode {k + 1} does not go on over the seam at {segments[i].start / sampling_rate:.4g} {unit}: both "
-            f"blocks' modes differ there by {100 * mismatch[i, k]:.0f} % of their own."
+            f"blocks' modes differ there by {percent(mismatch[i, k])} of their own."
         )
     return tuple(notes)

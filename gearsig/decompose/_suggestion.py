@@ -11,6 +11,7 @@ from gearsig.checks import FloatArray, count, positive
 from gearsig.decompose._types import SAMPLES_PER_MODE, ModeAxis, Modes, VmdSettings, check_supported, half_gain_distance
 from gearsig.decompose._vmd import modes_of_whole
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.results import Result
 from gearsig.timefreq import Source, UniformSignal, uniform
 
@@ -248,7 +249,7 @@ def _reasons(chosen: ModeTrial, trials: Sequence[ModeTrial], fs: float, axis: Mo
     unit = "Hz" if axis == "frequency" else "orders"
     same = {t.n_modes: t for t in trials if t.penalty == chosen.penalty}
     reasons = [
-        f"{chosen.n_modes} mode(s) at penalty {chosen.penalty:g}: all narrower than noise, none shares its lines.",
+        f"{counted(chosen.n_modes, 'mode')} at penalty {chosen.penalty:g}: all narrower than noise, none shares lines.",
         f"The modes leave {100 * chosen.reconstruction_error:.2g} % of the signal's rms in the residual.",
     ]
     if chosen.n_modes > 1:

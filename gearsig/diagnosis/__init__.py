@@ -5,8 +5,8 @@ from gearsig.diagnosis._bearing import smallest_depth
 from gearsig.diagnosis._bearing_families import (
     BEARING_PARTS,
     SAME_BEARING_ORDER,
-    slower_train,
     stands_out_from_neighbours,
+    underlying_impulse_train,
 )
 from gearsig.diagnosis._blocks import RecordBlocks, record_blocks
 from gearsig.diagnosis._crack import crack_depth, with_crack
@@ -29,8 +29,7 @@ from gearsig.diagnosis._reference import (
     beside_reference,
     changes,
     in_reference,
-    rate_of_reference,
-    rig_of_reference,
+    rig_and_rate_of_reference,
 )
 from gearsig.diagnosis._resonance import detect_resonances
 from gearsig.diagnosis._signals import BandEnvelope
@@ -51,13 +50,15 @@ from gearsig.diagnosis._types import (
     from_p_value,
     outcome_of,
 )
-from gearsig.diagnosis._verdict import ranked, verdict_of
+from gearsig.diagnosis._verdict import SURER_WITH, WHAT_WOULD_HELP, ranked, verdict_of
 
 __all__ = [
     "BEARING_PARTS",
     "CHANGED",
     "MEMORY_BYTES",
     "SAME_BEARING_ORDER",
+    "SURER_WITH",
+    "WHAT_WOULD_HELP",
     "AnalysedPart",
     "Analysis",
     "AnalysisSettings",
@@ -91,15 +92,14 @@ __all__ = [
     "modulation_of",
     "outcome_of",
     "ranked",
-    "rate_of_reference",
     "read_reference",
     "read_usual_part",
     "read_whole",
     "record_blocks",
-    "rig_of_reference",
-    "slower_train",
+    "rig_and_rate_of_reference",
     "smallest_depth",
     "stands_out_from_neighbours",
+    "underlying_impulse_train",
     "verdict_of",
     "with_crack",
     "with_known_angle",

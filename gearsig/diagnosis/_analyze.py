@@ -124,6 +124,8 @@ def _examined(
     announce: Callable[[str], object],
 ) -> tuple[Analysis, Shown | None]:
     """Return the analysis, and what it looked at where channels live and the machine turns."""
+    # What ends an analysis early comes first, cheapest first: a machine that starts and stops has no orders, and no
+    # spectrum helps where every channel is dead.
     recording, known = prepared.recording, prepared.rig
     announce("finding the speed")
     findings, dead = detect_data_problems(recording)
@@ -139,6 +141,7 @@ def _examined(
         order = ranked([*findings, cannot_tell("all-channels-dead", "Every vibration channel is dead.")])
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
 
+    # Signals are computed once, then looked at by all detectors; without an angle only those over frequency are there.
     announce("averages and spectra")
     usable = angle if isinstance(angle, ShaftAngle) else None
     signals = compute_signals(prepared, names, usable, settings, has_reference=healthy is not None)
@@ -147,6 +150,8 @@ def _examined(
     announce("levels over speed")
     levels = order_levels(signals)
 
+    # A wrong sampling rate must be known before anything is called by its order. Pulses or an encoder were sampled with
+    # the vibration: then orders stay right, and only frequencies are wrong.
     announce("gears, bearings and shafts")
     doubt = detect_sampling_rate(signals, angle, envelopes)
     if doubt is not None:
@@ -154,6 +159,7 @@ def _examined(
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
         order = ranked(findings)  # all orders are wrong, and what they would say
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
+    # The reference is analysed by itself, without one of its own: an unfit one is said to be so, and left out.
     if healthy is not None:
         announce("the reference")
     reference_analysis, then = _of_reference(healthy, settings)
@@ -164,6 +170,7 @@ def _examined(
     findings += [*_of_machine(signals, envelopes, own_bands), *detect_resonances(levels)]
     findings += detect_vibration_zone(signals, found)
 
+    # Against the reference, findings that it shows as well step down before what has changed adds findings of its own.
     compared: tuple[LevelChange, ...] = ()
     if healthy is not None and reference_analysis is not None and then is not None:
         now, before = in_common_bands(signals, envelopes, *then, healthy)
@@ -172,6 +179,7 @@ def _examined(
         findings = with_clearest_band(findings, signals, then[0])
         compared = level_changes(*beside)
         findings += change_findings(compared, signals, then[0], findings)
+    # Doubts come last, when all that they could lower is there; the crack's depth takes no channel that they spoil.
     findings, unfit = lowered(findings, names), dead | spoiled(findings, names)
     crack: Answer | None = withheld_crack(findings, asked=healthy is not None)
     if not unfit.issuperset(names):

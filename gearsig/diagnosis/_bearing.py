@@ -20,8 +20,8 @@ from gearsig.diagnosis._bearing_families import (
     part_text,
     parts_on_shaft,
     slip_of,
-    slower_train,
     speed_is_only_stated,
+    underlying_impulse_train,
 )
 from gearsig.diagnosis._lines import speed_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, witness_text
@@ -35,7 +35,7 @@ from gearsig.diagnosis._types import (
     from_p_value,
     p_text,
 )
-from gearsig.formatting import signed
+from gearsig.formatting import named, percent, signed
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
 from gearsig.rig import hunting_tooth_order
 
@@ -120,7 +120,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     evidence = [
         f"{_family_text(candidate)}, {signed(100 * slip, 2)} % from the kinematic order {candidate.expected:.4f}.",
         _modulation_text(candidate),
-        *(["Bearings of the same orders cannot be told apart by their envelope."] if candidate.twins else []),
+        *(["Bearings of the same orders cannot be told apart by their envelope."] if candidate.of_same_order else []),
         *(f"Within its slip, {rival} would show at the same order." for rival in candidate.rivals),
     ]
     if only_stated:
@@ -141,7 +141,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         _where(signals, candidate),
         _strength(candidate),
         confidence,
-        f"at most {100 * confidence:.0f} %: chance that lines fall on the order so well {p_text(candidate.p_value)} "
+        f"at most {percent(confidence)}: chance that lines fall on the order so well {p_text(candidate.p_value)} "
         "(all parts, bands, channels tried); never above 95 %, as one recording is looked at",
         tuple(evidence),
         surer,
@@ -160,11 +160,11 @@ def _is_among_hunting_lines(signals: AnalysisSignals, candidate: Candidate) -> b
 
 def _bearings_named(candidate: Candidate) -> str:
     """Name the bearing, and those that cannot be told from it."""
-    bearings = [b for b in (candidate.bearing, *candidate.twins) if b is not None]
-    names = " or ".join(f"{b.name} on shaft {b.shaft}" for b in bearings)
+    bearings = [b for b in (candidate.bearing, *candidate.of_same_order) if b is not None]
+    names = " or ".join(f"{b.name} on {named('shaft', b.shaft)}" for b in bearings)
     if len({b.shaft for b in bearings}) == 1:
-        names = f"{' or '.join(b.name for b in bearings)} on shaft {bearings[0].shaft}"
-    return names if names.lower().startswith("bearing") else f"bearing {names}"
+        names = f"{' or '.join(b.name for b in bearings)} on {named('shaft', bearings[0].shaft)}"
+    return named("bearing", names)
 
 
 def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
@@ -212,7 +212,7 @@ def _over_frequency(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> 
     best = clearest_family(envelopes, 4.0, min(1000.0, end_hz / 4))
     if best is None or best.p_value > signals.settings.false_alarm_probability:
         return
-    train = slower_train(best.envelope.excess, best.comb)
+    train = underlying_impulse_train(best.envelope.excess, best.comb)
     if train is not None:
         best = replace(best, comb=train, in_train=True)
     confidence, hertz = from_p_value(best.p_value, limit=0.99), best.comb.fundamental
@@ -244,7 +244,7 @@ def _strength(candidate: Candidate) -> Strength:
 
 def _family_basis(candidate: Candidate, confidence: float) -> str:
     chance = p_text(candidate.p_value)
-    return f"at most {100 * confidence:.0f} %, that the family exists: chance of it in noise {chance}"
+    return f"at most {percent(confidence)}, that the family exists: chance of it in noise {chance}"
 
 
 def _family_text(candidate: Candidate) -> str:
@@ -291,7 +291,7 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
     }
     examined = _examined(signals, depths)
     if not examined:
-        why = f"a modulation of {100 * CLEAR_MODULATION:.0f} % would not have stood out at the orders of their races"
+        why = f"a modulation of {percent(CLEAR_MODULATION)} would not have stood out at the orders of their races"
         return [_undecided(why, "A longer recording: the floor of the envelope spectrum falls with its root.", where)]
     shown = {key: depth for key, depth in depths.items() if key[0] in examined and depth <= CLEAR_MODULATION}
     bearing, name = max(shown, key=lambda key: shown[key])
@@ -334,7 +334,7 @@ def _not_examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], flo
             "bearing-part-hidden",
             f"Not examined: {', '.join(part_text(name, bearing) for bearing, name in hidden)}. Their orders fall on "
             "multiples of a shaft within the resolution, or the floor there is too high for a modulation of "
-            f"{100 * CLEAR_MODULATION:.0f} % to show.",
+            f"{percent(CLEAR_MODULATION)} to show.",
             where,
             surer="A longer recording: orders that are close need many revolutions to be told apart.",
         )

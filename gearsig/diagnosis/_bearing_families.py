@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
-from gearsig.prepared import MAINS_TOLERANCE, Comb, LineExcess, best_comb, comb_at
+from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at
 from gearsig.recording import MAINS_HZ
 from gearsig.rig import Bearing
 
@@ -19,7 +19,7 @@ AS_STRONG_DB = 9.0
 """Scatter of a train's lines about a smooth course: a line of two resonances' beats is weakened by so much."""
 
 
-def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ()) -> Comb | None:
+def underlying_impulse_train(excess: LinesOverFloor, comb: Comb, shafts: tuple[float, ...] = ()) -> Comb | None:
     """Return the train of impacts whose lines a family is a part of, or None if the family stands alone.
 
     Tried are p/q of the family's fundamental (q to 30, p to 3), over the range of the family's own lines. The best is
@@ -31,7 +31,7 @@ def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ())
 
     Parameters
     ----------
-    excess : LineExcess
+    excess : LinesOverFloor
     comb : Comb
         A family of multiples of one fundamental.
     shafts : tuple of float
@@ -63,7 +63,7 @@ def slower_train(excess: LineExcess, comb: Comb, shafts: tuple[float, ...] = ())
     return comb_at(excess, best, np.arange(1, int(reach / best) + 1), comb.p_value)
 
 
-def stands_out_from_neighbours(excess: LineExcess, comb: Comb, slip: float, others: tuple[float, ...]) -> bool:
+def stands_out_from_neighbours(excess: LinesOverFloor, comb: Comb, slip: float, others: tuple[float, ...]) -> bool:
     """Whether no family at orders a few percent to either side scores as high as this one.
 
     Neighbours in which one of the `others`, the orders of further parts, lies are left out: they may be families too.
@@ -78,27 +78,16 @@ def stands_out_from_neighbours(excess: LineExcess, comb: Comb, slip: float, othe
     return True
 
 
-def _unmasked(excess: LineExcess, fundamental: float, reach: float) -> FloatArray:
+def _unmasked(excess: LinesOverFloor, fundamental: float, reach: float) -> FloatArray:
     """Return the log ratios of the multiples up to `reach` that are not explained already."""
-    ratios: FloatArray = excess.log_ratio[_free_lines(excess, np.arange(1, int(reach / fundamental) + 1) * fundamental)]
+    ratios: FloatArray = excess.log_ratio[
+        excess.free_lines_at(np.arange(1, int(reach / fundamental) + 1) * fundamental)
+    ]
     return ratios
 
 
-def _free_lines(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
-    """Return the numbers of the lines at some places that are not explained already."""
-    index = _line_numbers(excess, places)
-    index = index[(index >= 0) & (index < len(excess.log_ratio))]
-    return index[~excess.masked[index]]
-
-
-def _line_numbers(excess: LineExcess, places: FloatArray) -> NDArray[np.int64]:
-    spectrum = excess.spectrum
-    index: NDArray[np.int64] = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
-    return index
-
-
 def _is_seen_between(
-    excess: LineExcess, fundamental: float, family: float, reach: float, shafts: tuple[float, ...]
+    excess: LinesOverFloor, fundamental: float, family: float, reach: float, shafts: tuple[float, ...]
 ) -> bool:
     """Whether at least half of the train's lines stand out that are none of the family's and none of its sidebands.
 
@@ -107,31 +96,22 @@ def _is_seen_between(
     places = np.arange(1, int(reach / fundamental) + 1) * fundamental
     sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in (1, 2, 3) for side in (-1, 1))]
     explained = np.any([_is_of_family(excess, places, family, sideband) for sideband in sidebands], axis=0)
-    further = _free_lines(excess, places[~explained])
+    further = excess.free_lines_at(places[~explained])
     seen = excess.log_ratio[further] >= np.log(4.0)
     if len(further) < 3 or float(np.mean(seen)) < 0.5:
         return False
-    multiples = _free_lines(excess, np.arange(1, int(reach / family) + 1) * family)
-    own_db, between_db = (_over_floor_db(excess, lines) for lines in (multiples, further[seen]))
+    multiples = excess.free_lines_at(np.arange(1, int(reach / family) + 1) * family)
+    own_db, between_db = (excess.over_floor_db(lines) for lines in (multiples, further[seen]))
     return bool(np.median(between_db) >= np.median(own_db) - AS_STRONG_DB)
 
 
-def _over_floor_db(excess: LineExcess, lines: NDArray[np.int64]) -> FloatArray:
-    """Return the height of the largest of each line and its two neighbours over the floor, not cut at any limit."""
-    values, last = excess.spectrum.values, len(excess.spectrum.values) - 1
-    near = np.clip(lines[:, None] + np.arange(-1, 2), 0, last)
-    ratio = values[near].max(axis=1) / np.maximum(excess.floor[np.clip(lines, 0, last)], 1e-300)
-    heights: FloatArray = 20 * np.log10(np.maximum(ratio, 1e-300))
-    return heights
-
-
-def _is_of_family(excess: LineExcess, places: FloatArray, family: float, sideband: float) -> NDArray[np.bool_]:
+def _is_of_family(excess: LinesOverFloor, places: FloatArray, family: float, sideband: float) -> NDArray[np.bool_]:
     """Whether a multiple of the family, shifted by `sideband`, is near and meets the peak at least as well."""
     others = sideband + np.maximum(np.rint((places - sideband) / family), 0) * family
     near: NDArray[np.bool_] = np.abs(others - places) < 2 * excess.spectrum.resolution
     if sideband:
         values, last = excess.spectrum.values, len(excess.spectrum.values) - 1
-        height, other_height = (values[np.clip(_line_numbers(excess, x), 0, last)] for x in (places, others))
+        height, other_height = (values[np.clip(excess.line_numbers(x), 0, last)] for x in (places, others))
         near = near & (other_height >= height)
     return near
 
@@ -164,8 +144,8 @@ MINIMUM_LINES = 3
 class Candidate:
     """One family found, and what it may be.
 
-    `twins` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is the
-    part's, twins included, among all that would show at that order. `loudest` is the channel with the largest line.
+    `of_same_order` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is
+    the part's, these included, among all that would show at that order. `loudest` is the channel with the largest line.
     """
 
     comb: Comb
@@ -175,7 +155,7 @@ class Candidate:
     name: str = ""
     expected: float = 0.0
     rivals: tuple[str, ...] = ()
-    twins: tuple[Bearing, ...] = ()
+    of_same_order: tuple[Bearing, ...] = ()
     share: float = 1.0
     in_train: bool = False
     loudest: str = ""
@@ -274,8 +254,8 @@ def _distinct(candidates: list[Candidate]) -> list[Candidate]:
 def _strength_in(envelope: BandEnvelope, fundamental: float) -> float:
     """Return the strength of a family in another envelope."""
     places = fundamental * np.arange(1, N_MULTIPLES + 1)
-    lines = _free_lines(envelope.excess, places)
-    return float(np.maximum(_over_floor_db(envelope.excess, lines), 0.0).sum()) / N_MULTIPLES
+    lines = envelope.excess.free_lines_at(places)
+    return float(np.maximum(envelope.excess.over_floor_db(lines), 0.0).sum()) / N_MULTIPLES
 
 
 def _is_multiple(fundamental: float, train: Candidate) -> bool:
@@ -319,7 +299,7 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
     best = clearest_family(envelopes, 1.5 * slowest, 14.0 * fastest)
     if best is None or best.p_value > signals.settings.false_alarm_probability:
         return None
-    train = slower_train(best.envelope.excess, best.comb, tuple(signals.known_shaft_orders.values()))
+    train = underlying_impulse_train(best.envelope.excess, best.comb, tuple(signals.known_shaft_orders.values()))
     if train is not None:
         return _as_cage(signals, replace(best, comb=train, in_train=True))
     known = _known_multiple(signals, best)
@@ -385,7 +365,9 @@ def _has_own_lines(comb: Comb) -> bool:
 
 def _train_of(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
     """Return the train of impacts that a candidate's lines are a part of, if it is one."""
-    train = slower_train(candidate.envelope.excess, candidate.comb, tuple(signals.known_shaft_orders.values()))
+    train = underlying_impulse_train(
+        candidate.envelope.excess, candidate.comb, tuple(signals.known_shaft_orders.values())
+    )
     if train is None:
         return None
     if candidate.name == "BSF" and abs(2 * train.fundamental / candidate.comb.fundamental - 1) < SAME_FAMILY:
@@ -436,12 +418,12 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
     parts = expected_parts(signals)
     order_of_part = next(o for b, name, o in parts if (b, name) == (candidate.bearing, candidate.name))
     near = nearest_bearing(signals, candidate.loudest or candidate.envelope.channel)
-    others, rivals, twins = 0.0, [], []
+    others, rivals, of_same_order = 0.0, [], []
     for bearing, name, order in parts:
         if (bearing, name) == (candidate.bearing, candidate.name):
             continue
         if name == candidate.name and abs(order / order_of_part - 1) < SAME_BEARING_ORDER:
-            twins.append(bearing)
+            of_same_order.append(bearing)
             continue
         slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
         if abs(slip) <= slip_of(signals):
@@ -459,7 +441,7 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
             rivals.append("a damaged element or cage, whose lines a cage's turn apart are there as strong,")
         elif shallow > 0.5:
             rivals.append("elements that differ, passing the load of a sound race,")
-    return replace(candidate, rivals=tuple(rivals), twins=tuple(twins), share=own / (own + others))
+    return replace(candidate, rivals=tuple(rivals), of_same_order=tuple(of_same_order), share=own / (own + others))
 
 
 SHALLOW = 0.15
@@ -502,7 +484,7 @@ def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) 
             if multiples[-1] * shaft >= spectrum.positions[-1]:
                 continue
             heights = np.array([spectrum.largest_near(m * shaft, 2 * spectrum.resolution)[1] for m in multiples])
-            over_floor_db = _over_floor_db(envelope.excess, _line_numbers(envelope.excess, multiples[own] * shaft))
+            over_floor_db = envelope.excess.over_floor_db(envelope.excess.line_numbers(multiples[own] * shaft))
             highest_between = heights[between].max(initial=0.0)
             carriers = np.flatnonzero(own)
             beside = np.maximum(heights[np.maximum(carriers - 1, 0)], heights[carriers + 1])
@@ -554,8 +536,8 @@ def _elements_differ(signals: AnalysisSignals, candidate: Candidate) -> bool:
         return False
     cage = candidate.comb.fundamental * orders["FTF"] / orders["BPFO"]
     places = np.array([abs(k * shaft + side * cage) for k in range(6) for side in (-1, 1)])
-    own = [_over_floor_db(excess, _free_lines(excess, candidate.comb.fundamental * np.arange(1, 4)))]
-    beside = _over_floor_db(excess, _free_lines(excess, np.unique(places)))
+    own = [excess.over_floor_db(excess.free_lines_at(candidate.comb.fundamental * np.arange(1, 4)))]
+    beside = excess.over_floor_db(excess.free_lines_at(np.unique(places)))
     return len(beside) >= 4 and len(own[0]) > 0 and bool(np.median(beside) >= np.median(own[0]) - 6.0)
 
 

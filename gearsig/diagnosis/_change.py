@@ -34,7 +34,7 @@ from gearsig.diagnosis._types import (
     cannot_tell,
 )
 from gearsig.errors import InputError, RefusalError
-from gearsig.formatting import signed
+from gearsig.formatting import named, percent, signed
 from gearsig.orders import order_map
 from gearsig.prepared import envelope_bands
 from gearsig.rig import order_lines
@@ -657,9 +657,7 @@ def _of_shaft(
             likely = Kind.SUSPICION if share >= 0.3 else Kind.NOTICE
             name = f" of {place.shaft}" if place.shaft else ""
             text = "Of what has been added in velocity, " + ", ".join(
-                f"{100 * power / total:.0f} % is at {c.label}"
-                for c in own
-                if (power := added[c.harmonic]) >= 0.01 * total
+                f"{percent(power / total)} is at {c.label}" for c in own if (power := added[c.harmonic]) >= 0.01 * total
             )
             yield Finding(cause, likely, f"{title}{name}.", place, None, share, _FIT, (f"{text}.",), confirm)
 
@@ -683,7 +681,7 @@ def _of_pair(name: str, risen: Sequence[LevelChange]) -> Iterator[Finding]:
             "The same load as in the reference; second and third harmonic rise more than the first with wear; wear "
             "particles in the oil; contact pattern and backlash."
         )
-        title = f"Perhaps wear, another load, or misaligned teeth at {name}."
+        title = f"Perhaps wear, another load, or misaligned teeth at {named('gear pair', name)}."
         yield Finding("mesh-risen", Kind.SUSPICION, title, mesh[0].where, None, 0.5, _FIT, _told(mesh), confirm)
     for one in sides:
         confirm = "The average of that shaft: one tooth or all around; run-out, keys and couplings; another load."

@@ -58,7 +58,7 @@ def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
                 Where(shaft=angle.shaft),
                 Strength(angle.mean_speed_rpm, "rpm", nominal, "nominal speed", against="a nominal speed of"),
                 confidence_basis="comparison with the rig file",
-                evidence=(f"It was found by the method {angle.method!r}.{pulses}",),
+                evidence=(f"How it was found: {angle.method}.{pulses}",),
                 surer="Check sampling rate, pulses per revolution and the speed in the rig file.",
             )
         )

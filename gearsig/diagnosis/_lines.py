@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
-from gearsig.prepared import RUN_UP_FOOT_ORDERS, LineExcess, floor_of, levels_beside
+from gearsig.prepared import RUN_UP_FOOT_ORDERS, LinesOverFloor, levels_beside, lines_over_noise_floor
 from gearsig.recording import MAINS_HZ
 from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
@@ -35,13 +35,17 @@ MESH_ELSEWHERE = "mesh-elsewhere"
 _OVER_FLOOR = "height over the noise floor"
 _UNKNOWN_CAUSE = f"{_OVER_FLOOR}; what causes it is not known"
 
+SPEED_UNKNOWN = "speed-unknown"
+"""Code of the finding that the speed is not known."""
+
 
 def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
     """State the speed and how it was found, or that it is not known."""
     if isinstance(angle, CannotTell):
         why = "The machine is at rest" if "at rest" in angle.reason else "The speed is not known"
         title = f"{why}: orders, synchronous averages and everything that rests on them are left out."
-        return cannot_tell("speed-unknown", title, evidence=(angle.reason,), surer=angle.remedy)
+        surer = f"{angle.remedy[:1].upper()}{angle.remedy[1:].rstrip('.')}." if angle.remedy else ""
+        return cannot_tell(SPEED_UNKNOWN, title, evidence=(angle.reason,), surer=surer)
     uncertainty = angle.relative_speed_uncertainty
     plus_minus = f" ± {uncertainty * angle.mean_speed_rpm:.2g}" if isfinite(uncertainty) else ""
     named = f"Shaft {angle.shaft}" if angle.shaft else "The shaft"
@@ -54,7 +58,7 @@ def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
         f"{text} ({angle.method}, {angle.n_revolutions:.5g} revolutions).",
         Where(shaft=angle.shaft, time_s=(angle.start_s, angle.end_s)),
         confidence=angle.quality,
-        confidence_basis=f"quality figure of the method '{angle.method}'",
+        confidence_basis="quality of the speed as it was found",
         evidence=angle.notes,
         surer="" if angle.method in ("pulses", "encoder") else "A tachometer: it also fixes the zero of the angle.",
     )
@@ -201,7 +205,7 @@ def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | 
     return best if best is not None and margins[best] > 0 else None
 
 
-def _margin_db(excess: LineExcess, mesh: float, order: float) -> float | None:
+def _margin_db(excess: LinesOverFloor, mesh: float, order: float) -> float | None:
     """Return by how much the lines at multiples of `order` contradict those of `mesh` in the worst harmonic.
 
     Positive: they do. Each is compared with the stated line and with the one as far on its other side, as a
@@ -244,7 +248,7 @@ def _mains(signals: AnalysisSignals) -> Finding | None:
     for name, spectrum in signals.spectra.items():
         if spectrum.resolution > 0.5:
             continue  # a mains line is then not told from a shaft's
-        excess = floor_of(spectrum, 4.0 * max(MAINS_HZ))
+        excess = lines_over_noise_floor(spectrum, 4.0 * max(MAINS_HZ))
         for mains in MAINS_HZ:
             lines = [line_at(excess, k * mains, 0.1) for k in (1, 2, 3)]
             near = [line for k, line in enumerate(lines, 1) if line and abs(line.position - k * mains) <= 0.1]
@@ -374,7 +378,9 @@ def _strongest(signals: AnalysisSignals) -> Finding | None:
     lines = []
     for name, spectrum in signals.spectra.items():
         start = spectrum.index_of(2.0) + 1
-        lines.append((PlacedLine.at(floor_of(spectrum), start + int(np.argmax(spectrum.values[start:]))), name))
+        lines.append(
+            (PlacedLine.at(lines_over_noise_floor(spectrum), start + int(np.argmax(spectrum.values[start:]))), name)
+        )
     clear = [(line, name) for line, name in lines if line.amplitude > line.floor * 10 ** (UNEXPLAINED_DB / 20)]
     if not clear:
         return None

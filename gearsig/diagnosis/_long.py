@@ -18,7 +18,7 @@ import numpy as np
 from gearsig.checks import FloatArray, freeze, instance_of, positive
 from gearsig.diagnosis._analyze import analyze
 from gearsig.diagnosis._blocks import RecordBlocks, record_blocks
-from gearsig.diagnosis._reference import rate_of_reference, rig_of_reference
+from gearsig.diagnosis._reference import rig_and_rate_of_reference
 from gearsig.diagnosis._types import Analysis, Finding, Kind, Outcome
 from gearsig.diagnosis._verdict import ranked
 from gearsig.errors import InputError
@@ -237,7 +237,7 @@ def read_reference(
     ----------
     path : str or Path
     rig : Rig or None
-        Of the recording that is compared; see `rig_of_reference`.
+        Of the recording that is compared; see `rig_and_rate_of_reference`.
     memory_bytes : float
         What the analysis of both may take; the reference may take half of it.
     sampling_rate_hz, speed
@@ -247,14 +247,8 @@ def read_reference(
     file = Path(instance_of(path, str | PathLike, "path", remedy="of a recording in memory, analyze takes it itself"))
     modified_ns = file.stat().st_mtime_ns if file.is_file() else 0
     own_speed = None if isinstance(speed, PulseTimes) else speed
-    return _read_reference(
-        file,
-        rig_of_reference(file, rig),
-        memory_bytes / 2,
-        rate_of_reference(file, sampling_rate_hz),
-        own_speed,
-        modified_ns,
-    )
+    its_rig, rate_hz = rig_and_rate_of_reference(file, rig, sampling_rate_hz)
+    return _read_reference(file, its_rig, memory_bytes / 2, rate_hz, own_speed, modified_ns)
 
 
 @lru_cache(maxsize=1)

@@ -11,8 +11,9 @@ import numpy as np
 from gearsig.diagnosis._lines import CLEAR_DB, mesh_is_confirmed, teeth_are_contradicted
 from gearsig.diagnosis._signals import AnalysisSignals, line_at
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, from_p_value, p_text
+from gearsig.formatting import signed
 from gearsig.indicators import lobe_lines
-from gearsig.prepared import INNER_LINES, RUN_UP_FOOT_ORDERS, Comb, LineExcess, best_comb, level_beside
+from gearsig.prepared import INNER_LINES, RUN_UP_FOOT_ORDERS, Comb, LinesOverFloor, best_comb, level_beside
 from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
 
@@ -92,13 +93,13 @@ def sideband_distance(spectrum: Spectrum, foot: float = 0.0) -> float:
 
 
 def modulation_of(
-    excess: LineExcess, mesh: float, order: float, foreign: tuple[float, ...], multiples: tuple[int, ...]
+    excess: LinesOverFloor, mesh: float, order: float, foreign: tuple[float, ...], multiples: tuple[int, ...]
 ) -> Modulation | None:
     """Return the modulation of a mesh by a shaft, None where a notable one would be hidden by noise.
 
     Parameters
     ----------
-    excess : LineExcess
+    excess : LinesOverFloor
     mesh, order : float
         Of the mesh and of the shaft.
     foreign : tuple of float
@@ -178,7 +179,7 @@ def _comes_again(cells: Cells, carriers: dict[int, float], h: int, k: int, side:
     )
 
 
-def _sideband(excess: LineExcess, place: float, order: float) -> float:
+def _sideband(excess: LinesOverFloor, place: float, order: float) -> float:
     """Return the power of a sideband, 0 where no line stands out of the floor and of what lies beside it."""
     apart = order / excess.spectrum.resolution
     line = line_at(excess, place, around=min(6.0, apart / 2) * excess.spectrum.resolution)
@@ -190,7 +191,7 @@ def _sideband(excess: LineExcess, place: float, order: float) -> float:
     return _power(excess, place)
 
 
-def _power(excess: LineExcess, place: float) -> float:
+def _power(excess: LinesOverFloor, place: float) -> float:
     """Return the power of the line at `place` less what noise adds to it, 0 where it is not clear of the floor.
 
     Noise adds the expected largest of its four lines there: 1 + 1/2 + 1/3 + 1/4 of their mean. Clear of the floor is
@@ -202,7 +203,7 @@ def _power(excess: LineExcess, place: float) -> float:
     return line.amplitude**2 - 2.0 * floor
 
 
-def _floor_power(excess: LineExcess, place: float) -> float:
+def _floor_power(excess: LinesOverFloor, place: float) -> float:
     return float(excess.floor[excess.spectrum.index_of(place)]) ** 2
 
 
@@ -239,7 +240,7 @@ def _modulated(
     how = "strongly modulated" if median >= STRONG_DB else "modulated"
     basis = "how much modulation is usual depends on the machine and the sensor's place"
     evidence = [
-        f"Sidebands against mesh harmonics: {median:.1f} dB (median), {strongest.level_db:.1f} dB in {channel}."
+        f"Sidebands against mesh harmonics: {signed(median)} dB (median), {signed(strongest.level_db)} dB in {channel}."
     ]
     if n <= 2:
         evidence.append("An eccentric gear, a bent shaft, misalignment and a fluctuating load all do this.")
@@ -327,7 +328,7 @@ def _is_part_of(spacing: float, orders: Sequence[float], resolution: float) -> b
     return any(1 <= n <= MOST_PARTS and abs(order - n * spacing) <= n * resolution / 6 for order, n in whole)
 
 
-def _family(signals: AnalysisSignals, excess: LineExcess, pair: GearPair, trains: Sequence[float]) -> Comb | None:
+def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, trains: Sequence[float]) -> Comb | None:
     mesh, hunting = signals.rig.mesh_order(pair), hunting_tooth_order(signals.rig, pair)
     if mesh is None:
         return None
@@ -351,7 +352,7 @@ def _family(signals: AnalysisSignals, excess: LineExcess, pair: GearPair, trains
     return best_comb(excess, lowest, 1.9, offsets=np.array([-3, -2, -1, 1, 2, 3]), centres=centres)
 
 
-def _is_family(excess: LineExcess, comb: Comb, mesh: float) -> bool:
+def _is_family(excess: LinesOverFloor, comb: Comb, mesh: float) -> bool:
     """Whether three of the lines stand out of what lies beside them by 6 dB, two of them on both sides of one carrier.
 
     The foot of a mesh line is above the floor and no family.

@@ -47,8 +47,19 @@ class Earlier:
     change_db: float | None
 
 
-def rig_of_reference(path: str | Path, rig: Rig | None) -> Rig | None:
-    """Return the recording's rig for its reference, with torque and sampling rate of the rig file beside the reference.
+def rig_and_rate_of_reference(
+    path: str | Path, rig: Rig | None, stated_hz: float | None
+) -> tuple[Rig | None, float | None]:
+    """Return (rig, sampling rate) of the healthy reference of a recording, by the rig file beside the reference.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the reference.
+    rig : Rig or None
+        Of the recording: it holds for the reference, but for torque and sampling rate that the file beside it states.
+    stated_hz : float or None
+        Sampling rate that was stated for the recording: it holds for the reference, unless that file states one.
 
     Raises
     ------
@@ -59,6 +70,11 @@ def rig_of_reference(path: str | Path, rig: Rig | None) -> Rig | None:
 
     beside = rig_file_beside(path)
     rig_beside = read_rig(beside) if beside is not None else None
+    rate_hz = stated_hz if rig_beside is None or rig_beside.sampling_rate_hz is None else None
+    return _rig_at_reference(path, rig, rig_beside), rate_hz
+
+
+def _rig_at_reference(path: str | Path, rig: Rig | None, rig_beside: Rig | None) -> Rig | None:
     if rig_beside is None or rig is None:
         return rig
     if rig_beside.sampling_rate_hz is not None:
@@ -83,17 +99,6 @@ def changes(analysis: Analysis) -> tuple[IndicatorChange | None, ...]:
     """
     then = {_key(i): i for i in analysis.reference.indicators} if analysis.reference is not None else {}
     return tuple(_change(now, then.get(_key(now))) for now in analysis.indicators)
-
-
-def rate_of_reference(path: str | Path, stated_hz: float | None) -> float | None:
-    """Return the sampling rate that is stated for a recording and holds for its reference as well.
-
-    None where the rig file beside the reference states one of its own: then that holds.
-    """
-    from gearsig.rig import read_rig, rig_file_beside
-
-    beside = rig_file_beside(path)
-    return stated_hz if beside is None or read_rig(beside).sampling_rate_hz is None else None
 
 
 def reference_unfit(reference: Analysis) -> Finding:

@@ -14,7 +14,7 @@ from gearsig.diagnosis._signals import AnalysisSignals, line_at
 from gearsig.diagnosis._types import Finding, Kind, OrderLevel, Strength, Where, from_p_value, p_text
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import SeparatedOrder
-from gearsig.prepared import LineExcess
+from gearsig.prepared import LinesOverFloor
 
 NARROWEST, WIDEST = 0.01, 0.05
 """Relative width within which peaks count as together: steps of speed and filters move them by as much at least."""
@@ -203,7 +203,7 @@ def _orders_to_track(signals: AnalysisSignals, channel: str) -> list[tuple[str, 
     return meshes + [(f"order {order:g}", order, "", 0) for order in sorted(others)]
 
 
-def _strongest(signals: AnalysisSignals, excess: LineExcess, highest: float) -> list[float]:
+def _strongest(signals: AnalysisSignals, excess: LinesOverFloor, highest: float) -> list[float]:
     """Return the multiples of half a shaft order at which a clear line stands, the strongest first.
 
     Half orders are those of four-stroke engines. Lines elsewhere are noise of a fixed frequency, smeared by the speed,

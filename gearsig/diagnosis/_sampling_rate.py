@@ -15,7 +15,7 @@ from gearsig.checks import FloatArray
 from gearsig.diagnosis._lines import speed_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
 from gearsig.diagnosis._types import CannotTell, Finding, Kind
-from gearsig.prepared import STATED_SPEED_TOLERANCE, LineExcess
+from gearsig.prepared import STATED_SPEED_TOLERANCE, LinesOverFloor
 from gearsig.recording import Recording
 from gearsig.rig import ConstantSpeed, EncoderChannel, Rig, TachometerChannel
 
@@ -167,7 +167,7 @@ class StrongLines:
     highest: float
 
 
-def _strong_lines(excess: LineExcess, highest: float) -> StrongLines | None:
+def _strong_lines(excess: LinesOverFloor, highest: float) -> StrongLines | None:
     from scipy.ndimage import maximum_filter1d
 
     spectrum = excess.spectrum
@@ -182,7 +182,7 @@ def _strong_lines(excess: LineExcess, highest: float) -> StrongLines | None:
     return StrongLines(spectrum.positions[places], 1.5 * spectrum.resolution, lowest, highest)
 
 
-def _strong_of_all(spectra: Sequence[LineExcess], highest: float) -> list[StrongLines]:
+def _strong_of_all(spectra: Sequence[LinesOverFloor], highest: float) -> list[StrongLines]:
     return [lines for excess in spectra if (lines := _strong_lines(excess, highest)) is not None]
 
 

@@ -15,7 +15,15 @@ from gearsig.checks import FloatArray
 from gearsig.diagnosis._types import AnalysisSettings, ChannelAnalysis, Finding, Kind, OrderLevel, Strength, Where
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import OrderMap, SeparatedAverage, SynchronousAverage, separate, whole_revolutions
-from gearsig.prepared import Comb, LineExcess, PreparedRecording, best_comb, envelope_bands, floor_of, over_floor_db
+from gearsig.prepared import (
+    Comb,
+    LinesOverFloor,
+    PreparedRecording,
+    best_comb,
+    envelope_bands,
+    lines_over_noise_floor,
+    over_floor_db,
+)
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from gearsig.spectra import BandCandidate, Kurtogram, Spectrum
@@ -85,7 +93,7 @@ class AnalysisSignals:
     angle: ShaftAngle | None
     settings: AnalysisSettings
     spectra: Mapping[str, Spectrum]
-    order_excess: Mapping[str, LineExcess]
+    order_excess: Mapping[str, LinesOverFloor]
     shafts: tuple[ShaftSignals, ...]
     order_maps: Mapping[str, OrderMap]
     has_reference: bool = False
@@ -151,7 +159,7 @@ class PlacedLine:
     is_highest: bool = True
 
     @classmethod
-    def at(cls, excess: LineExcess, i: int) -> PlacedLine:
+    def at(cls, excess: LinesOverFloor, i: int) -> PlacedLine:
         """Return line number i."""
         spectrum = excess.spectrum
         return cls(float(spectrum.positions[i]), float(spectrum.values[i]), float(excess.floor[i]), spectrum.unit)
@@ -172,7 +180,7 @@ class PlacedLine:
 
 
 def line_at(
-    excess: LineExcess, place: float, within: float | None = None, around: float | None = None
+    excess: LinesOverFloor, place: float, within: float | None = None, around: float | None = None
 ) -> PlacedLine | None:
     """Return the largest line within 1.5 lines of a place, and whether it is the highest within six lines.
 
@@ -196,7 +204,7 @@ def compute_signals(
 ) -> AnalysisSignals:
     """Compute what the detectors need of the named channels, as far as the speed and the rig allow."""
     spectra = {name: prepared.spectrum(name) for name in names}
-    excess: dict[str, LineExcess] = {}
+    excess: dict[str, LinesOverFloor] = {}
     shafts: tuple[ShaftSignals, ...] = ()
     over_angle: AngleSignal | None = None
     if angle is not None and angle.n_revolutions >= settings.minimum_revolutions:
@@ -255,7 +263,7 @@ class BandEnvelope:
     ----------
     channel : str
     band_hz : (float, float)
-    excess : LineExcess
+    excess : LinesOverFloor
         Over order where the speed is known, else over frequency.
     mean : float
         Mean of the envelope: lines over it are modulation depths.
@@ -265,7 +273,7 @@ class BandEnvelope:
 
     channel: str
     band_hz: tuple[float, float]
-    excess: LineExcess
+    excess: LinesOverFloor
     mean: float
     over_angle: AngleSignal | None = None
 
@@ -312,7 +320,9 @@ def envelopes_in(
             return  # the band is narrower than the modulations sought
     for name in envelopes.channel_names:
         spectrum = amplitude_spectrum(envelopes, name) if over_angle is None else order_spectrum(over_angle, name)
-        yield BandEnvelope(name, band, floor_of(spectrum), float(envelopes.values(name).mean()), over_angle)
+        yield BandEnvelope(
+            name, band, lines_over_noise_floor(spectrum), float(envelopes.values(name).mean()), over_angle
+        )
 
 
 def in_common_bands(

@@ -23,7 +23,7 @@ from gearsig.diagnosis._types import (
     from_p_value,
     p_text,
 )
-from gearsig.formatting import enumerated
+from gearsig.formatting import enumerated, percent, unit_text
 from gearsig.orders import whole_revolutions
 from gearsig.prepared import has_mark, sliding_mean, strongest_window
 
@@ -393,7 +393,7 @@ def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
     able = [s for s in signals.shafts if s.separated and _why_blind(signals, s) == ""]
     tested = [(s, largest_event(s, signals)) for s in able]
     examined = [_Examined(signals, s, event, min(1.0, event.place.p_value * len(tested))) for s, event in tested]
-    judged = [(e, _finding(e)) for e in _one_per_pair_of_twins(examined)]
+    judged = [(e, _finding(e)) for e in _one_per_speed(examined)]
     findings = [f for _, f in judged if f is not None]
     codes = {f.code for f in findings}
     shocks = [f for f in findings if f.code == "single-shock"]
@@ -406,7 +406,7 @@ def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
     return findings + _not_examined(signals, {s.shaft for s in able})
 
 
-def _one_per_pair_of_twins(examined: list[_Examined]) -> list[_Examined]:
+def _one_per_speed(examined: list[_Examined]) -> list[_Examined]:
     """Keep one of two shafts of equal speed: their averages hold the same events."""
     kept = list(examined)
     for one, other in combinations(examined, 2):
@@ -451,7 +451,7 @@ def _finding(examined: _Examined) -> Finding | None:
     if event.share_of_revolutions < 0.75:  # then it is a slower shaft's
         ratio = signals.rig.ratio(name) or 1.0
         slower = [n for n, order in signals.known_shaft_orders.items() if order < ratio * (1 - 1e-9)]
-        share, low = f"{100 * event.share_of_revolutions:.0f} %", "are stated too low"
+        share, low = percent(event.share_of_revolutions), "are stated too low"
         return Finding(
             "event-in-some-revolutions",
             Kind.CANNOT_TELL,
@@ -499,7 +499,7 @@ def _damage(examined: _Examined) -> Finding:
         confidence,
         f"chance of it on a gear whose teeth merely differ: {p_text(examined.p_value)}; one in ten such events has "
         "another cause on the shaft (key, coupling, rub)"
-        + (f"; halved because {assumed} are assumed" if assumed else ""),
+        + (f"; halved because of assumed data ({assumed})" if assumed else ""),
         tuple(_evidence(examined)),
         _surer(signals),
     )
@@ -510,7 +510,7 @@ def _evidence(examined: _Examined) -> Iterator[str]:
     yield f"Energy in one tooth pitch is {event.place.ratio_db:.1f} dB over the median pitch, all channels together."
     yield f"{shaft.averages[event.channel].n_revolutions} revolutions were averaged."
     yield f"It comes back: odd and even revolutions correlate there by {event.place.repeatability:.2f}."
-    yield f"Its rms is {100 * event.rms / event.average_rms:.0f} % of the whole average's."
+    yield f"Its rms is {percent(event.rms / event.average_rms)} of the whole average's."
     if len(event.peaks_rev) > 1:
         yield f"It is the largest of {len(event.peaks_rev)} local events: several teeth, or another cause."
     if examined.is_at_mark:
@@ -539,7 +539,7 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
     Where an event as large as half of the average's rms would not have shown, nothing is said about the teeth.
     """
     if signals.rig.assumed:
-        return _undecided(examined, f"{', '.join(signals.rig.assumed)} are assumed: damage may not show")
+        return _undecided(examined, f"on assumed data ({', '.join(signals.rig.assumed)}): damage may not show")
     withheld = [e for e in examined if e.is_withheld]
     examined = [e for e in examined if e not in withheld]
     sharp = [e for e in examined if e.smallest_visible <= 0.5 * e.event.average_rms]
@@ -604,9 +604,11 @@ def _shafts_text(names: Sequence[str]) -> str:
 def _visible_text(examined: _Examined) -> str:
     event, smallest = examined.event, examined.smallest_visible
     share = 100 * smallest / event.average_rms if event.average_rms > 0 else 0.0
+    unit = examined.signals.recording.channels[examined.signals.recording.index(event.channel)].unit
     return (
         f"Shaft {examined.shaft.shaft}: the largest tooth is {event.place.ratio_db:.1f} dB over the median (chance if "
-        f"teeth merely differ: {p_text(examined.p_value)}). An event of {smallest:.3g} rms in {event.channel}, "
+        f"teeth merely differ: {p_text(examined.p_value)}). An event of {smallest:.3g}"
+        f"{f' {unit_text(unit)}' if unit else ''} rms in {event.channel}, "
         f"{share:.0f} % of the average, would have shown."
     )
 

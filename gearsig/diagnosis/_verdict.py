@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gearsig.diagnosis._doubts import said_first
+from gearsig.diagnosis._lines import SPEED_UNKNOWN
 from gearsig.diagnosis._overall import VIBRATION_ZONE
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import (
@@ -19,6 +20,7 @@ from gearsig.diagnosis._types import (
     Where,
     outcome_of,
 )
+from gearsig.formatting import percent
 from gearsig.recording import Recording
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
@@ -27,6 +29,9 @@ DEPTH_UNKNOWN = "crack-depth-unknown"
 WITHOUT_REFERENCE = "Damage of many teeth would only show against an earlier recording."
 
 NO_FAULT = "No fault shows."
+
+SURER_WITH, WHAT_WOULD_HELP = "Surer with: ", "What would help: "
+"""Open the last sentence of a verdict that cannot tell."""
 
 _RANK = {kind: i for i, kind in enumerate(Kind)}
 
@@ -69,7 +74,7 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
         kind = Kind.FAULT if outcome is Outcome.FAULT else Kind.SUSPICION
         first, *more = (f for f in findings if f.kind is kind)
         claim = first.title.removesuffix(".")
-        claim += f" (at most {100 * first.confidence:.0f} % sure)" if kind is Kind.FAULT else ""
+        claim += f" (at most {percent(first.confidence)} sure)" if kind is Kind.FAULT else ""
         claim += f", and {len(more)} more" if more else ""
         return " ".join([f"{kind.value.capitalize()}: {claim}.", *(f.title for f in unused)])
     said = [f.title for f in findings if f.code in EXAMINED]
@@ -93,9 +98,9 @@ def _remedy(gaps: list[Finding]) -> list[str]:
     if first is None:
         return []
     surer = first.surer.partition(". ")[0].rstrip(".")
-    if first.code == DEPTH_UNKNOWN:  # says what to do, not what to have
-        return [f"What would help: {surer[:1].lower()}{surer[1:]}."]
-    return [f"Surer with: {surer}."]
+    if first.code in (DEPTH_UNKNOWN, SPEED_UNKNOWN):  # say what to do, not what to have
+        return [f"{WHAT_WOULD_HELP}{surer[:1].lower()}{surer[1:]}."]
+    return [f"{SURER_WITH}{surer}."]
 
 
 _TITLES = {

@@ -11,9 +11,9 @@ from gearsig.gap._attribution import (
     joint_probabilities,
     load_gap_calibration,
     score_of,
-    shared,
-    told_apart,
     tooth_load_n_per_mm,
+    with_likelihoods,
+    with_unknown_shared,
 )
 from gearsig.gap._change import (
     alike_features,
@@ -64,7 +64,7 @@ from gearsig.gap._evidence import (
     told_options,
     weighed_evidence,
 )
-from gearsig.gap._features import SIDES, Feature, Features, features_of, once
+from gearsig.gap._features import Feature, Features, features_of, once
 from gearsig.gap._floors import (
     StructuralFloor,
     credibility_of,
@@ -76,17 +76,17 @@ from gearsig.gap._floors import (
     pooled_scatter,
     soft_size,
 )
-from gearsig.gap._gearless import Standing, beside_standing, standing_place, stood_out
-from gearsig.gap._inputs import GapRequest, read_gap_inputs, read_labelled
+from gearsig.gap._gearless import UnexpectedFinding, beside_unexpected, place_of_unexpected, unexpected_findings
+from gearsig.gap._inputs import GapRequest, read_gap_inputs, read_labelled, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes, labelled_support, with_labelled
 from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._places import (
-    all_round_spot,
     counted_against,
     gap_places,
-    mesh_spot,
+    locate_all_round,
+    locate_mesh,
+    locate_tail,
     ranked_places,
-    tail_spot,
 )
 from gearsig.gap._population import (
     BY_HAND,
@@ -142,7 +142,6 @@ from gearsig.gap._reduction import (
     reduce_recording,
     speed_figures,
 )
-from gearsig.gap._rigs import twin_rig, with_stage
 from gearsig.gap._simulator import (
     Added,
     DriveFacts,
@@ -214,12 +213,12 @@ from gearsig.gap._words import (
     feature_words,
     fitted_words,
     hardly_predicted,
-    odds_text,
     point_text,
     same_condition,
     severity_unit,
     stance_words,
 )
+from gearsig.rig import SIDES
 
 __all__ = [
     "BY_HAND",
@@ -292,7 +291,6 @@ __all__ = [
     "SimulatedCourse",
     "SpectrumCurves",
     "SpeedFigures",
-    "Standing",
     "StructuralFloor",
     "Task",
     "ToothErrorChange",
@@ -301,17 +299,17 @@ __all__ = [
     "TriedEffect",
     "Twin",
     "TwinRun",
+    "UnexpectedFinding",
     "WaveformMatch",
     "against_reference",
     "alike_features",
-    "all_round_spot",
     "angle_curves",
     "apart_features",
     "at_its_tooth",
     "attribute",
     "average_curves",
     "banks_of",
-    "beside_standing",
+    "beside_unexpected",
     "beyond_the_mesh",
     "change_features",
     "change_once",
@@ -358,18 +356,20 @@ __all__ = [
     "load_gap_calibration",
     "load_learned",
     "load_population",
+    "locate_all_round",
+    "locate_mesh",
+    "locate_tail",
     "mains_lines",
     "matching_reference",
-    "mesh_spot",
     "mirrored",
     "next_recordings",
     "next_steps",
-    "odds_text",
     "once",
     "other_lines",
     "over_floors",
     "paths_of",
     "place_of",
+    "place_of_unexpected",
     "point_text",
     "pooled_scatter",
     "population_file",
@@ -389,20 +389,15 @@ __all__ = [
     "segment_changes",
     "severity_unit",
     "shaft_signs",
-    "shared",
     "shrinkage",
     "soft_size",
     "spectrum_curves",
     "speed_figures",
     "stance_words",
-    "standing_place",
-    "stood_out",
     "strange_pattern",
     "strange_teeth",
-    "tail_spot",
     "textbook_rules",
     "textbook_strengths",
-    "told_apart",
     "told_options",
     "tooth_error_changes",
     "tooth_error_evidence",
@@ -411,12 +406,15 @@ __all__ = [
     "try_effects",
     "twin_rig",
     "unbounded_fits",
+    "unexpected_findings",
     "waveform_match",
     "weighed_evidence",
     "with_channels_of",
     "with_common_channels",
     "with_labelled",
+    "with_likelihoods",
     "with_stage",
+    "with_unknown_shared",
     "within_reach",
     "within_the_floor",
     "without_machines_of",

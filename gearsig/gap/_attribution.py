@@ -247,8 +247,8 @@ class Attribution(Generic[TriedT]):
 
     Parameters
     ----------
-    evidence : mapping
-        Cause → probability, uncalibrated: by the forests, or by likelihood.
+    uncalibrated : mapping
+        Cause → probability: by the forests, or by likelihood.
     tried : dict
         Effect → how it was tried.
     calibration : GapCalibration
@@ -264,7 +264,7 @@ class Attribution(Generic[TriedT]):
         Effect → log-likelihood of the transmission error's change, of faults of teeth; empty without encoders.
     """
 
-    evidence: Mapping[str, float]
+    uncalibrated: Mapping[str, float]
     tried: dict[str, TriedT]
     calibration: GapCalibration
     size: float = 1.0
@@ -288,19 +288,19 @@ class Attribution(Generic[TriedT]):
     def probabilities(self, calibration: GapCalibration | None = None) -> dict[str, float]:
         """Return cause → probability, likeliest first; calibrated, but for effects that the forests do not know."""
         found = (calibration or self.calibration).probabilities(
-            self.evidence, self.scores, self.size, self.n_conditions
+            self.uncalibrated, self.scores, self.size, self.n_conditions
         )
         if self.labelled is not None:
             found = with_labelled(found, self.labelled.ratios, self.labelled.alike)
-        found = told_apart(told_apart(found, self.matches), self.courses)
-        return shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
+        found = with_likelihoods(with_likelihoods(found, self.matches), self.courses)
+        return with_unknown_shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
 
 
 MAX_TRIED, MIN_TRIED_PROBABILITY = 3, 0.06
 """Effects that are simulated: so many of the likeliest, none less likely than this."""
 
 
-def told_apart(probabilities: Mapping[str, float], matches: Mapping[str, float]) -> dict[str, float]:
+def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, float]) -> dict[str, float]:
     """Return the probabilities with those of faults of teeth parted anew by what tells them apart, likeliest first.
 
     p_i ∝ p_i L_i among those that have a likelihood; what they have together stays: a waveform tells how a tooth is
@@ -323,7 +323,7 @@ def told_apart(probabilities: Mapping[str, float], matches: Mapping[str, float])
     return dict(sorted({**probabilities, **parted}.items(), key=lambda item: -item[1]))
 
 
-def shared(probabilities: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
+def with_unknown_shared(probabilities: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
     """Return the probabilities with those of effects that only a trial speaks for, likeliest first.
 
     They share max_i s_i of what is unknown, each in proportion to its own s_i = max(score, 0): to the forests, a gap

@@ -9,7 +9,6 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap._features import (
-    SIDES,
     Feature,
     Features,
     NamedValue,
@@ -27,6 +26,7 @@ from gearsig.gap._reduction import (
     ShaftAverage,
     smooth_power,
 )
+from gearsig.rig import SIDES
 from gearsig.severity import ShaftLines, difference_lines
 
 # --------------------
@@ -181,7 +181,7 @@ MIN_SURPRISE = 0.1
 and what rounding leaves in it says nothing."""
 
 REPEATS = 0.1
-"""Share by which a healthy machine's pattern differs on another day, see `surprises`."""
+"""Share by which a healthy machine's pattern differs on another day, see `normalised_differences`."""
 
 
 def change_features(now: ReducedRecording, healthy: ReducedRecording) -> Features:
@@ -259,7 +259,7 @@ def _patterns(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[Name
     for side, (turned, _) in enumerate(differences):
         yield from pattern_features(
             f"surprise.{SIDES[side]}",
-            surprises(now, healthy, turned, side),
+            normalised_differences(now, healthy, turned, side),
             now.frame.teeth[side],
             noise=0.0,
             longer=0.0,
@@ -289,14 +289,16 @@ def _filled(row: ComplexArray, average: ShaftAverage) -> ComplexArray:
     return np.pad(row, (0, len(average.lines) - len(row)))
 
 
-def surprises(now: ReducedRecording, healthy: ReducedRecording, turned: ShaftLines, side: int) -> list[ComplexArray]:
+def normalised_differences(
+    now: ReducedRecording, healthy: ReducedRecording, turned: ShaftLines, side: int
+) -> list[ComplexArray]:
     """Return each channel's difference, line by line over what noise and a mounting of its own would make of it.
 
     w[n] = d[n] / √(σ²[n] + (s |r[n]|)²), with σ² the power that noise leaves in both averages, |r|² the healthy
     pattern's power about that order, s = `REPEATS`; scaled so that a healthy machine's energy is about 1 all round,
     whatever the machine. A change counts where it is sure, and not where the vibration is loud.
     """
-    surprises_by_channel = []
+    by_channel = []
     n = turned.lines.shape[1]
     healthy_lines = lines_of_shaft(healthy, side).lines
     for row, born, name in zip(turned.lines, healthy_lines, now.channels, strict=True):
@@ -304,8 +306,8 @@ def surprises(now: ReducedRecording, healthy: ReducedRecording, turned: ShaftLin
         noise = here.noise[:n] + healthy.average(name, side).noise[:n] + MIN_NOISE * here.mesh_power / n
         expected = np.sqrt(noise + REPEATS**2 * smooth_power(np.abs(born[:n]) ** 2))
         kept = here.residual(_filled(row / expected, here))
-        surprises_by_channel.append(kept * np.sqrt(2.0 / max(int(np.count_nonzero(kept)), 1)))
-    return surprises_by_channel
+        by_channel.append(kept * np.sqrt(2.0 / max(int(np.count_nonzero(kept)), 1)))
+    return by_channel
 
 
 def lines_of_shaft(reduced: ReducedRecording, side: int) -> ShaftLines:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import percent
 from gearsig.gap._change import change_features, difference_features, lines_of_shaft, turned_difference
 from gearsig.gap._evidence import over_floors
 from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_energy
@@ -213,7 +214,7 @@ def matching_reference(
     reference = nearest.reduced
     change = now.speed_hz / reference.speed_hz - 1.0
     if abs(change) > LARGEST_SPEED_DIFFERENCE:
-        return None, f"no reference within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
+        return None, f"no reference within {percent(LARGEST_SPEED_DIFFERENCE)} of its speed"
     if _torque_difference(rig, nearest.rig) > LARGEST_TORQUE_DIFFERENCE:
         here, there = _torque_nm(rig), _torque_nm(nearest.rig)
         return None, f"the reference at its speed has {there:.3g} N m, the recording {here:.3g} N m"
@@ -430,7 +431,7 @@ def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
     if share >= MIN_MESH_SHARE or wrong_teeth(now, name):  # that is said by itself
         return []
     remark = (
-        f"{name}: only {100 * share:.0f} % of what repeats with a shaft lies at mesh harmonics of the rig's "
+        f"{name}: only {percent(share)} of what repeats with a shaft lies at mesh harmonics of the rig's "
         f"{_teeth(now.frame)} teeth. Is it a recording of this machine?"
     )
     return [remark]

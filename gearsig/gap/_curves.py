@@ -13,7 +13,6 @@ from gearsig.gap._change import turned_difference
 from gearsig.gap._features import (
     MAX_SHAFT_ORDERS,
     SIDEBANDS,
-    SIDES,
     STEPS_PER_TOOTH,
     floor_ratio,
 )
@@ -22,6 +21,8 @@ from gearsig.gap._places import changed_pattern, own_pattern
 from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ReducedRecording
 from gearsig.gap._types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap._words import shaft_words
+from gearsig.prepared import circular_correlation
+from gearsig.rig import SIDES
 from gearsig.severity import load_calibration
 
 BEYOND = 0.5
@@ -281,8 +282,7 @@ def _turned(simulated: FloatArray, measured: FloatArray, *marks: bool) -> FloatA
     """Return the curve turned to its best agreement, unless marks fix it."""
     if all(marks):
         return simulated
-    agreement = np.fft.irfft(np.fft.rfft(measured) * np.conj(np.fft.rfft(simulated)), len(measured))
-    turned: FloatArray = np.roll(simulated, int(np.argmax(agreement)))
+    turned: FloatArray = np.roll(simulated, int(np.argmax(circular_correlation(measured, simulated))))
     return turned
 
 

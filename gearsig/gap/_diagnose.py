@@ -12,6 +12,7 @@ import numpy as np
 
 from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.formatting import odds_text
 from gearsig.gap._attribution import Attribution, attribute, is_calibrated
 from gearsig.gap._conditions import (
     Condition,
@@ -22,12 +23,12 @@ from gearsig.gap._conditions import (
 )
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import evidence_of
-from gearsig.gap._gearless import beside_standing, diagnose_gearless, standing_place, stood_out
+from gearsig.gap._gearless import beside_unexpected, diagnose_gearless, place_of_unexpected, unexpected_findings
+from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._places import counted_against, gap_places, ranked_places
 from gearsig.gap._population import load_learned
-from gearsig.gap._rigs import is_gearless, twin_rig, with_stage
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
 from gearsig.gap._tooth_error import ToothErrorEvidence, mean_log_likelihoods, tooth_error_evidence
 from gearsig.gap._trials import (
@@ -192,7 +193,7 @@ def diagnose_gap(
     labelled, left_out = labelled_changes(learn, healthy, conditions, twin, cache, fresh=fresh)
     courses = _courses(conditions, recordings, references)
     with ThreadPoolExecutor(1) as beside:  # step 5 has time while other processes simulate
-        standing_out = beside.submit(stood_out, recording, healthy)
+        unexpected_job = beside.submit(unexpected_findings, recording, healthy)
         attribution = attribute(
             conditions,
             known,
@@ -209,14 +210,14 @@ def diagnose_gap(
 
     # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
-    standing, remarks, faults = standing_out.result()
+    unexpected, remarks, faults = unexpected_job.result()
     groups = {name: effect.group for name, effect in known.items()}
-    outcome, unseen = beside_standing(attribution.calibration.outcome(probabilities, groups), standing)
+    outcome, unseen = beside_unexpected(attribution.calibration.outcome(probabilities, groups), unexpected)
     labels = _labelled_facts(attribution, _weighed(replace(attribution, labelled=None), clearest, known, gap), groups)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
-    places = ranked_places(gap, [standing_place(one, recording.rig) for one in standing])
+    places = ranked_places(gap, [place_of_unexpected(one, recording.rig) for one in unexpected])
     found = [_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items()]
     reference_of = {one.recording.name: one for one in healthy}.get(clearest.facts.reference)
     found, depths = _with_crack_depth(found, recording, reference_of, tried)
@@ -454,7 +455,7 @@ def _of_the_encoders(courses: Sequence[ToothErrorEvidence], known: Mapping[str, 
         return [f"{changed}, which at this speed tells no fault from another: the drive swings along. {slower}"]
     levels = ToothErrorEvidence(mean_log_likelihoods(courses), clearest.rms_um, clearest.gear).probabilities
     ranked = sorted(levels.items(), key=lambda item: -item[1])
-    likely = ", ".join(f"{known[name].title} {p:.0%}" for name, p in ranked if p >= 0.05 and name in known)
+    likely = ", ".join(f"{known[name].title} {odds_text(p)}" for name, p in ranked if p >= 0.05 and name in known)
     where = {"driver": ", on the driver", "driven": ", on the driven gear"}.get(clearest.gear, "")
     return [f"{changed}{where}; by its course alone, all faults of teeth as likely before: {likely}."]
 

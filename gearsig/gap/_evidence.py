@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearsig.gap._change import beyond_the_mesh
-from gearsig.gap._features import SIDES, Features
+from gearsig.gap._features import Features
 from gearsig.gap._floors import REPEATABLE, StructuralFloor, family_members, pooled_scatter
 from gearsig.gap._prediction import Fit, ObservedChange
 from gearsig.gap._reduction import GearFrame
 from gearsig.gap._types import Evidence
 from gearsig.gap._words import feature_words
+from gearsig.rig import SIDES
 
 MAX_SHOWN, MAX_OF_A_FAMILY = 10, 3
 CLEAR = 1.0

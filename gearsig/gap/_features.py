@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ChannelSums, GearFrame, ReducedRecording
+from gearsig.rig import SIDES
 
 # --------------------
 # Features of the two synchronous averages' lines: mesh harmonics, sidebands, shaft orders.
@@ -20,7 +21,6 @@ from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ChannelSums
 N_SIDEBAND_HARMONICS = 5
 SIDEBANDS = {"1": (1, 1), "2": (2, 2), "3to5": (3, 5), "6to12": (6, 12)}
 MAX_SHAFT_ORDERS = 30
-SIDES = ("driver", "driven")
 
 NamedValue = tuple[str, float]
 

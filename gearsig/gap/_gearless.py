@@ -22,7 +22,7 @@ from gearsig.diagnosis import (
     in_reference,
 )
 from gearsig.errors import RefusalError
-from gearsig.formatting import enumerated, named, signed
+from gearsig.formatting import enumerated, named, percent, signed
 from gearsig.gap._conditions import Stage, readable
 from gearsig.gap._simulator import GapEffect, OperatingCondition
 from gearsig.gap._types import (
@@ -68,7 +68,7 @@ MIN_RISE_DB = 6.0
 
 
 @dataclass(frozen=True)
-class Standing:
+class UnexpectedFinding:
     """A finding beyond what the machine is known to show.
 
     Parameters
@@ -107,7 +107,7 @@ class ExaminedRecording:
     angle : ShaftAngle
     reference : Analysis or None
         Of the healthy machine at its speed.
-    standing : tuple of Standing
+    unexpected : tuple of UnexpectedFinding
         Most important first.
     notices : tuple of str
     """
@@ -116,7 +116,7 @@ class ExaminedRecording:
     analysis: Analysis
     angle: ShaftAngle
     reference: Analysis | None
-    standing: tuple[Standing, ...]
+    unexpected: tuple[UnexpectedFinding, ...]
     notices: tuple[str, ...]
 
     @property
@@ -155,24 +155,24 @@ def examined(
     """Return what stands out of a recording, beyond the reference at its speed where there is one."""
     analysis, angle = analysis_and_angle
     reference, notices = _reference(name, analysis_and_angle, references)
-    standing = []
+    unexpected = []
     for finding in analysis.findings:
         if finding.code not in (*RACES, *IMPACTS, LINE):
             continue
         earlier = None if reference is None else in_reference(finding, reference)
         rise_db = None if earlier is None else _rise_db(finding, earlier)
         if earlier is None or finding.kind is Kind.FAULT or (rise_db is not None and rise_db >= MIN_RISE_DB):
-            standing.append(Standing(finding, name, rise_db))
+            unexpected.append(UnexpectedFinding(finding, name, rise_db))
         elif rise_db is None:
             notices.append(f"{name}: {finding.title.rstrip('.')}; the reference shows it too, in another band. {GREW}")
     warnings = tuple(f"{name}: {f.title}" for f in analysis.findings if f.kind in (Kind.DATA_PROBLEM, Kind.CANNOT_TELL))
-    return ExaminedRecording(name, analysis, angle, reference, tuple(standing), (*notices, *warnings))
+    return ExaminedRecording(name, analysis, angle, reference, tuple(unexpected), (*notices, *warnings))
 
 
-def surest(every: Sequence[ExaminedRecording]) -> list[Standing]:
+def surest(every: Sequence[ExaminedRecording]) -> list[UnexpectedFinding]:
     """Return what stands out, each part once, from the recording that shows it surest; single lines last."""
-    surest_of: dict[tuple[str, str], Standing] = {}
-    for part in (standing for recording in every for standing in recording.standing):
+    surest_of: dict[tuple[str, str], UnexpectedFinding] = {}
+    for part in (unexpected for recording in every for unexpected in recording.unexpected):
         key = (part.finding.code, part.finding.where.bearing)
         if key not in surest_of or part.sureness > surest_of[key].sureness:
             surest_of[key] = part
@@ -217,7 +217,7 @@ def _reference(
     nearest, its_angle = min(references, key=lambda candidate: abs(candidate[1].mean_speed_rpm - speed))
     why = ""
     if abs(its_angle.mean_speed_rpm / speed - 1.0) > LARGEST_SPEED_DIFFERENCE:
-        why = f"no reference is within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of its speed"
+        why = f"no reference is within {percent(LARGEST_SPEED_DIFFERENCE)} of its speed"
     elif missing := {c.channel for c in analysis.channels} - {c.channel for c in nearest.channels}:
         why = f"the reference has no channel {', '.join(sorted(missing))}"
     elif nearest.outcome is Outcome.FAULT:
@@ -235,12 +235,15 @@ HIDDEN = 0.2
 UNDECIDED = 0.5
 """Share of unknown in what is left over, where nothing tells it from none."""
 
-Races = Mapping[str, Standing]
+Races = Mapping[str, UnexpectedFinding]
 """Name of an effect → the surest finding of it."""
 
 
 def causes_of(
-    standing: Sequence[Standing], every: Sequence[ExaminedRecording], rig: Rig, effects: Mapping[str, GapEffect]
+    unexpected: Sequence[UnexpectedFinding],
+    every: Sequence[ExaminedRecording],
+    rig: Rig,
+    effects: Mapping[str, GapEffect],
 ) -> tuple[tuple[GapCause, ...], GapOutcome]:
     """Return the causes, that of the outcome first, and the outcome.
 
@@ -250,24 +253,24 @@ def causes_of(
 
     Parameters
     ----------
-    standing : sequence of Standing
+    unexpected : sequence of UnexpectedFinding
         Most important first.
     every : sequence of ExaminedRecording
     rig : Rig
     effects : mapping
         Those that may be named.
     """
-    races = {name: part for part in reversed(standing) if (name := RACES.get(part.finding.code, "")) in effects}
-    outcome, why = _outcome(standing, races, every, rig)
+    races = {name: part for part in reversed(unexpected) if (name := RACES.get(part.finding.code, "")) in effects}
+    outcome, why = _outcome(unexpected, races, every, rig)
     total = sum(part.finding.confidence for part in races.values())
     rest = 1.0 - min(total, 1.0)
-    unknown = rest * _share_of_unknown(standing, races, every)
+    unknown = rest * _share_of_unknown(unexpected, races, every)
     causes = [
         _race(effects[name], races.get(name), rig, scale=1.0 / max(total, 1.0))
         for name in RACES.values()
         if name in effects
     ]
-    strange = [part.finding for part in standing if part not in races.values()]
+    strange = [part.finding for part in unexpected if part not in races.values()]
     causes += [
         GapCause(
             UNKNOWN,
@@ -284,20 +287,20 @@ def causes_of(
     return tuple(sorted(causes, key=lambda cause: (cause.name != first, -cause.probability))), outcome
 
 
-def _sure(races: Races) -> list[Standing]:
+def _sure(races: Races) -> list[UnexpectedFinding]:
     """Return the races whose damage the search is sure of, surest first."""
     faults = [race for race in races.values() if race.finding.kind is Kind.FAULT]
     return sorted(faults, key=lambda race: -race.finding.confidence)
 
 
 def _outcome(
-    standing: Sequence[Standing], races: Races, every: Sequence[ExaminedRecording], rig: Rig
+    unexpected: Sequence[UnexpectedFinding], races: Races, every: Sequence[ExaminedRecording], rig: Rig
 ) -> tuple[GapOutcome, str]:
     """Return the outcome and its reason."""
     if _sure(races):
         return GapOutcome.EFFECT, ""
-    if standing:
-        return GapOutcome.UNKNOWN, _why_unknown(standing[0], races, rig)
+    if unexpected:
+        return GapOutcome.UNKNOWN, _why_unknown(unexpected[0], races, rig)
     if all(recording.reference is not None for recording in every):
         return GapOutcome.NO_GAP, "nothing stands out that the healthy reference does not show"
     if all(recording.is_healthy for recording in every):
@@ -305,7 +308,7 @@ def _outcome(
     return GapOutcome.UNKNOWN, "nothing stands out, but damage of a race might not have"
 
 
-def _why_unknown(part: Standing, races: Races, rig: Rig) -> str:
+def _why_unknown(part: UnexpectedFinding, races: Races, rig: Rig) -> str:
     code = part.finding.code
     if code in RACES:
         is_known = part in races.values()
@@ -319,16 +322,18 @@ def _why_unknown(part: Standing, races: Races, rig: Rig) -> str:
     return f"{why}; it may turn with {loose}, whose speed the rig file does not tell" if loose else why
 
 
-def _share_of_unknown(standing: Sequence[Standing], races: Races, every: Sequence[ExaminedRecording]) -> float:
-    impacts = [part.finding.confidence for part in standing if part.finding.code in IMPACTS]
+def _share_of_unknown(
+    unexpected: Sequence[UnexpectedFinding], races: Races, every: Sequence[ExaminedRecording]
+) -> float:
+    impacts = [part.finding.confidence for part in unexpected if part.finding.code in IMPACTS]
     if races:  # a line may be the ringing of the race's impacts, and says nothing beside them
         return max([UNDECIDED, *impacts])
-    if standing:
-        return max(part.finding.confidence for part in standing)
+    if unexpected:
+        return max(part.finding.confidence for part in unexpected)
     return HIDDEN if all(part.is_healthy for part in every) else UNDECIDED
 
 
-def _race(effect: GapEffect, part: Standing | None, rig: Rig, *, scale: float) -> GapCause:
+def _race(effect: GapEffect, part: UnexpectedFinding | None, rig: Rig, *, scale: float) -> GapCause:
     if part is None:
         return named_cause(effect.name, 0.0, {effect.name: effect})
     finding = part.finding
@@ -349,12 +354,12 @@ def _remarks(finding: Finding) -> tuple[str, ...]:
 NAN = float("nan")
 
 
-def standing_place(part: Standing, rig: Rig, *, name: str = "") -> GapPlace:
+def place_of_unexpected(part: UnexpectedFinding, rig: Rig, *, name: str = "") -> GapPlace:
     """Return the place of what stands out, without sizes in floors, for nothing is simulated to find it.
 
     Parameters
     ----------
-    part : Standing
+    part : UnexpectedFinding
     rig : Rig
     name : str
         The recording's where there are several.
@@ -381,7 +386,7 @@ def standing_place(part: Standing, rig: Rig, *, name: str = "") -> GapPlace:
     )
 
 
-def _what(part: Standing, rig: Rig) -> str:
+def _what(part: UnexpectedFinding, rig: Rig) -> str:
     code = part.finding.code
     if code in PARTS:
         return f"envelope lines of the {PARTS[code][0]} of {bearings_text(part.finding, rig)}"
@@ -448,24 +453,24 @@ def diagnose_gearless(
 
     every = readable(recordings, examine, "recording", left_out)
     hint = () if references else (NO_REFERENCE,)
-    standing = surest(every)
-    causes, outcome = causes_of(standing, every, rig, effects)
+    unexpected = surest(every)
+    causes, outcome = causes_of(unexpected, every, rig, effects)
     return GapReport(
         rig=rig.name,
         simulator="",
         conditions=tuple(_facts(one) for one in every),
         references=tuple(one.recording.name for one in references) if any(e.reference for e in every) else (),
         outcome=outcome,
-        places=tuple(standing_place(one, rig, name=one.recording if len(every) > 1 else "") for one in standing),
+        places=tuple(place_of_unexpected(one, rig, name=one.recording if len(every) > 1 else "") for one in unexpected),
         causes=causes,
-        spectra=_spectra(standing, every),
+        spectra=_spectra(unexpected, every),
         notices=(
             NOT_SIMULATED,
             HOW_SURE,
             *hint,
             *left_out,
             *_loose_shafts(rig),
-            *_limits(standing, every),
+            *_limits(unexpected, every),
             *(text for one in every for text in one.notices),
         ),
     )
@@ -483,16 +488,18 @@ def _loose_shafts(rig: Rig) -> list[str]:
     return [remark]
 
 
-def _limits(standing: Sequence[Standing], every: Sequence[ExaminedRecording]) -> list[str]:
+def _limits(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRecording]) -> list[str]:
     """Say where several races, or several recordings, do not agree on one answer."""
-    faults = [part for part in standing if part.finding.kind is Kind.FAULT]
+    faults = [part for part in unexpected if part.finding.kind is Kind.FAULT]
     texts = []
     if len({part.finding.code for part in faults if part.finding.code in RACES}) > 1:
         texts.append("Both races stand out and may both be damaged: the probabilities, of one cause each, are shared.")
     for fault in faults:
         key = (fault.finding.code, fault.finding.where.bearing)
         others = [
-            part.name for part in every if key not in [(s.finding.code, s.finding.where.bearing) for s in part.standing]
+            part.name
+            for part in every
+            if key not in [(s.finding.code, s.finding.where.bearing) for s in part.unexpected]
         ]
         if others:
             texts.append(
@@ -513,9 +520,9 @@ def _facts(examined_recording: ExaminedRecording) -> ConditionFacts:
     )
 
 
-def _spectra(standing: Sequence[Standing], every: Sequence[ExaminedRecording]) -> tuple[SpectrumCurves, ...]:
+def _spectra(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRecording]) -> tuple[SpectrumCurves, ...]:
     """Return the envelope spectrum that shows the first family; of the first channel where there is none."""
-    families = [one for one in standing if one.finding.code != LINE]
+    families = [one for one in unexpected if one.finding.code != LINE]
     name = families[0].recording if families else every[0].name
     channels = next(one for one in every if one.name == name).analysis.channels
     shown_channels = families[0].finding.where.channels if families else ()
@@ -549,9 +556,9 @@ HIGHEST_HARMONIC, SAME_ORDER = 40, 1e-3
 """Of a family of impacts, at which a line still belongs to it; relative."""
 
 
-def stood_out(
+def unexpected_findings(
     recording: PreparedRecording, references: Sequence[PreparedRecording]
-) -> tuple[list[Standing], list[str], list[str]]:
+) -> tuple[list[UnexpectedFinding], list[str], list[str]]:
     """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; remarks; warnings.
 
     The catalogue's effects are compared by features of known places; a strange family is one feature among a hundred
@@ -574,8 +581,8 @@ def stood_out(
             healthy = [analysed(nearest)]
     now_examined = examined(name, now, healthy)
     warnings = _fault_of_reference(healthy[0][0], now[0], name) if healthy else []
-    weak = [part for part in now_examined.standing if part.finding.code == LINE or part.finding.kind is Kind.NOTICE]
-    strong = [part for part in now_examined.standing if part not in weak]
+    weak = [part for part in now_examined.unexpected if part.finding.code == LINE or part.finding.kind is Kind.NOTICE]
+    strong = [part for part in now_examined.unexpected if part not in weak]
     remarks = [
         f"Not explained by the gear model, in {name}: {part.finding.title.rstrip('.')}{_odds(part)}."
         for part in weak
@@ -584,16 +591,16 @@ def stood_out(
     return strong, remarks, warnings
 
 
-def beside_standing(outcome: GapOutcome, standing: Sequence[Standing]) -> tuple[GapOutcome, list[str]]:
+def beside_unexpected(outcome: GapOutcome, unexpected: Sequence[UnexpectedFinding]) -> tuple[GapOutcome, list[str]]:
     """Return what a diagnosis that names no effect comes to where impacts stand out, and what is to be checked first.
 
     Impacts that no shaft repeats are a gap, however few features see them: unknown. Those of a bearing's race are in
     the catalogue; that the forests see too little of them leaves it undecided.
     """
-    if not standing or outcome not in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
+    if not unexpected or outcome not in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
         return outcome, []
-    races = [part for part in standing if part.finding.code in RACES]
-    if len(races) < len(standing):
+    races = [part for part in unexpected if part.finding.code in RACES]
+    if len(races) < len(unexpected):
         return GapOutcome.UNKNOWN, []
     return GapOutcome.UNDECIDED, [
         f"{part.recording}: {part.finding.title.rstrip('.')}{_odds(part)}, by the search for bearing orders; few of "
@@ -602,7 +609,7 @@ def beside_standing(outcome: GapOutcome, standing: Sequence[Standing]) -> tuple[
     ]
 
 
-def _is_harmonic(line: Standing, family: Standing) -> bool:
+def _is_harmonic(line: UnexpectedFinding, family: UnexpectedFinding) -> bool:
     """Whether a line is a multiple of a family's order: the family explains it."""
     order, base = line.finding.where.order, family.finding.where.order
     if not (order and base and line.finding.where.shaft == family.finding.where.shaft):
@@ -611,8 +618,8 @@ def _is_harmonic(line: Standing, family: Standing) -> bool:
     return 1 <= n <= HIGHEST_HARMONIC and abs(order / (n * base) - 1.0) < SAME_ORDER
 
 
-def _odds(part: Standing) -> str:
-    return "" if part.finding.code == LINE else f" (at most {100 * part.finding.confidence:.0f} %)"
+def _odds(part: UnexpectedFinding) -> str:
+    return "" if part.finding.code == LINE else f" (at most {percent(part.finding.confidence)})"
 
 
 def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[str]:

@@ -24,7 +24,6 @@ from gearsig.gap._features import (
     N_SHAFT_FAMILY,
     N_SIDEBAND_HARMONICS,
     RACES,
-    SIDES,
     SLIP,
     Feature,
     Features,
@@ -51,7 +50,9 @@ from gearsig.gap._reduction import (
 from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import UNKNOWN, GapPlace, PlaceKind
 from gearsig.gap._words import ComparedPair, LocatedChange, band_words, by_decibels, feature_words, hertz, shaft_words
+from gearsig.prepared import MAINS_TOLERANCE
 from gearsig.recording import MAINS_HZ
+from gearsig.rig import SIDES
 from gearsig.severity import ShaftLines, find_event, load_calibration
 
 # --------------------
@@ -63,7 +64,7 @@ SAME_ORDER = 0.02
 """Relative: of one family of lines, however they were found."""
 
 
-def ranked_places(places: Sequence[GapPlace], standing: Sequence[GapPlace] = ()) -> tuple[GapPlace, ...]:
+def ranked_places(places: Sequence[GapPlace], unexpected: Sequence[GapPlace] = ()) -> tuple[GapPlace, ...]:
     """Return the places in the order in which somebody at the machine should read them.
 
     Families of impacts that stand out by themselves come first: no tolerance of a simulator makes them. A place of the
@@ -74,13 +75,13 @@ def ranked_places(places: Sequence[GapPlace], standing: Sequence[GapPlace] = ())
     ----------
     places : sequence of GapPlace
         Of the gap, with sizes and shares.
-    standing : sequence of GapPlace
+    unexpected : sequence of GapPlace
         Found without a simulation, surest first.
     """
     remaining, first = list(places), []
-    for stood_out in standing:
-        same = [place for place in remaining if _same_family(place, stood_out)]
-        first.append(_joined(stood_out, same))
+    for family in unexpected:
+        same = [place for place in remaining if _same_family(place, family)]
+        first.append(_joined(family, same))
         remaining = [place for place in remaining if place not in same]
     return (*first, *sorted(remaining, key=_rank))
 
@@ -89,20 +90,20 @@ def _rank(place: GapPlace) -> tuple[bool, float]:
     return place.follows, -(place.structural if place.follows else place.share)
 
 
-def _same_family(place: GapPlace, standing: GapPlace) -> bool:
+def _same_family(place: GapPlace, unexpected: GapPlace) -> bool:
     """Whether a line or an envelope's line lies at the family's order."""
     if place.kind not in (PlaceKind.ENVELOPE, PlaceKind.LINE) or not place.orders:
         return False
-    return abs(place.orders[0] / standing.orders[0] - 1.0) < SAME_ORDER
+    return abs(place.orders[0] / unexpected.orders[0] - 1.0) < SAME_ORDER
 
 
-def _joined(standing: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
+def _joined(unexpected: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
     """Return what stands out with the sizes of the largest place of the same family, and their shares together."""
     if not same:
-        return standing
+        return unexpected
     largest = max(same, key=lambda place: place.share)
     share = sum(place.share for place in same)
-    return replace(standing, repeatability=largest.repeatability, structural=largest.structural, share=share)
+    return replace(unexpected, repeatability=largest.repeatability, structural=largest.structural, share=share)
 
 
 # --------------------
@@ -174,7 +175,6 @@ UPWARDS, N_SLIPS = 0.005, 41
 HIGHEST_MULTIPLE, MISSED = 12, 0.004
 MAX_OF_A_BAND = 0.5
 """Of a band's new power in one line: it is a tone, not noise."""
-_SUPPLY_WANDERS = 0.004
 _LINE_WIDTH = 3
 
 
@@ -206,13 +206,13 @@ class _Found:
     row: int
 
 
-def envelope_spot(comparison: ComparedPair) -> LocatedChange:
+def locate_envelope(comparison: ComparedPair) -> LocatedChange:
     """Return whose order modulates what no shaft repeats."""
     now, names = comparison.now, tuple(comparison.now.channels)
     both = [np.concatenate([envelope_ratios(g, g.channels[name]) for name in names]) for g in (now, comparison.other)]
     levels = _levels(comparison, both, now.cycle_step, comparison.other.cycle_step)
     levels, sign = _upwards(levels, comparison.size[comparison.strongest("envelope.")])
-    family = _told_apart(_best_race(comparison, levels), _strongest(comparison, levels, fundamental=True))
+    family = _family_or_line(_best_race(comparison, levels), _strongest(comparison, levels, fundamental=True))
     family = max(family, *_shafts(comparison, levels), key=lambda candidate: candidate.rise_db)
     bands = now.bands_hz * len(names)
     change = sign * family.rise_db
@@ -221,14 +221,14 @@ def envelope_spot(comparison: ComparedPair) -> LocatedChange:
     return LocatedChange(title, change, family.orders, bands[family.row], channel=channel)
 
 
-def line_spot(comparison: ComparedPair) -> LocatedChange:
+def locate_line(comparison: ComparedPair) -> LocatedChange:
     """Return which line of the residual changed most: the supply's, a bearing's, or a strange one."""
     strongest = comparison.strongest("line.outer", "line.inner", "line.ball", "line.cage", "line.strange", "hum")
     levels, sign = _upwards(_residual_levels(comparison), comparison.size[strongest])
     line = _strongest(comparison, levels, fundamental=False)
     if strongest == "hum" or (_is_the_supplys(comparison, line.orders[0]) and comparison.size["hum"] > 1.0):
         return _hum(comparison)
-    return _line(comparison, _told_apart(_best_race(comparison, levels), line), sign)
+    return _line(comparison, _family_or_line(_best_race(comparison, levels), line), sign)
 
 
 def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_db: float) -> LocatedChange | None:
@@ -296,7 +296,7 @@ def _widened(levels: FloatArray) -> FloatArray:
     return widened
 
 
-def _told_apart(family: _Found, line: _Found) -> _Found:
+def _family_or_line(family: _Found, line: _Found) -> _Found:
     """Return the family if it is heard beside the strongest line, or that line is one of its multiples."""
     harmonic = family.orders[0] / line.orders[0] if family.orders else 0.0
     if family.rise_db < MIN_OF_A_FAMILY_DB or (harmonic > 1.5 and abs(harmonic / round(harmonic) - 1.0) < MISSED):
@@ -401,7 +401,8 @@ def _fundamental(level: FloatArray, line: int) -> int:
 def _is_the_supplys(comparison: ComparedPair, order: float) -> bool:
     speed_hz = comparison.now.speed_hz
     lines = np.array([k * supply for supply in MAINS_HZ for k in range(1, N_HARMONICS + 1)])
-    width = np.maximum(_SUPPLY_WANDERS * lines, comparison.now.order_step * speed_hz)
+    # Twice what a supply wanders: the order was found on a grid of lines, at a mean speed.
+    width = np.maximum(2.0 * MAINS_TOLERANCE * lines, comparison.now.order_step * speed_hz)
     return bool((np.abs(order * speed_hz - lines) < width).any())
 
 
@@ -428,7 +429,7 @@ EXPLAINED = 0.5
 """Of the largest change of power, what a shaft's own lines must hold of it."""
 
 
-def mesh_spot(comparison: ComparedPair) -> LocatedChange | None:
+def locate_mesh(comparison: ComparedPair) -> LocatedChange | None:
     """Return the mesh harmonic that changed most."""
     frame = comparison.now.frame
     if comparison.strongest("mesh", "line.half_mesh") in ("mesh.half", "line.half_mesh"):
@@ -462,7 +463,7 @@ def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
     return (float(int(harmonic) * frame.teeth[DRIVER]),) if harmonic.isdigit() else ()
 
 
-def sideband_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
+def locate_sidebands(comparison: ComparedPair, side: int) -> LocatedChange | None:
     """Return about which mesh harmonic a shaft's sidebands changed most, and which of them."""
     now, before = _both(comparison, side, relative=not comparison.is_reference)
     frame = comparison.now.frame
@@ -485,7 +486,7 @@ def sideband_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
     return LocatedChange(title, change, orders, channel=_channel(comparison, row))
 
 
-def shaft_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
+def locate_shaft(comparison: ComparedPair, side: int) -> LocatedChange | None:
     """Return the low order of a shaft that changed most."""
     both = _both(comparison, side, relative=False)
     frame = comparison.now.frame
@@ -590,7 +591,7 @@ PILED_UP = 1e-3
 """Share of samples within half a percent of the extreme; of a vibration with random peaks, some 1e-5 lie there."""
 
 
-def band_spot(comparison: ComparedPair) -> LocatedChange:
+def locate_band(comparison: ComparedPair) -> LocatedChange:
     """Return the band of the residual that changed most: its level, or how impulsive it is."""
     name = comparison.strongest("floor.band", "floor.kurtosis")
     kind, _, number = Feature.of(name).detail.partition(".")
@@ -616,7 +617,7 @@ def _loudest(comparison: ComparedPair, band: int, *, kurtosis: bool) -> str:
     return max(comparison.now.channels, key=change)
 
 
-def speed_spot(comparison: ComparedPair) -> LocatedChange | None:
+def locate_speed(comparison: ComparedPair) -> LocatedChange | None:
     """Return what the speed does otherwise; None where it hardly does anything."""
     name = comparison.strongest("speed.")
     change = comparison.change_db[name]
@@ -629,7 +630,7 @@ def speed_spot(comparison: ComparedPair) -> LocatedChange | None:
     return LocatedChange(f"speed swings by {100 * swing:.2g} % rms, most at {frequency_hz:.2g} Hz", change, orders)
 
 
-def tail_spot(comparison: ComparedPair) -> LocatedChange:
+def locate_tail(comparison: ComparedPair) -> LocatedChange:
     """Return how the amplitudes are distributed otherwise."""
     name = comparison.strongest("raw.near", "raw.kurtosis")
     change = comparison.change_db[name]
@@ -714,7 +715,7 @@ def _pattern(
     return ToothPattern(energy, lines, synchronous / max(whole, 1e-300))
 
 
-def tooth_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
+def locate_tooth(comparison: ComparedPair, side: int) -> LocatedChange | None:
     """Return the angle and tooth that stands out, or that the teeth's pattern changed all round.
 
     None where most of the pattern is noise, or leaks into the average.
@@ -725,7 +726,7 @@ def tooth_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
     if pattern.own_share < OWN_SHARE:
         return None
     if pattern.prominence < STANDS_OUT:
-        return all_round_spot(comparison, side, shaft, name)
+        return locate_all_round(comparison, side, shaft, name)
     place, teeth = pattern.place_rev, frame.teeth[side]
     above, angle = 10.0 * float(np.log10(pattern.prominence)), 360.0 * place
     tooth = int(place * teeth) % teeth + 1 if now.marks[side] else None
@@ -734,7 +735,7 @@ def tooth_spot(comparison: ComparedPair, side: int) -> LocatedChange | None:
     return LocatedChange(title, above, angle_deg=angle, tooth=tooth, channel=name)
 
 
-def all_round_spot(comparison: ComparedPair, side: int, shaft: str, channel: str) -> LocatedChange:
+def locate_all_round(comparison: ComparedPair, side: int, shaft: str, channel: str) -> LocatedChange:
     """Return that no tooth in particular stands out, with the figure of the feature that was scored."""
     scored = comparison.strongest(*(f"{kind}.{SIDES[side]}." for kind in ("tooth", "change", "surprise")))
     level = f"tooth.{SIDES[side]}.level"
@@ -834,14 +835,14 @@ def _named(names: tuple[str, ...], values: FloatArray) -> Mapping[str, float]:
 
 def _spot(comparison: ComparedPair, family: Family) -> LocatedChange | None:
     kind, shaft = family
-    of_a_shaft = {PlaceKind.SIDEBANDS: sideband_spot, PlaceKind.SHAFT: shaft_spot, PlaceKind.TOOTH: tooth_spot}
+    of_a_shaft = {PlaceKind.SIDEBANDS: locate_sidebands, PlaceKind.SHAFT: locate_shaft, PlaceKind.TOOTH: locate_tooth}
     plain = {
-        PlaceKind.MESH: mesh_spot,
-        PlaceKind.ENVELOPE: envelope_spot,
-        PlaceKind.LINE: line_spot,
-        PlaceKind.BAND: band_spot,
-        PlaceKind.SPEED: speed_spot,
-        PlaceKind.TAIL: tail_spot,
+        PlaceKind.MESH: locate_mesh,
+        PlaceKind.ENVELOPE: locate_envelope,
+        PlaceKind.LINE: locate_line,
+        PlaceKind.BAND: locate_band,
+        PlaceKind.SPEED: locate_speed,
+        PlaceKind.TAIL: locate_tail,
     }
     return of_a_shaft[kind](comparison, SIDES.index(shaft)) if kind in of_a_shaft else plain[kind](comparison)
 

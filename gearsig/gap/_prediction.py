@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.gap._features import SIDES, Feature
+from gearsig.gap._features import Feature
 from gearsig.gap._floors import family_members, t_quantile
 from gearsig.gap._simulator import Added
 from gearsig.gap._types import MIN_PREDICTED, Interval, Shrinkage
+from gearsig.rig import SIDES
 
 STEPS = 41
 """Severities that are tried, over the whole range and again about the best."""

@@ -16,10 +16,11 @@ from gearsig.cache import read_arrays, write_whole
 from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
 from gearsig.gap._change import beyond_the_mesh, counted_from_the_mesh, seen_rows
-from gearsig.gap._features import SIDES, Features
+from gearsig.gap._features import Features
 from gearsig.gap._floors import REPEATABLE, StructuralFloor
 from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import UNKNOWN
+from gearsig.rig import SIDES
 
 # --------------------
 # Decision trees as plain arrays, packed for a file that comes with the library.

@@ -16,7 +16,7 @@ from gearsig import orders
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.prepared import PreparedRecording, prepare
+from gearsig.prepared import MAINS_TOLERANCE, PreparedRecording, prepare
 from gearsig.recording import MAINS_HZ, Recording, metres_per_second_squared
 from gearsig.rig import GearPair, Rig
 from gearsig.severity import orders_from_mesh
@@ -408,7 +408,6 @@ class ReducedRecording:
 
 
 N_HARMONICS = 3
-_TOLERANCE = 0.002  # how far a supply's frequency wanders
 _NEIGHBOURHOOD_HZ = 8.0
 _N_SHAFT_HARMONICS = 8
 _APART = 20.0
@@ -434,7 +433,7 @@ def _excess(values: FloatArray, recording: Recording, supply_hz: float, speed_hz
     excesses_db = []
     for k in range(1, N_HARMONICS + 1):
         frequency = k * supply_hz
-        width = max(2.0 * step, _TOLERANCE * frequency)
+        width = max(2.0 * step, MAINS_TOLERANCE * frequency)
         if frequency + _NEIGHBOURHOOD_HZ > recording.sampling_rate_hz / 2 or _on_a_gear_line(
             frequency, width, speed_hz, frame
         ):

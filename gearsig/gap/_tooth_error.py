@@ -23,9 +23,10 @@ from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, InputError
 from gearsig.gap._evidence import TOOTH_FAULTS
-from gearsig.gap._features import SIDES
 from gearsig.motion import TransmissionError, transmission_error
+from gearsig.prepared import circular_correlation
 from gearsig.recording import Recording
+from gearsig.rig import SIDES
 
 TOOTH_ERRORS_FILE = Path(__file__).with_name("tooth_errors.npz")
 MAX_BYTES = 10_000_000
@@ -116,8 +117,7 @@ def _resampled(rows: FloatArray) -> FloatArray:
 
 def _turned(before: FloatArray, here: FloatArray) -> FloatArray:
     x, y = here.ravel(), before.ravel()
-    alike = np.fft.irfft(np.fft.rfft(x) * np.conj(np.fft.rfft(y)), len(x))
-    turns = [0, *np.argsort(-alike)[:5].tolist()]
+    turns = [0, *np.argsort(-circular_correlation(x, y))[:5].tolist()]
     differences = [
         float(np.median(np.abs(_banded((x - np.roll(y, t)).reshape(here.shape), LOWEST_ORDER)))) for t in turns
     ]

@@ -18,7 +18,7 @@ from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.gap._conditions import SEED, Condition, halves, observed
 from gearsig.gap._evidence import ONE_TOOTH, SIGNS, TOOTH_FAULTS, told_options
-from gearsig.gap._features import SIDES, whole_and_parts
+from gearsig.gap._features import whole_and_parts
 from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
 from gearsig.gap._places import SAME_ORDER
 from gearsig.gap._prediction import (
@@ -51,6 +51,7 @@ from gearsig.gap._waveform import (
 )
 from gearsig.gap._words import shaft_words
 from gearsig.processes import active_cluster, can_be_sent, killed_text, run_jobs
+from gearsig.rig import SIDES
 
 # --------------------
 # A bank on disk: arrays without pickles, whole or not at all; a file that does not fit is made again.

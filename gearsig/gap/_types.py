@@ -10,6 +10,7 @@ from math import inf, isinf, nan
 import numpy as np
 
 from gearsig.checks import FloatArray
+from gearsig.formatting import odds_text
 from gearsig.gap._simulator import Added, OperatingCondition
 from gearsig.results import Result, verdict_html
 
@@ -494,7 +495,7 @@ class LabelledFacts:
         return (
             f"Labelled recordings of this rig that joined what is known of other machines: {n} ({kinds}). "
             f"Without {'them' if n > 1 else 'it'} the likeliest would be {first.replace('_', ' ')}, "
-            f"{100.0 * min(self.without.get(first, 0.0), 0.99):.0f} % (outcome: {self.outcome_without.value})."
+            f"{odds_text(self.without.get(first, 0.0))} (outcome: {self.outcome_without.value})."
         )
 
 
@@ -580,7 +581,7 @@ class GapReport(Result, rows="causes"):
     def _repr_html_(self) -> str:
         """Return the four lines of the verdict and the likeliest causes, for notebooks."""
         likeliest = [cause for cause in self.causes if cause.probability >= 0.01][:5]
-        rows = [(cause.title, f"{100.0 * cause.probability:.0f} %", cause.place) for cause in likeliest]
+        rows = [(cause.title, odds_text(cause.probability), cause.place) for cause in likeliest]
         return verdict_html(self.verdict, ("cause", "probability", "place"), rows)
 
     @property

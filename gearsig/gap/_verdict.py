@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import isfinite
 
+from gearsig.formatting import odds_text, percent
 from gearsig.gap._next_recording import HEALTHY_MACHINE, STEPS
 from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import (
@@ -21,7 +22,7 @@ from gearsig.gap._types import (
     Interval,
     rivals,
 )
-from gearsig.gap._words import hardly_predicted, odds_text, same_load, same_speed, severity_unit
+from gearsig.gap._words import hardly_predicted, same_load, same_speed, severity_unit
 
 
 def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
@@ -51,7 +52,7 @@ def _where(report: GapReport) -> str:
 def _with_size(place: GapPlace) -> str:
     """Return a place's title, with its size and share as far as it has them."""
     size = f", {place.structural:.2g} structural floors" if isfinite(place.structural) else ""
-    return f"{place.title}{size}{f' ({100 * place.share:.0f} % of the gap)' if isfinite(place.share) else ''}"
+    return f"{place.title}{size}{f' ({percent(place.share)} of the gap)' if isfinite(place.share) else ''}"
 
 
 def _which(report: GapReport) -> str:
@@ -202,8 +203,8 @@ def _how_far(report: GapReport) -> str:
         return f"How far: not known; {report.causes[0].title} {hardly_predicted(shrinkage)}."
     s, both = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
     low, high = (f"{100 * end:.0f}" for end in (s.low, s.high))
-    percent = f"{100 * s.value:.0f} %" + (f" ({low} to {high} %)" if low != high else "")
-    shrinks = f"shrinks {both}, by {percent} of what exceeds one,"
+    taken = percent(s.value) + (f" ({low} to {high} %)" if low != high else "")
+    shrinks = f"shrinks {both}, by {taken} of what exceeds one,"
     if s.value <= 0.0:
         shrinks = "does not shrink"
     elif shrinkage.after.high < 1.0:
@@ -257,7 +258,7 @@ def _where_seen(report: GapReport) -> str:
 
 def _which_seen(report: GapReport) -> str:
     first = report.causes[0]
-    odds = f"at most {100 * first.probability:.0f} %"
+    odds = f"at most {percent(first.probability)}"
     if report.outcome is GapOutcome.UNKNOWN:
         return f"Which: unknown; {first.title}."
     place = f" at {first.place}" if first.place else ""

@@ -30,10 +30,10 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap._change import lines_of_shaft, turned_difference
-from gearsig.gap._features import SIDES
 from gearsig.gap._reduction import ComplexArray, ReducedRecording
 from gearsig.gap._simulator import Added
 from gearsig.gap._types import Interval
+from gearsig.rig import SIDES
 
 N_HARMONICS = 8
 OFFSETS = np.array([*range(-12, -2), *range(3, 13)])

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isclose, isfinite
+from math import isclose
 
-from gearsig.gap._features import SIDES
 from gearsig.gap._reduction import GearFrame, ReducedRecording
 from gearsig.gap._simulator import OperatingCondition
 from gearsig.gap._types import Evidence, GapCause, PlaceKind, Shrinkage
+from gearsig.rig import SIDES
 
 # --------------------
 # Where exactly within one place: the comparison that is searched, and what is found.
@@ -163,21 +163,6 @@ _OTHER = {
     "speed.swing_line": "strongest line of the speed's swing",
     "hum": "mains lines",
 }
-
-
-def odds_text(probability: float) -> str:
-    """Write a probability for people: nothing is surer than "> 99 %".
-
-    Examples
-    --------
-    >>> odds_text(0.664), odds_text(0.998), odds_text(0.003)
-    ('66 %', '> 99 %', '< 1 %')
-    """
-    if not isfinite(probability):
-        return "–"
-    if probability > 0.99:
-        return "> 99 %"
-    return "< 1 %" if 0.0 < probability < 0.01 else f"{100.0 * probability:.0f} %"
 
 
 def severity_unit(unit: str) -> str:

@@ -196,8 +196,8 @@ def mesh_indicators(
     Returns
     -------
     tuple of Indicator
-        "mesh level h×", "sideband level h×-k" and "h×+k", "sideband ratio h×" in dB. nan with a note where an order is
-        not in the source, or a spectrum does not resolve the sidebands.
+        "mesh level h×", "sideband level h× − k" and "h× + k", "sideband ratio h×" in dB. nan with a note where an order
+        is not in the source, or a spectrum does not resolve the sidebands.
 
     Raises
     ------
@@ -240,12 +240,12 @@ def _sidebands(
         blurred = f"not resolved: sidebands {spacing:.4g} apart need a resolution below {needed:.4g}"
     first: list[float] = []
     for k in range(1, n_sidebands + 1):
-        for sign, side in ((-1, "-"), (1, "+")):
+        for sign, side in ((-1, "−"), (1, "+")):
             order = harmonic * mesh_order + sign * k * spacing
             line = find_line(source, order)
             value = float("nan") if blurred else line.amplitude
             first += [value] if k == 1 else []
-            yield f"sideband level {harmonic}×{side}{k}", value, source.unit, order_text(order), blurred or line.note
+            yield f"sideband level {harmonic}× {side} {k}", value, source.unit, order_text(order), blurred or line.note
     ratio = _ratio_db(float(np.mean(first)), carrier.amplitude) if first else float("nan")
     note = blurred or ("undefined: a line is missing or zero" if isnan(ratio) else "")
     yield f"sideband ratio {harmonic}×", ratio, "dB", order_text(harmonic * mesh_order), note

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.motion._measure import local_polynomial
 from gearsig.results import Result
 from gearsig.spectra import Spectrum, amplitude_spectrum
@@ -86,7 +87,7 @@ class MotionSegments(Result, rows="segments"):
     @property
     def summary(self) -> str:
         """Starts and stops in words; a record that begins or ends in motion holds one less of them."""
-        counts = f"{_counted(len(self.starts_s), 'start')} and {_counted(len(self.stops_s), 'stop')}"
+        counts = f"{counted(len(self.starts_s), 'start')} and {counted(len(self.stops_s), 'stop')}"
         moves = {
             "begins": self.segments[0].direction and not self.starts_at_once,
             "ends": self.segments[-1].direction,
@@ -113,10 +114,6 @@ class MotionSegments(Result, rows="segments"):
 
     def _pairs(self) -> list[tuple[MotionSegment, MotionSegment]]:
         return list(pairwise(self.segments))
-
-
-def _counted(n: int, name: str) -> str:
-    return f"{n} {name}" if n == 1 else f"{n} {name}s"
 
 
 def motion_segments(

@@ -12,11 +12,11 @@ import numpy as np
 from gearsig.angle import AngleSignal, ShaftAngle, find_pulse_edges, pulse_train_angle, tachometer_edges
 from gearsig.checks import FloatArray, freeze
 from gearsig.errors import InputError, RefusalError
-from gearsig.motion._measure import SIDES, find_roles, role_values, side_of
+from gearsig.motion._measure import find_roles, role_values, side_of
 from gearsig.orders import SynchronousAverage, order_spectrum
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
-from gearsig.rig import GearPair, PulseTimes, Rig, TachometerChannel
+from gearsig.rig import SIDES, GearPair, PulseTimes, Rig, TachometerChannel
 from gearsig.spectra import Spectrum
 
 NAME, UNIT = "transmission error", "um"

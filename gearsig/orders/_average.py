@@ -98,7 +98,7 @@ def block_times(
 
 def over_angle(
     signal: AngleSignal | Recording | FloatArray,
-    channel: str | float,
+    channel_or_rate_hz: str | float,
     shaft: str,
     shaft_angle: ShaftAngle | None,
     speed_rpm: float | FloatArray | None,
@@ -112,20 +112,20 @@ def over_angle(
                 where="shaft",
                 allowed="no other",
             )
-        return signal, str(channel)
-    recording, name = as_recording(signal, channel)
+        return signal, str(channel_or_rate_hz)
+    recording, name = as_recording(signal, channel_or_rate_hz)
     angle = angle_of(recording, shaft_angle, speed_rpm)
     if shaft not in ("", angle.shaft):
         angle = angle.of_shaft(shaft, known_ratio(recording.rig, shaft, to=angle.shaft))
     return resample_to_angle(recording, angle, channels=[name]), name
 
 
-def as_recording(signal: Recording | FloatArray, channel: str | float) -> tuple[Recording, str]:
+def as_recording(signal: Recording | FloatArray, channel_or_rate_hz: str | float) -> tuple[Recording, str]:
     """Return (a recording, the channel's name) of a recording and its channel, or of an array and its rate in Hz."""
     check_signal(signal)
     if isinstance(signal, Recording):
-        return signal, signal.channel_names[signal.index(str(channel))]
-    rate_hz = array_rate_hz(channel, "channel")
+        return signal, signal.channel_names[signal.index(str(channel_or_rate_hz))]
+    rate_hz = array_rate_hz(channel_or_rate_hz, "channel")
     return Recording(checked_signal(signal)[None], rate_hz, (Channel("signal"),)), "signal"
 
 

@@ -9,6 +9,7 @@ from numba import njit
 
 from gearsig.checks import FloatArray, count, positive, within
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import percent
 from gearsig.phase._neighbours import nearest_apart, spaced
 from gearsig.phase._types import (
     EmbeddingDimension,
@@ -107,7 +108,7 @@ def _chosen_dimension(x: FloatArray, rate: float, tau: int) -> int:
     if embedding.dimension == 0:
         raise RefusalError(
             f"no dimension up to {embedding.dimensions[-1]} unfolds the signal (false neighbours "
-            f"{100 * float(embedding.false_fraction.min()):.0f} % at best): it looks stochastic",
+            f"{percent(float(embedding.false_fraction.min()))} at best): it looks stochastic",
             remedy="filter to the motion of interest, average synchronously, or give dimension= knowingly",
         )
     return embedding.dimension

@@ -10,6 +10,7 @@ from numba import njit
 
 from gearsig.checks import FloatArray, count, one_of
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import percent
 from gearsig.phase._neighbours import IndexArray, nearest_apart, spaced
 from gearsig.phase._types import LyapunovExponent, PhasePortrait, check_portrait, checked_series, mean_period_samples
 
@@ -227,9 +228,9 @@ def fit_limits(curve: Divergence, memory: int, n_min: int, room: float = ROOM) -
     if stop - memory >= n_min:
         return memory, stop
     raise RefusalError(
-        f"{memory} steps on, neighbours are {np.exp(-missing):.0%} as far apart as unrelated points: no stretch of "
-        "exponential growth can be seen",
-        remedy="the signal looks stochastic or too noisy; filter it, record longer, or embed it with fewer dimensions",
+        f"{memory} steps on, neighbours are {percent(np.exp(-missing))} as far apart as unrelated points: no "
+        "stretch of exponential growth can be seen, as the signal is stochastic or too noisy",
+        remedy="filter it, record longer, or embed it with fewer dimensions",
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
+from gearsig.formatting import percent
 
 IndexArray = NDArray[np.intp]
 
@@ -147,8 +148,8 @@ def _no_return(share: float, theiler: int, *, exact: bool) -> RefusalError:
             remedy="look at its Poincaré section: no neighbours can part here",
         )
     return RefusalError(
-        f"{share:.0%} of the points have no neighbour but those within {theiler} samples in time: the path does not "
-        "come back to where it was",
+        f"{percent(share)} of the points have no neighbour but those within {theiler} samples in time: the path "
+        "does not come back to where it was",
         remedy="record longer, take the trend out of the signal, or lower the Theiler window",
     )
 

@@ -15,9 +15,9 @@ from gearsig.prepared._lines import (
     CLEAR_LINE_DB,
     FOOT_LINES,
     LOG_RATIO_LIMIT,
-    LineExcess,
+    LinesOverFloor,
     best_comb,
-    floor_of,
+    lines_over_noise_floor,
     over_floor_db,
     peak_position,
 )
@@ -176,7 +176,7 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     return _at(stated, fundamental_hz, resolution / (3 * len(harmonics)), min(0.95, 1 - comb.p_value))
 
 
-def _telling_harmonic(channels: list[LineExcess], fundamental_hz: float, stated_hz: float) -> int | None:
+def _telling_harmonic(channels: list[LinesOverFloor], fundamental_hz: float, stated_hz: float) -> int | None:
     """Return the lowest harmonic that tells two speeds apart if it is clearly at the stated one, else None.
 
     Higher harmonics of a speed that is off by a line or two may be a race's lines, with the shaft's sidebands about.
@@ -206,7 +206,7 @@ RULES_DB = 20.0
 """By which a rotor's own line stands above all others within the tolerance of a stated speed."""
 
 
-def _from_first_harmonic(channels: list[LineExcess], stated: ShaftAngle) -> ShaftAngle | None:
+def _from_first_harmonic(channels: list[LinesOverFloor], stated: ShaftAngle) -> ShaftAngle | None:
     """Take the one line near the stated speed that rules a channel's spectrum there: that of a rotor without harmonics.
 
     A line where a supply's may be leaves the speed unconfirmed.
@@ -230,7 +230,7 @@ def _from_first_harmonic(channels: list[LineExcess], stated: ShaftAngle) -> Shaf
     return None
 
 
-def _common_lines(spectra: list[LineExcess], n_own: int) -> LineExcess:
+def _common_lines(spectra: list[LinesOverFloor], n_own: int) -> LinesOverFloor:
     """Return the lines over frequency that all channels and the envelopes of their bands have in common.
 
     The mean over the spectra of the logarithm of power over floor, each cut so that no single one decides. The `n_own`
@@ -246,16 +246,16 @@ def _common_lines(spectra: list[LineExcess], n_own: int) -> LineExcess:
     ]
     mean = np.average(np.clip(log_ratios, -1.0, 1.5 * LOG_RATIO_LIMIT / 2), axis=0, weights=weights)
     first = spectra[0].spectrum
-    return floor_of(replace(first, values=np.exp(mean), positions=first.positions[:n], unit=""))
+    return lines_over_noise_floor(replace(first, values=np.exp(mean), positions=first.positions[:n], unit=""))
 
 
-def _line_db(excess: LineExcess, place: float) -> float:
+def _line_db(excess: LinesOverFloor, place: float) -> float:
     """Return the height over the floor of the largest line within one line of a place."""
     position, amplitude = excess.spectrum.largest_near(place, excess.spectrum.resolution)
     return over_floor_db(amplitude, float(excess.floor[excess.spectrum.index_of(position)]))
 
 
-def _spectra_of_shaft(recording: Recording) -> Iterator[LineExcess]:
+def _spectra_of_shaft(recording: Recording) -> Iterator[LinesOverFloor]:
     """Yield the spectra of all vibration channels, then those of their envelopes, all of the same resolution."""
     from gearsig.spectra import amplitude_spectrum, envelope_recording
 
@@ -264,7 +264,7 @@ def _spectra_of_shaft(recording: Recording) -> Iterator[LineExcess]:
         with suppress(InputError):  # the record is too short for so narrow a band
             sources.append(envelope_recording(recording, band, kind="magnitude"))
     for source in sources:
-        yield from (floor_of(amplitude_spectrum(source, name)) for name in source.vibration_names())
+        yield from (lines_over_noise_floor(amplitude_spectrum(source, name)) for name in source.vibration_names())
 
 
 # --------------------

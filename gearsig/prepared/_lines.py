@@ -1,4 +1,4 @@
-"""Families of equally spaced lines in a spectrum, and whether noise could have made them.
+"""Families of equally spaced lines in a spectrum, and whether noise could have made them; what averages share.
 
 The score of a fundamental is the sum, over its harmonics, of the logarithm of line power over local floor, each cut at
 a limit so that one huge line cannot make a family. Its null distribution is not assumed: the terms are drawn from the
@@ -7,6 +7,7 @@ spectrum's own lines, and the distribution of their sum is their convolution.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
@@ -14,9 +15,11 @@ from math import log
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.fft import ifft, next_fast_len
+from scipy.optimize import minimize_scalar
 
 from gearsig.checks import FloatArray
-from gearsig.spectra import Spectrum, noise_floor
+from gearsig.spectra import ComplexArray, Spectrum, noise_floor
 
 LOG_RATIO_LIMIT = 6.0
 """Natural log of power over floor at which a harmonic counts in full: 26 dB, far above what noise reaches."""
@@ -38,7 +41,7 @@ _STEP = 0.05
 
 
 @dataclass(frozen=True)
-class LineExcess:
+class LinesOverFloor:
     """How far each line of a spectrum stands above its floor.
 
     Parameters
@@ -60,7 +63,7 @@ class LineExcess:
 
     def without_multiples(
         self, fundamental: float, *, half_width: float = 0.0, start: float = 0.0, skirt: float = 0.0
-    ) -> LineExcess:
+    ) -> LinesOverFloor:
         """Return the same with the lines around start ± k·fundamental masked.
 
         At least a line's own foot is masked; `half_width` makes it more, in the axis' unit, and `skirt` in proportion
@@ -73,6 +76,30 @@ class LineExcess:
         masked = self.masked.copy()
         _mask_multiples(self.spectrum.positions, fundamental, start, reach, skirt, masked)
         return replace(self, masked=masked)
+
+    def line_numbers(self, places: FloatArray) -> NDArray[np.int64]:
+        """Return the numbers of the lines nearest to some places of the axis, which may lie beyond its ends."""
+        spectrum = self.spectrum
+        index: NDArray[np.int64] = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
+        return index
+
+    def lines_at(self, places: FloatArray) -> NDArray[np.int64]:
+        """Return the numbers of the lines nearest to those places that lie on the axis."""
+        index = self.line_numbers(places)
+        return index[(index >= 0) & (index < len(self.log_ratio))]
+
+    def free_lines_at(self, places: FloatArray) -> NDArray[np.int64]:
+        """Return the numbers of the lines at some places that are not explained already."""
+        index = self.lines_at(places)
+        return index[~self.masked[index]]
+
+    def over_floor_db(self, lines: NDArray[np.int64]) -> FloatArray:
+        """Return the height of the largest of each line and its two neighbours over the floor, not cut at any limit."""
+        values, last = self.spectrum.values, len(self.spectrum.values) - 1
+        near = np.clip(lines[:, None] + np.arange(-1, 2), 0, last)
+        ratio = values[near].max(axis=1) / np.maximum(self.floor[np.clip(lines, 0, last)], 1e-300)
+        heights: FloatArray = 20 * np.log10(np.maximum(ratio, 1e-300))
+        return heights
 
     def scores(self) -> FloatArray:
         """Log ratios with the masked lines at 0."""
@@ -140,7 +167,7 @@ def over_floor_db(amplitude: float, floor: float) -> float:
     return 20 * float(np.log10(max(amplitude, 1e-300) / max(floor, 1e-300)))
 
 
-def line_excess(spectrum: Spectrum, floor: FloatArray) -> LineExcess:
+def lines_over_floor(spectrum: Spectrum, floor: FloatArray) -> LinesOverFloor:
     """Return the excess of each line of an amplitude spectrum over its floor."""
     with np.errstate(divide="ignore", invalid="ignore"):
         log_ratio = spectrum.values / floor
@@ -149,17 +176,17 @@ def line_excess(spectrum: Spectrum, floor: FloatArray) -> LineExcess:
     widened = log_ratio.copy()
     np.maximum(widened[1:], log_ratio[:-1], out=widened[1:])
     np.maximum(widened[:-1], log_ratio[1:], out=widened[:-1])
-    return LineExcess(spectrum, np.asarray(floor), widened, np.zeros(len(widened), dtype=np.bool_))
+    return LinesOverFloor(spectrum, np.asarray(floor), widened, np.zeros(len(widened), dtype=np.bool_))
 
 
-def floor_of(spectrum: Spectrum, highest: float | None = None) -> LineExcess:
+def lines_over_noise_floor(spectrum: Spectrum, highest: float | None = None) -> LinesOverFloor:
     """Return an amplitude spectrum's lines, up to `highest`, against its local noise floor."""
     floor = noise_floor(spectrum, highest=highest).values
-    return line_excess(spectrum.head(len(floor)), floor)
+    return lines_over_floor(spectrum.head(len(floor)), floor)
 
 
 def best_comb(
-    excess: LineExcess,
+    excess: LinesOverFloor,
     low: float,
     high: float,
     offsets: NDArray[np.int_] | None = None,
@@ -169,7 +196,7 @@ def best_comb(
 
     Parameters
     ----------
-    excess : LineExcess
+    excess : LinesOverFloor
     low, high : float
         Range of fundamentals, in the axis' unit.
     offsets : array of int or None
@@ -203,13 +230,11 @@ def best_comb(
     return _described(excess, origins, factors, candidates[best], score, p_value)
 
 
-def comb_at(excess: LineExcess, fundamental: float, multiples: NDArray[np.int_], p_value: float) -> Comb:
+def comb_at(excess: LinesOverFloor, fundamental: float, multiples: NDArray[np.int_], p_value: float) -> Comb:
     """Return the family of the given multiples of a fundamental that was found by other means."""
     fitted = _described(excess, np.zeros(len(multiples)), multiples, fundamental, 0.0, p_value)
-    scores = excess.scores()
-    index = np.rint((multiples * fitted.fundamental - excess.spectrum.positions[0]) / excess.spectrum.resolution)
-    index = index[(index >= 0) & (index < len(scores))].astype(np.int64)
-    return replace(fitted, score=float(scores[index].sum()))
+    lines = excess.lines_at(multiples * fitted.fundamental)
+    return replace(fitted, score=float(excess.scores()[lines].sum()))
 
 
 def independent_trials(n_candidates: int) -> int:
@@ -217,7 +242,7 @@ def independent_trials(n_candidates: int) -> int:
     return max(1, n_candidates // 3)
 
 
-def score_needed(excess: LineExcess, n_terms: int, low: float, high: float, probability: float) -> float:
+def score_needed(excess: LinesOverFloor, n_terms: int, low: float, high: float, probability: float) -> float:
     """Return the score that the best family between `low` and `high` reaches by chance with `probability` only.
 
     Infinite if even lines that all count in full would be likelier than that.
@@ -236,7 +261,7 @@ def _widest(spectrum: Spectrum, starts: FloatArray, multiples: NDArray[np.int_])
 
 
 def _highest(
-    excess: LineExcess, origins: FloatArray, factors: NDArray[np.int_], low: float, step: float, n_candidates: int
+    excess: LinesOverFloor, origins: FloatArray, factors: NDArray[np.int_], low: float, step: float, n_candidates: int
 ) -> tuple[FloatArray, FloatArray, int]:
     """Return the fundamentals whose score is as good as the highest, their scores, and the lines that were summed.
 
@@ -271,13 +296,12 @@ def _comb_totals(scores, candidates, origins, factors, first, resolution, inside
     return total
 
 
-def _sharpest(excess: LineExcess, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
+def _sharpest(excess: LinesOverFloor, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
     """Return the candidate whose harmonics meet the peaks best."""
     spectrum = excess.spectrum
     heights = np.zeros(len(candidates))
     for origin, factor in zip(origins, factors, strict=True):
-        index = np.rint((origin + factor * candidates - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
-        index = np.clip(index, 0, len(spectrum.values) - 1)
+        index = np.clip(excess.line_numbers(origin + factor * candidates), 0, len(spectrum.values) - 1)
         with np.errstate(divide="ignore", invalid="ignore"):
             height = np.log(spectrum.values[index] / excess.floor[index])
         height = np.nan_to_num(height, nan=0.0, posinf=40.0, neginf=0.0)
@@ -285,7 +309,7 @@ def _sharpest(excess: LineExcess, origins: FloatArray, factors: NDArray[np.int_]
     return int(np.argmax(heights))
 
 
-def tail_probability(excess: LineExcess, n_terms: int, score: float) -> float:
+def tail_probability(excess: LinesOverFloor, n_terms: int, score: float) -> float:
     """Return P(sum of n_terms independent draws from the unmasked lines >= score)."""
     # Draws were floored to their cell, so the sum may lie half a cell per term higher than its cell says.
     threshold = int(np.floor((score - n_terms * _STEP / 2) / _STEP))
@@ -293,7 +317,7 @@ def tail_probability(excess: LineExcess, n_terms: int, score: float) -> float:
 
 
 def _described(
-    excess: LineExcess,
+    excess: LinesOverFloor,
     origins: FloatArray,
     multiples: NDArray[np.int_],
     fundamental: float,
@@ -337,7 +361,7 @@ class _Line:
 
 
 def _lines_near(
-    excess: LineExcess, origins: FloatArray, multiples: NDArray[np.int_], fundamental: float
+    excess: LinesOverFloor, origins: FloatArray, multiples: NDArray[np.int_], fundamental: float
 ) -> list[_Line]:
     """Return the family's lines that stand clearly above the floor; two lines off is still the same peak."""
     spectrum = excess.spectrum
@@ -415,3 +439,102 @@ def levels_beside(spectrum: Spectrum) -> FloatArray:
     # As a single row: in one dimension SciPy's filter takes the whole width, holes of the footprint included.
     medians = median_filter(power[None, :], footprint=footprint[None, :], mode="reflect")[0]
     return np.asarray(np.sqrt(medians / log(2)))
+
+
+# --------------------
+# One revolution: windows with the most energy, and turning one average onto another.
+# --------------------
+
+
+# Two searches for the tooth that stands out use the windows, and differ for a reason. `analyze` adds the energy of the
+# whole difference signal, because its test against surrogates (same spectrum, random phases) needs a statistic of the
+# signal as it is. `estimate_crack` divides each band about a mesh harmonic by its own median first, because its
+# calibration was made so: what a resonance multiplies, it multiplies at all teeth.
+#
+# Two alignments use the scores, and differ as well. `estimate_crack` and the gap diagnosis compare the same gears:
+# they try whole teeth, where a mark fixes the phase of the mesh, and only lines that tell teeth apart count. `compare`
+# turns a simulation of any gears onto a recording, by any angle, and mesh lines count, too.
+
+
+def sliding_mean(values: FloatArray, width: int) -> FloatArray:
+    """Return the mean over the window that starts at each sample of a periodic signal.
+
+    Parameters
+    ----------
+    values : array, (…, n)
+        One period.
+    width : int
+        Of the window, in samples; n at most.
+
+    Examples
+    --------
+    >>> sliding_mean(np.array([0.0, 2.0, 4.0, 6.0]), 2).tolist()
+    [1.0, 3.0, 5.0, 3.0]
+    """
+    padded = np.concatenate([np.zeros((*values.shape[:-1], 1)), values, values[..., :width]], axis=-1).cumsum(axis=-1)
+    mean: FloatArray = (padded[..., width:-1] - padded[..., : values.shape[-1]]) / width
+    return mean
+
+
+def strongest_window(energies: FloatArray) -> tuple[int, float]:
+    """Return where the window with the most energy starts, and its energy over the median window's.
+
+    Parameters
+    ----------
+    energies : array, (n,)
+        Of the window that starts at each sample.
+    """
+    start = int(np.argmax(energies))
+    return start, float(energies[start] / np.median(energies))
+
+
+def turned_lines(lines: ComplexArray, shift_rev: float) -> ComplexArray:
+    """Return the lines of an average turned forward: x[n] e^{−2πi n s}, order 0 first on the last axis."""
+    turned: ComplexArray = lines * np.exp(-2j * np.pi * np.arange(lines.shape[-1]) * shift_rev)
+    return turned
+
+
+def shift_scores(cross: ComplexArray, shifts_rev: FloatArray) -> FloatArray:
+    """Return Σ_n Re(c[n] e^{2πi n s}) for each shift s: how well averages agree when the second is turned by s.
+
+    Parameters
+    ----------
+    cross : complex array, (n_orders,)
+        Lines of the first times the conjugate lines of the second, weighted.
+    shifts_rev : array, (n_shifts,)
+    """
+    scores: FloatArray = np.real(np.exp(2j * np.pi * np.outer(shifts_rev, np.arange(len(cross)))) @ cross)
+    return scores
+
+
+def best_shift(cross: ComplexArray, is_possible: Callable[[FloatArray], NDArray[np.bool_]] | None = None) -> float:
+    """Return the shift of the largest score, −0.5 to 0.5 revolutions; 0 where nothing is there to compare.
+
+    Parameters
+    ----------
+    cross : complex array, (n_orders,)
+        As of `shift_scores`.
+    is_possible : callable, optional
+        Which of many shifts, in revolutions, may be the best; any unless given.
+    """
+    if not np.any(cross):
+        return 0.0
+    n = next_fast_len(16 * len(cross))  # 16 to a turn of the highest order, before the best is refined
+    shifts = np.fft.fftfreq(n)
+    scores = np.real(ifft(cross, n))
+    if is_possible is not None:
+        scores[~is_possible(shifts)] = -np.inf
+    start = float(shifts[int(np.argmax(scores))])
+    refined = minimize_scalar(
+        lambda shift: -float(shift_scores(cross, np.array([shift]))[0]),
+        bounds=(start - 1.0 / n, start + 1.0 / n),
+        method="bounded",
+        options={"xatol": 1e-9},
+    )
+    return float((refined.x + 0.5) % 1.0 - 0.5)
+
+
+def circular_correlation(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return Σ_i x[i + s] y[i] for each shift s in samples, of two periods of one length: `np.roll(y, s)` meets x."""
+    correlation: FloatArray = np.fft.irfft(np.fft.rfft(x) * np.conj(np.fft.rfft(y)), len(x))
+    return correlation

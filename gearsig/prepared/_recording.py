@@ -24,7 +24,7 @@ from gearsig.orders import (
     synchronous_average,
 )
 from gearsig.prepared._angle import phase_followed_angle, refined_angle
-from gearsig.prepared._lines import LineExcess, floor_of
+from gearsig.prepared._lines import LinesOverFloor, lines_over_noise_floor
 from gearsig.recording import Recording, check_recording
 from gearsig.rig import PulseTimes, Rig, TachometerChannel, check_rig, known_ratio
 from gearsig.spectra import Spectrum, amplitude_spectrum, fast_length, power_density
@@ -273,10 +273,11 @@ class PreparedRecording:
         """Return Welch's power spectral density over frequency."""
         return self.keep(("density", channel), lambda: power_density(self.recording, channel))
 
-    def order_lines(self, channel: str) -> LineExcess:
+    def order_lines(self, channel: str) -> LinesOverFloor:
         """Return the amplitude spectrum (peak) over order of the reference shaft, with its noise floor."""
         return self.keep(
-            ("order lines", channel), lambda: floor_of(order_spectrum(self.over_angle("", [channel]), channel))
+            ("order lines", channel),
+            lambda: lines_over_noise_floor(order_spectrum(self.over_angle("", [channel]), channel)),
         )
 
     def order_map(self, channel: str) -> OrderMap:

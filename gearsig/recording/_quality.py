@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.formatting import percent
 from gearsig.recording._types import Channel, Recording
 
 
@@ -445,7 +446,7 @@ def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | No
         multiple = round(line_hz / mains_hz)
         beside = abs(line_hz / (max(multiple, 1) * mains_hz) - 1)
         if 1 <= multiple <= 6 and beside < MAINS_WANDER and share > 0.5 and step_hz < 2.0:
-            evidence = f"{100 * share:.0f} % of the power stands at {line_hz:.5g} Hz, a multiple of {mains_hz:.0f} Hz"
+            evidence = f"{percent(share)} of the power stands at {line_hz:.5g} Hz, a multiple of {mains_hz:.0f} Hz"
             remedy = "check shield and earthing, if no shaft or mesh turns there; what is weaker drowns in it"
             return ChannelProblem(channel.name, "hum", share, evidence, remedy)
     return None

@@ -25,6 +25,7 @@ from gearsig.rig._toml import (
 )
 from gearsig.rig._types import (
     QUANTITIES,
+    SIDES,
     Bearing,
     ConstantSpeed,
     EncoderChannel,
@@ -47,6 +48,7 @@ from gearsig.rig._types import (
 __all__ = [
     "DAMPING_LAWS",
     "QUANTITIES",
+    "SIDES",
     "Bearing",
     "CatalogueBearing",
     "ConstantSpeed",

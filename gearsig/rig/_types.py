@@ -272,6 +272,10 @@ class Shaft:
             one_of(self.direction, f"direction of shaft {self.name!r}", ("ccw", "cw"))
 
 
+SIDES = ("driver", "driven")
+"""Of a pair of gears; by number, 0 and 1."""
+
+
 @dataclass(frozen=True)
 class GearPair:
     """Two gears in mesh.

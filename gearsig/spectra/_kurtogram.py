@@ -10,6 +10,7 @@ from numba import njit
 
 from gearsig.checks import FloatArray, count, freeze, not_negative, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import percent
 from gearsig.recording import Recording
 from gearsig.results import Result
 from gearsig.spectra._envelope import (
@@ -160,7 +161,7 @@ class Kurtogram(Result):
             )
         if share > 0.2:
             warnings.append(
-                f"one envelope sample carries {100 * share:.0f} % of the fourth moment: a single event, not a train "
+                f"one envelope sample carries {percent(share)} of the fourth moment: a single event, not a train "
                 "of impulses, may have chosen the band"
             )
         return tuple(warnings)

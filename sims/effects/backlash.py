@@ -25,7 +25,7 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
     return DriveEffect({"half_backlash_um": drive.number("half_backlash_um") + 0.5 * severity})
 
 
-def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """Teeth that part and meet again: blows at the mesh or at its half, scattered in size and time; another mesh."""
     order = scene.teeth[0] * float(rng.choice((0.5, 1.0)))
     at = book.passings(scene, order, rng.uniform())
@@ -72,6 +72,6 @@ EFFECT = Effect(
     textbook=book.Textbook(
         (("mesh.half", book.UP), ("line.half_mesh", book.UP)),
         "half orders of the mesh when teeth part",
-        by_the_book,
+        textbook_signature,
     ),
 )

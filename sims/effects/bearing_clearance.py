@@ -17,7 +17,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return with_bearing(machine, index, clearance_um=machine.bearings[index].clearance_um + severity)
 
 
-def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """A shaft that is held less: other paths from the mesh to each sensor, lines of elements passing.
 
     And what loose parts show: many orders of the shaft's turn, their halves, a mesh that swings with it, noise. A
@@ -76,7 +76,7 @@ EFFECT = Effect(
     textbook=book.Textbook(
         (("shaft.{side}.3", book.UP), ("shaft.{side}.low", book.UP), ("envelope.cage", book.UP)),
         "looseness: many orders of the shaft",
-        by_the_book,
+        textbook_signature,
         source="J. E. Berry, Illustrated Vibration Diagnostic Chart, 1994: many harmonics of running speed, halves, a "
         "raised floor; M. Tiwari, K. Gupta, O. Prakash, Effect of radial internal clearance of a ball bearing "
         "on the dynamics of a balanced horizontal rotor, J. Sound Vib. 238 (2000): a larger clearance makes the "

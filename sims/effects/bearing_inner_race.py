@@ -16,7 +16,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return shared.with_race_defect(machine, "inner", severity, options)
 
 
-def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """Knocks when elements pass the defect, louder in the load zone, that is once per turn."""
     return race_knocks(scene, size, rng, "BPFI")
 
@@ -46,6 +46,6 @@ EFFECT = Effect(
     textbook=Textbook(
         (("envelope.inner", UP),),
         "envelope lines at the ball pass order of the inner race",
-        by_the_book,
+        textbook_signature,
     ),
 )

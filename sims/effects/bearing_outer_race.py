@@ -16,7 +16,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return shared.with_race_defect(machine, "outer", severity, options)
 
 
-def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """Knocks when elements pass the defect, all alike."""
     return race_knocks(scene, size, rng, "BPFO")
 
@@ -47,6 +47,6 @@ EFFECT = Effect(
     textbook=Textbook(
         (("envelope.outer", UP),),
         "envelope lines at the ball pass order of the outer race",
-        by_the_book,
+        textbook_signature,
     ),
 )

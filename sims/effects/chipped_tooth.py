@@ -18,7 +18,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return shared.with_tooth_fault(machine, "chips", shared.gear_index(options), chip)
 
 
-def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """A missing corner: load is lost, the next tooth takes it with a blow."""
     side = book.draw_side(rng)
     window, place = book.tooth_window(scene, side, float(rng.uniform(0.5, 1.2)), rng)
@@ -70,6 +70,6 @@ EFFECT = Effect(
     textbook=book.Textbook(
         (("tooth.{side}.peak", book.UP), ("tooth.{side}.prominence", book.UP), ("tooth.{side}.second", book.UP)),
         "a strong impact at one tooth",
-        by_the_book,
+        textbook_signature,
     ),
 )

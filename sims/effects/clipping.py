@@ -26,7 +26,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return with_each_channel(machine, with_clipping)
 
 
-def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """Flat tops: from a thousandth to a third of the samples are cut off."""
     del scene, rng
     return Signature(cut_share=1e-3 * (size / SIZES[0]) ** (2.5 / log10(SIZES[1] / SIZES[0])))
@@ -51,6 +51,6 @@ EFFECT = Effect(
     textbook=Textbook(
         (("raw.near_the_extreme", UP), ("raw.kurtosis", DOWN)),
         "flat tops",
-        by_the_book,
+        textbook_signature,
     ),
 )

@@ -33,7 +33,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return replace(machine, wheels=wheels)
 
 
-def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """Run-out: the mesh swings once per turn in size and phase; the shaft's own line, and its second, may show.
 
     The gear's mass is off the axis as well, so that the line may be as large as that of an unbalance: the mesh tells.
@@ -84,6 +84,6 @@ EFFECT = Effect(
     textbook=Textbook(
         (("sideband.{side}.1", UP), ("shaft.{side}.1", UP)),
         "first sidebands of the shaft about the mesh, and its first order",
-        by_the_book,
+        textbook_signature,
     ),
 )

@@ -25,7 +25,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return replace(machine, shafts=shafts)
 
 
-def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """Two stiffness swings per turn, or a load that wanders along the teeth.
 
     The shaft's second line, mesh harmonics from the second on, sidebands one and two apart: any of them may lead. The
@@ -77,7 +77,7 @@ EFFECT = Effect(
     textbook=book.Textbook(
         (("shaft.{side}.2", book.UP), ("sideband.{side}.2", book.UP)),
         "the shaft's second order, second sidebands",
-        by_the_book,
+        textbook_signature,
         source="J. E. Berry, Illustrated Vibration Diagnostic Chart, 1994: higher mesh harmonics with sidebands at "
         "running speed",
     ),

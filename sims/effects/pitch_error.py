@@ -68,7 +68,7 @@ def cumulative_pitch(n_teeth: int, rng: np.random.Generator) -> FloatArray:
     return np.asarray(cumulative - cumulative.mean())
 
 
-def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """Each tooth comes early or late by its own amount: lines at all orders of its shaft; or one tooth does."""
     if rng.uniform() < ONE_TOOTH_SHARE:
         return _pitch_of_one_tooth(scene, size, rng)
@@ -147,6 +147,6 @@ EFFECT = Effect(
     textbook=Textbook(
         (("tooth.{side}.elsewhere", UP), ("shaft.{side}.low", UP), ("sideband.{side}.3to5", UP)),
         "all orders of the shaft rise, at every tooth",
-        by_the_book,
+        textbook_signature,
     ),
 )

@@ -57,7 +57,7 @@ def _deepest_mm(machine: MachineFacts, options: Options) -> float:
     return deepest_crack_mm(machine.gears[shared.gear_index(options)], float(options.get("angle_deg", 45.0)))
 
 
-def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """A softer tooth: it comes late and gives way while it carries, slower than the mesh; the mesh swings on.
 
     A deep crack lets the next tooth strike.
@@ -108,7 +108,7 @@ EFFECT = Effect(
     textbook=book.Textbook(
         (("tooth.{side}.prominence", book.UP), ("tooth.{side}.kurtosis", book.UP), ("sideband.{side}.6to12", book.UP)),
         "once per revolution a dip in stiffness: one tooth in the residual, a wide family of low sidebands",
-        by_the_book,
+        textbook_signature,
         source="P. D. McFadden, Detecting fatigue cracks in gears by amplitude and phase demodulation of the meshing "
         "vibration, J. Vib. Acoust. 108 (1986)",
     ),

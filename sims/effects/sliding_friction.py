@@ -31,7 +31,7 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
     return DriveEffect({"friction_coefficient": now + severity})
 
 
-def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """A force along the flanks that turns round at the pitch point, and some noise.
 
     Nearly a square wave of the mesh: its harmonics fall with their number. Across the line of action there is little
@@ -78,7 +78,7 @@ EFFECT = Effect(
     textbook=book.Textbook(
         (("mesh.share.2", book.UP), ("mesh.share.4", book.UP)),
         "the force reverses at the pitch point",
-        by_the_book,
+        textbook_signature,
         source="S. He, S. Cho, R. Singh, Prediction of dynamic friction forces in spur gears using alternate sliding "
         "friction formulations, J. Sound Vib. 309 (2008)",
     ),

@@ -38,7 +38,7 @@ def _locked_to(now: Roughness, asked: str) -> str:
     return asked
 
 
-def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """Asperities that slide over each other: noise, in bands, more or less with the mesh."""
     loose, locked = balance(rng, 2)
     total = sum(
@@ -93,6 +93,6 @@ EFFECT = Effect(
     textbook=Textbook(
         (("floor.band.3", UP), ("floor.band.4", UP), ("tooth.driver.elsewhere", UP)),
         "noise rises over a wide band",
-        by_the_book,
+        textbook_signature,
     ),
 )

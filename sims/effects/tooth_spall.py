@@ -20,7 +20,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return with_tooth_fault(machine, "spalls", gear_index(options), spall)
 
 
-def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """A pit: short blows when the flank enters and leaves it, different each time; the mesh hardly notices."""
     side = book.draw_side(rng)
     window, place = book.tooth_window(scene, side, float(rng.uniform(0.3, 0.8)), rng)
@@ -70,6 +70,6 @@ EFFECT = Effect(
     textbook=book.Textbook(
         (("tooth.{side}.prominence", book.UP), ("tooth.{side}.kurtosis", book.UP), ("tooth.{side}.centroid", book.UP)),
         "a short impact at one tooth, high in frequency",
-        by_the_book,
+        textbook_signature,
     ),
 )

@@ -27,7 +27,7 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
     return DriveEffect({name: drive.number(name) + severity})
 
 
-def by_the_book(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
+def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """A profile that is worn away from the pitch line: mesh harmonics grow, the higher the more; rough flanks.
 
     What modulates the mesh grows less than the mesh does: all alike would be another path.
@@ -69,6 +69,6 @@ EFFECT = Effect(
     textbook=book.Textbook(
         (("mesh.total", book.UP), ("mesh.share.2", book.UP), ("mesh.share.3", book.UP)),
         "mesh harmonics rise, the higher ones most",
-        by_the_book,
+        textbook_signature,
     ),
 )

@@ -31,7 +31,7 @@ def _any_order(rng: np.random.Generator) -> float:
     return float(rng.uniform(1.5, 16.0))
 
 
-def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """The drive pulls n times per turn: that line, and sidebands of the mesh so far apart."""
     shaft = scene.shaft_orders[draw_side(rng)]
     pulls = log_uniform(rng, 1.5, 15.0)  # motors and engines pull twice to six times rather than fifteen times
@@ -72,6 +72,6 @@ EFFECT = Effect(
     textbook=Textbook(
         (("sideband.{side}.strongest", UP), ("shaft.{side}.strongest", UP)),
         "a single pair of sidebands, a single order of the shaft",
-        by_the_book,
+        textbook_signature,
     ),
 )

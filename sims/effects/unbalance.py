@@ -41,7 +41,7 @@ def _largest_g_mm(machine: MachineFacts, options: Options) -> float:
     return 0.8 * _LARGEST_OFFSET * radius * usual_mass_kg(machine.nominal, side) * 1e3
 
 
-def by_the_book(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """A force that turns with the shaft: its line, and hardly a sideband; a large one bends what holds the shaft."""
     order = scene.shaft_orders[draw_side(rng)]
     force = size * 10.0 ** rng.uniform(0.0, 0.8)
@@ -78,6 +78,6 @@ EFFECT = Effect(
     textbook=Textbook(
         (("shaft.{side}.1", UP), ("shaft.{side}.1.to_mesh", UP)),
         "the shaft's first order",
-        by_the_book,
+        textbook_signature,
     ),
 )

@@ -12,6 +12,7 @@ from gearsig.checks import FloatArray, not_negative, one_of, positive, within
 from gearsig.errors import InputError
 from gearsig.rig import (
     DAMPING_LAWS,
+    SIDES,
     EncoderChannel,
     GearPair,
     OperatingPoint,
@@ -446,7 +447,6 @@ PARAMETERS: tuple[Parameter, ...] = (*_CYCLE, *_GEARS, *_CONTACT, *_MASSES, *_DR
 
 # What sliding has worn off the drive flanks, over the path of contact.
 
-SIDES = ("driver", "driven")
 N_PLACES = 65
 
 

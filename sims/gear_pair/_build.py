@@ -11,6 +11,7 @@ import numpy as np
 from gearsig.checks import within
 from gearsig.errors import InputError
 from gearsig.rig import (
+    SIDES,
     Bearing,
     EncoderChannel,
     GearPair,
@@ -180,7 +181,6 @@ def _encoders(values: ParameterValues, shafts: tuple[str, str]) -> tuple[Encoder
     return tuple(Encoder(f"{shaft} encoder", shaft, counts, noise_deg=noise_deg) for shaft in shafts if counts)
 
 
-_SIDES = ("driver", "driven")
 SHAFTS = ("input", "output")
 """Names of the driver's and the driven shaft where none are given."""
 
@@ -306,7 +306,7 @@ def _first_pulse_rev(pair: PairGeometry) -> tuple[float, float]:
 
 def gear_geometry(values: ParameterValues, side: int) -> GearGeometry:
     """Return the driver's (0) or the driven gear's (1) geometry."""
-    name = _SIDES[side]
+    name = SIDES[side]
     return transverse_section(
         values.whole(f"teeth_{name}"),
         values.number("module_mm"),
@@ -323,10 +323,10 @@ def gear_geometry(values: ParameterValues, side: int) -> GearGeometry:
 
 def _cracks(values: ParameterValues, side: int) -> tuple[RootCrack, ...]:
     depth_mm, percent = values.number("crack_depth_mm"), values.number("crack_width_percent")
-    if depth_mm == 0.0 or values.word("crack_gear") != _SIDES[side]:
+    if depth_mm == 0.0 or values.word("crack_gear") != SIDES[side]:
         return ()
     width_mm = None if percent == 100.0 else percent / 100.0 * values.number("face_width_mm")
-    tooth = int(within(values.whole("crack_tooth"), "crack_tooth", 1, values.whole(f"teeth_{_SIDES[side]}"))) - 1
+    tooth = int(within(values.whole("crack_tooth"), "crack_tooth", 1, values.whole(f"teeth_{SIDES[side]}"))) - 1
     return (RootCrack(depth_mm, values.number("crack_angle_deg"), tooth, width_mm),)
 
 
@@ -349,7 +349,7 @@ def _pitch_um(values: ParameterValues, teeth: int, side: int) -> tuple[float, ..
 
 
 def _wheel(values: ParameterValues, mesh: GearMesh, side: int) -> Wheel:
-    name, gear = _SIDES[side], (mesh.pair.driver, mesh.pair.driven)[side]
+    name, gear = SIDES[side], (mesh.pair.driver, mesh.pair.driven)[side]
     density = values.number("density_kg_m3")
     mass, inertia = values.optional(f"mass_{name}_kg"), values.optional(f"inertia_{name}_kg_m2")
     return Wheel(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from gearsig.rig import SIDES
 from sims.machine import BEARING_LAWS, MAX_DRY_FRICTION
 from sims.mesh import BODIES, MAX_SLICES
 from sims.simulator import Parameter
 
 _SWITCH = ("on", "off")
-_SIDES = ("driver", "driven")
 
 
 _GEARS = (
@@ -93,7 +93,7 @@ _MESH = (
 _CRACK = (
     Parameter("crack_depth_mm", "mm", "length of a root crack; 0: none", 0, 100, 0.0),
     Parameter("crack_angle_deg", "deg", "between the crack and the tooth's centre line", 15, 90, 45.0),
-    Parameter.choice("crack_gear", "gear with the crack", _SIDES, "driver"),
+    Parameter.choice("crack_gear", "gear with the crack", SIDES, "driver"),
     Parameter("crack_tooth", "", "tooth with the crack, from 1 at the mark", 1, 400, 1, whole=True),
     Parameter("crack_width_percent", "%", "part of the face width that the crack covers", 1, 100, 100.0),
 )

@@ -15,6 +15,7 @@ from sims.reduced_fe._contact import (
     solve_contacts,
     static_table,
 )
+from sims.reduced_fe._eigenfrequencies import SpreadingCheck, eigenfrequencies_hz, spreading_check, torsional_mode
 from sims.reduced_fe._growth import (
     STEEL_IN_AIR,
     CrackGrowth,
@@ -32,11 +33,9 @@ from sims.reduced_fe._pair import (
     FlexiblePair,
     bearing_springs,
     constants,
-    eigenfrequencies_hz,
     kept_modes,
     residual_compliance,
     start_state,
-    torsional_mode,
 )
 from sims.reduced_fe._respond import (
     STEP_S,
@@ -59,10 +58,6 @@ from sims.reduced_fe._simulator import (
     reduced_gap_simulator,
     simulate_pair,
     twin_parameters,
-)
-from sims.reduced_fe._spreading import (
-    SpreadingCheck,
-    spreading_check,
 )
 
 __all__ = [

@@ -23,13 +23,12 @@ from sims.gear_pair import (
     machine_fields,
 )
 from sims.machine import BearingSupport, Machine, Operation
-from sims.mesh import GearMesh, one_mesh_cycle
+from sims.mesh import GearMesh
 from sims.reduced_fe._contact import (
     FLANK,
     SIGNS,
     ContactTable,
     MeshMaps,
-    contact_state,
     contact_table,
     folded,
     force_map,
@@ -624,6 +623,8 @@ def constants(
     rng : numpy.random.Generator or None
         Draws the places of rolling elements in bearings with a defect; None: always the same ones.
     """
+    from sims.reduced_fe._eigenfrequencies import torsional_mode  # which takes these constants
+
     machine, mesh = pair.machine, pair.machine.mesh
     base = np.array([mesh.pair.driver.base_radius_mm, mesh.pair.driven.base_radius_mm]) * 1e-3
     force = max(operation.torque_nm.largest / base[0], MIN_FORCE_N)
@@ -812,140 +813,3 @@ def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: Fl
     per_unit = float(rigid.rows[column].mean(axis=0)[free])
     q[1, free] += (depth - approach(q)) / per_unit
     return replace(state, q=q)
-
-
-# The pair as a linear system about its loaded state: eigenfrequencies over the mesh angle.
-
-MIN_TORSIONAL_HZ = 200.0
-"""Modes below it are those of rotors on their couplings."""
-
-
-def eigenfrequencies_hz(
-    pair: FlexiblePair,
-    operation: Operation,
-    mesh_cycles: FloatArray | None = None,
-    *,
-    ready: FlexiblePairConstants | None = None,
-) -> FloatArray:
-    """Undamped eigenfrequencies of small motions about the loaded state at each mesh angle, (n_c, n), rising.
-
-    K = diag(ω²) + Σ rows S rowsᵀ with S = (R + h'(N))⁻¹ over the points that touch at the set torque.
-
-    Parameters
-    ----------
-    pair : FlexiblePair
-    operation : Operation
-        Its greatest torque loads the contact.
-    mesh_cycles : array or None
-        None: 50 points of a cycle.
-    ready : FlexiblePairConstants or None
-        Where they are at hand.
-    """
-    pair_constants = constants(pair, operation) if ready is None else ready
-    cycles = one_mesh_cycle(50) if mesh_cycles is None else mesh_cycles
-    return np.array(
-        [np.sqrt(np.maximum(_squares(pair, pair_constants, operation, c)[0], 0.0)) / (2.0 * pi) for c in cycles]
-    )
-
-
-@dataclass(frozen=True)
-class TorsionalMode:
-    """The mode in which the flanks move most against each other, mean over a mesh cycle.
-
-    Parameters
-    ----------
-    frequency_hz : float
-    contact_part : float
-        Part of its energy that lies in the compliance of the contact.
-    other_damping_ratio : float
-        ζ by shafts, bearings and gear bodies alone.
-    """
-
-    frequency_hz: float
-    contact_part: float
-    other_damping_ratio: float
-
-    def damping_time_s(self, damping_ratio: float) -> float:
-        """Time τ of the contact's damping, with which the mode has a damping ratio in all; 0 if it has more without.
-
-        2ζω = 2ζ₀ω + τ ω² · contact part
-        """
-        omega = 2.0 * pi * self.frequency_hz
-        return max(2.0 * (damping_ratio - self.other_damping_ratio) / (omega * self.contact_part), 0.0)
-
-
-def torsional_mode(
-    pair: FlexiblePair, operation: Operation, *, ready: FlexiblePairConstants | None = None, n_points: int = 20
-) -> TorsionalMode:
-    """Return the torsional mode of the pair about its loaded state.
-
-    Parameters
-    ----------
-    pair : FlexiblePair
-    operation : Operation
-        Its greatest torque loads the contact.
-    ready : FlexiblePairConstants or None
-        Where they are at hand.
-    n_points : int
-        Mesh angles in a cycle.
-    """
-    pair_constants = constants(pair, operation) if ready is None else ready
-    frequency, contact, others_damping = _torsional(pair, pair_constants, operation, one_mesh_cycle(n_points)).mean(
-        axis=0
-    )
-    return TorsionalMode(float(frequency), float(contact), float(others_damping))
-
-
-def torsional_curve_hz(pair: FlexiblePair, operation: Operation, mesh_cycles: FloatArray) -> FloatArray:
-    """Frequency of the torsional mode at each mesh angle, (n_c,)."""
-    return _torsional(pair, constants(pair, operation), operation, mesh_cycles)[:, 0]
-
-
-def _torsional(
-    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, mesh_cycles: FloatArray
-) -> FloatArray:
-    """Frequency, contact part and damping ratio of others at each mesh angle, (n_c, 3)."""
-    rates = np.concatenate([side.damping_rate for side in pair_constants.sides])
-    found = []
-    for c in mesh_cycles:
-        squares, shapes, rows, stiff = _squares(pair, pair_constants, operation, c)
-        energy = np.einsum("ij,ik,kj->j", rows @ shapes, stiff, rows @ shapes)
-        part = energy / np.maximum(squares, (2.0 * pi * MIN_TORSIONAL_HZ) ** 2)
-        mode = int(np.argmax(part))
-        omega = float(np.sqrt(squares[mode]))
-        found.append((omega / (2.0 * pi), part[mode], float(rates @ shapes[:, mode] ** 2) / (2.0 * omega)))
-    return np.array(found)
-
-
-def _squares(
-    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Squared angular frequencies, shapes, and what `contact_rows` returns, at one mesh angle."""
-    rows, stiff = contact_rows(pair, pair_constants, operation, cycles)
-    k = np.diag(np.concatenate([side.omega_rad_s for side in pair_constants.sides]) ** 2) + rows.T @ stiff @ rows
-    squares, shapes = np.linalg.eigh(k)
-    return squares, shapes, rows, stiff
-
-
-def contact_rows(
-    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return ∂D/∂η of the points that touch under the set torque, (n, n_modes), and their stiffness, (n, n)."""
-    force = max(operation.torque_nm.largest / pair_constants.base_radius_m[0], MIN_FORCE_N)
-    at = contact_state(pair_constants.table, pair.machine.mesh, force, cycles)
-    one, two = pair_constants.sides
-    turn, n = pair_constants.turn(), one.n_modes
-    rows = np.zeros((len(at.force_n), 2 * n))
-    for point, (number, column, part) in enumerate(zip(at.pair, at.column, at.part, strict=True)):
-        for index, side in enumerate((one, two)):
-            tooth = int(number % pair_constants.record["teeth"][index])
-            s = point % pair_constants.table.n_slices
-            seen = (1.0 - part) * side.rows[column, s] + part * side.rows[column + 1, s]
-            cosine, sine = turn[index, tooth]
-            c, d = np.split(seen[side.n_single :], 2)
-            full = np.concatenate((seen[: side.n_single], cosine * c - sine * d, sine * c + cosine * d))
-            rows[point, index * n : index * n + len(full)] = full
-    touching = at.force_n > 0.0
-    rows = rows[touching]
-    stiff: FloatArray = np.linalg.inv(at.compliance[np.ix_(touching, touching)])
-    return rows, stiff

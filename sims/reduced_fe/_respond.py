@@ -17,13 +17,13 @@ from sims.fe_gear import one_thread
 from sims.gear_pair import COORDINATES, YIELDS, PairResponse, RunPlan, StepConvergence, profile_points
 from sims.machine import Operation, Profile
 from sims.mesh import one_mesh_cycle
+from sims.reduced_fe._eigenfrequencies import contact_rows
 from sims.reduced_fe._integrate import Method, march, room, step_coefficients
 from sims.reduced_fe._pair import (
     FlexiblePair,
     FlexiblePairConstants,
     back_rows,
     constants,
-    contact_rows,
     hub_inertia,
     start_state,
 )

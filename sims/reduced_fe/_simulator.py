@@ -12,7 +12,7 @@ import numpy as np
 from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.recording import Recording
-from gearsig.rig import Rig
+from gearsig.rig import SIDES, Rig
 from sims.effects import effects, with_effects
 from sims.fe_gear import READY, GearBlank, ReducedGear, cached_gear, plan_for, ready_gear
 from sims.gear_pair import (
@@ -37,7 +37,8 @@ from sims.measure import plain
 from sims.mesh import Material
 from sims.presets import Preset
 from sims.reduced_fe._contact import MARGIN, corner_separation_m
-from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, eigenfrequencies_hz, torsional_mode
+from sims.reduced_fe._eigenfrequencies import eigenfrequencies_hz, torsional_mode
+from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants
 from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, check_convergence, followed_step_s, respond
 from sims.simulator import Parameter, ParameterValue, ParameterValues, Values
 
@@ -319,7 +320,6 @@ def check_depth(pair: FlexiblePair, operation: Operation) -> None:
 
 # From parameter values to a flexible pair.
 
-SIDES = ("driver", "driven")
 Gears = tuple[ReducedGear, ReducedGear]
 
 

@@ -92,7 +92,7 @@ def test_teeth_that_are_all_alike_are_aligned_to_whole_teeth_only() -> None:
     assert found.alignments[0].tooth_is_certain is False
     pitch_deg = 360.0 / 23
     assert (found.alignments[0].shift_deg - 3.6 + pitch_deg / 2) % pitch_deg == pytest.approx(pitch_deg / 2, abs=0.1)
-    assert any("No tooth of shaft in" in note for note in found.notes)
+    assert any("in the simulation is which in the recording" in note for note in found.notes)
 
 
 def test_noise_alone_shows_no_line_and_no_agreement() -> None:

@@ -9,12 +9,12 @@ from gearsig.diagnosis import (
     BandEnvelope,
     Kind,
     analyze,
-    slower_train,
     smallest_depth,
     stands_out_from_neighbours,
+    underlying_impulse_train,
 )
 from gearsig.errors import RefusalError
-from gearsig.prepared import LineExcess, best_comb, floor_of, refined_angle
+from gearsig.prepared import LinesOverFloor, best_comb, lines_over_noise_floor, refined_angle
 from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft, SpeedChannel
 from gearsig.spectra import amplitude_spectrum
@@ -192,10 +192,10 @@ def test_a_speed_beyond_the_sampling_rate_is_refused() -> None:
 RATE_HZ = 1000.0
 
 
-def lines(frequencies_hz: list[float], rng: np.random.Generator, amplitude: float = 0.3) -> LineExcess:
+def lines(frequencies_hz: list[float], rng: np.random.Generator, amplitude: float = 0.3) -> LinesOverFloor:
     t = np.arange(20_000) / RATE_HZ
     tones = sum(amplitude * np.cos(2 * np.pi * f * t + rng.uniform(0, 6.28)) for f in frequencies_hz)
-    return floor_of(amplitude_spectrum(rng.normal(size=len(t)) + tones, RATE_HZ))
+    return lines_over_noise_floor(amplitude_spectrum(rng.normal(size=len(t)) + tones, RATE_HZ))
 
 
 @pytest.mark.parametrize(("multiple", "divisor"), [(4, 1), (13, 1), (5, 2)])
@@ -205,7 +205,7 @@ def test_a_family_on_lines_of_a_slower_train_is_the_trains(multiple: int, diviso
     excess = lines([true_hz * k for k in range(1, int(310 / true_hz))], rng)
     comb = best_comb(excess, 49.5, 50.5)
     assert comb is not None
-    train = slower_train(excess, comb)
+    train = underlying_impulse_train(excess, comb)
     assert train is not None
     assert train.fundamental == pytest.approx(true_hz, rel=1e-3)
 
@@ -216,7 +216,7 @@ def test_a_family_with_sidebands_stands_alone() -> None:
     excess = lines(places, rng)
     comb = best_comb(excess, 49.0, 51.0)
     assert comb is not None
-    assert slower_train(excess, comb) is None
+    assert underlying_impulse_train(excess, comb) is None
     assert stands_out_from_neighbours(excess, comb, 0.02, ())
 
 
@@ -227,7 +227,7 @@ def test_sidebands_of_a_shaft_near_a_fifth_of_the_family_are_no_train() -> None:
     excess = lines(places, rng).without_multiples(shaft_hz)
     comb = best_comb(excess, 49.0, 50.6)
     assert comb is not None
-    assert slower_train(excess, comb, (shaft_hz,)) is None
+    assert underlying_impulse_train(excess, comb, (shaft_hz,)) is None
 
 
 def test_a_train_three_times_as_slow_as_a_shaft_is_one() -> None:
@@ -236,7 +236,7 @@ def test_a_train_three_times_as_slow_as_a_shaft_is_one() -> None:
     excess = lines([true_hz * k for k in range(1, 30)], rng).without_multiples(shaft_hz)
     comb = best_comb(excess, 13.0, 13.5)
     assert comb is not None
-    train = slower_train(excess, comb, (shaft_hz,))
+    train = underlying_impulse_train(excess, comb, (shaft_hz,))
     assert train is not None
     assert train.fundamental == pytest.approx(true_hz, rel=1e-3)
 
@@ -247,10 +247,10 @@ def test_a_train_weaker_than_the_family_on_its_lines_explains_nothing() -> None:
     t = np.arange(20_000) / RATE_HZ
     tones = sum(1.0 * np.cos(2 * np.pi * 36.0 * k * t + rng.uniform(0, 6.28)) for k in range(1, 7))
     tones = tones + sum(0.06 * np.cos(2 * np.pi * 2.0 * k * t + rng.uniform(0, 6.28)) for k in range(1, 108))
-    excess = floor_of(amplitude_spectrum(rng.normal(size=len(t)) + tones, RATE_HZ))
+    excess = lines_over_noise_floor(amplitude_spectrum(rng.normal(size=len(t)) + tones, RATE_HZ))
     comb = best_comb(excess, 35.5, 36.5)
     assert comb is not None
-    assert slower_train(excess, comb) is None
+    assert underlying_impulse_train(excess, comb) is None
 
 
 def at_sensors(order: float, heights: tuple[float, ...], *, seed: int = 0, odd: float = 1.0) -> Recording:

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from gearsig.prepared import best_comb, comb_at, floor_of, line_excess, score_needed, tail_probability
+from gearsig.prepared import (
+    best_comb,
+    comb_at,
+    lines_over_floor,
+    lines_over_noise_floor,
+    score_needed,
+    tail_probability,
+)
 from gearsig.spectra import amplitude_spectrum
 
 RATE_HZ = 1000.0
@@ -11,7 +18,7 @@ N = 20_000
 
 
 def excess_of(values):  # type: ignore[no-untyped-def]
-    return floor_of(amplitude_spectrum(values, RATE_HZ))
+    return lines_over_noise_floor(amplitude_spectrum(values, RATE_HZ))
 
 
 def family(fundamental_hz: float, amplitude: float, rng: np.random.Generator) -> np.ndarray:
@@ -82,7 +89,7 @@ def test_one_huge_line_is_no_family() -> None:
 
 def test_nothing_to_resolve() -> None:
     spectrum = amplitude_spectrum(np.random.default_rng(7).normal(size=256), RATE_HZ)
-    assert best_comb(line_excess(spectrum, np.ones(len(spectrum.values))), 1.0, 2.0) is None
+    assert best_comb(lines_over_floor(spectrum, np.ones(len(spectrum.values))), 1.0, 2.0) is None
 
 
 def test_ranges_beyond_the_axis_are_cut_to_it() -> None:

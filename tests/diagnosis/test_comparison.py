@@ -16,8 +16,7 @@ from gearsig.diagnosis import (
     analyze,
     beside_reference,
     changes,
-    rate_of_reference,
-    rig_of_reference,
+    rig_and_rate_of_reference,
 )
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
@@ -97,9 +96,9 @@ def test_a_reference_that_cannot_be_analysed_is_not_compared_and_the_verdict_say
 
 def test_the_rate_of_a_rig_file_beside_the_reference_holds_for_it(tmp_path: Path) -> None:
     path = tmp_path / "healthy.csv"
-    assert rate_of_reference(path, 12000.0) == 12000.0
+    assert rig_and_rate_of_reference(path, None, 12000.0)[1] == 12000.0
     write_rig(replace(RIG, sampling_rate_hz=48000.0), tmp_path / "healthy.toml")
-    assert rate_of_reference(path, 12000.0) is None
+    assert rig_and_rate_of_reference(path, None, 12000.0)[1] is None
 
 
 def test_without_a_reference_nothing_is_compared() -> None:
@@ -120,12 +119,12 @@ def test_a_fault_says_whether_the_reference_shows_it() -> None:
 def test_a_reference_whose_own_rig_file_has_other_teeth_is_of_another_machine(tmp_path: Path) -> None:
     recording = tmp_path / "then.csv"
     recording.touch()
-    assert rig_of_reference(recording, RIG) is RIG
+    assert rig_and_rate_of_reference(recording, RIG, None)[0] is RIG
     write_rig(teeth(20, 40), tmp_path / "then.toml")
     with pytest.raises(InputError, match="another machine: its rig file says teeth 20/40, the recording's 27/43"):
-        rig_of_reference(recording, RIG)
+        rig_and_rate_of_reference(recording, RIG, None)
     write_rig(replace(RIG, operating_point=replace(RIG.operating_point, torque_nm=70.0)), tmp_path / "then.toml")
-    rig = rig_of_reference(recording, RIG)
+    rig = rig_and_rate_of_reference(recording, RIG, None)[0]
     assert rig is not None
     assert rig.operating_point.torque_nm == 70.0
 

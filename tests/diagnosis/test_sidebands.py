@@ -13,7 +13,7 @@ from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.diagnosis import Analysis, Finding, Kind, Outcome, analyze, modulation_of
 from gearsig.diagnosis import Modulation as Found
 from gearsig.orders import order_spectrum
-from gearsig.prepared import LineExcess, floor_of, level_beside, levels_beside
+from gearsig.prepared import LinesOverFloor, level_beside, levels_beside, lines_over_noise_floor
 from gearsig.recording import Recording
 from gearsig.rig import GearPair, Rig, Shaft, TachometerChannel
 from sims.measure import ColouredNoise, Tachometer
@@ -71,7 +71,7 @@ def found(analysis: Analysis, code: str) -> list[Finding]:
 
 
 @cache
-def excess_of(am: float, pm: float, k: int, noise: float = 1e-3, tone_order: float = 0.0) -> LineExcess:
+def excess_of(am: float, pm: float, k: int, noise: float = 1e-3, tone_order: float = 0.0) -> LinesOverFloor:
     angle_rev = np.arange(N_REV * PER_REV) / PER_REV
     x = noise * np.random.default_rng(5).normal(size=len(angle_rev))
     for h in (1, 2, 3):
@@ -81,10 +81,10 @@ def excess_of(am: float, pm: float, k: int, noise: float = 1e-3, tone_order: flo
     turns = np.array([0.0, float(N_REV)])
     angle = ShaftAngle("in", turns, turns, np.array([1.0, 1.0]), "constant")
     signal = AngleSignal(x[None, :], PER_REV, angle, 0.0, ("a",), ("g",), PER_REV / 2)
-    return floor_of(order_spectrum(signal, "a"))
+    return lines_over_noise_floor(order_spectrum(signal, "a"))
 
 
-def measured(excess: LineExcess) -> Found:
+def measured(excess: LinesOverFloor) -> Found:
     modulation = modulation_of(excess, MESH, 1.0, (), ALL_K)
     assert modulation is not None
     return modulation

@@ -16,12 +16,12 @@ from gearsig.gap import (
     PlaceKind,
     ReducedRecording,
     StructuralFloor,
-    all_round_spot,
     beyond_the_mesh,
     change_features,
     difference_features,
     gap_places,
-    mesh_spot,
+    locate_all_round,
+    locate_mesh,
     reduce_recording,
 )
 from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
@@ -180,13 +180,13 @@ def test_few_lines_of_noise_pass_for_a_shafts_own() -> None:
 
 
 def test_clipping_is_told_from_a_stray_peak() -> None:
-    from gearsig.gap import ComparedPair, tail_spot
+    from gearsig.gap import ComparedPair, locate_tail
 
     recording = record(seed=1)
     clipped = reduce_recording(replace(recording, samples=np.clip(recording.samples, -4.0, 4.0)), RIG)
     figures = {"raw.near_the_extreme": 20.0, "raw.kurtosis": -1.0}
-    assert "as clipping makes them" in tail_spot(ComparedPair(clipped, healthy(), True, figures, figures)).title
-    assert "clipping" not in tail_spot(ComparedPair(healthy(), clipped, True, figures, figures)).title
+    assert "as clipping makes them" in locate_tail(ComparedPair(clipped, healthy(), True, figures, figures)).title
+    assert "clipping" not in locate_tail(ComparedPair(healthy(), clipped, True, figures, figures)).title
 
 
 def compared(change_db: dict[str, float]) -> ComparedPair:
@@ -197,22 +197,22 @@ def compared(change_db: dict[str, float]) -> ComparedPair:
 def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
     """The level of a pattern hardly moved; what exceeds its floor is how much the patterns differ."""
     level, apart = "tooth.driven.level", "change.driven.elsewhere"
-    round_it = all_round_spot(compared({level: 0.18, apart: 6.0}), DRIVEN, "shaft out", "a1")
+    round_it = locate_all_round(compared({level: 0.18, apart: 6.0}), DRIVEN, "shaft out", "a1")
     assert round_it.change_db == 6.0
     assert "up by 6 dB against what healthy machines change by" in round_it.title
     assert "0.18" not in round_it.title
-    louder = all_round_spot(compared({level: -4.0, apart: 2.0}), DRIVEN, "shaft out", "a1")
+    louder = locate_all_round(compared({level: -4.0, apart: 2.0}), DRIVEN, "shaft out", "a1")
     assert louder.title == "pattern of the teeth of shaft out all round, down by 4 dB"
-    shape = all_round_spot(compared({level: 0.5, "tooth.driven.kurtosis": 3.0}), DRIVEN, "shaft out", "a1")
+    shape = locate_all_round(compared({level: 0.5, "tooth.driven.kurtosis": 3.0}), DRIVEN, "shaft out", "a1")
     assert shape.follows
     assert "dB" not in shape.title
 
 
 def test_mesh_lines_that_hardly_moved_give_way_to_what_was_scored() -> None:
-    spot = mesh_spot(compared({"mesh.total": 0.2, "mesh.share.2": -4.0, "line.half_mesh": 0.0}))
+    spot = locate_mesh(compared({"mesh.total": 0.2, "mesh.share.2": -4.0, "line.half_mesh": 0.0}))
     assert spot is not None
     assert (spot.title, spot.change_db) == ("mesh harmonic 2 over all, down by 4 dB", -4.0)
     assert spot.orders == (2.0 * TEETH[0],)
-    spread = mesh_spot(compared({"mesh.total": 0.2, "alike.mesh.spread": 3.0, "line.half_mesh": 0.0}))
+    spread = locate_mesh(compared({"mesh.total": 0.2, "alike.mesh.spread": 3.0, "line.half_mesh": 0.0}))
     assert spread is not None
     assert spread.title == "what lies beside the mesh harmonics, which themselves hardly moved"

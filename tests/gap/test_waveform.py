@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig.gap import SIDEBAND_OFFSETS as OFFSETS
-from gearsig.gap import Added, SimulatedCourse, compared_course, told_apart, waveform_match
+from gearsig.gap import Added, SimulatedCourse, compared_course, waveform_match, with_likelihoods
 
 N_CHANNELS, N_HARMONICS = 2, 8
 HARMONICS = np.arange(1, N_HARMONICS + 1)[:, None]
@@ -157,9 +157,9 @@ def test_a_pitch_error_of_one_tooth_tells_behind_from_ahead_and_one_tooth_from_a
 
 def test_waveforms_part_what_faults_of_a_tooth_have_together() -> None:
     before = {"tooth_spall": 0.5, "root_crack": 0.3, "none": 0.2}
-    after = told_apart(before, {"tooth_spall": 0.0, "root_crack": 2.0})
+    after = with_likelihoods(before, {"tooth_spall": 0.0, "root_crack": 2.0})
     assert after["none"] == 0.2
     assert sum(after.values()) == pytest.approx(1.0)
     assert after["root_crack"] / after["tooth_spall"] == pytest.approx(0.6 * np.exp(2.0))
     assert next(iter(after)) == "root_crack"
-    assert told_apart(before, {"root_crack": 5.0}) == before
+    assert with_likelihoods(before, {"root_crack": 5.0}) == before

@@ -95,8 +95,8 @@ def test_sidebands_belong_to_the_shaft_that_modulates(shaft):
     found = {(i.name, i.shaft): i.value for i in mesh_indicators(spectrum(modulated(spacing, 0.3, 0.0)), RIG, PAIR)}
     other = "output" if shaft == "input" else "input"
     assert found["mesh level 1×", ""] == pytest.approx(4.0, rel=0.003)
-    assert found["sideband level 1×-1", shaft] == pytest.approx(0.6, rel=0.005)
-    assert found["sideband level 1×+1", shaft] == pytest.approx(0.6, rel=0.005)
+    assert found["sideband level 1× − 1", shaft] == pytest.approx(0.6, rel=0.005)
+    assert found["sideband level 1× + 1", shaft] == pytest.approx(0.6, rel=0.005)
     assert found["sideband ratio 1×", shaft] == pytest.approx(20 * math.log10(0.15), abs=0.05)
     assert found["sideband ratio 1×", other] < -50
 
@@ -107,14 +107,14 @@ def test_lines_are_called_by_the_order_at_which_they_are_expected():
     shifted = replace(plain, positions=plain.positions * 1.0004)
     bands = [[(i.name, i.band) for i in mesh_indicators(s, RIG, PAIR)] for s in (plain, shifted)]
     assert bands[0] == bands[1]
-    assert ("sideband level 1×-1", "order 28") in bands[0]
+    assert ("sideband level 1× − 1", "order 28") in bands[0]
 
 
 def test_amplitude_and_phase_modulation_together_lean_to_one_side():
     found = {
         i.name: i.value for i in mesh_indicators(spectrum(modulated(1.0, 0.1, 0.06)), RIG, PAIR) if i.shaft == "input"
     }
-    lower, upper = found["sideband level 1×-1"], found["sideband level 1×+1"]
+    lower, upper = found["sideband level 1× − 1"], found["sideband level 1× + 1"]
     assert lower == pytest.approx(4 * (0.1 - 0.06) / 2, rel=0.02)
     assert upper == pytest.approx(4 * (0.1 + 0.06) / 2, rel=0.02)
 
@@ -122,7 +122,7 @@ def test_amplitude_and_phase_modulation_together_lean_to_one_side():
 def test_each_sideband_is_reported_on_its_own_side():
     x = cosine(29, 4.0) + sum(cosine(29 + k, 0.1 * (k + 3)) for k in (-2, -1, 1, 2))
     found = {i.name: i.value for i in mesh_indicators(spectrum(x), RIG, PAIR) if i.shaft == "input"}
-    levels = [found[f"sideband level 1×{k}"] for k in ("-2", "-1", "+1", "+2")]
+    levels = [found[f"sideband level 1× {k}"] for k in ("− 2", "− 1", "+ 1", "+ 2")]
     assert levels == pytest.approx([0.1, 0.2, 0.4, 0.5], rel=1e-6)
     assert found["sideband ratio 1×"] == pytest.approx(20 * math.log10(0.3 / 4), abs=1e-6)
 

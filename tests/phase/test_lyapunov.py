@@ -80,7 +80,7 @@ def test_noise_is_refused(method, kind):
     rng = np.random.default_rng(3)
     x = rng.normal(size=N) if kind == "white" else narrow_band_noise(N, rng)
     portrait = _embedded(x, 1.0, 3 if kind == "white" else 12, 5)
-    with pytest.raises(RefusalError, match=r"% as far apart as unrelated points.*looks stochastic"):
+    with pytest.raises(RefusalError, match=r"% as far apart as unrelated points.*is stochastic"):
         largest_lyapunov_exponent(portrait, method=method)
 
 

@@ -34,7 +34,7 @@ from app.benchmark.scoring.scores import (
 )
 from gearsig import __version__
 from gearsig.cache import write_text
-from gearsig.formatting import rounded
+from gearsig.formatting import percent, rounded
 from gearsig.gap import NONE, UNKNOWN
 from gearsig.plot import Picture, embed
 from gearsig.report import Section, benchmark_html
@@ -135,7 +135,7 @@ def cell(figure: Figure, score: Score, *, with_n: bool = True) -> str:
         return NO_CASES
     n = f" of {score.n}" if with_n else ""
     if figure.is_share:
-        return f"{100 * score.value:.0f} % ({100 * score.low:.0f}–{100 * score.high:.0f}){n}"
+        return f"{percent(score.value)} ({100 * score.low:.0f}–{100 * score.high:.0f}){n}"
     interval = f" ({score.low:.2f}–{score.high:.2f})" if isfinite(score.low) else ""
     return f"{score.value:.2f}{interval}{n}".replace("-", "−")
 
@@ -146,7 +146,7 @@ def target_cell(figure: Figure, score: Score, column: int) -> str:
         return ""
     target = figure.targets[column]
     sign = "≥" if figure.is_least else "≤"
-    text = f"{sign} {100 * target:.0f} %" if figure.is_share else f"{sign} {target:.2f}"
+    text = f"{sign} {percent(target)}" if figure.is_share else f"{sign} {target:.2f}"
     verdict = judgement(score, target, is_least=figure.is_least)
     return f"{text}: {verdict}" if verdict else text
 
@@ -442,14 +442,14 @@ def _summary(result: BenchmarkResult) -> str:
         part = result.part(name)
         top, false = part.scores["top_1"], part.scores["named_on_none"]
         if top.n:
-            wrong = f"; an effect is named on {100 * false.value:.0f} % of healthy cases" if false.n else ""
-            said.append(f"{name}: {100 * top.value:.0f} % of mechanical effects right{wrong}")
+            wrong = f"; an effect is named on {percent(false.value)} of healthy cases" if false.n else ""
+            said.append(f"{name}: {percent(top.value)} of mechanical effects right{wrong}")
     return f"{'. '.join(text[0].upper() + text[1:] for text in said)}." if said else "No mechanical effects."
 
 
 def _provenance(result: BenchmarkResult, command: str) -> list[tuple[str, str]]:
     plan = result.wanted.plan
-    shares = ", ".join(f"{100 * part:.0f} % {kind}" for kind, part in SHARES.items())
+    shares = ", ".join(f"{percent(part)} {kind}" for kind, part in SHARES.items())
     return [
         ("command", command),
         ("cases", f"{plan.n_cases}, role {plan.role}, seed {plan.seed}; {shares}"),

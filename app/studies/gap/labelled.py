@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import typer
 
-from app.studies.gap.by_hand import rig_of, with_foreign_vibration
+from app.studies.gap.by_hand import with_foreign_vibration
 from app.studies.gap.machines import MOUNTED_ANEW_SHARE
 from app.studies.gap.quasi_static import EFFECTS, QUASI_STATIC, QuasiStaticDay, StaticMachine, record
 from app.studies.gap.rows import (
@@ -28,7 +28,7 @@ from app.studies.gap.rows import (
     PopulationSample,
     Recorded,
     one_rig,
-    reduced,
+    reduced_twin,
     samples_of,
     write,
 )
@@ -39,25 +39,17 @@ from gearsig.gap import (
     NONE,
     UNKNOWN,
     Features,
-    OperatingCondition,
     Recogniser,
-    ReducedRecording,
     labelled_support,
     load_gap_calibration,
     load_learned,
-    reduce_recording,
-    run_length_s,
     soft_size,
-    with_channels_of,
     with_labelled,
     within_reach,
     without_machines_of,
 )
-from gearsig.recording import Recording
 from sims.blind import CATALOGUE, MECHANICAL, Scene, draw_case, measure, run, scene_of
 from sims.blind import Fault as BlindFault
-from sims.cracked import CrackedTwin
-from sims.machine import nominal_of
 
 # --------------------
 # Machines with several recordings of each effect.
@@ -80,7 +72,7 @@ def static_machine(index: int) -> list[PopulationSample]:
     def made() -> Made:
         levels = record(machine, machine.healthy(), QuasiStaticDay.drawn(rng), None).samples[:-1].std(axis=1)
         reference = record(machine, machine.healthy(), QuasiStaticDay.drawn(rng), levels)
-        return reference, _twin(reference, rig, machine.drawn.torque_nm), recorded(levels)
+        return reference, reduced_twin(reference, rig, machine.drawn.torque_nm), recorded(levels)
 
     def recorded(levels: np.ndarray) -> Iterator[Recorded]:
         for run_index in range(N_RUNS):
@@ -139,21 +131,9 @@ def independent_machine(index: int) -> list[PopulationSample]:
     def made() -> Made:
         scene = levelled(scene_of(case.rig, case.references[0]))
         reference = measure(scene, run(scene))
-        return reference, _twin(reference, rig, torque_nm), recorded()
+        return reference, reduced_twin(reference, rig, torque_nm), recorded()
 
     return samples_of(INDEPENDENT, rig, made)
-
-
-def _twin(reference: Recording, rig: int, torque_nm: float) -> ReducedRecording:
-    here, known = reduced(reference, rig), rig_of(reference)
-    simulated = CrackedTwin(known, nominal_of(known)).run(
-        OperatingCondition(60.0 * here.speed_hz, torque_nm),
-        seed=rig,
-        duration_s=run_length_s(here),
-        sampling_rate_hz=reference.sampling_rate_hz,
-        noise=1,
-    )
-    return with_channels_of(reduce_recording(simulated, known), here)
 
 
 _MAKE: dict[str, Callable[[int], list[PopulationSample]]] = {

@@ -328,7 +328,10 @@ class LumpedRig:
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, light: bool = False) -> LumpedRig:
         """Draw one; `light`: hardly loaded, and by a load that swings once a turn, so that flanks part."""
+        # A seed stands for a machine, in the shipped numbers too: what is drawn here keeps its order.
         u = rng.uniform
+        # What the plate says: teeth, module, face, and two operating points by speed and load per face width. Loads
+        # follow the size of the teeth: drawn on their own, most machines would be idle or break.
         z1 = int(rng.integers(17, 41))
         teeth = z1, int(rng.integers(max(20, int(0.8 * z1)), 61))
         module_mm = float(rng.choice([1.5, 2.0, 2.5, 3.0, 4.0]))
@@ -339,13 +342,17 @@ class LumpedRig:
         load = line_load * face_mm * radii[1]
         other_speed = speed * rng.choice([u(0.55, 0.8), u(1.25, 1.5)])
         other_load = load * (u(1.2, 1.5) if light else rng.choice([u(0.5, 0.75), u(1.3, 1.6)]))
-        quality = u(0.6, 1.3)  # of the teeth
+        # One factor for all of a machine's teeth: who cuts good pitches cuts good profiles as well.
+        quality = u(0.6, 1.3)
 
         def pitches(z: int) -> FloatArray:
+            """Single errors, and a part that adds up from tooth to tooth and closes after a turn."""
             single = rng.standard_normal(z)
             adding = np.cumsum(single - single.mean())
             return np.asarray((0.6 * single + 0.35 * (adding - adding.mean())) * quality * 1.1e-6)
 
+        # Masses of steel discs, the module standing for the shaft's share; motor and load are heavier with the torque,
+        # and shafts as stiff as puts the natural frequencies of either end where those of test rigs are.
         mass = 7800.0 * pi * radii**2 * face_mm * 1.2e-3 + u(0.4, 0.8, 2) * module_mm / 2
         inertia = 0.55 * mass * radii**2
         ratio = teeth[0] / teeth[1]
@@ -357,11 +364,13 @@ class LumpedRig:
         )
         beside = 3.0 * inertia
         shafts = (2.0 * pi * np.array([u(60, 180), u(40, 140)])) ** 2 * ends * beside / (ends + beside)
+        # Bearings as large as the greater load asks for; their pitch leaves a gap between the balls.
         size = max(1.0, (max(load, other_load) / radii[1] / 1500.0) ** 0.5)
         balls = []
         for _ in range(2):
             n, d = int(rng.integers(8, 12)), u(7, 10) * min(size, 2.2)
             balls.append((n, round(d, 2), round(d * n / pi * u(1.45, 1.75), 2)))
+        # The housing outweighs its gears; its modes and sensors are as many as a measurement on a small gearbox sees.
         housing = u(4, 9) * mass.sum() + 3.0
         n_modes, n_sensors = int(rng.integers(6, 13)), int(rng.integers(1, 4))
         numbers = {

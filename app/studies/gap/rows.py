@@ -316,14 +316,6 @@ def _condition(
 ) -> Made:
     """Return what one condition is compared with, the twin at its speed and stated torque, and what is compared."""
     now, healthy, reference = recordings
-    here, known = reduced(now, rig), rig_of(now)
-    run = CrackedTwin(known, nominal_of(known)).run(
-        OperatingCondition(60.0 * here.speed_hz, torque_nm),
-        seed=rig,
-        duration_s=run_length_s(here),
-        sampling_rate_hz=now.sampling_rate_hz,
-        noise=1,
-    )
 
     def compared() -> Iterator[Recorded]:
         yield NONE, "", 0.0, healthy, torque_nm
@@ -335,4 +327,17 @@ def _condition(
             signed, _ = with_signature(healthy, name, rng)
             yield name, BY_HAND, severity if name == cause else 0.0, signed, torque_nm
 
-    return reference, with_channels_of(reduce_recording(run, known), here), compared()
+    return reference, reduced_twin(now, rig, torque_nm), compared()
+
+
+def reduced_twin(recording: Recording, rig: int, torque_nm: float) -> ReducedRecording:
+    """Return the run of the twin at a recording's speed and the stated torque, reduced, under its channels' names."""
+    here, known = reduced(recording, rig), rig_of(recording)
+    simulated = CrackedTwin(known, nominal_of(known)).run(
+        OperatingCondition(60.0 * here.speed_hz, torque_nm),
+        seed=rig,
+        duration_s=run_length_s(here),
+        sampling_rate_hz=recording.sampling_rate_hz,
+        noise=1,
+    )
+    return with_channels_of(reduce_recording(simulated, known), here)
