@@ -13,6 +13,7 @@ from gearsig.severity._estimate import (
 )
 from gearsig.severity._features import (
     FEATURES,
+    LARGEST_MARK_SHIFT,
     LARGEST_SPEED_DIFFERENCE,
     RELIEF,
     RISING,
@@ -63,6 +64,7 @@ __all__ = [
     "FILE",
     "KINDS",
     "KIND_FEATURES",
+    "LARGEST_MARK_SHIFT",
     "LARGEST_SPEED_DIFFERENCE",
     "LARGEST_TORQUE_CHANGE",
     "MIN_SPREAD",

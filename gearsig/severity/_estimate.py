@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, instance_of, listed, positive, within
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import percent
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording, check_recording
 from gearsig.rig import GearPair, Rig
@@ -277,7 +278,7 @@ def check_same_rig(now: Rig, healthy: Rig) -> None:
     if torque and reference_torque and same_shaft and abs(abs(torque / reference_torque) - 1.0) > LARGEST_TORQUE_CHANGE:
         raise RefusalError(
             f"the reference was taken at {reference_torque:g} N m, the recording at {torque:g} N m",
-            remedy=f"take it within {100 * LARGEST_TORQUE_CHANGE:.0f} % of the same torque",
+            remedy=f"take it within {percent(LARGEST_TORQUE_CHANGE)} of the same torque",
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +12,15 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.prepared import PreparedRecording, shift_scores, sliding_mean, strongest_window, turned_lines
+from gearsig.formatting import percent
+from gearsig.prepared import (
+    PreparedRecording,
+    best_shift,
+    shift_scores,
+    sliding_mean,
+    strongest_window,
+    turned_lines,
+)
 from gearsig.rig import GearPair
 
 MIN_REVOLUTIONS = 13
@@ -377,6 +386,13 @@ LARGEST_SPEED_DIFFERENCE = 0.02
 
 LARGEST_GAIN_CHANGE = 0.15
 
+LARGEST_MARK_SHIFT = 0.25
+"""Of a tooth: a mark's sensor that was mounted anew, its trigger and the shafts' twist move the mesh that little. Not
+counted, a degree, 0.1 tooth of 36, leaves more about the fourth mesh harmonic in the difference than was there."""
+
+SLOW_ORDERS = 4
+"""Up to which a shaft's orders say nothing of its teeth."""
+
 
 def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool) -> tuple[ShaftLines, float]:
     """Return the lines of `now` less those of the healthy gear, turned so that the same teeth meet.
@@ -388,14 +404,15 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
     now, healthy : ShaftLines
         Of the same shaft and channels.
     whole_teeth : bool
-        Whether the shift can only be a whole number of teeth: the mate's mark fixes the phase of the mesh. Without a
-        mark anywhere it is searched in sixteenths of a tooth; where both have a mark on this shaft, it is 0.
+        Whether the shift is a whole number of teeth, but for `LARGEST_MARK_SHIFT`: the mate's mark fixes the phase of
+        the mesh. Where both have a mark on this shaft, it is 0 but for that. Without a mark any shift is possible.
 
     Returns
     -------
     ShaftLines
     agreement : float
-        Σ w Re(…)/Σ w |…| at the shift: 1 where the teeth's pattern is the same. A deep crack lowers it, too.
+        Σ w Re(…)/Σ w |…| at the shift, over the orders that tell teeth apart: 1 where the teeth's pattern is the same.
+        A deep crack lowers it, too.
 
     Raises
     ------
@@ -405,18 +422,28 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
     check_same_speed(now, healthy)
     highest = min(now.highest_order, healthy.highest_order)
     x, r = now.lines[:, : highest + 1], healthy.lines[:, : highest + 1]
-    # The cross spectrum, summed over channels; strong lines count by their root.
+    # The cross spectrum, summed over channels; strong lines count by their root. Mesh lines tell parts of a tooth.
     orders = np.arange(highest + 1)
-    used = telling_teeth_apart(orders, now.teeth) & (orders <= 6 * now.teeth)
+    used = (orders > SLOW_ORDERS) & (orders <= 6 * now.teeth)
     size = np.sqrt(np.abs(x) * np.abs(r))
     cross = np.divide(x * np.conj(r), size, out=np.zeros_like(x), where=(size > 0) & used).sum(axis=0)
-    n = now.teeth * (1 if whole_teeth else 16)
-    shifts = np.zeros(1) if now.has_mark and healthy.has_mark else np.arange(n) / n
-    scores = shift_scores(cross, shifts)
-    best = int(np.argmax(scores))
-    agreement = float(scores[best] / np.abs(cross).sum()) if np.any(cross) else 0.0
-    turned = turned_lines(r, float(shifts[best]))
+    is_marked = now.has_mark and healthy.has_mark
+    marks = partial(_is_possible, teeth=now.teeth, whole_teeth=whole_teeth, is_marked=is_marked)
+    shift = best_shift(cross, marks)
+    pattern = np.where(telling_teeth_apart(orders, now.teeth), cross, 0.0)
+    agreement = float(shift_scores(pattern, np.array([shift]))[0] / np.abs(pattern).sum()) if np.any(pattern) else 0.0
+    turned = turned_lines(r, shift)
     return replace(now, lines=x - _matched(turned, x, now.teeth), highest_order=highest), agreement
+
+
+def _is_possible(shifts_rev: FloatArray, teeth: int, *, whole_teeth: bool, is_marked: bool) -> NDArray[np.bool_]:
+    """Return which shifts the marks allow."""
+    moved = shifts_rev * teeth
+    if is_marked:
+        return np.abs(moved) <= LARGEST_MARK_SHIFT
+    if whole_teeth:
+        return np.abs(moved - np.round(moved)) <= LARGEST_MARK_SHIFT
+    return np.ones(len(moved), dtype=bool)
 
 
 def check_same_speed(now: ShaftLines, healthy: ShaftLines) -> None:
@@ -427,7 +454,7 @@ def check_same_speed(now: ShaftLines, healthy: ShaftLines) -> None:
         raise RefusalError(
             f"the reference was taken at a speed {100 * change:.1f} % off: shaft {now.shaft!r} turns at {rpm[0]:.5g} "
             f"rpm there, at {rpm[1]:.5g} rpm in the recording",
-            remedy=f"take it within {100 * LARGEST_SPEED_DIFFERENCE:.0f} % of the same speed, at the same load",
+            remedy=f"take it within {percent(LARGEST_SPEED_DIFFERENCE)} of the same speed, at the same load",
         )
 
 
@@ -453,7 +480,7 @@ def _matched(reference: np.ndarray, x: np.ndarray, teeth: int) -> np.ndarray:
 
 def telling_teeth_apart(orders: np.ndarray, teeth: int) -> np.ndarray:
     """Return which orders tell one tooth from another; shaft orders, mesh lines and their sidebands hardly do."""
-    used: np.ndarray = (orders > 4) & (orders_from_mesh(orders, teeth) > 1)
+    used: np.ndarray = (orders > SLOW_ORDERS) & (orders_from_mesh(orders, teeth) > 1)
     return used
 
 
