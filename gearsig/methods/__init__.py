@@ -12,6 +12,7 @@ from __future__ import annotations
 from gearsig.methods._apply import METHODS, apply_method, apply_method_to_file
 from gearsig.methods._decompose import by_centre
 from gearsig.methods._phase import N_IN_SPACE
+from gearsig.methods._spectra import suggested_rate_hz
 from gearsig.methods._table import (
     Kind,
     Method,
@@ -38,5 +39,6 @@ __all__ = [
     "apply_method_to_file",
     "by_centre",
     "part_of",
+    "suggested_rate_hz",
     "usual_channel",
 ]

@@ -99,7 +99,10 @@ def _modes(
     names = [f"mode {k}, {centre:.5g} {unit}" for k, centre in enumerate(modes.centres, start=1)]
     columns = dict(zip(names, modes.waveforms, strict=True)) | {"residual": modes.residual}
     step = f"{modes.n_modes} variational modes, penalty {settings.penalty:g}, of {modes.source} less {offset:g}"
-    waveforms = waveforms_of(prepared, channel, signal, {"signal": signal.values, **columns}, step, residual="residual")
+    waveforms = waveforms_of(
+        prepared, channel, signal, {"signal": signal.values, **columns}, step,
+        residual="residual", shown_first=names[chosen],
+    )  # fmt: skip
     about = {
         "mode": np.arange(1, modes.n_modes + 1),
         f"centre ({unit})": modes.centres,

@@ -10,6 +10,7 @@ import numpy as np
 from gearsig import phase, plot
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import percent
 from gearsig.methods._table import SHAFT, Method, MethodAnswer, MethodOption, angle_or_none, unit_of
 from gearsig.plot import with_unit
 from gearsig.prepared import PreparedRecording
@@ -234,8 +235,8 @@ def _embedding(prepared: PreparedRecording, channel: str, **options: Any) -> Met
         notes=(
             (
                 f"Delay {information.delay_samples} samples by the curve ({information.rule}); a dimension unfolds the "
-                f"path where fewer than {curves.threshold:.0%} of the nearest neighbours are false.{yours} E2 near 1 "
-                "at every dimension says random."
+                f"path where fewer than {percent(curves.threshold)} of the nearest neighbours are false.{yours} E2 "
+                "near 1 at every dimension says random."
             ),
         ),
         warnings=said,

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from gearsig import plot, spectra
-from gearsig.angle import resample_to_angle
-from gearsig.diagnosis import RecordBlocks, analyze
+from gearsig.angle import ShaftAngle, resample_to_angle
+from gearsig.diagnosis import Analysis, Kind, RecordBlocks, analyze
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import readable
 from gearsig.methods._table import (
@@ -326,28 +326,29 @@ N_MAP_LINES = 144
 
 
 def _kurtosis_panel(grid: spectra.Kurtogram, band: spectra.BandCandidate, rate_hz: float) -> LevelPanel:
-    """Spectral kurtosis over frequency, a row for each number of bands; the band that was chosen is outlined."""
-    levels = np.unique(grid.level)
-    n = 3 * 2 ** int(np.ceil(levels.max()))
+    """Spectral kurtosis over frequency, a row for each bandwidth, the widest on top; the chosen band is outlined."""
+    levels = -np.unique(grid.level)[::-1]  # ascending in bandwidth
+    n = 3 * 2 ** int(np.ceil(-levels.min()))
     at = (np.arange(n) + 0.5) * rate_hz / 2.0 / n
     rows = np.zeros((len(levels), n))
     for low, high, level, kurtosis in zip(grid.low_hz, grid.high_hz, grid.level, grid.kurtosis, strict=True):
-        rows[np.searchsorted(levels, level), (at >= low) & (at < high)] = kurtosis
+        rows[np.searchsorted(levels, -level), (at >= low) & (at < high)] = kurtosis
     # Levels are not equally far apart: the row of each reaches halfway to its neighbours, over many lines of the map.
     halves = np.diff(levels) / 2.0 if len(levels) > 1 else np.array([0.5])
     edges = np.concatenate([levels[:1] - halves[:1], levels[:-1] + np.diff(levels) / 2.0, levels[-1:] + halves[-1:]])
     middles = edges[0] + (np.arange(N_MAP_LINES) + 0.5) * (edges[-1] - edges[0]) / N_MAP_LINES
     values = rows[np.searchsorted(edges, middles) - 1]
-    positions = np.geomspace(2.0 ** edges[0], 2.0 ** edges[-1], N_MAP_LINES)
-    chosen = int(np.argmin(np.abs(levels - band.level)))
-    below, above = 2.0 ** edges[chosen : chosen + 2]
+    edges_hz = rate_hz / 2.0 * 2.0**edges
+    positions = np.geomspace(edges_hz[0], edges_hz[-1], N_MAP_LINES)
+    chosen = int(np.argmin(np.abs(levels + band.level)))
+    below, above = edges_hz[chosen : chosen + 2]
     ends = np.clip([band.low_hz, band.high_hz], at[0], at[-1])
     outline = (
         ChartLine(np.repeat(ends, 2), np.array([below, above, above, below]), "the band chosen", 1),
         ChartLine(ends, np.array([below, below]), "the band chosen", 1),
     )
     return LevelPanel(
-        values, at, positions, "frequency (Hz)", "number of bands", "spectral kurtosis", logarithmic=True,
+        values, at, positions, "frequency (Hz)", "bandwidth (Hz)", "spectral kurtosis", logarithmic=True,
         lines=outline, span=max(float(values.max()), 1e-3),  # colours begin at 0: below, nothing is impulsive
     )  # fmt: skip
 
@@ -475,12 +476,30 @@ def _deconvolution(
 ) -> MethodAnswer:
     recording = prepared.recording
     x, fs = recording.values(channel), recording.sampling_rate_hz
-    if by == "multipoint" and not rate_hz:
-        raise RefusalError("no rate of the impacts is given", remedy="give how often they come, above 0 Hz")
+    warnings, what = list[str](), ""
+    notes: tuple[str, ...] = (
+        "It makes something impulsive of any noise: other rates must be less alike. Levels are not kept.",
+    )
     if by == "multipoint":
-        result = spectra.multipoint_deconvolution(x, fs, 1.0 / float(rate_hz or 1.0), n_taps=taps)
+        if rate_hz is None:
+            analysis = prepared.keep(("methods", "analysis"), lambda: analyze(prepared))
+            found_hz = suggested_rate_hz(analysis)
+            rate_hz, what = found_hz or ASSUMED_RATE_HZ, "as found in the recording" if found_hz else ""
+        if not rate_hz:
+            raise RefusalError("no rate of the impacts is given", remedy="give how often they come, above 0 Hz")
+        what = rhythm_at(prepared, rate_hz) or what
+        if not what and rate_hz == ASSUMED_RATE_HZ:
+            warnings.append(
+                f"{rate_hz:g} impacts per second are assumed: nothing is suspected, and no bearing or shaft is "
+                "described whose rate could be taken. Give the rate that you seek"
+            )
+        angle = angle_or_none(prepared)
+        if angle is not None and not angle.is_steady():
+            warnings.append("the speed changes, and the rate of impacts with it: choose a part of even speed")
+        result = spectra.multipoint_deconvolution(x, fs, 1.0 / rate_hz, n_taps=taps)
         chance = np.sqrt(taps / len(x))
         fact = f"Likeness to a train of {rate_hz:.5g} Hz: **{result.score:.3g}** (white noise: {chance:.2g})."
+        notes = (f"{rate_hz:.5g} Hz: {what}.", *notes) if what else notes
     else:
         result = spectra.minimum_entropy_deconvolution(x, fs, n_taps=taps)
         fact = f"Kurtosis **{result.score:.3g}** (3: Gaussian noise)."
@@ -500,9 +519,57 @@ def _deconvolution(
         waveforms.table(),
         numbers={"score": result.score},
         facts=(fact,),
-        notes=("It makes something impulsive of any noise: other rates must be less alike. Levels are not kept.",),
+        notes=notes,
+        warnings=warnings,
         waveforms=waveforms,
     )
+
+
+ASSUMED_RATE_HZ = 100.0
+"""Rate of impacts where nothing tells one."""
+
+
+def suggested_rate_hz(analysis: Analysis) -> float | None:
+    """Return how often impacts come, by what was found of the machine; else by its description; None without either.
+
+    The first of: impacts that a finding names; turns of the shaft of a damaged tooth; elements that pass the outer race
+    of the first bearing, which is damaged most often; turns of the reference shaft.
+    """
+    for finding in analysis.findings:
+        if finding.where.band_hz is not None and finding.where.frequency_hz:
+            return finding.where.frequency_hz
+    angle = analysis.shaft_angle
+    if not isinstance(angle, ShaftAngle) or angle.mean_speed_rpm <= 0:
+        return None
+    turns_hz, rig = angle.mean_speed_rpm / 60.0, analysis.rig
+    if rig is None or not rig.shafts:
+        return turns_hz
+    for finding in analysis.findings:
+        shaft = finding.where.gear.rpartition("/")[2] or finding.where.shaft
+        is_tooth = finding.where.tooth is not None or finding.where.angle_deg is not None
+        if finding.kind in (Kind.FAULT, Kind.SUSPICION) and is_tooth and shaft in rig.shaft_names:
+            return turns_hz * (rig.ratio(shaft) or 1.0)
+    races = (
+        ratio * bearing.orders()["BPFO"]
+        for bearing in rig.bearings
+        if (ratio := rig.ratio(bearing.shaft)) is not None and "BPFO" in bearing.orders()
+    )
+    return turns_hz * next(races, 1.0)
+
+
+def rhythm_at(prepared: PreparedRecording, rate_hz: float) -> str:
+    """Name the bearing line or the shaft that a rate is of, bearings within their slip; empty where there is none."""
+    angle = angle_or_none(prepared)
+    if angle is None or angle.mean_speed_rpm <= 0:
+        return ""
+    if not prepared.rig.shafts:
+        return "the shaft" if abs(60.0 * rate_hz / angle.mean_speed_rpm - 1.0) <= 0.1 * SLIP_SHARE else ""
+    order = 60.0 * rate_hz / angle.mean_speed_rpm
+    lines = order_lines(prepared.rig, angle.shaft, n_mesh_harmonics=1, n_shaft_harmonics=1, n_sidebands=0)
+    slips = {"shaft": 0.1 * SLIP_SHARE, "bearing": 2.0 * SLIP_SHARE}
+    near = [line for line in lines if line.kind in slips and abs(order / line.order - 1.0) <= slips[line.kind]]
+    best = min(near, key=lambda line: abs(order / line.order - 1.0), default=None)
+    return "" if best is None else best.label
 
 
 # Averages, indicators, waveform, speed.
@@ -659,8 +726,10 @@ RHYTHMS = {
                 minimum=10,
             ),
             MethodOption(
-                "rate_hz", "Impacts per second (Hz)", "number", 100.0,
-                "How often an impact comes, e.g. how often elements pass a race.", unit="Hz", minimum=0.0,
+                "rate_hz", "Impacts per second (Hz)", "number", None,
+                "How often an impact comes, e.g. how often elements pass a race.",
+                "as found, else as the machine's description says", unit="Hz", minimum=0.0,
+                suggested=suggested_rate_hz,
             ),
         ),
         "Envelope",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray, count, one_of, within
+from gearsig.diagnosis import Analysis
 from gearsig.errors import InputError, RefusalError
 from gearsig.plot import LevelPanel, LinePanel
 from gearsig.prepared import PreparedRecording
@@ -49,6 +50,8 @@ class MethodOption:
         or the text that stands for None in a number.
     more : bool
         Seldom needed.
+    suggested : callable or None
+        Analysis → the value that what it found, or the machine's description, suggests; None: none.
     """
 
     name: str
@@ -63,6 +66,7 @@ class MethodOption:
     maximum: float | None = None
     known: Callable[[PreparedRecording, str], Any] | None = None
     more: bool = False
+    suggested: Callable[[Analysis], Any] | None = None
 
     def check(self, value: Any) -> None:
         """Raise an `InputError` for a value that the option does not allow."""
@@ -97,8 +101,9 @@ class Waveforms:
         What was done to the signal, for the history of a file.
     axis : str
         "frequency" for signals over time, "order" for those over angle.
-    shaft, residual : str
-        Residual: the column that remains of the signal, if there is one.
+    shaft, residual, shown_first : str
+        Residual: the column that remains of the signal, if there is one. Shown first: the column that the answer
+        speaks of; empty: the first.
     """
 
     columns: Mapping[str, FloatArray]
@@ -110,6 +115,7 @@ class Waveforms:
     axis: Axis = "frequency"
     shaft: str = ""
     residual: str = ""
+    shown_first: str = ""
 
     @property
     def n_samples(self) -> int:
@@ -290,13 +296,14 @@ def waveforms_of(
     step: str,
     *,
     residual: str = "",
+    shown_first: str = "",
 ) -> Waveforms:
     """Return waveforms on the axis and in the unit of a signal that was made of a channel."""
     measured = prepared.recording.channels[prepared.recording.index(channel)]
     same = signal.unit == measured.unit and signal.source == channel
     return Waveforms(
         columns, signal.rate, signal.start, signal.unit, measured.quantity if same else "unknown",
-        f"{step}, of {channel}", signal.axis, signal.shaft, residual,
+        f"{step}, of {channel}", signal.axis, signal.shaft, residual, shown_first,
     )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """Figures of results; no arithmetic beyond display units."""
 
+from gearsig.formatting import unit_text
 from gearsig.plot._average import average_figure, polar_figure
 from gearsig.plot._comparison import average_overlay_figure, band_levels_figure, order_overlay_figure
 from gearsig.plot._cursors import (
@@ -123,7 +124,6 @@ from gearsig.plot._style import (
     level_colours,
     new_figure,
     plain,
-    unit_text,
     with_unit,
 )
 

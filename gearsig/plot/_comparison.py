@@ -10,12 +10,13 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.comparison import BEYOND, BandLevel, LevelPair, LineLevel
 from gearsig.errors import InputError
+from gearsig.formatting import unit_text
 from gearsig.orders import SynchronousAverage
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
 from gearsig.plot._series import envelope, thin
-from gearsig.plot._style import above_zero, plain, unit_text, with_unit
+from gearsig.plot._style import above_zero, plain, with_unit
 from gearsig.spectra import Spectrum
 
 if TYPE_CHECKING:

@@ -9,11 +9,12 @@ import numpy as np
 
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError
+from gearsig.formatting import readable, unit_text
 from gearsig.orders import OrderMap
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
-from gearsig.plot._style import decibels, unit_text
+from gearsig.plot._style import decibels
 from gearsig.spectra import BandCandidate, EnhancedEnvelope, Kurtogram, SpectralCoherence, enhanced_envelope
 from gearsig.timefreq import Ridge, TimeFrequencyMap
 
@@ -180,7 +181,7 @@ def time_frequency_figure(
 
 
 def kurtogram_figure(kurtogram: Kurtogram, band: BandCandidate | None = None, *, height_in: float = 4.2) -> Figure:
-    """Draw the kurtosis of each band over frequency, one row per level, widest bands on top.
+    """Draw the kurtosis of each band over frequency, one row per bandwidth, the widest on top.
 
     Parameters
     ----------
@@ -212,12 +213,13 @@ def kurtogram_figure(kurtogram: Kurtogram, band: BandCandidate | None = None, *,
     axes.plot(x, y, color="white", linewidth=3.0, clip_on=False)
     axes.plot(x, y, color=style.FAULT, linewidth=1.6, clip_on=False)
     prepared = "" if kurtogram.preparation == "none" else f", {kurtogram.preparation}"
-    style.label_axes(axes, "frequency (Hz)", "number of bands", f"kurtogram of {kurtogram.source}{prepared}")
+    style.label_axes(axes, "frequency (Hz)", "bandwidth (Hz)", f"kurtogram of {kurtogram.source}{prepared}")
     warnings = kurtogram.warnings(band)
     name = f"{band.low_hz:.5g} to {band.high_hz:.5g} Hz, kurtosis {band.kurtosis:.3g}"
     style.note(axes, warnings[0] if warnings else name)
     style.no_offset(axes)
-    axes.set_yticks(range(len(kurtogram.levels)), [f"{round(2**level)}" for level in kurtogram.levels])
+    widest_hz = float(kurtogram.high_hz.max())
+    axes.set_yticks(range(len(kurtogram.levels)), [readable(widest_hz / 2**level, 3) for level in kurtogram.levels])
     return figure
 
 

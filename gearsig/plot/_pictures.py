@@ -20,12 +20,11 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.fleet import Trend
-from gearsig.formatting import readable
+from gearsig.formatting import readable, unit_text
 from gearsig.orders import SynchronousAverage
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import AngleMark, Cursor
 from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, line_colour, pooled_levels
-from gearsig.plot._style import unit_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,13 +14,14 @@ from gearsig.checks import FloatArray, one_of
 from gearsig.decompose import Modes, mode_spectra
 from gearsig.diagnosis import OrderLevel
 from gearsig.errors import InputError
+from gearsig.formatting import unit_text
 from gearsig.indicators import Indicator
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
 from gearsig.plot._panels import ChartLine, LinePanel
 from gearsig.plot._series import N_POINTS, envelope, thin
-from gearsig.plot._style import Scale, above_zero, decibels, plain, unit_text, with_unit
+from gearsig.plot._style import Scale, above_zero, decibels, plain, with_unit
 from gearsig.recording import Recording
 from gearsig.spectra import Scaling, Spectrum
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.formatting import unit_text
 from gearsig.spectra import Scaling
 
 if TYPE_CHECKING:
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
 Scale = Literal["log", "decibel", "linear"]
 """How values are drawn: on a logarithmic axis, in decibels on a linear one, or as they are."""
-
-_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def decibels(values: FloatArray, scaling: Scaling) -> FloatArray:
@@ -47,22 +46,6 @@ def above_zero(values: FloatArray) -> FloatArray:
     largest = float(np.max(values, initial=0.0))
     lowest = 1e-10 * largest if largest > 0 else 1e-10
     return np.maximum(np.asarray(values, dtype=np.float64), max(lowest, float(np.finfo(np.float64).tiny)))
-
-
-def unit_text(unit: str) -> str:
-    """Write a unit with superscripts.
-
-    Examples
-    --------
-    >>> unit_text("(m/s^2)^2/Hz")
-    '(m/s²)²/Hz'
-    """
-    parts = unit.split("^")
-    text = parts[0]
-    for part in parts[1:]:
-        digits = len(part) - len(part.lstrip("-0123456789"))
-        text += part[:digits].translate(_SUPERSCRIPTS) + part[digits:] if digits else "^" + part
-    return text
 
 
 def with_unit(name: str, unit: str) -> str:

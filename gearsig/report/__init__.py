@@ -1,7 +1,6 @@
 """Results as JSON and self-contained HTML."""
 
 from gearsig.report._analysis_json import analysis_to_dict, analysis_to_json, long_analysis_to_json, write_json
-from gearsig.report._benchmark import Section, benchmark_html
 from gearsig.report._comparison import (
     alignment_texts,
     channel_rows,
@@ -12,7 +11,7 @@ from gearsig.report._comparison import (
     orders_csv,
     shown_orders,
 )
-from gearsig.report._files import check_writable, made_folder, page_names, recording_mark
+from gearsig.report._files import Section, benchmark_html, check_writable, made_folder, page_names, recording_mark
 from gearsig.report._fleet import fleet_page_html, fleet_page_pdf, write_fleet_page
 from gearsig.report._gap_json import gap_from_dict, gap_schema, gap_to_dict, gap_to_json, read_gap_json, write_gap_json
 from gearsig.report._gap_page import (
@@ -76,6 +75,7 @@ from gearsig.report._sections import (
     analysis_text,
     change_rows,
     finding_card,
+    finding_cards,
     headline_of,
     long_analysis_text,
     reference_text,
@@ -111,6 +111,7 @@ __all__ = [
     "condition_rows",
     "entry_of",
     "finding_card",
+    "finding_cards",
     "fitting_methods",
     "fleet_page_html",
     "fleet_page_pdf",

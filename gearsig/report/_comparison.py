@@ -123,7 +123,9 @@ def _teeth_text(comparison: Comparison, shaft: ShaftComparison) -> str:
     if not shaft.tooth_levels:
         return ""
     certain = next(alignment.tooth_is_certain for alignment in comparison.alignments if alignment.shaft == shaft.shaft)
-    unknown = " Which tooth of one is which of the other is not known here." if certain is False else ""
+    unknown = (
+        " Which tooth of the simulation is which of the recording cannot be told here." if certain is False else ""
+    )
     return f" {LOOK_AT_TEETH}{unknown}"
 
 
@@ -189,7 +191,7 @@ def alignment_texts(comparison: Comparison) -> list[str]:
             texts.append(f"{name}by the marks of both records")
             continue
         certain = alignment.tooth_is_certain
-        sure = {None: "", True: ", the same tooth in both", False: ", good to whole teeth only"}[certain]
+        sure = {None: "", True: ", the same tooth in both", False: ", to a whole number of teeth only"}[certain]
         within = "" if certain is False else f" ± {alignment.repeatability_deg:.2g}°"
         turned = f"{alignment.shift_deg:+.4g}°".replace("-", "−")
         texts.append(f"{name}by correlation, simulation turned by {turned}{within}{sure}")

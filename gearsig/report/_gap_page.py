@@ -15,7 +15,7 @@ import numpy as np
 
 from gearsig import __version__, plot
 from gearsig.cache import write_text
-from gearsig.formatting import enumerated, named, readable, signed
+from gearsig.formatting import enumerated, named, odds_text, percent, readable, signed
 from gearsig.gap import (
     NONE,
     UNKNOWN,
@@ -34,7 +34,6 @@ from gearsig.gap import (
     against_reference,
     hardly_predicted,
     lines_beyond,
-    odds_text,
     point_text,
     same_condition,
     severity_unit,
@@ -337,19 +336,6 @@ def interval_text(interval: Interval, unit: str = "") -> str:
     """Write a value with its 90 % interval."""
     value, within = readable(interval.value, 2), interval.words(lambda end: readable(end, 2))
     return f"{value}{' ' if unit else ''}{unit} ({within})"
-
-
-def percent(share: float) -> str:
-    """Write a share in percent: nothing below one is told from another.
-
-    Examples
-    --------
-    >>> percent(0.884), percent(0.003), percent(0.0), percent(float("nan")), percent(-0.1), percent(-0.001)
-    ('88 %', '< 1 %', '0 %', '–', '−10 %', '0 %')
-    """
-    if not isfinite(share):
-        return "–"
-    return "< 1 %" if 0 < share < MIN_SHOWN else f"{round(100 * share)} %".replace("-", "−")
 
 
 def _bar(share: float) -> float:

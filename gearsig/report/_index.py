@@ -18,7 +18,7 @@ from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.diagnosis import Analysis, Kind, Outcome
 from gearsig.fleet import date_in_name
-from gearsig.formatting import readable, spreadsheet_cell
+from gearsig.formatting import percent, readable, spreadsheet_cell
 from gearsig.indicators import Indicator
 from gearsig.plot import unit_text, with_unit
 from gearsig.report._files import render
@@ -93,7 +93,7 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         page,
         analysis.outcome,
         analysis.verdict,
-        " ".join(headline_of(analysis)).strip(),
+        " ".join(headline_of(analysis, with_remedy=True)).strip(),
         top.confidence if top is not None else None,
         top.strength.ratio_db if top is not None and top.strength is not None else None,
         analysis.indicators,
@@ -188,7 +188,7 @@ def index_of(entries: Sequence[Entry], failures: Sequence[Failure] = ()) -> Inde
             css_class(entry.outcome),
             quote(entry.page),
             f"{entry.date:%Y-%m-%d %H:%M}".removesuffix(" 00:00") if entry.date is not None else "",
-            f"{100 * entry.confidence:.0f} %" if entry.confidence is not None else "",
+            percent(entry.confidence) if entry.confidence is not None else "",
             _size_text(entry),
             tuple(cells[i] for _, cells in columns),
             tuple(place[i] for place in orders.values()),

@@ -144,7 +144,7 @@ def method_pictures(
         except RefusalError as refusal:
             reasons.append(f"{text}: {refusal}")
             continue
-        about = f"{answer.caption[0].upper()}{answer.caption[1:]}, {answer.channel}."
+        about = f"{answer.caption[0].upper()}{answer.caption[1:]} (channel {answer.channel})."
         if not answer.panels:
             pictures.append(embed(answer.draw(), about, about))
         for panel in answer.panels:

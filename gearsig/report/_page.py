@@ -20,13 +20,14 @@ from gearsig.formatting import readable
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed, order_cursors, unit_text
+from gearsig.prepared import circular_correlation
 from gearsig.recording import SI_FACTORS
 from gearsig.report._files import render
 from gearsig.report._methods import fitting_methods, method_pictures
 from gearsig.report._sections import (
     change_rows,
     css_class,
-    finding_card,
+    finding_cards,
     headline_of,
     indicator_tables,
     machine_rows,
@@ -35,7 +36,7 @@ from gearsig.report._sections import (
     speed_rows,
     truth_rows,
 )
-from gearsig.severity import CrackEstimate
+from gearsig.severity import LARGEST_MARK_SHIFT, CrackEstimate
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 CLAIMED = (Kind.FAULT, Kind.SUSPICION, Kind.DATA_PROBLEM)
@@ -63,8 +64,18 @@ def line_cursors(analysis: Analysis, spectrum: Spectrum | OrderMap, *, n_sideban
 
 
 def bearing_cursors(analysis: Analysis, spectrum: Spectrum) -> tuple[Cursor, ...]:
-    """Return shaft lines and three harmonics of each bearing line."""
-    return plot.rhythm_cursors(line_cursors(analysis, spectrum, n_sidebands=0))
+    """Return shaft lines, three harmonics of each bearing line, and of each rhythm that no described part explains."""
+    cursors = list(line_cursors(analysis, spectrum, n_sidebands=0))
+    for finding in analysis.findings:
+        position = _position(analysis, spectrum, finding.where) if is_of_envelope(finding.where) else None
+        if position is not None and not finding.where.bearing:
+            cursors.append(Cursor(position, "bearing", "impacts", 1))
+    return plot.rhythm_cursors(cursors)
+
+
+def is_of_envelope(where: Where) -> bool:
+    """Whether a place is a rhythm in a band's envelope: a bearing's, or impacts that no described part explains."""
+    return bool(where.bearing) or (where.band_hz is not None and (where.order or where.frequency_hz) is not None)
 
 
 def highest_order_of_interest(analysis: Analysis, spectrum: Spectrum | OrderMap) -> float:
@@ -100,12 +111,12 @@ def marked_positions(
 ) -> tuple[float, ...]:
     """Return where faults and suspicions of a channel lie on a spectrum's axis, faults first.
 
-    Bearing findings live in the envelope spectrum, all others in the spectrum itself. What has changed at a part's
-    kinematic order is marked at the order that a finding measured for it, if one did.
+    Impacts of bearings and others live in the envelope spectrum, all other findings in the spectrum itself. What has
+    changed at a part's kinematic order is marked at the order that a finding measured for it, if one did.
     """
     positions: list[float] = []
     for finding in sorted(analysis.findings, key=_faults_first):
-        if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or bool(finding.where.bearing) != of_bearings:
+        if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or is_of_envelope(finding.where) != of_bearings:
             continue
         if finding.where.channels and channel not in finding.where.channels:
             continue
@@ -154,8 +165,9 @@ class VerdictPicture:
     Parameters
     ----------
     about : str
-        "tooth": the mean revolution of a gear; "bearing": the envelope spectrum; "resonance": levels over speed;
-        "motion": starts and stops; "lines": the order spectrum, or the spectrum where the speed is not known.
+        "tooth": the mean revolution of a gear; "bearing": the envelope spectrum, with the impacts of a bearing,
+        described or not; "resonance": levels over speed; "motion": starts and stops; "lines": the order spectrum, or
+        the spectrum where the speed is not known.
     channel : ChannelAnalysis
     shaft : str
         Of a tooth.
@@ -189,11 +201,19 @@ def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
         shaft = where.gear.rpartition("/")[2] or where.shaft
         if (where.tooth or where.angle_deg is not None) and any(of == shaft for of, _ in channel.averages):
             return VerdictPicture("tooth", channel, shaft, finding)
-        if where.bearing and channel.envelope_spectrum is not None:
-            return VerdictPicture("bearing", channel, "", finding)
-        if finding.code == "resonance" and channel.order_levels:
-            return VerdictPicture("resonance", channel, "", finding)
+        if (about := _shown_by(finding, channel)) is not None:
+            return VerdictPicture(about, channel, "", finding)
     return VerdictPicture("lines", next(iter(channels.values())))
+
+
+def _shown_by(finding: Finding, channel: ChannelAnalysis) -> Literal["bearing", "resonance", "lines"] | None:
+    """Return which of a channel's spectra and levels shows a finding; None where it has no place in any."""
+    where = finding.where
+    if is_of_envelope(where) and channel.envelope_spectrum is not None:
+        return "bearing"
+    if finding.code == "resonance" and channel.order_levels:
+        return "resonance"
+    return "lines" if (where.order or where.frequency_hz) is not None else None
 
 
 def crack_picture(analysis: Analysis) -> Picture | None:
@@ -215,7 +235,8 @@ def crack_picture(analysis: Analysis) -> Picture | None:
         reference_channel = references.get(channel.channel)
         reference = reference_channel.averages.get((crack.shaft, "average")) if reference_channel is not None else None
         if reference is not None and reference.unit == average.unit:
-            then = factor * _on_angles_of(average.values, reference.values, turn=crack.tooth is None)
+            turn = LARGEST_MARK_SHIFT / teeth if teeth and crack.tooth is not None else 0.5
+            then = factor * _on_angles_of(average.values, reference.values, turn)
         change = float(np.std(now - then)) / size if then is not None and size > 0 else 0.0
         averages.append((change, channel.channel, now, then))
     if teeth is None or not averages:
@@ -250,15 +271,14 @@ def crack_picture(analysis: Analysis) -> Picture | None:
     )
 
 
-def _on_angles_of(values: FloatArray, reference: FloatArray, *, turn: bool) -> FloatArray:
-    """Return the reference's average on the angles of another; without a mark turned to where the two agree best."""
+def _on_angles_of(values: FloatArray, reference: FloatArray, largest_turn_rev: float) -> FloatArray:
+    """Return the reference's average on the angles of another, turned within limits to where the two agree best."""
     n = len(values)
     lines = np.fft.rfft(reference)[: n // 2 + 1] * (n / len(reference))
     result = np.fft.irfft(np.pad(lines, (0, n // 2 + 1 - len(lines))), n)
-    if turn:
-        agreement = np.fft.irfft(np.fft.rfft(values) * np.conj(np.fft.rfft(result)), n)
-        result = np.roll(result, int(np.argmax(agreement)))
-    return np.asarray(result)
+    agreement = circular_correlation(values, result)
+    agreement[np.abs(np.fft.fftfreq(n)) > largest_turn_rev] = -np.inf
+    return np.roll(result, int(np.argmax(agreement)))
 
 
 def start_stop_figures(examined: StartStop) -> Iterator[Captioned]:
@@ -359,7 +379,7 @@ def gallery(analysis: Analysis, methods: Sequence[str] | None = None) -> Gallery
     left_out, others = ordered[N_CHANNELS:], ordered[len(detailed) : N_CHANNELS]
     remarks = []
     if others:
-        remarks.append(f"{', '.join(others)}: main picture only; {', '.join(detailed)} in detail.")
+        remarks.append(f"{', '.join(others)}: spectrum only; {', '.join(detailed)} in detail.")
     if left_out:
         remarks.append(f"There are no pictures of {', '.join(left_out)}; their numbers are in the table.")
     remarks += [f"{reason}." for reason in reasons]
@@ -371,7 +391,7 @@ def _further_methods(
 ) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
     """Return the pictures of further methods, of the channel that a tooth's or race's finding names, and refusals."""
     teeth = [finding for finding in claims if finding.where.tooth is not None or finding.where.angle_deg is not None]
-    bearings = [finding for finding in claims if finding.where.bearing]
+    bearings = [finding for finding in claims if is_of_envelope(finding.where)]
     channel = next((name for finding in (*teeth, *bearings) for name in finding.where.channels), "")
     angle = analysis.shaft_angle if isinstance(analysis.shaft_angle, ShaftAngle) else None
     suspects = {"suspects_crack": bool(teeth), "suspects_bearing": bool(bearings)}
@@ -590,10 +610,11 @@ def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
     seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
     return Picture.of_svg(
         plot.svg_ring(average, n_teeth=teeth, marks=marks),
-        f"{shaft}: healthy teeth draw an even ring, a damaged one swings out."
+        f"{shaft or 'The shaft'}: healthy teeth draw an even ring, a damaged one swings out."
         if teeth
-        else f"{shaft}: what leaves the ring comes back at that angle every turn.",
-        f"Polar picture of the {average.kind} of {average.channel} over one revolution of {shaft}{seen}.",
+        else f"{shaft or 'The shaft'}: what leaves the ring comes back at that angle every turn.",
+        f"Polar picture of the {average.kind} of {average.channel} over one revolution of {shaft or 'the shaft'}"
+        f"{seen}.",
     )
 
 
@@ -689,7 +710,9 @@ def page_parts(
 ) -> dict[str, Any]:
     """Return what the page says, in HTML as in PDF."""
     recording = analysis.recording
-    headline, explanation = headline_of(analysis)
+    ordered = sorted(analysis.findings, key=lambda finding: finding.kind not in CLAIMED)
+    cards = list(zip(ordered, finding_cards(ordered), strict=True))
+    headline, explanation = headline_of(analysis, with_remedy=True)
     return {
         "title": recording.provenance.source or "recording made in memory",
         "machine_name": analysis.rig.name if analysis.rig is not None else "",
@@ -699,8 +722,8 @@ def page_parts(
         "changes": change_rows(analysis),
         "outcome_class": css_class(analysis.outcome),
         "outcome": analysis.outcome.value,
-        "findings": [finding_card(finding) for finding in analysis.findings if finding.kind in CLAIMED],
-        "further": [finding_card(finding) for finding in analysis.findings if finding.kind not in CLAIMED],
+        "findings": [card for finding, card in cards if finding.kind in CLAIMED],
+        "further": [card for finding, card in cards if finding.kind not in CLAIMED],
         "machine": machine_rows(analysis.rig),
         "warnings": [text for text in recording.warnings if text not in {f.title for f in analysis.findings}],
         "speed": speed_rows(analysis.shaft_angle),

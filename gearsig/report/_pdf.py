@@ -60,7 +60,7 @@ def page_pdf(
         "date": dict(parts["provenance"]).get("date", ""),
         "made": f"gearsig {__version__}",
         "changes": [
-            asdict(row) | {"change": f"{row.change_db:+.1f} dB", "repeatability": f"± {row.repeatability_db:.1f}"}
+            asdict(row) | {"change": row.change, "repeatability": f"± {row.repeatability_db:.1f}"}
             for row in parts["changes"]
         ],
         "verdict_picture": None if verdict is None else put_picture(verdict, pictures),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.metadata import version
 from textwrap import fill
@@ -17,23 +17,27 @@ from gearsig.angle import ShaftAngle
 from gearsig.checks import instance_of
 from gearsig.diagnosis import (
     CHANGED,
+    SURER_WITH,
+    WHAT_WOULD_HELP,
     Analysis,
     CannotTell,
     Finding,
     IndicatorChange,
     Kind,
+    LevelChange,
     LongAnalysis,
     Outcome,
     Strength,
     Where,
     changes,
 )
-from gearsig.formatting import named, readable
+from gearsig.formatting import counted, named, percent, readable, signed, with_minus
 from gearsig.indicators import Indicator
 from gearsig.plot import unit_text
 from gearsig.rig import Bearing, GearPair, Rig
 
 Rows = tuple[tuple[str, str], ...]
+_CLAIMS = (Kind.FAULT, Kind.SUSPICION)
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,6 @@ class FindingCard:
 
 def finding_card(finding: Finding) -> FindingCard:
     """Put a finding into words."""
-    stated = finding.kind in (Kind.FAULT, Kind.SUSPICION) or finding.confidence < 1.0
     return FindingCard(
         finding.kind.value,
         css_class(finding.kind),
@@ -63,12 +66,36 @@ def finding_card(finding: Finding) -> FindingCard:
         where_texts(finding.where),
         strength_text(finding.strength),
         _floor_percent(finding.strength),
-        round(100 * finding.confidence) if stated else None,
-        finding.confidence_basis,
+        round(100 * finding.confidence) if is_confidence_stated(finding) else None,
+        sureness_text(finding),
         finding.evidence,
         finding.surer,
         finding.code,
     )
+
+
+def finding_cards(findings: Sequence[Finding]) -> tuple[FindingCard, ...]:
+    """Put findings into words; what would make several of them surer is said of the first."""
+    said: set[str] = set()
+    cards = []
+    for finding in findings:
+        card = finding_card(finding)
+        cards.append(replace(card, surer="") if card.surer in said else card)
+        said.add(card.surer)
+    return tuple(cards)
+
+
+def is_confidence_stated(finding: Finding) -> bool:
+    """Whether a finding's confidence is more than that of a plain statement."""
+    return finding.kind in _CLAIMS or finding.confidence < 1.0
+
+
+def sureness_text(finding: Finding) -> str:
+    """Return how sure a finding is at most, and what that rests on."""
+    basis = finding.confidence_basis
+    if not basis or basis.startswith("at most") or not is_confidence_stated(finding):
+        return basis
+    return f"at most {percent(finding.confidence)}: {basis}"
 
 
 def css_class(kind: Kind | Outcome) -> str:
@@ -80,7 +107,7 @@ def where_texts(where: Where) -> tuple[str, ...]:
     """Return the place of a finding, one text per part of it."""
     texts = [
         ("channel " if len(where.channels) == 1 else "channels ") + ", ".join(where.channels) if where.channels else "",
-        named("gear", where.gear) if where.gear else named("shaft", where.shaft),
+        gear_text(where.gear) if where.gear else named("shaft", where.shaft),
         named("bearing", where.bearing),
         _tooth_text(where),
         _order_text(where),
@@ -88,6 +115,11 @@ def where_texts(where: Where) -> tuple[str, ...]:
         f"{readable(where.time_s[0])} to {readable(where.time_s[1])} s" if where.time_s is not None else "",
     ]
     return tuple(text for text in texts if text)
+
+
+def gear_text(gear: str) -> str:
+    """Name a gear, which is a pair and a shaft, or a pair of gears."""
+    return named("gear" if "/" in gear else "gear pair", gear)
 
 
 def _tooth_text(where: Where) -> str:
@@ -122,30 +154,56 @@ def _floor_percent(strength: Strength | None) -> float | None:
 
 @dataclass(frozen=True)
 class ChangeRow:
-    """A level that changed since the reference, as a bar."""
+    """A level that changed since the reference, as a bar; its channel is named where several have changed."""
 
     label: str
     change_db: float
     repeatability_db: float
     percent: float
 
+    @property
+    def change(self) -> str:
+        """The change with its sign."""
+        return f"{signed(self.change_db)} dB"
+
 
 def change_rows(analysis: Analysis, most: int = 8) -> tuple[ChangeRow, ...]:
     """Return the levels that changed most since the reference, largest first; bars are relative to the first."""
     changed = sorted((c for c in analysis.level_changes if c.is_change), key=lambda c: -abs(c.change_db))[:most]
     return tuple(
-        ChangeRow(c.label, c.change_db, c.repeatability_db, 100 * abs(c.change_db) / abs(changed[0].change_db))
+        ChangeRow(
+            _label_of(c, changed), c.change_db, c.repeatability_db, 100 * abs(c.change_db) / abs(changed[0].change_db)
+        )
         for c in changed
     )
+
+
+def _label_of(change: LevelChange, among: Sequence[LevelChange]) -> str:
+    """Name a level, with its channel where the levels are of several."""
+    several = len({c.where.channels for c in among}) > 1
+    return f"{change.label}, {', '.join(change.where.channels)}" if several else change.label
 
 
 LONGEST_HEADLINE = 120
 
 
-def headline_of(analysis: Analysis) -> tuple[str, str]:
-    """Return what the verdict comes to, and what else it says; what has changed is left to `change_rows`."""
+def headline_of(analysis: Analysis, *, with_remedy: bool = False) -> tuple[str, str]:
+    """Return what the verdict comes to, and what else it says; what has changed is left to `change_rows`.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    with_remedy : bool
+        Whether to say what would make it surer too, where the first finding's card, which stands below, says it.
+    """
     changed = next((f.title for f in analysis.findings if f.code == CHANGED), "")
-    return split_verdict(analysis.verdict.removeprefix(changed).strip() or analysis.verdict)
+    verdict = analysis.verdict.removeprefix(changed).strip() or analysis.verdict
+    first = next((f.surer.lower() for f in analysis.findings if f.kind is not Kind.INFORMATION), "")
+    for opener in (SURER_WITH, WHAT_WOULD_HELP):
+        rest, _, remedy = verdict.partition(f" {opener}")
+        if not with_remedy and remedy and first.startswith(remedy.removesuffix(".").lower()):
+            verdict = rest
+    return split_verdict(verdict)
 
 
 def split_verdict(verdict: str) -> tuple[str, str]:
@@ -214,7 +272,7 @@ def speed_rows(angle: ShaftAngle | CannotTell) -> Rows:
         ),
         ("how it was found", METHODS[angle.method] + f"; quality {readable(angle.quality, 2)} of 1"),
         ("revolutions", readable(angle.n_revolutions, 5)),
-        *(("remark on the speed", note) for note in angle.notes),
+        *(("remark on the speed", with_minus(f"{note[:1].upper()}{note[1:]}")) for note in angle.notes),
     )
 
 
@@ -229,7 +287,7 @@ def provenance_rows(analysis: Analysis, command: str, date: datetime) -> Rows:
         ("reader", origin.reader),
         ("history", "; ".join(origin.history)),
         ("sampling rate", f"{recording.sampling_rate_hz:.10g} Hz"),
-        ("parameters", ", ".join(f"{name} = {_setting(value)}" for name, value in analysis.settings.items())),
+        ("parameters", "; ".join(setting_text(name, value) for name, value in analysis.settings.items())),
         ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
         ("date", date.strftime("%Y-%m-%d %H:%M %Z").strip()),
         ("command", command),
@@ -237,10 +295,30 @@ def provenance_rows(analysis: Analysis, command: str, date: datetime) -> Rows:
     return tuple((name, text) for name, text in rows if text)
 
 
-def _setting(value: str | float | int | None) -> str:
-    if isinstance(value, float):
-        return f"{value:.10g}"
-    return "none" if value is None else str(value)
+_SETTINGS = {
+    "false_alarm_probability": "false alarms of one test {:.10g} %",
+    "n_surrogates": "surrogates of the test of teeth {:.10g}",
+    "minimum_revolutions": "at least {:.10g} revolutions",
+    "bearing_slip": "slip of bearings up to {:.10g} %",
+    "highest_modulation_order": "modulations up to {:.10g} cycles per revolution of the fastest shaft",
+    "seed": "seed of the random numbers {:.10g}",
+}
+"""What the settings of an analysis are called; shares are said in percent."""
+_SHARES = ("false_alarm_probability", "bearing_slip")
+
+
+def setting_text(name: str, value: str | float | int | None) -> str:
+    """Return a setting of an analysis in words.
+
+    Examples
+    --------
+    >>> setting_text("bearing_slip", 0.02), setting_text("n_surrogates", 1000)
+    ('slip of bearings up to 2 %', 'surrogates of the test of teeth 1000')
+    """
+    if name in _SETTINGS and isinstance(value, int | float):
+        return _SETTINGS[name].format(100 * value if name in _SHARES else value)
+    text = f"{value:.10g}" if isinstance(value, float) else "none" if value is None else str(value)
+    return f"{name.removeprefix('n_').replace('_', ' ')} {text}"
 
 
 def reference_text(reference: Analysis | None) -> str:
@@ -296,7 +374,7 @@ def indicator_tables(
 
 def _place(indicator: Indicator) -> str:
     if indicator.gear:
-        return _capital(named("gear", indicator.gear))
+        return _capital(gear_text(indicator.gear))
     if indicator.bearing:
         return _capital(named("bearing", indicator.bearing))
     return _capital(named("shaft", indicator.shaft)) or "Channels as a whole"
@@ -332,8 +410,7 @@ def _reference_text(change: IndicatorChange | None) -> str:
     text = f"was {readable(change.reference_value)}"
     if change.change_db is None:
         return text
-    sign = "+" if change.change_db >= 0 else "−"
-    return f"{text}, {sign}{abs(change.change_db):.1f} dB"
+    return f"{text}, {signed(change.change_db)} dB"
 
 
 WIDTH = 100
@@ -341,15 +418,13 @@ _SHORT = (Kind.NOTICE, Kind.INFORMATION)
 """Kinds that get their evidence only in the report."""
 
 
-_CLAIMS = (Kind.FAULT, Kind.SUSPICION)
-
-
 def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
     """Return the verdict and the findings, most important first, in plain text."""
     instance_of(analysis, Analysis, "analysis", remedy="gearsig.analyze(recording) makes one")
     recording = analysis.recording
     machine = (analysis.rig.name or "rig without a name") if analysis.rig is not None else "no rig file"
-    size = f"{len(recording.channels)} channel(s), {recording.duration_s:.6g} s at {recording.sampling_rate_hz:.6g} Hz"
+    n_channels = counted(len(recording.channels), "channel")
+    size = f"{n_channels}, {recording.duration_s:.6g} s at {recording.sampling_rate_hz:.6g} Hz"
     lines = [
         f"{recording.name}: {size}, {machine}",
         *([_paragraph(compared, "", first="")] if (compared := reference_text(analysis.reference)) else []),
@@ -357,14 +432,16 @@ def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
         fill(analysis.verdict, WIDTH),
         "",
     ]
+    said: set[str] = set()
     for number, finding in enumerate(analysis.findings, 1):
-        lines += _finding_lines(number, finding)
+        lines += _finding_lines(number, finding, says_surer=finding.surer not in said)
+        said.add(finding.surer)
     if with_indicators:
         lines += ["", *_indicator_lines(analysis)]
     return "\n".join(lines)
 
 
-def _finding_lines(number: int, finding: Finding) -> list[str]:
+def _finding_lines(number: int, finding: Finding, *, says_surer: bool) -> list[str]:
     lines = [_paragraph(f"{number:2}. [{finding.kind.value}] {finding.title}", "    ", first="")]
     place = "; ".join(where_texts(finding.where))
     if finding.kind not in _SHORT and place:
@@ -375,11 +452,9 @@ def _finding_lines(number: int, finding: Finding) -> list[str]:
         # How the speed was found, and what was repaired on the way, is worth a line of its own.
         return lines + [_paragraph(text) for text in finding.evidence if finding.code == "speed"]
     if finding.confidence_basis:
-        stated = finding.kind not in _CLAIMS or finding.confidence_basis.startswith("at most")
-        sure = "" if stated else f"at most {100 * finding.confidence:.0f} %; "
-        lines.append(_paragraph(f"how sure: {sure}{finding.confidence_basis}"))
+        lines.append(_paragraph(f"how sure: {sureness_text(finding)}"))
     lines += [_paragraph(f"evidence: {text}") for text in finding.evidence]
-    if finding.surer:
+    if finding.surer and says_surer:
         lines.append(_paragraph(f"surer with: {finding.surer}"))
     return [*lines, ""]
 

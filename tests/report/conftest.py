@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from gearsig.angle import ShaftAngle
-from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, Finding, Kind, Strength, Where
+from gearsig.diagnosis import (
+    Analysis,
+    AnalysisSettings,
+    CannotTell,
+    ChannelAnalysis,
+    Finding,
+    Kind,
+    Strength,
+    Where,
+)
 from gearsig.indicators import Indicator
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.recording import Channel, Provenance, Recording
@@ -193,7 +203,7 @@ def make_gearbox(
         make_indicators(names),
         make_findings(),
         "Tooth 17 of the input gear is damaged (93 % sure); the bearing on the same shaft deserves a look.",
-        {"window": "hann", "n_mesh_harmonics": 5, "highest_order": 380.0, "envelope_band_hz": None},
+        asdict(AnalysisSettings()) | {"window": None},
     )
 
 

@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 
 from app.cli.main import main
+from gearsig.diagnosis import CannotTell, Finding, Kind, Where, analyze
 from gearsig.errors import InputError, RefusalError
-from gearsig.methods import METHODS, apply_method
+from gearsig.methods import METHODS, apply_method, suggested_rate_hz
 from gearsig.prepared import prepare
 from gearsig.recording import Channel, Recording, write_recording
 from gearsig.report import fitting_methods, named_method, write_answer
@@ -57,7 +58,7 @@ def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> N
 def test_the_kurtograms_outline_frames_the_row_of_its_band() -> None:
     answer = apply_method("kurtogram", recording())
     panel, (low_hz, high_hz) = answer.panels[0], answer.numbers["band_hz"]
-    assert (panel.y, panel.logarithmic) == ("number of bands", True)
+    assert (panel.y, panel.logarithmic) == ("bandwidth (Hz)", True)
     x, y = panel.lines[0].x, panel.lines[0].y
     assert (x.min(), x.max()) == pytest.approx((low_hz, high_hz))
     # Lines of the map are drawn equally high, the first from the first position upwards.
@@ -70,6 +71,55 @@ def test_the_kurtograms_outline_frames_the_row_of_its_band() -> None:
     assert inside == pytest.approx(np.full(inside.shape, answer.numbers["kurtosis"]))
     for beside in (panel.levels[drawn_at < y.min()][-1, across], panel.levels[drawn_at > y.max()][0, across]):
         assert not np.allclose(beside, answer.numbers["kurtosis"])
+
+
+def test_the_kurtogram_lies_the_same_way_in_figure_and_page() -> None:
+    """Frequency to the right, bandwidth upwards: the widest band on top."""
+    answer = apply_method("kurtogram", recording())
+    panel, axes = answer.panels[0], answer.draw().axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (panel.x, panel.y) == ("frequency (Hz)", "bandwidth (Hz)")
+    widths_hz = [float(label.get_text()) for label in axes.get_yticklabels()]
+    upwards = widths_hz if axes.get_ylim()[0] < axes.get_ylim()[1] else widths_hz[::-1]
+    assert upwards == sorted(upwards)
+    assert upwards[-1] == pytest.approx(RATE_HZ / 2)
+    assert np.all(np.diff(panel.positions) > 0)
+
+
+def test_modes_show_the_waveform_that_their_text_speaks_of() -> None:
+    answer = apply_method("modes", recording(), n_modes=3)
+    number = answer.numbers["chosen_mode"]
+    assert number > 1
+    assert f"Mode **{number}** is the most impulsive" in answer.facts[0]
+    assert answer.waveforms.shown_first.startswith(f"mode {number},")
+    asked = apply_method("modes", recording(), n_modes=3, mode=1)
+    assert asked.waveforms.shown_first.startswith("mode 1,")
+
+
+def where_from(analysis, finding: Finding | None = None, **changes) -> float | None:
+    return suggested_rate_hz(replace(analysis, findings=() if finding is None else (finding,), **changes))
+
+
+def test_impacts_are_sought_at_the_rate_that_was_found_or_is_described() -> None:
+    """At 25 Hz; the 6205 on the output, which turns half as fast, has an outer race at 3.585 times its speed."""
+    rig = replace(RIG, bearings=(Bearing("drive end", "output", bearing="6205"),))
+    analysis = analyze(replace(recording(), rig=rig))
+    impacts = Where(("a1",), order=3.2, frequency_hz=80.0, band_hz=(1000.0, 2000.0))
+    tooth = Where(("a1",), shaft="output", gear="stage 1/output", tooth=3)
+    assert where_from(analysis, Finding("impacts", Kind.SUSPICION, "", impacts)) == 80.0
+    assert where_from(analysis, Finding("tooth", Kind.FAULT, "", tooth)) == pytest.approx(12.5, rel=1e-3)
+    assert where_from(analysis) == pytest.approx(12.5 * 3.5848, rel=1e-3)
+    assert where_from(analysis, rig=None) == pytest.approx(25.0, rel=1e-3)
+    assert where_from(analysis, rig=None, shaft_angle=CannotTell("speed", "unknown")) is None
+
+
+def test_a_rate_that_nothing_tells_is_said_to_be_assumed() -> None:
+    noise = Recording(np.random.default_rng(1).normal(size=(1, N)), RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),))
+    assumed = apply_method("deconvolution", noise)
+    assert "100 impacts per second are assumed" in assumed.warnings[0]
+    assert "train of 100 Hz" in assumed.facts[0]
+    described = apply_method("deconvolution", recording(), rate_hz=25.0)
+    assert not described.warnings
+    assert described.notes[0] == "25 Hz: 1× input."
 
 
 def test_an_envelope_has_plain_numbers_and_the_lines_of_bearings() -> None:

@@ -8,9 +8,21 @@ from importlib.resources import files
 
 import pytest
 
-from gearsig.diagnosis import Finding, Kind, Outcome, Where
+from gearsig.diagnosis import SURER_WITH, Finding, Kind, LevelChange, Outcome, Where
 from gearsig.indicators import Indicator
-from gearsig.report import page_html, page_pdf, write_page
+from gearsig.report import (
+    analysis_text,
+    bearing_cursors,
+    change_rows,
+    finding_card,
+    finding_cards,
+    headline_of,
+    marked_positions,
+    page_html,
+    page_pdf,
+    verdict_picture,
+    write_page,
+)
 
 EVIL = "<script>alert(1)</script>"
 QUOTES = "\"rig\" onload='x' & <b>"
@@ -78,12 +90,71 @@ def test_everything_is_said(gearbox, html):
         "pinion bearing, vertical",
         "found in the vibration, no tachometer",
         "ab" * 32,
-        "n_mesh_harmonics = 5",
+        "false alarms of one test 0.1 %; surrogates of the test of teeth 1000; at least 16 revolutions",
         "gearsig report 'monday run.mat'",
         "2025-03-04 05:06 UTC",
         "needs a healthy run",
     ):
         assert wanted in text, wanted
+
+
+def test_settings_are_said_in_words(html):
+    text = " ".join(parsed(html).text)
+    assert not re.findall(r"\b[a-z]+_[a-z_]+\b", text)
+
+
+def test_the_picture_of_impacts_without_a_bearing_is_their_envelope(gearbox):
+    """Their evidence lies there, in the channel that the finding names; three of their harmonics are named."""
+    where = Where(("a2",), order=3.21, order_shaft="input", frequency_hz=107.0, band_hz=(2000.0, 4000.0))
+    impacts = Finding("non-synchronous-impacts", Kind.SUSPICION, "Impacts.", where, confidence=0.9)
+    analysis = replace(gearbox, findings=(impacts,))
+    shown = verdict_picture(analysis)
+    assert (shown.about, shown.channel.channel, shown.finding) == ("bearing", "a2", impacts)
+    spectrum = shown.channel.envelope_spectrum
+    named = {c.label: c.position for c in bearing_cursors(analysis, spectrum) if "impacts" in c.label}
+    assert named == {"impacts": 3.21, "2× impacts": pytest.approx(6.42), "3× impacts": pytest.approx(9.63)}
+    assert marked_positions(analysis, spectrum, "a2", of_bearings=True) == (3.21,)
+    assert marked_positions(analysis, shown.channel.order_spectrum, "a2") == ()
+    html = page_html(analysis)
+    verdict = html[html.index('aria-label="verdict"') : html.index("<h2>Findings")]
+    assert "Envelope spectrum of a2" in verdict
+    assert "3× impacts" in verdict
+
+
+def test_the_picture_is_of_the_channel_that_the_first_finding_names(gearbox):
+    where = Where(("a2",), shaft="input", order=1.0, order_shaft="input", frequency_hz=33.3)
+    shown = verdict_picture(replace(gearbox, findings=(Finding("line", Kind.SUSPICION, "A line.", where),)))
+    assert (shown.about, shown.channel.channel) == ("lines", "a2")
+
+
+def test_what_would_make_it_surer_is_said_once(gearbox):
+    remedy = "A recording of the same gears when they were healthy. Or more revolutions."
+    gaps = tuple(Finding(code, Kind.CANNOT_TELL, f"{code}.", surer=remedy) for code in ("One gear", "Another gear"))
+    verdict = f"Cannot tell. {' '.join('Nothing shows at the teeth of this shaft.' for _ in range(4))} "
+    analysis = replace(gearbox, findings=gaps, verdict=f"{verdict}{SURER_WITH}{remedy.partition('. ')[0]}.")
+    assert [card.surer for card in finding_cards(gaps)] == [remedy, ""]
+    assert SURER_WITH not in " ".join(headline_of(analysis))
+    assert SURER_WITH in headline_of(analysis, with_remedy=True)[1]
+    assert SURER_WITH in " ".join(headline_of(replace(analysis, findings=())))
+    assert analysis_text(analysis).count("surer with:") == 1
+
+
+def test_levels_that_changed_are_told_apart_by_their_channels_with_a_minus_sign(gearbox):
+    levels = tuple(
+        LevelChange("noise 2 to 3 kHz", "noise", Where((name,)), 0.0, "", 0.0, -change, 0.2, 1e-9, True, True)
+        for name, change in (("a1", 19.5), ("a2", -7.5))
+    )
+    rows = change_rows(replace(gearbox, level_changes=levels))
+    assert [row.label for row in rows] == ["noise 2 to 3 kHz, a1", "noise 2 to 3 kHz, a2"]
+    assert [row.change for row in rows] == ["+19.5 dB", "−7.5 dB"]
+    assert [row.label for row in change_rows(replace(gearbox, level_changes=levels[:1]))] == ["noise 2 to 3 kHz"]
+
+
+def test_how_sure_is_said_once():
+    basis = "at most 95 %: chance of it in noise < 1e-6"
+    finding = Finding("x", Kind.FAULT, "X.", confidence=0.95, confidence_basis=basis)
+    assert finding_card(finding).confidence_basis == basis
+    assert finding_card(replace(finding, confidence_basis="height")).confidence_basis == "at most 95 %: height"
 
 
 def test_most_important_finding_comes_first(html):

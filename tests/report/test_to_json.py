@@ -49,7 +49,7 @@ def test_values_arrive(gearbox):
     assert first["strength"]["ratio_db"] == 18.6
     assert found["recording"]["sampling_rate_hz"] == 25_600.0
     assert found["rig"]["pairs"][0]["driver_teeth"] == 23
-    assert found["settings"]["envelope_band_hz"] is None
+    assert found["settings"]["window"] is None
 
 
 def test_undefined_indicator_is_null(gearbox):
