@@ -1,7 +1,7 @@
 """The page's address: what is chosen on a page stands in it, so that a view can be sent. The one place that touches it.
 
 A widget takes its first value from the address by `ask`, and stands in it while it differs from its default. Values
-that an address cannot ask for are ignored.
+that an address cannot ask for are ignored. Back and Forward of the browser make the page what their address says.
 """
 
 from __future__ import annotations
@@ -12,10 +12,13 @@ from contextvars import ContextVar
 from typing import Any
 
 import streamlit as st
+from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 ZOOM = "zoom"
 _ASKED, _NAMES, _PAGE, _WHOLE = "asked by the address", "names in the address", "page of the address", "whole page"
+_FOLLOWED, _BARE = "choices that follow the address", "pages with an empty address"
 _drawn: ContextVar[set[str] | None] = ContextVar("names in the address of what is being drawn", default=None)
+_draft: ContextVar[dict[str, list[str]] | None] = ContextVar("the address as it will be", default=None)
 Read = Callable[[list[str]], Any]
 """From texts of an address to a value; ValueError, KeyError or IndexError where they ask for nothing that there is."""
 
@@ -29,19 +32,54 @@ def of_page(page: str) -> Iterator[None]:
     """Draw a page: by its end, what stands in its address and is not of what it shows is taken out.
 
     What the address asks for is taken when the page is opened, and once: what is chosen later, another recording say,
-    begins with its own defaults.
+    begins with its own defaults. Back and Forward open the page anew, and their address goes before the session's
+    choices.
     """
-    if st.session_state.get(_PAGE) != page:
+    bare: set[str] = st.session_state.setdefault(_BARE, set())
+    # An empty address that the page did not make is that of a link to it, which asks for nothing.
+    is_followed = is_history() and (bool(_in_address()) or page in bare)
+    if st.session_state.get(_PAGE) != page or is_followed:
         st.session_state[_PAGE] = page
         st.session_state[_ASKED] = _in_address()
+        st.session_state[_FOLLOWED] = set() if is_followed else None
     st.session_state[_NAMES] = {}
     with of_part(_WHOLE):
         yield
+    if not _in_address():
+        bare.add(page)
+
+
+def is_history() -> bool:
+    """Whether the browser's Back or Forward made the page run; the address that they ask for is in force then."""
+    return bool(getattr(get_script_run_ctx(suppress_warning=True), "is_history_navigation", False))
 
 
 @contextmanager
 def of_part(part: str) -> Iterator[None]:
     """Draw a part of a page that may run without the rest of it, as a fragment; see `of_page`."""
+    is_inner = _drawn.get() is not None
+    if is_inner:
+        with _names_of(part):
+            yield
+        return
+    # Each change of the address is a step that Back takes: all that a run changes is written as one.
+    token = _draft.set(_in_address())
+    try:
+        with _names_of(part):
+            yield
+        known: dict[str, set[str]] = st.session_state[_NAMES]
+        # Not reached where a run is broken off: what it did not come to is still asked for, and stays.
+        if _WHOLE in known:
+            forget_asked()
+            kept = set().union(*known.values())
+            _draft.set({name: texts for name, texts in _as_it_will_be().items() if name in kept})
+    finally:
+        write()
+        _draft.reset(token)
+
+
+@contextmanager
+def _names_of(part: str) -> Iterator[None]:
     names: set[str] = set()
     is_inner, token = _drawn.get() is not None, _drawn.set(names)
     known: dict[str, set[str]] = st.session_state.setdefault(_NAMES, {})
@@ -51,14 +89,19 @@ def of_part(part: str) -> Iterator[None]:
         _drawn.reset(token)
         if is_inner:
             known[part] = names
-    # Not reached where a run is broken off: what it did not come to is still asked for, and stays.
     known[part] = names
-    if is_inner or _WHOLE not in known:
-        return
-    forget_asked()
-    kept = set().union(*known.values())
-    for name in [name for name in st.query_params if name not in kept]:
-        del st.query_params[name]
+
+
+def write() -> None:
+    """Write the address as far as it is known: what takes long is begun with an address that opens it again."""
+    draft = _draft.get()
+    if draft is not None and draft != _in_address():
+        st.query_params.from_dict(draft)
+
+
+def _as_it_will_be() -> dict[str, list[str]]:
+    draft = _draft.get()
+    return _in_address() if draft is None else draft
 
 
 def _in_address() -> dict[str, list[str]]:
@@ -72,17 +115,32 @@ def _asked() -> dict[str, list[str]]:
 
 def asked(name: str) -> str:
     """Return what the address asked for when the page was opened, an empty text for nothing."""
-    return next(iter(_asked().get(name, ())), "")
+    return next(iter(all_asked(name)), "")
+
+
+def all_asked(name: str) -> list[str]:
+    """Return all that the address asked for under a name when the page was opened."""
+    return _asked().get(name, [])
 
 
 def forget_asked() -> None:
     """Take nothing more from the address that the page was opened with."""
     st.session_state[_ASKED] = {}
+    st.session_state[_FOLLOWED] = None
+
+
+def follows(key: str) -> bool:
+    """Whether the address goes before what the session holds under a key: once after Back or Forward."""
+    followed: set[str] | None = st.session_state.get(_FOLLOWED)
+    if followed is None or key in followed:
+        return False
+    followed.add(key)
+    return True
 
 
 def now(name: str) -> str:
     """Return what stands in the address now, an empty text for nothing."""
-    return str(st.query_params.get(name, ""))
+    return next(iter(_as_it_will_be().get(name, ())), "")
 
 
 def claim(name: str) -> None:
@@ -96,12 +154,15 @@ def put(name: str, *texts: str) -> None:
     """Keep texts in the address; none takes the name out."""
     if texts:
         claim(name)
-    if list(texts) == st.query_params.get_all(name):
+    changed = _as_it_will_be()
+    if list(texts) == changed.get(name, []):
         return
     if texts:
-        st.query_params[name] = list(texts)
+        changed[name] = list(texts)
     else:
-        del st.query_params[name]
+        del changed[name]
+    if _draft.get() is None:
+        st.query_params.from_dict(changed)
 
 
 # --------------------
@@ -110,7 +171,7 @@ def put(name: str, *texts: str) -> None:
 
 
 def chosen(key: str, name: str, options: Collection[str], first: str) -> str:
-    """Return one of some options: the session's choice, else the address', which then always names it.
+    """Return one of some options: the session's choice, else the address', which then always names it; see `of_page`.
 
     Parameters
     ----------
@@ -122,8 +183,9 @@ def chosen(key: str, name: str, options: Collection[str], first: str) -> str:
     first : str
         Where neither names one of them.
     """
-    wanted = (st.session_state.get(key), *_asked().pop(name, ()))
-    choice = next((text for text in wanted if text in options), first)
+    held, texts = st.session_state.get(key), _asked().pop(name, [])
+    wanted: list[str | None] = [*texts] if follows(key) else [held, *texts]
+    choice = next((text for text in wanted if text is not None and text in options), first)
     st.session_state[key] = choice
     put(name, choice)
     return choice
@@ -133,6 +195,8 @@ def ask(
     widget: Callable[..., Any], label: str, *values: Any, key: str, name: str, first: Any, read: Read, **looks: Any
 ) -> Any:
     """Return what a widget of Streamlit gives; it stands in the address while it differs from its default.
+
+    The session keeps the choice while other views and pages are shown.
 
     Parameters
     ----------
@@ -150,7 +214,7 @@ def ask(
         From texts of the address to a value, e.g. `one_of(options)`.
     """
     begin(key, name, first, read)
-    value = widget(label, *values, key=key, **looks)
+    value = widget(label, *values, key=key, **{"persist_state": "session"} | looks)
     value = first if value is None else value
     keep(name, value, first)
     return value
@@ -173,9 +237,9 @@ def tabs(names: Sequence[str], *, key: str) -> Sequence[Any]:
 
 
 def begin(key: str, name: str, first: Any, read: Read) -> None:
-    """Give a widget that has no state yet the value that the address asks for, else `first`; see `ask`."""
+    """Give a widget that has no state yet the value that the address asks for, else `first`; see `ask`, `of_page`."""
     texts = _asked().pop(name, [])
-    if key in st.session_state:
+    if not follows(key) and key in st.session_state:
         return
     st.session_state[key] = first
     if texts:

@@ -185,7 +185,7 @@ def sha256_of_upload(file_id: str, _content: memoryview) -> str:
     return hashlib.sha256(_content).hexdigest()
 
 
-N_RECENT, RECENT_BYTES = 8, 400_000_000
+N_RECENT, RECENT_BYTES = 32, 400_000_000
 
 
 @st.cache_resource(show_spinner=False)

@@ -16,6 +16,7 @@ from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import (
     download,
     looked_at,
+    offer_page,
     padded_limits,
     show_differences,
     show_lines,
@@ -198,7 +199,7 @@ def choose_simulation() -> tuple[Simulation, Content | None] | None:
         st.divider()
         made = state.simulated()
         origins = (NOW, SAMPLE, FILE) if made is None else (NOW, SAMPLE, FILE, state.OF_LABORATORY)
-        looks = {"horizontal": True, "key": ORIGIN, "persist_state": "session"}
+        looks = {"horizontal": True, "key": ORIGIN}
         origin = address.ask_one(st.radio, "Simulation", origins, name="simulation", **looks)
         if origin == NOW:
             return _choose_run(), None
@@ -212,6 +213,7 @@ def choose_simulation() -> tuple[Simulation, Content | None] | None:
                 "simulation file",
                 rig="Its rig file (TOML), if it has one",
                 about_rig="Without one it is read as the file states, with the gears of the recording's rig.",
+                name="simulation_file",
             )
         return None if file is None else (file.request(), file.content)
 
@@ -227,7 +229,6 @@ def choose_alignment(simulation: Simulation | None) -> str:
             first="correlation" if source == "made here" else "auto",
             name="align",
             key=state.source_key("comparison alignment", source),
-            persist_state="session",
             help="Marks: angle 0 is the same tooth in both. Correlation: the simulation is turned to where the "
             "averages fit best. Auto: marks for shafts that have one in both.",
         )
@@ -276,7 +277,6 @@ def _choose_run() -> SimulationToCompare:
         format_func=title,
         key=MACHINE,
         name="machine",
-        persist_state="session",
         help="Set to the rig: its teeth, module and face width, all else usual for its size. A preset keeps its own "
         "geometry but takes the rig's teeth.",
     )
@@ -286,7 +286,7 @@ def _choose_run() -> SimulationToCompare:
     torque = choose_number(
         "Torque on the driver (N·m)", "simulation torque", "the rig's or the preset's", minimum=0.0, name="torque"
     )
-    looks = {"key": "simulation length", "name": "length", "first": 5.0, "persist_state": "session"}
+    looks = {"key": "simulation length", "name": "length", "first": 5.0}
     length = address.ask_one(st.segmented_control, "Length (s)", (2.0, 5.0, 10.0), **looks)
     seed = address.ask(
         st.number_input,
@@ -297,7 +297,6 @@ def _choose_run() -> SimulationToCompare:
         name="seed",
         first=0,
         read=address.number(0, whole=True),
-        persist_state="session",
     )
     return SimulationToCompare(str(machine), speed, torque, float(length), int(seed))
 
@@ -423,14 +422,10 @@ def _show_bands(comparison: Comparison, channel: ChannelComparison) -> None:
 
 def show_downloads(comparison: Comparison, command: str) -> None:
     """Offer the page, the data and the lines, made when they are asked for."""
+    offer_page(
+        "Page (HTML)", lambda: comparison_page(comparison, command=command).encode(), "compare.html", "comparison"
+    )
     with st.container(horizontal=True):
-        download(
-            "Page (HTML)",
-            lambda: comparison_page(comparison, command=command).encode(),
-            "compare.html",
-            "text/html",
-            primary=True,
-        )
         download("JSON", lambda: comparison_to_json(comparison).encode(), "compare.json", "application/json")
         download("Lines (CSV)", lambda: orders_csv(comparison).encode(), "orders.csv", "text/csv")
     if command:

@@ -39,6 +39,8 @@ STORE, EXAMPLE, SEARCHED, MACHINE, POINT, SERIES = (
     "fleet point",
     "fleet indicator",
 )
+EXAMPLE_NAME = "example"
+"""Of the samples' own store in the address; folders of this machine are never opened by a link."""
 N_MACHINES = 40
 Row = dict[Any, Any]
 """Of a table of the store."""
@@ -66,18 +68,24 @@ gearsig fleet watch incoming --pattern '{machine}/{point}_{date:%Y%m%d-%H%M}.csv
 
 def show() -> None:
     """Choose a store, a machine and an indicator, show it over time; worst first throughout."""
-    if EXAMPLE in st.session_state:  # a widget's value is set before it is drawn
-        st.session_state[STORE] = st.session_state.pop(EXAMPLE)
+    address.begin(EXAMPLE, "store", "", address.one_of((EXAMPLE_NAME, "")))
+    store = st.session_state[EXAMPLE]
+    address.keep("store", store, "")
     with st.sidebar:
         folder = st.text_input(
             "Folder of the fleet",
             os.environ.get("GEARSIG_FLEET", "fleet"),
             key=STORE,
             persist_state="session",
+            on_change=_see,
+            args=("",),
             help="Where `gearsig fleet add` keeps its results; `GEARSIG_FLEET` names another one.",
         )
+        if store == EXAMPLE_NAME:
+            st.caption("Shown is the example, made of the samples.")
+            st.button("Close the example", icon=":material/close:", on_click=_see, args=("",))
     st.subheader("Fleet: machines over time", anchor=False)
-    path = Path(folder).expanduser()
+    path = Path(example_store() if store == EXAMPLE_NAME else folder).expanduser()
     try:
         messages: list[str] = []
         fleet = open_fleet(path, on_message=messages.append)
@@ -115,9 +123,14 @@ def example_store() -> str:
 
 def _show_how_to_begin() -> None:
     st.markdown(HOW_TO_FILL)
-    if st.button("See an example", icon=":material/play_arrow:", help="Three gearboxes made of the samples; 10 s."):
-        st.session_state[EXAMPLE] = example_store()
-        st.rerun()
+    about = "Three gearboxes made of the samples. Their recordings are analysed once, which takes about 20 s."
+    look = ":material/play_arrow:"
+    st.button("See an example", icon=look, help=about, on_click=_see, args=(EXAMPLE_NAME,))
+
+
+def _see(store: str) -> None:
+    """Show the example, or with an empty name the folder that the user gives."""
+    st.session_state[EXAMPLE] = store
 
 
 def _show_counts(status: DataFrame) -> None:
@@ -128,7 +141,7 @@ def _show_counts(status: DataFrame) -> None:
 
 def _choose_point(status: DataFrame) -> tuple[str, str]:
     """Show machines with their measuring points, the worst first; return the one that is looked at."""
-    looks = {"key": SEARCHED, "placeholder": "Part of a name", "persist_state": "session"}
+    looks = {"key": SEARCHED, "placeholder": "Part of a name"}
     searched = address.ask(st.text_input, "Machine", name="search", first="", read=address.words, **looks)
     shown = status[status["machine"].str.contains(searched, case=False, regex=False)]
     of_machine = {name: rows.to_dict("records") for name, rows in shown.groupby("machine", sort=False)}

@@ -120,7 +120,7 @@ def show_gear() -> None:
     with st.expander("Numbers", key="gear numbers"):
         st.markdown("  \n".join(as_typed(line) for line in gear_body.lines(study)))
     st.caption(
-        f"A coarse mesh, which turns smoothly; `gearsig gear-body --dof 277200 -o gear` has a fine one. "
+        f"A coarse mesh, so that it turns smoothly{': Numbers say how coarse' if study.discretisation else ''}. "
         f"{gear_body.PEAKS if shown == stress else 'The motion is drawn much too large.'}"
     )
 
@@ -184,7 +184,7 @@ def show_publications() -> None:
     """Choose a publication; its figures are computed when asked for."""
     name = st.selectbox("Publication", list(PAPERS), format_func=PAPERS.__getitem__, key="publication")
     if not st.toggle("Compute its figures", key=f"publication {name} wanted"):
-        st.caption(f"Takes one to two minutes, once. The same as files: `gearsig papers {name} -o out`.")
+        st.caption("Takes one to two minutes, once.")
         return
     found = computed(name)
     st.markdown(f"**{found.summary}** {as_typed(found.source)}")

@@ -11,12 +11,12 @@ import streamlit as st
 from gearsig.diagnosis import Analysis
 
 ORIGIN, SAMPLE, RECORDING_FILE, RIG_FILE = "origin", "sample", "recording file", "recording file rig"
-TAB, CHANNEL = "tab", "channel"
+TAB, CHANNEL, ZOOMS = "tab", "channel", "zooms"
 START_PAGE = Path(__file__).parent / "pages" / "start.py"
 ANALYSIS_PAGE = Path(__file__).parent / "pages" / "analysis.py"
 OF_LABORATORY = "Laboratory"
 """Origin of a recording that the laboratory made."""
-_CHOSEN, _SIMULATED, _FILES, _TOKENS = "chosen", "simulated", "kept files", "tokens"
+_CHOSEN, _SIMULATED, _FILES, _OPENED, _TOKENS = "chosen", "simulated", "kept files", "opened files", "tokens"
 Content = Path | memoryview
 """Of a file: on this machine, or in memory."""
 
@@ -83,26 +83,28 @@ class ChosenFile:
         return AnalysisRequest(self.name, self.sha256, self.rig_name, self.rig_text, sampling_rate_hz, speed_rpm)
 
 
-def token_of(sha256: str, known: str = "") -> str:
+def token_of(kind: str, sha256: str, known: str = "") -> str:
     """Return what names an own file in the addresses of this session, and is guessed by nobody else.
 
     Parameters
     ----------
+    kind : str
+        What the file is given for: the same file may be kept with a machine here and without one there.
     sha256 : str
     known : str
         The token that the page's address names the file by, where this session begins with it.
     """
-    token: str = _tokens().setdefault(sha256, known or secrets.token_urlsafe(16))
+    token: str = _tokens().setdefault((kind, sha256), known or secrets.token_urlsafe(16))
     return token
 
 
-def tokens() -> tuple[str, ...]:
-    """Return the tokens of this session's files, the latest first."""
-    return tuple(reversed(_tokens().values()))
+def tokens(kind: str) -> tuple[str, ...]:
+    """Return the tokens of this session's files of one kind, the latest first."""
+    return tuple(token for (of, _), token in reversed(_tokens().items()) if of == kind)
 
 
-def _tokens() -> dict[str, str]:
-    found: dict[str, str] = st.session_state.setdefault(_TOKENS, {})
+def _tokens() -> dict[tuple[str, str], str]:
+    found: dict[tuple[str, str], str] = st.session_state.setdefault(_TOKENS, {})
     return found
 
 
@@ -143,10 +145,28 @@ def keep_files(kind: str, files: tuple[ChosenFile, ...]) -> None:
     st.session_state[source_key(_FILES, kind)] = files
 
 
+def open_files(kind: str, files: tuple[ChosenFile, ...]) -> None:
+    """Open files in place of what the uploaders of one kind hold."""
+    keep_files(kind, files)
+    st.session_state[source_key(_OPENED, kind)] = st.session_state.get(source_key(_OPENED, kind), 0) + 1
+
+
+def uploader_key(kind: str) -> str:
+    """Return the key of an uploader of one kind, another one whenever files were opened in place of its own."""
+    n_opened = st.session_state.get(source_key(_OPENED, kind), 0)
+    return f"{kind} {n_opened}" if n_opened else kind
+
+
 def kept_files(kind: str) -> tuple[ChosenFile, ...]:
     """Return the uploads of one kind that this session keeps."""
     files: tuple[ChosenFile, ...] = st.session_state.get(source_key(_FILES, kind), ())
     return files
+
+
+def zooms() -> dict[str, list[float]]:
+    """Return what the figures of this session were zoomed to, by their keys."""
+    found: dict[str, list[float]] = st.session_state.setdefault(ZOOMS, {})
+    return found
 
 
 def source_key(name: str, source: str) -> str:

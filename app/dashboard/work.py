@@ -16,6 +16,8 @@ from typing import Any, Generic, ParamSpec, TypeVar, cast
 import streamlit as st
 from streamlit.runtime.scriptrunner import get_script_run_ctx
 
+from app.dashboard import address
+
 P = ParamSpec("P")
 R = TypeVar("R")
 LOOK_EVERY_S = 0.05
@@ -187,6 +189,7 @@ class Kept(Generic[P, R]):
             while not work.wait(LOOK_EVERY_S):
                 beat.empty()  # Streamlit ends the run of a page when it has something to show
                 if not is_offered and monotonic() - work.begun_s > CANCEL_AFTER_S:
+                    address.write()
                     place.button(
                         "Cancel",
                         key=f"cancel {name}",

@@ -39,6 +39,21 @@ def opened(sample: str = "damaged_tooth", *, tab: str = "", **values: Any) -> Ap
     return page.switch_page("pages/analysis.py").run()
 
 
+def at(page: str, query: dict[str, Any], **values: Any) -> AppTest:
+    """Open a page by an address, in a session that knows nothing else.
+
+    Streamlit's tests pass over a main script that has a folder `pages` beside it; here it runs, as in the dashboard.
+    """
+    script = f"from runpy import run_path\nrun_path({str(FOLDER / 'main.py')!r})"
+    opened = AppTest.from_string(script, default_timeout=300).run()  # which makes its pages known
+    opened.query_params.update(query)
+    for key, value in values.items():
+        opened.session_state[key] = value
+    opened.switch_page(str(FOLDER / "pages" / f"{page}.py")).run()
+    assert not opened.exception
+    return opened
+
+
 def upload(page: AppTest, name: str, content: bytes, rig: str = "") -> AppTest:
     page.sidebar.radio(key=state.ORIGIN).set_value("Own file").run()
     page.sidebar.file_uploader(key=state.RECORDING_FILE).upload(name, content)
@@ -146,17 +161,18 @@ def bars(page: AppTest) -> np.ndarray:
 
 def pictures(page: AppTest) -> list[dict[str, Any]]:
     """Return what was sent to the pictures of the page that zoom; without the ring of teeth beside the verdict."""
-    return [picture for picture in _sent_to(page, "picture") if not picture["words"].endswith("stands out")]
+    return [picture for picture in sent_to(page, "picture") if not picture["words"].endswith("stands out")]
 
 
-def _sent_to(page: AppTest, component: str) -> list[dict[str, Any]]:
+def sent_to(page: AppTest, component: str) -> list[dict[str, Any]]:
+    """Return what was sent to the components of one name."""
     protos = [part.proto for part in page.get("bidi_component")]
     return [json.loads(proto.json) for proto in protos if proto.component_name == f"gearsig.{component}"]
 
 
 def figures(page: AppTest, *, of_verdict: bool = False) -> list[dict[str, Any]]:
     """Return what was sent to the figures of the page that zoom; without the one beside the verdict."""
-    known = _sent_to(page, "figure")
+    known = sent_to(page, "figure")
     return known if of_verdict else [figure for figure in known if not figure["name"].startswith("verdict")]
 
 

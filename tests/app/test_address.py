@@ -9,30 +9,16 @@ from streamlit.testing.v1 import AppTest
 
 from app.dashboard import address, state
 from app.dashboard.fleet import STORE
+from app.dashboard.state import AnalysisRequest, Chosen
 from app.dashboard.widgets.views import OF_CHANNEL
 from gearsig.fleet import open_fleet
 from gearsig.methods import METHODS
-from tests.app.pages import FOLDER, SAMPLES, choose, figures, go, key_of, labelled, shown_text
+from tests.app.pages import FOLDER, SAMPLES, at, choose, figures, go, key_of, labelled, press, shown_text
 from tests.fleet.conftest import make_recordings  # noqa: F401 - a fixture
 from tests.fleet.recordings import PATTERN
 
-PAGE = {"sample", "file", "view", "zoom", "reference", "torque"}
+PAGE = {"sample", "described", "file", "view", "zoom", "reference", "reference_file", "torque"}
 """What stands in the address of the analysis page in every view."""
-
-
-def at(page: str, query: dict[str, Any], **values: Any) -> AppTest:
-    """Open a page by an address, in a session that knows nothing else.
-
-    Streamlit's tests pass over a main script that has a folder `pages` beside it; here it runs, as in the dashboard.
-    """
-    script = f"from runpy import run_path\nrun_path({str(FOLDER / 'main.py')!r})"
-    opened = AppTest.from_string(script, default_timeout=300).run()  # which makes its pages known
-    opened.query_params.update(query)
-    for key, value in values.items():
-        opened.session_state[key] = value
-    opened.switch_page(str(FOLDER / "pages" / f"{page}.py")).run()
-    assert not opened.exception
-    return opened
 
 
 def analysis(sample: str = "two_stage", **query: Any) -> AppTest:
@@ -170,7 +156,7 @@ def test_what_belongs_to_a_recording_that_is_not_there_is_not_taken_for_another(
 
 def test_the_zoom_of_a_view_leaves_the_address_with_it() -> None:
     page = analysis("healthy", view="Spectrum")
-    page.session_state[key_of("spectrum of a1 chart", "healthy")] = {"range": [100.0, 200.0]}
+    page.session_state[state.ZOOMS] = {key_of("spectrum of a1 chart", "healthy"): [100.0, 200.0]}
     page.run()
     assert page.query_params["zoom"].endswith("_100_200")
     sent = analysis(**page.query_params)
@@ -179,6 +165,112 @@ def test_the_zoom_of_a_view_leaves_the_address_with_it() -> None:
     sent.session_state[state.TAB] = "Envelope"
     sent.run()
     assert "zoom" not in sent.query_params
+
+
+def opens(page: AppTest, script: str, query: dict[str, Any] | None = None) -> AppTest:
+    """Go to a page of the same session: by a link, whose address is empty, or with the address of Back."""
+    page.query_params.clear()
+    page.query_params.update(query or {})
+    page.switch_page(str(FOLDER / "pages" / f"{script}.py")).run()
+    assert not page.exception
+    return page
+
+
+def test_scale_and_zoom_of_a_view_outlast_another_page() -> None:
+    page = analysis("healthy", view="Spectrum")
+    choose(page, "Amplitude", "dB")
+    page.session_state[state.ZOOMS] = {key_of("spectrum of a1 chart", "healthy"): [100.0, 200.0]}
+    page.run()
+    left = dict(page.query_params)
+    opens(page, "compare")
+    assert "amplitude" not in page.query_params or page.query_params["amplitude"] != "dB"
+    opens(page, "analysis")
+    assert pills(page, "Amplitude").value == "dB"
+    assert figures(page)[0]["shown"] == [100.0, 200.0]
+    assert page.query_params == left
+
+
+def test_back_restores_view_channel_scale_zoom_and_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    page = analysis(view="Spectrum")
+    first = dict(page.query_params)
+    channel = labelled(page, "selectbox", "Channel")
+    before = channel.value
+    channel.set_value(next(name for name in channel.options if name != before)).run()
+    choose(page, "Amplitude", "dB")
+    page.session_state[state.ZOOMS] = {key_of(f"spectrum of {channel.value} chart", "two_stage"): [100.0, 200.0]}
+    page.run()
+    second = dict(page.query_params)
+    page.session_state[state.TAB] = "Envelope"
+    page.run()
+    page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES["healthy"]).run()
+    third = dict(page.query_params)
+
+    def go_to(query: dict[str, Any]) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(address, "is_history", lambda: True)
+            opens(page, "analysis", query)
+        assert page.query_params == query
+
+    go_to(second)
+    assert page.sidebar.selectbox(key=state.SAMPLE).value == SAMPLES["two_stage"]
+    assert labelled(page, "selectbox", "Channel").value != before
+    assert pills(page, "Amplitude").value == "dB"
+    assert figures(page)[0]["shown"] == [100.0, 200.0]
+    go_to(first)
+    assert labelled(page, "selectbox", "Channel").value == before
+    assert pills(page, "Amplitude").value == "Logarithmic"
+    go_to(third)
+    assert page.session_state[state.TAB] == "Envelope"
+    page.sidebar.selectbox(key=state.SAMPLE).set_value(SAMPLES["two_stage"]).run()
+    assert page.query_params["sample"] == "two_stage"  # what is chosen afterwards is the user's again
+
+
+def test_all_that_a_run_changes_is_one_step_of_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    from streamlit.runtime.state.query_params import QueryParams
+
+    sent: list[None] = []
+    send = QueryParams._send_query_param_msg
+    page = analysis(view="Spectrum", amplitude="dB", cursors="mesh", torque="3")
+    monkeypatch.setattr(QueryParams, "_send_query_param_msg", lambda params: sent.append(send(params)))
+    page.session_state[state.TAB] = "Envelope"
+    page.run()
+    assert choices(page) == {}
+    assert len(sent) == 1
+
+
+def test_the_described_machine_of_a_sample_survives_a_reload() -> None:
+    page = analysis("damaged_tooth", view="Machine")
+    labelled(page, "text_input", "Machine").set_value("Mill 3").run()
+    press(page, "Analyse with this machine")
+    assert "Mill 3" in shown_text(page)
+    sent = analysis(**page.query_params)
+    assert "Mill 3" in shown_text(sent)
+    assert sent.query_params == page.query_params
+    assert "Mill 3" not in shown_text(analysis(sample="two_stage", described=page.query_params["described"]))
+
+
+def test_the_described_machine_of_a_laboratorys_recording_survives_a_reload() -> None:
+    sample = SAMPLES["healthy"]
+    request = AnalysisRequest("made.h5", "0", "made.toml", sample.rig.read_text("utf-8"))
+    made = Chosen(request, memoryview(sample.recording.read_bytes()))
+    page = at("analysis", {"view": "Machine"}, **{"simulated": made, state.ORIGIN: state.OF_LABORATORY})
+    labelled(page, "text_input", "Machine").set_value("Mill 4").run()
+    press(page, "Analyse with this machine")
+    sent = at("analysis", page.query_params)
+    assert "made.h5" in shown_text(sent)
+    assert "Mill 4" in shown_text(sent)
+
+
+def test_an_own_healthy_reference_survives_a_reload() -> None:
+    page = analysis("damaged_tooth", view="Spectrum", reference="Own file")
+    healthy = SAMPLES["healthy"].recording
+    labelled(page, "file_uploader", "Recording of the healthy").upload("mine.h5", healthy.read_bytes())
+    page.run()
+    assert "Changed since the reference" in shown_text(page)
+    sent = analysis(**page.query_params)
+    assert "mine.h5" in shown_text(sent)
+    assert "Changed since the reference" in shown_text(sent)
+    assert sent.query_params == page.query_params
 
 
 def test_no_option_of_a_method_is_called_as_another_choice_beside_it() -> None:

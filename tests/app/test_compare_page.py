@@ -42,14 +42,14 @@ def test_two_samples_are_compared_in_every_view() -> None:
 def test_the_differences_follow_the_zoom_of_the_spectra() -> None:
     page = opened()
     channel = figures(page)[0]
-    page.session_state["orders chart of comparison a1"] = {"range": [50.0, 60.0]}
+    page.session_state[state.ZOOMS] = {"orders chart of comparison a1": [50.0, 60.0]}
     page.run()
     assert not page.exception
     assert channel["shown"] != [50.0, 60.0]
     assert [figure["shown"] for figure in figures(page)] == [[50.0, 60.0]] * 2
     name, *ends = page.query_params["zoom"].split("_")
     assert ends == ["50", "60"]
-    del page.session_state["orders chart of comparison a1"]
+    del page.session_state[state.ZOOMS]
     page.query_params["zoom"] = f"{name}_51_52"
     page.run()
     assert [figure["shown"] for figure in figures(page)] == [[51.0, 52.0]] * 2

@@ -5,19 +5,25 @@ from base64 import b64decode
 
 import numpy as np
 import pytest
+from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
+from app.dashboard.state import ChosenFile
+from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.views import VIEWS
 from tests.app.pages import (
     SAMPLES,
+    at,
     choose,
     figures,
     key_of,
+    labelled,
     numbers,
     opened,
     opened_file,
     pictures,
     press,
+    sent_to,
     shown_text,
     upload,
 )
@@ -118,6 +124,87 @@ def test_the_form_of_the_machine_makes_the_rig_of_its_file() -> None:
     assert "from tachometer pulses" not in shown_text(page.run())
 
 
+def test_a_machine_without_a_name_is_described_all_the_same() -> None:
+    sample = SAMPLES["damaged_tooth"]
+    nameless = sample.rig.read_text("utf-8").partition("\n")[2]
+    page = opened_file("a.csv.gz", sample.recording.read_bytes(), nameless)
+    assert "machine without a name" in shown_text(page)
+    page = opened_file("a.csv.gz", sample.recording.read_bytes())
+    assert "machine not described" in shown_text(page)
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ('[[bearing]]\nname = "b"\nshaft = "input"\nn_rolling_elements = 8\n', ("Bearings, row 1", "Ø pitch (mm)")),
+        ('[[bearing]]\nname = "b"\nshaft = "input"\npitch_diameter_mm = "x"\n', ("Bearings, row 1, Ø pitch (mm)",)),
+        ('[[bearing]]\nname = "b"\nshaft = "outptu"\n', ("machine.toml", "output")),
+        ('[[sensor]]\nchannel = "a1"\nscale = 0\n', ("Sensors, row 1",)),
+        ('[speed]\nsource = "constant"\nspeed_rpm = -3\n', ("Speed", "Speed (rpm)")),
+        ("[[pair]]\nmodule_mm = -1\n", ("Gear pairs, row 1",)),
+    ],
+)
+def test_the_form_is_corrected_in_its_own_words(table: str, said: tuple[str, ...]) -> None:
+    rig = f'[[shaft]]\nname = "input"\n[[shaft]]\nname = "output"\n{table}'
+    page = opened_file("a.csv.gz", SAMPLES["damaged_tooth"].recording.read_bytes(), rig)
+    (error,) = page.error
+    words = error.value.replace("\\", "").replace("\u2060", "")
+    assert all(text in words for text in said), words
+    assert not re.search(r"\[\[|\[speed\]|\w_\w", words)
+
+
+def test_what_a_recording_lacks_is_said_in_the_words_of_the_form() -> None:
+    page = opened_file("bare.csv", b"a1\n" + b"1\n2\n" * 500)
+    assert "the sampling rate, below or under Machine" in shown_text(page)
+    assert "sampling_rate_hz" not in shown_text(page)
+
+
+def test_units_are_written_as_in_print() -> None:
+    page = opened(tab="Machine")  # whose rig file says m/s^2
+    assert any("unit" in table.value and "m/s²" in set(table.value["unit"]) for table in page.dataframe)
+    assert not [b for b in page.button if b.label.startswith("Analyse")]
+    assert in_page_words("the file says g, the rig file m/s^2") == "the file says g, the rig file m/s²"
+
+
+def test_the_report_is_looked_at_before_it_is_taken() -> None:
+    page = opened(tab="Report")
+    assert not sent_to(page, "document")
+    labelled(page, "toggle", "Preview").set_value(True).run()
+    (sent,) = sent_to(page, "document")
+    assert "Local tooth damage" in sent["html"]
+
+
+def test_recording_and_rig_file_are_given_at_once_on_the_start_page() -> None:
+    sample = SAMPLES["damaged_tooth"]
+    page = at("start", {})
+    uploader = page.file_uploader(key="start file")
+    uploader.upload("machine.toml", sample.rig.read_bytes()).run()
+    assert "Now the recording" in shown_text(page)
+    uploader = page.file_uploader(key="start file").upload("machine.toml", sample.rig.read_bytes())
+    uploader.upload(sample.recording.name, sample.recording.read_bytes()).run()
+    (file,) = state_of(page, state.RECORDING_FILE)
+    assert (file.name, file.rig_name) == (sample.recording.name, "machine.toml")
+    assert file.rig_text == sample.rig.read_text("utf-8")
+    assert "Local tooth damage" in shown_text(page)
+
+
+def test_a_recording_without_a_rig_file_waits_for_it_or_a_press() -> None:
+    page = at("start", {})
+    content = SAMPLES["damaged_tooth"].recording.read_bytes()
+    page.file_uploader(key="start file").upload("a.csv.gz", content).run()
+    assert "or add its rig file" in shown_text(page)
+    press(page, "Open it")
+    assert "a.csv.gz" in shown_text(page)
+    page = at("start", {})
+    page.file_uploader(key="start file").upload("a.csv", b"1").upload("b.csv", b"1").run()
+    assert "2 recordings are given" in shown_text(page)
+
+
+def state_of(page: AppTest, kind: str) -> tuple[ChosenFile, ...]:
+    files: tuple[ChosenFile, ...] = page.session_state[f"kept files of {kind}"]
+    return files
+
+
 def test_a_sampling_rate_that_is_missing_is_asked_for_and_taken() -> None:
     lines = "\n".join(str((i * 37) % 101 - 50) for i in range(4000))
     page = upload(opened(), "bare.csv", f"a1\n{lines}\n".encode())
@@ -183,7 +270,7 @@ def test_no_long_signal_goes_to_the_browser_whole() -> None:
     assert numbers(whole["x"])[np.argmax(numbers(whole["y"]))] == pytest.approx(12.3456)
     ids = [part.proto.id for part in page.get("bidi_component")]
     key = next(name for name in ids if "time of a1" in name).split("-", 2)[-1]
-    page.session_state[key] = {"range": [12.3, 12.4]}
+    page.session_state[state.ZOOMS] = {key: [12.3, 12.4]}
     near = figures(page.run())[0]
     assert near["shown"] == [12.3, 12.4]
     assert len(numbers(near["lines"][0]["y"])) == pytest.approx(1000, abs=5)
@@ -256,7 +343,7 @@ def test_a_zoomed_ring_of_teeth_is_kept_in_the_address_and_reads_off_its_values(
     tooth = 1 + int(29 * np.argmax(np.abs(values)) / len(values))
     assert tooth == 12
     key = key_of("ring of a1 input residual")
-    page.session_state[key] = {"range": [200.0, 300.0, 100.0, 200.0]}
+    page.session_state[state.ZOOMS] = {key: [200.0, 300.0, 100.0, 200.0]}
     page.run()
     assert pictures(page)[0]["shown"] == [200.0, 300.0, 100.0, 200.0]
     assert page.query_params["zoom"].endswith("_200_300_100_200")

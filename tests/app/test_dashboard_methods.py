@@ -88,7 +88,8 @@ def test_names_are_shown_as_typed_and_a_segment_too_short_is_at_most_one_message
     page = opened_file("names.csv", content.replace(b";a1", f";{names[0]}".encode()), rig, tab=view_of(METHOD))
     for method in PAGES:
         go(page, method)
-        assert len(page.error) <= (view_of(method) == "Phase"), (method, shown_text(page))
+        messages = [*page.error, *page.info]
+        assert len(messages) <= (view_of(method) == "Phase"), (method, shown_text(page))
         raw = "\n".join(part.value for part in [*page.markdown, *page.caption, *page.info, *page.warning])
         for markup in ("<script", "**x**", "$y$", ":smile:"):
             assert not re.search(r"(?<!\\)" + re.escape(markup), raw), (method, markup)
@@ -97,7 +98,23 @@ def test_names_are_shown_as_typed_and_a_segment_too_short_is_at_most_one_message
         for limits_s in ((2.0, 2.05), (0.0, 0.0)) if sliders else ():
             next(s for s in page.slider if s.label.startswith("Segment")).set_value(limits_s).run()
             assert not page.exception, method
-            assert len(page.error) <= 1, method
+            assert len([*page.error, *page.info]) <= 1, method
+
+
+def test_modes_open_with_the_waveform_that_the_text_speaks_of_and_notes_are_a_list() -> None:
+    page = opened_at("Modes", "root_crack_3mm")
+    number = re.search(r"Mode \*\*(\d+)\*\* is the most impulsive", shown_text(page))[1]
+    assert labelled(page, "selectbox", "Waveform of").value.startswith(f"mode {number},")
+    notes = next(caption.value for caption in page.caption if "Upright lines" in caption.value)
+    assert all(line.startswith("- ") for line in notes.splitlines())
+    assert len(notes.splitlines()) > 1
+
+
+def test_deconvolution_opens_at_the_rate_that_the_analysis_found() -> None:
+    page = opened_at("Deconvolution", "two_stage")
+    rate = labelled(page, "number_input", "Impacts per second")
+    assert rate.value == pytest.approx(73.703, rel=1e-3)
+    assert "BPFI intermediate drive end" in shown_text(page)
 
 
 def test_waveforms_open_with_five_mesh_cycles() -> None:
@@ -221,7 +238,7 @@ def test_orders_that_make_no_sense_are_one_message() -> None:
     for orders in (["five"], ["5", "5.0"], ["-2"], ["1e9"], ["nan"]):
         page.multiselect[0].set_value(orders).run()
         assert not page.exception
-        assert len(page.error) == 1, (orders, shown_text(page))
+        assert len([*page.error, *page.info]) == 1, (orders, shown_text(page))
     page.multiselect[0].set_value(["5"]).run()
     assert not page.error
 
@@ -315,7 +332,8 @@ def test_the_lowest_frequency_is_half_the_slowest_shaft_or_what_the_segment_allo
     assert not page.error
     low.set_value(1.0).run()
     assert not page.exception
-    assert len(page.error) == 1
+    assert not page.error
+    assert "cannot be told from this segment" in page.info[0].value
     assert "the lowest frequency" in shown_text(page)
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from streamlit.testing.v1 import AppTest
 
-from app.dashboard.fleet import STORE
+from app.dashboard.fleet import STORE, example_store
 from gearsig.fleet import TrendSettings, open_fleet
-from tests.app.pages import FOLDER, figures, labelled, numbers, shown_text
+from tests.app.pages import FOLDER, at, figures, labelled, numbers, press, shown_text
 from tests.fleet.conftest import make_recordings  # noqa: F401 - a fixture
 from tests.fleet.recordings import PATTERN
 
@@ -55,14 +55,32 @@ def test_an_empty_store_says_how_to_fill_it(tmp_path):
 
 def test_an_empty_page_shows_an_example_whose_damaged_machines_are_alarms(tmp_path):
     page = opened(tmp_path / "nothing")
-    next(button for button in page.button if button.label == "See an example").click().run()
-    assert not page.exception
+    press(page, "See an example")
     assert "3 machines, 3 measuring points" in shown_text(page)
-    assert "alarm" in {level for name in ("Mixer 1", "Mixer 2") for level in _levels(page, name)}
-    assert _levels(page, "Mixer 3") == ["ok"]
+    assert "alarm" in {level for name in ("Mixer 1", "Mixer 2") for level in _levels(name)}
+    assert _levels("Mixer 3") == ["ok"]
     assert not (tmp_path / "nothing").exists()
+    press(page, "Close the example")
+    assert "gearsig fleet add" in shown_text(page)
 
 
-def _levels(page: AppTest, machine: str) -> list[str]:
-    status = open_fleet(Path(page.session_state[STORE])).status()
+def test_a_link_to_the_example_shows_it_in_another_session(tmp_path):
+    folder = {STORE: str(tmp_path / "nothing")}
+    page = press(at("fleet", {}, **folder), "See an example")
+    sent = at("fleet", page.query_params, **folder)
+    assert "3 machines, 3 measuring points" in shown_text(sent)
+    assert sent.query_params == page.query_params
+    labelled(sent, "text_input", "Folder").set_value(str(tmp_path)).run()
+    assert "gearsig fleet add" in shown_text(sent)
+    assert "store" not in sent.query_params
+
+
+def test_a_link_opens_no_folder_of_this_machine(make_recordings, tmp_path):  # noqa: F811
+    data = make_recordings("calm", [1.0])
+    open_fleet(tmp_path / "store", create=True).add(data, pattern=PATTERN, n_processes=1)
+    assert "calm" not in shown_text(at("fleet", {"store": str(tmp_path / "store")}))
+
+
+def _levels(machine: str) -> list[str]:
+    status = open_fleet(example_store()).status()
     return list(status.loc[status["machine"] == machine, "level"])

@@ -35,10 +35,19 @@ def test_the_surface_that_is_turned_encloses_the_gear(web_mm: float | None, orde
     assert volume == pytest.approx(mesh_quality(mesh).volume_m3, rel=0.02)
 
 
+def test_publications_are_said_in_the_pages_own_words() -> None:
+    page = AppTest.from_file(str(MAIN), default_timeout=300)
+    page.session_state["flexible shown"] = "Publications"
+    page.switch_page("pages/flexible.py").run()
+    assert [caption.value for caption in page.caption] == ["Takes one to two minutes, once."]
+
+
 @pytest.mark.slow
 def test_a_gear_is_shown_with_its_modes_and_stress() -> None:
     page = AppTest.from_file(str(MAIN), default_timeout=300).switch_page("pages/flexible.py").run()
     assert not page.exception
+    assert "Numbers say how coarse" in page.caption[-1].value
+    assert not any("gearsig" in caption.value for caption in page.caption)
     shown = page.selectbox(key="gear shown")
     assert len(shown.options) == 7
     assert "2 nodal diameters" in shown.options[0]

@@ -1,5 +1,6 @@
 """The gap page without a browser: what it is given becomes files, a run shows and stops, names are never markup."""
 
+import os
 import time
 from hashlib import sha256
 from pathlib import Path
@@ -8,13 +9,16 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 import app.dashboard
+from app.dashboard.gap import view
 from app.dashboard.gap.choice import Choice, common_rig, files_of, own_rig
 from app.dashboard.gap.view import _FINISHED, _JOB, Finished
 from app.dashboard.state import ChosenFile
+from app.gap_job import JSON
 from app.samples import sample_folder
 from gearsig.errors import InputError
 from gearsig.gap import read_gap_inputs
 from gearsig.report import gap_figures, gap_to_json
+from tests.app.pages import at, labelled, sent_to
 from tests.gap.example_report import all_reports, effect_report, with_few_curves
 from tests.gap.stub_diagnosis import OUTCOME, SECONDS, environment
 
@@ -24,6 +28,12 @@ CRACKED, HEALTHY = SAMPLES / "root_crack_3mm.h5", SAMPLES / "root_crack_0mm.h5"
 RIG = (SAMPLES / "root_crack_3mm.toml").read_text()
 REPORTS = all_reports()
 EVIL = "<script>*a*</script> :rocket: [x](http://y)"
+
+
+@pytest.fixture(autouse=True)
+def results_of_their_own(tmp_path, monkeypatch):
+    """Let no test find the results that another one has kept."""
+    monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path / "cache"))
 
 
 def upload(name: str, content: bytes = b"", text: str = "") -> ChosenFile:
@@ -144,6 +154,56 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
     assert labels[3:] == ["PNG", "SVG", "CSV"] * (len(labels[3:]) // 3)  # of pictures that do not zoom
     page.sidebar.multiselect(key="gap sample references").set_value([]).run()
     assert "what was chosen before" in text_of(page)
+
+
+def test_a_result_is_shown_again_after_a_reload(stub, tmp_path, monkeypatch) -> None:
+    stub()
+    page = wait_for_the_end(press(opened(), "Diagnose"))
+    again = opened()
+    assert "tooth 21 of the driver (93 %)" in text_of(again)
+    assert next(button for button in again.get("download_button")).label == "Report (HTML)"
+    again.sidebar.multiselect(key="gap sample references").set_value([]).run()
+    assert "what was chosen before" in text_of(again)
+    again.sidebar.multiselect(key="gap sample references").set_value(page.session_state["gap sample references"]).run()
+    assert "what was chosen before" not in text_of(again)
+    (kept,) = (tmp_path / "cache" / "gap-results").iterdir()
+    whole = kept.read_bytes()
+    kept.write_bytes(whole[: len(whole) // 2])
+    assert "which** effect that the simulator lacks" in text_of(opened())
+    kept.write_bytes(whole)
+    monkeypatch.setattr(view, "_code", lambda: "another state of it")
+    assert "which** effect that the simulator lacks" in text_of(opened())
+
+
+def test_only_so_many_results_are_kept(monkeypatch) -> None:
+    monkeypatch.setattr(view, "N_KEPT", 2)
+    choices = [Choice((sample(CRACKED),), torque_nm=float(n)) for n in range(1, 5)]
+    files = {JSON: gap_to_json(with_few_curves(effect_report())).encode()}
+    for n, choice in enumerate(choices):
+        view._keep_result(choice, files)
+        if view._place_of(choice).exists():
+            os.utime(view._place_of(choice), (n, n))
+    assert [view.kept_result(choice) is not None for choice in choices] == [False, False, True, True]
+
+
+def test_own_files_survive_a_reload() -> None:
+    page = at("gap", {"of": "Own files"})
+    page.sidebar.file_uploader(key="gap recordings").upload("one.h5", CRACKED.read_bytes())
+    page.sidebar.file_uploader(key="gap references").upload("two.h5", HEALTHY.read_bytes())
+    page.sidebar.file_uploader(key="gap rigs").upload("rig.toml", RIG.encode())
+    page.run()
+    again = at("gap", page.query_params)
+    assert "one.h5, against two.h5" in text_of(again)
+    assert "Teeth: 55/75" in text_of(again)
+    assert again.query_params == page.query_params
+
+
+def test_the_report_is_looked_at_before_it_is_taken() -> None:
+    page = opened()
+    page.session_state[_FINISHED] = finished(effect_report())
+    assert not sent_to(page.run(), "document")
+    labelled(page, "toggle", "Preview").set_value(True).run()
+    assert [sent["html"] for sent in sent_to(page, "document")] == ["<html>"]
 
 
 def test_stop_ends_it_and_says_so(stub) -> None:

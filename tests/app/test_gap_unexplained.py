@@ -9,7 +9,7 @@ import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Finding, Kind
-from gearsig.gap import GapOutcome, Standing, beside_standing, standing_place, stood_out
+from gearsig.gap import GapOutcome, UnexpectedFinding, beside_unexpected, place_of_unexpected, unexpected_findings
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
 from gearsig.rig import Rig
@@ -23,18 +23,20 @@ def knocking(_time: FloatArray, revolutions: FloatArray) -> FloatArray:
     return np.asarray(3.0 * ringing(revolutions * STRANGE))
 
 
-def seen(now: Recording, rig: Rig = RIG, *references: Recording) -> tuple[list[Standing], list[str], list[str]]:
+def seen(
+    now: Recording, rig: Rig = RIG, *references: Recording
+) -> tuple[list[UnexpectedFinding], list[str], list[str]]:
     prepared = [PreparedRecording(recording.with_rig(RIG)) for recording in references]
-    return stood_out(PreparedRecording(now.with_rig(rig).with_name("today")), prepared)
+    return unexpected_findings(PreparedRecording(now.with_rig(rig).with_name("today")), prepared)
 
 
 def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_silences_them() -> None:
     struck, healthy = record(knocking), record(seed=1)
     standing, *_ = seen(struck, RIG, healthy)
-    place = standing_place(standing[0], RIG)
+    place = place_of_unexpected(standing[0], RIG)
     assert "order 5.148" in place.title
     assert "no gear, no shaft and no bearing explains (" in place.title
-    assert "no shaft explains, the rig file naming no bearing" in standing_place(standing[0], NO_BEARINGS).title
+    assert "no shaft explains, the rig file naming no bearing" in place_of_unexpected(standing[0], NO_BEARINGS).title
     assert place.orders[0] == pytest.approx(STRANGE, rel=1e-3)
     again, *_ = seen(struck, RIG, record(knocking, seed=2))
     assert not again
@@ -61,18 +63,18 @@ def test_orders_of_a_place_are_the_drivers_whatever_shaft_the_speed_is_of() -> N
     assert turned.reference_shaft == "out"
     standing, *_ = seen(record(knocking), turned)
     assert standing[0].finding.where.order == pytest.approx(STRANGE * 37 / 23, rel=1e-3)
-    assert standing_place(standing[0], turned).orders[0] == pytest.approx(STRANGE, rel=1e-3)
+    assert place_of_unexpected(standing[0], turned).orders[0] == pytest.approx(STRANGE, rel=1e-3)
 
 
-def standing(code: str) -> Standing:
-    return Standing(Finding(code, Kind.FAULT, "Damage of the outer race", confidence=0.9), "today.h5")
+def standing(code: str) -> UnexpectedFinding:
+    return UnexpectedFinding(Finding(code, Kind.FAULT, "Damage of the outer race", confidence=0.9), "today.h5")
 
 
 def test_impacts_of_a_known_race_are_not_called_unknown() -> None:
     race, strange = standing("bearing-outer-race"), standing("non-synchronous-impacts")
-    outcome, warnings = beside_standing(GapOutcome.NO_GAP, [race])
+    outcome, warnings = beside_unexpected(GapOutcome.NO_GAP, [race])
     assert outcome is GapOutcome.UNDECIDED
     assert "today.h5: Damage of the outer race (at most 90 %)" in warnings[0]
-    assert beside_standing(GapOutcome.NO_GAP, [race, strange]) == (GapOutcome.UNKNOWN, [])
-    assert beside_standing(GapOutcome.NO_GAP, []) == (GapOutcome.NO_GAP, [])
-    assert beside_standing(GapOutcome.EFFECT, [race]) == (GapOutcome.EFFECT, [])
+    assert beside_unexpected(GapOutcome.NO_GAP, [race, strange]) == (GapOutcome.UNKNOWN, [])
+    assert beside_unexpected(GapOutcome.NO_GAP, []) == (GapOutcome.NO_GAP, [])
+    assert beside_unexpected(GapOutcome.EFFECT, [race]) == (GapOutcome.EFFECT, [])

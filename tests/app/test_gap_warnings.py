@@ -18,9 +18,9 @@ from gearsig.gap import (
     conditions_of,
     exchanged,
     reduce_recording,
-    stood_out,
     strange_pattern,
     strange_teeth,
+    unexpected_findings,
     wrong_teeth,
 )
 from gearsig.prepared import PreparedRecording
@@ -129,12 +129,12 @@ def test_recording_and_reference_exchanged_are_noticed_by_the_sign_of_the_change
 
 def test_a_reference_with_a_fault_is_told() -> None:
     damaged = recording(0, 1, chipped=True)
-    _, _, warnings = stood_out(*prepared(recording(0, 2)), prepared(recording(0, 3), damaged))
+    _, _, warnings = unexpected_findings(*prepared(recording(0, 2)), prepared(recording(0, 3), damaged))
     assert not warnings  # at the same speed, the first is taken
-    (doubt,) = stood_out(*prepared(recording(0, 2).with_name("now")), prepared(damaged))[2]
+    (doubt,) = unexpected_findings(*prepared(recording(0, 2).with_name("now")), prepared(damaged))[2]
     assert doubt.startswith("The reference of now does not look healthy")
     assert "they may have been exchanged" in doubt
-    (doubt,) = stood_out(*prepared(recording(0, 2, chipped=True)), prepared(damaged))[2]
+    (doubt,) = unexpected_findings(*prepared(recording(0, 2, chipped=True)), prepared(damaged))[2]
     assert "exchanged" not in doubt
 
 

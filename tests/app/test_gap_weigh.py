@@ -7,26 +7,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import RefusalError
-from gearsig.gap import NONE, UNKNOWN, Added, refuse_where_none_ran, shared
+from gearsig.gap import NONE, UNKNOWN, Added, refuse_where_none_ran, with_unknown_shared
 
 FOUND = {UNKNOWN: 0.5, "clipping": 0.3, NONE: 0.2}
 SCORES = st.dictionaries(st.sampled_from(["a", "b", "c"]), st.floats(-1.0, 1.0), max_size=3)
 
 
 def test_one_takes_of_unknown_what_it_explains() -> None:
-    found = shared(FOUND, {"mine": 0.8})
+    found = with_unknown_shared(FOUND, {"mine": 0.8})
     assert found == pytest.approx({"mine": 0.4, "clipping": 0.3, NONE: 0.2, UNKNOWN: 0.1})
     assert list(found) == ["mine", "clipping", NONE, UNKNOWN]
 
 
 def test_what_does_not_shrink_the_gap_has_no_share() -> None:
-    assert shared(FOUND, {"mine": -0.3}) == {**FOUND, "mine": 0.0}
-    assert shared(FOUND, {}) == FOUND
+    assert with_unknown_shared(FOUND, {"mine": -0.3}) == {**FOUND, "mine": 0.0}
+    assert with_unknown_shared(FOUND, {}) == FOUND
 
 
 @given(scores=SCORES)
 def test_nothing_is_lost_and_only_unknown_gives(scores: dict[str, float]) -> None:
-    found = shared(FOUND, scores)
+    found = with_unknown_shared(FOUND, scores)
     assert sum(found.values()) == pytest.approx(1.0)
     assert all(p >= 0.0 for p in found.values())
     assert (found["clipping"], found[NONE]) == (0.3, 0.2)

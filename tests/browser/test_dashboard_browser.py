@@ -142,6 +142,73 @@ def test_what_is_chosen_in_a_view_is_in_its_address_and_leaves_it_with_the_view(
     assert soon(page, lambda: "laboratory" in page.url and "sample=" not in page.url)
 
 
+def test_back_and_forward_restore_view_scale_zoom_and_recording(page: playwright.Page) -> None:
+    open_sample(page)
+    opened = page.url
+    view = open_view(page, "Spectrum")
+    n_entries = page.evaluate("history.length")
+    view.get_by_text("dB", exact=True).click()
+    assert soon(page, lambda: "amplitude=dB" in page.url)
+    settle(page)
+    box = view.locator(".figure svg").bounding_box()
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 0.4 * box["width"], middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.5 * box["width"], middle, steps=4)
+    page.mouse.up()
+    assert soon(page, lambda: "zoom=" in page.url)
+    settle(page)
+    zoomed = page.url
+    curve = view.locator(".figure svg path").last.get_attribute("d")
+    open_view(page, "Envelope")
+    assert soon(page, lambda: "view=Envelope" in page.url)
+    assert page.evaluate("history.length") == n_entries + 3  # one for each thing that was done
+    page.get_by_text("Own file", exact=True).click()
+    page.get_by_text("Give a recording on the left").first.wait_for()
+    settle(page)
+    page.go_back()
+    page.locator(".strip button[aria-pressed=true]").filter(has_text="Envelope").first.wait_for()
+    settle(page)
+    page.go_back()
+    page.locator(".strip button[aria-pressed=true]").filter(has_text="Spectrum").first.wait_for()
+    settle(page)
+    assert page.url == zoomed
+    assert view.locator(".figure svg path").last.get_attribute("d") == curve
+    for _ in range(3):
+        page.go_back()
+        settle(page)
+    assert page.url == opened
+    page.locator(".strip button[aria-pressed=true]").filter(has_text="Average").first.wait_for()
+    for _ in range(3):
+        page.go_forward()
+        settle(page)
+    assert page.url == zoomed
+    assert view.locator(".figure svg path").last.get_attribute("d") == curve
+    open_view(page, "Average")  # which was the first, and is a choice again
+    assert soon(page, lambda: "view=Average" in page.url)
+
+
+def test_a_report_is_looked_at_in_a_frame_that_runs_nothing(page: playwright.Page) -> None:
+    open_sample(page)
+    view = open_view(page, "Report")
+    assert page.locator(".document").count() == 0
+    view.get_by_text("Preview").click()
+    frame = page.locator(".document iframe")
+    frame.wait_for()
+    assert frame.get_attribute("sandbox") == ""
+    assert frame.bounding_box()["height"] <= 700
+    frame.content_frame.get_by_role("heading").filter(has_text="Local tooth damage").first.wait_for()
+
+
+def test_recording_and_rig_file_are_given_at_once(page: playwright.Page) -> None:
+    page.locator("[data-testid=stFileUploader] input[type=file]").first.set_input_files([SAMPLE.recording, SAMPLE.rig])
+    page.locator(".strip").first.wait_for()
+    settle(page)
+    assert "file=" in page.url
+    view = open_view(page, "Order spectrum")
+    assert view.get_by_text("1× mesh", exact=True).count() > 0
+
+
 def test_a_described_machine_is_analysed_at_once_and_survives_a_reload(page: playwright.Page, address: str) -> None:
     sample = next(sample for sample in samples() if sample.rig.stem == "outer_race")
     page.goto(address)
@@ -186,6 +253,20 @@ def test_a_small_window_shows_the_verdict_above_its_picture(page: playwright.Pag
     words, picture = page.locator(".st-key-verdict h3"), page.locator(".st-key-verdict img")
     assert words.bounding_box()["y"] < picture.bounding_box()["y"]
     assert page.evaluate("document.documentElement.scrollWidth") <= 800
+
+
+@pytest.mark.parametrize("query", ["analysis?sample=two_stage&view=Modes", "compare?sample=root_crack_3mm", "gap"])
+def test_what_is_chosen_can_be_read_in_a_small_window(page: playwright.Page, address: str, query: str) -> None:
+    page.set_viewport_size({"width": 800, "height": 1000})
+    page.goto(address + query)
+    page.locator("[data-testid=stSidebar] [role=combobox]").first.wait_for()
+    settle(page)
+    cut = page.evaluate(
+        """() => [...document.querySelectorAll('[data-testid=stSelectbox] input, [data-testid=stMultiSelect] span')]
+            .filter((part) => part.clientWidth > 1 && part.scrollWidth > part.clientWidth + 1)
+            .map((part) => part.value || part.textContent)"""
+    )
+    assert not cut
 
 
 def test_own_files(page: playwright.Page) -> None:

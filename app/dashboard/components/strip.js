@@ -2,11 +2,11 @@
 
 const NS = "http://www.w3.org/2000/svg";
 
-export default function ({ data, parentElement, setStateValue }) {
+export default function ({ data, parentElement, setTriggerValue }) {
   const strip = parentElement.querySelector(".strip");
   strip.setAttribute("role", "group");
   strip.setAttribute("aria-label", "Views");
-  strip.replaceChildren(...data.items.map((item) => tile(item, item.name === data.chosen, () => setStateValue("view", item.name))));
+  strip.replaceChildren(...data.items.map((item) => tile(item, item.name === data.chosen, () => setTriggerValue("view", item.name))));
   strip.onkeydown = (event) => {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     const tiles = [...strip.children], next = tiles[tiles.indexOf(strip.getRootNode().activeElement) + step];

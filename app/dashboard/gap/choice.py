@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import streamlit as st
 
@@ -175,10 +176,11 @@ def choose() -> Choice:
     from sims.registry import gap_simulators
 
     with st.sidebar:
-        origin = st.radio("Recordings", (SAMPLES, FILES), horizontal=True, key="gap origin", persist_state="session")
+        looks: dict[str, Any] = {"horizontal": True, "key": "gap origin", "name": "of"}
+        origin = address.ask_one(st.radio, "Recordings", (SAMPLES, FILES), **looks)
         recordings, references, rigs = _choose_samples() if origin == SAMPLES else _choose_files()
-        looks = {"key": "gap simulator", "name": "simulator", "persist_state": "session"}
-        model = address.ask_one(st.selectbox, "Simulator", tuple(gap_simulators()), **looks)
+        names = tuple(gap_simulators())
+        model = address.ask_one(st.selectbox, "Simulator", names, key="gap simulator", name="simulator")
         with st.expander("Not in the files?", icon=":material/tune:"):
             about = "Of the input shaft, for all recordings."
             torque = choose_number(
@@ -204,7 +206,6 @@ def _choose_samples() -> ChosenFiles:
             name=name,
             first=[first] if first in names else [],
             read=address.some_of(names),
-            persist_state="session",
             help=about,
         )
         return chosen
@@ -220,11 +221,11 @@ def _choose_samples() -> ChosenFiles:
 
 def _choose_files() -> ChosenFiles:
     about = "Several operating conditions (speeds, loads) tell more than one."
-    recordings = choose_files("Recordings of one rig", "gap recordings", about=about)
+    recordings = choose_files("Recordings of one rig", "gap recordings", about=about, name="recordings")
     about = (
         "What is known of the machine: teeth, bearings, speed source. A rig file named as a recording overrides speed "
         "and torque of that recording."
     )
-    rigs = choose_files("Rig file (TOML)", "gap rigs", about=about, of_rigs=True)
+    rigs = choose_files("Rig file (TOML)", "gap rigs", about=about, of_rigs=True, name="rigs")
     about = "The same rig when it was healthy. The answer becomes much surer."
-    return recordings, choose_files("Healthy references", "gap references", about=about), rigs
+    return recordings, choose_files("Healthy references", "gap references", about=about, name="references"), rigs

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cache
+from hashlib import sha256
 from html import escape
 from math import isfinite
-from typing import Any
+from pathlib import Path
+from typing import IO, Any
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import streamlit as st
 
+import gearsig.gap
 from app.dashboard import address
 from app.dashboard.gap.choice import Choice, files_of
 from app.dashboard.theme import as_typed, capitalised, one_line
@@ -19,6 +26,7 @@ from app.dashboard.widgets.charts import (
     QUIET,
     download,
     looked_at,
+    offer_page,
     show_differences,
     show_lines,
     show_picture,
@@ -26,8 +34,9 @@ from app.dashboard.widgets.charts import (
 from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.verdict import Colour
 from app.gap_job import JSON, PAGE, TWIN, Job, private_folder
-from gearsig.cache import cache_folder
+from gearsig.cache import cache_folder, keep
 from gearsig.errors import GearsigError
+from gearsig.formatting import odds_text, percent
 from gearsig.gap import (
     AverageCurves,
     GapOutcome,
@@ -48,6 +57,7 @@ from gearsig.report import (
     condition_rows,
     floors_text,
     gap_figures,
+    gap_from_dict,
     group_texts,
     inseparable_text,
     next_rows,
@@ -60,12 +70,14 @@ from gearsig.report import (
 )
 
 # --------------------
-# Run a diagnosis beside the page, with progress and a stop; keep its result for the session.
+# Run a diagnosis beside the page, with progress and a stop; keep its result for whoever asks the same again.
 # --------------------
 
 
 _JOB, _FINISHED, _STOPPED, _REFUSED = "gap job", "gap result", "gap stopped", "gap refused"
 EVERY_S = 0.5
+N_KEPT, MAX_KEPT_BYTES = 24, 200_000_000
+"""Results that are kept, and how large one may be."""
 
 
 @dataclass(frozen=True)
@@ -91,12 +103,12 @@ class Finished:
 class _Running:
     """A job, and what it was asked."""
 
-    key: str
+    choice: Choice
     job: Job
 
 
 def show_running(choice: Choice) -> Finished | None:
-    """Show the buttons and what goes on; return the last result of this session, if there is one.
+    """Show the buttons and what goes on; return the kept result of the choice, else the last one of this session.
 
     Raises
     ------
@@ -128,6 +140,9 @@ def show_running(choice: Choice) -> Finished | None:
     elif st.session_state.pop(_STOPPED, False):
         st.info("Stopped. Nothing was kept but what had been prepared for this rig.", icon=":material/stop_circle:")
     found: Finished | None = st.session_state.get(_FINISHED)
+    if running is None and choice.recordings and (found is None or found.key != choice.key):
+        found = kept_result(choice) or found
+        st.session_state[_FINISHED] = found
     return found
 
 
@@ -151,7 +166,7 @@ def _start(choice: Choice) -> None:
             raise
         st.session_state[_REFUSED] = error
         return
-    st.session_state[_JOB] = _Running(choice.key, job)
+    st.session_state[_JOB] = _Running(choice, job)
 
 
 def _stop() -> None:
@@ -176,11 +191,60 @@ def _take(running: _Running) -> None:
     del st.session_state[_JOB]
     try:
         report = job.report()
-        page, found = job.result(PAGE) or b"", job.result(JSON) or b""
-        figures = tuple(gap_figures(report, curves=False))
-        st.session_state[_FINISHED] = Finished(running.key, report, figures, page, found, job.result(TWIN))
+        files = {name: found for name in (PAGE, JSON, TWIN) if (found := job.result(name)) is not None}
+        st.session_state[_FINISHED] = _finished(running.choice, report, files)
+        _keep_result(running.choice, files)
     finally:
         job.close()
+
+
+def _finished(choice: Choice, report: GapReport, files: Mapping[str, bytes]) -> Finished:
+    figures = tuple(gap_figures(report, curves=False))
+    return Finished(choice.key, report, figures, files.get(PAGE, b""), files.get(JSON, b""), files.get(TWIN))
+
+
+def _place_of(choice: Choice) -> Path:
+    """Return where the result of a choice is kept: another one for other files, settings, or another state of the code.
+
+    Whoever asks has the files themselves: their hashes are in the name.
+    """
+    rigs = [file.rig_text for file in (*choice.recordings, *choice.references)]
+    asked = sha256(f"{gearsig.__version__} {_code()} {choice.key} {rigs!r}".encode()).hexdigest()
+    return cache_folder("gap-results") / f"{asked}.zip"
+
+
+@cache
+def _code() -> str:
+    """Return what stands for the code of the diagnosis."""
+    sources = sorted(Path(gearsig.gap.__path__[0]).rglob("*.py"))
+    return sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
+
+
+def _keep_result(choice: Choice, files: Mapping[str, bytes]) -> None:
+    """Keep the files of a result; the oldest results give way."""
+    path = _place_of(choice)
+
+    def write(file: IO[bytes]) -> None:
+        with ZipFile(file, "w", ZIP_DEFLATED) as archive:
+            for name, content in files.items():
+                archive.writestr(name, content)
+
+    keep(path, write)
+    with suppress(OSError):
+        for old in sorted(path.parent.glob("*.zip"), key=lambda one: one.stat().st_mtime)[:-N_KEPT]:
+            old.unlink(missing_ok=True)
+
+
+def kept_result(choice: Choice) -> Finished | None:
+    """Return the kept result of a choice, None where there is none that can be read."""
+    try:
+        with ZipFile(_place_of(choice)) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > MAX_KEPT_BYTES:
+                return None
+            files = {name: archive.read(name) for name in (PAGE, JSON, TWIN) if name in archive.namelist()}
+        return _finished(choice, gap_from_dict(json.loads(files[JSON])), files)
+    except Exception:  # noqa: BLE001 - there is none, or damaged bytes, which make their readers raise anything
+        return None
 
 
 LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
@@ -223,9 +287,9 @@ def _show_verdict(report: GapReport) -> None:
     if kind is None:
         return
     place = f", {kind.place}" if kind.place else ""
-    st.markdown(f"### {as_typed(capitalised(kind.title))}{as_typed(place)} :gray[{_percent(kind.probability)}]")
+    st.markdown(f"### {as_typed(capitalised(kind.title))}{as_typed(place)} :gray[{odds_text(kind.probability)}]")
     likely = [c for c in report.causes if c.group == kind.group and c.probability >= LIKELY]
-    words = (f":{colour}-badge[{as_typed(c.title)} {_percent(c.probability)}]" for c in likely)
+    words = (f":{colour}-badge[{as_typed(c.title)} {odds_text(c.probability)}]" for c in likely)
     st.markdown(f"{'Cause' if len(likely) == 1 else 'Possible causes'}: {' '.join(words)}")
 
 
@@ -236,16 +300,12 @@ TABS = ("Where", "Which", "How far", "Next and facts")
 TAB = "gap tab"
 
 
-def _percent(share: float) -> str:
-    return "> 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
-
-
 def _show_panels(report: GapReport) -> None:
     """Show where, which and how far side by side, each as bars with its sentence, and the way to all of it."""
     said = dict(verdict_rows(report))
-    places = [(place.title, place.share, _percent(place.share)) for place in report.places if isfinite(place.share)]
+    places = [(place.title, place.share, percent(place.share)) for place in report.places if isfinite(place.share)]
     causes = [
-        (cause.title, cause.probability, _percent(cause.probability))
+        (cause.title, cause.probability, odds_text(cause.probability))
         for cause in report.causes
         if cause.probability >= LEAST
     ]
@@ -298,8 +358,8 @@ def _show_remarks(report: GapReport) -> None:
 
 
 def _show_downloads(finished: Finished) -> None:
+    offer_page("Report (HTML)", lambda: finished.page, PAGE, "gap")
     with st.container(horizontal=True):
-        download("Report (HTML)", finished.page, PAGE, "text/html", primary=True)
         download("JSON", finished.json, JSON, "application/json")
         if finished.twin is not None:
             download("Twin (preset)", finished.twin, TWIN, "application/toml")

@@ -68,7 +68,7 @@ FAULTS = {
 def choose_drive(chosen: Preset) -> Setup:
     """Return what the user set; what is not offered is the preset's."""
     with st.sidebar:
-        looks = {"key": "mode of the drive", "name": "mode", "persist_state": "session"}
+        looks = {"key": "mode of the drive", "name": "mode"}
         mode = address.ask_one(st.segmented_control, "Mode", MODES, **looks)
         torque = choose_number("Torque of the motor (N·m)", "torque of the drive", chosen.torque_nm, 300.0)
         speed = choose_number(
@@ -82,7 +82,6 @@ def choose_drive(chosen: Preset) -> Setup:
                 first=str(chosen.parameters.get("damping_law", DAMPING_LAWS[0])),
                 key=f"law of {chosen.name}",
                 name="law",
-                persist_state="session",
                 help="What they really give: 0.947, 0.954 and 0.952 for a restitution of 0.95; 0.470, 0.725 and 0.663 "
                 "for 0.5.",
             )
@@ -120,7 +119,6 @@ def choose_drive(chosen: Preset) -> Setup:
                 first=2**20,
                 key="counts of the drive",
                 name="counts",
-                persist_state="session",
             )
             noise = choose_parameter(chosen, "angle_noise_urad", "Noise of the angles (µrad rms)", 200.0)
         show_typed_toggle()
@@ -159,7 +157,6 @@ def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
         name=f"{name}-{fault.option}",
         first=min(default, last),
         read=address.number(1, last, whole=True),
-        persist_state="session",
     )
     return EffectSetting(name, severity, {fault.option: float(place)})
 
@@ -234,7 +231,6 @@ def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
             key=f"view of the {'healthy' if faulty is None else 'faulty'} drive",
             name="view",
             label_visibility="collapsed",
-            persist_state="session",
         )
         which = "Faulty"
         if faulty is not None and view != TOGETHER:

@@ -24,7 +24,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError
 from gearsig.plot import Cursor, order_cursors
 from gearsig.recording import Recording
-from gearsig.rig import Rig, order_lines
+from gearsig.rig import SIDES, Rig, order_lines
 from sims.cracked import Response, simulate_with_motion
 from sims.effects import completed, effect
 from sims.gear_pair import build_rig
@@ -193,7 +193,6 @@ def faulty_of(setup: Setup, simulate: Callable[[Setup], R]) -> R | None:
 
 
 N_MESH_HARMONICS, N_SIDEBANDS, N_BEARING_HARMONICS, N_SHAFT_HARMONICS = 5, 3, 4, 8
-SIDES = ("driver", "driven")
 
 
 def affected_sides(setup: Setup) -> tuple[str, ...]:

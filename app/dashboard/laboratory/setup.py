@@ -351,7 +351,7 @@ def _choose_option(of: Effect, option: Option) -> float | str | None:
     unit = shown_unit(option.unit)
     words = option.name.removesuffix("_deg").removesuffix("_percent").removesuffix("_um").removesuffix("_hz")
     label = words.replace("_", " ").capitalize() + (f" ({unit})" if unit else "")
-    looks: dict[str, Any] = {"key": _option_key(of, option), "help": option.meaning, "persist_state": "session"}
+    looks: dict[str, Any] = {"key": _option_key(of, option), "help": option.meaning}
     looks["name"] = f"{of.name}-{option.name}"
     if isinstance(option.default, str):
         choices = option.choices or tuple(f"bearing {i + 1}" for i in range(4))
@@ -407,7 +407,7 @@ def choose_preset() -> Preset:
     """Return the machine: pairs that run at a steady speed, and the drive that starts and stops."""
     known = {name: preset for model in (*MODELS, DRIVE_MODEL) for name, preset in presets(model).items()}
     names = list(known)
-    looks = {"format_func": shown_name, "key": "machine of the laboratory", "persist_state": "session"}
+    looks = {"format_func": shown_name, "key": "machine of the laboratory"}
     with st.sidebar:
         name = address.ask_one(st.selectbox, "Machine", names, name="machine", first=FIRST, **looks)
         st.caption(known[name].title)
@@ -434,7 +434,6 @@ def _choose_flanks(preset: Preset) -> Parameters:
         name="friction",
         first=preset.parameters.get("friction", "on") == "on",
         read=address.one_of((False, True)),
-        persist_state="session",
     )
     return rough, oil, ("friction", "on" if friction else "off")
 
@@ -446,7 +445,6 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
         (AUTOMATIC, *DURATIONS_S),
         key="length of the laboratory",
         name="length",
-        persist_state="session",
         help="A longer signal has a finer spectrum and takes longer to follow the sliders. Auto: eight revolutions of "
         "the slower shaft, at most a second.",
     )
@@ -471,7 +469,6 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
         name="seed",
         first=0,
         read=address.number(0, MOST_SEEDS, whole=True),
-        persist_state="session",
         help="Another one draws other roughness, other noise, other angles. Healthy and faulty always share it.",
     )
     limit = choose_parameter(preset, "sensor_range_mps2", "Range of the sensors (m/s²)", 5e3)

@@ -40,9 +40,9 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show a signal of both machines, and the difference."""
     left, right = st.columns(2)
     names = (*healthy.vibration_channels, *MOTION)
-    looks = {"format_func": _shown, "key": "signal of the laboratory", "persist_state": "session"}
+    looks = {"format_func": _shown, "key": "signal of the laboratory"}
     name = address.ask_one(left.selectbox, "Signal", names, name="signal", **looks)
-    looks = {"first": "3 revolutions", "key": "segment of the laboratory", "persist_state": "session"}
+    looks = {"first": "3 revolutions", "key": "segment of the laboratory"}
     shown = address.ask_one(right.segmented_control, "Shown, of the input shaft", list(SEGMENTS), name="shown", **looks)
     end = _end_s(healthy, SEGMENTS[shown])
     healthy_line, label = signal_of(healthy, name, end)
@@ -272,9 +272,9 @@ Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show the portraits of one gear along the line of action."""
     left, right = st.columns(2)
-    looks = {"key": "gear of the laboratory", "persist_state": "session"}
+    looks = {"key": "gear of the laboratory"}
     gear = address.ask_one(left.segmented_control, "Gear", list(GEARS), name="gear", **looks)
-    looks = {"key": "strobe of the laboratory", "persist_state": "session"}
+    looks = {"key": "strobe of the laboratory"}
     strobe = address.ask_one(right.segmented_control, "A point once per", list(STROBES), name="strobe", **looks)
     n = STROBES[strobe] or healthy.machine.mesh.pair.driver.teeth
     both = [healthy] if faulty is None else [healthy, faulty]

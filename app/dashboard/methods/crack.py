@@ -19,6 +19,7 @@ from gearsig.angle import find_shaft_angle, resample_to_angle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
 from gearsig.errors import GearsigError, RefusalError
+from gearsig.formatting import percent
 from gearsig.orders import separate, synchronous_average
 from gearsig.plot import crack_comparison_figure
 from gearsig.recording import Recording
@@ -118,7 +119,7 @@ def _show_answer(estimate: CrackEstimate | NoCrackSeen) -> None:
         low, high = estimate.interval_mm
         tooth = f"tooth {estimate.tooth}" if estimate.tooth is not None else "not known"
         gear = f"{estimate.gear}{'' if estimate.gear_is_certain else ' or its mate'}"
-        kinds = ", ".join(f"{kind} {100.0 * share:.0f} %" for kind, share in estimate.kind_probabilities.items())
+        kinds = ", ".join(f"{kind} {percent(share)}" for kind, share in estimate.kind_probabilities.items())
         reach = f"{estimate.reach_cycles:.1f} mesh cycles; {estimate.squeezed_rise_db:+.1f} dB"
         numbers = {
             "Depth of a crack": f"{estimate.depth_mm:.2f} mm, {estimate.depth_percent:.0f} % of the root",

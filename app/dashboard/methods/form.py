@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import streamlit as st
@@ -128,13 +128,19 @@ def ask_options(page: MethodPage, method: Method, prepared: PreparedRecording) -
     shown = [o for o in method.options if known_angle or o.name not in ("over_angle", "over", "shaft", "pair")]
     values = {option.name: option.default for option in method.options}
     names = {o.name: o.known(prepared, page.channel.channel) if o.known is not None else () for o in shown}
-    shown = [option for option in shown if option.kind != "name" or len(names[option.name]) > 1]
+    shown = [_as_suggested(option, page) for option in shown if option.kind != "name" or len(names[option.name]) > 1]
     few, more = ([option for option in shown if option.more is is_more] for is_more in (False, True))
     _ask_in_rows(page, few, names, values)
     if more:
         with st.expander("More settings", icon=":material/tune:"):
             _ask_in_rows(page, more, names, values)
     return values
+
+
+def _as_suggested(option: MethodOption, page: MethodPage) -> MethodOption:
+    """Return an option whose default is what the analysis of the whole recording suggests, where it does."""
+    value = None if option.suggested is None else option.suggested(page.analysis)
+    return option if value is None else replace(option, default=float(f"{value:.5g}"))
 
 
 def _ask_in_rows(

@@ -21,7 +21,7 @@ from app.dashboard.cached import safe_file_name
 from app.dashboard.methods.form import MethodPage, ask_options
 from app.dashboard.theme import as_typed, capitalised, one_line, palette
 from app.dashboard.widgets import charts
-from app.dashboard.widgets.messages import show_error, show_unknown_speed, show_warnings
+from app.dashboard.widgets.messages import in_page_words, show_error, show_unknown_speed, show_warnings
 from app.dashboard.work import Kept, kept
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, with_known_angle
@@ -116,9 +116,18 @@ def show_method(name: str, analysis: Analysis, channel: ChannelAnalysis) -> None
         if isinstance(angle, CannotTell) and error.reason == angle.reason:
             show_unknown_speed(angle)
         else:
-            show_error(error)
+            _show_refusal(error)
     except GearsigError as error:
         show_error(error)
+
+
+def _show_refusal(error: RefusalError) -> None:
+    """Show that the recording allows no answer: a result like others, and no mistake of the user's."""
+    reason = capitalised(in_page_words(error.reason).rstrip("."))
+    lines = [f"**It cannot be told from this segment.** {as_typed(reason)}."]
+    if error.remedy:
+        lines.append(f"What to do: {as_typed(in_page_words(error.remedy).rstrip('.'))}.")
+    st.info("\n\n".join(lines), icon=":material/help:")
 
 
 def _show(name: str, page: MethodPage) -> None:
@@ -160,7 +169,7 @@ def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | Cann
         _show_space(page, answer.path)
     elif not answer.panels and answer.waveforms is None:
         charts.show_figure(answer.draw(), f"{answer.caption}, {answer.channel}", page.key("figure"))
-    st.caption(" ".join(as_typed(note) for note in answer.notes))
+    show_warnings([capitalised(note) for note in answer.notes], quiet=True)
     if answer.waveforms is not None and "signal" in answer.waveforms.columns:
         _show_waveforms(page, answer.waveforms, angle)
     for what, table in answer.tables.items():
@@ -213,9 +222,9 @@ def _show_waveforms(page: MethodPage, waveforms: Waveforms, angle: ShaftAngle | 
     """Draw one waveform over the signal, and what remains of the signal below."""
     names = [name for name in waveforms.columns if name not in ("signal", waveforms.residual)]
     left, right = st.columns((1, 2))
-    chosen = names[0]
+    chosen = waveforms.shown_first or names[0]
     if len(names) > 1:
-        looks: dict[str, Any] = {"key": f"waveform of {names}", "name": "waveform", "format_func": one_line}
+        looks: dict[str, Any] = {"key": f"waveform of {names} {chosen}", "name": "waveform", "format_func": one_line}
         chosen = page.ask(left.selectbox, "Waveform of", names, first=chosen, read=address.one_of(names), **looks)
     start, end = waveforms.start, waveforms.end
     length = min(first_length(page, waveforms, angle), end - start)

@@ -103,7 +103,6 @@ def choose_channel(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> str:
             key="sensor of the laboratory",
             name="sensor",
             label_visibility="collapsed",
-            persist_state="session",
         )
         if faulty is not None:
             views.show_legend()

@@ -1,4 +1,4 @@
-"""What gearsig is, three things to try, one's own file, and the samples."""
+"""What gearsig is, one's own recording, three things to try, and the samples."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import kept_file
+from app.dashboard.state import ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.chooser import choose_file, open_file, open_sample
+from app.dashboard.widgets.chooser import choose_with_rig, open_file, open_sample
 from app.dashboard.widgets.messages import show_error
 from app.samples import samples
 from gearsig.checks import FloatArray
@@ -91,12 +92,14 @@ TO_TRY: tuple[tuple[str, str, str, Callable[[], str], str], ...] = (
 
 
 def show() -> None:
-    """Show mark and purpose, three things to try, own and recent files, samples."""
+    """Show mark and purpose, own and recent files, three things to try, samples."""
     st.html(
         '<div class="hero"><h1>Gear vibration, from the recording to the reason</h1>'
         "<p>gearsig reads a recording, names the damaged tooth or bearing with its evidence, and says why a simulation "
         "differs from the machine.</p></div>"
     )
+    with st.container(key="own", border=True):
+        show_own()
     with st.container(key="try"):
         for column, (title, about, label, picture, page) in zip(st.columns(3), TO_TRY, strict=True):
             with column.container(border=True, height="stretch"):
@@ -107,34 +110,47 @@ def show() -> None:
                     if page == "analysis":
                         open_sample("damaged_tooth")
                     st.switch_page(state.ANALYSIS_PAGE.with_name(f"{page}.py"))
-    left, right = st.container(key="own").columns((5, 7), gap="large")
-    with left:
-        show_own()
-    with right:
-        show_samples()
+    show_samples()
 
 
 def show_own() -> None:
-    """Take a file of the user's, or one of those that were open last."""
-    st.subheader("Open your own file", anchor=False)
-    st.caption(f"{FORMAT_NAMES}. It stays on this machine; the machine is described in a form afterwards.")
-    file = choose_file("Recording", "start file", rig="Rig file (TOML), if you have one")
-    if file is not None:
-        open_file(file)
-        state.keep_files("start file", ())
-        st.switch_page(state.ANALYSIS_PAGE)
-    for kept in [file for token in state.tokens() if (file := kept_file(token)) is not None][:5]:
-        name = as_typed(kept.name)
-        if st.button(f"{name}", key=f"recent {kept.sha256}", icon=":material/history:", type="tertiary"):
-            open_file(kept)
-            st.switch_page(state.ANALYSIS_PAGE)
+    """Take a recording of the user's, with its rig file if there is one, or one of those that were open last."""
+    words, files = st.columns((5, 7), gap="medium", vertical_alignment="center")
+    with words:
+        st.subheader("Open your own recording", anchor=False)
+        st.caption(
+            "With its rig file (TOML), if you have one: give both at once. Without one, the machine is described in a "
+            "form afterwards. Files stay on this machine."
+        )
+        tokens = state.tokens(state.RECORDING_FILE)
+        for kept in [file for token in tokens if (file := kept_file(token)) is not None][:5]:
+            if st.button(as_typed(kept.name), key=f"recent {kept.sha256}", icon=":material/history:", type="tertiary"):
+                open_own(kept)
+    with files:
+        file, has_rig = choose_with_rig("Recording, and its rig file", "start file", about=f"{FORMAT_NAMES}.")
+        if file is None and has_rig:
+            st.caption(":material/upload_file: Now the recording that the rig file belongs to.")
+        elif file is not None and has_rig:
+            open_own(file)
+        elif file is not None:
+            with st.container(horizontal=True, vertical_alignment="center"):
+                if st.button("Open it", type="primary", key="open own", icon=":material/troubleshoot:"):
+                    open_own(file)
+                st.caption("or add its rig file first.", width="content")
+
+
+def open_own(file: ChosenFile) -> None:
+    """Go on with a file on the analysis page."""
+    open_file(file)
+    st.switch_page(state.ANALYSIS_PAGE)
 
 
 def show_samples() -> None:
     """Show the samples that show most."""
     st.subheader("Samples, each with what it shows", anchor=False)
-    for sample in samples()[:N_SHOWN]:
-        button, text = st.columns((2, 5), vertical_alignment="center")
+    for place, sample in zip(st.columns(2) * N_SHOWN, samples()[:N_SHOWN], strict=False):
+        with place:
+            button, text = st.columns((3, 5), vertical_alignment="center")
         text.markdown(f":gray[{sample.about}]")
         if button.button(sample.title, key=f"sample {sample.rig.stem}", width="stretch"):
             open_sample(sample.rig.stem)

@@ -7,6 +7,7 @@ from base64 import b64encode
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -136,9 +137,9 @@ def looked_at(key: str, whole: tuple[float, float], first: tuple[float, float] |
 
     The page's address keeps the last one, so that a view can be sent.
     """
-    ends, is_new = _zoomed(key)
-    is_whole = is_new and ends[0] <= whole[0] and ends[1] >= whole[1] and len(ends) == 2
-    if is_new and not is_whole:
+    ends = _zoomed(key)
+    is_whole = len(ends) == 2 and ends[0] <= whole[0] and ends[1] >= whole[1]
+    if ends and not is_whole:
         address.put(address.ZOOM, "_".join([_name(key), *(f"{end:.7g}" for end in ends)]))
     elif is_whole and address.now(address.ZOOM).startswith(f"{_name(key)}_"):
         address.put(address.ZOOM)
@@ -147,23 +148,35 @@ def looked_at(key: str, whole: tuple[float, float], first: tuple[float, float] |
     return (low, high) if low < high else whole
 
 
-def _zoomed(key: str) -> tuple[list[float], bool]:
+def _zoomed(key: str) -> list[float]:
     """Return what a figure was zoomed to, low and high, of a plane those of its values as well; empty where it was not.
 
-    And whether the figure says so, which the address does not yet.
+    The session keeps it: Streamlit forgets the state of a figure that is not shown.
     """
-    with suppress(KeyError, TypeError, ValueError):
-        ends = [float(end) for end in st.session_state[key]["range"]]
-        if len(ends) in (2, 4):
-            return ends, True
+    if address.follows(key) or key not in state.zooms():
+        state.zooms()[key] = _asked_zoom(key)
+    return state.zooms()[key]
+
+
+def _asked_zoom(key: str) -> list[float]:
     named, *words = address.now(address.ZOOM).split("_")
-    if named == _name(key) and len(words) in (2, 4):
-        with suppress(ValueError):
-            ends = [float(word) for word in words]
-            if np.all(np.isfinite(ends)) and ends[-2] < ends[-1]:
-                address.claim(address.ZOOM)
-                return ends, False
-    return [], False
+    return _ends(words) if named == _name(key) else []
+
+
+def _ends(values: object) -> list[float]:
+    """Return the ends of a range as an address or a browser names them; empty where it is none."""
+    with suppress(TypeError, ValueError):
+        ends = [float(value) for value in values]  # type: ignore[attr-defined]
+        if len(ends) in (2, 4) and np.all(np.isfinite(ends)) and ends[-2] < ends[-1] and ends[0] < ends[1]:
+            return ends
+    return []
+
+
+def _take_zoom(key: str) -> None:
+    """Keep what the user zoomed a figure to."""
+    ends = _ends(st.session_state[key]["range"])
+    if ends:
+        state.zooms()[key] = ends
 
 
 def _name(key: str) -> str:
@@ -221,9 +234,9 @@ def show_lines(
         "step": step,
         "spans": list(panel.spans),
         "plane": is_plane,
-        "across": _zoomed(key)[0][2:] or None if is_plane else None,
+        "across": _zoomed(key)[2:] or None if is_plane else None,
     }
-    _figure(key=key, data=data, on_range_change=_ignore, default={"range": None})
+    _figure(key=key, data=data, on_range_change=partial(_take_zoom, key), default={"range": None})
 
 
 def show_map(
@@ -283,11 +296,7 @@ def show_map(
             "also_unit": "" if also is None else also[1],
         },
     }
-    _figure(key=key, data=data, on_range_change=_ignore, default={"range": None})
-
-
-def _ignore() -> None:
-    """The run that follows a zoom looks at its range itself."""
+    _figure(key=key, data=data, on_range_change=partial(_take_zoom, key), default={"range": None})
 
 
 def _described(
@@ -420,7 +429,7 @@ def show_svg(svg: str, words: str, key: str, *, turned: bool = False, ring: Ring
     """
     left, _, width, _ = (float(number) for number in _VIEW_BOX.findall(svg)[0].split())
     looked_at(key, (left, left + width))  # which keeps it in the address
-    ends, _ = _zoomed(key)
+    ends = _zoomed(key)
     data = {
         "svg": svg,
         "words": one_line(words),
@@ -428,7 +437,7 @@ def show_svg(svg: str, words: str, key: str, *, turned: bool = False, ring: Ring
         "shown": ends if len(ends) == 4 else None,
         "ring": None if ring is None else {"values": packed(ring.values), "teeth": ring.teeth, "unit": ring.unit},
     }
-    _picture(key=key, data=data, on_range_change=_ignore, default={"range": None})
+    _picture(key=key, data=data, on_range_change=partial(_take_zoom, key), default={"range": None})
 
 
 _VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
@@ -549,3 +558,29 @@ def download(label: str, data: Any, name: str, mime: str, *, primary: bool = Fal
         type="primary" if primary else "secondary",
         icon=":material/download:",
     )
+
+
+_document = component_of("document")
+
+
+def offer_page(label: str, page: Callable[[], bytes], name: str, key: str) -> None:
+    """Offer a page of HTML as a file, and to be looked at before; it is made when it is asked for.
+
+    Parameters
+    ----------
+    label : str
+        Of the download.
+    page : callable
+        Returns the page, self-contained.
+    name : str
+        Of the file.
+    key : str
+        Unique on the page.
+    """
+    with st.container(horizontal=True, vertical_alignment="center"):
+        download(label, page, name, "text/html", primary=True)
+        is_shown = st.toggle("Preview", key=f"preview of {key}")
+    if is_shown:
+        with st.spinner("Making the page …"):
+            html = page().decode("utf-8")
+        _document(key=f"document of {key}", data={"html": html, "title": f"Preview of {name}"})

@@ -11,8 +11,9 @@ from app.dashboard import address, state
 from app.dashboard.cached import kept_file, remember_file, sha256_of_upload
 from app.dashboard.state import Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.machine import machine_text, stated, text_as_stated, text_of
+from app.dashboard.widgets.machine import describe, machine_text, stated, text_as_stated, text_of
 from app.samples import SampleRecording, samples
+from gearsig.errors import InputError
 from gearsig.recording import FORMAT_NAMES, FORMAT_OF_EXTENSION, sha256_of
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def choose_sample(label: str, key: str, *, first: str = "", without: str = "", n
 
 
 def choose_files(
-    label: str, key: str, *, about: str = KINDS, of_rigs: bool = False, several: bool = True
+    label: str, key: str, *, about: str = KINDS, of_rigs: bool = False, several: bool = True, name: str = ""
 ) -> tuple[ChosenFile, ...]:
     """Let the user give files; those from before another page was shown stay open until they are closed.
 
@@ -76,17 +77,21 @@ def choose_files(
     of_rigs : bool
         Rig files instead of recordings.
     several : bool
+    name : str
+        In the address, which names them by tokens of this session; empty where it is kept up elsewhere.
 
     Raises
     ------
     InputError
         If a rig file is no text.
     """
+    if name:
+        _open_named(key, name)
     given = st.file_uploader(
         label,
         type=["toml"] if of_rigs else list(ENDINGS),
         accept_multiple_files=several,
-        key=key,
+        key=state.uploader_key(key),
         help=about,
         on_change=state.keep_files,
         args=(key, ()),
@@ -94,29 +99,84 @@ def choose_files(
     files = given if isinstance(given, list) else [] if given is None else [given]
     if files:
         state.keep_files(key, tuple(_chosen_file(file, is_rig=of_rigs) for file in files))
-        return state.kept_files(key)
     kept = state.kept_files(key)
-    if kept:
+    if kept and not files:
         st.caption(f"Still open: {as_typed(', '.join(file.name for file in kept))}")
         st.button("Close", on_click=state.keep_files, args=(key, ()), key=f"close {key}")
+    if name:
+        _name_in_address(key, name, kept)
     return kept
 
 
-def choose_file(label: str, key: str, *, about: str = KINDS, rig: str = "", about_rig: str = "") -> ChosenFile | None:
-    """Let the user give one recording, and its rig file where `rig` is the label of its uploader.
+def choose_file(
+    label: str, key: str, *, about: str = KINDS, rig: str = "", about_rig: str = "", name: str = ""
+) -> ChosenFile | None:
+    """Let the user give one recording, and its rig file where `rig` is the label of its uploader; see `choose_files`.
 
     Raises
     ------
     InputError
         If the rig file is no text.
     """
-    files = choose_files(label, key, about=about, several=False)
+    files = choose_files(label, key, about=about, several=False, name=name)
     if rig:
-        given = st.file_uploader(rig, type=["toml"], key=f"{key} rig", max_upload_size=1, help=about_rig)
+        rig_key = f"{state.uploader_key(key)} rig"
+        given = st.file_uploader(rig, type=["toml"], key=rig_key, max_upload_size=1, help=about_rig)
         if files and given is not None:
             files = (replace(files[0], rig_name=given.name, rig_text=text_of(given.name, given.getvalue())),)
             state.keep_files(key, files)
+            if name:
+                _name_in_address(key, name, files)
     return files[0] if files else None
+
+
+def choose_with_rig(label: str, key: str, *, about: str = KINDS) -> tuple[ChosenFile | None, bool]:
+    """Let the user give one recording and its rig file at once; return it, and whether its rig file is there.
+
+    Raises
+    ------
+    InputError
+        If there are several of either, or the rig file is no text.
+    """
+    given = st.file_uploader(label, type=[*ENDINGS, ".toml"], accept_multiple_files=True, key=key, help=about)
+    rigs = [file for file in given if file.name.lower().endswith(".toml")]
+    recordings = [file for file in given if file not in rigs]
+    for files, kind in ((recordings, "recordings"), (rigs, "rig files")):
+        if len(files) > 1:
+            raise InputError(
+                f"{len(files)} {kind} are given: {', '.join(file.name for file in files)}",
+                allowed="one recording, and one rig file that describes its machine",
+                remedy="remove the others; `gearsig report FOLDER` makes pages of many",
+            )
+    if not recordings:
+        return None, bool(rigs)
+    recording = _chosen_file(recordings[0], is_rig=False)
+    if not rigs:
+        return recording, False
+    return replace(recording, rig_name=rigs[0].name, rig_text=text_of(rigs[0].name, rigs[0].getvalue())), True
+
+
+def _open_named(key: str, name: str) -> None:
+    """Open the files that the page's address names, where this session holds none or Back asks for them."""
+    asked = address.all_asked(name)
+    if not address.follows(key) and state.kept_files(key):
+        return
+    named = {token: file for token in asked if (file := kept_file(token)) is not None}
+    if named:
+        for token, file in named.items():
+            state.token_of(key, file.sha256, token)
+        state.open_files(key, tuple(named.values()))
+
+
+def _name_in_address(key: str, name: str, files: tuple[ChosenFile, ...]) -> None:
+    """Name files in the page's address by tokens of this session, and keep them for a reload."""
+    address.put(name, *(_kept_token(key, file) for file in files))
+
+
+def _kept_token(key: str, file: ChosenFile) -> str:
+    token = state.token_of(key, file.sha256)
+    remember_file(token, file)
+    return token
 
 
 def _chosen_file(file: UploadedFile, *, is_rig: bool) -> ChosenFile:
@@ -143,7 +203,6 @@ def choose_number(
         name=name,
         first=None,
         read=address.number(minimum),
-        persist_state="session",
         help=about or None,
     )
     return number
@@ -154,6 +213,8 @@ def choose_number(
 # --------------------
 
 SAMPLE, FILE, NO_REFERENCE = "Sample", "Own file", "None"
+MACHINE = "described"
+"""In the address: the machine of a sample that was described otherwise than it is."""
 
 
 def choose_recording(*, with_reference: bool = True) -> tuple[ChosenFile, Chosen] | None:
@@ -195,36 +256,47 @@ def choose_recording(*, with_reference: bool = True) -> tuple[ChosenFile, Chosen
 
 
 def _follow_address() -> None:
-    """Open what the page's address names, where this session has nothing open yet."""
-    if state.ORIGIN in st.session_state or state.SAMPLE in st.session_state:
+    """Open what the page's address names, where this session has nothing open yet or Back asks for it."""
+    is_open = state.ORIGIN in st.session_state or state.SAMPLE in st.session_state
+    if not address.follows(state.ORIGIN) and is_open:
         return
     named = {sample.rig.stem: sample for sample in samples()}.get(address.asked("sample"))
     if named is not None:
-        st.session_state[state.SAMPLE] = named
+        st.session_state[state.SAMPLE], st.session_state[state.ORIGIN] = named, SAMPLE
+        changed = kept_file(address.asked(MACHINE))
+        if changed is not None and changed.content == named.recording:
+            state.token_of(MACHINE, changed.sha256, address.asked(MACHINE))
+            describe(sample_file(named), changed.rig_text)
     token = address.asked("file")
     kept = kept_file(token)
     if kept is not None:
-        state.token_of(kept.sha256, token)
-        state.keep_files(state.RECORDING_FILE, (kept,))
-        st.session_state[state.ORIGIN] = FILE
+        state.token_of(state.RECORDING_FILE, kept.sha256, token)
+        open_file(kept)
 
 
 def _keep_address(file: ChosenFile, origin: str) -> None:
-    """Name what is open in the page's address; an own file, or one of the laboratory, by a token of this session."""
+    """Name what is open in the page's address, with the machine as it stands in this session.
+
+    A sample is named as such and its machine where it was changed; an own file, or one of the laboratory, by a token of
+    this session.
+    """
+    described = replace(file, rig_text=text_as_stated(file))
     named = {"sample": file.rig_name.removesuffix(".toml")} if origin == SAMPLE else {}
     if origin in (FILE, state.OF_LABORATORY):
-        named = {"file": state.token_of(file.sha256)}
-        remember_file(named["file"], replace(file, rig_text=text_as_stated(file)))
+        named = {"file": _kept_token(state.RECORDING_FILE, described)}
+    elif described != file:
+        named[MACHINE] = _kept_token(MACHINE, described)
     for name in ("sample", "file"):
         text = named.get(name, "")
         if address.asked(name) not in ("", text):  # it is not open: nor are its channels
             address.forget_asked()
-        address.put(name, *([text] if text else []))
+    for name in ("sample", "file", MACHINE):
+        address.put(name, *([named[name]] if name in named else []))
 
 
 def open_file(file: ChosenFile) -> None:
     """Let the analysis page open a file of the user's."""
-    state.keep_files(state.RECORDING_FILE, (file,))
+    state.open_files(state.RECORDING_FILE, (file,))
     st.session_state[state.ORIGIN] = FILE
 
 
@@ -271,13 +343,13 @@ def _choose_comparison(file: ChosenFile) -> tuple[ChosenFile | None, float | Non
         first=first,
         name="reference",
         key=state.source_key("reference", source),
-        persist_state="session",
         help="The same machine when it was healthy: same sensors, speed and load. Cracks of a millimetre show "
         "against it, and every level is compared. It is read with the machine and the numbers stated for the other.",
     )
     reference = sample_file(offered[name]) if name in offered else None
     if name == FILE:
-        reference = choose_file("Recording of the healthy machine", state.source_key("reference file", source))
+        key = state.source_key("reference file", source)
+        reference = choose_file("Recording of the healthy machine", key, name="reference_file")
     torque = choose_number(
         "Torque (N·m)",
         state.source_key("torque", source),

@@ -14,8 +14,9 @@ from app.dashboard import state
 from app.dashboard.state import ChosenFile
 from app.dashboard.theme import one_line, palette
 from app.dashboard.widgets.charts import download
-from app.dashboard.widgets.messages import show_error
+from app.dashboard.widgets.messages import FORM_LABELS, FORM_TABLES, show_error
 from gearsig.errors import GearsigError, InputError
+from gearsig.plot import unit_text
 from gearsig.rig import QUANTITIES, Rig, bearing_catalogue, order_lines, rig_from_dict
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "bearing": ("name", "shaft", "bearing", "n_rolling_elements", "rolling_element_diameter_mm", "pitch_diameter_mm"),
     "sensor": ("channel", "quantity", "unit", "position", "scale"),
 }
-TITLES = {"shaft": "Shafts", "pair": "Gear pairs", "bearing": "Bearings", "sensor": "Sensors"}
 SPEED_SOURCES: dict[str, tuple[str, ...]] = {
     "none": (),
     "constant": ("speed_rpm",),
@@ -38,14 +38,6 @@ SPEED_SOURCES: dict[str, tuple[str, ...]] = {
     "speed channel": ("channel", "rpm_per_unit"),
 }
 FIRST: Table = {"pulses_per_revolution": 1, "units_per_revolution": 360.0, "rpm_per_unit": 1.0, "speed_rpm": 1500.0}
-WORDS = {
-    "speed_rpm": "Speed (rpm)",
-    "pulses_per_revolution": "Pulses per revolution",
-    "units_per_revolution": "Units per revolution",
-    "rpm_per_unit": "rpm per unit",
-}
-
-
 _CHANGED = "machine changed"
 
 
@@ -103,8 +95,8 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
         first, follows = st.columns((5, 8), gap="medium")
         edited = _form(file, table, text, channels, first)
         with follows:
-            _show_consequences(edited, is_told=is_told and edited == table)
-    if _rig_of(edited) != _rig_of(table):
+            _show_consequences(edited, told=_rig_of(table) if is_told else None)
+    if _rig_of(edited) != _rig_of(table) or (edited != table and isinstance(_rig_of(edited), str)):
         changed = tomli_w.dumps(edited)
         with st.container(horizontal=True):
             look = ":material/check:"
@@ -120,7 +112,7 @@ def _rig_of(table: Table) -> Rig | str:
     try:
         return rig_from_dict(table)
     except GearsigError as error:
-        return f"{table}: {error}"
+        return str(error)
 
 
 def show_stated(file: ChosenFile) -> None:
@@ -152,11 +144,16 @@ def _key(file: ChosenFile) -> str:
     return state.source_key("machine", f"{file.sha256} {file.rig_name}")
 
 
-def _take(file: ChosenFile, text: str) -> None:
+def describe(file: ChosenFile, text: str) -> None:
+    """Take the text of a rig file for a file's machine in this session."""
     st.session_state[_key(file)] = text
     # tables of the form begin anew from the text
     version = state.source_key("machine version", file.sha256)
     st.session_state[version] = st.session_state.get(version, 0) + 1
+
+
+def _take(file: ChosenFile, text: str) -> None:
+    describe(file, text)
     st.session_state[_CHANGED] = True
 
 
@@ -175,7 +172,7 @@ def _form(file: ChosenFile, table: Table, text: str, channels: Sequence[str], fi
     edited |= {"name": name} if name else {}
     for kind in COLUMNS:
         with first if kind == "shaft" else st.container():
-            st.markdown(f"**{TITLES[kind]}**")
+            st.markdown(f"**{FORM_TABLES[kind]}**")
             edited[kind] = _edit(kind, list(table.get(kind, [])), edited, key(kind), channels)
     speed = _edit_speed(dict(table.get("speed", {})), edited, key, channels)
     edited = {name: value for name, value in edited.items() if value not in ([], {})}
@@ -187,8 +184,9 @@ def _edit(kind: str, rows: list[Table], rig: Table, key: str, channels: Sequence
     from pandas import DataFrame
 
     columns = COLUMNS[kind]
-    frame = DataFrame([[row.get(name) for name in columns] for row in rows], columns=list(columns))
-    numbers = [c for c in columns if c.endswith(("_teeth", "_mm", "elements")) or c == "scale"]
+    shown = [row | {"unit": unit_text(str(row["unit"]))} if "unit" in row else row for row in rows]
+    frame = DataFrame([[row.get(name) for name in columns] for row in shown], columns=list(columns))
+    numbers = _numbers(kind)
     frame = frame.astype(dict.fromkeys(numbers, "float64") | {c: "object" for c in columns if c not in numbers})
     result = st.data_editor(
         frame,
@@ -200,6 +198,10 @@ def _edit(kind: str, rows: list[Table], rig: Table, key: str, channels: Sequence
         column_config=_config(kind, rig, channels),
     )
     return [row for row in _rows(result, rows) if row]
+
+
+def _numbers(kind: str) -> list[str]:
+    return [name for name in COLUMNS[kind] if name.endswith(("_teeth", "_mm", "elements")) or name == "scale"]
 
 
 def _rows(frame: DataFrame, before: list[Table]) -> list[Table]:
@@ -215,36 +217,30 @@ def _rows(frame: DataFrame, before: list[Table]) -> list[Table]:
                 continue
             whole = isinstance(value, float) and value == int(value) and str(name).endswith(("_teeth", "elements"))
             row[str(name)] = int(value) if whole else value
+        if "unit" in row and row["unit"] == unit_text(str(known.get("unit", ""))):  # it was not changed
+            row["unit"] = known["unit"]
         found.append(row)
     return found
 
 
 def _config(kind: str, rig: Table, channels: Sequence[str]) -> dict[str, Any]:
-    column = st.column_config
+    column, label = st.column_config, FORM_LABELS.get
     shafts = [str(row["name"]) for row in rig.get("shaft", []) if row.get("name")]
-    number = column.NumberColumn
-    return {
-        "shaft": {"direction": column.SelectboxColumn("turns", options=["ccw", "cw"])},
-        "pair": {
-            "driver": column.SelectboxColumn("driver", options=shafts),
-            "driven": column.SelectboxColumn("driven", options=shafts),
-            "driver_teeth": number("teeth", step=1, format="%d"),
-            "driven_teeth": number("teeth ", step=1, format="%d"),
-            "module_mm": number("module (mm)"),
-            "face_width_mm": number("width (mm)"),
-        },
-        "bearing": {
-            "shaft": column.SelectboxColumn("shaft", options=shafts),
-            "bearing": column.SelectboxColumn("catalogue", options=sorted(bearing_catalogue()), help="Designation"),
-            "n_rolling_elements": number("elements", step=1, format="%d"),
-            "rolling_element_diameter_mm": number("Ø element (mm)"),
-            "pitch_diameter_mm": number("Ø pitch (mm)"),
-        },
-        "sensor": {
-            "channel": column.SelectboxColumn("channel", options=list(channels)) if channels else column.TextColumn(),
-            "quantity": column.SelectboxColumn("quantity", options=list(QUANTITIES)),
-        },
-    }[kind]
+    choices: dict[str, dict[str, Sequence[str]]] = {
+        "shaft": {"direction": ("ccw", "cw")},
+        "pair": {"driver": shafts, "driven": shafts},
+        "bearing": {"shaft": shafts, "bearing": sorted(bearing_catalogue())},
+        "sensor": {"quantity": QUANTITIES} | ({"channel": channels} if channels else {}),
+    }
+    made: dict[str, Any] = {}
+    for name in COLUMNS[kind]:
+        if name in choices[kind]:
+            made[name] = column.SelectboxColumn(label(name, name), options=list(choices[kind][name]))
+        elif name.endswith(("_teeth", "elements")):
+            made[name] = column.NumberColumn(label(name, name), step=1, format="%d")
+        elif name in _numbers(kind):
+            made[name] = column.NumberColumn(label(name, name))
+    return made
 
 
 def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: Sequence[str]) -> Table:
@@ -264,7 +260,7 @@ def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: S
         else:
             step = 1 if name == "pulses_per_revolution" else 0.1
             value = type(step)(float(speed.get(name) or FIRST[name]))
-            edited[name] = place.number_input(WORDS[name], value=value, step=step, key=key(f"speed {name}"))
+            edited[name] = place.number_input(FORM_LABELS[name], value=value, step=step, key=key(f"speed {name}"))
     shafts = [str(row["name"]) for row in rig.get("shaft", []) if row.get("name")]
     if chosen != "none" and shafts:
         at = shafts.index(speed["shaft"]) if speed.get("shaft") in shafts else 0
@@ -277,11 +273,12 @@ def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: S
 # --------------------
 
 
-def _show_consequences(table: Table, *, is_told: bool) -> None:
+def _show_consequences(table: Table, *, told: Rig | str | None) -> None:
+    """Show what follows from a machine, or what is wrong with it where `told` is not that already."""
     try:
         rig = rig_from_dict(table)
     except GearsigError as error:
-        if not is_told:
+        if str(error) != told:
             show_error(error)
         return
     if not rig.shafts:

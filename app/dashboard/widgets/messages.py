@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -11,7 +12,27 @@ from app.dashboard.theme import as_typed
 from gearsig.diagnosis import CannotTell
 from gearsig.errors import GearsigError, InputError
 
+FORM_TABLES = {"shaft": "Shafts", "pair": "Gear pairs", "bearing": "Bearings", "sensor": "Sensors"}
+"""What the form of the machine calls the lists of a rig file."""
+FORM_LABELS = {
+    "direction": "turns",
+    "driver_teeth": "driver teeth",
+    "driven_teeth": "driven teeth",
+    "module_mm": "module (mm)",
+    "face_width_mm": "width (mm)",
+    "n_rolling_elements": "elements",
+    "rolling_element_diameter_mm": "Ø element (mm)",
+    "pitch_diameter_mm": "Ø pitch (mm)",
+    "bearing": "catalogue",
+    "speed_rpm": "Speed (rpm)",
+    "pulses_per_revolution": "Pulses per revolution",
+    "units_per_revolution": "Units per revolution",
+    "rpm_per_unit": "rpm per unit",
+    "sampling_rate_hz": "Sampling rate (Hz)",
+}
+"""What the form of the machine calls the keys of a rig file; of others their own name."""
 _PLACES = {
+    "--fs or sampling_rate_hz in the rig file": "the sampling rate, below or under Machine",
     "--fs": "the sampling rate, below or under Machine",
     "--speed-rpm": "the constant speed, below or under Machine",
     "given with --reference": "chosen on the left as healthy machine",
@@ -26,9 +47,18 @@ _PLACES = {
     "window_length": "the window",
     "half_width": "the band around the ridge",
     "; `gearsig rig example` prints one to start from": ", or the same in the form under Machine",
+    "`gearsig rig bearings` lists them": "the column catalogue lists them",
     "set lowest to": "set the lowest line shown to",
+    "[speed] in the rig file": "the speed under Machine",
+    "/s^2": "/s²",
 }
-"""What the page calls the options of the command line and of functions that messages name."""
+"""What the page calls the options of the command line, of functions and of rig files that messages name."""
+_ROW = re.compile(r"(?:[^\[\]]*: )?\[\[(\w+)\]\] (\d+)(?:: (\w+))?")
+_TABLE = re.compile(r"(?:(an?)|(?:the rig(?: file)?'s|its)) \[\[(\w+)\]\](?: tables?)?(?: in the rig file)?")
+_KEY = re.compile(rf"\b(?:{'|'.join(key for key in FORM_LABELS if '_' in key)})\b")
+_SPEED = re.compile(r"(?:[^\[\]]*: )?\[speed\](?:: (\w+))?")
+_FILE = re.compile(r"(?:rig|rig\.toml)|[^\[\]]*: (\w+)")
+"""The name that a machine without a rig file has, or a key of the file itself."""
 
 
 def show_error(error: GearsigError) -> None:
@@ -37,26 +67,55 @@ def show_error(error: GearsigError) -> None:
         st.error(as_typed(in_page_words(str(error))), icon=":material/help:")
         return
     what = as_typed(in_page_words(error.what))
-    lines = [f"**{as_typed(_PLACES.get(error.where, error.where))}**: {what}" if error.where else what]
+    lines = [f"**{as_typed(place_in_form(error.where))}**: {what}" if error.where else what]
     if error.allowed:
-        lines.append(f"Allowed: {as_typed(error.allowed)}")
+        lines.append(f"Allowed: {as_typed(in_page_words(error.allowed))}")
     if error.remedy:
         lines.append(f"What to do: {as_typed(in_page_words(error.remedy))}")
     st.error("\n\n".join(lines), icon=":material/error:")
 
 
+def place_in_form(where: str) -> str:
+    """Return what the page calls the place of an error, e.g. in a rig file.
+
+    Examples
+    --------
+    >>> place_in_form("rig.toml: [[bearing]] 1: pitch_diameter_mm"), place_in_form("rig: [speed]"), place_in_form("rig")
+    ('Bearings, row 1, Ø pitch (mm)', 'Speed', 'Machine')
+    """
+    row = _ROW.fullmatch(where)
+    if row is not None and row[1] in FORM_TABLES:
+        return ", ".join(filter(None, (FORM_TABLES[row[1]], f"row {row[2]}", FORM_LABELS.get(row[3], row[3]))))
+    speed, whole = _SPEED.fullmatch(where), _FILE.fullmatch(where)
+    if speed is not None:
+        return ", ".join(filter(None, ("Speed", FORM_LABELS.get(speed[1], speed[1]))))
+    key = whole[1] if whole is not None else None
+    if whole is not None and (key is None or key in FORM_LABELS):
+        return FORM_LABELS[key] if key is not None else "Machine"
+    return _PLACES.get(where, where)
+
+
 def in_page_words(text: str) -> str:
-    """Return a text with the page's names of what the command line calls by its options."""
+    """Return a text with the page's names of what the command line calls by its options, and rig files by their keys.
+
+    Examples
+    --------
+    >>> in_page_words("add a [[shaft]] with that name"), in_page_words("speed_rpm must be given")
+    ('add a row of Shafts with that name', 'Speed (rpm) must be given')
+    """
     for option, place in _PLACES.items():
         text = text.replace(option, place)
-    return text
+    text = _ROW.sub(lambda found: place_in_form(found[0]), text)
+    text = _TABLE.sub(lambda found: f"{'a row of ' if found[1] else ''}{FORM_TABLES.get(found[2], found[2])}", text)
+    return _KEY.sub(lambda found: FORM_LABELS[found[0]], text)
 
 
 def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
     """Show what an answer says about itself, as one warning or quietly as small print; names in it come from files."""
     if not warnings:
         return
-    text = as_typed(warnings[0]) if len(warnings) == 1 else "\n".join(f"- {as_typed(text)}" for text in warnings)
+    said = [as_typed(in_page_words(text)) for text in warnings]
+    text = said[0] if len(said) == 1 else "\n".join(f"- {one}" for one in said)
     if quiet:
         st.caption(text)
     else:
@@ -65,7 +124,7 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
 
 def show_unknown_speed(reason: CannotTell) -> None:
     """Say why there is no speed and what would give it."""
-    remedy = f"\n\nWhat would give it: {as_typed(reason.remedy)}" if reason.remedy else ""
+    remedy = f"\n\nWhat would give it: {as_typed(in_page_words(reason.remedy))}" if reason.remedy else ""
     hint = "\n\nA constant speed can be given under *Machine*."
     st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
 

@@ -42,7 +42,6 @@ def choose_view(analysis: Analysis, names: Sequence[str]) -> str:
     _strip(
         key="strip",
         data={"items": items, "chosen": chosen},
-        default={"view": chosen},
         on_view_change=_take_view,
     )
     return chosen

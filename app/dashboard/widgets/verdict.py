@@ -73,12 +73,14 @@ def show_verdict(analysis: Analysis) -> None:
 
 def _show_words(analysis: Analysis) -> None:
     recording = analysis.recording
-    machine = analysis.rig.name if analysis.rig is not None else ""
+    rig = analysis.rig
+    is_described = rig is not None and bool(rig.shafts or rig.pairs or rig.bearings)
+    machine = rig.name if rig is not None else ""
     n = len(recording.channels)
     headline, rest = headline_of(analysis)
     facts = [
         f"**{as_typed(recording.provenance.source)}**",
-        as_typed(machine) or "machine not described",
+        as_typed(machine) or ("machine without a name" if is_described else "machine not described"),
         f"{n} channel{'s' if n != 1 else ''}",
         f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz",
     ]

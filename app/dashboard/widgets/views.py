@@ -17,9 +17,9 @@ from app.dashboard.methods.form import MethodPage
 from app.dashboard.methods.page import cached, show_method
 from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import show_figure, show_lines, show_map, show_panel
+from app.dashboard.widgets.charts import offer_page, show_figure, show_lines, show_map, show_panel
 from app.dashboard.widgets.machine import show_machine
-from app.dashboard.widgets.messages import show_error, show_facts, show_unknown_speed
+from app.dashboard.widgets.messages import in_page_words, show_error, show_facts, show_unknown_speed
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
 from app.dashboard.widgets.strip import choose_view
 from gearsig import plot
@@ -79,7 +79,6 @@ def show_of_channel(analysis: Analysis, view: Callable[[Analysis, ChannelAnalysi
         looks = {
             "key": state.view_key(f"{state.CHANNEL} {name}", analysis),
             "name": "channel",
-            "persist_state": "session",
         }
         name = address.ask_one(st.columns(3)[0].selectbox, "Channel", list(channels), first=name, **looks)
     view(analysis, channels[name])
@@ -140,7 +139,7 @@ def show_channels(analysis: Analysis) -> None:
     """Show chosen channels over a window of time, and the table of channels with their problems."""
     recording = analysis.recording
     for warning in recording.warnings:
-        st.warning(as_typed(warning), icon=":material/warning:")
+        st.warning(as_typed(in_page_words(warning)), icon=":material/warning:")
     _show_quality(analysis)
     names = address.ask(
         st.multiselect,
@@ -332,15 +331,8 @@ def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
         "One self-contained HTML page: verdict, findings, figures, indicators, and where everything came from. "
         "It opens without a network and holds no scripts."
     )
-    st.download_button(
-        "Download the report",
-        data=lambda: report_page(request, analysis),
-        file_name=f"{safe_file_name(request.name).split('.')[0] or 'recording'}.html",
-        mime="text/html",
-        on_click="ignore",
-        type="primary",
-        icon=":material/download:",
-    )
+    name = f"{safe_file_name(request.name).split('.')[0] or 'recording'}.html"
+    offer_page("Download the report", lambda: report_page(request, analysis), name, state.view_key("report", analysis))
     st.markdown("The same diagnosis from the command line:")
     st.code(command_of(request), language="bash", wrap_lines=True)
     _show_provenance(analysis)
