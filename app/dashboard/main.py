@@ -12,6 +12,8 @@ PAGES = Path(__file__).parent / "pages"
 
 st.set_page_config(page_title="gearsig", page_icon=str(PAGES.parent / "icon.svg"), layout="wide")
 st.html(PAGES.parent / "page.css")
+SCRIPT = (PAGES.parent / "page.js").read_text("utf-8")
+st.html(f'<script class="of-page">{SCRIPT}</script>', unsafe_allow_javascript=True)
 st.logo(str(PAGES.parent / "logo.svg"), size="large")
 page = st.navigation(
     [

@@ -9,7 +9,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -128,3 +128,12 @@ def settle(page: playwright.Page) -> None:
     for _ in range(2):
         page.wait_for_timeout(250)
         page.wait_for_function(idle)
+
+
+def soon(page: playwright.Page, is_so: Callable[[], bool]) -> bool:
+    """Wait up to a minute until something is so."""
+    for _ in range(300):
+        if is_so():
+            return True
+        page.wait_for_timeout(200)
+    return False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,7 @@ from app.samples import samples
 from gearsig.diagnosis import analyze
 from gearsig.recording import read_recording
 from gearsig.rig import read_rig
-from tests.browser.conftest import CHROMIUM, open_view, settle
+from tests.browser.conftest import CHROMIUM, open_view, settle, soon
 
 VIEWS = ("Machine", "Waveform", "Speed", "Spectrum", "Order spectrum", "Map", "Average", "Envelope", "Indicators")
 SAMPLE = next(sample for sample in samples() if sample.rig.stem == "no_tachometer")
@@ -66,15 +65,6 @@ def test_one_click_from_the_start_to_the_damaged_tooth_and_through_all_views(pag
     assert download.value.suggested_filename == "damaged_tooth.html"
     assert "Local tooth damage" in html
     assert "<script" not in html
-
-
-def soon(page: playwright.Page, is_so: Callable[[], bool]) -> bool:
-    """Wait up to a minute until something is so."""
-    for _ in range(300):
-        if is_so():
-            return True
-        page.wait_for_timeout(200)
-    return False
 
 
 def test_zooming_refines_and_cursors_are_dragged(page: playwright.Page) -> None:

@@ -7,7 +7,7 @@ from urllib.parse import unquote
 
 import pytest
 
-from tests.browser.conftest import CHROMIUM, settle
+from tests.browser.conftest import CHROMIUM, settle, soon
 
 PAGES = ("", "analysis?sample=damaged_tooth", "laboratory", "flexible", "compare", "gap", "fleet")
 BROKEN = {"name": "broken.mat", "mimeType": "", "buffer": b"\x80\x04\x95 pickle"}
@@ -93,3 +93,61 @@ def test_the_ring_of_teeth_zooms_is_read_off_and_sent_as_an_address(page: playwr
     page.keyboard.press("0")
     page.wait_for_function("!location.search.includes('zoom=')")
     assert part_shown(shown) == whole
+
+
+def test_back_undoes_the_zoom_of_the_ring_of_teeth(page: playwright.Page, address: str) -> None:
+    opened(page, address + "analysis?sample=damaged_tooth")
+    ring = page.locator(".st-key-verdict .picture .frame")
+    ring.scroll_into_view_if_needed()
+    box, shown = ring.bounding_box(), ring.locator("img")
+    views = [part_shown(shown)]
+    for share in (0.8, 0.5):
+        page.mouse.move(box["x"] + 0.1 * box["width"], box["y"] + 0.1 * box["height"])
+        page.mouse.down()
+        page.mouse.move(box["x"] + share * box["width"], box["y"] + share * box["height"], steps=4)
+        page.mouse.up()
+        page.wait_for_function(f"location.search !== {page.evaluate('location.search')!r}")
+        settle(page)
+        views.append(part_shown(shown))
+    assert views[2][2] < views[1][2] < views[0][2]
+    for view in (views[1], views[0]):
+        page.go_back()
+        assert soon(page, lambda view=view: part_shown(shown) == pytest.approx(view, rel=1e-5))
+    page.go_forward()
+    assert soon(page, lambda: part_shown(shown) == pytest.approx(views[1], rel=1e-5))
+
+
+def test_back_undoes_the_zoom_of_a_phase_plane(page: playwright.Page, address: str) -> None:
+    opened(page, address + "analysis?sample=damaged_tooth&view=Phase")
+    figure = page.locator(".st-key-view .figure svg").first
+    figure.scroll_into_view_if_needed()
+    paths = "svg => [...svg.querySelectorAll('path')].map(path => path.getAttribute('d')).join()"
+    whole = figure.evaluate(paths)
+    box = figure.bounding_box()
+    page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 0.6 * box["height"], steps=4)
+    page.mouse.up()
+    page.wait_for_function("location.search.includes('zoom=')")
+    settle(page)
+    assert figure.evaluate(paths) != whole
+    page.go_back()
+    assert soon(page, lambda: figure.evaluate(paths) == whole)
+    page.go_forward()
+    assert soon(page, lambda: figure.evaluate(paths) != whole)
+
+
+def test_a_page_of_the_navigation_bar_is_one_step_of_the_history(page: playwright.Page, address: str) -> None:
+    opened(page, address)
+    begun, n_entries = page.url, page.evaluate("history.length")
+    for n, name in enumerate(("Analysis", "Comparison"), 1):
+        page.get_by_role("link", name=name).click()
+        page.wait_for_function("location.search.includes('sample=')" if n == 1 else "location.pathname == '/compare'")
+        settle(page)
+        assert page.evaluate("history.length") == n_entries + n
+    page.go_back()
+    page.locator(".strip").first.wait_for()
+    settle(page)
+    page.go_back()
+    page.get_by_role("button", name="Open the recording").first.wait_for()
+    assert page.url == begun

@@ -59,8 +59,9 @@ def test_the_chosen_mode_goes_on_to_the_squeezed_transform(page: playwright.Page
     panel.get_by_role("combobox", name="The chosen mode goes on to").click()
     page.get_by_role("option", name="Squeezed wavelet").click()
     settle(page)
-    panel.get_by_text("Colours span").first.wait_for()
     panel.locator(".figure svg image").first.wait_for()
+    panel.get_by_text("Segment and further settings").click()
+    panel.get_by_text("Colours span").first.wait_for()
 
 
 def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page) -> None:

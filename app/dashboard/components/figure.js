@@ -38,13 +38,13 @@ class Figure {
   }
 
   update(data) {
-    const asked = this.asked, stays = data.plane && this.data?.plane && same(data.whole, this.whole);
+    const asked = this.asked;
     this.data = data;
     this.lines = data.lines.map((line) => ({ ...line, x: numbers(line.x), y: numbers(line.y), low: numbers(line.low), high: numbers(line.high) }));
     this.levels = data.map && bytes(data.map.levels);
     this.whole = data.whole;
     // An answer to an earlier question does not undo a zoom that is under way.
-    if (!stays && (!asked || same(asked, data.shown))) {
+    if (!asked || same(asked, [...data.shown, ...(data.across ?? [])])) {
       this.view = data.shown;
       this.asked = null;
       this.across = data.across ?? null;
@@ -63,10 +63,10 @@ class Figure {
     low = Math.max(this.whole[0], Math.min(low, this.whole[1] - span));
     this.view = [low, low + span];
     this.across = across; // of a plane: the values shown
-    this.asked = this.data.plane ? null : this.view;
+    const asked = (this.asked = [...this.view, ...(across ?? [])]);
     this.draw();
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => this.tell([...this.view, ...(this.across ?? [])]), 200);
+    this.timer = setTimeout(() => this.tell(asked), 200);
   }
 
   type(event) {
@@ -506,7 +506,8 @@ const element = (name, looks = {}) => set(document.createElementNS(NS, name), lo
 const add = (parent, name, looks) => parent.appendChild(element(name, looks));
 const html = (name, kind = "") => Object.assign(document.createElement(name), { className: kind });
 const range = (low, high) => Array.from({ length: high - low + 1 }, (_, i) => low + i);
-const same = (a, b) => Math.abs(a[0] - b[0]) + Math.abs(a[1] - b[1]) < 1e-9 * Math.abs(a[1] - a[0]) + 1e-15;
+// Of one range, or of a plane's two.
+const same = (a, b) => a.length === b.length && a.every((value, i) => Math.abs(value - b[i]) <= 1e-9 * Math.abs(a[i | 1] - a[i & ~1]) + 1e-15);
 const figure = (value) => String(Number(value.toPrecision(6)));
 // A number beside a logarithmic axis; as a power of ten where some of them are far from one, then all of them.
 function short(value, powers) {

@@ -36,10 +36,15 @@ class Picture {
     this.values = data.ring && new Float64Array(Uint8Array.from(atob(data.ring.values), (letter) => letter.charCodeAt(0)).buffer);
     this.image.classList.toggle("turned", data.turned);
     this.frame.setAttribute("aria-label", data.words);
-    if (!isNew) return;
-    const [x, y, width, height] = data.svg.match(/viewBox="([^"]*)"/)[1].split(/[ ,]+/).map(Number);
-    this.whole = [x, x + width, y, y + height];
-    this.show(data.shown ?? this.whole);
+    if (isNew) {
+      const [x, y, width, height] = data.svg.match(/viewBox="([^"]*)"/)[1].split(/[ ,]+/).map(Number);
+      this.whole = [x, x + width, y, y + height];
+    }
+    const shown = data.shown ?? this.whole;
+    // An answer to an earlier question does not undo a zoom that is under way.
+    if (!isNew && this.asked && !same(this.asked, shown)) return;
+    this.asked = null;
+    if (isNew || !same(this.view, shown)) this.show(shown);
   }
 
   // left, right, top, bottom: widened to the whole's proportions, and kept within it.
@@ -59,6 +64,7 @@ class Picture {
     this.show(view);
     clearTimeout(this.timer);
     const told = this.button.hidden ? this.whole.slice(0, 2) : this.view;
+    this.asked = this.view;
     this.timer = setTimeout(() => this.tell(told), 200);
   }
 
@@ -137,4 +143,5 @@ class Picture {
   }
 }
 
+const same = (a, b) => a.every((value, i) => Math.abs(value - b[i]) < 1e-6);
 const made = (name, looks) => Object.assign(document.createElement(name), looks);
