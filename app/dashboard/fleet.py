@@ -55,15 +55,15 @@ BADGES = {"alarm": "red", "warning": "orange", "unknown": "gray", "ok": "green"}
 HOW_TO_FILL = """
 There are no results in this folder yet. Recordings are added from the command line, as often as you like; what is
 known already is passed over:
-
-```sh
+"""
+COMMANDS = """
 gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv' --dry-run
 gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv'
 gearsig fleet watch incoming --pattern '{machine}/{point}_{date:%Y%m%d-%H%M}.csv'
-```
-
-`--dry-run` shows which machine, point and date each file is taken for; `watch` takes new files as they appear.
-"""
+""".strip()
+ABOUT_COMMANDS = (
+    "`--dry-run` shows which machine, point and date each file is taken for; `watch` takes new files as they appear."
+)
 
 
 def show() -> None:
@@ -123,6 +123,8 @@ def example_store() -> str:
 
 def _show_how_to_begin() -> None:
     st.markdown(HOW_TO_FILL)
+    st.code(COMMANDS, language="bash", wrap_lines=True)
+    st.markdown(ABOUT_COMMANDS)
     about = "Three gearboxes made of the samples. Their recordings are analysed once, which takes about 20 s."
     look = ":material/play_arrow:"
     st.button("See an example", icon=look, help=about, on_click=_see, args=(EXAMPLE_NAME,))
@@ -151,24 +153,29 @@ def _choose_point(status: DataFrame) -> tuple[str, str]:
     machine = address.chosen(MACHINE, "machine", {name for name, _ in everywhere}, first[0])
     points = [point for name, point in everywhere if name == machine]
     chosen = (machine, address.chosen(POINT, "point", points, first[1] if machine == first[0] else points[0]))
-    with st.container(height=620 if len(of_machine) > 6 else "content", border=False):
+    with st.container(height=620 if len(of_machine) > 6 else "content", border=False, gap="small", key="tree"):
         for name, rows in list(of_machine.items())[:N_MACHINES]:
-            worst = rows[0]["level"]
-            is_open = name == chosen[0]
-            with st.expander(f"{MARKS[worst]} {as_typed(name)}", expanded=is_open or len(of_machine) <= 6):
+            if len(rows) == 1:
+                words = " · ".join(part for part in (name, rows[0]["point"]) if part)
+                _point_button(rows[0], words, is_chosen=(name, rows[0]["point"]) == chosen)
+                continue
+            label, is_open = f"{MARKS[rows[0]['level']]} {as_typed(name)}", name == chosen[0]
+            with st.expander(label, expanded=is_open or len(of_machine) <= 6):
                 for row in rows:
-                    _point_button(row, is_chosen=(name, row["point"]) == chosen)
+                    is_chosen = (name, row["point"]) == chosen
+                    _point_button(row, row["point"] or "all channels", is_chosen=is_chosen)
         if len(of_machine) > N_MACHINES:
             st.caption(f"{len(of_machine) - N_MACHINES} more: search by name.")
     return chosen
 
 
-def _point_button(row: Row, *, is_chosen: bool) -> None:
-    words = as_typed(row["point"] or "all channels")
+def _point_button(row: Row, words: str, *, is_chosen: bool) -> None:
+    # never the primary colour: on it the mark's own would not be seen
+    name = f"**{as_typed(words)}**" if is_chosen else as_typed(words)
     st.button(
-        f"{MARKS[row['level']]} {words}",
+        f"{MARKS[row['level']]} {name}",
         key=f"point {row['machine']!r} {row['point']!r}",
-        type="primary" if is_chosen else "tertiary",
+        type="secondary" if is_chosen else "tertiary",
         width="stretch",
         help=as_typed(trends_text(row) or str(row["outcome"] or "no diagnosis")),
         on_click=_look_at,
@@ -278,7 +285,7 @@ def _about(trend: Trend) -> str:
         words += f" An unchanged machine leaves them in one of {1 / rate:,.0f} recordings.".replace(",", " ")
     if trend.normalised:
         words += f" What is expected follows {' and '.join(trend.normalised)}."
-    return words + (f" Another level since {trend.changed:%Y-%m-%d}." if trend.changed is not None else "")
+    return words + (f" The level changed on {trend.changed:%Y-%m-%d}." if trend.changed is not None else "")
 
 
 def _show_recordings(recordings: DataFrame) -> None:

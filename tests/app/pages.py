@@ -149,7 +149,7 @@ def labelled(page: AppTest, kind: str, label: str) -> Any:
 
 def shown_text(page: AppTest) -> str:
     """Return the words of the page as a reader sees them: without escapes and invisible joiners."""
-    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.warning, *page.info]
+    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.warning, *page.info, *page.code]
     return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "").replace("\u00a0", " ")
 
 

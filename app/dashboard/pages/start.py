@@ -83,7 +83,7 @@ TO_TRY: tuple[tuple[str, str, str, Callable[[], str], str], ...] = (
     ),
     (
         "Why does my simulation differ?",
-        "Recordings against a simulation of their rig: where they differ, which effect is missing, how far it goes.",
+        "Recordings against a simulation of their rig: where they differ, which effect is missing, what it explains.",
         "Open the gap diagnosis",
         two_spectra,
         "gap",
@@ -102,10 +102,11 @@ def show() -> None:
         show_own()
     with st.container(key="try"):
         for column, (title, about, label, picture, page) in zip(st.columns(3), TO_TRY, strict=True):
-            with column.container(border=True, height="stretch"):
-                st.image(f'<svg xmlns="{SVG}" viewBox="0 0 300 124">{picture()}</svg>', width="stretch", alt="")
-                st.markdown(f"**{title}**")
-                st.caption(about)
+            with column.container(border=True, height="stretch", vertical_alignment="distribute"):
+                with st.container():
+                    st.image(f'<svg xmlns="{SVG}" viewBox="0 0 300 124">{picture()}</svg>', width="stretch", alt="")
+                    st.markdown(f"**{title}**")
+                    st.caption(about)
                 if st.button(label, type="primary", width="stretch", key=f"try {page}"):
                     if page == "analysis":
                         open_sample("damaged_tooth")
@@ -148,13 +149,15 @@ def open_own(file: ChosenFile) -> None:
 def show_samples() -> None:
     """Show the samples that show most."""
     st.subheader("Samples, each with what it shows", anchor=False)
-    for place, sample in zip(st.columns(2) * N_SHOWN, samples()[:N_SHOWN], strict=False):
-        with place:
-            button, text = st.columns((3, 5), vertical_alignment="center")
-        text.markdown(f":gray[{sample.about}]")
-        if button.button(sample.title, key=f"sample {sample.rig.stem}", width="stretch"):
-            open_sample(sample.rig.stem)
-            st.switch_page(state.ANALYSIS_PAGE)
+    with st.container(key="samples", gap="small"):
+        shown = samples()[:N_SHOWN]
+        for first in range(0, len(shown), 2):
+            cells = st.columns((3, 5) * 2, vertical_alignment="center")
+            for button, text, sample in zip(cells[::2], cells[1::2], shown[first : first + 2], strict=False):
+                text.markdown(f":gray[{sample.about}]")
+                if button.button(sample.title, key=f"sample {sample.rig.stem}", width="stretch"):
+                    open_sample(sample.rig.stem)
+                    st.switch_page(state.ANALYSIS_PAGE)
 
 
 try:
