@@ -122,8 +122,8 @@ class MethodPage:
         return start, min(max(round(high * rate), start + MIN_SAMPLES), recording.n_samples)
 
 
-def ask_options(page: MethodPage, method: Method, prepared: PreparedRecording) -> dict[str, Any]:
-    """Return the options that the user chose, three widgets in a row and the seldom needed ones behind a click."""
+def ask_options(page: MethodPage, method: Method, prepared: PreparedRecording, more_of: Any) -> dict[str, Any]:
+    """Return the options that the user chose, a few widgets in a row; the seldom needed ones stand in `more_of`."""
     known_angle = isinstance(page.analysis.shaft_angle, ShaftAngle)
     shown = [o for o in method.options if known_angle or o.name not in ("over_angle", "over", "shaft", "pair")]
     values = {option.name: option.default for option in method.options}
@@ -131,9 +131,8 @@ def ask_options(page: MethodPage, method: Method, prepared: PreparedRecording) -
     shown = [_as_suggested(option, page) for option in shown if option.kind != "name" or len(names[option.name]) > 1]
     few, more = ([option for option in shown if option.more is is_more] for is_more in (False, True))
     _ask_in_rows(page, few, names, values)
-    if more:
-        with st.expander("More settings", icon=":material/tune:"):
-            _ask_in_rows(page, more, names, values)
+    with more_of:
+        _ask_in_rows(page, more, names, values)
     return values
 
 
@@ -146,9 +145,10 @@ def _as_suggested(option: MethodOption, page: MethodPage) -> MethodOption:
 def _ask_in_rows(
     page: MethodPage, options: Sequence[MethodOption], known: Mapping[str, Any], values: dict[str, Any]
 ) -> None:
-    for first in range(0, len(options), 3):
-        row = options[first : first + 3]
-        for place, option in zip(st.columns(3, vertical_alignment="bottom"), row, strict=False):
+    n = 4 if len(options) > 3 else 3
+    for first in range(0, len(options), n):
+        row = options[first : first + n]
+        for place, option in zip(st.columns(n, vertical_alignment="bottom"), row, strict=False):
             with place:
                 values[option.name] = _asked(page, option, known[option.name])
 

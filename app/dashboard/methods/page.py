@@ -137,9 +137,13 @@ def _show(name: str, page: MethodPage) -> None:
         with_known_angle(recording, analysis.shaft_angle, memory_limit_mb=MEMORY_LIMIT_MB),
         recording.sampling_rate_hz,
     )
-    start, stop = page.segment(n_first=method.n_first)
+    few = st.container()
+    more = st.expander("Segment and further settings", icon=":material/tune:")
+    with more:
+        start, stop = page.segment(n_first=method.n_first)
     said = st.empty()
-    options = ask_options(page, method, part_of(whole, start / rate, stop / rate))
+    with few:
+        options = ask_options(page, method, part_of(whole, start / rate, stop / rate), more)
     # what takes longer than a few seconds is cut, which is said
     end = min(stop, start + (method.n_max if method.limit is None else min(method.n_max, method.limit(options))))
     text = f"Analysed: {start / rate:.4g} to {end / rate:.4g} s of {recording.duration_s:.4g} s, {end - start} samples"
@@ -151,17 +155,17 @@ def _show(name: str, page: MethodPage) -> None:
         else CannotTell("speed", "the shaft's angle is not known in this segment", "choose another one")
     )
     answer = answer_of(name, part.recording, angle, page.channel.channel, options)
-    show_answer(page, answer, angle)
+    show_answer(page, answer, angle, more)
 
 
-def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | CannotTell) -> None:
+def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | CannotTell, more: Any) -> None:
     """Show what was found: words, figures, waveforms, tables."""
     for fact in answer.facts:
         st.markdown("".join(part if part in (" ", "**") else as_typed(part) for part in _SPOKEN.split(fact)))
     show_warnings([capitalised(text) for text in answer.warnings])
     span = 60.0
     if any(isinstance(panel, LevelPanel) and panel.span is None for panel in answer.panels):
-        slider, read = st.columns(3)[0].slider, address.number(20, 120, whole=True)
+        slider, read = more.slider, address.number(20, 120, whole=True)
         span = float(page.ask(slider, "Colours span (dB)", 20, 120, step=5, name="colours", first=60, read=read))
     for number, panel in enumerate(answer.panels):
         charts.show_panel(panel, page.key(f"figure {number} {panel.x} {panel.y}"), span)
