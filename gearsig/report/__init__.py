@@ -78,6 +78,7 @@ from gearsig.report._sections import (
     finding_cards,
     headline_of,
     long_analysis_text,
+    provenance_rows,
     reference_text,
     split_verdict,
 )
@@ -150,6 +151,7 @@ __all__ = [
     "page_pdf",
     "place_rows",
     "plain",
+    "provenance_rows",
     "read_gap_json",
     "recording_mark",
     "reference_text",

@@ -10,7 +10,7 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard import address, state
-from app.dashboard.theme import as_typed, palette
+from app.dashboard.theme import as_typed, capitalised, palette
 from app.dashboard.widgets.charts import (
     N_COLUMNS,
     Ring,
@@ -139,7 +139,7 @@ def show_spectrum(
     joined = " Peaks are joined; the pale band reaches down to the lowest line of each pixel."
     many = len(spectra) == 1 and first.index_of(high) - first.index_of(low) > 2 * N_COLUMNS
     st.caption(
-        f"Resolution {first.resolution:.4g} {first.axis_unit}, {first.window} window{averages}."
+        f"Resolution {first.resolution:.4g} {first.axis_unit}, {capitalised(first.window)} window{averages}."
         f"{joined if many else ''} Drag to zoom, double click for all."
     )
     return low, high

@@ -13,6 +13,7 @@ from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.spectrum import show_ring, show_spectrum
 from gearsig.diagnosis import BEARING_PARTS, CHANGED, Analysis, Finding, Kind, Outcome
+from gearsig.formatting import enumerated, signed
 from gearsig.plot import ChartLine, LinePanel, marks_of, with_unit
 from gearsig.report import (
     FindingCard,
@@ -111,7 +112,7 @@ def _show_changes(analysis: Analysis, reference: Analysis) -> None:
     st.markdown(f"**Changed since the reference** :gray[{as_typed(reference.recording.provenance.source)}]")
     rows = "".join(
         f'<tr><td>{escape(one_line(row.label))}</td><td class="bar"><i class="{"up" if row.change_db > 0 else "down"}" '
-        f'style="width:{row.percent:.0f}%"></i></td><td>{row.change_db:+.1f} dB</td>'
+        f'style="width:{row.percent:.0f}%"></i></td><td>{signed(row.change_db)} dB</td>'
         f"<td>± {row.repeatability_db:.1f}</td></tr>"
         for row in shown
     )
@@ -127,7 +128,8 @@ def show_verdict_picture(analysis: Analysis) -> None:
     if picture.about == "tooth":
         teeth = teeth_of_shaft(analysis, picture.shaft)
         marks = marks_of(analysis.findings, picture.shaft, teeth)
-        words = f"Mean revolution of {picture.shaft}: {', '.join(mark.label for mark in marks)} stands out"
+        stand_out = f"{enumerated([mark.label for mark in marks])} {'stand' if len(marks) > 1 else 'stands'} out"
+        words = f"Mean revolution of {picture.shaft}: {stand_out if marks else 'no tooth stands out'}"
         show_ring(picture.average, teeth, marks, words, state.view_key(place, analysis))
         return
     if picture.about == "resonance":
@@ -151,9 +153,10 @@ def show_verdict_picture(analysis: Analysis) -> None:
         cursors = line_cursors(analysis, spectrum, n_sidebands=1)
     if spectrum is None:
         return
-    families = [c.position for c in cursors if c.kind == "bearing"]
+    is_bearing = picture.about == "bearing"
+    families = [c.position for c in cursors if is_bearing and c.kind == "bearing"]
     end = 1.08 * max(families) if families else highest_order_of_interest(analysis, spectrum)
-    marked = marked_positions(analysis, spectrum, channel.channel, of_bearings=picture.about == "bearing")[:1]
+    marked = marked_positions(analysis, spectrum, channel.channel, of_bearings=is_bearing)[:1]
     show_spectrum(
         analysis,
         spectrum,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import datetime
 from functools import partial
 from math import isfinite, nan
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import streamlit as st
@@ -17,7 +18,7 @@ from app.dashboard.methods.form import MethodPage
 from app.dashboard.methods.page import cached, show_method
 from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import offer_page, show_figure, show_lines, show_map, show_panel
+from app.dashboard.widgets.charts import download, offer_page, show_figure, show_lines, show_map, show_panel
 from app.dashboard.widgets.machine import show_machine
 from app.dashboard.widgets.messages import in_page_words, show_error, show_facts, show_unknown_speed
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
@@ -25,13 +26,22 @@ from app.dashboard.widgets.strip import choose_view
 from gearsig import plot
 from gearsig.angle import resample_to_angle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
-from gearsig.errors import GearsigError
+from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import csv_text
 from gearsig.indicators import Indicator
 from gearsig.methods import METHODS
 from gearsig.orders import OrderMap, frequency_map, order_map
 from gearsig.plot import ChartLine
-from gearsig.report import bearing_cursors, highest_order_of_interest, line_cursors, marked_positions, speed_is_constant
+from gearsig.report import (
+    bearing_cursors,
+    check_pdf,
+    highest_order_of_interest,
+    line_cursors,
+    marked_positions,
+    page_pdf,
+    provenance_rows,
+    speed_is_constant,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -204,8 +214,15 @@ def show_indicators(analysis: Analysis) -> None:
         chosen = address.ask(column.multiselect, label, known, key=key, name=name, first=[], read=read)
         kept = kept[kept[name].isin(chosen)] if chosen else kept
     number = st.column_config.NumberColumn(format="%.5g")
-    config = {"value": number, "reference": number, "change (dB)": st.column_config.NumberColumn(format="%+.1f")}
-    st.dataframe(kept, hide_index=True, width="stretch", height=520, column_config=config)
+    config: dict[str, Any] = {
+        "value": number,
+        "reference": number,
+        "change (dB)": st.column_config.NumberColumn(format="%+.1f"),
+        "indicator": st.column_config.TextColumn(width=190, pinned=True),
+        "of": st.column_config.TextColumn(width=130),
+        "band": st.column_config.TextColumn(width=130),
+    }
+    st.dataframe(kept, hide_index=True, width="stretch", height=520, column_config=config, placeholder="–")
     left, right = st.columns((3, 1), vertical_alignment="center")
     left.caption(f"{len(kept)} of {len(table)} indicators")
     right.download_button(
@@ -328,25 +345,25 @@ def show_start_stop(analysis: Analysis) -> None:
 def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
     """Offer the page that `gearsig report` writes, and the command that repeats the analysis."""
     st.markdown(
-        "One self-contained HTML page: verdict, findings, figures, indicators, and where everything came from. "
-        "It opens without a network and holds no scripts."
+        "One page: verdict, findings, figures, indicators, and where everything came from. As HTML it is one file that "
+        "opens without a network and holds no scripts; as PDF it is to be printed, without the table of indicators."
     )
-    name = f"{safe_file_name(request.name).split('.')[0] or 'recording'}.html"
-    offer_page("Download the report", lambda: report_page(request, analysis), name, state.view_key("report", analysis))
+    stem = safe_file_name(request.name).split(".")[0] or "recording"
+    key = state.view_key("report", analysis)
+    offer_page("Download the report", lambda: report_page(request, analysis), f"{stem}.html", key)
+    try:
+        check_pdf()
+    except InputError as error:
+        st.caption(as_typed(f"{error.what}: {error.remedy}"))
+    else:
+        download("PDF", lambda: page_pdf(analysis, command=command_of(request)), f"{stem}.pdf", "application/pdf")
     st.markdown("The same diagnosis from the command line:")
     st.code(command_of(request), language="bash", wrap_lines=True)
-    _show_provenance(analysis)
+    _show_provenance(analysis, command_of(request))
 
 
-def _show_provenance(analysis: Analysis) -> None:
-    recording = analysis.recording
-    rows = [
-        ("file", recording.provenance.source),
-        ("SHA-256", recording.provenance.sha256),
-        ("reader", recording.provenance.reader),
-        *((f"step {i}", step) for i, step in enumerate(recording.provenance.history, 1)),
-        *((name, str(value)) for name, value in analysis.settings.items()),
-    ]
+def _show_provenance(analysis: Analysis, command: str) -> None:
+    rows = provenance_rows(analysis, command, datetime.now().astimezone())
     table = {"provenance": [name for name, _ in rows], "": [text for _, text in rows]}
     config = {"provenance": st.column_config.TextColumn(width="small"), "": st.column_config.TextColumn(width="large")}
     st.dataframe(table, hide_index=True, width="stretch", column_config=config)
