@@ -287,7 +287,7 @@ def _choose_run() -> SimulationToCompare:
         "Torque on the driver (N·m)", "simulation torque", "the rig's or the preset's", minimum=0.0, name="torque"
     )
     looks = {"key": "simulation length", "name": "length", "first": 5.0}
-    length = address.ask_one(st.segmented_control, "Length (s)", (2.0, 5.0, 10.0), **looks)
+    length = address.ask_one(st.segmented_control, "Length (s)", (2.0, 5.0, 10.0), format_func="{:g}".format, **looks)
     seed = address.ask(
         st.number_input,
         "Seed",
@@ -402,7 +402,9 @@ def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
             "simulated − recorded",
         )
         certain = next((one.tooth_is_certain for one in comparison.alignments if one.shaft == shaft.shaft), None)
-        unknown = " Which tooth of one is which of the other is not known here." if certain is False else ""
+        unknown = (
+            " Which tooth of the simulation is which of the recording is not known here." if certain is False else ""
+        )
         st.caption(f"Tooth by tooth, at the middle of each.{unknown}")
 
 

@@ -103,7 +103,7 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
 
 def _worst(line: LineLevel, gain: float) -> str:
     off = line.level.difference_db - gain
-    return f", the most at {line.label}: {abs(off):.1f} dB too {'weak' if off < 0 else 'strong'}"
+    return f", most at {line.label}, where the simulation is too {'weak' if off < 0 else 'strong'}"
 
 
 def _missing_texts(channel: ChannelComparison) -> list[str]:
@@ -150,7 +150,7 @@ def _shape_texts(channel: ChannelComparison) -> list[str]:
     return [
         *texts,
         (
-            f"{percent(locked.recorded.value)} of the recording's energy repeats with the shafts' turns, "
+            f"{percent(locked.recorded.value)} of the recording's energy repeats with the shafts' revolutions, "
             f"{percent(locked.simulated.value)} of the simulation's."
         ),
     ]

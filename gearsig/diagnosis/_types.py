@@ -9,6 +9,7 @@ from math import e, exp, log
 
 from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray, count, positive, within
+from gearsig.formatting import unit_text
 from gearsig.indicators import Indicator
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
@@ -415,6 +416,9 @@ def p_text(p_value: float) -> str:
     Examples
     --------
     >>> p_text(3.2e-4), p_text(5e-141)
-    ('3e-04', '< 1e-6')
+    ('3 × 10⁻⁴', '< 10⁻⁶')
     """
-    return "< 1e-6" if p_value < 1e-6 else f"{p_value:.0e}" if p_value < 0.01 else f"{p_value:.1g}"
+    if p_value < 1e-6:
+        return "< 10⁻⁶"
+    digit, power = f"{p_value:.0e}".split("e")
+    return f"{digit} × {unit_text(f'10^{int(power)}')}" if p_value < 0.01 else f"{p_value:.1g}"

@@ -10,6 +10,7 @@ import numpy as np
 from gearsig import motion as motions
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from gearsig.formatting import with_minus
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._series import thin
@@ -64,7 +65,7 @@ def start_stop_figure(examined: motions.StartStop, *, title: str = "") -> Figure
     _draw_loops(loop, drawn)
     if examined.loop is not None and examined.loop.n_cycles:
         lost, work = examined.loop.loss_per_cycle_j, examined.loop.work_per_cycle_j
-        style.note(loop, f"{lost:.3g} of {work:.3g} J lost a cycle")
+        style.note(loop, with_minus(f"{lost:.3g} of {work:.3g} J lost a cycle"))
     return figure
 
 

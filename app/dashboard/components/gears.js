@@ -75,6 +75,7 @@ class Gears {
   draw() {
     const style = getComputedStyle(this.root);
     this.ink = style.color;
+    this.paper = style.getPropertyValue("--st-background-color");
     this.button.textContent = this.playing ? "Stop" : "Turn";
     this.signal.setAttribute("aria-valuenow", this.at.toFixed(2));
     const parts = [`mesh cycle ${this.at.toFixed(2)}`, `tooth ${(((Math.floor(this.at) % this.data.teeth[0]) + this.data.teeth[0]) % this.data.teeth[0]) + 1} of the driver enters`];
@@ -87,10 +88,7 @@ class Gears {
   drawWheels() {
     const [context, width, height] = ready(this.wheels), { teeth, cracked, colours } = this.data;
     const radii = teeth.map((n) => (n * MODULE) / 2), turned = this.at - APPROACH;
-    context.fillStyle = this.ink;
-    context.font = "12px system-ui, sans-serif";
-    context.fillText(`driver, ${teeth[0]} teeth`, 10, 18);
-    context.fillText(`driven, ${teeth[1]} teeth`, 10, 0.64 * height);
+    context.save();
     // the driver is above the driven gear: the mesh lies along the width
     context.translate(width / 2, height / 2);
     context.rotate(Math.PI / 2);
@@ -109,6 +107,20 @@ class Gears {
     context.beginPath();
     context.arc(...tip, 6, 0, 2 * Math.PI);
     context.fill();
+    context.restore();
+    this.write(context, `driver, ${teeth[0]} teeth`, 10, 18);
+    this.write(context, `driven, ${teeth[1]} teeth`, 10, 0.64 * height);
+  }
+
+  // Words over a drawing, with a rim of paper around the letters.
+  write(context, words, x, y) {
+    context.font = "12px system-ui, sans-serif";
+    context.lineJoin = "round";
+    context.lineWidth = 4;
+    context.strokeStyle = this.paper;
+    context.strokeText(words, x, y);
+    context.fillStyle = this.ink;
+    context.fillText(words, x, y);
   }
 
   drawSignal() {
@@ -122,9 +134,7 @@ class Gears {
       for (let i = 0; i < x.length; i++) context.lineTo(across(x[i]), up(y[i]));
       context.stroke();
     }
-    context.fillStyle = this.ink;
-    context.font = "12px system-ui, sans-serif";
-    context.fillText(this.data.label, 4, 13);
+    this.write(context, this.data.label, 4, 13);
     context.fillRect(across(this.at) - 1, 0, 2, height);
   }
 }

@@ -15,6 +15,7 @@ from app.dashboard.laboratory.setup import (
     choose_parameter,
     preset_number,
     show_typed_toggle,
+    shown_name,
     shown_unit,
 )
 from app.dashboard.laboratory.views import show_metrics, show_title
@@ -254,7 +255,7 @@ def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
         st.dataframe(rows, hide_index=True)
     else:
         words = "Speed of the pinion with the impacts, phase plane of the teeth, torque over twist"
-        show_figure(plot.start_stop_figure(run.examined, title=run.setup.preset), words, "drive")
+        show_figure(plot.start_stop_figure(run.examined, title=shown_name(run.setup.preset)), words, "drive")
     for text in (*(f"Cannot tell the {text}" for text in run.examined.refusals), *run.examined.notes):
         st.caption(f":material/info: {as_typed(text)}")
 
@@ -264,7 +265,7 @@ def _show_force(run: DriveRun) -> None:
         st.info(as_typed(run.refusal))
         return
     words = "Force between the teeth: measured, piecewise model, Hunt–Crossley; below, the errors"
-    show_figure(plot.force_figure(run.force, title=run.setup.preset), words, "force of the drive")
+    show_figure(plot.force_figure(run.force, title=shown_name(run.setup.preset)), words, "force of the drive")
     rows = [
         {
             "model": e.model,
