@@ -146,7 +146,7 @@ def _choose_point(status: DataFrame) -> tuple[str, str]:
     looks = {"key": SEARCHED, "placeholder": "Part of a name"}
     searched = address.ask(st.text_input, "Machine", name="search", first="", read=address.words, **looks)
     shown = status[status["machine"].str.contains(searched, case=False, regex=False)]
-    of_machine = {name: rows.to_dict("records") for name, rows in shown.groupby("machine", sort=False)}
+    of_machine = {str(name): rows.to_dict("records") for name, rows in shown.groupby("machine", sort=False)}
     known = [(row["machine"], row["point"]) for rows in of_machine.values() for row in rows]
     everywhere = list(zip(status["machine"], status["point"], strict=True))
     first = (known or everywhere)[0]

@@ -356,17 +356,17 @@ def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
     except InputError as error:
         st.caption(as_typed(f"{error.what}: {error.remedy}"))
     else:
-        download("PDF", lambda: page_pdf(analysis, command=command_of(request)), f"{stem}.pdf", "application/pdf")
+        download("As PDF", lambda: page_pdf(analysis, command=command_of(request)), f"{stem}.pdf", "application/pdf")
     st.markdown("The same diagnosis from the command line:")
     st.code(command_of(request), language="bash", wrap_lines=True)
-    _show_provenance(analysis, command_of(request))
+    _show_provenance(analysis)
 
 
-def _show_provenance(analysis: Analysis, command: str) -> None:
-    rows = provenance_rows(analysis, command, datetime.now().astimezone())
-    table = {"provenance": [name for name, _ in rows], "": [text for _, text in rows]}
-    config = {"provenance": st.column_config.TextColumn(width="small"), "": st.column_config.TextColumn(width="large")}
-    st.dataframe(table, hide_index=True, width="stretch", column_config=config)
+def _show_provenance(analysis: Analysis) -> None:
+    rows = provenance_rows(analysis, "", datetime.now().astimezone())
+    st.markdown("Where it came from:")
+    # a table of words, whose cells wrap
+    st.table({name: as_typed(text) for name, text in rows}, border="horizontal")
 
 
 Of = Callable[[Analysis, ChannelAnalysis], None]
