@@ -189,6 +189,8 @@ class TorqueTwist(Result, columns=("twist_rad", "torque_nm")):
     loss_per_cycle_j : float
         ∮ τ dδ per segment of motion: what contact and friction of the teeth take; nan where the motion neither stops
         nor reverses, as no loop closes then.
+    loss_uncertainty_j : float
+        By how much two ways of summing it differ, over compression and over its rate: noise, where that is larger.
     work_per_cycle_j : float
         ∫ τ dθ1 per segment of motion: what goes through the shaft; nan likewise.
     n_cycles : int
@@ -198,6 +200,7 @@ class TorqueTwist(Result, columns=("twist_rad", "torque_nm")):
     torque_nm: FloatArray
     lost_motion_rad: float
     loss_per_cycle_j: float
+    loss_uncertainty_j: float
     work_per_cycle_j: float
     n_cycles: int
 
@@ -215,11 +218,14 @@ def torque_twist(motion: PairMotion, segments: MotionSegments, datum_m: float) -
     twist = (motion.compression_m - datum_m) / r1
     n_cycles = len(segments.moving) if segments.stops_s or segments.n_reversals else 0
     share = 1.0 / (n_cycles * motion.sampling_rate_hz) if n_cycles else float("nan")
+    by_rate = float(np.trapezoid(torque * motion.compression_rate_mps / r1, dx=share))
+    by_compression = float(np.trapezoid(torque, twist)) / n_cycles if n_cycles else float("nan")
     return TorqueTwist(
         twist,
         torque,
         _width(twist, torque),
-        float(np.trapezoid(torque * motion.compression_rate_mps / r1, dx=share)),
+        by_rate,
+        abs(by_rate - by_compression),
         float(np.trapezoid(torque * motion.driver_speed_rad_s, dx=share)),
         n_cycles,
     )

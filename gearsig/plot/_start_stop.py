@@ -10,7 +10,6 @@ import numpy as np
 from gearsig import motion as motions
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.formatting import with_minus
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._series import thin
@@ -65,7 +64,9 @@ def start_stop_figure(examined: motions.StartStop, *, title: str = "") -> Figure
     _draw_loops(loop, drawn)
     if examined.loop is not None and examined.loop.n_cycles:
         lost, work = examined.loop.loss_per_cycle_j, examined.loop.work_per_cycle_j
-        style.note(loop, with_minus(f"{lost:.3g} of {work:.3g} J lost a cycle"))
+        uncertain = examined.loop.loss_uncertainty_j
+        least = f"{lost:.3g}" if lost > uncertain else f"at most {max(abs(lost), uncertain):.2g}"
+        style.note(loop, f"{least} of {work:.3g} J lost a cycle")
     return figure
 
 

@@ -116,6 +116,12 @@ def test_work_and_loss_of_the_loop_are_those_of_the_model() -> None:
     work = np.trapezoid(run["torque"] * run["pinion speed"], dx=1e-4)
     assert loop.work_per_cycle_j == pytest.approx(work / 2.0, rel=1e-3)
     assert loop.loss_per_cycle_j == pytest.approx(run["lost in contact"][-1] / 2.0, rel=0.5)
+    assert loop.loss_uncertainty_j < 0.01 * loop.loss_per_cycle_j
+    noisy_motion = measure_motion(start_stop())
+    noisy = torque_twist(
+        noisy_motion, motion_segments(noisy_motion.driver_angle_rad, noisy_motion.sampling_rate_hz), 0.0
+    )
+    assert abs(noisy.loss_per_cycle_j - loop.loss_per_cycle_j) < 3.0 * noisy.loss_uncertainty_j
     with pytest.raises(RefusalError, match="torque"):
         torque_twist(measure_motion(without(recording, "torque")), segments, 0.0)
 
