@@ -206,7 +206,7 @@ def _cause(name: str, probability: float, options: Mapping[str, str]) -> GapCaus
 
 def diagnose_forest(seen: VisibleCase) -> GapReport:
     """Return the calibrated probabilities of the forests, what may be said of them, and the shaft that shows it."""
-    from gearsig.gap import attribute, conditions_of, told_options
+    from gearsig.gap import attribute, conditions_of, determined_options
     from sims.cracked import cracked_gap_simulator
 
     simulator = cracked_gap_simulator()
@@ -217,7 +217,7 @@ def diagnose_forest(seen: VisibleCase) -> GapReport:
     probabilities = weighed.probabilities()
     groups = {name: effect.group for name, effect in simulator.gap_effects().items()}
     changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
-    shafts = {name: told_options(name, changes, teeth) for name in probabilities}
+    shafts = {name: determined_options(name, changes, teeth) for name in probabilities}
     return bare_report("forest", probabilities, shafts, weighed.calibration.outcome(probabilities, groups))
 
 

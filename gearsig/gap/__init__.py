@@ -58,11 +58,11 @@ from gearsig.gap._evidence import (
     SIGNS,
     TOOTH_FAULTS,
     ShaftSigns,
+    determined_options,
     evidence_of,
+    evidence_of_feature,
     over_floors,
     shaft_signs,
-    told_options,
-    weighed_evidence,
 )
 from gearsig.gap._features import Feature, Features, features_of, once
 from gearsig.gap._floors import (
@@ -76,7 +76,7 @@ from gearsig.gap._floors import (
     pooled_scatter,
     soft_size,
 )
-from gearsig.gap._gearless import UnexpectedFinding, beside_unexpected, place_of_unexpected, unexpected_findings
+from gearsig.gap._gearless import UnexpectedFinding, place_of_unexpected, unexpected_findings, with_unexpected
 from gearsig.gap._inputs import GapRequest, read_gap_inputs, read_labelled, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes, labelled_support, with_labelled
 from gearsig.gap._next_recording import next_recordings, next_steps
@@ -136,9 +136,9 @@ from gearsig.gap._reduction import (
     GearFrame,
     ReducedRecording,
     SpeedFigures,
+    background_orders,
     gear_frame,
     mains_lines,
-    other_lines,
     reduce_recording,
     speed_figures,
 )
@@ -155,11 +155,11 @@ from gearsig.gap._simulator import (
 )
 from gearsig.gap._tooth_error import (
     TOOTH_ERRORS_FILE,
-    KnownCourses,
+    KnownToothErrors,
     ToothErrorChange,
     ToothErrorEvidence,
-    course_descriptors,
     tooth_error_changes,
+    tooth_error_descriptors,
     tooth_error_evidence,
 )
 from gearsig.gap._trials import (
@@ -203,9 +203,9 @@ from gearsig.gap._types import (
 from gearsig.gap._verdict import is_settled, unbounded_fits, within_the_floor
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
 from gearsig.gap._waveform import (
-    SimulatedCourse,
+    SimulatedWaveform,
     WaveformMatch,
-    compared_course,
+    compare_waveform,
     waveform_match,
 )
 from gearsig.gap._words import (
@@ -271,7 +271,7 @@ __all__ = [
     "HasFurtherPlaces",
     "HealthyReference",
     "Interval",
-    "KnownCourses",
+    "KnownToothErrors",
     "LabelSpace",
     "LabelledFacts",
     "LabelledRecording",
@@ -288,7 +288,7 @@ __all__ = [
     "ReducedRecording",
     "ShaftSigns",
     "Shrinkage",
-    "SimulatedCourse",
+    "SimulatedWaveform",
     "SpectrumCurves",
     "SpeedFigures",
     "StructuralFloor",
@@ -308,24 +308,25 @@ __all__ = [
     "at_its_tooth",
     "attribute",
     "average_curves",
+    "background_orders",
     "banks_of",
-    "beside_unexpected",
     "beyond_the_mesh",
     "change_features",
     "change_once",
     "check_steady",
     "closed_shares",
     "compare",
-    "compared_course",
+    "compare_waveform",
     "conditions_of",
     "counted_against",
-    "course_descriptors",
     "credibility_of",
+    "determined_options",
     "diagnose_gap",
     "difference_features",
     "effects_without_place",
     "even_weights",
     "evidence_of",
+    "evidence_of_feature",
     "exchanged",
     "family_members",
     "family_of",
@@ -365,7 +366,6 @@ __all__ = [
     "next_recordings",
     "next_steps",
     "once",
-    "other_lines",
     "over_floors",
     "paths_of",
     "place_of",
@@ -398,8 +398,8 @@ __all__ = [
     "strange_teeth",
     "textbook_rules",
     "textbook_strengths",
-    "told_options",
     "tooth_error_changes",
+    "tooth_error_descriptors",
     "tooth_error_evidence",
     "tooth_load_n_per_mm",
     "transplanted",
@@ -408,12 +408,12 @@ __all__ = [
     "unbounded_fits",
     "unexpected_findings",
     "waveform_match",
-    "weighed_evidence",
     "with_channels_of",
     "with_common_channels",
     "with_labelled",
     "with_likelihoods",
     "with_stage",
+    "with_unexpected",
     "with_unknown_shared",
     "within_reach",
     "within_the_floor",

@@ -135,8 +135,8 @@ class GapCalibration:
         if 1.0 - none - unknown < self.named_from:
             return GapOutcome.UNDECIDED
         effects = {name: p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)}
-        first, *others = sorted(effects.values(), reverse=True)
-        second = others[0] if others else 0.0
+        first, *remaining = sorted(effects.values(), reverse=True)
+        second = remaining[0] if remaining else 0.0
         together: dict[str, float] = {}
         for name, p in effects.items():
             together[groups.get(name, name)] = together.get(groups.get(name, name), 0.0) + p
@@ -199,7 +199,7 @@ NOT_SEEN_LOADED = {"backlash": 0.9}
 
 
 def joint_probabilities(
-    found: Sequence[Mapping[str, float]], loads_n_per_mm: Sequence[float], allowed: Collection[str]
+    per_condition: Sequence[Mapping[str, float]], loads_n_per_mm: Sequence[float], allowed: Collection[str]
 ) -> dict[str, float]:
     """Return the joint probabilities of n conditions, p ∝ Π p_i^(1/n): the logarithmic opinion pool.
 
@@ -211,7 +211,7 @@ def joint_probabilities(
 
     Parameters
     ----------
-    found : sequence of mapping
+    per_condition : sequence of mapping
         Cause → probability, of each condition.
     loads_n_per_mm : sequence of float
         Of the teeth, at each; nan where it is not known.
@@ -220,11 +220,11 @@ def joint_probabilities(
     """
     parts_somewhere = any(load <= LIGHT_LOAD_N_PER_MM for load in loads_n_per_mm)
     joint = dict.fromkeys(sorted(allowed), 1.0)
-    for at, load in zip(found, loads_n_per_mm, strict=True):
+    for at, load in zip(per_condition, loads_n_per_mm, strict=True):
         loaded = parts_somewhere and load > LIGHT_LOAD_N_PER_MM
         for name in joint:
-            unseen = 0.0 if len(found) == 1 else NOT_SEEN_LOADED.get(name, NOT_SEEN) if loaded else NOT_SEEN
-            joint[name] *= ((1.0 - unseen) * at[name] + unseen * at[NONE]) ** (1.0 / len(found))
+            unseen = 0.0 if len(per_condition) == 1 else NOT_SEEN_LOADED.get(name, NOT_SEEN) if loaded else NOT_SEEN
+            joint[name] *= ((1.0 - unseen) * at[name] + unseen * at[NONE]) ** (1.0 / len(per_condition))
     total = sum(joint.values())
     return {name: p / total for name, p in joint.items()}
 
@@ -256,11 +256,11 @@ class Attribution(Generic[TriedT]):
     size : float
         Of the gap in structural floors; of several conditions the largest.
     n_conditions : int
-    unheard_of : tuple of str
+    untrained : tuple of str
         Effects that the forests do not know, the user's own: each was to be tried.
     labelled : LabelledEvidence or None
         What labelled recordings of the rig say.
-    courses : mapping
+    tooth_error_log_likelihoods : mapping
         Effect → log-likelihood of the transmission error's change, of faults of teeth; empty without encoders.
     """
 
@@ -269,9 +269,9 @@ class Attribution(Generic[TriedT]):
     calibration: GapCalibration
     size: float = 1.0
     n_conditions: int = 1
-    unheard_of: tuple[str, ...] = ()
+    untrained: tuple[str, ...] = ()
     labelled: LabelledEvidence | None = None
-    courses: Mapping[str, float] = field(default_factory=dict)
+    tooth_error_log_likelihoods: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def scores(self) -> dict[str, float]:
@@ -287,13 +287,13 @@ class Attribution(Generic[TriedT]):
 
     def probabilities(self, calibration: GapCalibration | None = None) -> dict[str, float]:
         """Return cause → probability, likeliest first; calibrated, but for effects that the forests do not know."""
-        found = (calibration or self.calibration).probabilities(
+        posterior = (calibration or self.calibration).probabilities(
             self.uncalibrated, self.scores, self.size, self.n_conditions
         )
         if self.labelled is not None:
-            found = with_labelled(found, self.labelled.ratios, self.labelled.alike)
-        found = with_likelihoods(with_likelihoods(found, self.matches), self.courses)
-        return with_unknown_shared(found, {name: self.scores[name] for name in self.unheard_of if name in self.tried})
+            posterior = with_labelled(posterior, self.labelled.ratios, self.labelled.alike)
+        posterior = with_likelihoods(with_likelihoods(posterior, self.matches), self.tooth_error_log_likelihoods)
+        return with_unknown_shared(posterior, {n: self.scores[n] for n in self.untrained if n in self.tried})
 
 
 MAX_TRIED, MIN_TRIED_PROBABILITY = 3, 0.06
@@ -331,10 +331,10 @@ def with_unknown_shared(probabilities: Mapping[str, float], scores: Mapping[str,
     """
     positive = {name: max(score, 0.0) for name, score in scores.items()}
     total = sum(positive.values())
-    taken = probabilities[UNKNOWN] * max(positive.values(), default=0.0)
-    found = {**probabilities, UNKNOWN: probabilities[UNKNOWN] - taken}
-    found |= {name: taken * score / total if total else 0.0 for name, score in positive.items()}
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
+    passed_on = probabilities[UNKNOWN] * max(positive.values(), default=0.0)
+    shared = {**probabilities, UNKNOWN: probabilities[UNKNOWN] - passed_on}
+    shared |= {name: passed_on * score / total if total else 0.0 for name, score in positive.items()}
+    return dict(sorted(shared.items(), key=lambda item: -item[1]))
 
 
 def attribute(
@@ -348,7 +348,7 @@ def attribute(
     max_tried: int = MAX_TRIED,
     fresh: bool = False,
     labelled: Sequence[LabelledChange] = (),
-    courses: Mapping[str, float] = MappingProxyType({}),
+    tooth_error_log_likelihoods: Mapping[str, float] = MappingProxyType({}),
 ) -> Attribution[TriedEffect]:
     """Ask the forests and what is labelled, then simulate, fit and score the likeliest effects, `max_tried` at most.
 
@@ -364,21 +364,23 @@ def attribute(
     size = max(condition.size.structural.value for condition in conditions)
     calibration = load_gap_calibration(with_reference=with_reference)
     evidence = labelled_evidence(conditions, _loads(conditions), labelled) if labelled else None
-    told = {name: value for name, value in courses.items() if name in forest}
-    asked = Attribution[TriedEffect](forest, {}, calibration, size, len(conditions), labelled=evidence, courses=told)
-    first = asked.probabilities()
+    log_likelihoods = {name: value for name, value in tooth_error_log_likelihoods.items() if name in forest}
+    attribution = Attribution[TriedEffect](
+        forest, {}, calibration, size, len(conditions), labelled=evidence, tooth_error_log_likelihoods=log_likelihoods
+    )
+    first = attribution.probabilities()
     likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
-    heard_of = _known_to_forests(conditions)
-    own = [name for name in effects or known if name not in heard_of] if max_tried else []
+    trained = _trained_effects(conditions)
+    untrained = [name for name in effects or known if name not in trained] if max_tried else []
     if max_tried and any(name in TOOTH_FAULTS for name in likely):  # waveforms part them: all are tried, or none
         likely += [name for name in TOOTH_FAULTS if name in first and name in known and name not in likely]
-    likely += own
+    likely += untrained
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     refuse_where_none_ran(tried, likely, twin)
-    return replace(asked, tried=tried, unheard_of=tuple(own))
+    return replace(attribution, tried=tried, untrained=tuple(untrained))
 
 
-def _known_to_forests(conditions: Sequence[Condition]) -> set[str]:
+def _trained_effects(conditions: Sequence[Condition]) -> set[str]:
     return {name for c in conditions for name in c.learned.causes}
 
 
@@ -386,13 +388,13 @@ def _forest(
     conditions: Sequence[Condition], effects: Sequence[str], known: Mapping[str, GapEffect]
 ) -> dict[str, float]:
     """Return the forests' joint probabilities over what may be named."""
-    allowed = {NONE, UNKNOWN, *(effects or known)} & _known_to_forests(conditions)
-    found, loads = [], _loads(conditions)
+    allowed = {NONE, UNKNOWN, *(effects or known)} & _trained_effects(conditions)
+    per_condition, loads = [], _loads(conditions)
     for condition, load in zip(conditions, loads, strict=True):
         recogniser = condition.learned.recognisers[condition.reference is not None]
-        found.append(recogniser.probabilities(condition.change, load, known.values()))
-    return joint_probabilities(found, loads, allowed)
+        per_condition.append(recogniser.probabilities(condition.change, load, known.values()))
+    return joint_probabilities(per_condition, loads, allowed)
 
 
 def _loads(conditions: Sequence[Condition]) -> list[float]:
-    return [tooth_load_n_per_mm(one.now.frame.pair, one.facts.point.torque_nm) for one in conditions]
+    return [tooth_load_n_per_mm(condition.now.frame.pair, condition.facts.point.torque_nm) for condition in conditions]

@@ -77,8 +77,8 @@ def segment_changes(now: ReducedRecording, healthy: ReducedRecording) -> FloatAr
     """Return the changes in dB, (n_channels, n_harmonics, 3); nan where a part does not stand clear of noise."""
     rows = []
     for name in now.channels:
-        here, before = _segments(now, name), _segments(healthy, name)
-        rows.append(np.clip(here - before, -MAX_DB, MAX_DB))
+        after, before = _segments(now, name), _segments(healthy, name)
+        rows.append(np.clip(after - before, -MAX_DB, MAX_DB))
     changes: FloatArray = np.array(rows)
     return changes
 
@@ -96,43 +96,43 @@ def _segments(reduced: ReducedRecording, channel: str) -> FloatArray:
                 power[k - 1] = np.nan
                 continue
             is_own_sideband = np.arange(low, high) != k * teeth
-            beside, under = square[low:high][is_own_sideband], noise[low:high][is_own_sideband]
-            power[k - 1, REPEATED] += max(float(np.sum(beside - under)), 0.0)
-            floor[k - 1, 1] += float(under.sum())
+            sideband_power, noise_power = square[low:high][is_own_sideband], noise[low:high][is_own_sideband]
+            power[k - 1, REPEATED] += max(float(np.sum(sideband_power - noise_power)), 0.0)
+            floor[k - 1, 1] += float(noise_power.sum())
             if side == DRIVER:
                 power[k - 1, MESH], floor[k - 1, 0] = max(square[k * teeth] - noise[k * teeth], 0.0), noise[k * teeth]
-                power[k - 1, NOISE] = float(under.sum()) * average.n_revolutions
-    seen = np.column_stack([power[:, :2] > np.array(CLEAR) * floor, power[:, NOISE] > 0.0])
-    levels: FloatArray = 10.0 * np.log10(np.where(seen, power, np.nan))
+                power[k - 1, NOISE] = float(noise_power.sum()) * average.n_revolutions
+    is_clear = np.column_stack([power[:, :2] > np.array(CLEAR) * floor, power[:, NOISE] > 0.0])
+    levels: FloatArray = 10.0 * np.log10(np.where(is_clear, power, np.nan))
     return levels
 
 
-def _seen(values: FloatArray) -> FloatArray:
+def _finite(values: FloatArray) -> FloatArray:
     finite: FloatArray = values[np.isfinite(values)]
     return finite
 
 
 def _median(values: FloatArray) -> float:
-    seen = _seen(values)
-    return float(np.median(seen)) if len(seen) else 0.0
+    finite = _finite(values)
+    return float(np.median(finite)) if len(finite) else 0.0
 
 
 def _rms(values: FloatArray) -> float:
-    seen = _seen(values)
-    return float(np.sqrt(np.mean(seen**2))) if len(seen) else 0.0
+    finite = _finite(values)
+    return float(np.sqrt(np.mean(finite**2))) if len(finite) else 0.0
 
 
 def _rise(values: FloatArray) -> float:
     """Return the mean step from one harmonic to the next."""
     steps = [values[:, b] - values[:, a] for a, b in pairwise(range(values.shape[1]))]
-    seen = _seen(np.array(steps))
-    return float(seen.mean()) if len(seen) else 0.0
+    finite = _finite(np.array(steps))
+    return float(finite.mean()) if len(finite) else 0.0
 
 
 def _together(a: FloatArray, b: FloatArray) -> float:
     """Return 10 (2 Σ ab)/(Σ a² + Σ b² + n): 10 where both changed alike and much, −10 where in opposite directions."""
-    both = np.isfinite(a) & np.isfinite(b)
-    x, y = a[both], b[both]
+    is_known = np.isfinite(a) & np.isfinite(b)
+    x, y = a[is_known], b[is_known]
     return float(20.0 * np.sum(x * y) / (np.sum(x**2 + y**2) + MIN_POWER * max(len(x), 1)))
 
 
@@ -147,9 +147,9 @@ def apart_features(now: ReducedRecording, healthy: ReducedRecording) -> Iterator
     What drives the gears harder is seen by every sensor, each through its own path; a sensor that was mounted anew, or
     a bearing that holds its shaft less, changes the paths, and each in its own way.
     """
-    here, before = _mesh_levels(now), _mesh_levels(healthy)
-    n = min(here.shape[1], before.shape[1])  # the faster recording shows fewer
-    yield "apart.mesh", _scatter(here[:, :n] - before[:, :n])
+    after, before = _mesh_levels(now), _mesh_levels(healthy)
+    n = min(after.shape[1], before.shape[1])  # the faster recording shows fewer
+    yield "apart.mesh", _scatter(after[:, :n] - before[:, :n])
     yield "apart.floor", _scatter(_floor_levels(now) - _floor_levels(healthy))
 
 
@@ -189,24 +189,24 @@ def change_features(now: ReducedRecording, healthy: ReducedRecording) -> Feature
 
     The reference's scatter counts as well: variances of both add.
     """
-    (names, here), before = whole_and_parts(now), whole_and_parts(healthy)[1]
-    joined, values = _joined(names, here[0] - before[0], now, healthy)
+    (names, after), before = whole_and_parts(now), whole_and_parts(healthy)[1]
+    joined, values = _joined(names, after[0] - before[0], now, healthy)
     return _with_scatter(
         joined,
         values,
         np.stack(
-            [_joined(names, v - before[0], part, healthy)[1] for v, part in zip(here[1:], _parts(now), strict=True)]
+            [_joined(names, v - before[0], part, healthy)[1] for v, part in zip(after[1:], _parts(now), strict=True)]
         ),
         np.stack(
-            [_joined(names, here[0] - v, now, part)[1] for v, part in zip(before[1:], _parts(healthy), strict=True)]
+            [_joined(names, after[0] - v, now, part)[1] for v, part in zip(before[1:], _parts(healthy), strict=True)]
         ),
     )
 
 
 def change_once(now: ReducedRecording, healthy: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values of the change features, without their scatter."""
-    (names, here), before = once(now), once(healthy)[1]
-    return _joined(names, here - before, now, healthy)
+    (names, after), before = once(now), once(healthy)[1]
+    return _joined(names, after - before, now, healthy)
 
 
 def difference_features(
@@ -220,8 +220,8 @@ def difference_features(
     credibility : array, (n_features,), or float
         How much of what the simulation says of each feature is subtracted, see `gearsig.gap`.
     """
-    (names, here), before = whole_and_parts(now), credibility * whole_and_parts(simulated)[1]
-    return _with_scatter(names, here[0] - before[0], here[1:] - before[0], here[0] - before[1:])
+    (names, measured), before = whole_and_parts(now), credibility * whole_and_parts(simulated)[1]
+    return _with_scatter(names, measured[0] - before[0], measured[1:] - before[0], measured[0] - before[1:])
 
 
 def _with_scatter(names: tuple[str, ...], values: FloatArray, *left_out: FloatArray) -> Features:
@@ -250,8 +250,8 @@ def _patterns(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[Name
         residuals, n = difference_residuals(now, turned, side), turned.lines.shape[1]
         pairs = [(now.average(name, side), healthy.average(name, side)) for name in now.channels]
         noises = [
-            (here.noise[:n] + before.noise[:n])[lines[:n] != 0].sum() / 2.0 / here.mesh_power
-            for lines, (here, before) in zip(residuals, pairs, strict=True)
+            (after.noise[:n] + before.noise[:n])[lines[:n] != 0].sum() / 2.0 / after.mesh_power
+            for lines, (after, before) in zip(residuals, pairs, strict=True)
         ]
         longer = min(average.longer for pair in pairs for average in pair)
         yield from pattern_features(f"change.{SIDES[side]}", residuals, turned.teeth, float(np.mean(noises)), longer)
@@ -263,7 +263,7 @@ def _patterns(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[Name
             now.frame.teeth[side],
             noise=0.0,
             longer=0.0,
-            least=MIN_SURPRISE,
+            minimum=MIN_SURPRISE,
         )
     yield from apart_features(now, healthy)
     yield from alike_features(now, healthy)
@@ -302,10 +302,10 @@ def normalised_differences(
     n = turned.lines.shape[1]
     healthy_lines = lines_of_shaft(healthy, side).lines
     for row, born, name in zip(turned.lines, healthy_lines, now.channels, strict=True):
-        here = now.average(name, side)
-        noise = here.noise[:n] + healthy.average(name, side).noise[:n] + MIN_NOISE * here.mesh_power / n
+        average = now.average(name, side)
+        noise = average.noise[:n] + healthy.average(name, side).noise[:n] + MIN_NOISE * average.mesh_power / n
         expected = np.sqrt(noise + REPEATS**2 * smooth_power(np.abs(born[:n]) ** 2))
-        kept = here.residual(_filled(row / expected, here))
+        kept = average.residual(_filled(row / expected, average))
         by_channel.append(kept * np.sqrt(2.0 / max(int(np.count_nonzero(kept)), 1)))
     return by_channel
 

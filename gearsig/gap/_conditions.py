@@ -89,7 +89,7 @@ class Condition:
     learned: Learned = field(repr=False)
 
     @property
-    def other(self) -> ReducedRecording:
+    def baseline(self) -> ReducedRecording:
         """What it is compared with."""
         return self.reference if self.reference is not None else self.simulated
 
@@ -216,8 +216,8 @@ def matching_reference(
     if abs(change) > LARGEST_SPEED_DIFFERENCE:
         return None, f"no reference within {percent(LARGEST_SPEED_DIFFERENCE)} of its speed"
     if _torque_difference(rig, nearest.rig) > LARGEST_TORQUE_DIFFERENCE:
-        here, there = _torque_nm(rig), _torque_nm(nearest.rig)
-        return None, f"the reference at its speed has {there:.3g} N m, the recording {here:.3g} N m"
+        torque_nm, reference_nm = _torque_nm(rig), _torque_nm(nearest.rig)
+        return None, f"the reference at its speed has {reference_nm:.3g} N m, the recording {torque_nm:.3g} N m"
     if nearest.whole is not None:
         reference = as_long_as(nearest.whole, reference, now)
     named = _with_names_of(reference, now)
@@ -260,10 +260,10 @@ def _distance(now: ReducedRecording, rig: Rig, reference: HealthyReference) -> f
 
 def _torque_difference(rig: Rig, reference: Rig) -> float:
     """Return by which part of the reference's torque the recording's differs from it; 0 where one is not stated."""
-    here_nm, there_nm = _torque_nm(rig), _torque_nm(reference)
-    if here_nm is None or there_nm is None:
+    recording_nm, reference_nm = _torque_nm(rig), _torque_nm(reference)
+    if recording_nm is None or reference_nm is None:
         return 0.0
-    return abs(here_nm / there_nm - 1.0) if there_nm else math.inf
+    return abs(recording_nm / reference_nm - 1.0) if reference_nm else math.inf
 
 
 def _torque_nm(rig: Rig) -> float | None:
@@ -274,8 +274,8 @@ def observed(condition: Condition, index: int, n: int, change: Features | None =
     """Return a condition's distances and floors of the first `n` features; `change` instead of its own."""
     used = change or condition.change
     structural = condition.floor
-    both = (structural.of(used.names) ** 2 + (REPEATABLE * pooled_scatter(used)) ** 2) ** 0.5
-    return ObservedChange(index, structural.from_centre(used.names, used.values)[:n], both[:n])
+    floors = (structural.of(used.names) ** 2 + (REPEATABLE * pooled_scatter(used)) ** 2) ** 0.5
+    return ObservedChange(index, structural.from_centre(used.names, used.values)[:n], floors[:n])
 
 
 def halves(reduced: ReducedRecording) -> tuple[ReducedRecording, ReducedRecording]:
@@ -316,10 +316,10 @@ MIN_TEETH, MAX_TEETH = 12, 200
 
 LOST_DB, OWN_DB = 10.0, 6.0
 """By how much one tooth's burst has become less since the reference, and by how much it stands above the reference's
-middling tooth: healthy teeth that differ by chance have up to 7 dB, and lose nothing from one day to the next."""
+median tooth: healthy teeth that differ by chance have up to 7 dB, and lose nothing from one day to the next."""
 
 CLEAR_CHANGE, ALONE = 10.0, 4.0
-"""Energy of the change at one tooth over that at the middling tooth, and over the largest more than a tooth away: worn
+"""Energy of the change at one tooth over that at the median tooth, and over the largest more than a tooth away: worn
 flanks and another path to the sensor change all teeth, some of them much."""
 
 
@@ -347,12 +347,12 @@ def wrong_teeth(now: ReducedRecording, name: str, reference: ReducedRecording | 
         best = max(shares, key=shares.__getitem__, default=stated)
         if shares.get(stated, 1.0) < HARDLY_EXPLAINED and shares.get(best, 0.0) > WELL_EXPLAINED:
             shaft = shaft_words(now.frame, side)
-            remark = (
+            message = (
                 f"{name}: the teeth do not fit. What repeats with {shaft} does so {best} times a revolution, and the "
                 f"rig file gives its gear {stated} teeth. Unless it is a recording of another machine, the rig file is "
                 "wrong; until that is settled nothing here can be relied on."
             )
-            return [remark]
+            return [message]
     return []
 
 
@@ -392,23 +392,26 @@ def exchanged(now: ReducedRecording, reference: ReducedRecording, name: str) -> 
         except RefusalError:
             return []
         recorded = lines_of_shaft(now, side).lines[:, : difference.lines.shape[1]]
-        changed, here, there = (
+        changed, now_energy, reference_energy = (
             _energy(now, side, difference, lines) for lines in (difference.lines, recorded, recorded - difference.lines)
         )
         at = int(np.argmax(changed))
-        lost_db, prominence_db = decibel(there[at] / here[at]), decibel(there[at] / float(np.median(there)))
+        lost_db, prominence_db = (
+            decibel(reference_energy[at] / now_energy[at]),
+            decibel(reference_energy[at] / float(np.median(reference_energy))),
+        )
         elsewhere = np.roll(changed, -at)[2 * STEPS_PER_TOOTH : -2 * STEPS_PER_TOOTH]
         is_one_tooth = changed[at] >= max(CLEAR_CHANGE * float(np.median(changed)), ALONE * float(elsewhere.max()))
         if is_one_tooth and lost_db >= LOST_DB and prominence_db >= OWN_DB:
             place = (at / len(changed) + (0.5 - load_calibration().lag_pitches) / difference.teeth) % 1.0
             tooth = f"Tooth {int(place * difference.teeth) + 1}" if now.marks[side] else "One tooth"
-            remark = (
+            message = (
                 f"{name}: recording and reference may have been exchanged. {tooth} of {shaft_words(now.frame, side)} "
-                f"(at {360.0 * place:.0f}°) stands {prominence_db:.0f} dB above the middling one in the reference, "
+                f"(at {360.0 * place:.0f}°) stands {prominence_db:.0f} dB above the median tooth in the reference, "
                 f"and is {lost_db:.0f} dB weaker in the recording; damage adds such a burst and takes none away. If "
                 "so, what is named is what the reference has: give the two the other way round."
             )
-            return [remark]
+            return [message]
     return []
 
 
@@ -430,11 +433,11 @@ def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
     share = max(_mesh_share(now, side) for side in (DRIVER, DRIVEN))
     if share >= MIN_MESH_SHARE or wrong_teeth(now, name):  # that is said by itself
         return []
-    remark = (
+    message = (
         f"{name}: only {percent(share)} of what repeats with a shaft lies at mesh harmonics of the rig's "
         f"{_teeth(now.frame)} teeth. Is it a recording of this machine?"
     )
-    return [remark]
+    return [message]
 
 
 def strange_pattern(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
@@ -447,12 +450,12 @@ def strange_pattern(now: ReducedRecording, reference: ReducedRecording, name: st
         return []
     if max(agreements) >= MIN_AGREEMENT:
         return []
-    both = " and ".join(f"{max(a, 0.0):.2f}" for a in agreements)
-    remark = (
-        f"{name}: the patterns of the teeth of both gears agree with the reference by {both} only, where 1 is the same "
+    by = " and ".join(f"{max(a, 0.0):.2f}" for a in agreements)
+    message = (
+        f"{name}: the patterns of the teeth of both gears agree with the reference by {by} only, where 1 is the same "
         "gears. The reference is of another machine, or both gears have worn since."
     )
-    return [remark]
+    return [message]
 
 
 def _has_pattern(reduced: ReducedRecording, side: int) -> bool:
@@ -518,8 +521,8 @@ def conditions_of(
         If in no recording, or in no reference, the speed can be known and there are enough revolutions.
     """
     learned = load_learned() if learned is None else learned
-    notices: list[str] = []
-    healthy = readable(references, read_healthy, "reference", notices)
+    messages: list[str] = []
+    healthy = readable(references, read_healthy, "reference", messages)
     done = iter(range(len(recordings)))
 
     def condition_of(recording: PreparedRecording) -> tuple[Condition, list[str]]:
@@ -527,23 +530,23 @@ def conditions_of(
         tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * next(done) / len(recordings))
         return _condition(recording, healthy, twin, learned)
 
-    conditions = readable(recordings, condition_of, "recording", notices)
+    conditions = readable(recordings, condition_of, "recording", messages)
     if not references:
-        notices.append(
+        messages.append(
             "No healthy reference: a recording of the same rig when it was healthy would make it much surer."
         )
-    return conditions, notices
+    return conditions, messages
 
 
-Found = TypeVar("Found")
+ReadT = TypeVar("ReadT")
 
 
 def readable(
     recordings: Sequence[PreparedRecording],
-    read: Callable[[PreparedRecording], tuple[Found, list[str]]],
-    what: str,
-    notices: list[str],
-) -> list[Found]:
+    read: Callable[[PreparedRecording], tuple[ReadT, list[str]]],
+    kind: str,
+    messages: list[str],
+) -> list[ReadT]:
     """Return what can be read of each recording; one of several that is refused, as too short, is left out and said.
 
     Parameters
@@ -551,9 +554,9 @@ def readable(
     recordings : sequence of PreparedRecording
     read : callable
         Returns what is wanted of a recording, and remarks.
-    what : str
+    kind : str
         What the recordings are called.
-    notices : list of str
+    messages : list of str
         Remarks and refusals are added to it.
 
     Raises
@@ -564,47 +567,47 @@ def readable(
     read_recordings, refused = [], list[RefusalError]()
     for recording in recordings:
         try:
-            content, remarks = read(recording)
+            content, new_messages = read(recording)
         except RefusalError as refusal:
             refused.append(RefusalError(f"{recording.recording.name}: {refusal.reason}", remedy=refusal.remedy))
         else:
             read_recordings.append(content)
-            notices += remarks
+            messages += new_messages
     if refused and not read_recordings:
         raise refused[0]
-    notices += [f"{refusal.reason}; this {what} is left out." for refusal in refused]
+    messages += [f"{refusal.reason}; this {kind} is left out." for refusal in refused]
     return read_recordings
 
 
 def read_healthy(recording: PreparedRecording) -> tuple[HealthyReference, list[str]]:
     """Return a healthy recording reduced, and what is worth a remark."""
-    name, (reduced, notices) = recording.recording.name, _reduced(recording)
-    return HealthyReference(reduced, recording.rig, name, recording), [*notices, *strange_teeth(reduced, name)]
+    name, (reduced, messages) = recording.recording.name, _reduced(recording)
+    return HealthyReference(reduced, recording.rig, name, recording), [*messages, *strange_teeth(reduced, name)]
 
 
 def _condition(
     recording: PreparedRecording, healthy: Sequence[HealthyReference], twin: Twin, learned: Learned
 ) -> tuple[Condition, list[str]]:
     """Return a recording beside its reference and the healthy twin at its point, and what is worth a remark."""
-    name, (now, notices) = recording.recording.name, _reduced(recording)
+    name, (now, messages) = recording.recording.name, _reduced(recording)
     facts = facts_of(recording, now, twin)
-    notices += _assumed(recording, facts)
+    messages += _assumed(recording, facts)
     match, why = matching_reference(now, recording.rig, healthy)
     if match is None or strange_teeth(match.reduced, match.name):  # a healthy one that fits: damage repeats otherwise
-        notices += strange_teeth(now, name)
+        messages += strange_teeth(now, name)
     if why:
-        notices.append(f"{name} is compared with the simulation: {why}.")
+        messages.append(f"{name} is compared with the simulation: {why}.")
     if match is not None:
         facts = replace(facts, reference=match.name)
         now = as_long_as(recording, now, match.reduced)
-        now = with_common_channels(now, match.reduced, healthy, name, notices)
+        now = with_common_channels(now, match.reduced, healthy, name, messages)
     reference = None if match is None else match.reduced
     check_steady(now, reference)
     condition = Condition(facts, now, simulated(twin, facts, now), reference, learned)
     if reference is not None:
-        notices += strange_pattern(now, reference, name)
-        notices += _strange_reference(condition)
-    return condition, notices
+        messages += strange_pattern(now, reference, name)
+        messages += _strange_reference(condition)
+    return condition, messages
 
 
 def with_common_channels(
@@ -612,14 +615,14 @@ def with_common_channels(
     reference: ReducedRecording,
     healthy: Sequence[HealthyReference],
     name: str,
-    notices: list[str],
+    messages: list[str],
 ) -> ReducedRecording:
     """Return a recording with the channels that its reference has as well, and say what was made of the others."""
     if not any(set(reference.channels) & set(candidate.reduced.channels) for candidate in healthy):
-        notices.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
+        messages.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
     left_out = [channel for channel in now.channels if channel not in reference.channels]
     if left_out:
-        notices.append(f"{name}: {', '.join(left_out)} is left out, for the reference has no such channel.")
+        messages.append(f"{name}: {', '.join(left_out)} is left out, for the reference has no such channel.")
     return now.with_channels({channel: now.channels[channel] for channel in reference.channels})
 
 
@@ -638,21 +641,21 @@ def check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> N
 
 def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
     """Return a recording reduced without its dead channels, and remarks."""
-    recording, name, notices = prepared.recording, prepared.recording.name, list[str]()
+    recording, name, messages = prepared.recording, prepared.recording.name, list[str]()
     dead = {p.channel: p for p in find_problems(recording) if p.kind == "dead"}
     live = [channel for channel in recording.vibration_names() if channel not in dead]
     if not live:
-        seen = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
-        raise RefusalError(f"no vibration channel is live ({seen})", remedy="check sensors, cables and inputs")
+        problems = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
+        raise RefusalError(f"no vibration channel is live ({problems})", remedy="check sensors, cables and inputs")
     unknown = [c.name for c in recording.channels if c.name in live and metres_per_second_squared(c) is None]
     if unknown:
-        notices.append(
+        messages.append(
             f"{name}: {', '.join(unknown)} is no acceleration in a known unit; it is compared as if it were m/s², so "
             "that without a reference its level says nothing."
         )
     reduced = reduce_recording(prepared, channels=live)
-    notices += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
-    return reduced, notices
+    messages += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
+    return reduced, messages
 
 
 def _assumed(prepared: PreparedRecording, facts: ConditionFacts) -> list[str]:
@@ -673,12 +676,12 @@ def _assumed(prepared: PreparedRecording, facts: ConditionFacts) -> list[str]:
 
 def _strange_reference(condition: Condition) -> list[str]:
     """Say so where the reference itself is far from the simulation of a healthy machine."""
-    change = compare(condition.other, condition.simulated, None, condition.learned)
+    change = compare(condition.baseline, condition.simulated, None, condition.learned)
     size = gap_size(change, condition.learned.floor(with_reference=False)).structural.value
     if size < CLEAR_WITHOUT:
         return []
-    remark = (
+    message = (
         f"The reference of {condition.facts.name} is itself {size:.1f} structural floors from the simulation of a "
         "healthy machine: if it was not healthy, only what changed since is seen."
     )
-    return [remark]
+    return [message]

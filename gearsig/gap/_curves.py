@@ -17,7 +17,7 @@ from gearsig.gap._features import (
     floor_ratio,
 )
 from gearsig.gap._floors import StructuralFloor
-from gearsig.gap._places import changed_pattern, own_pattern
+from gearsig.gap._places import changed_pattern, pattern_of_recording
 from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ReducedRecording
 from gearsig.gap._types import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap._words import shaft_words
@@ -93,8 +93,8 @@ class _Runs:
     reference: ReducedRecording | None
 
     @property
-    def beside(self) -> dict[str, ReducedRecording]:
-        """Those beside the recording that there are, by the name of their curve."""
+    def compared(self) -> dict[str, ReducedRecording]:
+        """What the recording is compared with, by the name of its curve."""
         named = {"before": self.before, "after": self.after, "reference": self.reference}
         return {name: run for name, run in named.items() if run is not None}
 
@@ -126,11 +126,11 @@ def residual_features(now: ReducedRecording, orders: FloatArray) -> list[str]:
 def _of_average(side: int, runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves:
     now = runs.now
     power, noise = _average_power(now, side, names)
-    others = {name: _average_power(run, side, names) for name, run in runs.beside.items()}
+    levels = {name: _average_power(run, side, names) for name, run in runs.compared.items()}
     last = int((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[side])
-    n = min(last + 1, len(power), *(len(level) for level, _ in others.values()))
-    floors = {name: np.sqrt(_RARE * (noise[:n] + level[:n])) for name, (_, level) in others.items()}
-    amplitudes = {name: np.sqrt(level[:n]) for name, (level, _) in others.items()}
+    n = min(last + 1, len(power), *(len(level) for level, _ in levels.values()))
+    floors = {name: np.sqrt(_RARE * (noise[:n] + level[:n])) for name, (_, level) in levels.items()}
+    amplitudes = {name: np.sqrt(level[:n]) for name, (level, _) in levels.items()}
     return SpectrumCurves(
         f"average over {shaft_words(now.frame, side)}",
         unit,
@@ -158,11 +158,11 @@ def _of_residual(runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves
     top = min((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[DRIVER], *highest)
     orders = np.arange(min(len(power), int(top / now.order_step) + 1)) * now.order_step
     measured = power[: len(orders)]
-    others = {name: (run.order_step, _residual_power(run, names)) for name, run in runs.beside.items()}
+    residuals = {name: (run.order_step, _residual_power(run, names)) for name, run in runs.compared.items()}
     # 2: squares of peaks from mean squares.
     amplitudes = {
         name: np.sqrt(2.0 * np.interp(orders, np.arange(len(values)) * step, values))
-        for name, (step, values) in others.items()
+        for name, (step, values) in residuals.items()
     }
     floor = np.sqrt(2.0 * _RARE * measured / floor_ratio(measured[None])[0])
     return SpectrumCurves(
@@ -234,7 +234,7 @@ def angle_curves(
     simulated_healthy: ReducedRecording | None = None,
     unit: str = "",
 ) -> tuple[AngleCurves, ...]:
-    """Return, for both shafts, the energy within one pitch over that of the measured middling tooth.
+    """Return, for both shafts, the energy within one pitch over that of the measured median tooth.
 
     The angle is that at which a tooth engages: the answer's usual lag is taken off. Simulated curves are turned to
     where they agree best, unless both have a mark on that shaft.
@@ -248,10 +248,10 @@ def angle_curves(
         has none, and its curve is 0.
     """
     compared = healthy is not None and simulated_healthy is not None
-    both_shafts = []
+    curves_of_shafts = []
     for side in (DRIVER, DRIVEN):
         measured = _energy(now, healthy if compared else None, side)
-        middling = max(float(np.median(measured)), 1e-300)
+        median = max(float(np.median(measured)), 1e-300)
         simulated = [
             _turned(
                 _energy(run, simulated_healthy if compared else None, side), measured, run.marks[side], now.marks[side]
@@ -259,21 +259,21 @@ def angle_curves(
             for run in (before, after)
             if run is not None
         ]
-        curves = [values / middling for values in (measured, *simulated)]
+        curves = [values / median for values in (measured, *simulated)]
         angle, shift = _angles(now.frame.teeth[side])
         first, second, third = ([np.roll(values, -shift) for values in curves] + [NOTHING])[:3]
         frame = now.frame
-        both_shafts.append(
+        curves_of_shafts.append(
             AngleCurves(frame.shafts[side], unit, frame.teeth[side], now.marks[side], angle, first, second, third)
         )
-    return tuple(both_shafts)
+    return tuple(curves_of_shafts)
 
 
 def _energy(run: ReducedRecording, healthy: ReducedRecording | None, side: int) -> FloatArray:
     """Return the energy at each start of a pitch, mean over channels; 0 for a run compared with itself."""
     if healthy is run:
         return np.zeros(run.frame.teeth[side] * STEPS_PER_TOOTH)
-    pattern = own_pattern(run, side) if healthy is None else changed_pattern(run, healthy, side)
+    pattern = pattern_of_recording(run, side) if healthy is None else changed_pattern(run, healthy, side)
     energy: FloatArray = pattern.energy.mean(axis=0)
     return energy
 

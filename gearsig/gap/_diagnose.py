@@ -23,7 +23,7 @@ from gearsig.gap._conditions import (
 )
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import evidence_of
-from gearsig.gap._gearless import beside_unexpected, diagnose_gearless, place_of_unexpected, unexpected_findings
+from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpected_findings, with_unexpected
 from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
@@ -52,7 +52,7 @@ from gearsig.gap._types import (
 from gearsig.gap._verdict import (
     in_order,
     is_settled,
-    likeliest_two,
+    most_probable_two,
     named_cause,
     unbounded_fits,
     within_the_floor,
@@ -71,7 +71,7 @@ UNCALIBRATED = (
     "take them as a ranking only."
 )
 
-OWN_EFFECT = (
+USER_EFFECT_MESSAGE = (
     "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
     "effects. Its probability is the share of “unknown” that its held-out shrink beyond placebos explains, and is not "
     "calibrated."
@@ -163,8 +163,8 @@ def diagnose_gap(
     # 1. What is given must fit together, and each recording count once.
     _check(recordings, references, effects, known)
     recordings, references = _named_apart(recordings), _named_apart(references)
-    _check_distinct([*recordings, *references, *(one.recording for one in learn)])
-    rig = _check_rigs([*recordings, *references, *(one.recording for one in learn)])
+    _check_distinct([*recordings, *references, *(item.recording for item in learn)])
+    rig = _check_rigs([*recordings, *references, *(item.recording for item in learn)])
     allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
 
     # 2. Machines that start and stop are compared by their motion, those without gears by their bearings alone.
@@ -182,18 +182,18 @@ def diagnose_gap(
     alone, assumed = twin_rig(rig)
     twin, learned = simulator.twin_of(alone), load_learned()
     start_early(run_for_a_moment, twin)
-    _check_own(twin, set(allowed) - set(learned.causes))
+    _check_user_effects(twin, set(allowed) - set(learned.causes))
     tell("reading the recordings", 0.02)
-    conditions, notices = conditions_of(prepared, healthy, twin, tell=tell, learned=learned)
+    conditions, messages = conditions_of(prepared, healthy, twin, tell=tell, learned=learned)
     clearest = max(conditions, key=lambda condition: condition.size.structural.value)
-    recording = next(one for one in prepared if one.recording.name == clearest.facts.name)
+    recording = next(item for item in prepared if item.recording.name == clearest.facts.name)
 
     # 4. Which effect: what the forests and labelled recordings say, and of the likeliest what trials on the twin say.
     tell("recognising", 0.2)
     labelled, left_out = labelled_changes(learn, healthy, conditions, twin, cache, fresh=fresh)
-    courses = _courses(conditions, recordings, references)
-    with ThreadPoolExecutor(1) as beside:  # step 5 has time while other processes simulate
-        unexpected_job = beside.submit(unexpected_findings, recording, healthy)
+    tooth_errors = _tooth_error_evidences(conditions, recordings, references)
+    with ThreadPoolExecutor(1) as executor:  # step 5 has time while other processes simulate
+        unexpected_job = executor.submit(unexpected_findings, recording, healthy)
         attribution = attribute(
             conditions,
             known,
@@ -203,25 +203,25 @@ def diagnose_gap(
             lambda what, done: tell(what, 0.25 + 0.55 * done),
             fresh=fresh,
             labelled=labelled,
-            courses=mean_log_likelihoods(courses),
+            tooth_error_log_likelihoods=mean_log_likelihoods(tooth_errors),
         )
     tried, gap = attribution.tried, _places(clearest)
-    probabilities = _weighed(attribution, clearest, known, gap)
+    probabilities = _posterior(attribution, clearest, known, gap)
 
     # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
-    unexpected, remarks, faults = unexpected_job.result()
+    unexpected, unexpected_messages, faults = unexpected_job.result()
     groups = {name: effect.group for name, effect in known.items()}
-    outcome, unseen = beside_unexpected(attribution.calibration.outcome(probabilities, groups), unexpected)
-    labels = _labelled_facts(attribution, _weighed(replace(attribution, labelled=None), clearest, known, gap), groups)
+    outcome, unseen = with_unexpected(attribution.calibration.outcome(probabilities, groups), unexpected)
+    labels = _labelled_facts(attribution, _posterior(replace(attribution, labelled=None), clearest, known, gap), groups)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
-    places = ranked_places(gap, [place_of_unexpected(one, recording.rig) for one in unexpected])
-    found = [_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items()]
-    reference_of = {one.recording.name: one for one in healthy}.get(clearest.facts.reference)
-    found, depths = _with_crack_depth(found, recording, reference_of, tried)
-    causes = in_order(found, outcome)
+    places = ranked_places(gap, [place_of_unexpected(item, recording.rig) for item in unexpected])
+    cause_list = [_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items()]
+    reference_of = {item.recording.name: item for item in healthy}.get(clearest.facts.reference)
+    cause_list, depths = _with_crack_depth(cause_list, recording, reference_of, tried)
+    causes = in_order(cause_list, outcome)
     named = causes[0] if outcome in NAMING else None
     warnings = (*warnings, *unbounded_fits(causes, outcome))
     fitted = None if named is None else named.fitted
@@ -267,16 +267,16 @@ def diagnose_gap(
             *(() if labels is None else (labels.text,)),
             *left_out,
             *assumed,
-            *notices,
+            *messages,
             *(
-                (OWN_EFFECT if name in tried else NOT_SIMULATED).format(title=known[name].title)
-                for name in attribution.unheard_of
+                (USER_EFFECT_MESSAGE if name in tried else NOT_SIMULATED).format(title=known[name].title)
+                for name in attribution.untrained
             ),
             *effects_without_place(twin, allowed),
-            *remarks,
-            *(depths or _of_the_fit(named, tried)),
-            *_of_the_waveforms(tried, known, clearest),
-            *(_of_the_encoders(courses, known) if named is not None else ()),
+            *unexpected_messages,
+            *(depths or _fit_messages(named, tried)),
+            *_waveform_messages(tried, known, clearest),
+            *(_encoder_messages(tooth_errors, known) if named is not None else ()),
         ),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
         warnings=warnings,
@@ -298,8 +298,8 @@ def _check(
     effects: Sequence[str],
     known: Mapping[str, GapEffect],
 ) -> None:
-    for label, given in (("recordings", recordings), ("references", references)):
-        for place, recording in enumerate(listed(given, label, object)):
+    for label, items in (("recordings", recordings), ("references", references)):
+        for place, recording in enumerate(listed(items, label, object)):
             check_recording(recording, f"{label}[{place}]")
     if not recordings:
         raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
@@ -319,7 +319,7 @@ def _effects_of(simulator: GapSimulator | DriveSimulator) -> Mapping[str, GapEff
     return simulator.gap_effects()
 
 
-def _check_own(twin: Twin, names: Iterable[str]) -> None:
+def _check_user_effects(twin: Twin, names: Iterable[str]) -> None:
     """Run effects that are somebody's own for a moment, before the long work: their files may fail."""
     for name in sorted(names):
         for added in twin.candidates(name)[-1:]:
@@ -341,16 +341,16 @@ def _named_apart(recordings: Sequence[Recording]) -> list[Recording]:
 
 def _check_distinct(recordings: Sequence[Recording]) -> None:
     """Refuse copies: they tell nothing more, and a recording does not differ from itself."""
-    seen: dict[bytes, str] = {}
+    by_digest: dict[bytes, str] = {}
     for recording in recordings:
         digest = sha256(np.ascontiguousarray(recording.samples).tobytes()).digest()
-        if digest in seen:
+        if digest in by_digest:
             raise InputError(
-                f"holds the same samples as {seen[digest]}",
+                f"holds the same samples as {by_digest[digest]}",
                 where=recording.name,
                 remedy="give each recording once, in one role",
             )
-        seen[digest] = recording.name
+        by_digest[digest] = recording.name
 
 
 def _on_stage(
@@ -369,9 +369,9 @@ def _on_stage(
 
     labelled = [
         replace(
-            one, recording=chosen(one.recording), reference=None if one.reference is None else chosen(one.reference)
+            item, recording=chosen(item.recording), reference=None if item.reference is None else chosen(item.reference)
         )
-        for one in learn
+        for item in learn
     ]
     return with_stage(rig, stage), [*map(chosen, recordings)], [*map(chosen, references)], labelled
 
@@ -385,10 +385,12 @@ def _labelled_facts(
     return LabelledFacts(attribution.labelled.counts, without, attribution.calibration.outcome(without, groups))
 
 
-def _refuse_labelled(learn: Sequence[LabelledRecording], what: str) -> None:
+def _refuse_labelled(learn: Sequence[LabelledRecording], machines: str) -> None:
     if learn:
         raise InputError(
-            f"labelled recordings of {what} tell nothing yet", where="learn", remedy="give a healthy reference instead"
+            f"labelled recordings of {machines} tell nothing yet",
+            where="learn",
+            remedy="give a healthy reference instead",
         )
 
 
@@ -407,14 +409,14 @@ def effects_without_place(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[
     titles = [effect.title for name, effect in allowed.items() if not twin.candidates(name)]
     if not titles:
         return []
-    remark = (
+    message = (
         f"The rig file names nothing that {', '.join(titles)} could be in: none of it can be simulated, and any "
         "probability rests on recognition alone."
     )
-    return [remark]
+    return [message]
 
 
-def _of_the_waveforms(
+def _waveform_messages(
     tried: Mapping[str, TriedEffect], known: Mapping[str, GapEffect], condition: Condition
 ) -> list[str]:
     """Say how well the twin shows the faults of a tooth and the healthy machine, and what follows from it."""
@@ -423,44 +425,44 @@ def _of_the_waveforms(
         return []
     missed_db = 20.0 / np.log(10.0) * gain_scatter(condition.reference, condition.simulated)
     ranked = sorted(matches.items(), key=lambda item: -item[1])
-    seen = ", ".join(f"{title} {correlation:.2f}" for title, correlation in ranked)
-    told = any(trial.match is not None and trial.match.is_good for trial in tried.values())
-    meant = "the highest is likeliest" if told else "too little to part them: the twin is not like this machine"
-    said = (
-        f"As a waveform beside the mesh harmonics, the recorded change correlates with the twin's: {seen}; {meant}. "
+    values = ", ".join(f"{title} {correlation:.2f}" for title, correlation in ranked)
+    is_decided = any(trial.match is not None and trial.match.is_good for trial in tried.values())
+    meant = "the highest is likeliest" if is_decided else "too little to part them: the twin is not like this machine"
+    message = (
+        f"As a waveform beside the mesh harmonics, the recorded change correlates with the twin's: {values}; {meant}. "
         f"The healthy twin's mesh harmonics miss those of the reference by {missed_db:.0f} dB beside each other, and "
         "as much is allowed to each harmonic of a fault: the more, the less its waveform tells."
     )
-    return [said]
+    return [message]
 
 
-def _courses(
+def _tooth_error_evidences(
     conditions: Sequence[Condition], recordings: Sequence[Recording], references: Sequence[Recording]
 ) -> list[ToothErrorEvidence]:
     """Return what encoders say, of the conditions that have a reference and encoders in both."""
-    of = {one.name: one for one in (*references, *recordings)}
+    of = {prepared.name: prepared for prepared in (*references, *recordings)}
     pairs = [(c.facts.name, c.facts.reference) for c in conditions if c.facts.reference]
-    found = [tooth_error_evidence(of[now], of[healthy]) for now, healthy in pairs]
-    return [evidence for evidence in found if evidence is not None]
+    evidences = [tooth_error_evidence(of[now], of[healthy]) for now, healthy in pairs]
+    return [evidence for evidence in evidences if evidence is not None]
 
 
-def _of_the_encoders(courses: Sequence[ToothErrorEvidence], known: Mapping[str, GapEffect]) -> list[str]:
+def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[str, GapEffect]) -> list[str]:
     """Say what the transmission error tells, and where it tells nothing, what would."""
-    if not courses:
+    if not evidences:
         return []
-    clearest = max(courses, key=lambda one: one.rms_um)
+    clearest = max(evidences, key=lambda evidence: evidence.rms_um)
     changed = f"The transmission error by the encoders changed by {clearest.rms_um:.2g} µm rms where it changed most"
-    if all(one.is_unlike_any for one in courses):
+    if all(evidence.is_unlike_any for evidence in evidences):
         slower = "At a few revolutions per second or less its course tells crack, spall and chip apart."
         return [f"{changed}, which at this speed tells no fault from another: the drive swings along. {slower}"]
-    levels = ToothErrorEvidence(mean_log_likelihoods(courses), clearest.rms_um, clearest.gear).probabilities
+    levels = ToothErrorEvidence(mean_log_likelihoods(evidences), clearest.rms_um, clearest.gear).probabilities
     ranked = sorted(levels.items(), key=lambda item: -item[1])
     likely = ", ".join(f"{known[name].title} {odds_text(p)}" for name, p in ranked if p >= 0.05 and name in known)
     where = {"driver": ", on the driver", "driven": ", on the driven gear"}.get(clearest.gear, "")
     return [f"{changed}{where}; by its course alone, all faults of teeth as likely before: {likely}."]
 
 
-def _of_the_fit(named: GapCause | None, tried: Mapping[str, TriedEffect]) -> list[str]:
+def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect]) -> list[str]:
     """Say what the stated severity is worth, or that there is none."""
     if named is None:
         return []
@@ -470,22 +472,22 @@ def _of_the_fit(named: GapCause | None, tried: Mapping[str, TriedEffect]) -> lis
     return [*nearer, *([NOT_NEARER.format(title=named.title)] if not named.fitted and named.shrinkage else [])]
 
 
-def _weighed(
+def _posterior(
     attribution: Attribution[TriedEffect],
     clearest: Condition,
     known: Mapping[str, GapEffect],
     gap: Sequence[GapPlace],
 ) -> dict[str, float]:
     """Return cause → probability, with what the whole gap and its places say."""
-    found = within_the_floor(attribution.probabilities(), clearest.size.structural)
-    return counted_against(found, known, gap, clearest.now.frame)
+    posterior = within_the_floor(attribution.probabilities(), clearest.size.structural)
+    return counted_against(posterior, known, gap, clearest.now.frame)
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:
     try:
         return gap_places(
             condition.now,
-            condition.other,
+            condition.baseline,
             condition.floor,
             is_reference=condition.reference is not None,
             change=condition.change,
@@ -544,8 +546,8 @@ def _with_crack_depth(
     if fitted is not None and depth.value <= max(simulated_mm, default=0.0):
         fitted = replace(fitted, severity=depth.value)
     changed = replace(crack, severity=depth, fitted=fitted)
-    said = OF_THE_DEPTH.format(depth=depth.value, low=depth.low, high=depth.high)
-    return [changed if cause is crack else cause for cause in causes], [said]
+    message = OF_THE_DEPTH.format(depth=depth.value, low=depth.low, high=depth.high)
+    return [changed if cause is crack else cause for cause in causes], [message]
 
 
 CRACK = "root_crack"
@@ -563,7 +565,7 @@ def _next(
     twin: Twin,
     conditions: Sequence[Condition],
 ) -> tuple[NextRecording, ...]:
-    pair = likeliest_two(causes)
+    pair = most_probable_two(causes)
     if pair is None or is_settled(causes) or any(name not in tried for name in pair):
         return ()
     first, second = pair

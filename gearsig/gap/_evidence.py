@@ -23,7 +23,7 @@ CLEAR = 1.0
 SMALLEST = 0.3
 """Floors from which the sign of a prediction says something."""
 
-OWN_COUNTS = 2.0
+OWN_FEATURE_WEIGHT = 2.0
 
 AGREES = 0.5
 """Observed over predicted, from here to its inverse, speaks for the effect."""
@@ -43,7 +43,7 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
     """
     clearest = max(observed, key=lambda change: float(np.abs(change.normalised).max()))
     predicted = fit.at(clearest.condition)
-    sizes = np.maximum(OWN_COUNTS * np.abs(predicted), np.abs(clearest.distances)) / clearest.floors
+    sizes = np.maximum(OWN_FEATURE_WEIGHT * np.abs(predicted), np.abs(clearest.distances)) / clearest.floors
     clear = np.maximum(np.abs(predicted), np.abs(clearest.distances)) >= CLEAR * clearest.floors
     best = [
         int(i)
@@ -52,7 +52,7 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
     ]
     telling = sorted((i for i in best if clear[i]), key=lambda i: -sizes[i])
     return tuple(
-        weighed_evidence(
+        evidence_of_feature(
             feature_words(fit.path.names[i], frame),
             float(predicted[i]),
             float(clearest.distances[i]),
@@ -62,8 +62,8 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
     )
 
 
-def weighed_evidence(
-    feature: str, predicted_db: float, observed_db: float, floor_db: float, *, least: float = CLEAR
+def evidence_of_feature(
+    feature: str, predicted_db: float, observed_db: float, floor_db: float, *, min_floors: float = CLEAR
 ) -> Evidence:
     """Return a predicted change beside the observed one, with what it says of the effect.
 
@@ -77,14 +77,14 @@ def weighed_evidence(
     feature : str
         In words.
     predicted_db, observed_db, floor_db : float
-    least : float
+    min_floors : float
         Floors from which a prediction of the right size speaks for the effect.
     """
     size, remainder = abs(predicted_db), abs(predicted_db - observed_db)
     if size == 0.0 or size < SMALLEST * floor_db:
         return Evidence(feature, predicted_db, observed_db, floor_db, speaks_for=False)
     ratio, is_clear = observed_db / predicted_db, size >= CLEAR * floor_db
-    alike = size >= least * floor_db and AGREES <= ratio <= 1.0 / AGREES
+    alike = size >= min_floors * floor_db and AGREES <= ratio <= 1.0 / AGREES
     agrees = alike or (is_clear and remainder <= floor_db)
     further = not agrees and ratio > 1.0 and (is_clear or remainder <= floor_db)
     return Evidence(feature, predicted_db, observed_db, floor_db, agrees, further)
@@ -99,20 +99,20 @@ def weighed_evidence(
 # --------------------
 
 
-ONE_TOOTH = ("root_crack", "tooth_spall", "chipped_tooth")
+SINGLE_TOOTH_FAULTS = ("root_crack", "tooth_spall", "chipped_tooth")
 """Causes on a single tooth."""
 
 DISPLACED = "pitch_error"
 """What may be of one tooth as well."""
 
-TOOTH_FAULTS = (*ONE_TOOTH, DISPLACED)
+TOOTH_FAULTS = (*SINGLE_TOOTH_FAULTS, DISPLACED)
 """Causes that change one engagement each, with a course of its own: waveforms and encoders tell them apart."""
 
 _BURST = ("change.{}.peak", "change.{}.prominence", "tooth.{}.peak", "tooth.{}.prominence", "tooth.{}.kurtosis")
 _ALL_ROUND = ("change.{}.level", "change.{}.elsewhere", "tooth.{}.level", "tooth.{}.elsewhere", "shaft.{}.low")
 
 SIGNS: Mapping[str, tuple[str, ...]] = {
-    **dict.fromkeys(ONE_TOOTH, _BURST),
+    **dict.fromkeys(SINGLE_TOOTH_FAULTS, _BURST),
     "pitch_error": _ALL_ROUND,
     "eccentricity": ("sideband.{}.1", "sideband.{}.own", "shaft.{}.1", "shaft.{}.1.to_mesh"),
     "unbalance": ("shaft.{}.1", "shaft.{}.1.to_mesh"),
@@ -152,8 +152,8 @@ class ShaftSigns:
         if self.slow is not None and TIMES * self.rise[self.slow] > self.rise[1 - self.slow]:
             return self.slow if self.rise[self.slow] >= CLEAR else None
         larger = int(np.argmax(self.rise))
-        most, least = self.rise[larger], self.rise[1 - larger]
-        return larger if most >= CLEAR and most >= TIMES * least else None
+        larger_rise, smaller_rise = self.rise[larger], self.rise[1 - larger]
+        return larger if larger_rise >= CLEAR and larger_rise >= TIMES * smaller_rise else None
 
 
 def shaft_signs(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> ShaftSigns | None:
@@ -183,11 +183,11 @@ def _slow(cause: str, teeth: tuple[int, int]) -> int | None:
     The faster one's orders are orders of it, too; but its own first is none of the other's, nor is one tooth of it.
     """
     slow = int(np.argmax(teeth))
-    ratio, rest = divmod(teeth[slow], teeth[1 - slow])
-    return slow if not rest and FIRST_ORDER.get(cause, 1) % ratio else None
+    ratio, remainder = divmod(teeth[slow], teeth[1 - slow])
+    return slow if not remainder and FIRST_ORDER.get(cause, 1) % ratio else None
 
 
-def told_options(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> dict[str, str]:
+def determined_options(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> dict[str, str]:
     """Return the option of the effect that says which shaft it is on, {"gear": "driven"}, say; empty: cannot be told.
 
     Parameters

@@ -88,9 +88,9 @@ _OTHER_SIDE = {"driver": "driven", "driven": "driver"}
 
 @cache
 def _feature_of(name: str) -> Feature:
-    family, _, rest = name.partition(".")
-    side, _, detail = rest.partition(".")
-    return Feature(family, side, detail) if side in SIDES else Feature(family, "", rest)
+    family, _, remainder = name.partition(".")
+    side, _, detail = remainder.partition(".")
+    return Feature(family, side, detail) if side in SIDES else Feature(family, "", remainder)
 
 
 def line_features(reduced: ReducedRecording, channel: str) -> Iterator[NamedValue]:
@@ -149,11 +149,11 @@ def _shaft_orders(power: FloatArray, teeth: int, highest: int, total: float, sid
         yield f"shaft.{side}.{n}", level
         yield f"shaft.{side}.{n}.to_mesh", level - decibel(total)
     last = min(MAX_SHAFT_ORDERS, teeth - 3, highest)
-    rest = power[4 : last + 1]
-    strongest = int(np.argmax(rest))
-    yield f"shaft.{side}.strongest", decibel(float(rest[strongest] / np.median(rest)))
-    yield f"shaft.{side}.strongest.to_mesh", decibel(float(rest[strongest]) / total)
-    yield f"shaft.{side}.low", decibel(float(rest.mean()) / total)
+    further_orders = power[4 : last + 1]
+    strongest = int(np.argmax(further_orders))
+    yield f"shaft.{side}.strongest", decibel(float(further_orders[strongest] / np.median(further_orders)))
+    yield f"shaft.{side}.strongest.to_mesh", decibel(float(further_orders[strongest]) / total)
+    yield f"shaft.{side}.low", decibel(float(further_orders.mean()) / total)
 
 
 # --------------------
@@ -196,15 +196,15 @@ def pattern_features(
     teeth: int,
     noise: float,
     longer: float,
-    least: float = 1e-30,
+    minimum: float = 1e-30,
 ) -> Iterator[NamedValue]:
     """Yield size, prominence, kurtosis, width, centroid of residuals relative to their mesh.
 
-    `noise` is the energy that noise leaves in them; `longer` times it is put under what exceeds it. `least` is the
+    `noise` is the energy that noise leaves in them; `longer` times it is put under what exceeds it. `minimum` is the
     energy that is told apart from nothing.
     """
     energy = np.mean([tooth_energy(lines, teeth) for lines in residuals], axis=0)
-    energy = np.maximum(np.maximum(energy - noise, 0.0) + longer * noise, least)
+    energy = np.maximum(np.maximum(energy - noise, 0.0) + longer * noise, minimum)
     best = int(np.argmax(energy))
     share = energy / energy.max()
     width = float(np.count_nonzero(share > 0.5)) / STEPS_PER_TOOTH
@@ -259,10 +259,10 @@ def floor_ratio(power: FloatArray) -> FloatArray:
 
     Medians of adjoining stretches are joined by straight lines: a running median costs a hundred times as much.
     """
-    n_stretches = max(1, power.shape[-1] // FLOOR_WIDTH)
-    width = power.shape[-1] // n_stretches
-    medians = np.median(power[:, : n_stretches * width].reshape(len(power), n_stretches, width), axis=2)
-    middles = (np.arange(n_stretches) + 0.5) * width
+    n_segments = max(1, power.shape[-1] // FLOOR_WIDTH)
+    width = power.shape[-1] // n_segments
+    medians = np.median(power[:, : n_segments * width].reshape(len(power), n_segments, width), axis=2)
+    middles = (np.arange(n_segments) + 0.5) * width
     logs = np.log(np.maximum(medians, 1e-300))
     floors = np.exp([np.interp(np.arange(power.shape[-1]), middles, row) for row in logs])
     ratio: FloatArray = power * np.log(2.0) / floors

@@ -172,8 +172,8 @@ class StructuralFloor:
         if len(set(self.names)) != n:
             raise InputError("names of the floor repeat", allowed="each feature once")
         for name, default in (("values", None), ("centres", np.zeros(n))):
-            given = getattr(self, name)
-            array = frozen_array(default if given is None else given, name, ndim=1)
+            values = getattr(self, name)
+            array = frozen_array(default if values is None else values, name, ndim=1)
             if len(array) != n:
                 raise InputError(f"{name} has {len(array)} numbers for {n} features", allowed="one each")
             object.__setattr__(self, name, array)
@@ -182,7 +182,7 @@ class StructuralFloor:
         object.__setattr__(self, "_row", {name: i for i, name in enumerate(self.names)})
 
     @classmethod
-    def of_healthy(cls, names: Sequence[str], rows: FloatArray, *, least_db: float = 0.2) -> StructuralFloor:
+    def of_healthy(cls, names: Sequence[str], rows: FloatArray, *, min_db: float = 0.2) -> StructuralFloor:
         """Return the floor of a table of healthy changes, (n_machines, n): medians, 95 % of distances, and the whole.
 
         Parameters
@@ -190,12 +190,12 @@ class StructuralFloor:
         names : sequence of str
         rows : array, (n_machines, n)
             At least 20 of them say something.
-        least_db : float
+        min_db : float
             A feature that never moved in the table still may.
         """
         table = np.asarray(rows, dtype=np.float64)
         centres = np.median(table, axis=0)
-        values = np.maximum(np.quantile(np.abs(table - centres), 1.0 - _TAIL, axis=0), least_db)
+        values = np.maximum(np.quantile(np.abs(table - centres), 1.0 - _TAIL, axis=0), min_db)
         sizes = [soft_size(names, row) for row in (table - centres) / values]
         return cls(tuple(names), values, centres, float(np.quantile(sizes, 1.0 - _TAIL)))
 

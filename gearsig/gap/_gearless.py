@@ -154,7 +154,7 @@ def examined(
 ) -> ExaminedRecording:
     """Return what stands out of a recording, beyond the reference at its speed where there is one."""
     analysis, angle = analysis_and_angle
-    reference, notices = _reference(name, analysis_and_angle, references)
+    reference, messages = _reference(name, analysis_and_angle, references)
     unexpected = []
     for finding in analysis.findings:
         if finding.code not in (*RACES, *IMPACTS, LINE):
@@ -164,9 +164,9 @@ def examined(
         if earlier is None or finding.kind is Kind.FAULT or (rise_db is not None and rise_db >= MIN_RISE_DB):
             unexpected.append(UnexpectedFinding(finding, name, rise_db))
         elif rise_db is None:
-            notices.append(f"{name}: {finding.title.rstrip('.')}; the reference shows it too, in another band. {GREW}")
+            messages.append(f"{name}: {finding.title.rstrip('.')}; the reference shows it too, in another band. {GREW}")
     warnings = tuple(f"{name}: {f.title}" for f in analysis.findings if f.kind in (Kind.DATA_PROBLEM, Kind.CANNOT_TELL))
-    return ExaminedRecording(name, analysis, angle, reference, tuple(unexpected), (*notices, *warnings))
+    return ExaminedRecording(name, analysis, angle, reference, tuple(unexpected), (*messages, *warnings))
 
 
 def surest(every: Sequence[ExaminedRecording]) -> list[UnexpectedFinding]:
@@ -190,7 +190,7 @@ def bearings_text(finding: Finding, rig: Rig) -> str:
     bearing_order = orders.get(finding.where.bearing)
     if not bearing_order:
         return ""
-    alike = [other for other, order in orders.items() if abs(order / bearing_order - 1.0) < SAME_BEARING_ORDER]
+    alike = [bearing for bearing, order in orders.items() if abs(order / bearing_order - 1.0) < SAME_BEARING_ORDER]
     return named("bearing", " or ".join(alike))
 
 
@@ -263,8 +263,8 @@ def causes_of(
     races = {name: part for part in reversed(unexpected) if (name := RACES.get(part.finding.code, "")) in effects}
     outcome, why = _outcome(unexpected, races, every, rig)
     total = sum(part.finding.confidence for part in races.values())
-    rest = 1.0 - min(total, 1.0)
-    unknown = rest * _share_of_unknown(unexpected, races, every)
+    remainder = 1.0 - min(total, 1.0)
+    unknown = remainder * _share_of_unknown(unexpected, races, every)
     causes = [
         _race(effects[name], races.get(name), rig, scale=1.0 / max(total, 1.0))
         for name in RACES.values()
@@ -278,9 +278,9 @@ def causes_of(
             why if outcome is GapOutcome.UNKNOWN else "something else",
             "",
             unknown,
-            remarks=_remarks(strange[0]) if strange and outcome is GapOutcome.UNKNOWN else (),
+            remarks=_messages(strange[0]) if strange and outcome is GapOutcome.UNKNOWN else (),
         ),
-        GapCause(NONE, NONE, why if outcome is GapOutcome.NO_GAP else "no damage", "", rest - unknown),
+        GapCause(NONE, NONE, why if outcome is GapOutcome.NO_GAP else "no damage", "", remainder - unknown),
     ]
     firsts = {GapOutcome.UNKNOWN: UNKNOWN, GapOutcome.NO_GAP: NONE}
     first = firsts.get(outcome) or RACES[_sure(races)[0].finding.code]
@@ -338,10 +338,10 @@ def _race(effect: GapEffect, part: UnexpectedFinding | None, rig: Rig, *, scale:
         return named_cause(effect.name, 0.0, {effect.name: effect})
     finding = part.finding
     cause = named_cause(effect.name, scale * finding.confidence, {effect.name: effect}, bearings_text(finding, rig))
-    return replace(cause, remarks=_remarks(finding))
+    return replace(cause, remarks=_messages(finding))
 
 
-def _remarks(finding: Finding) -> tuple[str, ...]:
+def _messages(finding: Finding) -> tuple[str, ...]:
     basis = finding.confidence_basis
     return (*finding.evidence, *((f"{basis[:1].upper()}{basis[1:]}.",) if basis else ()))
 
@@ -370,11 +370,11 @@ def place_of_unexpected(part: UnexpectedFinding, rig: Rig, *, name: str = "") ->
         f" in {band_words(where.band_hz)}" if where.band_hz else ""
     )
     since = "" if part.rise_db is None else f", {signed(part.rise_db)} dB over the reference"
-    seen = f", in {name}" if name else ""
+    in_recording = f", in {name}" if name else ""
     driver = rig.ratio(rig.pairs[0].driver) if rig.pairs else 1.0
     return GapPlace(
         PlaceKind.LINE if part.finding.code == LINE else PlaceKind.ENVELOPE,
-        f"{_what(part, rig)} (order {order:.4g}, {hertz(frequency)}), {over}{since}{seen}",
+        f"{_part_text(part, rig)} (order {order:.4g}, {hertz(frequency)}), {over}{since}{in_recording}",
         part.over_floor_db if part.rise_db is None else part.rise_db,
         repeatability=NAN,
         structural=NAN,
@@ -386,7 +386,7 @@ def place_of_unexpected(part: UnexpectedFinding, rig: Rig, *, name: str = "") ->
     )
 
 
-def _what(part: UnexpectedFinding, rig: Rig) -> str:
+def _part_text(part: UnexpectedFinding, rig: Rig) -> str:
     code = part.finding.code
     if code in PARTS:
         return f"envelope lines of the {PARTS[code][0]} of {bearings_text(part.finding, rig)}"
@@ -443,7 +443,7 @@ def diagnose_gearless(
     """
     tell("analysing the references", 0.05)
     left_out: list[str] = []
-    healthy = readable(references, lambda one: (_with_bearings(one), []), "reference", left_out)
+    healthy = readable(references, lambda item: (_with_bearings(item), []), "reference", left_out)
     done, rig = iter(range(len(recordings))), recordings[0].rig
 
     def examine(recording: PreparedRecording) -> tuple[ExaminedRecording, list[str]]:
@@ -458,10 +458,12 @@ def diagnose_gearless(
     return GapReport(
         rig=rig.name,
         simulator="",
-        conditions=tuple(_facts(one) for one in every),
-        references=tuple(one.recording.name for one in references) if any(e.reference for e in every) else (),
+        conditions=tuple(_facts(item) for item in every),
+        references=tuple(item.recording.name for item in references) if any(e.reference for e in every) else (),
         outcome=outcome,
-        places=tuple(place_of_unexpected(one, rig, name=one.recording if len(every) > 1 else "") for one in unexpected),
+        places=tuple(
+            place_of_unexpected(item, rig, name=item.recording if len(every) > 1 else "") for item in unexpected
+        ),
         causes=causes,
         spectra=_spectra(unexpected, every),
         notices=(
@@ -471,7 +473,7 @@ def diagnose_gearless(
             *left_out,
             *_loose_shafts(rig),
             *_limits(unexpected, every),
-            *(text for one in every for text in one.notices),
+            *(text for item in every for text in item.notices),
         ),
     )
 
@@ -481,11 +483,11 @@ def _loose_shafts(rig: Rig) -> list[str]:
     loose = shafts_of_unknown_speed(rig)
     if not loose:
         return []
-    remark = (
+    message = (
         f"The rig file does not tell the speed of {loose}, as it names no gear pair: what turns with it is taken for "
         "something strange, and its bearings were not looked for. Give the teeth of the pair."
     )
-    return [remark]
+    return [message]
 
 
 def _limits(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRecording]) -> list[str]:
@@ -496,14 +498,14 @@ def _limits(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRec
         texts.append("Both races stand out and may both be damaged: the probabilities, of one cause each, are shared.")
     for fault in faults:
         key = (fault.finding.code, fault.finding.where.bearing)
-        others = [
+        quiet_parts = [
             part.name
             for part in every
             if key not in [(s.finding.code, s.finding.where.bearing) for s in part.unexpected]
         ]
-        if others:
+        if quiet_parts:
             texts.append(
-                f"{', '.join(others)}: no lines of the {PARTS[key[0]][0]} of {named('bearing', key[1])} stand out."
+                f"{', '.join(quiet_parts)}: no lines of the {PARTS[key[0]][0]} of {named('bearing', key[1])} stand out."
             )
     return texts
 
@@ -522,9 +524,9 @@ def _facts(examined_recording: ExaminedRecording) -> ConditionFacts:
 
 def _spectra(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRecording]) -> tuple[SpectrumCurves, ...]:
     """Return the envelope spectrum that shows the first family; of the first channel where there is none."""
-    families = [one for one in unexpected if one.finding.code != LINE]
+    families = [item for item in unexpected if item.finding.code != LINE]
     name = families[0].recording if families else every[0].name
-    channels = next(one for one in every if one.name == name).analysis.channels
+    channels = next(item for item in every if item.name == name).analysis.channels
     shown_channels = families[0].finding.where.channels if families else ()
     channel = next((c for c in channels if c.channel in shown_channels), channels[0])
     spectrum, band = channel.envelope_spectrum, channel.envelope_band_hz
@@ -583,15 +585,15 @@ def unexpected_findings(
     warnings = _fault_of_reference(healthy[0][0], now[0], name) if healthy else []
     weak = [part for part in now_examined.unexpected if part.finding.code == LINE or part.finding.kind is Kind.NOTICE]
     strong = [part for part in now_examined.unexpected if part not in weak]
-    remarks = [
+    messages = [
         f"Not explained by the gear model, in {name}: {part.finding.title.rstrip('.')}{_odds(part)}."
         for part in weak
         if not (part.finding.code == LINE and any(_is_harmonic(part, family) for family in strong))
     ]
-    return strong, remarks, warnings
+    return strong, messages, warnings
 
 
-def beside_unexpected(outcome: GapOutcome, unexpected: Sequence[UnexpectedFinding]) -> tuple[GapOutcome, list[str]]:
+def with_unexpected(outcome: GapOutcome, unexpected: Sequence[UnexpectedFinding]) -> tuple[GapOutcome, list[str]]:
     """Return what a diagnosis that names no effect comes to where impacts stand out, and what is to be checked first.
 
     Impacts that no shaft repeats are a gap, however few features see them: unknown. Those of a bearing's race are in
@@ -628,8 +630,8 @@ def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[s
         return []
     fault = reference.findings[0].title.rstrip(".")
     perhaps = "" if now.outcome is Outcome.FAULT else " and the recording shows no fault: they may have been exchanged"
-    remark = (
+    message = (
         f"The reference of {name} does not look healthy ({fault}){perhaps}. What is named may be what the "
         "reference has and the recording has not."
     )
-    return [remark]
+    return [message]

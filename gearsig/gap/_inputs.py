@@ -62,12 +62,12 @@ class GapInputs:
     labelled: tuple[LabelledRecording, ...] = ()
 
 
-def read_gap_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda _: None) -> GapInputs:
+def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lambda _: None) -> GapInputs:
     """Read everything, rigs first.
 
     Parameters
     ----------
-    asked : GapRequest
+    request : GapRequest
     on_file : callable
         Is told the name of each file before it is read.
 
@@ -77,40 +77,40 @@ def read_gap_inputs(asked: GapRequest, on_file: Callable[[str], object] = lambda
         If a file cannot be read, a recording has no rig, the rigs are of different machines, a file is given twice, or
         the number of torques fits none.
     """
-    _check_files(asked)
-    files = (*asked.recordings, *asked.references)
+    _check_files(request)
+    files = (*request.recordings, *request.references)
     names = (
-        *(asked.names or _names(asked.recordings)),
-        *(asked.reference_names or _names(asked.references)),
+        *(request.names or _names(request.recordings)),
+        *(request.reference_names or _names(request.references)),
     )
     recordings = []
-    for path, name, rig in zip(files, names, _rigs(asked, files), strict=True):
+    for path, name, rig in zip(files, names, _rigs(request, files), strict=True):
         on_file(path.name)
-        speed = None if asked.speed_rpm is None else ConstantSpeed(asked.speed_rpm)
-        recording = read_whole(path, rig, sampling_rate_hz=asked.sampling_rate_hz, speed=speed)
+        speed = None if request.speed_rpm is None else ConstantSpeed(request.speed_rpm)
+        recording = read_whole(path, rig, sampling_rate_hz=request.sampling_rate_hz, speed=speed)
         recordings.append(recording.with_name(name))
-    n, labelled = len(asked.recordings), tuple[LabelledRecording, ...]()
-    if asked.learn is not None:
-        on_file(asked.learn.name)
+    n, labelled = len(request.recordings), tuple[LabelledRecording, ...]()
+    if request.learn is not None:
+        on_file(request.learn.name)
         labelled = read_labelled(
-            asked.learn, rig=recordings[0].rig, sampling_rate_hz=asked.sampling_rate_hz, on_file=on_file
+            request.learn, rig=recordings[0].rig, sampling_rate_hz=request.sampling_rate_hz, on_file=on_file
         )
     return GapInputs(tuple(recordings[:n]), tuple(recordings[n:]), labelled)
 
 
-def _check_files(asked: GapRequest) -> None:
-    if not asked.recordings:
+def _check_files(request: GapRequest) -> None:
+    if not request.recordings:
         raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
-    seen: set[Path] = set()
-    for path in (*asked.recordings, *asked.references):
+    paths: set[Path] = set()
+    for path in (*request.recordings, *request.references):
         if not path.exists():
             raise InputError("there is no such file", where=str(path), remedy="check its name and folder")
-        if path.resolve() in seen:
-            healthy = path in asked.references and path in asked.recordings
-            what = "is given as a recording and as its own healthy reference" if healthy else "is given twice"
-            raise InputError(what, where=str(path), remedy="give each file once")
-        seen.add(path.resolve())
-    n, n_torques = len(asked.recordings), len(asked.torques_nm)
+        if path.resolve() in paths:
+            healthy = path in request.references and path in request.recordings
+            problem = "is given as a recording and as its own healthy reference" if healthy else "is given twice"
+            raise InputError(problem, where=str(path), remedy="give each file once")
+        paths.add(path.resolve())
+    n, n_torques = len(request.recordings), len(request.torques_nm)
     if n_torques > 1 and n_torques != n:
         raise InputError(
             f"{n_torques} torques are given for {n} recording{'s' if n > 1 else ''}",
@@ -118,26 +118,26 @@ def _check_files(asked: GapRequest) -> None:
         )
 
 
-def _rigs(asked: GapRequest, files: Sequence[Path]) -> tuple[Rig, ...]:
+def _rigs(request: GapRequest, files: Sequence[Path]) -> tuple[Rig, ...]:
     """Return the rig of each file, all of the same machine."""
-    common = read_rig(asked.rig) if asked.rig is not None else None
+    common = read_rig(request.rig) if request.rig is not None else None
     first = common
     rigs = []
     for place, path in enumerate(files):
-        beside = rig_file_beside(path)
-        is_beside = beside is not None and (asked.rig is None or beside.resolve() != asked.rig.resolve())
-        rig_beside = read_rig(beside) if beside is not None and is_beside else None
-        if rig_beside is None and common is None:
+        rig_file = rig_file_beside(path)
+        has_rig_file = rig_file is not None and (request.rig is None or rig_file.resolve() != request.rig.resolve())
+        recording_rig = read_rig(rig_file) if rig_file is not None and has_rig_file else None
+        if recording_rig is None and common is None:
             raise InputError(
                 "no rig file is given, and none lies beside it",
                 where=str(path),
                 remedy="give --rig RIG.toml with the gears' teeth and module; `gearsig rig example` prints one",
             )
-        first = first or rig_beside
-        if rig_beside is not None and first is not None:
-            _check_same(first, rig_beside, path.name)
-        rig = _merged(common, rig_beside)
-        rigs.append(_with_torque(rig, asked, place))
+        first = first or recording_rig
+        if recording_rig is not None and first is not None:
+            _check_same(first, recording_rig, path.name)
+        rig = _merged(common, recording_rig)
+        rigs.append(_with_torque(rig, request, place))
     return tuple(rigs)
 
 
@@ -147,32 +147,32 @@ def _merged(common: Rig | None, of_recording: Rig | None) -> Rig:
         rig = common or of_recording
         assert rig is not None  # noqa: S101 - the caller has made sure of one
         return rig
-    point, there = of_recording.operating_point, common.operating_point
-    if point.shaft in ("", there.shaft):
+    point, common_point = of_recording.operating_point, common.operating_point
+    if point.shaft in ("", common_point.shaft):
         point = replace(
             point,
-            shaft=there.shaft,
-            speed_rpm=there.speed_rpm if point.speed_rpm is None else point.speed_rpm,
-            torque_nm=there.torque_nm if point.torque_nm is None else point.torque_nm,
+            shaft=common_point.shaft,
+            speed_rpm=common_point.speed_rpm if point.speed_rpm is None else point.speed_rpm,
+            torque_nm=common_point.torque_nm if point.torque_nm is None else point.torque_nm,
         )
     return replace(common, operating_point=point, speed=of_recording.speed or common.speed)
 
 
-def _with_torque(rig: Rig, asked: GapRequest, place: int) -> Rig:
+def _with_torque(rig: Rig, request: GapRequest, place: int) -> Rig:
     """Return the rig at the torque that was stated: a single one is the references' as well."""
-    if not asked.torques_nm or (len(asked.torques_nm) > 1 and place >= len(asked.torques_nm)):
+    if not request.torques_nm or (len(request.torques_nm) > 1 and place >= len(request.torques_nm)):
         return rig
-    torque_nm = asked.torques_nm[0 if len(asked.torques_nm) == 1 else place]
+    torque_nm = request.torques_nm[0 if len(request.torques_nm) == 1 else place]
     return replace(rig, operating_point=replace(rig.operating_point, torque_nm=torque_nm))
 
 
 def _check_same(rig: Rig, of_recording: Rig, name: str) -> None:
     """Compare what both rig files state of the machine."""
-    for what, stated in _identity(of_recording).items():
-        expected = _identity(rig).get(what)
+    for quantity, stated in _identity(of_recording).items():
+        expected = _identity(rig).get(quantity)
         if expected is not None and expected != stated:
             raise InputError(
-                f"the rig file beside it is of another machine: {what} {stated}, elsewhere {expected}",
+                f"the rig file beside it is of another machine: {quantity} {stated}, elsewhere {expected}",
                 where=name,
                 remedy="diagnose recordings of one rig together, those of another on their own",
             )
@@ -243,13 +243,13 @@ def read_labelled(
 
     def read(path: Path) -> Recording:
         on_file(path.name)
-        beside = rig_file_beside(path)
-        rig_beside = read_rig(beside) if beside is not None else None
-        if rig_beside is not None and rig is not None:
-            _check_same(rig, rig_beside, path.name)
-        if rig_beside is None and rig is None:
+        rig_file = rig_file_beside(path)
+        recording_rig = read_rig(rig_file) if rig_file is not None else None
+        if recording_rig is not None and rig is not None:
+            _check_same(rig, recording_rig, path.name)
+        if recording_rig is None and rig is None:
             raise InputError("no rig is given, and none lies beside it", where=path.name, remedy="give --rig RIG.toml")
-        recording = read_whole(path, _merged(rig, rig_beside), sampling_rate_hz=sampling_rate_hz)
+        recording = read_whole(path, _merged(rig, recording_rig), sampling_rate_hz=sampling_rate_hz)
         return recording.with_name(f"{folder.name}/{path.name}")
 
     labelled = []
@@ -258,10 +258,10 @@ def read_labelled(
         label, severity = _label(line["effect"], where), _severity(line.get("severity", ""), where)
         healthy = None
         if line.get("reference"):
-            there = _named(folder, line["reference"], where, "reference")
-            if there == path:
+            reference_path = _named(folder, line["reference"], where, "reference")
+            if reference_path == path:
                 raise InputError("a recording is its own reference", where=where, remedy="name a healthy one, or none")
-            healthy = references[there] = references.get(there) or read(there)
+            healthy = references[reference_path] = references.get(reference_path) or read(reference_path)
         labelled.append(LabelledRecording(read(path), label, healthy, severity))
     return tuple(labelled)
 
@@ -384,9 +384,9 @@ def _check_teeth(rig: Rig) -> None:
     pair = rig.pairs[0]
     gears = [name for name, teeth in (("driver", pair.driver_teeth), ("driven", pair.driven_teeth)) if teeth is None]
     if gears:
-        both = "both gears" if len(gears) == 2 else f"the {gears[0]} gear"
+        gear_text = "both gears" if len(gears) == 2 else f"the {gears[0]} gear"
         raise RefusalError(
-            f"the rig data are missing that a simulation needs: teeth of {both} of pair {pair.name!r}",
+            f"the rig data are missing that a simulation needs: teeth of {gear_text} of pair {pair.name!r}",
             remedy="complete the rig file; `gearsig analyze` says what can be said without them",
         )
 
@@ -416,8 +416,8 @@ def with_stage(rig: Rig, stage: str = "") -> Rig:
             remedy="say which with --stage NAME (stage=… from Python); the others are taken for background",
         )
     if stage and len(chosen) != 1:
-        what = f"{len(chosen)} pairs sit on shaft {stage!r}" if chosen else f"there is no gear pair {stage!r}"
-        raise InputError(what, where="stage", allowed=", ".join(names), remedy=closest_match_hint(stage, names))
+        problem = f"{len(chosen)} pairs sit on shaft {stage!r}" if chosen else f"there is no gear pair {stage!r}"
+        raise InputError(problem, where="stage", allowed=", ".join(names), remedy=closest_match_hint(stage, names))
     return replace(rig, pairs=(*chosen, *(pair for pair in rig.pairs if pair not in chosen))) if stage else rig
 
 
@@ -433,7 +433,7 @@ def twin_rig(rig: Rig) -> tuple[Rig, list[str]]:
 
     Without a module, T = F b m (m z/2) with F = 50 N/mm² and b = 10 m lets it follow from the torque; or it is 2.5 mm.
     """
-    pair, remarks = rig.pairs[0], list[str]()
+    pair, messages = rig.pairs[0], list[str]()
     torque_nm = rig.nominal_torque_nm(pair.driver)
     if pair.module_mm is None and pair.driver_teeth:
         module = USUAL_MODULE_MM
@@ -443,14 +443,14 @@ def twin_rig(rig: Rig) -> tuple[Rig, list[str]]:
         width = pair.face_width_mm or WIDTH_MODULES * module
         pair = replace(pair, module_mm=module, face_width_mm=width)
         why = f"that the torque of {torque_nm:.3g} N·m lets expect" if torque_nm else "as usual for small gearboxes"
-        remarks.append(
+        messages.append(
             f"Of the gears only teeth are known: the twin has a module of {module:g} mm, {why}, and a face width of "
             f"{width:g} mm. A machine may have half or twice that: severities in mm and µm are orders of magnitude."
         )
     if len(rig.pairs) > 1:
-        others = ", ".join(further.name for further in rig.pairs[1:])
-        remarks.append(f"Diagnosed is {pair.name}; what {others} is heard at is background, and taken out.")
-    elif not remarks:
+        further_names = ", ".join(further.name for further in rig.pairs[1:])
+        messages.append(f"Diagnosed is {pair.name}; what {further_names} is heard at is background, and taken out.")
+    elif not messages:
         return rig, []
     point, on = rig.operating_point, (pair.driver, pair.driven)
     speed_rpm = rig.nominal_speed_rpm(pair.driver)
@@ -464,4 +464,4 @@ def twin_rig(rig: Rig) -> tuple[Rig, list[str]]:
         contact=None,
         assumed=(*rig.assumed, *(() if rig.pairs[0].module_mm else ("module_mm", "face_width_mm"))),
     )
-    return alone, remarks
+    return alone, messages

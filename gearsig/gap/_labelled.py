@@ -109,18 +109,18 @@ def labelled_changes(
     ways = sorted({c.reference is not None for c in conditions})
     channels = tuple(conditions[0].now.channels)
     shared = [read_healthy(recording)[0] for recording in references]
-    changes_of_labels, remarks = list[LabelledChange](), list[str]()
+    changes_of_labels, messages = list[LabelledChange](), list[str]()
     for recording in labelled:
         try:
             changes_of_labels.append(
                 _change(recording, shared, ways, channels, conditions[0].learned, twin, None if fresh else cache)
             )
         except RefusalError as refusal:
-            remarks.append(f"{recording.recording.name}: {refusal.reason}; this labelled recording is left out.")
+            messages.append(f"{recording.recording.name}: {refusal.reason}; this labelled recording is left out.")
     if cache is not None:
         for change in changes_of_labels:
             _keep(change, cache)
-    return changes_of_labels, remarks
+    return changes_of_labels, messages
 
 
 def _change(
@@ -144,8 +144,8 @@ def _change(
     changes: dict[bool, Features] = {}
     if True in ways and match is not None:
         common = match.reduced.channels
-        here = now.with_channels({name: now.channels[name] for name in common})
-        changes[True] = change_features(here, match.reduced)
+        recorded = now.with_channels({name: now.channels[name] for name in common})
+        changes[True] = change_features(recorded, match.reduced)
     if False in ways:
         changes[False] = difference_features(now, simulated(twin, facts, now), learned.credibility)
     if not changes:
@@ -217,9 +217,9 @@ def labelled_support(log_ratios: FloatArray) -> float:
 
     They are kept apart, for one effect at two places, or of two severities, looks like neither in the middle.
     """
-    weighed = WEIGHT * log_ratios
-    top = float(weighed.max())
-    return top + float(np.log(np.mean(np.exp(weighed - top))))
+    weighted_logs = WEIGHT * log_ratios
+    top = float(weighted_logs.max())
+    return top + float(np.log(np.mean(np.exp(weighted_logs - top))))
 
 
 SAME_SPEED = 1.25
@@ -256,18 +256,18 @@ def labelled_evidence(
         way = condition.reference is not None
         recogniser = condition.learned.recognisers[way]
         row = within_reach(recogniser.input_row(condition.change, load))
-        here = recogniser.probabilities(condition.change, load)
+        unlabelled = recogniser.probabilities(condition.change, load)
         for label in labels:
-            given = [change for change in labelled if change.label == label and way in change.changes]
-            near = [change for change in given if _speed_ratio(change, condition) <= SAME_SPEED] or given
+            of_label = [change for change in labelled if change.label == label and way in change.changes]
+            near = [change for change in of_label if _speed_ratio(change, condition) <= SAME_SPEED] or of_label
             if not near:
                 continue
             rows = np.array([within_reach(recogniser.input_row(change.changes[way], load)) for change in near])
             ratios[label].append(labelled_support(recogniser.labels.log_ratios(row, rows, label)))
             if label not in recogniser.causes:
-                there = [recogniser.probabilities(change.changes[way], load) for change in near]
-                mean = {name: float(np.mean([p[name] for p in there])) for name in here}
-                alike.setdefault(label, []).append(sum(min(here[name], mean[name]) for name in here))
+                near_probabilities = [recogniser.probabilities(change.changes[way], load) for change in near]
+                mean = {name: float(np.mean([p[name] for p in near_probabilities])) for name in unlabelled}
+                alike.setdefault(label, []).append(sum(min(unlabelled[name], mean[name]) for name in unlabelled))
     counts = {label: sum(change.label == label for change in labelled) for label in labels}
     means = {label: float(np.mean(values)) for label, values in ratios.items() if values}
     return LabelledEvidence(counts, means, {label: float(np.mean(values)) for label, values in alike.items()})

@@ -25,7 +25,7 @@ time went into it."""
 ENOUGH = 1.2
 """Times the distance that there is now, from which a further point is worth naming."""
 
-OWN = ""
+PRESENT_SENSORS = ""
 """Stands for the rig's own sensors together among names of channels."""
 
 
@@ -56,8 +56,10 @@ def next_recordings(
     """
     base = conditions[0].facts
     measured, places = twin.with_further_sensors() if isinstance(twin, HasFurtherPlaces) else (twin, {})
-    here = [condition.facts.point for condition in conditions]
-    points = _distinct([*here, *(_rounded(v * base.point.speed_rpm, t * base.point.torque_nm) for v, t in FACTORS)])
+    present_points = [condition.facts.point for condition in conditions]
+    points = _distinct(
+        [*present_points, *(_rounded(v * base.point.speed_rpm, t * base.point.torque_nm) for v, t in FACTORS)]
+    )
     runs = [
         TwinRun(
             measured,
@@ -74,16 +76,18 @@ def next_recordings(
         point: _distances(conditions, of_first, of_second)
         for point, of_first, of_second in zip(points, rows[::2], rows[1::2], strict=True)
     }
-    known = [distances for point, distances in at.items() if point in here and distances]
+    known = [distances for point, distances in at.items() if point in present_points and distances]
     if not known:
         return ()
-    now = max(distances[OWN] for distances in known)
+    now = max(distances[PRESENT_SENSORS] for distances in known)
     best_sensor = max(d for distances in known for channel, d in distances.items() if channel not in places)
     recordings = []
     for point, distances in at.items():
         for channel, apart in _worth_naming(distances, places, now, best_sensor):
             place = places.get(channel, "")
-            text = _text(point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in here)
+            text = _text(
+                point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in present_points
+            )
             recordings.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
     return tuple(sorted(recordings, key=lambda of_first: -of_first.standard_deviations)[:5])
 
@@ -107,19 +111,19 @@ def _distances(conditions: Sequence[Condition], first: Reduced | str, second: Re
     if not (isinstance(first, Reduced) and isinstance(second, Reduced)):
         return {}
     alone = {name: _apart(conditions, change - second.alone[name]) for name, change in first.alone.items()}
-    return {OWN: _apart(conditions, first.change - second.change), **alone}
+    return {PRESENT_SENSORS: _apart(conditions, first.change - second.change), **alone}
 
 
 def _worth_naming(
     distances: Mapping[str, float], places: Mapping[str, str], now: float, best_sensor: float
 ) -> Iterator[tuple[str, float]]:
     """Yield the rig's own sensors, and the best further one if it shows more than they, where it is worth it."""
-    on_own_sensors = distances.get(OWN, 0.0)
-    if on_own_sensors >= ENOUGH * now:
-        yield OWN, on_own_sensors
+    with_present_sensors = distances.get(PRESENT_SENSORS, 0.0)
+    if with_present_sensors >= ENOUGH * now:
+        yield PRESENT_SENSORS, with_present_sensors
     further = {name: d for name, d in distances.items() if name in places}
     best = max(further, key=further.__getitem__, default="")
-    usual = max([best_sensor, on_own_sensors, *(d for name, d in distances.items() if name not in places)])
+    usual = max([best_sensor, with_present_sensors, *(d for name, d in distances.items() if name not in places)])
     if best and further[best] >= ENOUGH * usual:
         yield best, further[best]
 

@@ -111,7 +111,7 @@ def _joined(unexpected: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
 # --------------------
 
 
-MOST = 0.5
+MAX_SHARE_OF_REST = 0.5
 """Share of the gap from which one order is more of it than all else."""
 
 
@@ -135,7 +135,9 @@ def counted_against(
     frame : GearFrame
     """
     lowered = dict(probabilities)
-    for place in (candidate for candidate in places if candidate.share > MOST and _is_an_order(candidate, frame)):
+    for place in (
+        candidate for candidate in places if candidate.share > MAX_SHARE_OF_REST and _is_an_order(candidate, frame)
+    ):
         for name in probabilities.keys() & effects.keys():
             if not _can_make(effects[name].shows_in, place):
                 lowered[name] *= 2.0 * (1.0 - place.share)
@@ -165,7 +167,7 @@ def _can_make(shows_in: Sequence[str], place: GapPlace) -> bool:
 
 
 RACE_WORDS = {"outer": "outer race", "inner": "inner race", "ball": "rolling elements", "cage": "cage"}
-A_FAMILY_IS_HEARD = 0.6
+MIN_SHARE_OF_A_FAMILY = 0.6
 """A family's rise over that of the strongest line, from which on the line is taken for one of the family's."""
 MIN_OF_A_FAMILY_DB = 3.0
 MIN_OF_A_FAMILY = 3
@@ -184,7 +186,7 @@ class LineLevels:
 
     Parameters
     ----------
-    now, other : arrays, (n_rows, n_lines)
+    now, baseline : arrays, (n_rows, n_lines)
         On the same orders.
     step : float
         Orders from line to line.
@@ -193,7 +195,7 @@ class LineLevels:
     """
 
     now: FloatArray
-    other: FloatArray
+    baseline: FloatArray
     step: float
     taken: NDArray[np.bool_]
 
@@ -209,8 +211,10 @@ class _Found:
 def locate_envelope(comparison: ComparedPair) -> LocatedChange:
     """Return whose order modulates what no shaft repeats."""
     now, names = comparison.now, tuple(comparison.now.channels)
-    both = [np.concatenate([envelope_ratios(g, g.channels[name]) for name in names]) for g in (now, comparison.other)]
-    levels = _levels(comparison, both, now.cycle_step, comparison.other.cycle_step)
+    ratios = [
+        np.concatenate([envelope_ratios(g, g.channels[name]) for name in names]) for g in (now, comparison.baseline)
+    ]
+    levels = _levels(comparison, ratios, now.cycle_step, comparison.baseline.cycle_step)
     levels, sign = _upwards(levels, comparison.size[comparison.strongest("envelope.")])
     family = _family_or_line(_best_race(comparison, levels), _strongest(comparison, levels, fundamental=True))
     family = max(family, *_shafts(comparison, levels), key=lambda candidate: candidate.rise_db)
@@ -238,19 +242,19 @@ def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_d
     now = comparison.now
     powers = [
         np.stack([g.channels[name].residual_power.mean(axis=0) for name in now.channels])
-        for g in (now, comparison.other)
+        for g in (now, comparison.baseline)
     ]
     orders = np.arange(powers[0].shape[1]) * now.order_step
     within = (orders * now.speed_hz >= band_hz[0]) & (orders * now.speed_hz <= band_hz[1])
     row, peak = (int(i) for i in np.unravel_index(int(np.argmax(np.where(within, powers[0], 0.0))), powers[0].shape))
     line = powers[0][row, max(peak - _LINE_WIDTH, 0) : peak + _LINE_WIDTH + 1].sum()
-    old = np.arange(powers[1].shape[1]) * comparison.other.order_step * now.speed_hz
+    old = np.arange(powers[1].shape[1]) * comparison.baseline.order_step * now.speed_hz
     before = powers[1][row, (old >= band_hz[0]) & (old <= band_hz[1])].sum()
     if line < MAX_OF_A_BAND * max(float(powers[0][row, within].sum() - before), 1e-300):
         return None
     order = float(orders[peak])
     levels = _residual_levels(comparison)
-    rise = float((levels.now - levels.other)[row, min(peak, len(levels.taken) - 1)])
+    rise = float((levels.now - levels.baseline)[row, min(peak, len(levels.taken) - 1)])
     words = _strange_words(comparison, order)
     return replace(_line(comparison, _Found(words, rise, (order,), row), 1.0), kind=PlaceKind.LINE)
 
@@ -262,9 +266,9 @@ def _line(comparison: ComparedPair, line: _Found, sign: float) -> LocatedChange:
 
 
 def _residual_levels(comparison: ComparedPair) -> LineLevels:
-    now, before = comparison.now, comparison.other
-    both = [residual_ratios(g, [g.channels[name] for name in now.channels]) for g in (now, before)]
-    return _levels(comparison, both, now.order_step, before.order_step)
+    now, before = comparison.now, comparison.baseline
+    ratios = [residual_ratios(g, [g.channels[name] for name in now.channels]) for g in (now, before)]
+    return _levels(comparison, ratios, now.order_step, before.order_step)
 
 
 def _levels(comparison: ComparedPair, ratios: list[FloatArray], step: float, step_before: float) -> LineLevels:
@@ -285,7 +289,7 @@ def _upwards(levels: LineLevels, size: float) -> tuple[LineLevels, float]:
     """Return the comparison the other way round, and −1, where it went down."""
     if size >= 0:
         return levels, 1.0
-    return replace(levels, now=levels.other, other=_widened(levels.now)), -1.0
+    return replace(levels, now=levels.baseline, baseline=_widened(levels.now)), -1.0
 
 
 def _widened(levels: FloatArray) -> FloatArray:
@@ -303,18 +307,18 @@ def _family_or_line(family: _Found, line: _Found) -> _Found:
         return line  # of a lower line's harmonics, the family has but some
     multiple = line.orders[0] / family.orders[0]
     is_multiple = round(multiple) in range(1, HIGHEST_MULTIPLE + 1) and abs(multiple / round(multiple) - 1.0) < MISSED
-    return family if is_multiple or family.rise_db > A_FAMILY_IS_HEARD * line.rise_db else line
+    return family if is_multiple or family.rise_db > MIN_SHARE_OF_A_FAMILY * line.rise_db else line
 
 
 def _best_race(comparison: ComparedPair, levels: LineLevels) -> _Found:
     """Return the bearing's family whose lines rose most."""
     races = [_Found("", 0.0, (), 0)]
-    now, other = _widened(levels.now), levels.other
+    now, baseline = _widened(levels.now), levels.baseline
     for bearing in comparison.now.frame.bearings:
         for kind, (attribute, factor) in RACES.items():
             order = getattr(bearing, attribute) * factor
             if np.isfinite(order):
-                rise, row, slipped = _family_rise(now - other, order, levels)
+                rise, row, slipped = _family_rise(now - baseline, order, levels)
                 words = f"of the {RACE_WORDS[kind]} of {_bearing(bearing.name)} (order {slipped:.3g})"
                 races.append(_Found(words, rise, _multiples(slipped, N_FAMILY), row))
     return max(races, key=lambda family: family.rise_db)
@@ -345,7 +349,7 @@ def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[fl
 
 def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_Found]:
     """Return the shafts' families, where the features say that they changed."""
-    families, rise = [], _widened(levels.now) - levels.other
+    families, rise = [], _widened(levels.now) - levels.baseline
     for side, order in enumerate(comparison.now.frame.shaft_orders):
         lines = np.rint(order * np.arange(1, N_SHAFT_FAMILY + 1) / levels.step).astype(np.intp)
         means = rise[:, lines[lines < rise.shape[1]]].mean(axis=1)
@@ -361,7 +365,7 @@ def _multiples(order: float, n: int) -> tuple[float, ...]:
 
 def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: bool) -> _Found:
     """Return the line that rose most of those at no multiple of a shaft's order."""
-    rise = np.where(levels.taken, -np.inf, levels.now - levels.other)
+    rise = np.where(levels.taken, -np.inf, levels.now - levels.baseline)
     row, line = (int(i) for i in np.unravel_index(int(np.argmax(rise)), rise.shape))
     change = float(rise[row, line])
     if fundamental:
@@ -435,9 +439,13 @@ def locate_mesh(comparison: ComparedPair) -> LocatedChange | None:
     if comparison.strongest("mesh", "line.half_mesh") in ("mesh.half", "line.half_mesh"):
         half = comparison.change_db[comparison.strongest("mesh.half", "line.half_mesh")]
         return LocatedChange(f"half the mesh order, {by_decibels(half)}", half, (frame.teeth[0] / 2.0,))
-    both = _both(comparison, DRIVER, relative=not comparison.is_reference)
-    lines = [k * frame.teeth[0] for k in range(1, N_MESH_HARMONICS + 1) if k * frame.teeth[0] < both[0].power.shape[1]]
-    strongest = _strongest_group(*both, [[line] for line in lines])
+    lines_of_both = _lines_of_both(comparison, DRIVER, relative=not comparison.is_reference)
+    lines = [
+        k * frame.teeth[0]
+        for k in range(1, N_MESH_HARMONICS + 1)
+        if k * frame.teeth[0] < lines_of_both[0].power.shape[1]
+    ]
+    strongest = _strongest_group(*lines_of_both, [[line] for line in lines])
     if strongest is None:
         return None
     row, best, change = strongest
@@ -465,7 +473,7 @@ def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
 
 def locate_sidebands(comparison: ComparedPair, side: int) -> LocatedChange | None:
     """Return about which mesh harmonic a shaft's sidebands changed most, and which of them."""
-    now, before = _both(comparison, side, relative=not comparison.is_reference)
+    now, before = _lines_of_both(comparison, side, relative=not comparison.is_reference)
     frame = comparison.now.frame
     teeth, n = frame.teeth[side], now.power.shape[1]
     reach = min(FURTHEST_SIDEBAND, teeth // 2)
@@ -478,7 +486,7 @@ def locate_sidebands(comparison: ComparedPair, side: int) -> LocatedChange | Non
     if strongest is None or abs(strongest[2]) < MIN_CHANGE_DB:
         return None
     row, best, change = strongest
-    lines = _largest_lines(now.own[row] - before.own[row], groups[best])
+    lines = _largest_lines(now.synchronous[row] - before.synchronous[row], groups[best])
     title = f"sidebands of {shaft_words(frame, side)} about {_times(best + 1)}mesh, {by_decibels(change)}"
     carrier = (best + 1) * teeth
     title += _how_far_apart([abs(line - carrier) for line in lines])
@@ -488,13 +496,13 @@ def locate_sidebands(comparison: ComparedPair, side: int) -> LocatedChange | Non
 
 def locate_shaft(comparison: ComparedPair, side: int) -> LocatedChange | None:
     """Return the low order of a shaft that changed most."""
-    both = _both(comparison, side, relative=False)
+    lines_of_both = _lines_of_both(comparison, side, relative=False)
     frame = comparison.now.frame
-    last = min(MAX_SHAFT_ORDERS, frame.teeth[side] - 3, both[0].power.shape[1] - 1)
+    last = min(MAX_SHAFT_ORDERS, frame.teeth[side] - 3, lines_of_both[0].power.shape[1] - 1)
     scored = Feature.of(comparison.strongest(f"shaft.{SIDES[side]}"))
     first = scored.detail.partition(".")[0]  # the order, or "strongest" or "low"
     groups = [[int(first)]] if first.isdigit() else [[order] for order in range(1, last + 1)]
-    strongest = _strongest_group(*both, groups)
+    strongest = _strongest_group(*lines_of_both, groups)
     if strongest is None or abs(strongest[2]) < MIN_CHANGE_DB:
         return None
     row, best, change = strongest
@@ -508,25 +516,25 @@ class _Lines:
     """Lines of a shaft's average, (n_channels, n_orders): all power, the shaft's own, and the noise put under it."""
 
     power: FloatArray
-    own: FloatArray
+    synchronous: FloatArray
     floor: FloatArray
 
     def first(self, n: int) -> _Lines:
-        return _Lines(self.power[:, :n], self.own[:, :n], self.floor[:, :n])
+        return _Lines(self.power[:, :n], self.synchronous[:, :n], self.floor[:, :n])
 
     def of_groups(self, groups: Sequence[list[int]]) -> _Lines:
         """Return the sums over groups of lines, (n_channels, n_groups)."""
         sums = [
             np.stack([values[:, group].sum(axis=1) for group in groups], axis=1)
-            for values in (self.power, self.own, self.floor)
+            for values in (self.power, self.synchronous, self.floor)
         ]
         return _Lines(*sums)
 
 
-def _both(comparison: ComparedPair, side: int, *, relative: bool) -> tuple[_Lines, _Lines]:
+def _lines_of_both(comparison: ComparedPair, side: int, *, relative: bool) -> tuple[_Lines, _Lines]:
     """Return the lines of both on the same orders; `relative` to each channel's mesh harmonics."""
     names = tuple(comparison.now.channels)
-    now, before = (_lines(run, names, side, relative=relative) for run in (comparison.now, comparison.other))
+    now, before = (_lines(run, names, side, relative=relative) for run in (comparison.now, comparison.baseline))
     n = min(now.power.shape[1], before.power.shape[1])
     return now.first(n), before.first(n)
 
@@ -547,10 +555,10 @@ def _strongest_group(now: _Lines, before: _Lines, groups: Sequence[list[int]]) -
     Channels are weighed by their own largest change: a sensor with a small gain sees the same. What changed must be the
     shaft's own lines; None where it is noise, or leaks into the average.
     """
-    here, there = now.of_groups(groups), before.of_groups(groups)
-    floor = np.maximum(np.maximum(here.floor, there.floor), 1e-300)
-    ratio = 10.0 * np.log10((here.own + floor) / (there.own + floor))
-    moved, whole = np.abs(here.own - there.own), np.abs(here.power - there.power)
+    now_sums, before_sums = now.of_groups(groups), before.of_groups(groups)
+    floor = np.maximum(np.maximum(now_sums.floor, before_sums.floor), 1e-300)
+    ratio = 10.0 * np.log10((now_sums.synchronous + floor) / (before_sums.synchronous + floor))
+    moved, whole = np.abs(now_sums.synchronous - before_sums.synchronous), np.abs(now_sums.power - before_sums.power)
     explained = moved.max(axis=1, keepdims=True) >= EXPLAINED * whole.max(axis=1, keepdims=True)
     enough = (moved > 0.0) & (moved >= WORTH_NAMING * moved.max(axis=1, keepdims=True)) & explained
     if not enough.any():
@@ -600,8 +608,8 @@ def locate_band(comparison: ComparedPair) -> LocatedChange:
     tone = line_within(comparison, band, change) if kind == "band" else None
     if tone is not None:
         return tone
-    what = "noise" if kind == "band" else "kurtosis of the noise"
-    title = f"{what} between {band_words(band).replace(' to ', ' and ')}, {by_decibels(change)}"
+    quantity = "noise" if kind == "band" else "kurtosis of the noise"
+    title = f"{quantity} between {band_words(band).replace(' to ', ' and ')}, {by_decibels(change)}"
     channel = _loudest(comparison, int(number) - 1, kurtosis=kind != "band")
     return LocatedChange(title, change, band_hz=band, channel=channel, follows=kind != "band")
 
@@ -610,8 +618,8 @@ def _loudest(comparison: ComparedPair, band: int, *, kurtosis: bool) -> str:
     """Return the channel on which the band changed most."""
 
     def change(name: str) -> float:
-        both = [g.channels[name].moments.mean(axis=0)[band] for g in (comparison.now, comparison.other)]
-        figures = [fourth / max(square**2, 1e-300) if kurtosis else square for square, fourth in both]
+        band_moments = [g.channels[name].moments.mean(axis=0)[band] for g in (comparison.now, comparison.baseline)]
+        figures = [fourth / max(square**2, 1e-300) if kurtosis else square for square, fourth in band_moments]
         return abs(float(np.log(max(figures[0], 1e-300) / max(figures[1], 1e-300))))
 
     return max(comparison.now.channels, key=change)
@@ -622,7 +630,7 @@ def locate_speed(comparison: ComparedPair) -> LocatedChange | None:
     name = comparison.strongest("speed.")
     change = comparison.change_db[name]
     drift, swing, _, frequency_hz = comparison.now.speed
-    if max(abs(drift), swing, *(abs(figure) for figure in comparison.other.speed[:2])) < MIN_SPEED_CHANGE:
+    if max(abs(drift), swing, *(abs(figure) for figure in comparison.baseline.speed[:2])) < MIN_SPEED_CHANGE:
         return None
     if name == "speed.drift":
         return LocatedChange(f"speed drifts by {100 * drift:.2g} % along the record", change)
@@ -651,13 +659,13 @@ def locate_tail(comparison: ComparedPair) -> LocatedChange:
 
 
 STANDS_OUT = 6.0
-"""Energy within one pitch over the middling pitch's from which on one tooth is named: of teeth that all
+"""Energy within one pitch over the median pitch's from which on one tooth is named: of teeth that all
 differ by chance, the largest has some 5."""
 
 ALL_ROUND = (".level", ".elsewhere", ".peak")
 """Ends of the names of features that say how large a pattern is, and not what shape it has."""
 
-OWN_SHARE = 0.3
+MIN_SYNCHRONOUS_SHARE = 0.3
 """Of a pattern's power in the shaft's own lines, below which it is no pattern of teeth."""
 
 
@@ -671,13 +679,13 @@ class ToothPattern:
         Mean square within one pitch over the mesh harmonics' power.
     lines : ShaftLines
         What it was made of.
-    own_share : float
+    synchronous_share : float
         Of its power, in lines that keep their phase from block to block.
     """
 
     energy: FloatArray
     lines: ShaftLines
-    own_share: float
+    synchronous_share: float
 
     @property
     def prominence(self) -> float:
@@ -692,7 +700,7 @@ class ToothPattern:
         return (centre - load_calibration().lag_pitches / self.lines.teeth) % 1.0
 
 
-def own_pattern(reduced: ReducedRecording, side: int) -> ToothPattern:
+def pattern_of_recording(reduced: ReducedRecording, side: int) -> ToothPattern:
     """Return the pattern of a recording by itself."""
     residuals = [average.pattern for average in reduced.averages(side)]
     return _pattern(reduced, side, residuals, lines_of_shaft(reduced, side))
@@ -721,9 +729,11 @@ def locate_tooth(comparison: ComparedPair, side: int) -> LocatedChange | None:
     None where most of the pattern is noise, or leaks into the average.
     """
     frame, now = comparison.now.frame, comparison.now
-    pattern = changed_pattern(now, comparison.other, side) if comparison.is_reference else own_pattern(now, side)
+    pattern = (
+        changed_pattern(now, comparison.baseline, side) if comparison.is_reference else pattern_of_recording(now, side)
+    )
     shaft, name = shaft_words(frame, side), list(now.channels)[int(np.argmax(pattern.energy.max(axis=1)))]
-    if pattern.own_share < OWN_SHARE:
+    if pattern.synchronous_share < MIN_SYNCHRONOUS_SHARE:
         return None
     if pattern.prominence < STANDS_OUT:
         return locate_all_round(comparison, side, shaft, name)
@@ -747,8 +757,8 @@ def locate_all_round(comparison: ComparedPair, side: int, shaft: str, channel: s
         return LocatedChange(title, change, channel=channel, follows=True)
     of_difference = not scored.startswith("tooth.")
     by = f"{by_decibels(change)} against what healthy machines change by" if of_difference else by_decibels(change)
-    what = "what has changed of the pattern of the teeth" if of_difference else "pattern of the teeth"
-    return LocatedChange(f"{what} of {shaft} all round, {by}", change, channel=channel)
+    subject = "what has changed of the pattern of the teeth" if of_difference else "pattern of the teeth"
+    return LocatedChange(f"{subject} of {shaft} all round, {by}", change, channel=channel)
 
 
 MIN_SHARE = 0.01
@@ -759,7 +769,7 @@ REPEATED = ("floor.to_signal", "floor.total", "raw.level")
 
 def gap_places(
     now: ReducedRecording,
-    other: ReducedRecording,
+    baseline: ReducedRecording,
     structural: StructuralFloor,
     *,
     is_reference: bool,
@@ -775,11 +785,11 @@ def gap_places(
     Parameters
     ----------
     now : ReducedRecording
-    other : ReducedRecording
+    baseline : ReducedRecording
         A healthy recording of the same machine, or its simulation.
     structural : StructuralFloor
     is_reference : bool
-        Whether `other` is a recording of the same machine: the teeth's patterns can then be subtracted.
+        Whether `baseline` is a recording of the same machine: the teeth's patterns can then be subtracted.
     change : Features or None
         What `change_features` or `difference_features` made of the two; None: made here.
 
@@ -789,18 +799,20 @@ def gap_places(
         If the reference was taken at another speed.
     """
     if change is None:
-        change = change_features(now, other) if is_reference else difference_features(now, other)
+        change = change_features(now, baseline) if is_reference else difference_features(now, baseline)
     distances = structural.from_centre(change.names, change.values)
     if is_reference:
         distances = beyond_the_mesh(change.names, distances)
     floors = structural.of(change.names), REPEATABLE * pooled_scatter(change)
     # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
-    both = distances / np.maximum(*floors)
-    comparison = ComparedPair(now, other, is_reference, _named(change.names, distances), _named(change.names, both))
+    ratios = distances / np.maximum(*floors)
+    comparison = ComparedPair(
+        now, baseline, is_reference, _named(change.names, distances), _named(change.names, ratios)
+    )
     members = {family: _telling(change.names, rows) for family, rows in family_members(change.names).items()}
-    energies = {family: max(family_size(both[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
-    least = MIN_SHARE * sum(energies.values())
-    spots = {family: _spot(comparison, family) for family, energy in energies.items() if energy > least}
+    energies = {family: max(family_size(ratios[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
+    min_energy = MIN_SHARE * sum(energies.values())
+    spots = {family: _spot(comparison, family) for family, energy in energies.items() if energy > min_energy}
     following = {family for family, spot in spots.items() if spot is not None and spot.follows}
     total = sum(energy for family, energy in energies.items() if family not in following)
     places = []

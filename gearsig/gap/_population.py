@@ -249,17 +249,21 @@ def fit_recogniser(population: Population, *, with_reference: bool, n_trees: int
         n_jobs=2,
         random_state=_SEED,
     )
-    seen = _visible(floor, tables[0], population.causes)
+    is_visible = _visible(floor, tables[0], population.causes)
     exchanged = mirrored(floor.names)
-    changes, scatter = (np.concatenate([table[seen], table[seen][:, exchanged]]) for table in tables)
-    loads = np.tile(population.loads_n_per_mm[seen], 2)
+    changes, scatter = (np.concatenate([table[is_visible], table[is_visible][:, exchanged]]) for table in tables)
+    loads = np.tile(population.loads_n_per_mm[is_visible], 2)
     rows = input_rows(floor, changes, scatter, loads).astype(np.float32)
-    causes = np.tile(population.causes[seen], 2)
-    forest.fit(rows, causes, sample_weight=np.tile(even_weights(population.sources[seen], population.causes[seen]), 2))
+    causes = np.tile(population.causes[is_visible], 2)
+    forest.fit(
+        rows,
+        causes,
+        sample_weight=np.tile(even_weights(population.sources[is_visible], population.causes[is_visible]), 2),
+    )
     names = tuple(map(str, forest.classes_))
     usual_load = float(np.median(population.loads_n_per_mm))
-    simulated = np.tile(~population.by_hand[seen], 2)
-    machines = np.concatenate([population.rigs[seen], -1 - population.rigs[seen]])[simulated]
+    simulated = np.tile(~population.by_hand[is_visible], 2)
+    machines = np.concatenate([population.rigs[is_visible], -1 - population.rigs[is_visible]])[simulated]
     labels = fit_label_space(within_reach(rows[simulated]).astype(np.float64), causes[simulated], machines)
     if with_reference:
         return Recogniser(names, floor, Trees.of(forest), usual_load, labels)
@@ -285,8 +289,8 @@ def _visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str
     """Return which rows to learn from: an effect that changes nothing would only teach that nothing is that effect."""
     rows = floor.from_centre(floor.names, changes) / floor.of(floor.names)
     sizes = np.array([soft_size(floor.names, row) for row in rows]) / floor.whole_of(floor.names)
-    seen: NDArray[np.bool_] = (sizes > MIN_SIZE) | np.isin(causes, (NONE, UNKNOWN))
-    return seen
+    is_visible: NDArray[np.bool_] = (sizes > MIN_SIZE) | np.isin(causes, (NONE, UNKNOWN))
+    return is_visible
 
 
 def load_learned() -> Learned:

@@ -264,9 +264,9 @@ def _costs(
     costs, ways = [], []
     for change in observed:
         misses = change.distances - path.at(severities, change.condition)
-        each = _squares(misses, change.floors) @ weights + _unusual(path)[:, None]
-        ways.append(each.argmin(axis=0))
-        costs.append(each.min(axis=0))
+        cost_of_way = _squares(misses, change.floors) @ weights + _unusual(path)[:, None]
+        ways.append(cost_of_way.argmin(axis=0))
+        costs.append(cost_of_way.min(axis=0))
     return np.mean(costs, axis=0), np.array(ways)
 
 
@@ -355,33 +355,33 @@ def transplanted(
     array, (n,)
         dB; `change.…` from what repetition gives.
     """
-    given = dict(zip(names, change.tolist(), strict=True))
-    moved = dict(given)
+    simulated_change = dict(zip(names, change.tolist(), strict=True))
+    moved = dict(simulated_change)
     gain_db = real["mesh.total"] - simulated["mesh.total"]
     floor_db = real["floor.total"] - simulated["floor.total"] - gain_db
     for name in names:
         feature = Feature.of(name)
         gain_of_effect_db = level_db + (ground_db - gain_db if feature.is_of_the_body else 0.0)
         if (feature.is_relative and feature.family != "change") or name == "mesh.half":
-            moved[name] = _added(given[name], simulated[name], real[name], gain_of_effect_db)
+            moved[name] = _added(simulated_change[name], simulated[name], real[name], gain_of_effect_db)
         elif feature.is_shaft_level or name == "floor.total" or name.startswith(_BANDS):
-            moved[name] = _added(given[name], simulated[name], real[name], gain_db + gain_of_effect_db)
+            moved[name] = _added(simulated_change[name], simulated[name], real[name], gain_db + gain_of_effect_db)
         elif feature.family in ("envelope", "line") and name != "envelope.depth":
-            moved[name] = _added(given[name], simulated[name], real[name], level_db - floor_db)
-    moved |= _mesh(given, real, level_db)
+            moved[name] = _added(simulated_change[name], simulated[name], real[name], level_db - floor_db)
+    moved |= _mesh(simulated_change, real, level_db)
     for name in names:
         if name.startswith(_KURTOSIS):
             part = _part(moved[name.replace(_KURTOSIS, _BANDS)])
-            moved[name] = part * (simulated[name] + given[name] - real[name])
+            moved[name] = part * (simulated[name] + simulated_change[name] - real[name])
     for side in SIDES:
         for name, rose in _STRONGEST.items():
             strongest = name.format(side)
             moved[strongest] = _risen(
-                real[strongest], simulated[strongest] + given[strongest], moved[rose.format(side)]
+                real[strongest], simulated[strongest] + simulated_change[strongest], moved[rose.format(side)]
             )
-        moved |= _tooth(f"tooth.{side}", moved, given, simulated, real)
-        if f"change.{side}.level" in given:
-            moved |= _pattern(f"change.{side}", given, usual, real[f"tooth.{side}.level"], level_db)
+        moved |= _tooth(f"tooth.{side}", moved, simulated_change, simulated, real)
+        if f"change.{side}.level" in simulated_change:
+            moved |= _pattern(f"change.{side}", simulated_change, usual, real[f"tooth.{side}.level"], level_db)
     return np.array([moved[name] for name in names])
 
 
@@ -397,10 +397,10 @@ def _added(change_db: float, simulated_db: float, real_db: float, gain_db: float
     return float(10.0 * np.log10(1.0 + more / _power(real_db)))
 
 
-def _mesh(given: Mapping[str, float], real: Mapping[str, float], level_db: float) -> dict[str, float]:
+def _mesh(change: Mapping[str, float], real: Mapping[str, float], level_db: float) -> dict[str, float]:
     """Return the mesh harmonics' changes: what is added comes as much louder, on the harmonics that the machine has."""
-    shares = [name for name in given if name.startswith("mesh.share.")]
-    levels = [_louder(given[name] + given["mesh.total"], level_db) for name in shares]
+    shares = [name for name in change if name.startswith("mesh.share.")]
+    levels = [_louder(change[name] + change["mesh.total"], level_db) for name in shares]
     powers = np.array([_power(real[name]) for name in shares])
     total = float(10.0 * np.log10(powers @ [_power(level) for level in levels] / powers.sum()))
     return {"mesh.total": total} | {name: level - total for name, level in zip(shares, levels, strict=True)}
@@ -424,7 +424,7 @@ def _risen(born_db: float, alone_db: float, more_db: float) -> float:
 def _tooth(
     name: str,
     moved: Mapping[str, float],
-    given: Mapping[str, float],
+    change: Mapping[str, float],
     simulated: Mapping[str, float],
     real: Mapping[str, float],
 ) -> dict[str, float]:
@@ -432,26 +432,27 @@ def _tooth(
     peak, elsewhere = moved[f"{name}.peak"], moved[f"{name}.elsewhere"]
     part = _part(moved[f"{name}.level"])
     shapes = {
-        f"{name}.{what}": part * (simulated[f"{name}.{what}"] + given[f"{name}.{what}"] - real[f"{name}.{what}"])
-        for what in ("kurtosis", "width", "below_mesh", "centroid")
+        f"{name}.{detail}": part
+        * (simulated[f"{name}.{detail}"] + change[f"{name}.{detail}"] - real[f"{name}.{detail}"])
+        for detail in ("kurtosis", "width", "below_mesh", "centroid")
     }
-    second = _risen(real[f"{name}.second"], simulated[f"{name}.second"] + given[f"{name}.second"], peak)
+    second = _risen(real[f"{name}.second"], simulated[f"{name}.second"] + change[f"{name}.second"], peak)
     return {f"{name}.prominence": peak - elsewhere, f"{name}.second": second, **shapes}
 
 
 def _pattern(
-    name: str, given: Mapping[str, float], usual: Mapping[str, float], pattern_db: float, level_db: float
+    name: str, change: Mapping[str, float], usual: Mapping[str, float], pattern_db: float, level_db: float
 ) -> dict[str, float]:
     """Return how far the pattern of the difference lies from what mere repetition gives."""
     moved = {}
-    for what in ("level", "elsewhere", "peak"):
-        key = f"{name}.{what}"
-        moved[key] = float(10.0 * np.log10(1.0 + _power(given[key] + level_db) / _power(usual[key])))
+    for detail in ("level", "elsewhere", "peak"):
+        key = f"{name}.{detail}"
+        moved[key] = float(10.0 * np.log10(1.0 + _power(change[key] + level_db) / _power(usual[key])))
     part = _part(moved[f"{name}.level"])
-    for what in _OF_A_PATTERN:
-        key = f"{name}.{what}"
-        moved[key] = part * (given[key] - usual[key])
-    agreement = (1.0 + _power(given[f"{name}.level"] + level_db - pattern_db)) ** -0.5
+    for detail in _OF_A_PATTERN:
+        key = f"{name}.{detail}"
+        moved[key] = part * (change[key] - usual[key])
+    agreement = (1.0 + _power(change[f"{name}.level"] + level_db - pattern_db)) ** -0.5
     moved[f"{name}.agreement"] = 10.0 * (agreement - 1.0)
     return moved
 
@@ -464,7 +465,7 @@ def _pattern(
 ALIKE = 0.8
 """Cosine of the angle between two predictions, in floors, from which they say the same."""
 
-OWN_FROM = 1.5
+MIN_OWN_FEATURE = 1.5
 """Floors that an effect must change a feature by for it to be its own."""
 
 
@@ -515,7 +516,7 @@ class _Score:
 def own_features(fit: Fit, observed: ObservedChange) -> FloatArray:
     """Return 1 for the features that the fitted effect changes, 0 for the others; its strongest one at least."""
     predicted = np.abs(fit.at(observed.condition) / observed.floors)
-    used: FloatArray = (predicted >= min(OWN_FROM, float(predicted.max()))).astype(np.float64)
+    used: FloatArray = (predicted >= min(MIN_OWN_FEATURE, float(predicted.max()))).astype(np.float64)
     return used
 
 
@@ -538,12 +539,12 @@ def closed_shares(fits: Mapping[str, Sequence[Fit]], folds: Sequence[Fold]) -> d
     """
     shares: dict[str, list[float]] = {name: [] for name in fits}
     for i, fold in enumerate(folds):
-        one_fold = {name: of_effect[i] for name, of_effect in fits.items()}
-        shown = [fit for fit in one_fold.values() if _largest_predicted(fit, fold.scored) >= MIN_PREDICTED]
+        fits_of_fold = {name: of_effect[i] for name, of_effect in fits.items()}
+        shown = [fit for fit in fits_of_fold.values() if _largest_predicted(fit, fold.scored) >= MIN_PREDICTED]
         if not shown:
             continue
         used = np.max([own_features(fit, fold.scored) for fit in shown], axis=0)
-        for name, fit in one_fold.items():
+        for name, fit in fits_of_fold.items():
             shares[name].append(_before_and_after(fit, fold.scored, used)[2])
     return {name: float(np.mean(values)) for name, values in shares.items() if values}
 
@@ -618,10 +619,10 @@ def _elsewhere(paths: Sequence[EffectPath], fold: Fold) -> float | None:
 
     The level comes from the condition's own other revolutions: no other condition knows the path at this speed.
     """
-    others = [change for change in fold.fitted if change.condition != fold.scored.condition]
-    if not others:
+    elsewhere = [change for change in fold.fitted if change.condition != fold.scored.condition]
+    if not elsewhere:
         return None
-    fit = fit_effect(paths, others)
+    fit = fit_effect(paths, elsewhere)
     for change in fold.fitted:
         if change.condition == fold.scored.condition:
             fit = fit.at_level_of(change)
@@ -632,11 +633,13 @@ def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPat
     used = own_features(fit, fold.scored)
     wrong = [fit_path(path, fold.fitted) for path in (*paths, *excluded) if path.options != fit.path.options]
     placebos = [
-        _before_and_after(other, fold.scored, used)[2] for other in wrong if not _is_alike(fit, other, fold.scored)
+        _before_and_after(wrong_fit, fold.scored, used)[2]
+        for wrong_fit in wrong
+        if not _is_alike(fit, wrong_fit, fold.scored)
     ]
     variances = np.zeros(3)
     for group in fold.again:
-        rows = np.array([_before_and_after(fit, one, used) for one in group])
+        rows = np.array([_before_and_after(fit, change, used) for change in group])
         variances += (len(rows) - 1.0) * rows.var(axis=0)
     return _Score(
         _before_and_after(fit, fold.scored, used),
@@ -648,9 +651,9 @@ def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPat
     )
 
 
-def _is_alike(fit: Fit, other: Fit, scored: ObservedChange) -> bool:
+def _is_alike(first: Fit, second: Fit, scored: ObservedChange) -> bool:
     """Whether two places predict the same: bearings of one type on one shaft do, and are no placebos of each other."""
-    a, b = (one.at(scored.condition) / scored.floors for one in (fit, other))
+    a, b = (fitted.at(scored.condition) / scored.floors for fitted in (first, second))
     product = float(np.sqrt((a @ a) * (b @ b)))
     return product > 0.0 and float(a @ b) > ALIKE * product
 

@@ -235,7 +235,7 @@ def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArra
 
 Signs = tuple[tuple[str, int], ...]
 
-NOTHING_SAID = 1.0
+NEUTRAL_STRENGTH = 1.0
 """Strength that counts for no gap, of which there is no rule: healthy machines are one spread from usual."""
 
 MAX_OF_A_SIGN = 8.0
@@ -343,8 +343,8 @@ class Recogniser:
         row = self.input_row(change, tooth_load_n_per_mm)
         shares = self.trees.probabilities(row)
         if self.linear is not None:
-            told = self.linear.probabilities(within_reach(row))
-            shares = (1.0 - LINEAR_SHARE) * shares + LINEAR_SHARE * told
+            linear_shares = self.linear.probabilities(within_reach(row))
+            shares = (1.0 - LINEAR_SHARE) * shares + LINEAR_SHARE * linear_shares
             shares = shares * self._by_the_rules(change, textbook_rules(effects))
         shares = np.maximum(shares, MIN_PROBABILITY)
         return dict(zip(self.causes, (shares / shares.sum()).tolist(), strict=True))
@@ -365,8 +365,10 @@ class Recogniser:
         names = self.floor.names
         spreads = self.floor.of(names) / REPEATABLE
         deviations = self.floor.from_centre(names, change.values) / spreads
-        said = textbook_strengths(rules, dict(zip(names, deviations.tolist(), strict=True)))
-        factors: FloatArray = np.exp(RULES_WEIGHT * np.array([said.get(name, NOTHING_SAID) for name in self.causes]))
+        strengths = textbook_strengths(rules, dict(zip(names, deviations.tolist(), strict=True)))
+        factors: FloatArray = np.exp(
+            RULES_WEIGHT * np.array([strengths.get(name, NEUTRAL_STRENGTH) for name in self.causes])
+        )
         return factors
 
 
@@ -386,13 +388,13 @@ def input_rows(
     kept = [i for i, name in enumerate(floor.names) if not name.startswith(left_out)]
     names = [floor.names[i] for i in kept]
     distances = floor.from_centre(floor.names, changes)[:, kept]
-    both = np.hypot(floor.of(names) / REPEATABLE, scatter[:, kept])
-    held = seen_rows(names, beyond_the_mesh(names, distances) / both)
+    scatters = np.hypot(floor.of(names) / REPEATABLE, scatter[:, kept])
+    held = seen_rows(names, beyond_the_mesh(names, distances) / scatters)
     further = np.ones(held.shape[1], dtype=bool)
     further[: 2 * len(names)] = np.tile(counted_from_the_mesh(names) != 0.0, 2)  # the others are as they were
     return np.column_stack(
         [
-            seen_rows(names, distances / both),
+            seen_rows(names, distances / scatters),
             held[:, further],
             np.log10(np.maximum(loads_n_per_mm, MIN_LOAD_N_PER_MM)),
         ]
@@ -503,7 +505,7 @@ def _recogniser(arrays: Mapping[str, Any], way: str) -> Recogniser:
         float(stored["largest"]),
     )
     linear = LinearRule(*(stored[key].astype(np.float64) for key in _LINEAR)) if _LINEAR[0] in stored else None
-    directions, *others = (stored[key].astype(np.float64) for key in _LABELS)
-    labels = LabelSpace(directions, tuple(map(str, stored["labels"])), *others)
+    directions, *remaining = (stored[key].astype(np.float64) for key in _LABELS)
+    labels = LabelSpace(directions, tuple(map(str, stored["labels"])), *remaining)
     trees, usual_load = Trees(*(stored[key] for key in _TREES)), float(stored["usual_load_n_per_mm"])
     return Recogniser(tuple(map(str, stored["causes"])), floor, trees, usual_load, labels, linear)

@@ -62,7 +62,7 @@ class GearFrame:
     teeth : (int, int)
     bearings : tuple of BearingFrame
     background : tuple of float
-        Orders at which a machine's other pairs and shafts are heard, per revolution of the driver: `other_lines`.
+        Orders at which a machine's other pairs and shafts are heard, per revolution of the driver: `background_orders`.
     """
 
     pair: GearPair
@@ -106,14 +106,14 @@ def gear_frame(rig: Rig) -> GearFrame:
                 bearing.name, side, *(orders_of_shaft.get(name, nan) for name in ("BPFO", "BPFI", "BSF", "FTF"))
             )
         )
-    return GearFrame(pair, shafts, teeth, tuple(bearings), other_lines(rig))
+    return GearFrame(pair, shafts, teeth, tuple(bearings), background_orders(rig))
 
 
 N_BACKGROUND_HARMONICS, N_BACKGROUND_SIDEBANDS, N_BACKGROUND_ORDERS = 20, 2, 4
 """Of another pair's mesh, beside each of its harmonics by either of its shafts, and of another shaft."""
 
 
-def other_lines(rig: Rig) -> tuple[float, ...]:
+def background_orders(rig: Rig) -> tuple[float, ...]:
     """Return the orders of a rig's pairs but the first, per revolution of that one's driver, rising.
 
     Mesh harmonics with sidebands at both of a pair's shafts, and the first orders of shafts that the first pair does
@@ -121,9 +121,9 @@ def other_lines(rig: Rig) -> tuple[float, ...]:
     """
     if len(rig.pairs) < 2:
         return ()
-    first, *others = rig.pairs
+    first, *further_pairs = rig.pairs
     line_orders: set[float] = set()
-    for pair in others:
+    for pair in further_pairs:
         mesh = rig.mesh_order(pair, first.driver)
         turns = [rig.ratio(shaft, to=first.driver) for shaft in (pair.driver, pair.driven)]
         for shaft, ratio in zip((pair.driver, pair.driven), turns, strict=True):
@@ -131,21 +131,21 @@ def other_lines(rig: Rig) -> tuple[float, ...]:
                 line_orders |= {k * ratio for k in range(1, N_BACKGROUND_ORDERS + 1)}
         if mesh is None:
             continue
-        beside = {0.0} | {
+        offsets = {0.0} | {
             sign * k * ratio
             for ratio in turns
             if ratio is not None
             for k in range(1, N_BACKGROUND_SIDEBANDS + 1)
             for sign in (-1, 1)
         }
-        line_orders |= {k * mesh + step for k in range(1, N_BACKGROUND_HARMONICS + 1) for step in beside}
+        line_orders |= {k * mesh + step for k in range(1, N_BACKGROUND_HARMONICS + 1) for step in offsets}
     shaft_ratios = (1.0, rig.ratio(first.driven, to=first.driver) or 1.0)
     steps = np.array([k * ratio for ratio in shaft_ratios for k in range(-SMOOTH_SIDEBANDS, SMOOTH_SIDEBANDS + 1)])
     teeth = float(first.driver_teeth or np.inf)
 
     def is_own(order: float) -> bool:
-        beside = order - steps
-        return bool(np.min(np.abs(beside - teeth * np.maximum(np.round(beside / teeth), 1.0))) < CLOSE)
+        offsets = order - steps
+        return bool(np.min(np.abs(offsets - teeth * np.maximum(np.round(offsets / teeth), 1.0))) < CLOSE)
 
     return tuple(sorted(order for order in line_orders if order > 0.0 and not is_own(order)))
 
@@ -287,8 +287,8 @@ class ShaftAverage:
         """
         degrees = max(self.n_blocks - 1, 1)
         # The F distribution with 2 and 2m degrees has P(F > f) = (1 + f/m)^(−m).
-        least = degrees * (BY_CHANCE ** (-1.0 / degrees) - 1.0)
-        held: NDArray[np.bool_] = np.abs(self.lines) ** 2 > least * self.scatter
+        threshold = degrees * (BY_CHANCE ** (-1.0 / degrees) - 1.0)
+        held: NDArray[np.bool_] = np.abs(self.lines) ** 2 > threshold * self.scatter
         return held
 
     def residual(self, lines: ComplexArray | None = None) -> ComplexArray:
@@ -296,14 +296,14 @@ class ShaftAverage:
 
         Orders that the other shaft has, too, are left out unless those are most: which teeth meet depends on them.
         """
-        given = self.lines if lines is None else lines
-        orders = np.arange(len(given))
+        source_lines = self.lines if lines is None else lines
+        orders = np.arange(len(source_lines))
         near = orders_from_mesh(orders, self.teeth) <= SMOOTH_SIDEBANDS
         out = near | (orders <= SMOOTH_SHAFT_ORDERS) | (orders > self.highest)
         apart = self.teeth // gcd(self.teeth, self.other_teeth)
         if apart >= MIN_APART:
             out |= orders % apart == 0
-        kept: ComplexArray = np.where(out, 0.0, given)
+        kept: ComplexArray = np.where(out, 0.0, source_lines)
         return kept
 
     @cached_property
@@ -451,8 +451,8 @@ def _on_a_gear_line(frequency_hz: float, width_hz: float, speed_hz: float, frame
     Of a slow shaft only the first orders count, which are strong: all of them lie everywhere.
     """
     shafts_hz = [order * speed_hz for order in frame.shaft_orders]
-    told = [hz for hz in shafts_hz if hz >= _APART * width_hz or round(frequency_hz / hz) <= _N_SHAFT_HARMONICS]
-    return any(_to_a_multiple(frequency_hz, hz) < 2.0 * width_hz for hz in (frame.teeth[0] * speed_hz, *told))
+    counted_hz = [hz for hz in shafts_hz if hz >= _APART * width_hz or round(frequency_hz / hz) <= _N_SHAFT_HARMONICS]
+    return any(_to_a_multiple(frequency_hz, hz) < 2.0 * width_hz for hz in (frame.teeth[0] * speed_hz, *counted_hz))
 
 
 def _to_a_multiple(frequency_hz: float, of_hz: float) -> float:
@@ -497,17 +497,17 @@ def speed_figures(angle: ShaftAngle, other_shafts: Sequence[float] = ()) -> Spee
     speed = 1.0 / np.diff(whole)
     middle = 0.5 * (whole[1:] + whole[:-1])
     slope, level = np.polyfit(middle - middle.mean(), speed, 1)
-    rest = (speed - level - slope * (middle - middle.mean())) / level
-    rest = _without_cycles(rest, tuple(_cycles_per_revolution(other_shafts, len(rest))))
-    window = np.hanning(len(rest) + 2)[1:-1]
-    power = np.abs(np.fft.rfft(rest * window, 4 * len(rest)))[1:] ** 2
+    deviation = (speed - level - slope * (middle - middle.mean())) / level
+    deviation = _without_cycles(deviation, tuple(_cycles_per_revolution(other_shafts, len(deviation))))
+    window = np.hanning(len(deviation) + 2)[1:-1]
+    power = np.abs(np.fft.rfft(deviation * window, 4 * len(deviation)))[1:] ** 2
     strongest = int(np.argmax(power))
     typical = float(np.median(power)) / np.log(2.0)
     return SpeedFigures(
         float(slope * (middle[-1] - middle[0]) / level),
-        float(np.std(rest)),
+        float(np.std(deviation)),
         float(power[strongest] / max(typical, 1e-30)),
-        float((strongest + 1) / (4 * len(rest)) * level),
+        float((strongest + 1) / (4 * len(deviation)) * level),
     )
 
 
@@ -525,16 +525,16 @@ MAX_RUN_OUT = 2e-3
 drive whose alias falls on another shaft's order is larger, and only so much of it is taken out."""
 
 
-def _without_cycles(rest: FloatArray, cycles: Sequence[float]) -> FloatArray:
+def _without_cycles(deviation: FloatArray, cycles: Sequence[float]) -> FloatArray:
     """Return a speed without the best-fitting sine at each of some frequencies, in cycles per sample."""
     if not cycles:
-        return rest
-    phase = 2.0 * np.pi * np.outer(np.arange(len(rest)), cycles)
+        return deviation
+    phase = 2.0 * np.pi * np.outer(np.arange(len(deviation)), cycles)
     waves = np.hstack([np.cos(phase), np.sin(phase)])
-    coefficients = np.linalg.lstsq(waves, rest, rcond=None)[0]
+    coefficients = np.linalg.lstsq(waves, deviation, rcond=None)[0]
     amplitudes = np.hypot(*coefficients.reshape(2, -1))
-    taken = np.minimum(1.0, MAX_RUN_OUT / np.maximum(amplitudes, 1e-300))
-    remainder: FloatArray = rest - waves @ (coefficients * np.tile(taken, 2))
+    removed_share = np.minimum(1.0, MAX_RUN_OUT / np.maximum(amplitudes, 1e-300))
+    remainder: FloatArray = deviation - waves @ (coefficients * np.tile(removed_share, 2))
     return remainder
 
 
@@ -708,12 +708,12 @@ def _without_lines(values: FloatArray, background: FloatArray, n_per_rev: int) -
     hann = np.array([-0.25, 0.5, -0.25])
     unit = _line(at[:, None] - three, n) @ hann
     for _ in range(N_PASSES):
-        for f, k, beside, whole in zip(at, near, three, unit, strict=True):
+        for f, k, neighbours, whole in zip(at, near, three, unit, strict=True):
             kept = slice(max(k - REACH, 0), min(k + REACH, len(lines)))
             away = f - np.arange(kept.start, kept.stop)
-            lines[kept] -= (lines[beside] @ hann) / whole * _line(away, n)
-    rest: FloatArray = irfft(lines, n)
-    return rest
+            lines[kept] -= (lines[neighbours] @ hann) / whole * _line(away, n)
+    remainder: FloatArray = irfft(lines, n)
+    return remainder
 
 
 def _line(away: FloatArray, n: int) -> ComplexArray:

@@ -118,10 +118,10 @@ class CanBeQuiet(Protocol):
 
 
 @runtime_checkable
-class HasCourses(Protocol):
+class HasFurtherSettings(Protocol):
     """A twin that knows further settings of a tooth's fault, which take another course over the engagement."""
 
-    def courses(self, effect: str) -> Sequence[Added]:
+    def further_settings(self, effect: str) -> Sequence[Added]:
         """Return those settings, beside the candidates; none where these show all there is."""
         ...
 

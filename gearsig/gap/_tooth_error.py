@@ -94,13 +94,13 @@ def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> l
     """
     changes = []
     for side in (0, 1):
-        here, before = (_resampled((t.driver_um, t.driven_um)[side]) for t in (now, healthy))
+        after, before = (_resampled((t.driver_um, t.driven_um)[side]) for t in (now, healthy))
         errors = [float(np.mean((t.driver_error_um, t.driven_error_um)[side])) for t in (now, healthy)]
-        pattern = here - _turned(before, here)
+        pattern = after - _turned(before, after)
         rms = sqrt(float(_window_energy(_banded(pattern, LOWEST_ORDER)).max()) / WINDOW)
         changes.append(ToothErrorChange(side, pattern, _resampled(healthy.mesh_um[None])[0], rms, hypot(*errors)))
-    most = max(change.rms_um for change in changes)
-    return [change for change in changes if change.rms_um >= ALIKE * most]
+    largest_um = max(change.rms_um for change in changes)
+    return [change for change in changes if change.rms_um >= ALIKE * largest_um]
 
 
 def _resampled(rows: FloatArray) -> FloatArray:
@@ -108,21 +108,21 @@ def _resampled(rows: FloatArray) -> FloatArray:
     n, m = rows.size, len(rows) * STEPS
     lines = np.fft.rfft(rows.ravel())
     kept = np.zeros(m // 2 + 1, dtype=np.complex128)
-    both = min(len(lines), len(kept))
+    n_kept = min(len(lines), len(kept))
     # Both are at the middles of their steps.
-    kept[:both] = lines[:both] * np.exp(1j * pi * np.arange(both) * (1.0 / m - 1.0 / n))
+    kept[:n_kept] = lines[:n_kept] * np.exp(1j * pi * np.arange(n_kept) * (1.0 / m - 1.0 / n))
     resampled: FloatArray = np.fft.irfft(kept, m).reshape(-1, STEPS) * (m / n)
     return resampled
 
 
-def _turned(before: FloatArray, here: FloatArray) -> FloatArray:
-    x, y = here.ravel(), before.ravel()
+def _turned(before: FloatArray, after: FloatArray) -> FloatArray:
+    x, y = after.ravel(), before.ravel()
     turns = [0, *np.argsort(-circular_correlation(x, y))[:5].tolist()]
     differences = [
-        float(np.median(np.abs(_banded((x - np.roll(y, t)).reshape(here.shape), LOWEST_ORDER)))) for t in turns
+        float(np.median(np.abs(_banded((x - np.roll(y, t)).reshape(after.shape), LOWEST_ORDER)))) for t in turns
     ]
     best = int(np.argmin(differences))
-    turned: FloatArray = np.roll(y, turns[best] if 2.0 * differences[best] < differences[0] else 0).reshape(here.shape)
+    turned: FloatArray = np.roll(y, turns[best] if 2.0 * differences[best] < differences[0] else 0).reshape(after.shape)
     return turned
 
 
@@ -140,7 +140,7 @@ def _window_energy(wave: FloatArray) -> FloatArray:
     return np.convolve(np.concatenate([square, square[: WINDOW - 1]]), np.ones(WINDOW), "valid")
 
 
-def course_descriptors(change: ToothErrorChange) -> FloatArray:
+def tooth_error_descriptors(change: ToothErrorChange) -> FloatArray:
     """Return the course of the largest event, 17 numbers on a scale that is logarithmic where they are large.
 
     Read from the root of the damaged tooth to its tip, as the driver's contact runs: how much of all is in it, and
@@ -151,8 +151,8 @@ def course_descriptors(change: ToothErrorChange) -> FloatArray:
     wave = _banded(change.pattern_um, LOWEST_ORDER)
     energy = _window_energy(wave)
     start = int(np.argmax(energy))
-    beside = float(np.median(np.roll(wave, -start)[WINDOW:] ** 2)) if len(wave) > WINDOW else 0.0
-    over = 10.0 * log10(max(float(energy[start]) / WINDOW, 1e-12) / max(beside, 1e-12))
+    background = float(np.median(np.roll(wave, -start)[WINDOW:] ** 2)) if len(wave) > WINDOW else 0.0
+    over = 10.0 * log10(max(float(energy[start]) / WINDOW, 1e-12) / max(background, 1e-12))
     event = _straightened(np.roll(_banded(change.pattern_um, 0), -start)[:WINDOW])
     event = event if change.side == 0 else event[::-1]
     size = np.abs(event)
@@ -169,7 +169,7 @@ def course_descriptors(change: ToothErrorChange) -> FloatArray:
     phase = 2.0 * pi * (at if change.side == 0 else -at)
     power = np.abs(np.fft.rfft(event, 16 * STEPS)) ** 2
     orders = np.fft.rfftfreq(16 * STEPS, 1.0 / STEPS)
-    told = np.array(
+    descriptors = np.array(
         [
             float(energy[start]) / max(float(np.sum(wave**2)), 1e-24),
             min(over, 40.0),
@@ -188,7 +188,7 @@ def course_descriptors(change: ToothErrorChange) -> FloatArray:
             float(np.ptp(event)) / peak,
         ]
     )
-    return np.asarray(np.sign(told) * np.log1p(np.abs(told)))
+    return np.asarray(np.sign(descriptors) * np.log1p(np.abs(descriptors)))
 
 
 def _straightened(event: FloatArray) -> FloatArray:
@@ -201,7 +201,7 @@ def _straightened(event: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class KnownCourses:
+class KnownToothErrors:
     """Descriptors of events of known cause, and how likely each fault makes another: a mean of Gaussian kernels.
 
     L(x | fault) = mean_i exp(−|A (x − x_i)|²/2) + b, A the inverse root of the covariance within faults, b the weight
@@ -240,7 +240,7 @@ def _covariance(rows: FloatArray) -> FloatArray:
 
 
 @cache
-def load_known_courses() -> KnownCourses:
+def load_known_tooth_errors() -> KnownToothErrors:
     """Return those that come with this version.
 
     Raises
@@ -251,11 +251,11 @@ def load_known_courses() -> KnownCourses:
     arrays = read_arrays(TOOTH_ERRORS_FILE, MAX_BYTES)
     if arrays is None:
         raise InputError(
-            "the courses of transmission errors are not there, or damaged",
+            "the known changes of transmission errors are not there, or damaged",
             where=TOOTH_ERRORS_FILE.name,
             remedy=MAKE_TOOTH_ERRORS,
         )
-    return KnownCourses(np.asarray(arrays["descriptors"], dtype=np.float64), arrays["faults"])
+    return KnownToothErrors(np.asarray(arrays["descriptors"], dtype=np.float64), arrays["faults"])
 
 
 def has_encoders(recording: Recording) -> bool:
@@ -329,7 +329,9 @@ def tooth_error_evidence(recording: Recording, reference: Recording) -> ToothErr
     if not changes:
         return None
     weight = 1.0 / (1.0 + now.mesh_hz / STATIC_MESH_HZ)
-    said = [load_known_courses().log_likelihoods(course_descriptors(change)) for change in changes]
-    told = {name: weight * log(float(np.mean([exp(measured[name]) for measured in said]))) for name in TOOTH_FAULTS}
+    per_gear = [load_known_tooth_errors().log_likelihoods(tooth_error_descriptors(change)) for change in changes]
+    log_likelihoods = {
+        name: weight * log(float(np.mean([exp(measured[name]) for measured in per_gear]))) for name in TOOTH_FAULTS
+    }
     gear = SIDES[changes[0].side] if len(changes) == 1 else ""
-    return ToothErrorEvidence(told, max(change.rms_um for change in changes), gear)
+    return ToothErrorEvidence(log_likelihoods, max(change.rms_um for change in changes), gear)

@@ -17,7 +17,7 @@ from gearsig.cache import keep, modules_digest, read_arrays
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.gap._conditions import SEED, Condition, halves, observed
-from gearsig.gap._evidence import ONE_TOOTH, SIGNS, TOOTH_FAULTS, told_options
+from gearsig.gap._evidence import SIGNS, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS, determined_options
 from gearsig.gap._features import whole_and_parts
 from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
 from gearsig.gap._places import SAME_ORDER
@@ -36,15 +36,15 @@ from gearsig.gap._prediction import (
     transplanted,
 )
 from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording
-from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, HasCourses, OperatingCondition, Twin
+from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, HasFurtherSettings, OperatingCondition, Twin
 from gearsig.gap._types import GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
 from gearsig.gap._waveform import (
     N_HARMONICS,
     OFFSETS,
     WaveformMatch,
-    compared_course,
+    compare_waveform,
     gain_scatter,
-    joined_courses,
+    joined_waveforms,
     mesh_sidebands,
     sideband_noise,
     waveform_match,
@@ -237,10 +237,10 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
     key = run.healthy_key, task.seed
     try:
         if key not in known:
-            known[key] = _gathered(run, task.seed, None, 0)
+            known[key] = _reduced_run(run, task.seed, None, 0)
         healthy = known[key]
         # A healthy specimen is measured again with other noise: against itself everything would be zero.
-        now = _gathered(run, task.seed, task.added, run.noise if task.added is not None else max(run.noise, 1))
+        now = _reduced_run(run, task.seed, task.added, run.noise if task.added is not None else max(run.noise, 1))
         alone = {}
         if task.further:
             alone = {name: change_once(_of(now, name), _of(healthy, name))[1] for name in healthy.channels}
@@ -257,7 +257,7 @@ def _of(reduced: ReducedRecording, *channels: str) -> ReducedRecording:
     return reduced.with_channels({name: reduced.channels[name] for name in channels})
 
 
-def _gathered(run: TwinRun, seed: int, added: Added | None, noise: int) -> ReducedRecording:
+def _reduced_run(run: TwinRun, seed: int, added: Added | None, noise: int) -> ReducedRecording:
     from gearsig.gap._reduction import reduce_recording
 
     recording = run.twin.run(
@@ -548,28 +548,32 @@ def try_effects(
     if not effects:
         return {}
     changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
-    told = {effect.name: told_options(effect.name, changes, teeth) for effect in effects}
+    determined = {effect.name: determined_options(effect.name, changes, teeth) for effect in effects}
     folds = folds_of(conditions)
     where = " and ".join(c.facts.name for c in conditions)
-    candidates = {name: worth_simulating(twin.candidates(name), told[name]) for name in told}
-    courses: dict[str, Sequence[Added]] = {}
-    if isinstance(twin, HasCourses) and any(condition.reference is not None for condition in conditions):
-        courses = {n: [a for a in twin.courses(n) if told[n].items() <= a.options.items()] for n in told}
+    candidates = {name: worth_simulating(twin.candidates(name), determined[name]) for name in determined}
+    further_settings: dict[str, Sequence[Added]] = {}
+    if isinstance(twin, HasFurtherSettings) and any(condition.reference is not None for condition in conditions):
+        further_settings = {
+            n: [a for a in twin.further_settings(n) if determined[n].items() <= a.options.items()] for n in determined
+        }
     banks = banks_of(
         [_run(twin, condition) for condition in conditions],
-        {name: [*candidates[name], *courses.get(name, ())] for name in told},
+        {name: [*candidates[name], *further_settings.get(name, ())] for name in determined},
         seeds=[SEED],
         folder=cache,
         processes=PROCESSES,
         fresh=fresh,
-        on_progress=lambda done, of: on_progress(f"simulating {len(told)} effects at the point of {where}", done / of),
+        on_progress=lambda done, of: on_progress(
+            f"simulating {len(determined)} effects at the point of {where}", done / of
+        ),
     )
     tried_effects, fits = {}, {}
     for effect in effects:
         name = effect.name
         every = _paths([at[name] for at in banks], candidates[name], conditions, effect.shows_in)
         if every:
-            paths, excluded = on_shaft(every, told[name])
+            paths, excluded = on_shaft(every, determined[name])
             fits[name] = fold_fits(paths, folds)
             shrink = shrinkage(paths, folds, HELD_OUT, excluded, fits[name])
             match = _match([at[name] for at in banks], conditions, effect) if name in TOOTH_FAULTS else None
@@ -583,23 +587,25 @@ def try_effects(
     }
 
 
-def worth_simulating(candidates: Sequence[Added], told: Mapping[str, str]) -> list[Added]:
+def worth_simulating(candidates: Sequence[Added], determined: Mapping[str, str]) -> list[Added]:
     """Return the candidates on the shaft that the recordings tell by themselves, and the strongest on the other one.
 
     That one serves as a placebo. All where nothing is told, or no candidate is there.
     """
-    placed = [added for added in candidates if told.items() <= added.options.items()]
+    placed = [added for added in candidates if determined.items() <= added.options.items()]
     if not placed:
         return list(candidates)
     elsewhere: dict[tuple[tuple[str, float | str], ...], Added] = {}
-    for added in sorted((one for one in candidates if one not in placed), key=lambda one: one.severity):
+    for added in sorted(
+        (candidate for candidate in candidates if candidate not in placed), key=lambda candidate: candidate.severity
+    ):
         elsewhere[tuple(sorted(added.options.items()))] = added
     return [*placed, *elsewhere.values()]
 
 
 def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEffect) -> WaveformMatch | None:
     """Return what an effect's waveforms say at the conditions that have a reference."""
-    courses = []
+    waveforms = []
     for bank, condition in zip(banks, conditions, strict=True):
         if condition.reference is None:
             continue
@@ -611,7 +617,7 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
         noise = sideband_noise(condition.now, condition.reference)
         scatter = gain_scatter(condition.reference, condition.simulated)
         compared = [
-            compared_course(
+            compare_waveform(
                 setting,
                 sidebands[channels, side],
                 observed[:, side],
@@ -623,9 +629,9 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
             for setting, sidebands, on_all in _settings(bank, effect)
             if (side := _side(setting)) is not None
         ]
-        courses.append([course for course in compared if course is not None])
+        waveforms.append([waveform for waveform in compared if waveform is not None])
     severities = [added.severity for bank in banks for added in bank.added]
-    return waveform_match(joined_courses(courses), min(severities), max(severities)) if severities else None
+    return waveform_match(joined_waveforms(waveforms), min(severities), max(severities)) if severities else None
 
 
 def _settings(bank: Bank, effect: GapEffect) -> Iterator[tuple[Added, ComplexArray, bool]]:
@@ -651,12 +657,12 @@ def _side(added: Added) -> int | None:
 
 
 def on_shaft(
-    paths: Sequence[EffectPath], told: Mapping[str, str]
+    paths: Sequence[EffectPath], determined: Mapping[str, str]
 ) -> tuple[tuple[EffectPath, ...], tuple[EffectPath, ...]]:
     """Return the paths on the shaft that the recordings tell by themselves, and the others; all where they do not."""
-    kept = tuple(path for path in paths if told.items() <= path.options.items())
-    others = tuple(path for path in paths if not told.items() <= path.options.items())
-    return (kept, others) if kept else (others, ())
+    kept = tuple(path for path in paths if determined.items() <= path.options.items())
+    remaining = tuple(path for path in paths if not determined.items() <= path.options.items())
+    return (kept, remaining) if kept else (remaining, ())
 
 
 def n_compared(conditions: Sequence[Condition]) -> int:
@@ -704,7 +710,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     floor, names = condition.floor, bank.feature_names
     usual = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
     simulated = dict(zip(names, bank.healthy.mean(axis=0).tolist(), strict=True))
-    base_names, base = whole_and_parts(condition.other)
+    base_names, base = whole_and_parts(condition.baseline)
     if condition.reference is not None:
         compared, baseline = bank.change_names, base[0]
     else:
@@ -713,8 +719,10 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     repeated = dict(zip(floor.names, usual.tolist(), strict=True))
     again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
     again[: len(names)] = bank.healthy_changes.mean(axis=0)[: len(names)]
-    given = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]
-    rows = [[transplanted(compared, change, simulated, real, repeated, *way) for change in given] for way in WAYS_DB]
+    mean_changes = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]
+    rows = [
+        [transplanted(compared, change, simulated, real, repeated, *way) for change in mean_changes] for way in WAYS_DB
+    ]
     table = np.array(rows).reshape(len(WAYS_DB), len(kept), len(compared))
     return np.where(shown_in(compared, shows_in), table, 0.0)
 
@@ -724,10 +732,10 @@ def folds_of(conditions: Sequence[Condition]) -> list[Fold]:
     n, whole = n_compared(conditions), observed_changes(conditions)
     folds = []
     for k, condition in enumerate(conditions):
-        others, again = [one for one in whole if one.condition != k], _again(condition, k, n)
+        fitted, again = [observation for observation in whole if observation.condition != k], _again(condition, k, n)
         changes = [condition.change_of(part) for part in halves(condition.now)]
         first, second = (observed(condition, k, n, change) for change in changes)
-        folds += [Fold((*others, first), second, again), Fold((*others, second), first, again)]
+        folds += [Fold((*fitted, first), second, again), Fold((*fitted, second), first, again)]
     return folds
 
 
@@ -766,10 +774,10 @@ def steps_of(
     """Return the gap before, and what is left with the likeliest effect, then with the next one as well."""
     folds = folds_of(conditions)
     names = [c.name for c in causes if c.name in tried][:MAX_ADDED]
-    steps = [GapStep("before", _left(conditions, folds, []))]
+    steps = [GapStep("before", _remaining_gap(conditions, folds, []))]
     added: list[TriedEffect] = []
     for name in names:
-        remaining = _left(conditions, folds, [*added, tried[name]])
+        remaining = _remaining_gap(conditions, folds, [*added, tried[name]])
         if added and remaining.value > (1.0 - WORTH_IT) * steps[-1].left.value:
             break
         added.append(tried[name])
@@ -778,7 +786,7 @@ def steps_of(
     return tuple(steps)
 
 
-def _left(conditions: Sequence[Condition], folds: Sequence[Fold], added: Sequence[TriedEffect]) -> Interval:
+def _remaining_gap(conditions: Sequence[Condition], folds: Sequence[Fold], added: Sequence[TriedEffect]) -> Interval:
     """Return the whole gap's size, mean over folds; each effect is fitted to what the ones before it leave."""
     sizes = []
     for fold in folds:
@@ -800,7 +808,7 @@ def _without(change: ObservedChange, fits: Sequence[Fit]) -> ObservedChange:
     return replace(change, distances=distances)
 
 
-def _size(condition: Condition, scored: ObservedChange, taken: FloatArray, n: int) -> Interval:
+def _size(condition: Condition, scored: ObservedChange, explained: FloatArray, n: int) -> Interval:
     """Return the size of what a condition's change leaves, with the scored part's own distances."""
     change = condition.change
     structural = condition.floor
@@ -809,8 +817,8 @@ def _size(condition: Condition, scored: ObservedChange, taken: FloatArray, n: in
     shift[:n] = scored.distances - whole[:n]
     moved = replace(
         change,
-        values=change.values + shift - taken,
-        left_out=tuple(rows + shift - taken for rows in change.left_out),
+        values=change.values + shift - explained,
+        left_out=tuple(rows + shift - explained for rows in change.left_out),
     )
     return gap_size(moved, structural).structural
 
@@ -854,9 +862,11 @@ def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlac
     if race is None:
         return [fitted]
     orders = {bearing.name: float(getattr(bearing, race)) for bearing in frame.bearings}
-    seen = [place.orders[0] for place in places if place.kind is PlaceKind.ENVELOPE and place.orders]
-    for seen_order in (*seen, orders.get(fitted, np.nan)):
-        if alike := [other for other, order in orders.items() if abs(seen_order / order - 1.0) < SAME_ORDER]:
+    envelope_orders = [place.orders[0] for place in places if place.kind is PlaceKind.ENVELOPE and place.orders]
+    for observed_order in (*envelope_orders, orders.get(fitted, np.nan)):
+        if alike := [
+            alternative for alternative, order in orders.items() if abs(observed_order / order - 1.0) < SAME_ORDER
+        ]:
             return alike
     return [fitted]
 
@@ -871,11 +881,11 @@ def cause_place(
     """
     frame = conditions[0].now.frame
     changes = [condition.over_floors for condition in conditions]
-    told: dict[str, float | str] = {**told_options(name, changes, frame.teeth)}
+    options: dict[str, float | str] = {**determined_options(name, changes, frame.teeth)}
     if tried is not None and tried.match is not None and tried.is_shown:
-        told["gear"] = tried.match.added.options["gear"]
-    if told or name not in SIGNS:
-        added = tried.added if tried is not None else Added(name, 0.0, _with_a_tooth(name, told))
+        options["gear"] = tried.match.added.options["gear"]
+    if options or name not in SIGNS:
+        added = tried.added if tried is not None else Added(name, 0.0, _with_a_tooth(name, options))
         return place_of(added, frame, places)
     if tried is not None and _is_clear(tried, conditions):
         return place_of(tried.fit.added, frame, places)
@@ -883,20 +893,22 @@ def cause_place(
     return f"{either} (which cannot be told)"
 
 
-def _with_a_tooth(name: str, told: dict[str, float | str]) -> dict[str, float | str]:
-    return {**told, "tooth": 1.0} if name in ONE_TOOTH else told
+def _with_a_tooth(name: str, options: dict[str, float | str]) -> dict[str, float | str]:
+    return {**options, "tooth": 1.0} if name in SINGLE_TOOTH_FAULTS else options
 
 
 def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:
     """Whether the fit is worse on the other shaft by more than chance."""
-    seen = observed_changes(conditions)
-    costs = [fit_effect(paths, seen).cost for paths in _by_shaft(tried.paths)]
+    observations = observed_changes(conditions)
+    costs = [fit_effect(paths, observations).cost for paths in _by_shaft(tried.paths)]
     return len(costs) < len(SIDES) or max(costs) - min(costs) > INTERVAL_COST
 
 
 def _by_shaft(paths: Sequence[EffectPath]) -> list[list[EffectPath]]:
-    both = [[path for path in paths if path.options.get("gear", path.options.get("shaft")) == side] for side in SIDES]
-    return [some for some in both if some]
+    paths_of_shafts = [
+        [path for path in paths if path.options.get("gear", path.options.get("shaft")) == side] for side in SIDES
+    ]
+    return [some for some in paths_of_shafts if some]
 
 
 def at_its_tooth(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> Added:

@@ -65,7 +65,7 @@ class AngleCurves:
         Whether angle 0 is a mark, so that teeth have numbers.
     angle_deg : array, (n,)
     measured, before, after : arrays, (n,)
-        Energy within one pitch, over the middling tooth's; `after` may be empty.
+        Energy within one pitch, over the median tooth's; `after` may be empty.
     """
 
     shaft: str
@@ -580,8 +580,8 @@ class GapReport(Result, rows="causes"):
 
     def _repr_html_(self) -> str:
         """Return the four lines of the verdict and the likeliest causes, for notebooks."""
-        likeliest = [cause for cause in self.causes if cause.probability >= 0.01][:5]
-        rows = [(cause.title, odds_text(cause.probability), cause.place) for cause in likeliest]
+        probable = [cause for cause in self.causes if cause.probability >= 0.01][:5]
+        rows = [(cause.title, odds_text(cause.probability), cause.place) for cause in probable]
         return verdict_html(self.verdict, ("cause", "probability", "place"), rows)
 
     @property

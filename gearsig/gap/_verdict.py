@@ -42,11 +42,11 @@ def _where(report: GapReport) -> str:
         return f"Where: nowhere beyond the floor; the gap is {report.size.value:.2g} structural floors."
     if not report.places:
         return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
-    first, *others = report.places
-    beside = ""
-    if not isfinite(first.structural) and others and isfinite(others[0].share):
-        beside = f"; beside it, {_with_size(others[0])}"
-    return f"Where: {_with_size(first)}{beside}."
+    first, *further_places = report.places
+    second_place = ""
+    if not isfinite(first.structural) and further_places and isfinite(further_places[0].share):
+        second_place = f"; beside it, {_with_size(further_places[0])}"
+    return f"Where: {_with_size(first)}{second_place}."
 
 
 def _with_size(place: GapPlace) -> str:
@@ -89,15 +89,15 @@ def _kind_and_rivals(report: GapReport, rivals: Sequence[str]) -> str:
         return _either(report, rivals)
     groups = {cause.name: cause.group for cause in report.causes}
     within = [name for name in rivals if groups.get(name) == report.kind.group]
-    others = [name for name in rivals if name not in within]
+    beyond = [name for name in rivals if name not in within]
     if not within:
         return _either(report, rivals)
-    return f"{_kind(report.kind)}: {_either(report, within)}{f'; else {_either(report, others)}' if others else ''}"
+    return f"{_kind(report.kind)}: {_either(report, within)}{f'; else {_either(report, beyond)}' if beyond else ''}"
 
 
 def _either(report: GapReport, names: Sequence[str]) -> str:
-    *others, last = (_titled(report, name) for name in names)
-    return f"{', '.join(others)} or {last}" if others else last
+    *titles, last = (_titled(report, name) for name in names)
+    return f"{', '.join(titles)} or {last}" if titles else last
 
 
 def _which_unknown(report: GapReport) -> str:
@@ -130,7 +130,7 @@ def in_order(causes: Sequence[GapCause], outcome: GapOutcome) -> tuple[GapCause,
     return (first, *(c for c in ranked if c is not first))
 
 
-def likeliest_two(causes: Sequence[GapCause]) -> tuple[str, str] | None:
+def most_probable_two(causes: Sequence[GapCause]) -> tuple[str, str] | None:
     """Return the names of the first two effects, None where there are fewer."""
     names = [c.name for c in causes if c.name not in (NONE, UNKNOWN)]
     return (names[0], names[1]) if len(names) > 1 else None
@@ -176,8 +176,8 @@ def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]
 def _which_undecided(report: GapReport) -> str:
     """Name the likeliest two, and the group that is likelier than not."""
     named = {NONE: "no gap", UNKNOWN: "a gap of unknown cause"}
-    likeliest = sorted(report.causes, key=lambda cause: -cause.probability)[:2]
-    parts = [f"{named.get(cause.name, cause.title)} {odds_text(cause.probability)}" for cause in likeliest]
+    most_probable = sorted(report.causes, key=lambda cause: -cause.probability)[:2]
+    parts = [f"{named.get(cause.name, cause.title)} {odds_text(cause.probability)}" for cause in most_probable]
     groups = {name: p for name, p in report.groups.items() if name not in (NONE, UNKNOWN, "")}
     group = max(groups, key=groups.__getitem__, default="")
     if group and groups[group] >= LIKELIER_THAN_NOT:
@@ -201,14 +201,14 @@ def _how_far(report: GapReport) -> str:
         return "How far: no effect was added."
     if not shrinkage.is_predicted:
         return f"How far: not known; {report.causes[0].title} {hardly_predicted(shrinkage)}."
-    s, both = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
+    s, sizes = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
     low, high = (f"{100 * end:.0f}" for end in (s.low, s.high))
-    taken = percent(s.value) + (f" ({low} to {high} %)" if low != high else "")
-    shrinks = f"shrinks {both}, by {taken} of what exceeds one,"
+    closed = percent(s.value) + (f" ({low} to {high} %)" if low != high else "")
+    shrinks = f"shrinks {sizes}, by {closed} of what exceeds one,"
     if s.value <= 0.0:
         shrinks = "does not shrink"
     elif shrinkage.after.high < 1.0:
-        shrinks = f"shrinks {both}, within what healthy machines show,"
+        shrinks = f"shrinks {sizes}, within what healthy machines show,"
     return f"How far: with {report.causes[0].title}, the gap on its own features {shrinks} on {shrinkage.held_out}."
 
 
@@ -228,8 +228,8 @@ def _next(report: GapReport) -> str:
     if sum(cause.shrinkage is not None for cause in report.causes) < 2:
         ways = " or ".join(_not_varied(report)) or "sensor"
         return f"Next: another {ways}; no two effects are likely enough to compute which would tell most."
-    seen = _place_of_both(report)
-    look = f"look at {seen}; " if seen else ""
+    where_to_look = _place_of_both(report)
+    look = f"look at {where_to_look}; " if where_to_look else ""
     why = "speed or load that was simulated would put the two likeliest effects further apart"
     if is_settled(report.causes):
         why = "effect is likely enough to be told from this one by a further recording"

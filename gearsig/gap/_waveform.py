@@ -63,7 +63,7 @@ GOOD = 0.6
 _N_TURNS = 128
 _SHIFT_PITCHES = 0.04
 _N_SEVERITIES = 61
-_LEAST = 0.5
+_EXTENSION = 0.5
 """Of the smallest plausible severity, from which severities are looked at."""
 _AS_LIKELY = 0.26
 """Of the largest density, exp(−1.645²/2): where an end of the range has as much, nothing bounds the severity there."""
@@ -81,17 +81,17 @@ def mesh_sidebands(now: ReducedRecording, healthy: ReducedRecording, *, is_turne
     """
     sidebands = np.zeros((len(now.channels), len(SIDES), N_HARMONICS, len(OFFSETS)), dtype=np.complex128)
     for side in range(len(SIDES)):
-        here = lines_of_shaft(now, side)
+        after = lines_of_shaft(now, side)
         if is_turned:
             difference = turned_difference(now, healthy, side)[0].lines
         else:
             before = lines_of_shaft(healthy, side).lines
-            n = min(here.lines.shape[1], before.shape[1])
-            difference = here.lines[:, :n] - before[:, :n]
-        for k, mesh in _harmonics(here.teeth, difference.shape[1]):
-            carrier = here.lines[:, mesh] - difference[:, mesh]
-            there = carrier != 0.0
-            sidebands[there, side, k] = difference[there][:, mesh + OFFSETS] / carrier[there, None]
+            n = min(after.lines.shape[1], before.shape[1])
+            difference = after.lines[:, :n] - before[:, :n]
+        for k, mesh in _harmonics(after.teeth, difference.shape[1]):
+            carrier = after.lines[:, mesh] - difference[:, mesh]
+            is_used = carrier != 0.0
+            sidebands[is_used, side, k] = difference[is_used][:, mesh + OFFSETS] / carrier[is_used, None]
     return sidebands
 
 
@@ -106,11 +106,11 @@ def sideband_noise(now: ReducedRecording, healthy: ReducedRecording) -> FloatArr
     noise = np.zeros((len(now.channels), len(SIDES), N_HARMONICS, len(OFFSETS)))
     for side in range(len(SIDES)):
         pairs = zip(now.averages(side), healthy.averages(side), strict=True)
-        for channel, (here, before) in enumerate(pairs):
-            n = min(len(here.noise), len(before.noise))
+        for channel, (after, before) in enumerate(pairs):
+            n = min(len(after.noise), len(before.noise))
             for k, mesh in _harmonics(now.frame.teeth[side], n):
                 carrier = max(float(np.abs(before.lines[mesh]) ** 2), 1e-300)
-                noise[channel, side, k] = (here.noise[mesh + OFFSETS] + before.noise[mesh + OFFSETS]) / carrier
+                noise[channel, side, k] = (after.noise[mesh + OFFSETS] + before.noise[mesh + OFFSETS]) / carrier
     return noise
 
 
@@ -132,17 +132,17 @@ def gain_scatter(healthy: ReducedRecording, simulated: ReducedRecording) -> floa
         The reference, and the healthy twin with its channels.
     """
     ratios = []
-    for here, there in zip(healthy.averages(0), simulated.averages(0), strict=True):
-        n = min(len(here.lines), len(there.lines))
+    for recorded, twin in zip(healthy.averages(0), simulated.averages(0), strict=True):
+        n = min(len(recorded.lines), len(twin.lines))
         orders = [mesh for _, mesh in _harmonics(healthy.frame.teeth[0], n)]
-        both = np.abs(np.stack([here.lines[orders], there.lines[orders]]))
-        ratio = np.diff(np.log(np.maximum(both, 1e-300)), axis=0)[0]
+        magnitudes = np.abs(np.stack([recorded.lines[orders], twin.lines[orders]]))
+        ratio = np.diff(np.log(np.maximum(magnitudes, 1e-300)), axis=0)[0]
         ratios.append(float(np.var(ratio)))
     return max(float(np.sqrt(np.mean(ratios))), MIN_GAIN_SCATTER)
 
 
 @dataclass(frozen=True)
-class SimulatedCourse:
+class SimulatedWaveform:
     """How one simulated setting compares with what was observed.
 
     Parameters
@@ -162,7 +162,7 @@ class SimulatedCourse:
     log_size: float
 
 
-def compared_course(
+def compare_waveform(
     added: Added,
     simulated: ComplexArray,
     observed: ComplexArray,
@@ -171,7 +171,7 @@ def compared_course(
     moves_pitches: float = 0.0,
     n_teeth: int = 0,
     gain_scatter: float = MIN_GAIN_SCATTER,
-) -> SimulatedCourse | None:
+) -> SimulatedWaveform | None:
     """Compare one setting's sidebands with those observed; None where nothing was observed or simulated.
 
     Parameters
@@ -188,19 +188,19 @@ def compared_course(
         α, see `gain_scatter`.
     """
     power = np.mean(np.abs(observed) ** 2, axis=-1, keepdims=True)
-    seen = (power > 0.0) & (np.mean(np.abs(simulated) ** 2, axis=-1, keepdims=True) > 0.0)
-    if not np.any(seen):
+    is_used = (power > 0.0) & (np.mean(np.abs(simulated) ** 2, axis=-1, keepdims=True) > 0.0)
+    if not np.any(is_used):
         return None
-    power = np.where(seen, power, 1.0)
-    o: ComplexArray = np.where(seen, observed, 0.0)
-    t: ComplexArray = np.where(seen, simulated, 0.0)
+    power = np.where(is_used, power, 1.0)
+    o: ComplexArray = np.where(is_used, observed, 0.0)
+    t: ComplexArray = np.where(is_used, simulated, 0.0)
     moved = _moved(moves_pitches, observed.shape[1])
     counted = COUNTED / len(observed)
     rows, correlations = [], []
     for misfit in MISFITS:
         # With all of it unexplained there is no room for noise beside.
         variance = np.minimum(noise, (1.0 - misfit) * power) + misfit * power
-        explained = float(np.sum(np.where(seen, 1.0 + np.log(power / variance) - np.abs(o) ** 2 / variance, 0.0)))
+        explained = float(np.sum(np.where(is_used, 1.0 + np.log(power / variance) - np.abs(o) ** 2 / variance, 0.0)))
         products: ComplexArray = counted * np.conj(t) * o / variance
         simulated_power: FloatArray = counted * np.abs(t) ** 2 / variance
         whole = counted * float(np.sum(np.abs(o) ** 2 / variance))
@@ -214,7 +214,7 @@ def compared_course(
     levels = np.stack(rows, axis=1).reshape(len(LOG_SCALES), -1)
     best = int(np.argmax([row.max() for row in rows]))
     size = 0.5 * float(np.log(np.sum(np.abs(t) ** 2 / power) / np.sum(np.abs(o) ** 2 / power)))
-    return SimulatedCourse(added, _log_mean(levels, axis=1), float(correlations[best]), size)
+    return SimulatedWaveform(added, _log_mean(levels, axis=1), float(correlations[best]), size)
 
 
 def _moved(moves_pitches: float, n_harmonics: int) -> ComplexArray:
@@ -256,8 +256,8 @@ def _of_all_teeth(
     Σ_i v |S_i|²/(1 + v T_i) − ln(1 + v T_i), v = h² E|b_i|², S_i and T_i over harmonics, channels and both sides.
     """
     half = len(OFFSETS) // 2
-    each, size = products.sum(axis=(0, 1)), simulated_power.sum(axis=(0, 1))
-    sums, whole = each[half:] + np.conj(each[:half][::-1]), size[half:] + size[:half][::-1]
+    of_offsets, size = products.sum(axis=(0, 1)), simulated_power.sum(axis=(0, 1))
+    sums, whole = of_offsets[half:] + np.conj(of_offsets[:half][::-1]), size[half:] + size[:half][::-1]
     v = scales[:, None] ** 2 * n_teeth / (4.0 * np.sin(pi * OFFSETS[half:] / n_teeth) ** 2)
     level = v * np.abs(sums) ** 2 / (1.0 + v * whole) - np.log1p(v * whole)
     reached = float(np.sum(np.abs(sums) ** 2 / np.maximum(whole, 1e-300)))
@@ -303,7 +303,9 @@ class WaveformMatch:
         return self.correlation >= GOOD
 
 
-def waveform_match(courses: Sequence[SimulatedCourse], least: float, most: float) -> WaveformMatch | None:
+def waveform_match(
+    waveforms: Sequence[SimulatedWaveform], min_severity: float, max_severity: float
+) -> WaveformMatch | None:
     """Return what all settings of an effect say together; None where there are none.
 
     p(u | s) is that of the settings simulated next to severity s, scaled to the size that sidebands have there, with
@@ -312,26 +314,26 @@ def waveform_match(courses: Sequence[SimulatedCourse], least: float, most: float
 
     Parameters
     ----------
-    courses : sequence of SimulatedCourse
-    least, most : float
+    waveforms : sequence of SimulatedWaveform
+    min_severity, max_severity : float
         Severities that are plausible.
     """
-    groups: dict[tuple[tuple[str, float | str], ...], list[SimulatedCourse]] = {}
-    for course in sorted(courses, key=lambda one: one.added.severity):
-        groups.setdefault(tuple(sorted(course.added.options.items())), []).append(course)
+    groups: dict[tuple[tuple[str, float | str], ...], list[SimulatedWaveform]] = {}
+    for waveform in sorted(waveforms, key=lambda waveform: waveform.added.severity):
+        groups.setdefault(tuple(sorted(waveform.added.options.items())), []).append(waveform)
     if not groups:
         return None
-    log_severity = np.linspace(np.log(_LEAST * least), np.log(most), _N_SEVERITIES)
+    log_severity = np.linspace(np.log(_EXTENSION * min_severity), np.log(max_severity), _N_SEVERITIES)
     fullest = max(groups.values(), key=len)
     rows = np.array([_over_severity(group, fullest, log_severity) for group in groups.values()])
     level = float(_log_mean(rows))
     density = np.exp(rows - rows.max()).sum(axis=0)
     interval = _interval(np.exp(log_severity), density)
-    likeliest = list(groups.values())[int(np.argmax(_log_mean(rows, axis=1)))]
-    best = max(likeliest, key=lambda course: float(course.levels.max()))
+    best_group = list(groups.values())[int(np.argmax(_log_mean(rows, axis=1)))]
+    best = max(best_group, key=lambda waveform: float(waveform.levels.max()))
     severity = float(f"{interval.value:.4g}")
     return WaveformMatch(
-        max(course.correlation for course in likeliest),
+        max(waveform.correlation for waveform in best_group),
         level,
         Added(best.added.name, severity, dict(best.added.options)),
         interval,
@@ -339,7 +341,7 @@ def waveform_match(courses: Sequence[SimulatedCourse], least: float, most: float
 
 
 def _over_severity(
-    group: Sequence[SimulatedCourse], fullest: Sequence[SimulatedCourse], log_severity: FloatArray
+    group: Sequence[SimulatedWaveform], fullest: Sequence[SimulatedWaveform], log_severity: FloatArray
 ) -> FloatArray:
     """Return ln p(u | s) of one set of options."""
     at, sizes = (
@@ -353,7 +355,7 @@ def _over_severity(
     off = (LOG_SCALES[None, :] - (size[:, None, None] - sizes[None, :, None]).reshape(-1, 1)) / SCALE_SCATTER
     weights = np.exp(-0.5 * off**2) + 1e-300
     weights /= weights.sum(axis=1, keepdims=True)
-    levels = np.array([course.levels for course in group])
+    levels = np.array([waveform.levels for waveform in group])
     top = levels.max()
     likely = (weights.reshape(len(size), len(group), -1) * np.exp(levels - top)[None]).sum(axis=2)
     place = np.interp(log_severity, at, np.arange(len(at)))
@@ -362,7 +364,7 @@ def _over_severity(
     return log_likelihood
 
 
-def _straight(log_severity: FloatArray, shape: Sequence[SimulatedCourse]) -> FloatArray:
+def _straight(log_severity: FloatArray, shape: Sequence[SimulatedWaveform]) -> FloatArray:
     """Return ln of the sidebands' size over ln s, straight between simulations and beyond them."""
     at, size = (np.array(v) for v in zip(*((np.log(c.added.severity), c.log_size) for c in shape), strict=True))
     if len(at) == 1:
@@ -381,26 +383,26 @@ def _interval(severities: FloatArray, density: FloatArray) -> Interval:
     return Interval(value, 0.0 if as_likely[0] else low, inf if as_likely[-1] else high)
 
 
-def joined_courses(conditions: Sequence[Sequence[SimulatedCourse]]) -> list[SimulatedCourse]:
+def joined_waveforms(conditions: Sequence[Sequence[SimulatedWaveform]]) -> list[SimulatedWaveform]:
     """Return the settings of several operating conditions, ln L averaged: one machine's conditions say nearly the same.
 
     Parameters
     ----------
-    conditions : sequence of sequences of SimulatedCourse
+    conditions : sequence of sequences of SimulatedWaveform
         Settings that one of them lacks are left out.
     """
-    by_setting: dict[tuple[float, tuple[tuple[str, float | str], ...]], list[SimulatedCourse]] = {}
-    for courses in conditions:
-        for course in courses:
-            key = course.added.severity, tuple(sorted(course.added.options.items()))
-            by_setting.setdefault(key, []).append(course)
+    by_setting: dict[tuple[float, tuple[tuple[str, float | str], ...]], list[SimulatedWaveform]] = {}
+    for waveforms in conditions:
+        for waveform in waveforms:
+            key = waveform.added.severity, tuple(sorted(waveform.added.options.items()))
+            by_setting.setdefault(key, []).append(waveform)
     whole = [same for same in by_setting.values() if len(same) == len(conditions)]
     return [
-        SimulatedCourse(
+        SimulatedWaveform(
             same[0].added,
-            np.mean([course.levels for course in same], axis=0),
-            float(np.mean([course.correlation for course in same])),
-            float(np.mean([course.log_size for course in same])),
+            np.mean([waveform.levels for waveform in same], axis=0),
+            float(np.mean([waveform.correlation for waveform in same])),
+            float(np.mean([waveform.log_size for waveform in same])),
         )
         for same in whole
     ]

@@ -22,9 +22,9 @@ class ComparedPair:
 
     Parameters
     ----------
-    now, other : ReducedRecording
+    now, baseline : ReducedRecording
     is_reference : bool
-        Whether `other` is a healthy recording of the same machine; otherwise a simulation.
+        Whether `baseline` is a healthy recording of the same machine; otherwise a simulation.
     change_db : mapping
         Feature → change from what healthy machines change by.
     size : mapping
@@ -32,7 +32,7 @@ class ComparedPair:
     """
 
     now: ReducedRecording
-    other: ReducedRecording
+    baseline: ReducedRecording
     is_reference: bool
     change_db: Mapping[str, float]
     size: Mapping[str, float]
@@ -180,19 +180,19 @@ def feature_words(name: str, frame: GearFrame) -> str:
     """Return a feature's name in words, e.g. "input shaft: sidebands 6 to 12"."""
     if name in _OTHER:
         return _OTHER[name]
-    first, _, rest = name.partition(".")
-    side, _, detail = rest.partition(".")
+    first, _, remainder = name.partition(".")
+    side, _, detail = remainder.partition(".")
     if first == "mesh":
         return f"mesh harmonic {detail} over all"
     if first in _OF_A_SHAFT and side in SIDES:
-        what, table = _OF_A_SHAFT[first]
-        return f"{shaft_words(frame, SIDES.index(side))}: {what}{table[detail]}"
+        kind, table = _OF_A_SHAFT[first]
+        return f"{shaft_words(frame, SIDES.index(side))}: {kind}{table[detail]}"
     if first == "floor":
         return f"floor, band {detail}" if side == "band" else f"kurtosis of the floor, band {detail}"
     where = "envelope" if first == "envelope" else "lines"
-    if rest.endswith("_shaft"):
-        return f"{where}: orders of {shaft_words(frame, SIDES.index(rest.removesuffix('_shaft')))}"
-    return f"{where}: {_CYCLIC[rest]}"
+    if remainder.endswith("_shaft"):
+        return f"{where}: orders of {shaft_words(frame, SIDES.index(remainder.removesuffix('_shaft')))}"
+    return f"{where}: {_CYCLIC[remainder]}"
 
 
 def hardly_predicted(shrinkage: Shrinkage) -> str:

@@ -191,7 +191,7 @@ def _draw_path(axes: Axes, points: FloatArray, colour: str) -> None:
     axes.plot(*points[-40_000:].T, color=colour, linewidth=0.5, alpha=0.65)
 
 
-def course_figure(examined: motions.StartStop, *, title: str = "") -> Figure:
+def motion_profile_figure(examined: motions.StartStop, *, title: str = "") -> Figure:
     """Draw the driver's speed, the torque where it was measured, and the compression with the play.
 
     Behind all of them the phases are shaded: run-up, running, run-down, rest.

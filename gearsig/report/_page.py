@@ -287,7 +287,7 @@ def start_stop_figures(examined: StartStop) -> Iterator[Captioned]:
 
     motion, impacts = examined.motion, examined.impacts
     yield Captioned(
-        plot.course_figure(examined, title="Speed, torque and compression in their phases"),
+        plot.motion_profile_figure(examined, title="Speed, torque and compression in their phases"),
         "Look when the compression changes sides: between the dashed lines the flanks do not touch, beyond them they "
         "carry. A run-down that grows shorter tells of friction.",
         f"Driver's speed, torque and compression over {motion.time_s[-1]:.4g} s, phases shaded.",

@@ -167,7 +167,7 @@ class PlausibleRange:
         Largest severity that the machine allows.
     n_severities : int
         Worth a try, at even ratios.
-    courses : callable
+    further_settings : callable
         Further option sets, with which the fault of a tooth takes another course over the engagement, and with which of
         these severities each is worth a try.
     """
@@ -180,7 +180,7 @@ class PlausibleRange:
     drawn: Callable[[MachineFacts, np.random.Generator], Options] = lambda _machine, _rng: {}
     largest: Scale = lambda _machine, _options: float("inf")
     n_severities: int = 3
-    courses: Callable[[MachineFacts], Sequence[tuple[Options, Sequence[int]]]] = lambda _machine: ()
+    further_settings: Callable[[MachineFacts], Sequence[tuple[Options, Sequence[int]]]] = lambda _machine: ()
 
 
 # --------------------

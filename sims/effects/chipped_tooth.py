@@ -61,7 +61,7 @@ EFFECT = Effect(
             "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0))),
         },
         # Without its whole tip a tooth carries nothing there; with most of it left, nearly as much as ever.
-        courses=lambda machine: [
+        further_settings=lambda machine: [
             (options, (0, 1, 2))
             for percent in (35.0, 100.0)
             for options in shared.first_teeth(machine, width_percent=percent)

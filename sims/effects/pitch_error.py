@@ -140,7 +140,7 @@ EFFECT = Effect(
         shared.either_gear,
         _drawn,
         # The teeth's deviations are drawn; what a small one of them changes, each changes. A large one parts its tooth.
-        courses=lambda machine: [
+        further_settings=lambda machine: [
             (options, (0, 2)) for stands in STANDS for options in shared.first_teeth(machine, stands=stands)
         ],
     ),

@@ -57,7 +57,7 @@ EFFECT = Effect(
         "percent of the face; a pit of a tenth is lost in ordinary flanks, 90 is the model's limit",
         choices=lambda machine: first_teeth(machine, length_mm=0.45 * machine.nominal.module_mm),
         # The ends of a spall are two steps: how far they lie apart decides which orders they add up or cancel at.
-        courses=lambda machine: [
+        further_settings=lambda machine: [
             (options, (2,))
             for length in (0.2, 0.3, 0.67, 1.0)
             for options in first_teeth(machine, length_mm=length * machine.nominal.module_mm)

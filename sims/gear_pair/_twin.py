@@ -264,9 +264,9 @@ class PairTwin:
         which = range(plausible.n_severities)
         return self._settings(name, [(options, which) for options in plausible.choices(self._facts)])
 
-    def courses(self, name: str) -> Sequence[Added]:
+    def further_settings(self, name: str) -> Sequence[Added]:
         """Return further settings, with which a tooth's fault takes another course over the engagement."""
-        return self._settings(name, effect(name).plausible_range.courses(self._facts))
+        return self._settings(name, effect(name).plausible_range.further_settings(self._facts))
 
     def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[int]]]) -> list[Added]:
         """Return each set of options with some of its severities."""

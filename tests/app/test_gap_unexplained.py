@@ -9,7 +9,7 @@ import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Finding, Kind
-from gearsig.gap import GapOutcome, UnexpectedFinding, beside_unexpected, place_of_unexpected, unexpected_findings
+from gearsig.gap import GapOutcome, UnexpectedFinding, place_of_unexpected, unexpected_findings, with_unexpected
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
 from gearsig.rig import Rig
@@ -72,9 +72,9 @@ def standing(code: str) -> UnexpectedFinding:
 
 def test_impacts_of_a_known_race_are_not_called_unknown() -> None:
     race, strange = standing("bearing-outer-race"), standing("non-synchronous-impacts")
-    outcome, warnings = beside_unexpected(GapOutcome.NO_GAP, [race])
+    outcome, warnings = with_unexpected(GapOutcome.NO_GAP, [race])
     assert outcome is GapOutcome.UNDECIDED
     assert "today.h5: Damage of the outer race (at most 90 %)" in warnings[0]
-    assert beside_unexpected(GapOutcome.NO_GAP, [race, strange]) == (GapOutcome.UNKNOWN, [])
-    assert beside_unexpected(GapOutcome.NO_GAP, []) == (GapOutcome.NO_GAP, [])
-    assert beside_unexpected(GapOutcome.EFFECT, [race]) == (GapOutcome.EFFECT, [])
+    assert with_unexpected(GapOutcome.NO_GAP, [race, strange]) == (GapOutcome.UNKNOWN, [])
+    assert with_unexpected(GapOutcome.NO_GAP, []) == (GapOutcome.NO_GAP, [])
+    assert with_unexpected(GapOutcome.EFFECT, [race]) == (GapOutcome.EFFECT, [])

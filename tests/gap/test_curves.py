@@ -80,7 +80,7 @@ def test_a_line_that_moved_by_one_is_the_same() -> None:
     assert gap_by_order(curves, before) == pytest.approx(np.zeros(20))
 
 
-def test_energy_peaks_at_the_tooth_and_is_over_the_middling_one() -> None:
+def test_energy_peaks_at_the_tooth_and_is_over_the_median_one() -> None:
     driver, driven = angle_curves(knocking(), healthy())
     place = driver.angle_deg[np.argmax(driver.measured)]
     assert place == pytest.approx(0.4 * 360, abs=360 / TEETH[0])
@@ -92,7 +92,7 @@ def test_energy_peaks_at_the_tooth_and_is_over_the_middling_one() -> None:
 
 
 def test_the_simulated_change_has_the_size_of_the_measured_one() -> None:
-    """Half the knock has a quarter of the energy, in the units of the measured middling tooth."""
+    """Half the knock has a quarter of the energy, in the units of the measured median tooth."""
     simulated = knocking(0.75, seed=2)
     driver = angle_curves(knocking(), healthy(), simulated, healthy=healthy(), simulated_healthy=healthy())[0]
     assert driver.after.max() / driver.measured.max() == pytest.approx(0.25, rel=0.1)

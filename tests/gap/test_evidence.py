@@ -12,8 +12,8 @@ from gearsig.gap import (
     Interval,
     ObservedChange,
     evidence_of,
+    evidence_of_feature,
     gear_frame,
-    weighed_evidence,
 )
 from tests.gap.synthetic import RIG
 
@@ -57,13 +57,13 @@ def test_what_moved_further_than_predicted_is_not_against_it() -> None:
         (0.0, 12.0): (False, False),
     }
     for (predicted, observed), stance in said.items():
-        one = weighed_evidence("kurtosis", predicted, observed, 1.0)
+        one = evidence_of_feature("kurtosis", predicted, observed, 1.0)
         assert (one.speaks_for, one.is_further) == stance, (predicted, observed)
 
 
 def test_small_predictions_speak_for_an_effect_by_their_size_alone() -> None:
     """Where they count from 0.3 floors on, the other sign is within the floor, and no agreement."""
-    assert weighed_evidence("level", 0.4, 0.6, 1.0, least=0.3).speaks_for
+    assert evidence_of_feature("level", 0.4, 0.6, 1.0, min_floors=0.3).speaks_for
     for observed in (-0.5, 5.0):
-        one = weighed_evidence("level", 0.4, observed, 1.0, least=0.3)
+        one = evidence_of_feature("level", 0.4, observed, 1.0, min_floors=0.3)
         assert (one.speaks_for, one.is_further) == (False, False)

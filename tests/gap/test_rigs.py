@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap import once, other_lines, reduce_recording, twin_rig, with_stage
+from gearsig.gap import background_orders, once, reduce_recording, twin_rig, with_stage
 from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Shaft
 from sims.registry import gap_simulator
 from tests.gap.synthetic import RIG, TEETH, record
@@ -67,8 +67,8 @@ def test_teeth_alone_are_enough_and_a_stated_torque_says_how_large_the_gears_are
 def test_lines_of_the_other_pair_are_background() -> None:
     train = with_stage(TRAIN, "stage")
     mesh = 19 * TEETH[0] / TEETH[1]
-    lines = other_lines(train)
-    assert other_lines(RIG) == ()
+    lines = background_orders(train)
+    assert background_orders(RIG) == ()
     slow = mesh / 61
     for order in (mesh, 3 * mesh, mesh + 2 * slow, mesh - TEETH[0] / TEETH[1], slow):
         assert min(abs(order - line) for line in lines) < 1e-6

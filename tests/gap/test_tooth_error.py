@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.gap import TOOTH_FAULTS, KnownCourses, ToothErrorChange, course_descriptors, tooth_error_evidence
+from gearsig.gap import TOOTH_FAULTS, KnownToothErrors, ToothErrorChange, tooth_error_descriptors, tooth_error_evidence
 from gearsig.recording import Recording
 from sims.cracked import CrackedPair
 from sims.effects import EffectSetting
@@ -34,7 +34,7 @@ def change(seed: int = 0) -> ToothErrorChange:
 def test_descriptors_know_neither_the_tooth_nor_the_size(teeth: int, factor: float) -> None:
     made = change()
     other = replace(made, pattern_um=factor * np.roll(made.pattern_um, teeth, axis=0))
-    np.testing.assert_allclose(course_descriptors(other), course_descriptors(made), atol=1e-6)
+    np.testing.assert_allclose(tooth_error_descriptors(other), tooth_error_descriptors(made), atol=1e-6)
 
 
 def test_the_driven_gear_is_read_backwards() -> None:
@@ -43,7 +43,7 @@ def test_the_driven_gear_is_read_backwards() -> None:
     backwards = replace(
         made, side=1, pattern_um=made.pattern_um.ravel()[::-1].reshape(TEETH, STEPS), mesh_um=made.mesh_um[::-1]
     )
-    here, there = course_descriptors(made), course_descriptors(backwards)
+    here, there = tooth_error_descriptors(made), tooth_error_descriptors(backwards)
     np.testing.assert_allclose(there, here, atol=0.15)
 
 
@@ -51,7 +51,7 @@ def test_a_known_course_is_told_and_a_strange_one_is_not() -> None:
     rng = np.random.default_rng(1)
     centres = 3.0 * rng.standard_normal((4, 17))
     rows = np.concatenate([centre + rng.standard_normal((60, 17)) for centre in centres])
-    known = KnownCourses(rows, np.repeat(TOOTH_FAULTS, 60))
+    known = KnownToothErrors(rows, np.repeat(TOOTH_FAULTS, 60))
     for name, centre in zip(TOOTH_FAULTS, centres, strict=True):
         said = known.log_likelihoods(centre)
         assert max(said, key=said.__getitem__) == name

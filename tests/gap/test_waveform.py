@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig.gap import SIDEBAND_OFFSETS as OFFSETS
-from gearsig.gap import Added, SimulatedCourse, compared_course, waveform_match, with_likelihoods
+from gearsig.gap import Added, SimulatedWaveform, compare_waveform, waveform_match, with_likelihoods
 
 N_CHANNELS, N_HARMONICS = 2, 8
 HARMONICS = np.arange(1, N_HARMONICS + 1)[:, None]
@@ -31,8 +31,8 @@ def noise_alone(seed: int) -> np.ndarray:
     return rng.normal(size=shape) + 1j * rng.normal(size=shape)
 
 
-def compared(observed: np.ndarray, simulated: np.ndarray, severity: float = 1.0, **how: float) -> SimulatedCourse:
-    found = compared_course(Added("root_crack", severity, {"gear": "driver"}), simulated, observed, NOISE, **how)  # type: ignore[arg-type]
+def compared(observed: np.ndarray, simulated: np.ndarray, severity: float = 1.0, **how: float) -> SimulatedWaveform:
+    found = compare_waveform(Added("root_crack", severity, {"gear": "driver"}), simulated, observed, NOISE, **how)  # type: ignore[arg-type]
     assert found is not None
     return found
 
@@ -81,8 +81,8 @@ def test_the_severity_is_that_of_the_right_size_and_its_interval_holds_it() -> N
 
 
 def test_one_severity_grows_as_the_fullest_set_does() -> None:
-    def with_length(length: float, severity: float) -> SimulatedCourse:
-        found = compared_course(
+    def with_length(length: float, severity: float) -> SimulatedWaveform:
+        found = compare_waveform(
             Added("tooth_spall", severity, {"length_mm": length}),
             course(0.0, 0.03 * length, severity**2),
             course(1.0, 0.06, 0.25),
@@ -108,8 +108,8 @@ def test_where_any_severity_fits_nothing_bounds_it() -> None:
 def test_where_nothing_was_seen_or_simulated_there_is_no_match() -> None:
     added = Added("root_crack", 1.0, {"gear": "driver"})
     nothing = 0.0 * course(0.0, 0.05)
-    assert compared_course(added, course(0.0, 0.05), nothing, NOISE) is None
-    assert compared_course(added, nothing, course(0.0, 0.05), NOISE) is None
+    assert compare_waveform(added, course(0.0, 0.05), nothing, NOISE) is None
+    assert compare_waveform(added, nothing, course(0.0, 0.05), NOISE) is None
     assert waveform_match([], 1.0, 2.0) is None
 
 
@@ -130,7 +130,7 @@ def test_uneven_pitch_is_the_course_of_one_tooth_with_any_pattern() -> None:
     both_sides = np.concatenate([np.conj(pattern[::-1]), pattern])
     seen = 3.0 * both_sides * course(0.0, 0.05)
     added = Added("pitch_error", 1.0, {"gear": "driver", "tooth": 1.0})
-    every = compared_course(added, course(0.0, 0.05), seen, NOISE, n_teeth=n_teeth)
+    every = compare_waveform(added, course(0.0, 0.05), seen, NOISE, n_teeth=n_teeth)
     assert every is not None
     assert every.correlation == pytest.approx(1.0, abs=0.01)
     match = waveform_match([every], 0.5, 20.0)
@@ -139,7 +139,7 @@ def test_uneven_pitch_is_the_course_of_one_tooth_with_any_pattern() -> None:
     assert match.log_likelihood > likely(seen, course(0.0, 0.05)) + 5.0
     # A fault of one tooth has one size at all orders, and gains of harmonics are allowed it: a pattern is less likely.
     local = course(0.3, 0.05) * (1.0 + 0.3 * noise_alone(8)[:1, :, :1])
-    as_pattern = compared_course(added, course(0.0, 0.05), local, NOISE, n_teeth=n_teeth)
+    as_pattern = compare_waveform(added, course(0.0, 0.05), local, NOISE, n_teeth=n_teeth)
     assert as_pattern is not None
     assert likely(local, course(0.0, 0.05)) > float(as_pattern.levels.max()) + 5.0
 
@@ -149,7 +149,7 @@ def test_a_pitch_error_of_one_tooth_tells_behind_from_ahead_and_one_tooth_from_a
     hypotheses = {"behind": (course(0.0, 0.05), 0), "ahead": (-course(0.0, 0.05), 0), "all": (course(0.0, 0.05), 29)}
     levels = {}
     for name, (simulated, n_teeth) in hypotheses.items():
-        compared = compared_course(Added("pitch_error", 1.0, {}), simulated, seen, NOISE, n_teeth=n_teeth)
+        compared = compare_waveform(Added("pitch_error", 1.0, {}), simulated, seen, NOISE, n_teeth=n_teeth)
         assert compared is not None
         levels[name] = float(compared.levels.max())
     assert levels["ahead"] > max(levels["behind"], levels["all"]) + 3.0

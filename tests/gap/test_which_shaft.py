@@ -16,11 +16,11 @@ from gearsig.gap import (
     ReducedRecording,
     ShaftSigns,
     change_features,
+    determined_options,
     load_learned,
     over_floors,
     reduce_recording,
     shaft_signs,
-    told_options,
 )
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 from sims.registry import gap_simulator
@@ -41,15 +41,15 @@ def on_both(cause: str) -> dict[str, float]:
 @pytest.mark.parametrize("cause", SIGNS)
 @pytest.mark.parametrize("side", SIDES)
 def test_signs_that_rose_on_one_shaft_put_it_there(cause: str, side: str) -> None:
-    (option,) = told_options(cause, [risen(cause, side, 2.0)], TEETH).items()
+    (option,) = determined_options(cause, [risen(cause, side, 2.0)], TEETH).items()
     assert option == ("shaft" if cause == "misalignment" else "gear", side)
-    assert told_options(cause, [risen(cause, side, 0.9)], TEETH) == {}
-    assert told_options(cause, [risen(cause, side, -5.0)], TEETH) == {}
+    assert determined_options(cause, [risen(cause, side, 0.9)], TEETH) == {}
+    assert determined_options(cause, [risen(cause, side, -5.0)], TEETH) == {}
 
 
 def test_what_no_shaft_has_to_itself_cannot_be_told() -> None:
     assert shaft_signs("tooth_wear", [{}], TEETH) is None
-    assert told_options("backlash", [{}], TEETH) == {}
+    assert determined_options("backlash", [{}], TEETH) == {}
 
 
 @given(st.floats(0.0, 20.0), st.floats(0.0, 20.0))
@@ -60,13 +60,13 @@ def test_exchanged_shafts_exchange_the_answer(one: float, other: float) -> None:
 
 def test_signs_on_both_shafts_cannot_be_told_but_for_an_order_that_one_shaft_cannot_have() -> None:
     both = on_both("eccentricity")
-    assert told_options("eccentricity", [both], TEETH) == {}
+    assert determined_options("eccentricity", [both], TEETH) == {}
     # Two turns of the driver are one of the driven shaft: only the latter makes half an order of the driver.
-    assert told_options("eccentricity", [both], (23, 46)) == {"gear": "driven"}
-    assert told_options("eccentricity", [risen("eccentricity", "driver", 4.0)], (23, 46)) == {"gear": "driver"}
+    assert determined_options("eccentricity", [both], (23, 46)) == {"gear": "driven"}
+    assert determined_options("eccentricity", [risen("eccentricity", "driver", 4.0)], (23, 46)) == {"gear": "driver"}
     # Its second order is the driver's first.
-    assert told_options("misalignment", [on_both("misalignment")], (23, 46)) == {}
-    assert told_options("misalignment", [on_both("misalignment")], (69, 23)) == {"shaft": "driver"}
+    assert determined_options("misalignment", [on_both("misalignment")], (23, 46)) == {}
+    assert determined_options("misalignment", [on_both("misalignment")], (69, 23)) == {"shaft": "driver"}
 
 
 def test_every_sign_is_a_feature() -> None:
@@ -108,7 +108,7 @@ def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, flo
 @pytest.mark.parametrize("side", SIDES)
 def test_a_simulated_effect_is_put_on_its_shaft(cause: str, side: str) -> None:
     *_, strong = (added for added in twin().candidates(cause) if added.options["gear"] == side)
-    assert told_options(cause, [simulated(strong)], (29, 47)) == {"gear": side}
+    assert determined_options(cause, [simulated(strong)], (29, 47)) == {"gear": side}
 
 
 @pytest.mark.parametrize(
@@ -120,9 +120,9 @@ def test_what_shows_at_speed_or_load_only_is_put_on_its_shaft_there(
     cause: str, point: OperatingCondition, side: str
 ) -> None:
     *_, strong = (a for a in twin().candidates(cause) if a.options.get("gear", a.options.get("shaft")) == side)
-    assert list(told_options(cause, [simulated(strong, point=point)], (29, 47)).values()) == [side]
+    assert list(determined_options(cause, [simulated(strong, point=point)], (29, 47)).values()) == [side]
 
 
 def test_a_healthy_machine_has_no_signs_on_either_shaft() -> None:
     again = simulated()
-    assert all(told_options(cause, [again], (29, 47)) == {} for cause in SIGNS)
+    assert all(determined_options(cause, [again], (29, 47)) == {} for cause in SIGNS)

@@ -144,7 +144,7 @@ def test_multiples_of_the_found_order_are_marked_without_a_simulation() -> None:
     assert not any("multiples" in str(label) for label in unmarked)
 
 
-def test_the_polar_picture_is_in_decibels_from_the_middling_tooth() -> None:
+def test_the_polar_picture_is_in_decibels_from_the_median_tooth() -> None:
     angle = np.arange(0.0, 360.0, 5.0)
     measured = np.where(angle == 90.0, 100.0, 1.0)
     curves = AngleCurves("in", "m/s^2", 18, False, angle, measured, np.ones(72), np.zeros(0))

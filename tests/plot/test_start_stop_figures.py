@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.motion import StartStop, examine_start_stop, measure_motion
-from gearsig.plot import course_figure, impacts_figure
+from gearsig.plot import impacts_figure, motion_profile_figure
 from tests.motion.recordings import start_stop, without
 
 
@@ -17,7 +17,7 @@ def examined() -> StartStop:
 
 
 def test_course_has_speed_torque_and_compression_over_phases(examined: StartStop) -> None:
-    speed, torque, compression = course_figure(examined).axes
+    speed, torque, compression = motion_profile_figure(examined).axes
     assert max(speed.lines[0].get_ydata()) == pytest.approx(examined.motion.driver_speed_rad_s.max() * 30.0 / np.pi)
     assert max(torque.lines[0].get_ydata()) == pytest.approx(examined.motion.torque_nm.max())  # type: ignore[union-attr]  # measured
     walls = [line.get_ydata()[0] for line in compression.lines[1:]]
@@ -28,7 +28,7 @@ def test_course_has_speed_torque_and_compression_over_phases(examined: StartStop
 
 def test_course_without_torque_has_two_panels() -> None:
     examined = examine_start_stop(measure_motion(without(start_stop(), "torque")))
-    assert [a.get_ylabel() for a in course_figure(examined).axes] == ["driver (rpm)", "compression (µm)"]
+    assert [a.get_ylabel() for a in motion_profile_figure(examined).axes] == ["driver (rpm)", "compression (µm)"]
 
 
 def test_every_impact_is_drawn_once_in_each_panel(examined: StartStop) -> None:

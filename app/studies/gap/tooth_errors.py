@@ -1,4 +1,4 @@
-"""Learn the courses of transmission errors by which encoders tell tooth faults apart.
+"""Learn the changes of transmission errors by which encoders tell tooth faults apart.
 
 `python -m app.studies.gap.tooth_errors` draws static contacts of two simulators that describe teeth and faults
 otherwise than each other – load shared by teeth of a rack's shape, and the quasi-static machines – and writes the
@@ -35,9 +35,9 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.gap import (
     TOOTH_ERRORS_FILE,
     TOOTH_FAULTS,
-    KnownCourses,
+    KnownToothErrors,
     ToothErrorChange,
-    course_descriptors,
+    tooth_error_descriptors,
     tooth_error_evidence,
 )
 from sims.blind import draw_case, record_case
@@ -139,14 +139,14 @@ def quasi_static(fault: str, rng: np.random.Generator) -> ToothErrorChange:
     side = int(np.argmax(moved))
     cycles, path = _cycles(machine.drawn.teeth[side]), machine.path
     reached = is_in_reach(cycles, path)
-    own = at_places(cycles, path, machine.stiffness_n_per_m)
+    pair_stiffness = at_places(cycles, path, machine.stiffness_n_per_m)
 
     def error_um(state: QuasiStaticState) -> FloatArray:
         def met(tables: Sequence[FloatArray]) -> FloatArray:
             only = tuple(table if s == side else np.zeros_like(table) for s, table in enumerate(tables))
             return meeting(cycles, path, only, (0, 0))  # type: ignore[arg-type]  # two of them
 
-        stiffness = np.where(reached, own / (1.0 + met(state.weak)), 1e-3)
+        stiffness = np.where(reached, pair_stiffness / (1.0 + met(state.weak)), 1e-3)
         gaps = np.where(reached, met(state.gaps_m), OUT_OF_REACH_M)
         return 1e6 * static_contact(stiffness, gaps, np.full(len(cycles), machine.load_n))[0]
 
@@ -175,21 +175,21 @@ def _change(side: int, faulty_um: FloatArray, healthy_um: FloatArray, rng: np.ra
 SIMULATORS: dict[str, Drawn] = {"shared load": shared_load, "quasi-static": quasi_static}
 
 
-def courses_of(simulator: str, n_each: int) -> KnownCourses:
-    """Return the courses of so many faults of each kind."""
+def known_tooth_errors_of(simulator: str, n_each: int) -> KnownToothErrors:
+    """Return the changes of the transmission error by so many faults of each kind."""
     rng = np.random.default_rng([SEED, [*SIMULATORS].index(simulator)])
     rows: list[FloatArray] = []
     for fault in TOOTH_FAULTS:
         n_rows = len(rows) + n_each
         while len(rows) < n_rows:
             try:
-                rows.append(course_descriptors(SIMULATORS[simulator](fault, rng)))
+                rows.append(tooth_error_descriptors(SIMULATORS[simulator](fault, rng)))
             except (InputError, RefusalError):
                 continue
-    return KnownCourses(np.array(rows), np.repeat(TOOTH_FAULTS, n_each))
+    return KnownToothErrors(np.array(rows), np.repeat(TOOTH_FAULTS, n_each))
 
 
-def named(known: KnownCourses, rows: FloatArray) -> tuple[NDArray[np.str_], FloatArray]:
+def named(known: KnownToothErrors, rows: FloatArray) -> tuple[NDArray[np.str_], FloatArray]:
     """Return the likeliest fault of each row, and its probability where all four are as likely beforehand."""
     levels = np.array([[known.log_likelihoods(row)[name] for name in TOOTH_FAULTS] for row in rows])
     weights = np.exp(levels - levels.max(axis=1, keepdims=True))
@@ -236,12 +236,12 @@ def main() -> None:
     parser.add_argument("--blind", type=int, default=0, help="faults of each kind on the independent rig")
     parser.add_argument("--to", type=Path, default=TOOTH_ERRORS_FILE)
     given = parser.parse_args()
-    of = {name: courses_of(name, given.each) for name in SIMULATORS}
-    for name, own in of.items():
-        (other,) = (courses for title, courses in of.items() if title != name)
-        _told(f"{name} left out", own.faults, *named(other, own.descriptors))
-    rows = np.concatenate([courses.descriptors for courses in of.values()]).astype(np.float16)
-    faults = np.concatenate([courses.faults for courses in of.values()])
+    by_simulator = {name: known_tooth_errors_of(name, given.each) for name in SIMULATORS}
+    for name, left_out in by_simulator.items():
+        (fitted_to,) = (known for title, known in by_simulator.items() if title != name)
+        _told(f"{name} left out", left_out.faults, *named(fitted_to, left_out.descriptors))
+    rows = np.concatenate([known.descriptors for known in by_simulator.values()]).astype(np.float16)
+    faults = np.concatenate([known.faults for known in by_simulator.values()])
     write_whole(given.to, lambda file: np.savez_compressed(file, allow_pickle=False, descriptors=rows, faults=faults))
     if given.blind:
         blind(given.blind)

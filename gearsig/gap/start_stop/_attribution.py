@@ -63,14 +63,14 @@ class DriveFloor:
         centre, scale = np.zeros(table.shape[1]), np.full(table.shape[1], 6.0)
         for i, name in enumerate(NAMES):
             known = np.isfinite(table[:, i])
-            values, own = table[known, i], errors[known, i]
+            values, value_errors = table[known, i], errors[known, i]
             if len(values) >= 5:
                 # 2 % of a level; a fifth of the step of what is ordinarily near zero
-                centre[i], least = _centre(values, own), 0.15 if FEATURES[name].is_level else 0.87
-                scale[i] = max(_scale(values - centre[i], own), least)
-        one = cls(centre, scale, 1.0)
-        sizes = [one.widened(e).size(r) for r, e in zip(table, errors, strict=True)]
-        return replace(one, whole=float(np.quantile(sizes, 0.95)))
+                centre[i], min_scale = _centre(values, value_errors), 0.15 if FEATURES[name].is_level else 0.87
+                scale[i] = max(_scale(values - centre[i], value_errors), min_scale)
+        unscaled = cls(centre, scale, 1.0)
+        sizes = [unscaled.widened(e).size(r) for r, e in zip(table, errors, strict=True)]
+        return replace(unscaled, whole=float(np.quantile(sizes, 0.95)))
 
     def widened(self, scatter: FloatArray) -> DriveFloor:
         """Return the floor of a recording whose changes have standard errors of their own, (n,)."""
@@ -272,10 +272,10 @@ def evidences(change: FloatArray, floor: DriveFloor, fits: Sequence[FittedDriveC
         return total + float(np.log(np.mean(np.exp(np.minimum(gains, 200.0)))))
 
     alone = mean_of(gains) if len(gains) else total
-    both = mean_of([a + b for i, a in enumerate(gains) for b in gains[:i]]) if len(gains) > 1 else alone
+    pairs = mean_of([a + b for i, a in enumerate(gains) for b in gains[:i]]) if len(gains) > 1 else alone
     every = float(np.sum(floor.log_density(change, nothing, 4.0 * floor.scale)))
-    unknown = float(np.logaddexp.reduce([alone, both, every]) - np.log(3.0))
-    return {one.name: one.log_evidence for one in fits} | {NONE: total, UNKNOWN: unknown}
+    unknown = float(np.logaddexp.reduce([alone, pairs, every]) - np.log(3.0))
+    return {fitted.name: fitted.log_evidence for fitted in fits} | {NONE: total, UNKNOWN: unknown}
 
 
 def shares(logs: Mapping[str, float]) -> dict[str, float]:
@@ -288,12 +288,12 @@ def shares(logs: Mapping[str, float]) -> dict[str, float]:
 def own_features(predicted: FloatArray, change: FloatArray, floor: DriveFloor) -> NDArray[np.intp]:
     """Return the places of changes that the effect predicts to exceed the floor; its largest where none does."""
     sizes = np.where(np.isfinite(change), np.abs(predicted) / floor.limit, -1.0)
-    own = np.flatnonzero(sizes >= 1.0)
-    return own if len(own) else np.array([int(np.argmax(sizes))], dtype=np.intp)
+    features = np.flatnonzero(sizes >= 1.0)
+    return features if len(features) else np.array([int(np.argmax(sizes))], dtype=np.intp)
 
 
 def shrink(
-    change: FloatArray, predicted: FloatArray, floor: DriveFloor, own: NDArray[np.intp]
+    change: FloatArray, predicted: FloatArray, floor: DriveFloor, features: NDArray[np.intp]
 ) -> tuple[float, float, float, float]:
     """Return root mean squares before and after in floors, 1 − after²/before², and the slope, on an effect's features.
 
@@ -304,7 +304,7 @@ def shrink(
     change : array
         Of cycles that the severity was not fitted to.
     """
-    z, p = ((change - floor.centre) / floor.limit)[own], (predicted / floor.limit)[own]
+    z, p = ((change - floor.centre) / floor.limit)[features], (predicted / floor.limit)[features]
     known = np.isfinite(z)
     z, p = z[known], p[known]
     if not len(z):
@@ -374,18 +374,27 @@ def attribute_drive(
     """
     shipped, calibration = load_floors(with_reference=with_reference)
     whole, half = floors or shipped
-    wholes = [whole.widened(seen.scatter) for seen in every]
-    folds = [(seen.predicted, half.widened(HALF * seen.scatter), fold) for seen in every for fold in seen.folds]
-    names = [name for name in every[0].predicted if all(name in seen.predicted for seen in every)]
-    fits = [
-        [fit(seen.predicted[name], seen.whole, floor) for name in names]
-        for seen, floor in zip(every, wholes, strict=True)
+    wholes = [whole.widened(evidence.scatter) for evidence in every]
+    folds = [
+        (evidence.predicted, half.widened(HALF * evidence.scatter), fold)
+        for evidence in every
+        for fold in evidence.folds
     ]
-    logs = [evidences(seen.whole, floor, own) for seen, floor, own in zip(every, wholes, fits, strict=True)]
-    best = {name: max(own, key=lambda one: one.log_evidence) for name, *own in zip(names, *fits, strict=True)}
+    names = [name for name in every[0].predicted if all(name in evidence.predicted for evidence in every)]
+    fits = [
+        [fit(evidence.predicted[name], evidence.whole, floor) for name in names]
+        for evidence, floor in zip(every, wholes, strict=True)
+    ]
+    logs = [
+        evidences(evidence.whole, floor, fitted) for evidence, floor, fitted in zip(every, wholes, fits, strict=True)
+    ]
+    best = {
+        name: max(cause_fits, key=lambda fitted: fitted.log_evidence)
+        for name, *cause_fits in zip(names, *fits, strict=True)
+    }
     return Attribution(
         shares({name: float(np.mean([log[name] for log in logs])) for name in logs[0]}),
-        {name: replace(one, shrinkage=_shrinkage(name, folds)) for name, one in best.items()},
+        {name: replace(fitted, shrinkage=_shrinkage(name, folds)) for name, fitted in best.items()},
         calibration,
     )
 
@@ -395,17 +404,19 @@ def _shrinkage(name: str, folds: Sequence[tuple[Mapping[str, PredictedCause], Dr
     values, placebos, variances = [], [], []
     for predicted, floor, fold in folds:
         guess = fit(predicted[name], fold.fitted_to, floor).predicted
-        own = own_features(guess, fold.held_out, floor)
-        values.append(shrink(fold.held_out, guess, floor, own))
-        rows = np.array([shrink(row, guess, floor, own)[:3] for row in fold.without])
-        variances.append([_jackknife_variance(column, of_one=0.25) for column in rows.T])
-        placebos.append(max((shrink(row, guess, floor, own)[2] for row in fold.elsewhere.get(name, ())), default=0.0))
-    before, after, taken, slope = (_mean_of_known(column) for column in zip(*values, strict=True))
+        features = own_features(guess, fold.held_out, floor)
+        values.append(shrink(fold.held_out, guess, floor, features))
+        rows = np.array([shrink(row, guess, floor, features)[:3] for row in fold.without])
+        variances.append([_jackknife_variance(column, of_one_block=0.25) for column in rows.T])
+        placebos.append(
+            max((shrink(row, guess, floor, features)[2] for row in fold.elsewhere.get(name, ())), default=0.0)
+        )
+    before, after, closed, slope = (_mean_of_known(column) for column in zip(*values, strict=True))
     wide = NORMAL_90 * np.sqrt(np.sum(variances, axis=0)) / len(folds)
     return Shrinkage(
         Interval.around(before, float(wide[0]), low=0.0),
         Interval.around(after, float(wide[1]), low=0.0),
-        Interval.around(taken, float(wide[2]), high=1.0),
+        Interval.around(closed, float(wide[2]), high=1.0),
         slope,
         float(np.mean(placebos)),
         "starts and stops that it was not fitted to",
@@ -418,6 +429,6 @@ def _mean_of_known(values: Sequence[float]) -> float:
     return float(np.mean(known)) if known else float("nan")
 
 
-def _jackknife_variance(values: Sequence[float] | FloatArray, of_one: float = 0.0) -> float:
-    """Return the variance of what leaving out each block tells; `of_one` where there is one block only."""
-    return (len(values) - 1.0) * float(np.var(values)) if len(values) > 1 else of_one
+def _jackknife_variance(values: Sequence[float] | FloatArray, of_one_block: float = 0.0) -> float:
+    """Return the variance of what leaving out each block tells; `of_one_block` where there is one block only."""
+    return (len(values) - 1.0) * float(np.var(values)) if len(values) > 1 else of_one_block

@@ -206,7 +206,7 @@ class DriveComparison:
     drive: SimulatedDrive
 
     @property
-    def other(self) -> CycleFeatures:
+    def baseline(self) -> CycleFeatures:
         """What it is compared with."""
         return self.drive.healthy if self.reference is None else self.reference.features()
 
@@ -218,7 +218,7 @@ class DriveComparison:
     @cached_property
     def spot(self) -> LocatedDriveChange:
         """Tooth and order that changed most."""
-        return spot_of(self.features, self.other)
+        return spot_of(self.features, self.baseline)
 
     @property
     def order(self) -> int:
@@ -227,7 +227,7 @@ class DriveComparison:
 
     def change_in(self, cycles: tuple[int, ...] | None = None, at: LocatedDriveChange | None = None) -> FloatArray:
         """Return the change of some cycles, or of all."""
-        return change_of(self.now.features(cycles), self.other, self.drive.shape, at)
+        return change_of(self.now.features(cycles), self.baseline, self.drive.shape, at)
 
     @cached_property
     def change(self) -> FloatArray:
@@ -247,8 +247,13 @@ class DriveComparison:
         """
         rows = np.zeros((1, len(NAMES)))
         if (reference := self.reference) is not None:
-            others = [reference.features(kept) for kept in _but_each(reference.every)]
-            rows = np.array([change_of(self.features, other, self.drive.shape, self.spot) for other in others])
+            without_blocks = [reference.features(kept) for kept in _but_each(reference.every)]
+            rows = np.array(
+                [
+                    change_of(self.features, without_block, self.drive.shape, self.spot)
+                    for without_block in without_blocks
+                ]
+            )
         return np.hypot(_jackknife(self.without), _jackknife(rows))
 
     def floor(self, *, of_half: bool = False) -> DriveFloor:
@@ -263,9 +268,9 @@ class DriveComparison:
         return DriveEvidence(self.change, self.scatter, folds, predicted)
 
     def _fold(self, ours: tuple[int, ...], theirs: tuple[int, ...]) -> CycleFold:
-        here = self.now.features(ours)
-        spot, n_teeth, n_orders = spot_of(here, self.other), len(here.teeth_um), len(here.ripple)
-        blocks = [tuple(c for c in theirs if c != one) for one in theirs] if len(theirs) > 1 else [theirs]
+        features = self.now.features(ours)
+        spot, n_teeth, n_orders = spot_of(features, self.baseline), len(features.teeth_um), len(features.ripple)
+        blocks = [tuple(c for c in theirs if c != left_out) for left_out in theirs] if len(theirs) > 1 else [theirs]
         steps = [1 + i * max(1, n_teeth // (N_PLACEBOS + 1)) for i in range(N_PLACEBOS)]
         elsewhere = {
             CRACK: [replace(spot, tooth=(spot.tooth + step) % n_teeth) for step in steps],

@@ -391,7 +391,7 @@ def contact_features(m: motions.PairMotion, flanks: Flanks, rows: Mask) -> dict[
     q, drive, keep = m.compression_m, flanks.design[:, 0] > 0.0, flanks.loaded & rows
     keep = keep & _touching(flanks, q, keep, drive)
     back = keep & ~drive
-    others, has_back = _known_columns(flanks, keep), np.sum(back) >= 12
+    known_columns, has_back = _known_columns(flanks, keep), np.sum(back) >= 12
     counts = np.bincount(flanks.place[keep & drive], minlength=N_PLACES)
     places = np.flatnonzero(counts >= 5)
     if len(places) < N_PLACES // 3:
@@ -399,11 +399,11 @@ def contact_features(m: motions.PairMotion, flanks: Flanks, rows: Mask) -> dict[
     known = np.isin(flanks.place, places)
     keep = keep & ((drive & known) | (~drive & has_back))
     levels = (drive[:, None] & (flanks.place[:, None] == places)).astype(np.float64)
-    columns = [levels, flanks.design[:, others]] + ([(~drive)[:, None].astype(np.float64)] if has_back else [])
+    columns = [levels, flanks.design[:, known_columns]] + ([(~drive)[:, None].astype(np.float64)] if has_back else [])
     design = np.concatenate(columns, axis=1)
     x, keep = robust_least_squares(design, q, keep, (drive, ~drive))
     residual = q - design @ x
-    of = dict(zip(others, x[len(places) : len(places) + len(others)], strict=True))
+    of = dict(zip(known_columns, x[len(places) : len(places) + len(known_columns)], strict=True))
     # A place whose samples all lay far off has a level that nothing rests on.
     rests = np.bincount(flanks.place[keep & drive], minlength=N_PLACES)[places] > 0
     at_places = np.where(rests, x[: len(places)], NAN)
@@ -416,9 +416,9 @@ def contact_features(m: motions.PairMotion, flanks: Flanks, rows: Mask) -> dict[
     deflection = 1e6 * of.get(1, NAN) * ordinary
     teeth = np.full(m.path.teeth[0], NAN)
     for j in range(len(teeth)):
-        here = alone & (flanks.tooth == j)
-        if np.sum(here) >= 3:
-            teeth[j] = np.median(residual[here])
+        of_tooth = alone & (flanks.tooth == j)
+        if np.sum(of_tooth) >= 3:
+            teeth[j] = np.median(residual[of_tooth])
     return {
         "play_um": 1e6 * play if play > 0.0 else NAN,
         "deflection_um": deflection if deflection > 0.0 else NAN,
@@ -594,25 +594,25 @@ class LocatedDriveChange:
     next_tooth_um: float
 
 
-def spot_of(now: CycleFeatures, other: CycleFeatures) -> LocatedDriveChange:
+def spot_of(now: CycleFeatures, baseline: CycleFeatures) -> LocatedDriveChange:
     """Return the tooth and the order that changed most over what the others did.
 
     Teeth: the scatter of their changes, 1.4826 of the median deviation, so that a tooth is judged by the other teeth
     and not by what another make differs by; 1 % of the deflection at least. Orders: f (1 + (w₀/w)³), f = 1 % of the
     mean torque, w₀ = 6, w the waves of an order in one run: with fewer, the trend of a start and a stop passes for it.
     """
-    teeth, ripple = now.teeth_um - other.teeth_um, now.ripple - other.ripple
+    teeth, ripple = now.teeth_um - baseline.teeth_um, now.ripple - baseline.ripple
     known = teeth[np.isfinite(teeth)]
     scatter = _spread(np.abs(known - np.median(known))) if len(known) else 0.0
-    waves = np.maximum(np.minimum(now.ripple_waves, other.ripple_waves), 1e-3)
+    waves = np.maximum(np.minimum(now.ripple_waves, baseline.ripple_waves), 1e-3)
     steps = 0.01 * (1.0 + (6.0 / waves) ** 3)
     tooth, order = (int(np.nanargmax(v)) if np.any(np.isfinite(v)) else 0 for v in (teeth, ripple / steps))
     next_um = max(float(np.nan_to_num(_largest_but(teeth, tooth))), 0.0)
-    return LocatedDriveChange(tooth, order, float(np.hypot(scatter, 0.01 * _deflection(now, other))), steps, next_um)
+    return LocatedDriveChange(tooth, order, float(np.hypot(scatter, 0.01 * _deflection(now, baseline))), steps, next_um)
 
 
 def change_of(
-    now: CycleFeatures, other: CycleFeatures, curve_shape: FloatArray, at: LocatedDriveChange | None = None
+    now: CycleFeatures, baseline: CycleFeatures, curve_shape: FloatArray, at: LocatedDriveChange | None = None
 ) -> FloatArray:
     """Return how far what is told changed, (n,) by `NAMES`; nan where it cannot be told.
 
@@ -622,23 +622,23 @@ def change_of(
 
     Parameters
     ----------
-    now, other : CycleFeatures
+    now, baseline : CycleFeatures
         Of two machines, or one machine at two times; or measured and simulated.
     curve_shape : array
         Profile of the compression over the mesh cycle that worn flanks give; its mean is 0.
     at : LocatedDriveChange or None
         Tooth and order to look at, and their steps. None: those that changed most.
     """
-    spot = at or spot_of(now, other)
-    teeth = (now.teeth_um - other.teeth_um) / spot.tooth_step_um
-    ripple = (now.ripple - other.ripple) / spot.ripple_step
-    deflection, drive = _deflection(now, other), other.drive_nm
-    waves, off_centre = now.waves_um - other.waves_um, now.off_centre_nm - other.off_centre_nm
+    spot = at or spot_of(now, baseline)
+    teeth = (now.teeth_um - baseline.teeth_um) / spot.tooth_step_um
+    ripple = (now.ripple - baseline.ripple) / spot.ripple_step
+    deflection, drive = _deflection(now, baseline), baseline.drive_nm
+    waves, off_centre = now.waves_um - baseline.waves_um, now.off_centre_nm - baseline.off_centre_nm
 
-    def level(name: str, least: float = 0.0) -> float:
-        a, b = getattr(now, name), getattr(other, name)
-        if least != 0.0:  # below it nothing is told from nothing
-            a, b = np.hypot(a, least), np.hypot(b, least)
+    def level(name: str, minimum: float = 0.0) -> float:
+        a, b = getattr(now, name), getattr(baseline, name)
+        if minimum != 0.0:  # below it nothing is told from nothing
+            a, b = np.hypot(a, minimum), np.hypot(b, minimum)
         return 20.0 * float(np.log10(a / b)) if a > 0.0 and b > 0.0 else NAN
 
     def signed(value: float, step: float) -> float:
@@ -649,10 +649,10 @@ def change_of(
     values = {
         "play": level("play_um"),
         "deflection": level("deflection_um"),
-        "curve": signed(_projected(now.curve_um - other.curve_um, curve_shape), 0.1 * deflection),
+        "curve": signed(_projected(now.curve_um - baseline.curve_um, curve_shape), 0.1 * deflection),
         "inertia": level("inertia_kg_m2"),
         "load_friction": level("friction_nm"),
-        "flank_friction": signed(now.flank_friction - other.flank_friction, 0.02),
+        "flank_friction": signed(now.flank_friction - baseline.flank_friction, 0.02),
         "tooth": signed(float(teeth[spot.tooth]), 1.0) - next_tooth,
         "next_tooth": next_tooth,
         "ripple": signed(float(ripple[spot.order]) if len(ripple) else NAN, 1.0) - next_ripple,
@@ -667,9 +667,9 @@ def change_of(
     return np.array([values[name] for name in NAMES], dtype=np.float64)
 
 
-def _deflection(now: CycleFeatures, other: CycleFeatures) -> float:
+def _deflection(now: CycleFeatures, baseline: CycleFeatures) -> float:
     """Return what a pair of teeth yields under the ordinary load; 20 µm where no torque tells it."""
-    return next((d for d in (other.deflection_um, now.deflection_um) if np.isfinite(d)), 20.0)
+    return next((d for d in (baseline.deflection_um, now.deflection_um) if np.isfinite(d)), 20.0)
 
 
 def _projected(curve: FloatArray, shape: FloatArray) -> float:
@@ -682,10 +682,10 @@ def _projected(curve: FloatArray, shape: FloatArray) -> float:
     return float(np.ptp(shape) * np.sum(s * c) / np.sum(s * s))
 
 
-def _largest_but(values: FloatArray, place: int, beside: int = 0) -> float:
+def _largest_but(values: FloatArray, place: int, n_neighbours: int = 0) -> float:
     """Return the largest of the others, those beside it left out."""
-    rest = np.delete(values, np.arange(max(place - beside, 0), min(place + beside + 1, len(values))))
-    return float(np.nanmax(rest)) if np.any(np.isfinite(rest)) else NAN
+    remaining = np.delete(values, np.arange(max(place - n_neighbours, 0), min(place + n_neighbours + 1, len(values))))
+    return float(np.nanmax(remaining)) if np.any(np.isfinite(remaining)) else NAN
 
 
 COMPRESSION, TORQUE = "compression", "torque"
@@ -719,20 +719,25 @@ def prediction_errors(cycles: PreparedCycles, known: CycleFeatures) -> dict[tupl
     if np.isfinite(known.play_um) and np.sum(drive) >= 20:
         ordinary = float(np.median(np.abs(elastic[flanks.alone]))) if np.any(flanks.alone) else 0.0
         per_load = known.deflection_um / ordinary if ordinary > 0.0 else 0.0
-        left = 1e6 * m.compression_m - side * 0.5 * known.play_um - np.nan_to_num(per_load) * elastic
-        left = left - float(np.median(left[drive]))
-        residuals += [(COMPRESSION, "drive", left, drive), (COMPRESSION, "back", left, flanks.loaded & (side < 0.0))]
+        residual = 1e6 * m.compression_m - side * 0.5 * known.play_um - np.nan_to_num(per_load) * elastic
+        residual = residual - float(np.median(residual[drive]))
+        residuals += [
+            (COMPRESSION, "drive", residual, drive),
+            (COMPRESSION, "back", residual, flanks.loaded & (side < 0.0)),
+        ]
     if equation is not None and np.isfinite(known.inertia_kg_m2):
-        given = equation.columns[:, 0] + known.flank_friction * equation.columns[:, 1]
+        load_torque = equation.columns[:, 0] + known.flank_friction * equation.columns[:, 1]
         needed = known.inertia_kg_m2 * equation.response - known.friction_nm * equation.columns[:, 2]
         r1, r2 = m.path.base_radii_m
-        residuals.append((TORQUE, "", (given - needed) * r1 / r2, equation.turning))
+        residuals.append((TORQUE, "", (load_torque - needed) * r1 / r2, equation.turning))
     errors = {}
-    for quantity, flank, left, rows in residuals:
+    for quantity, flank, residual, rows in residuals:
         for number, phase in enumerate(PHASES):
-            here = left[rows & (cycles.phase == number) & (cycles.number >= 0)]
-            if len(here) >= 20:
-                offset = float(np.median(here))
-                variance = np.median((here - offset) ** 2) / 0.455  # the median of a normal variable's square
+            errors_of_phase = residual[rows & (cycles.phase == number) & (cycles.number >= 0)]
+            if len(errors_of_phase) >= 20:
+                offset = float(np.median(errors_of_phase))
+                variance = (
+                    np.median((errors_of_phase - offset) ** 2) / 0.455
+                )  # the median of a normal variable's square
                 errors[quantity, phase, flank] = float(np.sqrt(offset**2 + variance))
     return errors

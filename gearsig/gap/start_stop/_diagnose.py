@@ -25,11 +25,11 @@ from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import readable
 from gearsig.gap import _types as types
 from gearsig.gap._attribution import Attribution
-from gearsig.gap._evidence import weighed_evidence
+from gearsig.gap._evidence import evidence_of_feature
 from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
 from gearsig.gap._types import NAMING, GapCause, GapOutcome, GapPlace, GapReport, Interval
-from gearsig.gap._verdict import in_order, likeliest_two, named_cause
+from gearsig.gap._verdict import in_order, most_probable_two, named_cause
 from gearsig.gap._words import fitted_words, severity_unit
 from gearsig.gap.start_stop._attribution import (
     CRACK,
@@ -70,7 +70,7 @@ class DriveDiagnosis:
     effects : mapping
         Those of the simulator.
     compared : tuple of DriveComparison
-    seen : tuple of DriveEvidence
+    evidence : tuple of DriveEvidence
         Of each.
     attribution : Attribution
     outcome : GapOutcome
@@ -81,7 +81,7 @@ class DriveDiagnosis:
     simulator: str
     effects: Mapping[str, GapEffect]
     compared: tuple[DriveComparison, ...]
-    seen: tuple[DriveEvidence, ...]
+    evidence: tuple[DriveEvidence, ...]
     attribution: Attribution[FittedDriveCause]
     outcome: GapOutcome
     references: tuple[str, ...] = ()
@@ -119,29 +119,29 @@ def diagnose_start_stop(
     tell("reading the motion", 0.02)
     healthy = [read_cycles(reference) for reference in references]
     compared = tuple(compare_drive(read_cycles(now), healthy, simulator, now.name) for now in recordings)
-    seen = []
-    for i, each in enumerate(compared):
+    evidence = []
+    for i, comparison in enumerate(compared):
 
         def simulating(name: str, done: float, i: int = i) -> None:
             tell(f"simulating {name.replace('_', ' ')}", 0.1 + 0.7 * (i + done) / len(compared))
 
-        seen.append(each.evidence(predict(each, effects, simulating)))
+        evidence.append(comparison.evidence(predict(comparison, effects, simulating)))
     tell("weighing", 0.85)
-    attribution = attribute_drive(seen, with_reference=bool(references))
+    attribution = attribute_drive(evidence, with_reference=bool(references))
     outcome = attribution.calibration.outcome(attribution.probabilities())
     rig = "" if recordings[0].rig is None else recordings[0].rig.name
     names = tuple(reference.name for reference in references)
-    return DriveDiagnosis(rig, simulator.name, effects, compared, tuple(seen), attribution, outcome, names)
+    return DriveDiagnosis(rig, simulator.name, effects, compared, tuple(evidence), attribution, outcome, names)
 
 
 def drive_report(diagnosis: DriveDiagnosis) -> GapReport:
     """Return the report of a diagnosis; places, curves and steps are of the recording that differs most."""
     outcome, effects, fits = diagnosis.outcome, diagnosis.effects, diagnosis.attribution.tried
     k = int(np.argmax([c.floor().size(c.change) for c in diagnosis.compared]))
-    compared, seen = diagnosis.compared[k], diagnosis.seen[k]
+    compared, evidence = diagnosis.compared[k], diagnosis.evidence[k]
     probabilities = diagnosis.attribution.probabilities()
     causes = in_order([_cause(diagnosis, k, name, p) for name, p in probabilities.items()], outcome)
-    first, pair, is_named = causes[0], likeliest_two(causes), outcome in NAMING
+    first, pair, is_named = causes[0], most_probable_two(causes), outcome in NAMING
     fitted = first.fitted if is_named else None
     floor = compared.floor()
     repeated = compared.change / _repeatability_limit(compared)
@@ -156,13 +156,13 @@ def drive_report(diagnosis: DriveDiagnosis) -> GapReport:
         repeatability=float(np.sqrt(np.nanmean(repeated**2))),
         places=drive_places(compared),
         causes=causes,
-        steps=_steps(compared, seen, first) if is_named else (),
-        next_recordings=_next_recordings(compared, seen, fits, pair, effects)
+        steps=_steps(compared, evidence, first) if is_named else (),
+        next_recordings=_next_recordings(compared, evidence, fits, pair, effects)
         if pair and outcome is not GapOutcome.NO_GAP
         else (),
         spectra=_torque_curves(compared, fitted),
         angles=_tooth_curves(compared, fitted, fits),
-        notices=tuple(_notices(diagnosis, compared, seen)),
+        notices=tuple(_messages(diagnosis, compared, evidence)),
         twin_toml="" if fitted is None else compared.drive.twin.preset_toml(fitted, note),
     )
 
@@ -191,7 +191,7 @@ def _cause(diagnosis: DriveDiagnosis, k: int, name: str, probability: float) -> 
         return base
     fitted, compared = diagnosis.attribution.tried[name], diagnosis.compared[k]
     places = {CRACK: f"tooth {compared.spot.tooth + 1} of the pinion", RIPPLE: f"order {compared.order} of the pinion"}
-    options = diagnosis.seen[k].predicted[name].options
+    options = diagnosis.evidence[k].predicted[name].options
     return replace(
         base,
         severity=fitted.severity,
@@ -211,34 +211,36 @@ def _evidence(fitted: FittedDriveCause, compared: DriveComparison) -> tuple[type
     known = [i for i in np.argsort(-size) if np.isfinite(change[i])]
     kept = [i for i in known if abs(predicted[i]) > SMALLEST * limit[i] or size[i] > 1.0][:6]
     return tuple(
-        weighed_evidence(
-            FEATURES[NAMES[i]].words, float(predicted[i]), float(observed[i]), float(limit[i]), least=SMALLEST
+        evidence_of_feature(
+            FEATURES[NAMES[i]].words, float(predicted[i]), float(observed[i]), float(limit[i]), min_floors=SMALLEST
         )
         for i in kept
     )
 
 
-def _steps(compared: DriveComparison, seen: DriveEvidence, cause: GapCause) -> tuple[types.GapStep, ...]:
+def _steps(compared: DriveComparison, evidence: DriveEvidence, cause: GapCause) -> tuple[types.GapStep, ...]:
     """Return what is left of the whole gap: before, and with an effect, fitted to the other half of the cycles."""
-    floor, predicted = compared.floor(of_half=True), seen.predicted[cause.name]
-    fitted = [fit(predicted, fold.fitted_to, floor).predicted for fold in seen.folds]
+    floor, predicted = compared.floor(of_half=True), evidence.predicted[cause.name]
+    fitted = [fit(predicted, fold.fitted_to, floor).predicted for fold in evidence.folds]
 
-    def left(taken: Sequence[FloatArray]) -> Interval:
-        pairs = list(zip(seen.folds, taken, strict=True))
+    def remaining(predictions: Sequence[FloatArray]) -> Interval:
+        pairs = list(zip(evidence.folds, predictions, strict=True))
         return floor.size_interval([fold.held_out - t for fold, t in pairs], [fold.without - t for fold, t in pairs])
 
-    return types.GapStep("before", left([0.0 * each for each in fitted])), types.GapStep(cause.title, left(fitted))
+    return types.GapStep("before", remaining([0.0 * change for change in fitted])), types.GapStep(
+        cause.title, remaining(fitted)
+    )
 
 
-def _notices(diagnosis: DriveDiagnosis, clearest: DriveComparison, seen: DriveEvidence) -> Iterator[str]:
+def _messages(diagnosis: DriveDiagnosis, clearest: DriveComparison, evidence: DriveEvidence) -> Iterator[str]:
     """Say what could not be told, what was taken for granted, and what the recording would not show."""
     effects, every = diagnosis.effects, diagnosis.compared
     if not is_drive_calibrated():
         yield "The probabilities are not calibrated yet: take them as a ranking only."
-    known = set.intersection(*(set(tellable(each, effects)) for each in every))
+    known = set.intersection(*(set(tellable(c, effects)) for c in every))
     missing = [effects[name].title for name in TRIED if name in effects and name not in known]
     if missing:
-        lacking = [each.name for each in every if each.now.motion.torque_nm is None]
+        lacking = [c.name for c in every if c.now.motion.torque_nm is None]
         why = "only a healthy reference tells what is ordinary"
         if lacking:
             why = f"no torque was recorded in {', '.join(lacking)}"
@@ -248,20 +250,20 @@ def _notices(diagnosis: DriveDiagnosis, clearest: DriveComparison, seen: DriveEv
             "Tooth and order count from the zero of the pinion's encoder, which must be the same in both recordings. "
             "In the figures of torque and teeth the healthy reference stands for the simulation before."
         )
-    for each in every:
-        if each.now.n_cycles < 4:
-            yield f"{each.name} has {each.now.n_cycles} starts: how far the gap shrinks rests on few cycles."
-        if not each.features.play_um > 0.0:
-            yield f"{each.name} loads one flank only: its play cannot be told; record a stop with the brake."
+    for c in every:
+        if c.now.n_cycles < 4:
+            yield f"{c.name} has {c.now.n_cycles} starts: how far the gap shrinks rests on few cycles."
+        if not c.features.play_um > 0.0:
+            yield f"{c.name} loads one flank only: its play cannot be told; record a stop with the brake."
     hidden = []
-    for name, cause in seen.predicted.items():
-        least = cause.minimum_severity(clearest.floor())
+    for name, cause in evidence.predicted.items():
+        min_severity = cause.minimum_severity(clearest.floor())
         unit, title = severity_unit(effects[name].unit), effects[name].title
-        if np.isfinite(least):
-            hidden.append(f"{title} below {readable(least, 2)} {unit}".rstrip())
+        if np.isfinite(min_severity):
+            hidden.append(f"{title} below {readable(min_severity, 2)} {unit}".rstrip())
         else:
-            most = f"{readable(float(cause.severities[-1]), 2)} {unit}".rstrip()
-            hidden.append(f"{title} at all (up to {most} were tried)")
+            max_severity = f"{readable(float(cause.severities[-1]), 2)} {unit}".rstrip()
+            hidden.append(f"{title} at all (up to {max_severity} were tried)")
     if hidden:
         yield f"This recording would not show: {'; '.join(hidden)}."
 
@@ -306,10 +308,10 @@ def drive_places(compared: DriveComparison) -> tuple[GapPlace, ...]:
 
 def _titles(compared: DriveComparison) -> dict[str, str]:
     """Return changes in one sentence each, with their numbers."""
-    now, other, spot = compared.features, compared.other, compared.spot
+    now, baseline, spot = compared.features, compared.baseline, compared.spot
 
     def pair(name: str, unit: str) -> str:
-        return beside(getattr(now, name), getattr(other, name), unit)
+        return beside(getattr(now, name), getattr(baseline, name), unit)
 
     def beside(a: float, b: float, unit: str) -> str:
         return f"{readable(float(a), 3)}{' ' if unit else ''}{unit} against {readable(float(b), 3)}"
@@ -317,10 +319,10 @@ def _titles(compared: DriveComparison) -> dict[str, str]:
     def size(difference: FloatArray, unit: str) -> str:
         return f"{readable(float(np.hypot(*difference)), 2)} {unit}"
 
-    curve, waves = now.curve_um - other.curve_um, now.waves_um - other.waves_um
+    curve, waves = now.curve_um - baseline.curve_um, now.waves_um - baseline.waves_um
     span = f"{readable(float(np.nanmax(curve) - np.nanmin(curve)), 2)} µm" if np.any(np.isfinite(curve)) else "– µm"
-    extra_um = readable(float((now.teeth_um - other.teeth_um)[spot.tooth]), 2)
-    ripple = beside(100 * now.ripple[spot.order], 100 * other.ripple[spot.order], "% of its mean")
+    extra_um = readable(float((now.teeth_um - baseline.teeth_um)[spot.tooth]), 2)
+    ripple = beside(100 * now.ripple[spot.order], 100 * baseline.ripple[spot.order], "% of its mean")
     return {
         "play": f"where the drive stops and the back flank takes over: play {pair('play_um', 'µm')}",
         "deflection": f"under load: teeth yield by {pair('deflection_um', 'µm')}",
@@ -328,12 +330,12 @@ def _titles(compared: DriveComparison) -> dict[str, str]:
         "inertia": f"in starts and stops, torque per acceleration of the load: {pair('inertia_kg_m2', 'kg·m²')}",
         "load_friction": f"while the load turns, torque that does not accelerate it: {pair('friction_nm', 'N·m')}",
         "flank_friction": f"loaded flanks, friction coefficient {pair('flank_friction', '')}",
-        "tooth": f"drive flank, tooth {spot.tooth + 1} of the pinion yields {extra_um} µm more than the middling tooth",
+        "tooth": f"drive flank, tooth {spot.tooth + 1} of the pinion yields {extra_um} µm more than the median tooth",
         "ripple": f"torque while running, order {compared.order} of the pinion: {ripple}",
         "driver_wave": f"compression once per revolution of the pinion: a wave of {size(waves[:2], 'µm')}",
         "driven_wave": f"compression once per revolution of the wheel: a wave of {size(waves[2:], 'µm')}",
         "off_centre": "load once per revolution of the wheel: a torque of "
-        f"{size(now.off_centre_nm - other.off_centre_nm, 'N·m')}",
+        f"{size(now.off_centre_nm - baseline.off_centre_nm, 'N·m')}",
         "impact": f"hardest impact of the flanks: {pair('impact_mps', 'm/s')}",
     }
 
@@ -341,11 +343,11 @@ def _titles(compared: DriveComparison) -> dict[str, str]:
 def _phases(compared: DriveComparison) -> list[GapPlace]:
     """Return the phases in which motion or torque are predicted worse than the healthy machine's own, by 3 dB."""
     healthy = compared.drive.healthy_run if compared.reference is None else compared.reference
-    now, other = (prediction_errors(one, compared.other) for one in (compared.now, healthy))
+    now, baseline = (prediction_errors(cycles, compared.baseline) for cycles in (compared.now, healthy))
     nothing = float("nan")
     places = []
     for (quantity, phase, flank), rms in now.items():
-        usual = other.get((quantity, phase, flank), nothing)
+        usual = baseline.get((quantity, phase, flank), nothing)
         change_db = float(20.0 * np.log10(max(rms, 1e-9) / max(usual, 1e-9)))
         if np.isfinite(change_db) and change_db > 3.0:
             title = (
@@ -360,14 +362,14 @@ def _phases(compared: DriveComparison) -> list[GapPlace]:
 
 def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[types.SpectrumCurves, ...]:
     """Return the torque by order of the pinion while running; none without torque."""
-    cycles, now, other = compared.now, compared.features.ripple, compared.other.ripple
-    if cycles.motion.torque_nm is None or not np.all(np.isfinite(now)) or not np.all(np.isfinite(other)):
+    cycles, now, baseline = compared.now, compared.features.ripple, compared.baseline.ripple
+    if cycles.motion.torque_nm is None or not np.all(np.isfinite(now)) or not np.all(np.isfinite(baseline)):
         return ()
     mean_nm = float(np.quantile(np.abs(cycles.motion.torque_nm), 0.9))
     every = cycles.every
-    rows = np.array([cycles.features(tuple(c for c in every if c != one)).ripple for one in every])
+    rows = np.array([cycles.features(tuple(c for c in every if c != cycle)).ripple for cycle in every])
     scatter = np.sqrt((len(rows) - 1.0) * np.var(rows, axis=0))
-    after = other.copy() if fitted is not None else np.zeros(0)
+    after = baseline.copy() if fitted is not None else np.zeros(0)
     if fitted is not None and fitted.name == RIPPLE:
         after[compared.spot.order] = np.hypot(after[compared.spot.order], 0.01 * fitted.severity)
     # How far a line of healthy drives may rise: the floor of the ripple, from its scale to a part of the mean torque.
@@ -379,10 +381,10 @@ def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[typ
             "N m",
             cycles.orders.astype(np.float64),
             mean_nm * now,
-            mean_nm * other,
+            mean_nm * baseline,
             mean_nm * after,
             mean_nm * FLOOR_IN_DEVIATIONS * np.maximum(scatter, 1e-5),
-            20.0 * np.log10(1.0 + part / np.maximum(other, 1e-5)),
+            20.0 * np.log10(1.0 + part / np.maximum(baseline, 1e-5)),
         ),
     )
 
@@ -391,7 +393,7 @@ def _tooth_curves(
     compared: DriveComparison, fitted: Added | None, fits: Mapping[str, FittedDriveCause]
 ) -> tuple[types.AngleCurves, ...]:
     """Return what each tooth of the pinion yields beyond the median one, 1 + (extra/floor)²: healthy ones are 1."""
-    now, other, spot = compared.features.teeth_um, compared.other.teeth_um, compared.spot
+    now, baseline, spot = compared.features.teeth_um, compared.baseline.teeth_um, compared.spot
     n = len(now)
     if np.sum(np.isfinite(now)) < 0.8 * n:
         return ()
@@ -401,19 +403,19 @@ def _tooth_curves(
 
     after: FloatArray = np.zeros(0)
     if fitted is not None:
-        teeth = np.nan_to_num(other)
+        teeth = np.nan_to_num(baseline)
         if fitted.name == CRACK:  # from the predicted change back to µm
             over = float(fits[CRACK].predicted[NAMES.index("tooth")]) * np.log(10.0) / 20.0
             over += np.arcsinh(0.5 * spot.next_tooth_um / spot.tooth_step_um)
             teeth[spot.tooth] += 2.0 * spot.tooth_step_um * np.sinh(over)
         after = energy(teeth)
     angle = 360.0 * (np.arange(n) + 0.5) / n
-    return (types.AngleCurves("pinion", "µm²", n, True, angle, energy(now), energy(other), after),)
+    return (types.AngleCurves("pinion", "µm²", n, True, angle, energy(now), energy(baseline), after),)
 
 
 def _next_recordings(
     compared: DriveComparison,
-    seen: DriveEvidence,
+    evidence: DriveEvidence,
     fits: Mapping[str, FittedDriveCause],
     pair: tuple[str, str],
     effects: Mapping[str, GapEffect],
@@ -426,7 +428,7 @@ def _next_recordings(
         """Return the predicted change of another drive, where the cause is expected to show."""
         if name in (WEAR, CRACK, TORQUE_GAIN):
             return fits[name].predicted
-        added = Added(name, fits[name].severity.value, seen.predicted[name].options)
+        added = Added(name, fits[name].severity.value, evidence.predicted[name].options)
         change = change_of(drive.features(added), drive.healthy, compared.drive.shape, compared.spot)
         return np.where(np.isin(NAMES, effects[name].shows_in), np.nan_to_num(change), 0.0)
 
@@ -441,17 +443,17 @@ def _next_recordings(
         if not abs(drive.healthy.friction_nm - healthy_friction_nm) < 0.1 * healthy_friction_nm:
             continue
         try:
-            there = apart(*(predicted(name, drive) for name in pair))
+            distance = apart(*(predicted(name, drive) for name in pair))
         except GearsigError:
             continue
-        if there > 1.1 * now:
+        if distance > 1.1 * now:
             titles = " and ".join(effects[name].title for name in pair)
             text = (
                 f"starts and stops at {drive.point.torque_nm:.3g} N·m; {titles} are then "
-                f"{there:.2g} structural floors apart instead of {now:.2g}."
+                f"{distance:.2g} structural floors apart instead of {now:.2g}."
             )
-            recordings.append(types.NextRecording(drive.point, pair, there, now, text))
-    return tuple(sorted(recordings, key=lambda one: -one.standard_deviations))
+            recordings.append(types.NextRecording(drive.point, pair, distance, now, text))
+    return tuple(sorted(recordings, key=lambda recording: -recording.standard_deviations))
 
 
 def refuse_start_stop(recordings: Sequence[Recording], model: str) -> None:

@@ -207,22 +207,26 @@ def test_candidates_and_draws_lie_in_one_range_and_fit_the_machine(name: str) ->
     ("name", "option", "values"),
     [("tooth_spall", "length_mm", 4), ("chipped_tooth", "width_percent", 2), ("pitch_error", "tooth", 1)],
 )
-def test_faults_of_teeth_are_tried_with_other_courses_beside_the_candidates(
+def test_faults_of_teeth_are_tried_with_further_settings_beside_the_candidates(
     name: str, option: str, values: int
 ) -> None:
     made = twin()
-    courses, candidates = made.courses(name), made.candidates(name)
-    assert len({a.options[option] for a in courses}) == values
-    assert {a.options["gear"] for a in courses} == {"driver", "driven"}
-    assert {a.severity for a in courses} <= {a.severity for a in candidates}
-    assert not any(a in candidates for a in courses)
-    for added in courses:
+    settings, candidates = made.further_settings(name), made.candidates(name)
+    assert len({a.options[option] for a in settings}) == values
+    assert {a.options["gear"] for a in settings} == {"driver", "driven"}
+    assert {a.severity for a in settings} <= {a.severity for a in candidates}
+    assert not any(a in candidates for a in settings)
+    for added in settings:
         machine_of(made, added)
 
 
-def test_other_effects_have_no_courses_of_their_own() -> None:
-    assert {name for name in effects() if twin().courses(name)} == {"tooth_spall", "chipped_tooth", "pitch_error"}
-    pitch = {(added.options["gear"], added.options["stands"]) for added in twin().courses("pitch_error")}
+def test_effects_but_faults_of_teeth_have_no_further_settings() -> None:
+    assert {name for name in effects() if twin().further_settings(name)} == {
+        "tooth_spall",
+        "chipped_tooth",
+        "pitch_error",
+    }
+    pitch = {(added.options["gear"], added.options["stands"]) for added in twin().further_settings("pitch_error")}
     assert pitch == {(gear, way) for gear in ("driven", "driver") for way in ("ahead", "behind")}
 
 
