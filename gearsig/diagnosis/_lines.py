@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
-from gearsig.prepared import RUN_UP_FOOT_ORDERS, LinesOverFloor, levels_beside, lines_over_noise_floor
+from gearsig.prepared import RUN_UP_FOOT_ORDERS, LinesOverFloor, lines_over_noise_floor, neighbour_levels
 from gearsig.recording import MAINS_HZ
 from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
@@ -295,7 +295,7 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
             clear = 20 * np.log10(spectrum.values / excess.floor) > UNEXPLAINED_DB
         if signals.speed_varies:
             # Skirts of lines that pass a resonance are far above the floor, but not above what lies beside them.
-            clear &= spectrum.values > levels_beside(spectrum) * 10 ** (UNEXPLAINED_DB / 20)
+            clear &= spectrum.values > neighbour_levels(spectrum) * 10 ** (UNEXPLAINED_DB / 20)
         height = np.where(clear & ~excess.masked & (spectrum.positions > 0.2), spectrum.values, 0.0)
         i = int(np.argmax(height))
         if height[i] > 0 and (best is None or height[i] > best[0]):

@@ -13,7 +13,7 @@ from gearsig.diagnosis._signals import AnalysisSignals, line_at
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, from_p_value, p_text
 from gearsig.formatting import signed
 from gearsig.indicators import lobe_lines
-from gearsig.prepared import INNER_LINES, RUN_UP_FOOT_ORDERS, Comb, LinesOverFloor, best_comb, level_beside
+from gearsig.prepared import INNER_LINES, RUN_UP_FOOT_ORDERS, Comb, LinesOverFloor, best_comb, neighbour_level
 from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
 
@@ -185,7 +185,7 @@ def _sideband(excess: LinesOverFloor, place: float, order: float) -> float:
     line = line_at(excess, place, around=min(6.0, apart / 2) * excess.spectrum.resolution)
     if line is None or not line.is_highest:
         return 0.0  # a sideband is the highest line of its surroundings; the foot of its carrier is not
-    beside = level_beside(excess.spectrum, line.position, apart - INNER_LINES)
+    beside = neighbour_level(excess.spectrum, line.position, apart - INNER_LINES)
     if beside is not None and line.amplitude < beside * 10 ** (CLEAR_DB / 20):
         return 0.0
     return _power(excess, place)
@@ -360,7 +360,7 @@ def _is_family(excess: LinesOverFloor, comb: Comb, mesh: float) -> bool:
     own_reach = comb.fundamental / excess.spectrum.resolution - 3
     places = []
     for position in comb.positions:
-        level = level_beside(excess.spectrum, position, own_reach)
+        level = neighbour_level(excess.spectrum, position, own_reach)
         amplitude = excess.spectrum.largest_near(position, excess.spectrum.resolution)[1]
         if level is None or amplitude >= level * 10 ** (6.0 / 20):
             h = max(1, round(position / mesh))

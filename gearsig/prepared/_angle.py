@@ -218,8 +218,8 @@ def _from_first_harmonic(channels: list[LinesOverFloor], stated: ShaftAngle) -> 
         if len(near) < 2 * FOOT_LINES + 2:
             continue
         top = int(near[np.argmax(values[near])])
-        beside = near[np.abs(near - top) > FOOT_LINES]
-        rules = values[top] >= 10 ** (RULES_DB / 20) * max(values[beside].max(initial=0.0), excess.floor[top])
+        away_from_top = near[np.abs(near - top) > FOOT_LINES]
+        rules = values[top] >= 10 ** (RULES_DB / 20) * max(values[away_from_top].max(initial=0.0), excess.floor[top])
         peak_hz = peak_position(excess.spectrum, top)
         if rules and near[0] < top < near[-1]:
             is_supply = any(abs(peak_hz / hz - 1) <= MAINS_TOLERANCE for hz in MAINS_HZ)
@@ -230,15 +230,15 @@ def _from_first_harmonic(channels: list[LinesOverFloor], stated: ShaftAngle) -> 
     return None
 
 
-def _common_lines(spectra: list[LinesOverFloor], n_own: int) -> LinesOverFloor:
+def _common_lines(spectra: list[LinesOverFloor], n_first: int) -> LinesOverFloor:
     """Return the lines over frequency that all channels and the envelopes of their bands have in common.
 
-    The mean over the spectra of the logarithm of power over floor, each cut so that no single one decides. The `n_own`
-    spectra of the channels themselves, which come first, count half of all: unbalance and bow are lines there, and
-    hardly modulate.
+    The mean over the spectra of the logarithm of power over floor, each cut so that no single one decides. The
+    `n_first` spectra of the channels themselves, which come first, count half of all: unbalance and bow are lines
+    there, and hardly modulate.
     """
-    weights = np.full(len(spectra), 0.5 / max(len(spectra) - n_own, 1))
-    weights[:n_own] = 0.5 / n_own
+    weights = np.full(len(spectra), 0.5 / max(len(spectra) - n_first, 1))
+    weights[:n_first] = 0.5 / n_first
     n = min(len(excess.floor) for excess in spectra)
     log_ratios = [
         np.log(np.maximum(excess.spectrum.values[:n], 1e-300) / np.maximum(excess.floor[:n], 1e-300))

@@ -406,7 +406,7 @@ RUN_UP_FOOT_ORDERS = 0.1
 """Width of a line's foot over a run-up, where its level changes from resonance to resonance."""
 
 
-def level_beside(spectrum: Spectrum, position: float, outer_lines: float = OUTER_LINES) -> float | None:
+def neighbour_level(spectrum: Spectrum, position: float, outer_lines: float = OUTER_LINES) -> float | None:
     """Return the amplitude (root of the mean power) of what lies beside a line, None if that is too few lines.
 
     The mean is taken from the median, P = median/ln 2 for lines of noise: then a neighbouring line does not raise it.
@@ -423,14 +423,14 @@ def level_beside(spectrum: Spectrum, position: float, outer_lines: float = OUTER
     reach = int(min(outer_lines, OUTER_LINES))
     below = spectrum.values[max(i - reach, 0) : max(i - INNER_LINES + 1, 0)]
     above = spectrum.values[min(i + INNER_LINES, n) : min(i + reach + 1, n)]
-    beside = np.concatenate([below, above])
-    if len(beside) < MIN_LINES:
+    neighbours = np.concatenate([below, above])
+    if len(neighbours) < MIN_LINES:
         return None
-    return float(np.sqrt(np.sort(beside**2)[len(beside) // 2] / log(2)))
+    return float(np.sqrt(np.sort(neighbours**2)[len(neighbours) // 2] / log(2)))
 
 
-def levels_beside(spectrum: Spectrum) -> FloatArray:
-    """Return `level_beside` at every line; the ends are mirrored."""
+def neighbour_levels(spectrum: Spectrum) -> FloatArray:
+    """Return `neighbour_level` at every line; the ends are mirrored."""
     from scipy.ndimage import median_filter
 
     footprint = np.ones(2 * OUTER_LINES + 1, dtype=np.bool_)

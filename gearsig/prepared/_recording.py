@@ -222,7 +222,7 @@ class PreparedRecording:
         # where there is nothing to follow.
         place = ("over angle", angle.shaft, turns, self._is_followed(followed))
         together = (key[-1] for key in self._kept if isinstance(key, tuple) and key[:-1] == place)
-        held = next((others for others in together if set(names) <= set(others)), names)
+        held = next((group for group in together if set(names) <= set(group)), names)
         signal = self.keep((*place, held), lambda: resample_to_angle(self.recording, angle, channels=held))
         return signal if held == names else _rows(signal, names)
 

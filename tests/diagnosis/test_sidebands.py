@@ -13,7 +13,7 @@ from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.diagnosis import Analysis, Finding, Kind, Outcome, analyze, modulation_of
 from gearsig.diagnosis import Modulation as Found
 from gearsig.orders import order_spectrum
-from gearsig.prepared import LinesOverFloor, level_beside, levels_beside, lines_over_noise_floor
+from gearsig.prepared import LinesOverFloor, lines_over_noise_floor, neighbour_level, neighbour_levels
 from gearsig.recording import Recording
 from gearsig.rig import GearPair, Rig, Shaft, TachometerChannel
 from sims.measure import ColouredNoise, Tachometer
@@ -250,10 +250,10 @@ def test_pulses_of_which_there_are_twice_as_many_are_doubted() -> None:
 
 def test_the_level_beside_a_line_is_that_of_the_noise() -> None:
     spectrum = excess_of(0.0, 0.0, 1).spectrum
-    everywhere = levels_beside(spectrum)
+    everywhere = neighbour_levels(spectrum)
     for order in (5.0, 27.0, 40.3):
         i = spectrum.index_of(order)
-        beside = level_beside(spectrum, order)
+        beside = neighbour_level(spectrum, order)
         assert beside == pytest.approx(everywhere[i])
         assert beside == pytest.approx(float(excess_of(0.0, 0.0, 1).floor[i]), rel=0.7)
-    assert level_beside(spectrum, 27.0, outer_lines=4) is None
+    assert neighbour_level(spectrum, 27.0, outer_lines=4) is None
