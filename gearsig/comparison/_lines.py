@@ -44,11 +44,11 @@ def line_levels(
             continue
         if 1 <= n < lines[shaft][0].first.shape[1]:
             kind: LineKind = line.kind  # type: ignore[assignment]  # `expected_lines` has no others
-            (simulated_db, simulated_error, simulated_seen), (recorded_db, recorded_error, recorded_seen) = (
+            (simulated_db, simulated_error, simulated_is_seen), (recorded_db, recorded_error, recorded_is_seen) = (
                 _read(side, channel, n) for side in lines[shaft]
             )
             level = LevelPair(simulated_db, recorded_db, float(np.hypot(simulated_error, recorded_error)))
-            levels[order] = LineLevel(line.label, kind, line.order, shaft, level, simulated_seen, recorded_seen)
+            levels[order] = LineLevel(line.label, kind, line.order, shaft, level, simulated_is_seen, recorded_is_seen)
     return tuple(levels[order] for order in sorted(levels))
 
 
@@ -83,11 +83,11 @@ def _read(lines: HalvedLines, channel: int, n: int) -> tuple[float, float, bool]
     """Return level, its standard error, and whether the line is seen."""
     amplitudes, noise = np.abs(lines.whole[channel]), lines.noise()[channel, n]
     strongest = float(np.max(amplitudes[1:] ** 2, initial=0.0))
-    seen = bool(amplitudes[n] > 3.0 * noise)  # noise alone is so high in one line of 8000
+    is_seen = bool(amplitudes[n] > 3.0 * noise)  # noise alone is so high in one line of 8000
     # What is not seen is at most the noise: the level is a bound then.
-    shown = amplitudes[n] if seen else max(amplitudes[n], noise)
-    level = float(decibel(np.array([shown**2]), strongest)[0])
-    return level, float(amplitude_error_db(np.array([shown]), np.array([noise]))[0]), seen
+    level_or_noise = amplitudes[n] if is_seen else max(amplitudes[n], noise)
+    level = float(decibel(np.array([level_or_noise**2]), strongest)[0])
+    return level, float(amplitude_error_db(np.array([level_or_noise]), np.array([noise]))[0]), is_seen
 
 
 def other_lines(
@@ -167,7 +167,7 @@ def _other_level(
     label: str, order: float, line: int, simulated: Sequence[Spectrum], recorded: Sequence[Spectrum]
 ) -> LineLevel:
     """Read both records at one order; a slightly other speed or slip may move the line by one."""
-    levels, errors, seen = [], [], []
+    levels, errors, are_seen = [], [], []
     for halves in (simulated, recorded):
         power = np.stack([half.values for half in halves])
         near = slice(max(line - 1, 0), line + 2)
@@ -176,9 +176,9 @@ def _other_level(
         a, b = decibel(peaks, float(power.max()))
         levels.append(float(decibel(np.array([peaks.mean()]), float(power.max()))[0]))
         errors.append(abs(float(a - b)) / 2.0)
-        seen.append(bool(10.0 * np.log10(max(peaks.min(), 1e-300) / max(floor, 1e-300)) > OTHER_OVER_FLOOR_DB))
+        are_seen.append(bool(10.0 * np.log10(max(peaks.min(), 1e-300) / max(floor, 1e-300)) > OTHER_OVER_FLOOR_DB))
     level = LevelPair(levels[0], levels[1], float(np.hypot(errors[0], errors[1])))
-    return LineLevel(label, "other", order, "", level, seen[0], seen[1])
+    return LineLevel(label, "other", order, "", level, are_seen[0], are_seen[1])
 
 
 OCTAVE_RATIO = 10.0**0.3

@@ -46,7 +46,7 @@ def make_side(
     channels: Mapping[str, float],
     names: Mapping[str, str],
     ratios: Mapping[str, float],
-    which: str,
+    side_name: str,
 ) -> ComparedSide:
     """Sample a record's channels over each shaft's angle, and cut them into halves.
 
@@ -60,7 +60,7 @@ def make_side(
         Shaft as the result calls it → as this side's rig calls it.
     ratios : mapping
         Shaft as the result calls it → its revolutions per revolution of the first one.
-    which : str
+    side_name : str
         "simulation" or "recording".
 
     Raises
@@ -70,7 +70,7 @@ def make_side(
     """
     recording, rig = prepared.recording, prepared.rig
     reference = next(iter(ratios))
-    reference_ratio = _reference_ratio(prepared, names.get(reference, reference), which)
+    reference_ratio = _reference_ratio(prepared, names.get(reference, reference), side_name)
     signals: dict[str, tuple[AngleSignal, AngleSignal]] = {}
     for shaft, ratio in ratios.items():
         place = (names.get(shaft, shaft), ratio * reference_ratio)
@@ -79,7 +79,7 @@ def make_side(
             if shaft != reference:
                 continue
             raise RefusalError(
-                f"the {which} holds {n_revolutions:.3g} revolutions of shaft {shaft or 'of reference'}, "
+                f"the {side_name} holds {n_revolutions:.3g} revolutions of shaft {shaft or 'of reference'}, "
                 f"{MIN_REVOLUTIONS} are needed",
                 remedy="make it longer",
             )
@@ -89,7 +89,7 @@ def make_side(
         if halved is not None:
             signals[shaft] = halved
     if reference not in signals:
-        raise RefusalError(f"the {which} holds too few whole revolutions", remedy="make it longer")
+        raise RefusalError(f"the {side_name} holds too few whole revolutions", remedy="make it longer")
     rows = [recording.index(name) for name in channels]
     factors = np.array(list(channels.values()))[:, None]
     return ComparedSide(
@@ -102,16 +102,18 @@ def make_side(
     )
 
 
-def _reference_ratio(prepared: PreparedRecording, shaft: str, which: str) -> float:
+def _reference_ratio(prepared: PreparedRecording, shaft: str, side_name: str) -> float:
     """Return revolutions of the shaft that the result counts orders of, per revolution of this side's reference."""
     try:
         angle = prepared.followed_angle
     except RefusalError as refusal:
-        raise RefusalError(f"the speed of the {which} is not known: {refusal.reason}", remedy=refusal.remedy) from None
+        raise RefusalError(
+            f"the speed of the {side_name} is not known: {refusal.reason}", remedy=refusal.remedy
+        ) from None
     ratio = prepared.rig.ratio(shaft, to=angle.shaft) if shaft and angle.shaft else 1.0
     if ratio is None:
         raise RefusalError(
-            f"the speed of shaft {shaft!r} does not follow from the teeth of the {which}'s rig",
+            f"the speed of shaft {shaft!r} does not follow from the teeth of the {side_name}'s rig",
             remedy="complete the tooth counts",
         )
     return ratio
@@ -245,7 +247,7 @@ def _factor(unit: str, target_unit: str, quantity: str) -> float | None:
     return None
 
 
-def check_live(recording: Recording, channels: Sequence[str], which: str) -> None:
+def check_live(recording: Recording, channels: Sequence[str], side_name: str) -> None:
     """Refuse dead channels: their level is that of nothing.
 
     Raises
@@ -255,7 +257,7 @@ def check_live(recording: Recording, channels: Sequence[str], which: str) -> Non
     for problem in find_problems(recording):
         if problem.kind == "dead" and problem.channel in channels:
             raise RefusalError(
-                f"channel {problem.channel} of the {which} is dead ({problem.evidence})",
+                f"channel {problem.channel} of the {side_name} is dead ({problem.evidence})",
                 remedy="check sensor, cable and input, or name other channels with --channel SIM=RECORDED",
             )
 

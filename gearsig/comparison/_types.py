@@ -343,8 +343,8 @@ DEEPEST_DB = 160.0
 
 def decibel(power: FloatArray, strongest: float) -> FloatArray:
     """Return 10 lg of mean squares, none more than `DEEPEST_DB` below the strongest."""
-    least = max(strongest * 10.0 ** (-DEEPEST_DB / 10.0), 1e-300)
-    levels: FloatArray = 10.0 * np.log10(np.maximum(power, least))
+    smallest = max(strongest * 10.0 ** (-DEEPEST_DB / 10.0), 1e-300)
+    levels: FloatArray = 10.0 * np.log10(np.maximum(power, smallest))
     return levels
 
 
@@ -354,12 +354,12 @@ def power_levels(simulated: FloatArray, recorded: FloatArray, *, smooth: int = 5
     The level's standard error is half the difference between the halves; or its rms over `smooth` neighbours,
     where that is larger: two halves agree by chance now and then.
     """
-    both = []
+    levels_of_sides = []
     for power in (simulated, recorded):
         strongest = float(power.max(initial=0.0))
         a, b = decibel(power[0], strongest), decibel(power[1], strongest)
-        both.append((decibel(power.mean(axis=0), strongest), _smoothed(np.abs(a - b) / 2.0, smooth)))
-    (simulated_db, simulated_error), (recorded_db, recorded_error) = both
+        levels_of_sides.append((decibel(power.mean(axis=0), strongest), _smoothed(np.abs(a - b) / 2.0, smooth)))
+    (simulated_db, simulated_error), (recorded_db, recorded_error) = levels_of_sides
     errors = np.hypot(simulated_error, recorded_error)
     return tuple(
         LevelPair(float(s), float(r), float(e)) for s, r, e in zip(simulated_db, recorded_db, errors, strict=True)

@@ -109,16 +109,16 @@ def _worst(line: LineLevel, gain: float) -> str:
 def _missing_texts(channel: ChannelComparison) -> list[str]:
     """Name the strongest lines that only one of the two shows."""
     texts = []
-    for seen, lacking, words in (
+    for seen_field, lacking_field, words in (
         ("recorded_is_seen", "simulated_is_seen", "The simulation lacks"),
         ("simulated_is_seen", "recorded_is_seen", "Only the simulation has"),
     ):
         missing = [
             line
             for line in (*channel.lines, *channel.other_lines)
-            if getattr(line, seen) and not getattr(line, lacking) and not _is_hidden(line)
+            if getattr(line, seen_field) and not getattr(line, lacking_field) and not _is_hidden(line)
         ]
-        side = "recorded_db" if seen.startswith("recorded") else "simulated_db"
+        side = "recorded_db" if seen_field.startswith("recorded") else "simulated_db"
         strongest = max(getattr(line.level, side) for line in (*channel.lines, *channel.other_lines))
         # A line that one record lacks is named if it is within 40 dB of the other's strongest.
         missing = [line for line in missing if getattr(line.level, side) > strongest - 40.0]
