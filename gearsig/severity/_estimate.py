@@ -102,12 +102,12 @@ def gear_evidence(
     Mesh energies that the event is compared with are the geometric mean of both recordings'.
     """
     return tuple(
-        _one_gear(now, healthy, i, Conditions(module_mm, load_mpa, shaft.order_hz * shaft.teeth, tip_relief_um))
+        _gear_evidence(now, healthy, i, Conditions(module_mm, load_mpa, shaft.order_hz * shaft.teeth, tip_relief_um))
         for i, shaft in enumerate(now)
     )
 
 
-def _one_gear(
+def _gear_evidence(
     now: Sequence[ShaftLines], healthy: Sequence[ShaftLines] | None, i: int, conditions: Conditions
 ) -> GearEvidence:
     shaft = now[i]
@@ -309,8 +309,8 @@ def _mesh_levels(shaft: ShaftLines, n: int) -> tuple[FloatArray, FloatArray]:
     z, tiny = shaft.teeth, np.finfo(float).tiny
     energies = np.maximum(mesh_energies(shaft, n), tiny)
     around = [np.abs(shaft.lines[:, k * z - z // 2 : k * z + z // 2 + 1]) ** 2 for k in range(1, n + 1)]
-    beside = np.maximum([np.median(lines, axis=1) for lines in around], tiny)
-    return 10.0 * np.log10(energies), 10.0 * np.log10(energies / beside)
+    neighbours = np.maximum([np.median(lines, axis=1) for lines in around], tiny)
+    return 10.0 * np.log10(energies), 10.0 * np.log10(energies / neighbours)
 
 
 def share_of_the_recording(now: ShaftLines, difference: ShaftLines, event: ToothEvent) -> tuple[float, float]:
@@ -480,9 +480,11 @@ def estimate_crack(
     facts = pair_facts(prepared.rig, torque_nm)
     used = calibration or load_calibration()
     if tip_relief_um is not None:  # beyond any in the calibration it is a wrong unit's
-        most = MAX_RELIEF_SHARE * used.reach["load_mpa"][1] * used.reach["module_mm"][1] / STIFFNESS_N_PER_MM_UM
+        max_relief_um = (
+            MAX_RELIEF_SHARE * used.reach["load_mpa"][1] * used.reach["module_mm"][1] / STIFFNESS_N_PER_MM_UM
+        )
         remedy = "give what is ground off at the tips, in µm"
-        within(tip_relief_um, "tip_relief_um", 0.0, round(most), "µm", remedy=remedy)
+        within(tip_relief_um, "tip_relief_um", 0.0, round(max_relief_um), "µm", remedy=remedy)
     names = acceleration_channels(prepared.recording, listed(channels, "channels", str))
     now = pair_lines(prepared, None, facts.pair, names)
     used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
@@ -522,7 +524,7 @@ def judge(
         alone = calibration.models[ALONE]
         clear = alone.score(best.features) >= alone.threshold
     if clear:
-        return _seen(gears, best, model, calibration, facts)
+        return _crack_estimate(gears, best, model, calibration, facts)
     if strange and weakest is not None:
         raise RefusalError(
             f"the teeth's own pattern on shaft {weakest!r} agrees with that of the reference by "
@@ -552,7 +554,7 @@ def judge(
     )
 
 
-def _seen(
+def _crack_estimate(
     gears: Sequence[GearEvidence], best: GearEvidence, model: DepthModel, calibration: Calibration, facts: PairFacts
 ) -> CrackEstimate:
     shaft, teeth, features = best.shaft.shaft, best.shaft.teeth, best.features
@@ -578,7 +580,7 @@ def _seen(
     interval = min(bounds[0], percent), max(min(bounds[1], 100.0), percent)
     per_mm = percent_per_mm(teeth, facts.module_mm)
     place = (best.event.centre_rev - calibration.lag_pitches / teeth) % 1.0
-    others = [e.event.prominence for e in gears if e is not best]
+    further_prominences = [e.event.prominence for e in gears if e is not best]
     if best.shaft.has_mark:
         reasons.append("Teeth count from 1 at the mark, as they engage; the place is good to about one tooth.")
     else:
@@ -590,7 +592,9 @@ def _seen(
         gear=f"{facts.pair.name}/{shaft}",
         tooth=int(place * teeth) % teeth + 1 if best.shaft.has_mark else None,
         angle_deg=360.0 * place,
-        gear_is_certain=all(log(best.event.prominence / prominence) >= CLEARLY_LARGER for prominence in others),
+        gear_is_certain=all(
+            log(best.event.prominence / prominence) >= CLEARLY_LARGER for prominence in further_prominences
+        ),
         depth_mm=percent / per_mm,
         depth_percent=percent,
         interval_mm=(interval[0] / per_mm, interval[1] / per_mm),

@@ -95,8 +95,8 @@ class DepthModel:
 
     def __post_init__(self) -> None:
         n, curves = len(FEATURES), len(SHAPED)
-        each = ("mean", "scale", "coefficients", "detection", "lowest", "highest")
-        shapes: dict[str, tuple[int, ...]] = dict.fromkeys(each, (n,))
+        names = ("mean", "scale", "coefficients", "detection", "lowest", "highest")
+        shapes: dict[str, tuple[int, ...]] = dict.fromkeys(names, (n,))
         shapes |= {"spread": (n + 1,), "precision": (n, n), "knots": (curves, 2), "slopes": (curves, 3)}
         _freeze(self, shapes | {"healthy_scores": self.healthy_scores.shape[:1]})
         rising = [FEATURES.index(name) for name in RISING]
