@@ -270,8 +270,8 @@ def contact_equation(motion: PairMotion) -> ContactEquation:
     usable = (np.abs(force) > LOADED * float(np.quantile(np.abs(force), 0.95))) & _clear(motion, side)
     if np.sum(usable) < 10 * MIN_SAMPLES:
         raise RefusalError(f"{np.sum(usable)} samples carry a load", remedy="record while the machine drives")
-    both = min(np.sum(usable & (side > 0)), np.sum(usable & (side < 0))) >= MIN_SAMPLES
-    start = _start(motion, both_flanks=bool(both))
+    has_both = min(np.sum(usable & (side > 0)), np.sum(usable & (side < 0))) >= MIN_SAMPLES
+    start = _start(motion, both_flanks=bool(has_both))
     speed = meeting_speeds(motion, float(start[0]), float(start[1]))
     group, n_groups = _groups(speed, usable, side)
     betas = np.full(n_groups, start[NAMES.index("damping")] / 0.1)
@@ -286,7 +286,7 @@ def contact_equation(motion: PairMotion) -> ContactEquation:
         group,
         usable & (group >= 0),
         np.concatenate([start, betas]),
-        tuple(i for i in range(len(NAMES) + n_groups) if both or i != NAMES.index("half_backlash")),
+        tuple(i for i in range(len(NAMES) + n_groups) if has_both or i != NAMES.index("half_backlash")),
     )
 
 
@@ -648,10 +648,10 @@ def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
     tooth = (motion.path.tooth(motion.driver_angle_rad) - 1.0).astype(np.int64)
     n_teeth = motion.path.teeth[0]
     counts = np.bincount(tooth[single], minlength=n_teeth)
-    n_seen = int(np.sum(counts >= MIN_SAMPLES_PER_TOOTH))
-    if n_seen < n_teeth // 2:
+    n_measured = int(np.sum(counts >= MIN_SAMPLES_PER_TOOTH))
+    if n_measured < n_teeth // 2:
         raise RefusalError(
-            f"{n_seen} of {n_teeth} teeth of the driver carried alone for {MIN_SAMPLES_PER_TOOTH} samples",
+            f"{n_measured} of {n_teeth} teeth of the driver carried alone for {MIN_SAMPLES_PER_TOOTH} samples",
             remedy="record more revolutions, under load",
         )
     middle, spread = np.full(n_teeth, np.nan), np.full(n_teeth, np.nan)

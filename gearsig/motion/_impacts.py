@@ -69,8 +69,8 @@ def fit_flight(
     at_end : bool
     """
     # 3 ms next to the flank: before that, a valve that moves or friction that turns has changed the acceleration.
-    most = int(np.clip(round(3e-3 * sampling_rate_hz), 3, MAX_SAMPLES))
-    chosen = np.arange(max(first, last - most), last) if at_end else np.arange(first, min(last, first + most))
+    n_max = int(np.clip(round(3e-3 * sampling_rate_hz), 3, MAX_SAMPLES))
+    chosen = np.arange(max(first, last - n_max), last) if at_end else np.arange(first, min(last, first + n_max))
     t = (chosen - chosen[0]) / sampling_rate_hz
     rows = [np.stack([np.ones_like(t), t, t**2], axis=1) / max(scatter[0], 1e-12)]
     values = [compression_m[chosen] / max(scatter[0], 1e-12)]

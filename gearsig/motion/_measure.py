@@ -80,11 +80,11 @@ def role_values(recording: Recording, rig: Rig, role: str, name: str) -> FloatAr
     return np.asarray(recording.values(name), dtype=np.float64) * _worth(channel, rig, role.rpartition(" ")[2])
 
 
-def _worth(channel: Channel, rig: Rig, what: str) -> float:
+def _worth(channel: Channel, rig: Rig, quantity: str) -> float:
     source = rig.speed
-    if what == "angle" and isinstance(source, EncoderChannel) and source.channel == channel.name:
+    if quantity == "angle" and isinstance(source, EncoderChannel) and source.channel == channel.name:
         return 2.0 * pi / source.units_per_revolution
-    known = _UNITS[what]
+    known = _UNITS[quantity]
     unit = " ".join(channel.unit.split())
     for spelt in (unit, unit.casefold()):
         if spelt in known:
@@ -97,10 +97,10 @@ def _worth(channel: Channel, rig: Rig, what: str) -> float:
 
 
 def _fits(channel: Channel, role: str, pair: GearPair) -> bool:
-    side, _, what = role.rpartition(" ")
+    side, _, quantity = role.rpartition(" ")
     if not side:
-        return channel.quantity == what
-    if channel.quantity not in QUANTITY_OF[what]:
+        return channel.quantity == quantity
+    if channel.quantity not in QUANTITY_OF[quantity]:
         return False
     return side == side_of(channel, pair)
 
@@ -472,7 +472,9 @@ class _Reader:
 
     def side(self, side: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return angle, speed and acceleration of one gear."""
-        angle_role, speed_role, acceleration_role = (f"{side} {what}" for what in ("angle", "speed", "acceleration"))
+        angle_role, speed_role, acceleration_role = (
+            f"{side} {quantity}" for quantity in ("angle", "speed", "acceleration")
+        )
         if angle_role not in self.roles and speed_role not in self.roles:
             raise RefusalError(
                 f"neither angle nor speed of the {side} gear was measured: how far the flanks are apart is not known",
@@ -496,8 +498,8 @@ class _Reader:
     def check_scales(self, side: str, motion: tuple[FloatArray, FloatArray, FloatArray]) -> None:
         """Refuse a measured speed or acceleration that the measured angle of that gear contradicts."""
         angle = self.roles.get(f"{side} angle")
-        for order, what in ((1, "speed"), (2, "acceleration")):
-            name = self.roles.get(f"{side} {what}")
+        for order, quantity in ((1, "speed"), (2, "acceleration")):
+            name = self.roles.get(f"{side} {quantity}")
             if angle is not None and name is not None:
                 where, rate = self.recording.provenance.source or "recording", self.recording.sampling_rate_hz
                 check_scale(motion[0], motion[order], rate, order=order, names=(angle, name), where=where)

@@ -314,11 +314,13 @@ def _both_angles(
             angles[side] = _from_encoder(role_values(recording, rig, f"{side} angle", name), recording, name)
         elif (stated := _stated_pulses(recording, rig, shaft)) is not None:
             angles[side] = stated
-    for side, other in (SIDES, SIDES[::-1]):
+    for side, opposite in (SIDES, SIDES[::-1]):
         channels = [] if side in angles else _tachometers(recording, pair, side)
-        if len(channels) == 1 and other in angles:
+        if len(channels) == 1 and opposite in angles:
             ratio = (pair.driven_teeth or 1) / (pair.driver_teeth or 1)
-            angles[side] = _counted(recording, channels[0], angles[other], ratio if side == "driver" else 1.0 / ratio)
+            angles[side] = _counted(
+                recording, channels[0], angles[opposite], ratio if side == "driver" else 1.0 / ratio
+            )
     missing = [side for side in SIDES if side not in angles]
     if missing:
         raise RefusalError(
