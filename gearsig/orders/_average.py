@@ -39,21 +39,21 @@ def first_whole_sample(signal: AngleSignal) -> tuple[int, int]:
     return round((first - signal.start_revolution) * per_rev), first
 
 
-def whole_revolutions(signal: AngleSignal, channel: str, *, at_least: int = 1) -> FloatArray:
+def whole_revolutions(signal: AngleSignal, channel: str, *, minimum: int = 1) -> FloatArray:
     """Return a channel as (n_revolutions, samples_per_revolution), partial revolutions at either end left out.
 
     Raises
     ------
     RefusalError
-        If there are fewer than `at_least` whole revolutions.
+        If there are fewer than `minimum` whole revolutions.
     """
     x = signal.values(channel)
     start, _ = first_whole_sample(signal)
     per_rev = signal.samples_per_revolution
     n_rev = max(0, (len(x) - start) // per_rev)
-    if n_rev < at_least:
+    if n_rev < minimum:
         raise RefusalError(
-            f"only {n_rev} whole revolution(s) of shaft {signal.shaft_angle.shaft!r}, {at_least} needed",
+            f"only {n_rev} whole revolution(s) of shaft {signal.shaft_angle.shaft!r}, {minimum} needed",
             remedy="record longer or at a higher speed",
         )
     revolutions: FloatArray = x[start : start + n_rev * per_rev].reshape(n_rev, per_rev)
@@ -143,8 +143,8 @@ def angle_of(recording: Recording, shaft_angle: ShaftAngle | None, speed_rpm: fl
             )
         return find_shaft_angle(recording)
     if np.ndim(speed_rpm) == 0:
-        one: Any = speed_rpm
-        return constant_speed_angle(not_negative(one, "speed_rpm", "rpm"), recording.duration_s)
+        rpm: Any = speed_rpm
+        return constant_speed_angle(not_negative(rpm, "speed_rpm", "rpm"), recording.duration_s)
     if np.shape(speed_rpm) != (recording.n_samples,):
         raise InputError(
             f"speed_rpm has shape {np.shape(speed_rpm)}",
@@ -204,7 +204,7 @@ def synchronous_average(
     """
     count(n_jackknife_blocks, "n_jackknife_blocks", minimum=2)
     signal, channel = over_angle(signal, channel, shaft, shaft_angle, speed_rpm)
-    revolutions = whole_revolutions(signal, channel, at_least=2)
+    revolutions = whole_revolutions(signal, channel, minimum=2)
     mean, standard_error = mean_and_error(revolutions, n_jackknife_blocks)
     return SynchronousAverage(
         values=mean,
@@ -291,7 +291,7 @@ def average_lines(
     highest = int(min(limit + 1e-9, (per_rev - 1) // 2))
     rows = []
     for name in names:
-        revolutions = whole_revolutions(signal, name, at_least=n_parts)
+        revolutions = whole_revolutions(signal, name, minimum=n_parts)
         blocks = _blocks(len(revolutions), n_parts)
         means = np.stack([_weighted_mean(revolutions[block], weighting) for block in blocks])
         rows.append(lines_of_revolution(means, scaling)[:, : highest + 1])

@@ -158,9 +158,9 @@ def mesh_band(average: SynchronousAverage, teeth: int, harmonic: int, half_width
 
 def checked_teeth(average: SynchronousAverage, teeth: int | Iterable[int]) -> tuple[int, ...]:
     """Return the teeth as a tuple; each at least 3 and with its mesh order inside the average."""
-    given: Any = teeth
-    is_one = isinstance(given, int | float | np.number | str)  # of which `count` says what is wrong
-    numbers = (given,) if is_one else listed(given, "teeth", object)
+    numbers_of_teeth: Any = teeth
+    is_single = isinstance(numbers_of_teeth, int | float | np.number | str)  # of which `count` says what is wrong
+    numbers = (numbers_of_teeth,) if is_single else listed(numbers_of_teeth, "teeth", object)
     if not numbers:
         raise InputError("no teeth are given", remedy="give the teeth of each gear on the shaft")
     for z in numbers:

@@ -174,10 +174,10 @@ def amplitude_at_speeds(tracked: TrackedOrder, speeds_rpm: FloatArray) -> FloatA
 
 
 def _checked_orders(signal: AngleSignal, orders: Sequence[float], margin: float) -> FloatArray:
-    given = listed_numbers(orders, "orders", remedy="give a list: [2, 4.5]")
-    if not given:
+    listed_orders = listed_numbers(orders, "orders", remedy="give a list: [2, 4.5]")
+    if not listed_orders:
         raise InputError("no orders are given", remedy="name at least one")
-    numbers = np.array([not_negative(order, "order") for order in given])
+    numbers = np.array([not_negative(order, "order") for order in listed_orders])
     if numbers.max() + margin > signal.highest_order:
         raise RefusalError(
             f"order {numbers.max():g} lies above the highest valid order {signal.highest_order:g} of the signal",

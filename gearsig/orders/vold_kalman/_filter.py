@@ -256,15 +256,15 @@ def _neighbours(tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, poles: 
         If two orders never drift apart by half a cycle.
     """
     step = max(1, valid.shape[1] // 2**15)  # frequencies are smooth
-    there, f, cycles = valid[:, ::step], tracks.frequency_hz[:, ::step], tracks.cycles[:, ::step]
+    is_valid, f, cycles = valid[:, ::step], tracks.frequency_hz[:, ::step], tracks.cycles[:, ::step]
     width = np.broadcast_to(bandwidth, valid.shape)[:, ::step]
     pairs = []
     for k, m in combinations(range(len(valid)), 2):
-        both = there[k] & there[m]
-        if not both.any():
+        are_valid = is_valid[k] & is_valid[m]
+        if not are_valid.any():
             pairs.append(Neighbours(k, m, np.inf, 0.0, 0.0))
             continue
-        drift = float(np.ptp((cycles[k] - cycles[m])[both]))
+        drift = float(np.ptp((cycles[k] - cycles[m])[are_valid]))
         if drift < 0.5:
             raise InputError(
                 f"orders {tracks.names[k]!r} and {tracks.names[m]!r} drift apart by {drift:.3g} cycles only",
@@ -272,8 +272,8 @@ def _neighbours(tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, poles: 
                 allowed="different orders",
                 remedy="leave one of them out or record longer",
             )
-        difference = (f[k] - f[m])[both]
-        of_half = 2.0 * np.abs(difference) / np.maximum(width[k], width[m])[both]
+        difference = (f[k] - f[m])[are_valid]
+        of_half = 2.0 * np.abs(difference) / np.maximum(width[k], width[m])[are_valid]
         crossing = difference.min() <= 0.0 <= difference.max()
         nearest = 0.0 if crossing else float(of_half.min())
         distance = 0.0 if crossing else float(np.abs(difference).min())
@@ -360,10 +360,10 @@ def _settled(bandwidth: FloatArray, valid: BoolArray, sampling_rate: float, skir
     Where the bandwidth varies, so does the settling time T: it has passed once ∫ dt/T has grown by one.
     """
     settled = np.zeros(valid.shape, dtype=bool)
-    for k, there in enumerate(valid):
+    for k, is_valid in enumerate(valid):
         rate = 1.0 / (settling_time(bandwidth[k], skirt_poles) * sampling_rate)
-        passed = rate[0] * np.arange(len(there)) if len(rate) == 1 else np.cumsum(rate)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).view(np.int8)))
+        passed = rate[0] * np.arange(len(is_valid)) if len(rate) == 1 else np.cumsum(rate)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], is_valid, [False]]).view(np.int8)))
         for first, end in edges.reshape(-1, 2):
             begin = first + np.searchsorted(passed[first:end], passed[first] + 1.0)
             stop = first + np.searchsorted(passed[first:end], passed[end - 1] - 1.0, side="right")
@@ -388,7 +388,7 @@ def _time_notes(
         f"at the ends of the recording, and beside parts left out, levels are not reliable over {span} "
         f"{tracks.duration_unit}, in which the filter's response decays to 1 %"
     )
-    never = [repr(name) for name, there in zip(tracks.names, settled, strict=True) if not there.any()]
+    never = [repr(name) for name, is_settled in zip(tracks.names, settled, strict=True) if not is_settled.any()]
     if never:
         notes.append(f"the recording is too short for order(s) {', '.join(never)} to settle: widen the band")
     return notes

@@ -91,17 +91,17 @@ def solve_groups(
         for g, part in zip(rows, parts, strict=True):
             solutions[g], waveforms[g] = _solve_group(y, part)
         return _envelopes(solutions, problem), waveforms, 0.0
-    rest = y.astype(np.float64)
-    largest = float(np.abs(rest).max()) or 1.0
+    residual = y.astype(np.float64)
+    largest = float(np.abs(residual).max()) or 1.0
     before, error = 1.0, 1.0
     for _ in range(20):
         change = 0.0
         for g, part in zip(rows, parts, strict=True):
-            rest += waveforms[g].sum(axis=0)
-            solutions[g], new = _solve_group(rest, part)
+            residual += waveforms[g].sum(axis=0)
+            solutions[g], new = _solve_group(residual, part)
             change = max(change, float(np.abs(new - waveforms[g]).max()) / largest)
             waveforms[g] = new
-            rest -= new.sum(axis=0)
+            residual -= new.sum(axis=0)
         # Each sweep changes the waveforms by the same fraction of what the last one did.
         error = change * min(1.0, change / before)
         before = change
@@ -589,9 +589,9 @@ def _sampled(coefficients: ComplexArray, basis: FloatArray, n: int, n_splines: i
     for k in range(len(a)):
         windows = np.lib.stride_tricks.sliding_window_view(a[k], PIECES)
         for first, last, samples in _chunks(d, n, n):
-            both = (windows.real[first:last] @ basis.T, windows.imag[first:last] @ basis.T)
+            parts = (windows.real[first:last] @ basis.T, windows.imag[first:last] @ basis.T)
             length = samples.stop - samples.start
-            x.real[k, samples], x.imag[k, samples] = both[0].reshape(-1)[:length], both[1].reshape(-1)[:length]
+            x.real[k, samples], x.imag[k, samples] = parts[0].reshape(-1)[:length], parts[1].reshape(-1)[:length]
     return x
 
 
@@ -668,10 +668,10 @@ def _substitute(triangle: Array, right: Array, x: Array, n: int) -> bool:
     for j in range(n - 1, -1, -1):
         if triangle[j, 0].real == 0.0:
             return False
-        rest = right[j]
+        remainder = right[j]
         for m in range(1, min(width, len(x) - j)):
-            rest -= triangle[j, m] * x[j + m]
-        x[j] = rest / triangle[j, 0].real
+            remainder -= triangle[j, m] * x[j + m]
+        x[j] = remainder / triangle[j, 0].real
     return True
 
 

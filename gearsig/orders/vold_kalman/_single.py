@@ -88,8 +88,8 @@ _applied = _for(lambda a, z: a * z, lambda a, z: complex(a[0] * z.real + a[1] * 
 def _block_with_data(s: Entry, g: complex, _x: complex, data: FloatArray, row: int, i: int) -> tuple[Entry, complex]:
     """Add hhᵀ and h y with h = (cos Θ, -sin Θ); data holds signal, cosine and sine."""
     y, c, n = data[0, row, i], data[1, row, i], -data[2, row, i]
-    beside = s[1] + c * n
-    return (s[0] + c * c, beside, beside, s[3] + n * n), g + complex(y * c, y * n)
+    off_diagonal = s[1] + c * n
+    return (s[0] + c * c, off_diagonal, off_diagonal, s[3] + n * n), g + complex(y * c, y * n)
 
 
 _with_data = _for(lambda s, g, x, data, row, i: (s + data[0, row, i], g + x), _block_with_data)
@@ -103,9 +103,9 @@ def _number_damped(s: float, q: float) -> tuple[float, float]:
 def _block_damped(s: Entry, q: float) -> tuple[Entry, Entry]:
     determinant = s[0] * s[3] - s[1] * s[1]
     f = 1.0 / (1.0 + q * (s[0] + s[3]) + q * q * determinant)
-    beside, qd = s[1] * f, q * determinant
-    r = (f + q * s[3] * f, -q * beside, -q * beside, f + q * s[0] * f)
-    return r, ((s[0] + qd) * f, beside, beside, (s[3] + qd) * f)
+    off_diagonal, qd = s[1] * f, q * determinant
+    r = (f + q * s[3] * f, -q * off_diagonal, -q * off_diagonal, f + q * s[0] * f)
+    return r, ((s[0] + qd) * f, off_diagonal, off_diagonal, (s[3] + qd) * f)
 
 
 _damped = _for(_number_damped, _block_damped)  # (R = 1/(I + q s), s R) of a symmetric entry
@@ -139,7 +139,7 @@ _kept = _for(lambda _unit, gains, row, i, k: gains[row, i, k], _block_kept)  # `
 # One step forward, by poles: add the data of a sample, and go to the next. The form holds S's upper triangle, then g.
 
 
-def _step_one(
+def _forward_step(
     form: State, x: Array, data: FloatArray, q: FloatArray, _kappa: Any, gains: FloatArray, row: int, i: int
 ) -> State:
     """One pole: x' = x + ε."""
@@ -209,14 +209,14 @@ def _step_three(
     return xx, x_v, xa, vv, va, aa, g_x, g_v - g_x, g_a - g_v
 
 
-_step = _by(lambda form, *_: {2: _step_one, 5: _step_two, 9: _step_three}[len(form)])
+_step = _by(lambda form, *_: {2: _forward_step, 5: _step_two, 9: _step_three}[len(form)])
 
 
 # One step back: from the state after it to that before, z_j - z_(j+1) for all but the last component, and for that one
 # R z_p - Σ (q s_j R)ᵀ z_j + q R g.
 
 
-def _back_one(z: State, x: Array, gains: FloatArray, row: int, i: int, unit: Entry) -> State:
+def _backward_step(z: State, x: Array, gains: FloatArray, row: int, i: int, unit: Entry) -> State:
     z_x = _applied(_kept(unit, gains, row, i, 0), z[0]) + x[i]
     x[i] = z_x
     return (z_x,)
@@ -241,7 +241,7 @@ def _back_three(z: State, x: Array, gains: FloatArray, row: int, i: int, unit: E
     return z_x, z_v, z_a
 
 
-_back = _by(lambda z, *_: (_back_one, _back_two, _back_three)[len(z) - 1])
+_back = _by(lambda z, *_: (_backward_step, _back_two, _back_three)[len(z) - 1])
 
 
 @_kernel
