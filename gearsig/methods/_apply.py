@@ -71,14 +71,16 @@ def _method(name: str, options: Mapping[str, Any]) -> tuple[Method, dict[str, An
             f"there is no method {name!r}", allowed=", ".join(METHODS), remedy=closest_match_hint(name, list(METHODS))
         )
     method = METHODS[name]
-    taken = {option.name: option for option in method.options}
+    defined = {option.name: option for option in method.options}
     for key, value in options.items():
-        if key not in taken:
+        if key not in defined:
             fitting = [n for n, m in METHODS.items() if key in (o.name for o in m.options)]
-            remedy = f"it is an option of {', '.join(fitting)}" if fitting else f"it takes {', '.join(taken) or 'none'}"
+            remedy = (
+                f"it is an option of {', '.join(fitting)}" if fitting else f"it takes {', '.join(defined) or 'none'}"
+            )
             raise InputError(f"{name} takes no {key.replace('_', ' ')}", remedy=remedy)
-        taken[key].check(value)
-    return method, {key: option.default for key, option in taken.items()} | dict(options)
+        defined[key].check(value)
+    return method, {key: option.default for key, option in defined.items()} | dict(options)
 
 
 # --------------------
@@ -127,8 +129,8 @@ def apply_method_to_file(
     """
     method, settings = _method(name, options)
     allowed = positive(memory_bytes - PROGRAM_BYTES, "memory less 0.2 GB", "bytes", remedy="allow more than 0.2 GB")
-    given: dict[str, Any] = {"rig": rig, "sampling_rate_hz": sampling_rate_hz, "speed": speed}
-    record = record_blocks(path, **given)
+    how_to_read: dict[str, Any] = {"rig": rig, "sampling_rate_hz": sampling_rate_hz, "speed": speed}
+    record = record_blocks(path, **how_to_read)
     n_samples, rate = record.n_samples, record.head.sampling_rate_hz
     first = min(n_samples - 1, max(0, round((start_s or 0.0) * rate)))
     last = n_samples if end_s is None else max(first + 1, min(n_samples, round(end_s * rate)))
@@ -141,14 +143,14 @@ def apply_method_to_file(
     if record.is_parted and part_bytes <= allowed:
         return apply_method(name, record.read(slice(first, last)), channel, **options)
     if record.is_parted and method.in_blocks is not None:
-        return _in_blocks(name, method, record_blocks(path, **given, part=slice(first, last)), channel, settings)
+        return _in_blocks(name, method, record_blocks(path, **how_to_read, part=slice(first, last)), channel, settings)
     longest_s = float(f"{0.9 * allowed / (reading + per_sample) / rate:.2g}")
     begin_s = start_s or 0.0
     remedy = f"look at a part, e.g. --from {begin_s:g}s --to {begin_s + longest_s:g}s, or give more with --memory"
     if not record.is_parted:
         remedy += ", or convert it to HDF5, Parquet, TDMS or WAV, which are read in parts"
     elif method.in_blocks is None:
-        all_of_it = ", ".join(other for other, m in METHODS.items() if m.in_blocks is not None)
+        all_of_it = ", ".join(block_method for block_method, m in METHODS.items() if m.in_blocks is not None)
         remedy += f"; all of it is looked at by: {all_of_it}"
     needed = part_bytes if record.is_parted else whole_bytes
     raise InputError(

@@ -63,7 +63,7 @@ def _modes(
     dual_step: float,
     engine: Any,
 ) -> MethodAnswer:
-    signal, offset = _taken_apart(prepared, channel, envelope_hz, over_angle=over_angle, shaft=shaft)
+    signal, offset = _decomposed(prepared, channel, envelope_hz, over_angle=over_angle, shaft=shaft)
     reasons: tuple[str, ...] = ()
     settings, trials = VmdSettings(n_modes or 4, penalty or 2000.0), dict[str, Any]()
     place = ("methods", "modes", channel, envelope_hz, over_angle, shaft)
@@ -159,7 +159,7 @@ def _modes(
     )
 
 
-def _taken_apart(
+def _decomposed(
     prepared: PreparedRecording,
     channel: str,
     envelope_hz: tuple[float, float] | None,
@@ -252,9 +252,9 @@ def _denoising(
     step = f"{threshold} {rule} thresholds, {wavelet}"
     waveforms = waveforms_of(prepared, channel, signal_of(prepared, channel), columns, step, residual="removed")
     at, unit = waveforms.at(), unit_of(prepared, channel)
-    both = [ChartLine(at, columns[name], name, k - 1) for k, name in enumerate(("signal", "without noise"))]
+    lines = [ChartLine(at, columns[name], name, k - 1) for k, name in enumerate(("signal", "without noise"))]
     panels = (
-        LinePanel(both, "time (s)", with_unit(channel, unit)),
+        LinePanel(lines, "time (s)", with_unit(channel, unit)),
         LinePanel([ChartLine(at, denoised.removed, "removed", 1)], "time (s)", with_unit("removed", unit)),
     )
     table = {

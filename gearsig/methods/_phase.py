@@ -169,10 +169,10 @@ def _embedded(
         information = phase.average_mutual_information(values, rate_hz, source=source)
         chosen = delay or information.delay_samples
         curves = phase.embedding_dimension(values, rate_hz, delay_samples=chosen, source=source)
-        n_axes, said = dimension or curves.dimension, tuple[str, ...]()
+        n_axes, messages = dimension or curves.dimension, tuple[str, ...]()
         if n_axes == 0:
             n_axes = curves.dimensions[-1]
-            said = (
+            messages = (
                 (
                     f"no dimension up to {n_axes} unfolds the path: the signal looks stochastic. {n_axes} dimensions "
                     "are taken; a narrower band or a dimension of your own may say more"
@@ -181,7 +181,7 @@ def _embedded(
         path = phase.delay_embedding(
             values, rate_hz, delay_samples=chosen, dimension=n_axes, unit=unit_of(prepared, channel), source=source
         )
-        return replace(path, start_s=start_s), information, curves, said
+        return replace(path, start_s=start_s), information, curves, messages
 
     return prepared.keep(("methods", "embedding", channel, lowest_hz, highest_hz, delay, dimension), embed)
 
@@ -216,7 +216,7 @@ def _columns(path: phase.PhasePortrait) -> dict[str, FloatArray]:
 
 
 def _embedding(prepared: PreparedRecording, channel: str, **options: Any) -> MethodAnswer:
-    _, information, curves, said = _embedded(prepared, channel, **options)
+    _, information, curves, messages = _embedded(prepared, channel, **options)
     yours = f" Neighbours are those at your delay of {curves.delay_samples}." if options["delay"] else ""
     return MethodAnswer(
         channel,
@@ -239,19 +239,19 @@ def _embedding(prepared: PreparedRecording, channel: str, **options: Any) -> Met
                 "near 1 at every dimension says random."
             ),
         ),
-        warnings=said,
+        warnings=messages,
     )
 
 
 def _portrait(
     prepared: PreparedRecording, channel: str, pair: str, shaft: str, place: float, in_space: bool, **options: Any
 ) -> MethodAnswer:
-    path, *_, said = _embedded(prepared, channel, **options)
+    path, *_, messages = _embedded(prepared, channel, **options)
     if path.n_axes == 1:
         raise RefusalError("one dimension makes no portrait", remedy="give a larger one")
     if in_space and path.n_axes < 3:
         raise RefusalError(f"the path has {path.n_axes} dimensions", remedy="give at least 3 to see it in space")
-    section, warnings = None, [*said]
+    section, warnings = None, [*messages]
     try:
         section = phase.poincare_section(path, _lock(prepared, pair, shaft), phase_cycles=place)
         warnings += _unsteady(prepared)
@@ -278,7 +278,7 @@ def _lyapunov(
     fit_s: tuple[float, float] | None,
     **options: Any,
 ) -> MethodAnswer:
-    path, *_, said = _embedded(prepared, channel, **options)
+    path, *_, messages = _embedded(prepared, channel, **options)
     exponent = phase.largest_lyapunov_exponent(path, method=method, theiler_samples=theiler, n_steps=steps, fit_s=fit_s)
     return MethodAnswer(
         channel,
@@ -297,7 +297,7 @@ def _lyapunov(
                 "time. The dashed line is the distance of unrelated points; shaded is what was fitted."
             ),
         ),
-        warnings=said,
+        warnings=messages,
     )
 
 
@@ -310,7 +310,7 @@ def _recurrence(
     shortest: int,
     **options: Any,
 ) -> MethodAnswer:
-    path, *_, said = _embedded(prepared, channel, **options)
+    path, *_, messages = _embedded(prepared, channel, **options)
     rate = rate_percent / 100.0
     pairs = phase.recurrence_plot(path, recurrence_rate=rate, n_points=n_points, stride=every)
     measures = phase.recurrence_measures(path, recurrence_rate=rate, shortest_line=shortest, stride=every)
@@ -328,7 +328,7 @@ def _recurrence(
                 f"than {measures.theiler_points} points left out. Lines along the diagonal are motion that repeats."
             ),
         ),
-        warnings=said,
+        warnings=messages,
     )
 
 
@@ -343,7 +343,7 @@ def _chaos_test(
     shaft: str,
     **options: Any,
 ) -> MethodAnswer:
-    path, *_, said = _embedded(prepared, channel, **options)
+    path, *_, messages = _embedded(prepared, channel, **options)
     if of == "section":
         section = phase.poincare_section(path, _lock(prepared, pair, shaft))
         values = np.ascontiguousarray(section.points[:, 0])
@@ -364,7 +364,7 @@ def _chaos_test(
             "K near 0: regular, a bounded walk. K near 1: chaos or noise, a walk like Brownian motion; only the false "
             "neighbours tell these two apart." + (f" Every {test.every}-th value is used." if test.every > 1 else ""),
         ),
-        warnings=(*said, *undecided),
+        warnings=(*messages, *undecided),
     )
 
 

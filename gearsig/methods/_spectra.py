@@ -262,11 +262,11 @@ def _kurtogram(
 ) -> MethodAnswer:
     recording = prepared.recording
     usual = highest_modulation_hz or _usual_modulation_hz(prepared)
-    most = max(1, int(np.log2(max(recording.n_samples / 512.0, 2.0))))
-    n_levels = levels or min(7, most)
-    asked = (preparation, n_levels, usual, band_hz)
+    max_levels = max(1, int(np.log2(max(recording.n_samples / 512.0, 2.0))))
+    n_levels = levels or min(7, max_levels)
+    settings = (preparation, n_levels, usual, band_hz)
     chosen = prepared.keep(
-        ("methods", "kurtogram", channel, asked),
+        ("methods", "kurtogram", channel, settings),
         lambda: spectra.kurtogram_envelope(
             recording,
             channel,
@@ -459,10 +459,10 @@ def _words_about(peaks: dict[Cursor, float], cursors: Sequence[Cursor], resoluti
         return ", ".join(dict.fromkeys(f"{cursor.label} ({cursor.position:.5g})" for cursor in chosen))
 
     apart = [cursor for cursor in peaks if on_multiple(cursor)]
-    others = [cursor for cursor in peaks if cursor not in apart]
+    remaining = [cursor for cursor in peaks if cursor not in apart]
     text = ["Above noise's level means that there is modulation, not that there is damage: healthy gears modulate too."]
-    if others:
-        text.append(f"Lines that stand above noise's level, bearings' within 1 % for their slip: {names(others)}.")
+    if remaining:
+        text.append(f"Lines that stand above noise's level, bearings' within 1 % for their slip: {names(remaining)}.")
     if apart:
         text.append(
             "Bearing lines whose peak lies on a multiple of a shaft's speed, which meshes and shafts cause as well: "
@@ -476,19 +476,19 @@ def _deconvolution(
 ) -> MethodAnswer:
     recording = prepared.recording
     x, fs = recording.values(channel), recording.sampling_rate_hz
-    warnings, what = list[str](), ""
+    warnings, rhythm = list[str](), ""
     notes: tuple[str, ...] = (
         "It makes something impulsive of any noise: other rates must be less alike. Levels are not kept.",
     )
     if by == "multipoint":
         if rate_hz is None:
             analysis = prepared.keep(("methods", "analysis"), lambda: analyze(prepared))
-            found_hz = suggested_rate_hz(analysis)
-            rate_hz, what = found_hz or ASSUMED_RATE_HZ, "as found in the recording" if found_hz else ""
+            suggested_hz = suggested_rate_hz(analysis)
+            rate_hz, rhythm = suggested_hz or ASSUMED_RATE_HZ, "as found in the recording" if suggested_hz else ""
         if not rate_hz:
             raise RefusalError("no rate of the impacts is given", remedy="give how often they come, above 0 Hz")
-        what = rhythm_at(prepared, rate_hz) or what
-        if not what and rate_hz == ASSUMED_RATE_HZ:
+        rhythm = rhythm_at(prepared, rate_hz) or rhythm
+        if not rhythm and rate_hz == ASSUMED_RATE_HZ:
             warnings.append(
                 f"{rate_hz:g} impacts per second are assumed: nothing is suspected, and no bearing or shaft is "
                 "described whose rate could be taken. Give the rate that you seek"
@@ -499,7 +499,7 @@ def _deconvolution(
         result = spectra.multipoint_deconvolution(x, fs, 1.0 / rate_hz, n_taps=taps)
         chance = np.sqrt(taps / len(x))
         fact = f"Likeness to a train of {rate_hz:.5g} Hz: **{result.score:.3g}** (white noise: {chance:.2g})."
-        notes = (f"{rate_hz:.5g} Hz: {what}.", *notes) if what else notes
+        notes = (f"{rate_hz:.5g} Hz: {rhythm}.", *notes) if rhythm else notes
     else:
         result = spectra.minimum_entropy_deconvolution(x, fs, n_taps=taps)
         fact = f"Kurtosis **{result.score:.3g}** (3: Gaussian noise)."

@@ -238,8 +238,8 @@ def usual_channel(recording: Recording, name: str = "") -> str:
         for channel in recording.channels:
             if channel.quantity == quantity:
                 return channel.name
-    others = [c.name for c in recording.channels if c.quantity != "tachometer"]
-    return others[0] if others else recording.channels[0].name
+    vibration_channels = [c.name for c in recording.channels if c.quantity != "tachometer"]
+    return vibration_channels[0] if vibration_channels else recording.channels[0].name
 
 
 def part_of(prepared: PreparedRecording, start_s: float, end_s: float, channel: str = "") -> PreparedRecording:
