@@ -179,9 +179,9 @@ def _oversampled(phi: FloatArray) -> bool:
 
 def _verdict(k: float, oversampled: bool, step: int) -> tuple[ChaosVerdict, str]:
     if oversampled:
-        taken = "each value" if step == 1 else f"every {step}-th value"
+        sampling = "each value" if step == 1 else f"every {step}-th value"
         return "undecided", (
-            f"with {taken} taken, neighbours lie too close: chaos would look regular, and noise on regular motion "
+            f"with {sampling} taken, neighbours lie too close: chaos would look regular, and noise on regular motion "
             "irregular; take fewer of them, or record longer"
         )
     if k < REGULAR:
@@ -253,10 +253,10 @@ def kind_of_motion(
     section = poincare_section(portrait, lock)
     period = section_period(section, tolerance=tolerance)
     if period:
-        seen = (
+        shown_by = (
             f"the section repeats after {period} cycle(s) of the {lock.name}, within {tolerance:g} of the path's size"
         )
-        return MotionKind("periodic" if period == 1 else "subharmonic", period, (seen,), section)
+        return MotionKind("periodic" if period == 1 else "subharmonic", period, (shown_by,), section)
     evidence = [f"the section of {section.n_points} points does not repeat within 16 cycles of the {lock.name}"]
     test = _answer(lambda: zero_one_test_of_section(section, damping=0.0 if noise_free else 1.0), "0–1 test", evidence)
     if test is not None:

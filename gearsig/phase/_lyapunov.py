@@ -21,7 +21,7 @@ N_UNRELATED = 20_000
 
 @dataclass(frozen=True)
 class Divergence:
-    """Divergence curve, and the same from each stretch of the signal.
+    """Divergence curve, and the same from each segment of the signal.
 
     Parameters
     ----------
@@ -96,9 +96,9 @@ def _blocks(references: IndexArray, n: int) -> IndexArray:
 def _unrelated(points: FloatArray, theiler: int, *, last_axis: bool) -> float:
     """Mean logarithm of the distance of points far apart in time: pairs by the golden ratio, spread over all delays."""
     n = len(points)
-    here = spaced(n, N_UNRELATED)
-    there = (here + 1 + theiler + ((np.arange(len(here)) * 0.6180339887498949) % 1.0 * (n - 2 * theiler - 2))) % n
-    difference = points[here] - points[there.astype(np.intp)]
+    firsts = spaced(n, N_UNRELATED)
+    seconds = (firsts + 1 + theiler + ((np.arange(len(firsts)) * 0.6180339887498949) % 1.0 * (n - 2 * theiler - 2))) % n
+    difference = points[firsts] - points[seconds.astype(np.intp)]
     distance = np.abs(difference[:, -1]) if last_axis else np.linalg.norm(difference, axis=1)
     return float(np.log(distance[distance > 0.0]).mean())
 
@@ -135,12 +135,12 @@ def largest_lyapunov_exponent(
     n_steps: int | None = None,
     fit_s: tuple[float, float] | None = None,
 ) -> LyapunovExponent:
-    """Return the rate at which neighbouring stretches of a path part: λ = dS/dt of the divergence curve S.
+    """Return the rate at which neighbouring segments of a path part: λ = dS/dt of the divergence curve S.
 
-    The fit goes from the embedding's length (d-1)τ, before which the stretches still share values, to where S first
+    The fit goes from the embedding's length (d-1)τ, before which the segments still share values, to where S first
     comes within 2 of its saturation, or to the last step. Saturation is the mean logarithm of the distance of unrelated
     points, or the end of the curve where that lies lower and the curve has risen by 3 or more (phase-coherent motion
-    parts fully only much later). The uncertainty joins two parts: the jackknife over 12 stretches of the signal, and
+    parts fully only much later). The uncertainty joins two parts: the jackknife over 12 segments of the signal, and
     half the span of the slopes found in either half of the fit and with 1.5 and 2.5 in place of 2.
 
     Parameters
@@ -156,7 +156,7 @@ def largest_lyapunov_exponent(
     n_steps : int or None
         Steps followed; None: 30 mean periods, at most a quarter of the path.
     fit_s : (float, float) or None
-        Stretch of the curve to be fitted instead of the one that the rule finds.
+        Segment of the curve to be fitted instead of the one that the rule finds.
 
     Returns
     -------
@@ -174,7 +174,7 @@ def largest_lyapunov_exponent(
     -----
     The estimate presumes determinism: check the signal with `embedding_dimension` first. Noise lifts the start of the
     curve. With 1 % of the standard deviation the Lorenz system's exponent comes out 5 % low, with 2 % 12 % low; with
-    5 % no stretch is left but across the path ("transverse", "undecided"); with 10 % there is no answer.
+    5 % no segment is left but across the path ("transverse", "undecided"); with 10 % there is no answer.
 
     Source: M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993); H. Kantz, Physics Letters A 185 (1994).
     """
@@ -196,7 +196,7 @@ def largest_lyapunov_exponent(
     if fit_s is None:
         first, stop = fit_limits(curve, memory, max(MIN_STEPS, round(0.25 * period)))
     else:
-        first, stop = _asked_limits(fit_s, rate, len(curve.log_distance))
+        first, stop = _requested_limits(fit_s, rate, len(curve.log_distance))
     slope, uncertainty = slope_of(curve, first, stop)
     return LyapunovExponent(
         exponent_per_s=slope * rate,
@@ -205,7 +205,7 @@ def largest_lyapunov_exponent(
         step_s=1.0 / rate,
         fit_s=(first / rate, (stop - 1) / rate),
         saturation_log_distance=curve.saturation,
-        verdict=_verdict(slope, uncertainty, stop - 1 - first, room_left=stop == len(curve.log_distance)),
+        verdict=_verdict(slope, uncertainty, stop - 1 - first, has_room=stop == len(curve.log_distance)),
         method=method,
         n_references=curve.n_references,
         theiler_samples=window,
@@ -229,12 +229,12 @@ def fit_limits(curve: Divergence, memory: int, n_min: int, room: float = ROOM) -
         return memory, stop
     raise RefusalError(
         f"{memory} steps on, neighbours are {percent(np.exp(-missing))} as far apart as unrelated points: no "
-        "stretch of exponential growth can be seen, as the signal is stochastic or too noisy",
+        "segment of exponential growth can be seen, as the signal is stochastic or too noisy",
         remedy="filter it, record longer, or embed it with fewer dimensions",
     )
 
 
-def _asked_limits(fit_s: tuple[float, float], rate: float, n_steps: int) -> tuple[int, int]:
+def _requested_limits(fit_s: tuple[float, float], rate: float, n_steps: int) -> tuple[int, int]:
     first, stop = round(fit_s[0] * rate), round(fit_s[1] * rate) + 1
     if first < 0 or not first + MIN_STEPS <= stop <= n_steps:
         raise InputError(
@@ -258,14 +258,14 @@ def slope_of(curve: Divergence, first: int, stop: int) -> tuple[float, float]:
     blocks = curve.by_block[:, first:stop]
     blocks = blocks[np.isfinite(blocks).all(axis=1)]
     n = len(blocks)
-    rest = [(blocks.sum(axis=0) - b) / (n - 1) for b in blocks] if n > 2 else []
-    without = np.array([_slope(k[first:stop], r) for r in rest] or [slope])
+    without_block = [(blocks.sum(axis=0) - b) / (n - 1) for b in blocks] if n > 2 else []
+    without = np.array([_slope(k[first:stop], r) for r in without_block] or [slope])
     scatter = float(np.sqrt(max(n - 1, 0) * np.var(without)))
-    others = [_slope(k[a:b], s[a:b]) for a, b in _other_fits(curve, first, stop)]
-    return slope, float(np.hypot(scatter, 0.5 * (max(others) - min(others))))
+    further_slopes = [_slope(k[a:b], s[a:b]) for a, b in _fits_of_other_limits(curve, first, stop)]
+    return slope, float(np.hypot(scatter, 0.5 * (max(further_slopes) - min(further_slopes))))
 
 
-def _other_fits(curve: Divergence, first: int, stop: int) -> list[tuple[int, int]]:
+def _fits_of_other_limits(curve: Divergence, first: int, stop: int) -> list[tuple[int, int]]:
     middle = (first + stop) // 2
     fits = [(first, middle + 1), (middle, stop)]
     if stop < len(curve.log_distance):
@@ -277,11 +277,11 @@ def _other_fits(curve: Divergence, first: int, stop: int) -> list[tuple[int, int
 
 
 def _verdict(
-    slope: float, uncertainty: float, n_fitted: int, *, room_left: bool
+    slope: float, uncertainty: float, n_fitted: int, *, has_room: bool
 ) -> Literal["diverging", "not diverging", "undecided"]:
     if slope * n_fitted >= 1.0 and slope > 2.0 * uncertainty:
         return "diverging"
-    return "not diverging" if room_left and slope * n_fitted < 1.0 else "undecided"
+    return "not diverging" if has_room and slope * n_fitted < 1.0 else "undecided"
 
 
 def _slope(k: FloatArray, s: FloatArray) -> float:
@@ -309,16 +309,16 @@ def _comparable(portrait: PhasePortrait) -> FloatArray:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def mean_log_distance(points, here, there, block, across, sums, counts):  # type: ignore[no-untyped-def]
+def mean_log_distance(points, firsts, seconds, block, across, sums, counts):  # type: ignore[no-untyped-def]
     """Add ln|x(i + k) - x(j + k)| for all pairs i, j and steps k to sums[block, k]; distances of zero are left out.
 
-    Points are the path in time, (n, d); here and there hold the pairs, with a sample before and after each step. With
-    `across` only the part of the distance across the path counts: the part along x(i + k + 1) - x(i + k - 1) is taken
-    off.
+    Points are the path in time, (n, d); `firsts` and `seconds` hold the pairs, with a sample before and after each
+    step. With `across` only the part of the distance across the path counts: the part along
+    x(i + k + 1) - x(i + k - 1) is taken off.
     """
     d = points.shape[1]
-    for r in range(here.shape[0]):
-        i, j, b = here[r], there[r], block[r]
+    for r in range(firsts.shape[0]):
+        i, j, b = firsts[r], seconds[r], block[r]
         for k in range(sums.shape[1]):
             square, along, speed = 0.0, 0.0, 0.0
             for a in range(d):
@@ -336,15 +336,15 @@ def mean_log_distance(points, here, there, block, across, sums, counts):  # type
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def log_mean_distance(points, here, starts, near, block, sums, counts):  # type: ignore[no-untyped-def]
+def log_mean_distance(points, references, starts, near, block, sums, counts):  # type: ignore[no-untyped-def]
     """Add ln of the mean distance of a neighbourhood, Kantz's mean, to sums[block, k].
 
     Neighbours of reference r are near[starts[r] : starts[r + 1]]; the distance is that of the last coordinate.
     """
     n, d = points.shape
     n_steps = sums.shape[1]
-    for r in range(here.shape[0]):
-        i, b = here[r], block[r]
+    for r in range(references.shape[0]):
+        i, b = references[r], block[r]
         for k in range(min(n_steps, n - i)):
             total, m = 0.0, 0
             for q in range(starts[r], starts[r + 1]):

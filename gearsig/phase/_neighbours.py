@@ -65,13 +65,13 @@ def nearest_apart(
     tree = cKDTree(np.ascontiguousarray(points[library]), balanced_tree=False, compact_nodes=False)
     distance = np.full(len(references), np.inf)
     index = np.full(len(references), -1, dtype=np.intp)
-    found_d, found_i = _query(tree, points[references], min(_FIRST_LOOK, len(library)), norm)
-    times = library[np.minimum(found_i, len(library) - 1)]
-    apart = (np.abs(times - references[:, None]) > theiler) & np.isfinite(found_d)
+    distances, positions = _query(tree, points[references], min(_FIRST_LOOK, len(library)), norm)
+    times = library[np.minimum(positions, len(library) - 1)]
+    apart = (np.abs(times - references[:, None]) > theiler) & np.isfinite(distances)
     if not equal_counts:
-        apart &= found_d > 0.0
+        apart &= distances > 0.0
     first, rows = apart.argmax(axis=1), np.flatnonzero(apart.any(axis=1))
-    distance[rows], index[rows] = found_d[rows, first[rows]], times[rows, first[rows]]
+    distance[rows], index[rows] = distances[rows, first[rows]], times[rows, first[rows]]
     open_ = np.flatnonzero(index < 0)
     n_equal = 0
     if len(open_) and len(library) > _FIRST_LOOK:
@@ -123,8 +123,8 @@ def _walked(
         place,
         equal,
     )
-    found = np.where(place >= 0, times[place], -1)
-    return distance, found, int(np.count_nonzero(equal & (place < 0)))
+    neighbour_times = np.where(place >= 0, times[place], -1)
+    return distance, neighbour_times, int(np.count_nonzero(equal & (place < 0)))
 
 
 def _flat(tree: Any) -> tuple[IndexArray, IndexArray]:
@@ -195,25 +195,25 @@ def nearest(  # type: ignore[no-untyped-def]
     high,
     first,
     last,
-    here,
+    references,
     now,
     theiler,
     largest,
     equal_counts,
     limited,
-    most,
+    n_max,
     distance,
     index,
     equal,
 ):
-    """Fill distance, index (−1: none) and equal (an equal point was met) for the references `here` at times `now`.
+    """Fill distance, index (−1: none) and equal (an equal point was met) for `references` at times `now`.
 
     largest : whether the largest coordinate is the distance, else the Euclidean one.
-    most : a neighbour with so many points closer than it, near in time or equal to it, does not count; looked at where
+    n_max : a neighbour with so many points closer than it, near in time or equal to it, does not count; looked at where
         `limited`, or where there are equal points.
     """
     waiting, ahead = np.empty(len(nodes), dtype=np.int64), np.empty(len(nodes))
-    for r in range(here.shape[0]):
+    for r in range(references.shape[0]):
         best, nearest, n_waiting = np.inf, -1, 1
         waiting[0], ahead[0] = 0, 0.0
         while n_waiting > 0:
@@ -223,8 +223,8 @@ def nearest(  # type: ignore[no-untyped-def]
                 continue
             start, end, lesser, greater = nodes[node]
             if lesser >= 0:
-                to_lesser = _to_box(here[r], low[lesser], high[lesser], largest)
-                to_greater = _to_box(here[r], low[greater], high[greater], largest)
+                to_lesser = _to_box(references[r], low[lesser], high[lesser], largest)
+                to_greater = _to_box(references[r], low[greater], high[greater], largest)
                 if to_lesser < to_greater:
                     lesser, greater, to_lesser, to_greater = greater, lesser, to_greater, to_lesser
                 waiting[n_waiting], ahead[n_waiting] = lesser, to_lesser
@@ -234,7 +234,7 @@ def nearest(  # type: ignore[no-untyped-def]
             for i in range(start, end):
                 if abs(times[i] - now[r]) <= theiler:
                     continue
-                size = _between(points[i], here[r], largest, best)
+                size = _between(points[i], references[r], largest, best)
                 if size == 0.0 and not equal_counts:
                     equal[r] = True
                 elif size < best:
@@ -242,7 +242,7 @@ def nearest(  # type: ignore[no-untyped-def]
         if (
             (limited or equal[r])
             and nearest >= 0
-            and _n_closer(points, nodes, low, high, here[r], largest, best, most, waiting) >= most
+            and _n_closer(points, nodes, low, high, references[r], largest, best, n_max, waiting) >= n_max
         ):
             best, nearest = np.inf, -1
         distance[r] = best if largest else np.sqrt(best)
@@ -250,34 +250,34 @@ def nearest(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _n_closer(points, nodes, low, high, here, largest, best, most, waiting):  # type: ignore[no-untyped-def]
-    """Count the points that are closer than the neighbour, up to `most`."""
+def _n_closer(points, nodes, low, high, point, largest, best, n_max, waiting):  # type: ignore[no-untyped-def]
+    """Count the points that are closer than the neighbour, up to `n_max`."""
     n_closer, n_waiting = 0, 1
     waiting[0] = 0
-    while n_waiting > 0 and n_closer < most:
+    while n_waiting > 0 and n_closer < n_max:
         n_waiting -= 1
         node = waiting[n_waiting]
         start, end, lesser, greater = nodes[node]
-        if _to_far_corner(here, low[node], high[node], largest) < best:
+        if _to_far_corner(point, low[node], high[node], largest) < best:
             n_closer += end - start
         elif lesser >= 0:
             for child in (lesser, greater):
-                if _to_box(here, low[child], high[child], largest) < best:
+                if _to_box(point, low[child], high[child], largest) < best:
                     waiting[n_waiting] = child
                     n_waiting += 1
         else:
             for i in range(start, end):
-                if _between(points[i], here, largest, best) < best:
+                if _between(points[i], point, largest, best) < best:
                     n_closer += 1
     return n_closer
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _between(one, other, largest, enough):  # type: ignore[no-untyped-def]
+def _between(first, second, largest, enough):  # type: ignore[no-untyped-def]
     """Largest coordinate or sum of squares of the difference; what exceeds `enough` need not be exact."""
     size = 0.0
-    for a in range(one.shape[0]):
-        step = abs(one[a] - other[a])
+    for a in range(first.shape[0]):
+        step = abs(first[a] - second[a])
         size = max(size, step) if largest else size + step * step
         if size >= enough:
             break

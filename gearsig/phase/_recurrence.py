@@ -33,7 +33,7 @@ def recurrence_plot(
         In standard deviations of the axes; wins over `recurrence_rate`.
     n_points : int
         At most so many points from the start of the path (2 to 3000): the matrix never grows with the signal. For
-        another stretch see `PhasePortrait.between`.
+        another segment see `PhasePortrait.between`.
     stride : int or None
         Every so-many-th point is taken; None: as many as leave 16 in a mean period.
 
@@ -48,7 +48,7 @@ def recurrence_plot(
     Letters 4 (1987).
     """
     within(count(n_points, "n_points", minimum=2), "n_points", 2, MAX_PLOT_POINTS)
-    points, step = _taken(portrait, n_points, stride)
+    points, step = _thinned_points(portrait, n_points, stride)
     limit = _radius(points, recurrence_rate, radius, 0)
     matrix = np.empty((len(points), len(points)), dtype=np.bool_)
     recurrence_matrix(points, limit, matrix)
@@ -83,7 +83,7 @@ def recurrence_measures(
         None: one mean period, and at least one point taken.
     n_points : int
         At most so many points from the start of the path (100 to 20 000). Time grows with its square, memory does not:
-        the matrix is never held. For another stretch see `PhasePortrait.between`.
+        the matrix is never held. For another segment see `PhasePortrait.between`.
     stride : int or None
         Every so-many-th point is taken; None: as many as leave 16 in a mean period. A coarser one loses lines.
 
@@ -106,8 +106,8 @@ def recurrence_measures(
     """
     within(count(n_points, "n_points", minimum=100), "n_points", 100, MAX_MEASURE_POINTS)
     count(shortest_line, "shortest_line", minimum=2)
-    points, taken = _taken(portrait, n_points, stride)
-    window = _theiler(portrait, theiler_samples, taken)
+    points, stride_taken = _thinned_points(portrait, n_points, stride)
+    window = _theiler(portrait, theiler_samples, stride_taken)
     if len(points) < 2 * window + 20:
         raise RefusalError(
             f"{len(points)} points are too few for a Theiler window of {window}", remedy="record longer or lower it"
@@ -115,7 +115,7 @@ def recurrence_measures(
     limit = _radius(points, recurrence_rate, radius, window)
     diagonal, vertical = np.zeros(len(points) + 1, dtype=np.int64), np.zeros(len(points) + 1, dtype=np.int64)
     line_lengths(points, limit, window, diagonal, vertical)
-    step = taken / portrait.sampling_rate_hz
+    step = stride_taken / portrait.sampling_rate_hz
     n_apart = len(points) - window - 1
     recurrent = float(np.dot(np.arange(len(diagonal)), diagonal))
     determinism, mean_line, longest, entropy = _lines(diagonal, shortest_line)
@@ -131,7 +131,7 @@ def recurrence_measures(
         radius=limit,
         shortest_line=shortest_line,
         theiler_points=window,
-        stride=taken,
+        stride=stride_taken,
         n_points=len(points),
         duration_s=len(points) * step,
         source=portrait.source,
@@ -151,7 +151,7 @@ def _lines(counts: np.ndarray, shortest: int) -> tuple[float, float, float, floa
     return on_lines / total, on_lines / float(n), float(long[n_long > 0].max()), float(-np.sum(share * np.log(share)))
 
 
-def _taken(portrait: PhasePortrait, n_points: int, stride: int | None) -> tuple[FloatArray, int]:
+def _thinned_points(portrait: PhasePortrait, n_points: int, stride: int | None) -> tuple[FloatArray, int]:
     """Return the first points at the stride, in standard deviations of the axes, and the stride."""
     check_portrait(portrait)
     extent = portrait.extent
@@ -186,10 +186,10 @@ def _radius(points: FloatArray, rate: float, radius: float | None, theiler: int)
     # A pair (i, j) is drawn with the weight that the triangle j - i > theiler gives it.
     u, v = (np.arange(N_PAIRS) + 0.5) / N_PAIRS, (np.arange(N_PAIRS) * GOLDEN) % 1.0
     lag = lowest + np.minimum(((n - lowest) * (1.0 - np.sqrt(1.0 - u))).astype(np.intp), n - lowest - 1)
-    here = (v * (n - lag)).astype(np.intp)
-    distance = np.linalg.norm(points[here + lag] - points[here], axis=1)
-    found = float(np.quantile(distance, rate))
-    return found if found > 0.0 else float(np.nextafter(0.0, 1.0))
+    starts = (v * (n - lag)).astype(np.intp)
+    distance = np.linalg.norm(points[starts + lag] - points[starts], axis=1)
+    quantile = float(np.quantile(distance, rate))
+    return quantile if quantile > 0.0 else float(np.nextafter(0.0, 1.0))
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]

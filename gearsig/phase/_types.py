@@ -266,13 +266,13 @@ class LyapunovExponent(Result, columns=("times_s", "log_distance")):
     Parameters
     ----------
     exponent_per_s, uncertainty_per_s : float
-        Slope of the curve and one standard deviation of it: scatter between stretches of the signal, and dependence on
+        Slope of the curve and one standard deviation of it: scatter between segments of the signal, and dependence on
         where the line is fitted.
     log_distance : array, (n_steps,)
         Mean logarithm of the distance of neighbours after 0, 1, 2, … steps of `step_s`.
     step_s : float
     fit_s : (float, float)
-        Stretch of the curve that was fitted.
+        Segment of the curve that was fitted.
     saturation_log_distance : float
         Mean logarithm of the distance of points that have nothing to do with each other.
     verdict : str
@@ -393,7 +393,7 @@ class RecurrenceMeasures(Result):
     shortest_line, theiler_points, stride, n_points : int
         In points taken; every `stride`-th sample was.
     duration_s : float
-        Length of the stretch.
+        Length of the segment.
     source : str
     """
 
@@ -438,7 +438,7 @@ def checked_series(values: FloatArray, *, minimum: int, name: str = "values") ->
     if high - low <= 8.0 * np.finfo(x.dtype).eps * max(abs(low), abs(high)):
         raise RefusalError(
             f"{name} is constant at {low:g}: nothing moves, so there is nothing to embed",
-            remedy="check the sensor, or take a channel or a stretch that vibrates",
+            remedy="check the sensor, or take a channel or a segment that vibrates",
         )
     return np.asarray(x, dtype=np.float64)
 
