@@ -9,7 +9,7 @@ from gearsig.timefreq._packets import (
     wavelet_packet_map,
     wavelet_packets,
 )
-from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, tops_beside, untangled
+from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, tops_of_parted_paths, untangled
 from gearsig.timefreq._squeezing import SqueezeEngine, squeeze_lines
 from gearsig.timefreq._stft import squeezed_stft, squeezed_stft_map, stft, stft_map
 from gearsig.timefreq._types import Axis, Reduction, Ridge, TimeFrequencyMap, at_label
@@ -62,7 +62,7 @@ __all__ = [
     "squeezed_stft_map",
     "stft",
     "stft_map",
-    "tops_beside",
+    "tops_of_parted_paths",
     "uniform",
     "untangled",
     "wavelet_packet_map",

@@ -114,16 +114,16 @@ def cwt_map(
     scaling: str = "amplitude peak",
     edges: Edges = "reflect",
 ) -> TimeFrequencyMap:
-    """Return levels of the wavelet transform in `n_columns` stretches, never holding the whole matrix.
+    """Return levels of the wavelet transform in `n_columns` segments, never holding the whole matrix.
 
     Parameters
     ----------
     signal, channel, wavelet, positions, lowest, highest, n_per_octave, edges
         As in `cwt`.
     n_columns : int
-        Most columns; each stretch has a whole number of samples, the last may be shorter.
+        Most columns; each segment has a whole number of samples, the last may be shorter.
     reduction : str
-        "mean" of the power in each stretch, or "max": short impacts keep their height.
+        "mean" of the power in each segment, or "max": short impacts keep their height.
     scaling : str
         "amplitude peak" or "power".
 
@@ -223,7 +223,7 @@ def squeezed_cwt_map(
     edges: Edges = "reflect",
     engine: SqueezeEngine = "gearsig",
 ) -> TimeFrequencyMap:
-    """Return levels of the synchrosqueezed wavelet transform in stretches, never holding the whole matrix.
+    """Return levels of the synchrosqueezed wavelet transform in segments, never holding the whole matrix.
 
     Parameters
     ----------
@@ -346,8 +346,8 @@ def _blocks(
         for piece in block_pieces(x.values, group, start, edges, space, derivatives=True):
             squeeze(piece.values, piece.derivatives, weights, plan.smallest, table.borders, table.lookup, T[0], 0)
             numbers, of_piece = plan.lines_among(piece.lines)
-            here = (numbers >= part[0]) & (numbers <= part[-1])
-            T[1, numbers[here] - part[0]] = piece.values[of_piece][here]
+            in_part = (numbers >= part[0]) & (numbers <= part[-1])
+            T[1, numbers[in_part] - part[0]] = piece.values[of_piece][in_part]
         yield part, start, step, T
 
 

@@ -176,12 +176,12 @@ def component(
     z = np.zeros(x.n_samples, dtype=np.complex128)
     for group in plan_groups(plan.analysed / x.rate, wavelet, x.n_samples):
         for piece in pieces(x.values, group, edges, derivatives=squeezed):
-            here = slice(piece.start, piece.start + piece.values.shape[1])
-            limits = borders[0][here], borders[1][here]
+            columns = slice(piece.start, piece.start + piece.values.shape[1])
+            limits = borders[0][columns], borders[1][columns]
             if squeezed:
-                gather_near(piece.values, piece.derivatives, plan.weight, plan.smallest, *limits, z[here])
+                gather_near(piece.values, piece.derivatives, plan.weight, plan.smallest, *limits, z[columns])
             else:
-                gather_lines(piece.values, omegas[piece.lines], plan.weight, *limits, z[here])
+                gather_lines(piece.values, omegas[piece.lines], plan.weight, *limits, z[columns])
     if not squeezed:  # the share of C = ∫ Ψ(v)/v dv that lies within the band
         s = np.linspace(-np.log1p(width), np.log1p(width), 4001)
         z /= float(np.trapezoid(wavelet.response(np.exp(s)), s)) / admissibility(wavelet)

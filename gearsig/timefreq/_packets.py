@@ -138,10 +138,10 @@ def wavelet_packets(
         raise InputError(f"level is {level}", allowed="1 to 12")
     shortest = filters.dec_len << level
     if x.n_samples < shortest:
-        most = int(np.log2(max(x.n_samples / filters.dec_len, 1.0)))
+        max_level = int(np.log2(max(x.n_samples / filters.dec_len, 1.0)))
         raise RefusalError(
             f"{x.n_samples} samples are too few for level {level} with {wavelet}, which needs {shortest}",
-            remedy=f"set level to {most}" if most else "take a shorter wavelet, or record longer",
+            remedy=f"set level to {max_level}" if max_level else "take a shorter wavelet, or record longer",
         )
     n_per_band = -(-x.n_samples // (1 << level))
     filled = np.zeros(n_per_band << level)
@@ -192,7 +192,7 @@ def wavelet_packet_map(
     reduction: Reduction = "mean",
     scaling: str = "amplitude peak",
 ) -> TimeFrequencyMap:
-    """Return levels of the wavelet packet bands in stretches of time or angle.
+    """Return levels of the wavelet packet bands in segments of time or angle.
 
     Parameters
     ----------

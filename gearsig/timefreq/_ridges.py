@@ -91,7 +91,7 @@ class Meeting:
 
 
 def meetings(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
-    """Return the stretches where |a - b| <= gap, those less than a few columns apart taken as one."""
+    """Return the segments where |a - b| <= gap, those less than a few columns apart taken as one."""
     near = np.abs(a - b) <= gap
     steps = np.diff(near.astype(np.int8), prepend=0, append=0)
     starts, stops = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)
@@ -141,14 +141,14 @@ def untangled(
 
 def _settled_from_afar(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
     """Return the meetings, each in the widest of several gaps that leaves columns to compare on both sides."""
-    found: list[Meeting] = []
+    settled: list[Meeting] = []
     for share in _SEEN_FROM:
         for meeting in meetings(a, b, share * gap):
             room = min(meeting.start, len(a) - meeting.stop)
-            known = any(m.start <= meeting.start and meeting.stop <= m.stop for m in found)
+            known = any(m.start <= meeting.start and meeting.stop <= m.stop for m in settled)
             if not known and room >= (_N_FIT if share > _SEEN_FROM[-1] else _MIN_FIT):
-                found.append(meeting)
-    return found
+                settled.append(meeting)
+    return settled
 
 
 def shared_columns(paths: list[FloatArray], gap: float) -> list[NDArray[np.bool_]]:
@@ -189,7 +189,7 @@ def _settle(a: _Track, b: _Track, meeting: Meeting, level_weight: float, power: 
     crossed, parted = (keep, swap) if crosses_now else (swap, keep)
     if power is not None and _valley(power, crossed, start, gap):
         if crosses_now:
-            _exchange(a, b, meeting, tops_beside(power, parted, start))
+            _exchange(a, b, meeting, tops_of_parted_paths(power, parted, start))
         return
     cost = [[_change(p, q, last - first, level_weight) for q in after] for p in before]
     if cost[0][1] + cost[1][0] < cost[0][0] + cost[1][1]:
@@ -198,8 +198,8 @@ def _settle(a: _Track, b: _Track, meeting: Meeting, level_weight: float, power: 
 
 def _exchange(a: _Track, b: _Track, meeting: Meeting, between: list[FloatArray]) -> None:
     stop = meeting.stop
-    for one, other in zip(a, b, strict=True):
-        one[stop:], other[stop:] = other[stop:].copy(), one[stop:].copy()
+    for first, partner in zip(a, b, strict=True):
+        first[stop:], partner[stop:] = partner[stop:].copy(), first[stop:].copy()
     for (path, _), piece in zip((a, b), between, strict=True):
         path[meeting.start : stop] = piece
 
@@ -218,7 +218,7 @@ def _largest_near(power: FloatArray, lines: NDArray[np.int64], columns: NDArray[
     return result
 
 
-def tops_beside(power: FloatArray, parted: list[FloatArray], start: int) -> list[FloatArray]:
+def tops_of_parted_paths(power: FloatArray, parted: list[FloatArray], start: int) -> list[FloatArray]:
     """Return the largest power's line on either side of the middle between two paths that part again."""
     middle = np.clip(np.round((parted[0] + parted[1]) / 2), 0, len(power) - 1).astype(np.int64)
     half = np.ceil(np.abs(parted[0] - parted[1])).astype(np.int64)
@@ -258,7 +258,7 @@ MAX_COLUMNS = 4000
 """Columns that the search for a path works on; longer transforms are pooled."""
 _SPARE = 8
 """Ridges looked for beyond those asked, of which the strongest are kept: the clearest need not be strong."""
-_MIN_SEEN = 0.6  # share of its columns in which a path is not covered by others
+_MIN_UNCOVERED = 0.6  # share of its columns in which a path is not covered by others
 _MIN_SCORE = 0.25  # mean score of a path: below, it hops between maxima of noise
 
 
@@ -359,11 +359,11 @@ def _lines_between(positions: FloatArray, lowest: float | None, highest: float |
 
 def _check_room(n_ridges: int, part: slice, n_reach: int) -> None:
     """Raise InputError if so many ridges cannot be told apart on the lines."""
-    most = max(1, (part.stop - part.start) // (2 * n_reach + 1))
-    if n_ridges > most:
+    max_ridges = max(1, (part.stop - part.start) // (2 * n_reach + 1))
+    if n_ridges > max_ridges:
         raise InputError(
             f"n_ridges is {n_ridges} on {part.stop - part.start} lines, each ridge covering {2 * n_reach + 1} of them",
-            allowed=f"1 to {most}",
+            allowed=f"1 to {max_ridges}",
             remedy="ask for fewer, or compute more lines",
         )
 
@@ -395,28 +395,28 @@ def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> lis
     strengths: list[float] = []
     for _ in range(n_ridges + _SPARE):
         hidden = _hidden(scores.shape, parts, grid.n_reach)
-        path = _seen_path(scores, hidden, steepest, stiffness)
-        seen = _along(hidden, path) == NOT_HIDDEN
-        if not seen.any() or float(_along(scores, path)[seen].mean()) < _MIN_SCORE:
+        path = _uncovered_path(scores, hidden, steepest, stiffness)
+        is_uncovered = _along(hidden, path) == NOT_HIDDEN
+        if not is_uncovered.any() or float(_along(scores, path)[is_uncovered].mean()) < _MIN_SCORE:
             break
         parts.append(path)
-        strengths.append(float(_along(power, path)[seen].mean()))
+        strengths.append(float(_along(power, path)[is_uncovered].mean()))
     strongest = sorted(range(len(parts)), key=lambda i: -strengths[i])[:n_ridges]
     paths = [parts[i] for i in sorted(strongest)]
-    others = [parts[i] for i in range(len(parts)) if i not in strongest]
+    weaker = [parts[i] for i in range(len(parts)) if i not in strongest]
     if len(paths) > 1:
         paths = _settled(paths, grid, power)
         for i in range(len(paths)):  # once more, now that each knows where the others go
-            hidden = _hidden(scores.shape, others + paths[:i] + paths[i + 1 :], grid.n_reach)
-            paths[i] = _seen_path(scores, hidden, steepest, stiffness)
+            hidden = _hidden(scores.shape, weaker + paths[:i] + paths[i + 1 :], grid.n_reach)
+            paths[i] = _uncovered_path(scores, hidden, steepest, stiffness)
         paths = _settled(paths, grid, power)
     return paths
 
 
-def _seen_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float) -> FloatArray:
+def _uncovered_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float) -> FloatArray:
     """Return the best path; one that hides behind others, by weaving across them, is searched without credit."""
     path = best_path(scores, hidden, steepest, stiffness)
-    if float(np.mean(_along(hidden, path) == NOT_HIDDEN)) >= _MIN_SEEN:
+    if float(np.mean(_along(hidden, path) == NOT_HIDDEN)) >= _MIN_UNCOVERED:
         return path
     return best_path(scores, hidden, steepest, stiffness, credit=0.0)
 

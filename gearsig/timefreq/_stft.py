@@ -21,7 +21,7 @@ from gearsig.timefreq._squeezing import (
     unit_rms,
 )
 from gearsig.timefreq._types import Coefficients, ComplexArray, Reduction, TimeFrequencyMap
-from gearsig.timefreq._uniform import EDGES, Edges, LinePlan, Source, UniformSignal, plan_columns, stretch, uniform
+from gearsig.timefreq._uniform import EDGES, Edges, LinePlan, Source, UniformSignal, plan_columns, segment_of, uniform
 
 
 def stft(
@@ -95,7 +95,7 @@ def stft_map(
     scaling: str = "amplitude peak",
     edges: Edges = "reflect",
 ) -> TimeFrequencyMap:
-    """Return levels of the short-time Fourier transform in stretches, never holding the whole matrix.
+    """Return levels of the short-time Fourier transform in segments, never holding the whole matrix.
 
     Parameters
     ----------
@@ -303,12 +303,12 @@ class FramePlan:
         n_frames, n = -(-self.signal.n_samples // step), len(self.window)
         n_batch, half = max(1, (1 << 19) // self.n_fft), n // 2
         for frame in range(0, n_frames, n_batch):
-            n_here = min(n_batch, n_frames - frame)
-            part = stretch(self.signal.values, frame * step - half, (n_here - 1) * step + n, self.edges)
+            n_now = min(n_batch, n_frames - frame)
+            part = segment_of(self.signal.values, frame * step - half, (n_now - 1) * step + n, self.edges)
             frames = np.lib.stride_tricks.sliding_window_view(part, n)[::step]
             spectra = []
             for window in (self.window,) if self.engine is None else (self.window, self.slope):
-                turned = np.zeros((n_here, self.n_fft))
+                turned = np.zeros((n_now, self.n_fft))
                 turned[:, : n - half] = frames[:, half:] * window[half:]
                 turned[:, self.n_fft - half :] = frames[:, :half] * window[:half]
                 spectra.append(rfft(turned, axis=1)[:, self.first : self.last])

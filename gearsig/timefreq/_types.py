@@ -27,11 +27,11 @@ class TimeFrequencyMap(Result, matrix=("values", "at", "positions")):
     Parameters
     ----------
     values : array, (n_columns, n_lines)
-        Each is the mean or the maximum of the power in a stretch of the signal, in `scaling`.
+        Each is the mean or the maximum of the power in a segment of the signal, in `scaling`.
     positions : array, (n_lines,)
         Frequencies in Hz or orders, increasing; see `axis`.
     at : array, (n_columns,)
-        Middle of each stretch: seconds from the start, or revolutions of the shaft.
+        Middle of each segment: seconds from the start, or revolutions of the shaft.
     axis : str
         "frequency" over time, or "order" over shaft angle.
     spacing : str
@@ -43,7 +43,7 @@ class TimeFrequencyMap(Result, matrix=("values", "at", "positions")):
     method : str
         Transform with its wavelet or window.
     reduction : str
-        "mean" or "max" of the power in each stretch.
+        "mean" or "max" of the power in each segment.
     edge : array, (n_lines,)
         How far from both ends, in the unit of `at`, a line is touched by what was assumed beyond them.
     n_reach : int

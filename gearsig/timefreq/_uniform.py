@@ -148,7 +148,7 @@ Edges = Literal["reflect", "zero"]
 EDGES = ("reflect", "zero")
 
 
-def stretch(values: FloatArray, start: int, n: int, edges: Edges) -> FloatArray:
+def segment_of(values: FloatArray, start: int, n: int, edges: Edges) -> FloatArray:
     """Return n samples from `start` on, in double precision, with what is assumed beyond the ends."""
     n_samples = len(values)
     inside = values[max(0, start) : max(0, start + n)]
@@ -171,24 +171,24 @@ Of a squeezed transform (2, n_lines, n_columns): squeezed, and as they were."""
 
 @dataclass(frozen=True)
 class Columns:
-    """Stretches of `n_per_column` samples; the last may be shorter."""
+    """Segments of `n_per_column` samples; the last may be shorter."""
 
     n_samples: int
     n_per_column: int
 
     @property
     def n_columns(self) -> int:
-        """Number of stretches."""
+        """Number of segments."""
         return -(-self.n_samples // self.n_per_column)
 
     @property
     def largest_step(self) -> int:
-        """Largest power of two that leaves at least eight coefficients in every stretch, if it has as many samples."""
+        """Largest power of two that leaves at least eight coefficients in every segment, if it has as many samples."""
         return 1 << min(20, max(0, self.n_per_column.bit_length() - 4))
 
 
 def plan_columns(signal: UniformSignal, n_columns: int) -> Columns:
-    """Return at most `n_columns` stretches of equal length."""
+    """Return at most `n_columns` segments of equal length."""
     return Columns(signal.n_samples, -(-signal.n_samples // count(n_columns, "n_columns", minimum=2)))
 
 
@@ -247,21 +247,21 @@ class LinePlan:
         one_of(reduction, "reduction", ("mean", "max"))
         kind = cast("Scaling", one_of(scaling, "scaling", ("amplitude peak", "power")))
         x, n_per_column = self.signal, columns.n_per_column
-        gathered = np.zeros((2 if self.squeezed else 1, len(self.lines), columns.n_columns))
-        n_read = np.zeros(gathered.shape[1:], dtype=np.int64)
+        level_sums = np.zeros((2 if self.squeezed else 1, len(self.lines), columns.n_columns))
+        n_read = np.zeros(level_sums.shape[1:], dtype=np.int64)
         for lines, start, step, W in pieces:
-            power = (W.real**2 + W.imag**2).reshape(len(gathered), len(lines), -1)
+            power = (W.real**2 + W.imag**2).reshape(len(level_sums), len(lines), -1)
             column = (start + step * np.arange(power.shape[2])) // n_per_column
             first = np.flatnonzero(np.diff(column, prepend=-1))
             at = slice(int(column[0]), int(column[-1]) + 1)
             if reduction == "max":
                 largest = np.maximum.reduceat(power, first, axis=2)
-                gathered[:, lines, at] = np.maximum(gathered[:, lines, at], largest)
+                level_sums[:, lines, at] = np.maximum(level_sums[:, lines, at], largest)
                 n_read[lines, at] = 1
             else:
-                gathered[:, lines, at] += np.add.reduceat(power, first, axis=2, dtype=np.float64)
+                level_sums[:, lines, at] += np.add.reduceat(power, first, axis=2, dtype=np.float64)
                 n_read[lines, at] += np.diff(first, append=len(column))
-        power = gathered / np.maximum(n_read, 1)
+        power = level_sums / np.maximum(n_read, 1)
         levels = [(np.sqrt(p) if kind == "amplitude peak" else p / 2).T for p in power]
         begin = np.arange(columns.n_columns) * n_per_column
         last = np.minimum(begin + n_per_column, columns.n_samples) - 1

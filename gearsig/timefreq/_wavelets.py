@@ -14,7 +14,7 @@ from scipy.fft import ifft, rfft
 from gearsig.checks import FloatArray, count, frozen_array, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._types import ComplexArray, Spacing
-from gearsig.timefreq._uniform import Edges, UniformSignal, stretch
+from gearsig.timefreq._uniform import Edges, UniformSignal, segment_of
 
 TAIL = 1e-6
 """Share of the peak below which a wavelet is taken for zero, in time and in frequency."""
@@ -382,8 +382,8 @@ def sampled_pieces(
 
 def workspace(group: LineGroup) -> ComplexArray:
     """Return room for the coefficients of a piece and their derivatives: asking for it each time costs more."""
-    most = max(_rows_at_once(batch, group) * group.n_block // batch.step for batch in group.batches)
-    return np.empty((2, most), dtype=np.complex64)
+    n_columns = max(_rows_at_once(batch, group) * group.n_block // batch.step for batch in group.batches)
+    return np.empty((2, n_columns), dtype=np.complex64)
 
 
 def _rows_at_once(batch: Batch, group: LineGroup) -> int:
@@ -399,7 +399,7 @@ def block_pieces(
     """
     margin, length = group.n_margin, min(group.n_core, len(values) - start)
     # In double precision: rounding in strong parts of the spectrum must not reach the weak ones.
-    spectrum = rfft(stretch(values, start - margin, group.n_block, edges))
+    spectrum = rfft(segment_of(values, start - margin, group.n_block, edges))
     for batch in group.batches:
         X = spectrum[batch.first : batch.first + batch.response.shape[1]].astype(np.complex64)
         dX = (X * (1j * batch.omega)).astype(np.complex64) if derivatives else X[:0]

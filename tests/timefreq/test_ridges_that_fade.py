@@ -15,7 +15,7 @@ from gearsig.timefreq import (
     cwt_map,
     ridges,
     squeezed_cwt_map,
-    tops_beside,
+    tops_of_parted_paths,
 )
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
@@ -68,5 +68,5 @@ def test_a_ridge_in_noise_of_more_power_is_followed(transform, seed: int, course
 
 def test_paths_that_would_meet_beyond_the_map_part_at_its_edge():
     beyond = [np.array([19.0, 20.5, 21.0]), np.array([17.0, 19.5, 20.0])]
-    upper, lower = tops_beside(np.ones((18, 3)), beyond, 0)
+    upper, lower = tops_of_parted_paths(np.ones((18, 3)), beyond, 0)
     assert np.all((lower >= 0) & (lower <= upper) & (upper <= 17))
