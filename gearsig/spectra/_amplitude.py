@@ -292,13 +292,13 @@ def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
     centres = np.arange(len(blocks)) * half + (block - 1) / 2
     levels = _quantiles(blocks, q)
     short = [s for s in (half, half // 2) if s >= MIN_LINES // 2]
-    left = [(float(np.quantile(power[:s], q)), (s - 1) / 2) for s in reversed(short)]
-    right = [(float(np.quantile(power[-s:], q)), n - (s + 1) / 2) for s in short]
+    below = [(float(np.quantile(power[:s], q)), (s - 1) / 2) for s in reversed(short)]
+    above = [(float(np.quantile(power[-s:], q)), n - (s + 1) / 2) for s in short]
     last = float(np.quantile(power[-block:], q)), n - (block + 1) / 2
     if last[1] > centres[-1]:
-        right.insert(0, last)
-    x = np.concatenate([[c for _, c in left], centres, [c for _, c in right]])
-    y = np.concatenate([[v for v, _ in left], levels, [v for v, _ in right]])
+        above.insert(0, last)
+    x = np.concatenate([[c for _, c in below], centres, [c for _, c in above]])
+    y = np.concatenate([[v for v, _ in below], levels, [v for v, _ in above]])
     # Zeros (a dead segment of a simulated spectrum) have no logarithm; the smallest positive double stands for them.
     logs = np.log(np.maximum(y, np.finfo(np.float64).tiny))
     order = np.argsort(x, kind="stable")

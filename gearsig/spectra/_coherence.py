@@ -349,9 +349,9 @@ def correlate_lines(lines: ComplexArray, bands: CarrierBands, n_alphas: int) -> 
         power = v.real**2 + v.imag**2
         shifted = ifft(weight * fft(power, n_fft), overwrite_x=True).real
         m = n_alphas - np.arange(FIRST_LINE, n_alphas + 1)
-        own = float(np.dot(G, power[n_alphas:]))
+        carrier_power = float(np.dot(G, power[n_alphas:]))
         S[:, i] = d[m] / G.sum()
-        below = own * np.maximum(shifted[m], 1e-14 * float(power.max()))
+        below = carrier_power * np.maximum(shifted[m], 1e-14 * float(power.max()))
         square = d[m].real ** 2 + d[m].imag ** 2
         gamma[:, i] = np.divide(square, below, out=np.zeros(len(m)), where=below > 0)
     return S, gamma
@@ -562,9 +562,9 @@ def _correlate_over_angle(
         product = _at_rate(narrow, n_envelope) * np.conj(_at_rate(around, n_envelope))
         c = sums(product[inside] * weight) * (n_envelope**2 / bands.weight.sum())
         S[:, i] = c[FIRST_LINE:]
-        own = abs(float(c[0].real))
+        carrier_power = abs(float(c[0].real))
         square = S[:, i].real ** 2 + S[:, i].imag ** 2
-        gamma[:, i] = square / own**2 if own > 0 else 0.0
+        gamma[:, i] = square / carrier_power**2 if carrier_power > 0 else 0.0
     return S, gamma
 
 

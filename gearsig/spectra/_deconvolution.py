@@ -115,8 +115,8 @@ def minimum_entropy_deconvolution(
         last = kurtosis
         taps = solve(_correlated(x, y**3))
         taps /= np.linalg.norm(taps)
-    what = f"{source or 'signal'}, minimum entropy deconvolution"
-    return Deconvolved(_filtered(x, best_taps), fs, best_taps, best, unit, what)
+    title = f"{source or 'signal'}, minimum entropy deconvolution"
+    return Deconvolved(_filtered(x, best_taps), fs, best_taps, best, unit, title)
 
 
 def multipoint_deconvolution(
@@ -181,8 +181,8 @@ def multipoint_deconvolution(
     taps /= np.linalg.norm(taps)
     y = _filtered(x, taps)
     score = float(train @ y / (np.linalg.norm(train) * np.linalg.norm(y)))
-    what = f"{source or 'signal'}, multipoint deconvolution at {1 / period_s:.6g} Hz"
-    return Deconvolved(y, fs, taps, score, unit, what)
+    title = f"{source or 'signal'}, multipoint deconvolution at {1 / period_s:.6g} Hz"
+    return Deconvolved(y, fs, taps, score, unit, title)
 
 
 def multipoint_norms(

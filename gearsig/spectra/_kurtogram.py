@@ -583,14 +583,14 @@ def _combine(sums, n_parts, n, z):  # type: ignore[no-untyped-def]
     last = n_parts - 1
     for m in range(n):
         for component in range(2):
-            other = 1 - component
+            opposite = 1 - component
             sign = 1.0 if component == 0 else -1.0  # -i(p + iq) = q - ip
             even_c, odd_c = sums[0, component, m], sums[1, component, m]
-            even_s, odd_s = sign * sums[2, other, m], sign * sums[3, other, m]
+            even_s, odd_s = sign * sums[2, opposite, m], sign * sums[3, opposite, m]
             z[0, component, m] = even_c + odd_c + even_s + odd_s
             z[last, component, m] = even_c - odd_c - even_s + odd_s
             if n_parts == 3:
-                z[1, component, m] = sums[4, component, m] + sign * sums[5, other, m]
+                z[1, component, m] = sums[4, component, m] + sign * sums[5, opposite, m]
 
 
 @njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]

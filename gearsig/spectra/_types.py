@@ -144,8 +144,8 @@ class Window:
     def noise_bandwidth_bins(self) -> float:
         """Equivalent noise bandwidth in lines, n Σw² / (Σw)²: 1 for rectangular, 1.5 for Hann."""
         if self.coefficients:
-            first, *others = self.coefficients
-            return round(1.0 + sum((a / first) ** 2 for a in others) / 2.0, 12)
+            first, *further = self.coefficients
+            return round(1.0 + sum((a / first) ** 2 for a in further) / 2.0, 12)
         w = self.values
         return round(float(self.n_samples * np.dot(w, w) / w.sum() ** 2), 12)
 
@@ -256,11 +256,11 @@ def fast_length(n: int) -> int:
     (4000, 3927)
     """
     for length in range(n, 0, -1):
-        rest = length
+        remainder = length
         for prime in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31):
-            while rest % prime == 0:
-                rest //= prime
-        if rest == 1:
+            while remainder % prime == 0:
+                remainder //= prime
+        if remainder == 1:
             return length
     return n
 
@@ -314,12 +314,12 @@ def check_signal(signal: object, kinds: type | UnionType = Recording) -> None:
         check_recording(signal, "signal", kinds | np.ndarray)
 
 
-def array_rate_hz(given: str | float, parameter: str) -> float:
+def array_rate_hz(channel: str | float, parameter: str) -> float:
     """Return an array's sampling rate in Hz, which stands where a recording's channel would be named.
 
     Parameters
     ----------
-    given : str or float
+    channel : str or float
     parameter : str
         Under which the caller gave it, for the errors.
 
@@ -328,9 +328,9 @@ def array_rate_hz(given: str | float, parameter: str) -> float:
     InputError
         If it is a name, or not above zero.
     """
-    if isinstance(given, str):
-        raise InputError(f"an array has no channel {given!r}", where=parameter, allowed="its sampling rate in Hz")
-    return positive(given, f"{parameter}, an array's sampling rate,", "Hz")
+    if isinstance(channel, str):
+        raise InputError(f"an array has no channel {channel!r}", where=parameter, allowed="its sampling rate in Hz")
+    return positive(channel, f"{parameter}, an array's sampling rate,", "Hz")
 
 
 def plan_blocks(n_samples: int, n_per_block: int | None, overlap: float, window: str) -> BlockPlan:
