@@ -124,7 +124,7 @@ class _AnalysisJob:
 
 def add_recordings(
     store: Store,
-    found: Sequence[Origin],
+    recordings: Sequence[Origin],
     options: AnalysisOptions,
     *,
     n_processes: int | None = None,
@@ -136,8 +136,8 @@ def add_recordings(
     from gearsig.recording import sha256_of
 
     setups = _setups(options)
-    known = _known(store, found, __version__)
-    missing = [origin for origin in found if _identity(origin, setups(origin.path)) not in known]
+    known = _known(store, recordings, __version__)
+    missing = [origin for origin in recordings if _identity(origin, setups(origin.path)) not in known]
     elsewhere: list[Origin] = []
     unseen: list[Origin] = []  # of known content under a new name or date of change
     results: list[AddedRecording] = []
@@ -185,7 +185,7 @@ def add_recordings(
             claim.close()
     if store.n_new() >= COMPACT_FROM:
         store.compact()
-    n_known = len(found) - len(missing) + len(unseen)
+    n_known = len(recordings) - len(missing) + len(unseen)
     return AddResult(tuple(results), n_known, len(elsewhere))
 
 
@@ -201,15 +201,15 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
     options, path, began = job.options, job.origin.path, time.process_time()
     try:
         rig = options.rig
-        if rig is None and (beside := rig_file_beside(path)) is not None:
-            rig = read_rig(beside)
-        given: dict[str, Any] = {"sampling_rate_hz": options.sampling_rate_hz, "speed": options.speed}
-        given["memory_bytes"] = options.memory_bytes
+        if rig is None and (rig_file := rig_file_beside(path)) is not None:
+            rig = read_rig(rig_file)
+        reading: dict[str, Any] = {"sampling_rate_hz": options.sampling_rate_hz, "speed": options.speed}
+        reading["memory_bytes"] = options.memory_bytes
         reference = None
         if options.reference is not None and options.reference.resolve() != path.resolve():
-            reference = read_reference(options.reference, rig, **given)
-        found = analyze_file(path, rig, reference=reference, torque_nm=options.torque_nm, **given)
-        analysis = found.as_one() if isinstance(found, LongAnalysis) else found
+            reference = read_reference(options.reference, rig, **reading)
+        result = analyze_file(path, rig, reference=reference, torque_nm=options.torque_nm, **reading)
+        analysis = result.as_one() if isinstance(result, LongAnalysis) else result
         if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # of parts no hash is taken
             return _row(job, outcome=FAILED, reason="it was written while it was read", key=""), [], job.origin
     except GearsigError as error:
@@ -218,7 +218,7 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
         text = " ".join(str(error).split())
         reason = f"unexpected error, please report: {type(error).__name__}: {text}"
         return _row(job, outcome=FAILED, reason=reason), [], job.origin
-    facts = _facts(analysis, options) | ({"duration_s": found.duration_s} if isinstance(found, LongAnalysis) else {})
+    facts = _facts(analysis, options) | ({"duration_s": result.duration_s} if isinstance(result, LongAnalysis) else {})
     row = _row(job, **facts, cpu_s=time.process_time() - began)
     return row, _indicators(analysis), job.origin
 
@@ -323,13 +323,13 @@ def _killed(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
     return _row(job, outcome=FAILED, reason=killed_text("analysed it"), key=""), [], job.origin
 
 
-def _known(store: Store, found: Sequence[Origin], version: str) -> set[tuple[Any, ...]]:
+def _known(store: Store, recordings: Sequence[Origin], version: str) -> set[tuple[Any, ...]]:
     """Return the identities of files that the store holds results of, as far as size and time of change tell."""
-    wanted = {_printable(origin.path) for origin in found}
+    names = {_printable(origin.path) for origin in recordings}
     sql = "SELECT source, n_bytes, mtime_ns, machine, point, date, setup FROM recordings WHERE version = ? " + (
-        "AND source IN (SELECT unnest(?))" if len(wanted) < 100_000 else ""
+        "AND source IN (SELECT unnest(?))" if len(names) < 100_000 else ""
     )
-    arguments: list[Any] = [version, sorted(wanted)] if len(wanted) < 100_000 else [version]
+    arguments: list[Any] = [version, sorted(names)] if len(names) < 100_000 else [version]
     return set(store.read(lambda connection: connection.execute(sql, arguments).fetchall()))
 
 
@@ -349,8 +349,8 @@ def _of_content(store: Store, files: Mapping[Origin, str]) -> dict[Origin, tuple
         f"WHERE sha256 IN (SELECT unnest($1)) OR (outcome = '{FAILED}' AND source IN (SELECT unnest($2))) "
         "ORDER BY added"
     )
-    asked = [[*files.values()], [_printable(origin.path) for origin in files]]
-    rows = store.read(lambda connection: connection.execute(sql, asked).fetchall())
+    arguments = [[*files.values()], [_printable(origin.path) for origin in files]]
+    rows = store.read(lambda connection: connection.execute(sql, arguments).fetchall())
     of_place = {tuple(row[:4]): tuple(row[5:8]) for row in rows}
     of_file = {(row[0], row[4]): row[5] for row in rows} | {row[4]: row[5] for row in rows if row[8] == FAILED}
     result: dict[Origin, tuple[str, ...]] = {}
@@ -380,8 +380,8 @@ def _setups(options: AnalysisOptions) -> Callable[[Path], str]:
 
     @cache
     def setup(path: Path) -> str:
-        beside = rig_file_beside(path) if options.rig is None else None
-        rig = rig_to_dict(options.rig) if options.rig is not None else of_rig_file(beside) if beside else None
+        rig_file = rig_file_beside(path) if options.rig is None else None
+        rig = rig_to_dict(options.rig) if options.rig is not None else of_rig_file(rig_file) if rig_file else None
         return _digest([rig, *shared])
 
     return setup

@@ -186,17 +186,17 @@ class Fleet:
         if n_processes is not None:
             count(n_processes, "n_processes")
         places = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
-        found = [item for item in places if isinstance(item, Origin)]
+        listed = [item for item in places if isinstance(item, Origin)]
         paths = [item for item in places if not isinstance(item, Origin)]
         passed_over = list[PassedOver]()
-        if paths or not found:
+        if paths or not listed:
             stated: dict[str, Any] = {"machine": machine, "point": point, "date": date, "rig": rig}
-            found += origins(paths, pattern=pattern, **stated, on_passed_over=passed_over.append)
+            listed += origins(paths, pattern=pattern, **stated, on_passed_over=passed_over.append)
         options = AnalysisOptions(
             rig, sampling_rate_hz, speed, Path(reference) if reference is not None else None, torque_nm, memory_bytes
         )
         result = add_recordings(
-            self._store, found, options, n_processes=n_processes, executor=executor, on_progress=on_progress
+            self._store, listed, options, n_processes=n_processes, executor=executor, on_progress=on_progress
         )
         self._refreshed()
         return replace(result, passed_over=tuple(passed_over))
@@ -216,8 +216,8 @@ class Fleet:
         """State a period in which a machine was healthy, e.g. after an overhaul; it replaces an earlier one."""
         self._check_place(machine, point)
         settings = self.settings
-        others = tuple(b for b in settings.baselines if (b.machine, b.point) != (machine, point))
-        self.set(replace(settings, baselines=(*others, Baseline(machine, point, start, end))))
+        unchanged = tuple(b for b in settings.baselines if (b.machine, b.point) != (machine, point))
+        self.set(replace(settings, baselines=(*unchanged, Baseline(machine, point, start, end))))
 
     # ---------------- tables
 
@@ -333,19 +333,21 @@ class Fleet:
         self._check_place(machine, point)
         points = [point] if point else [p for (p,) in self._rows(_POINTS, [machine])]
         of_points = {chosen: self.point_trends(machine, chosen) for chosen in points}
-        found = [
+        series = [
             (chosen, column, row)
             for chosen, trends in of_points.items()
             for column, row in enumerate(trends.series.to_dict("records"))
         ]
-        asked = {"name": name, "channel": channel, "place": place, "computed_on": computed_on}
-        for key, value in asked.items():
+        conditions = {"name": name, "channel": channel, "place": place, "computed_on": computed_on}
+        for key, value in conditions.items():
             if value:
-                what = "indicator" if key == "name" else f"{name} {'on' if key == 'computed_on' else f'of {key}'}"
-                known = sorted({row[key] for *_, row in found})
-                known_name(value, known, f"there is no {what} {value!r}", where=machine)
-                found = [each for each in found if each[2][key] == value]
-        result = [_trend(of_points[chosen], column, machine, chosen) for chosen, column, _ in found]
+                column_text = (
+                    "indicator" if key == "name" else f"{name} {'on' if key == 'computed_on' else f'of {key}'}"
+                )
+                known = sorted({row[key] for *_, row in series})
+                known_name(value, known, f"there is no {column_text} {value!r}", where=machine)
+                series = [item for item in series if item[2][key] == value]
+        result = [_trend(of_points[chosen], column, machine, chosen) for chosen, column, _ in series]
         return tuple(sorted(result, key=lambda t: STATUS_LEVELS.index(t.level)))
 
     def export(
@@ -480,8 +482,8 @@ class Fleet:
             if fingerprint is None:
                 continue
             trends = _judged(connection, machine, point, settings)
-            found = state_rows(trends, machine, point, fingerprint)
-            rows += found or [
+            states = state_rows(trends, machine, point, fingerprint)
+            rows += states or [
                 dict.fromkeys(_STATE)
                 | {"machine": machine, "point": point, "name": "", "level": OK, "fingerprint": fingerprint}
             ]

@@ -119,18 +119,18 @@ class FilePattern:
         '20261301 is no date in the form %Y%m%d'
         """
         expression, form = self._compiled()
-        found = None
+        match = None
         if root is not None and path.is_relative_to(root):
-            found = expression.fullmatch(path.relative_to(root).as_posix())
-        found = found or expression.search(path.absolute().as_posix())
-        if found is None:
+            match = expression.fullmatch(path.relative_to(root).as_posix())
+        match = match or expression.search(path.absolute().as_posix())
+        if match is None:
             return PassedOver(path.absolute(), "does not match the pattern")
-        result: dict[str, str | datetime] = {k: v for k, v in found.groupdict().items() if k != "date"}
+        result: dict[str, str | datetime] = {k: v for k, v in match.groupdict().items() if k != "date"}
         if form:
             try:
-                result["date"] = datetime.strptime(found["date"], form)  # noqa: DTZ007 - as the name states it
+                result["date"] = datetime.strptime(match["date"], form)  # noqa: DTZ007 - as the name states it
             except ValueError:  # the 31st of February
-                return PassedOver(path.absolute(), f"{found['date']} is no date in the form {form}")
+                return PassedOver(path.absolute(), f"{match['date']} is no date in the form {form}")
         return result
 
     def _compiled(self) -> tuple[re.Pattern[str], str]:
@@ -140,17 +140,17 @@ class FilePattern:
 @cache
 def _compile(text: str) -> tuple[re.Pattern[str], str]:
     where, form, parts, end = "--pattern", "", ["(?:^|/)"], 0
-    seen: set[str] = set()
+    names: set[str] = set()
     for field in _FIELD.finditer(text):
         parts.append(_literal(text[end : field.start()]))
         name, end = field["name"], field.end()
         if name and name not in FIELDS:
             raise InputError(f"{{{name}}} is not known", where=where, allowed=", ".join(f"{{{n}}}" for n in FIELDS))
-        if name in seen:
+        if name in names:
             raise InputError(f"{{{name}}} stands twice", where=where)
         if bool(field["form"]) != (name == "date"):
             raise InputError(f"{field[0]} has no date's form", where=where, remedy="write for example {date:%Y%m%d}")
-        seen.add(name)
+        names.add(name)
         if name == "date":
             form = field["form"]
             parts.append(f"(?P<date>{_of_form(form)})")
@@ -183,12 +183,12 @@ def date_in_name(name: str) -> datetime | None:
     >>> [str(date_in_name(name)) for name in ("pump_2026-01-31T1405.csv", "20260131_140512", "run_1234.h5")]
     ['2026-01-31 14:05:00', '2026-01-31 14:05:12', 'None']
     """
-    for found in _DATE_IN_NAME.finditer(name):
-        digits = re.sub(r"\D", "", found["day"])
-        time = re.sub(r"\D", "", found["time"] or "")
-        for rest in (time, ""):
+    for match in _DATE_IN_NAME.finditer(name):
+        digits = re.sub(r"\D", "", match["day"])
+        time = re.sub(r"\D", "", match["time"] or "")
+        for clock in (time, ""):
             try:
-                return datetime.strptime(digits + rest.ljust(6, "0"), "%Y%m%d%H%M%S")  # noqa: DTZ007
+                return datetime.strptime(digits + clock.ljust(6, "0"), "%Y%m%d%H%M%S")  # noqa: DTZ007
             except ValueError:
                 continue
     return None
@@ -205,21 +205,21 @@ def find_recordings(places: Iterable[str | Path]) -> list[tuple[Path, Path]]:
     InputError
         If a place does not exist.
     """
-    found: dict[Path, Path] = {}
+    root_of: dict[Path, Path] = {}
     for place in places:
         root = Path(place)
         if root.is_dir():
             for path in _walk(root):
                 if _is_recording(path):
-                    found.setdefault(path, root)
+                    root_of.setdefault(path, root)
         elif any(letter in root.name for letter in "*?[") and not root.exists():
             matches = sorted(root.parent.glob(root.name)) if root.parent.is_dir() else []
             if not matches:
                 raise InputError("no file matches", where=str(root), remedy="check the folder and the pattern")
-            found |= {path: path.parent for path in matches if path.is_file()}
+            root_of |= {path: path.parent for path in matches if path.is_file()}
         else:
-            found.setdefault(root, root.parent)
-    return list(found.items())
+            root_of.setdefault(root, root.parent)
+    return list(root_of.items())
 
 
 def _walk(root: Path) -> Iterable[Path]:
@@ -311,12 +311,12 @@ def matching_origins(
     rig: Rig | None = None,
 ) -> list[Origin]:
     """Return what `origins` does, but nothing where nothing is found."""
-    wanted = FilePattern(pattern) if pattern else None
-    found = find_recordings(places)
+    file_pattern = FilePattern(pattern) if pattern else None
+    recordings = find_recordings(places)
     rigs = _rig_names(rig)
     result = []
-    for path, root in found:
-        named = wanted.examined(path, root) if wanted is not None else {}
+    for path, root in recordings:
+        named = file_pattern.examined(path, root) if file_pattern is not None else {}
         if isinstance(named, PassedOver):
             on_passed_over(named)
             continue
@@ -390,8 +390,8 @@ def _rig_names(rig: Rig | None) -> Callable[[Path], str]:
     def name(path: Path) -> str:
         if rig is not None:
             return rig.name
-        beside = rig_file_beside(path)
-        return of_file(beside) if beside is not None else ""
+        rig_file = rig_file_beside(path)
+        return of_file(rig_file) if rig_file is not None else ""
 
     return name
 
@@ -406,7 +406,7 @@ def _clean(text: object) -> str:
     return " ".join(line.split())[:LONGEST_NAME]
 
 
-def origin_rows(found: Sequence[Origin]) -> list[tuple[str, str, str, str]]:
+def origin_rows(recordings: Sequence[Origin]) -> list[tuple[str, str, str, str]]:
     """Return file, machine, point and date of each, with what it rests on, as a person checks them."""
     return [
         (
@@ -415,5 +415,5 @@ def origin_rows(found: Sequence[Origin]) -> list[tuple[str, str, str, str]]:
             f"{o.point} ({o.point_from})" if o.point else "–",
             f"{o.date:%Y-%m-%d %H:%M} ({o.date_from})",
         )
-        for o in found
+        for o in recordings
     ]

@@ -134,7 +134,7 @@ def prediction_limits(
     p = x.shape[1]
     expected, width = np.full((n, m), np.nan), np.full((n, m), np.nan)
     scatter, n_baseline = np.full(m, np.nan), np.zeros(m, dtype=np.int64)
-    least = np.broadcast_to(np.asarray(min_scatter, dtype=np.float64), (m,))
+    min_scatters = np.broadcast_to(np.asarray(min_scatter, dtype=np.float64), (m,))
     for pattern, columns in _patterns(np.isfinite(y) & baseline[:, None]):
         freedom = int(pattern.sum()) - p
         n_baseline[columns] = int(pattern.sum())
@@ -143,7 +143,7 @@ def prediction_limits(
         inverse = np.linalg.inv(x[pattern].T @ x[pattern])
         b = inverse @ (x[pattern].T @ y[np.ix_(pattern, columns)])
         residual = y[np.ix_(pattern, columns)] - x[pattern] @ b
-        s = np.maximum(np.sqrt(np.square(residual).sum(axis=0) / freedom), least[columns])
+        s = np.maximum(np.sqrt(np.square(residual).sum(axis=0) / freedom), min_scatters[columns])
         reach = np.sqrt(1.0 + np.einsum("ij,jk,ik->i", x, inverse, x))
         t = -float(stdtrit(freedom, 0.5 * false_alarm_rate))
         expected[:, columns] = x @ b

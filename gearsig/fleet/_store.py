@@ -142,19 +142,19 @@ class Store:
                 )
             segments, replaced = [str(name) for name in data["segments"]], [str(key) for key in data["replaced"]]
         except FileNotFoundError:
-            return self._segments_there(), []
+            return self._present_segments(), []
         except (ValueError, KeyError, TypeError, RecursionError):
             self._set_aside(self.folder / MANIFEST, "the list of segments is damaged; all segments count")
-            return self._segments_there(), []
+            return self._present_segments(), []
         return [name for name in segments if Path(name).name == name and self._segment(name).is_dir()], replaced
 
-    def _segments_there(self) -> list[str]:
+    def _present_segments(self) -> list[str]:
         """Return the segments without those that another one holds already."""
-        there = {path.name for path in (self.folder / SEGMENTS).glob("[0-9]*") if path.is_dir()}
-        for name in sorted(there):
+        names = {path.name for path in (self.folder / SEGMENTS).glob("[0-9]*") if path.is_dir()}
+        for name in sorted(names):
             with suppress(OSError, ValueError, TypeError):
-                there -= set(json.loads((self._segment(name) / MERGED).read_text(encoding="utf-8")))
-        return sorted(there)
+                names -= set(json.loads((self._segment(name) / MERGED).read_text(encoding="utf-8")))
+        return sorted(names)
 
     def _write_manifest(self, segments: Sequence[str], replaced: Sequence[str]) -> None:
         content = {
@@ -244,10 +244,10 @@ class Store:
         state = tuple(segments)
         unseen = names if state != self._segments_known else names - self._loose_known
         if unseen and segments:
-            found = connection.execute(
+            doubled = connection.execute(
                 f"SELECT key FROM read_parquet({_list(segments)}) WHERE key IN (SELECT unnest(?))", [sorted(unseen)]
             ).fetchall()
-            for (key,) in found:
+            for (key,) in doubled:
                 (self.folder / NEW / f"{key}.parquet").unlink(missing_ok=True)
         self._loose_known, self._segments_known = names, state
 
@@ -275,10 +275,10 @@ class Store:
         for name in self._manifest()[0]:
             folder = self._segment(name)
             try:
-                for table_name, wanted in (("recordings", columns), ("indicators", [*INDICATOR, "key"])):
+                for table_name, expected in (("recordings", columns), ("indicators", [*INDICATOR, "key"])):
                     with (folder / f"{table_name}.parquet").open("rb") as file:
                         parts = pq.ParquetFile(file)
-                        if not set(wanted) <= set(parts.schema_arrow.names):
+                        if not set(expected) <= set(parts.schema_arrow.names):
                             raise ValueError("columns")  # noqa: TRY301
                         for group in range(parts.num_row_groups):
                             parts.read_row_group(group)
@@ -392,18 +392,18 @@ class Store:
                 f"machine, point, date, unnest(indicators) AS i FROM read_parquet({_list(files)}){kept})"
             )
             of_old = f"SELECT key, machine, point, date, {names} FROM read_parquet({_list(of)}){kept}"
-            both = " UNION ALL ".join(sql for sql, there in ((of_old, of), (of_loose, files)) if there)
+            rows = " UNION ALL ".join(sql for sql, exists in ((of_old, of), (of_loose, files)) if exists)
             order = ", ".join(("machine", "point", *SERIES, "date"))
             connection.execute(
-                f"COPY (SELECT * FROM ({both}) ORDER BY {order}) TO {_text(str(part / 'indicators.parquet'))} {options}"
+                f"COPY (SELECT * FROM ({rows}) ORDER BY {order}) TO {_text(str(part / 'indicators.parquet'))} {options}"
             )
             (part / MERGED).write_text(json.dumps(merged), encoding="utf-8")
             part.rename(self._segment(name))
         except BaseException:
             shutil.rmtree(part, ignore_errors=True)
             raise
-        left = [old_name for old_name in segments if old_name not in merged]
-        self._write_manifest([*left, name], replaced if left else [])
+        remaining = [old_name for old_name in segments if old_name not in merged]
+        self._write_manifest([*remaining, name], replaced if remaining else [])
         for path in loose:
             path.unlink(missing_ok=True)
 

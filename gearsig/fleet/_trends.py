@@ -284,8 +284,8 @@ def judge(
     rate = settings.false_alarm_rate / max(len(series), 1)
     limits = prediction_limits(y, x, baseline, rate, min_scatter=np.where(in_db, MIN_SCATTER, 1e-9))
     judged = (~baseline & inside)[:, None] & np.isfinite(y) & np.isfinite(limits.high)
-    least = np.where(in_db, settings.minimum_change_db, 0.0)
-    reach, rise = np.maximum(limits.high - limits.expected, least), y - limits.expected
+    min_rise = np.where(in_db, settings.minimum_change_db, 0.0)
+    reach, rise = np.maximum(limits.high - limits.expected, min_rise), y - limits.expected
     with np.errstate(invalid="ignore"):
         sample = np.where(np.abs(rise) > reach, np.where(in_db & (rise >= SERIOUS_DB), ALARM, WARNING), OK)
         calm = np.abs(rise) <= RETURN * reach
@@ -419,7 +419,7 @@ def events_of(text: str) -> list[AlarmEvent]:
     def moment(value: str | None) -> datetime | None:
         return datetime.fromisoformat(value) if value else None
 
-    found: Sequence[Mapping[str, Any]] = json.loads(text)
+    entries: Sequence[Mapping[str, Any]] = json.loads(text)
     return [
         AlarmEvent(
             int(e["level"]),
@@ -428,5 +428,5 @@ def events_of(text: str) -> list[AlarmEvent]:
             moment(e["cleared"]),
             moment(e["cleared_added"]),
         )
-        for e in found
+        for e in entries
     ]

@@ -55,7 +55,7 @@ class WatchEvent:
                 "outcome": self.added.outcome,
             }
         if self.passed_over:
-            result["passed_over"] = [{"file": str(each.path), "reason": each.reason} for each in self.passed_over]
+            result["passed_over"] = [{"file": str(file.path), "reason": file.reason} for file in self.passed_over]
         return result
 
 
@@ -112,7 +112,7 @@ def watch(
     FilePattern(how.get("pattern", ""))  # one that is no pattern is refused at once
     roots = [Path(place) for place in places]
     seen: dict[Path, _Seen] = {}
-    said: set[Path] = set()
+    reported: set[Path] = set()
     problems: set[str] = set()
     n_failed = 0
 
@@ -130,8 +130,8 @@ def watch(
             try:
                 left_out = list[PassedOver]()
                 ready, n_waiting = _ready(roots, seen, settle_s, how, left_out.append)
-                if new := tuple(each for each in left_out if each.path not in said):
-                    said |= {each.path for each in new}
+                if new := tuple(file for file in left_out if file.path not in reported):
+                    reported |= {file.path for file in new}
                     on_event(WatchEvent("passed over", datetime.now(UTC), passed_over_text(new), passed_over=new))
                 if ready:
                     if pool is None:
@@ -172,11 +172,11 @@ def _ready(
     on_passed_over: Callable[[PassedOver], object],
 ) -> tuple[list[Origin], int]:
     """Return the recordings that stand still and were not taken yet, and how many do not stand still."""
-    there = [root for root in roots if root.exists()]
+    present_roots = [root for root in roots if root.exists()]
     of_origin = {name: how[name] for name in (*_OF_ORIGIN, "rig") if name in how}
     now_s, wall_s = time.monotonic(), time.time()
     ready, n_waiting = [], 0
-    for origin in matching_origins(there, on_passed_over, **of_origin):
+    for origin in matching_origins(present_roots, on_passed_over, **of_origin):
         signature = origin.n_bytes, origin.mtime_ns
         known = seen.get(origin.path)
         if known is None:
