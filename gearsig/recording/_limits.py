@@ -20,30 +20,30 @@ CGROUPS = Path("/sys/fs/cgroup")
 def free_memory_bytes() -> float | None:
     """Memory that programs can still take, of the system and of a container; None where neither tells."""
     limits = [free for free in (_system_free_bytes(), container_free_bytes()) if free is not None]
-    least = min(limits, default=inf)
-    return least if isfinite(least) else None
+    smallest = min(limits, default=inf)
+    return smallest if isfinite(smallest) else None
 
 
-def container_free_bytes(own: Path = Path("/proc/self/cgroup"), mount: Path = CGROUPS) -> float | None:
+def container_free_bytes(cgroup_file: Path = Path("/proc/self/cgroup"), mount: Path = CGROUPS) -> float | None:
     """What the control groups of this program, from its own up to the outermost, still allow; None without a limit.
 
     What is taken counts without cached files, which make way.
 
     Parameters
     ----------
-    own : Path
+    cgroup_file : Path
         Lines "id:controllers:path": version 2 has none between its colons, version 1 has "memory".
     mount : Path
         Where the groups are shown; those of version 1 in a folder "memory".
     """
     limits: list[float | None] = []
     try:
-        lines = own.read_text(encoding="utf-8").splitlines()
+        lines = cgroup_file.read_text(encoding="utf-8").splitlines()
     except OSError:
         return None
     for line in lines:
-        _, _, rest = line.partition(":")
-        controllers, _, path = rest.partition(":")
+        _, _, fields = line.partition(":")
+        controllers, _, path = fields.partition(":")
         if not controllers:
             root, names = mount, ("memory.max", "memory.current", "inactive_file")
         elif "memory" in controllers.split(","):
@@ -57,12 +57,12 @@ def container_free_bytes(own: Path = Path("/proc/self/cgroup"), mount: Path = CG
     return min((free for free in limits if free is not None), default=None)
 
 
-def _group_free_bytes(group: Path, limit_name: str, taken_name: str, cached_name: str) -> float | None:
+def _group_free_bytes(group: Path, limit_name: str, used_name: str, cached_name: str) -> float | None:
     try:
         limit = float((group / limit_name).read_text(encoding="ascii").replace("max", "inf"))
-        taken = float((group / taken_name).read_text(encoding="ascii"))
+        used = float((group / used_name).read_text(encoding="ascii"))
         stat = dict(line.split() for line in (group / "memory.stat").read_text(encoding="ascii").splitlines())
-        return max(limit - taken + float(stat.get(cached_name, 0.0)), 0.0)
+        return max(limit - used + float(stat.get(cached_name, 0.0)), 0.0)
     except (OSError, ValueError):
         return None
 

@@ -212,22 +212,22 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
     spreads = {c.name: float(np.std(recording.values(c.name), dtype=np.float64)) for c in recording.channels}
     for channel in recording.channels:
         if channel.is_vibration:
-            others = [spreads[c.name] for c in recording.channels if _is_comparable(c, channel)]
-            problems += _problems_of(channel, recording.values(channel.name), spreads[channel.name], others)
+            other_spreads = [spreads[c.name] for c in recording.channels if _is_comparable(c, channel)]
+            problems += _problems_of(channel, recording.values(channel.name), spreads[channel.name], other_spreads)
             if problems and problems[-1].channel == channel.name and problems[-1].kind == "dead":
                 continue
-            problems += _doubts_of(channel, recording.values(channel.name), recording.sampling_rate_hz)
+            problems += _further_problems(channel, recording.values(channel.name), recording.sampling_rate_hz)
     return tuple(problems)
 
 
-def _is_comparable(other: Channel, channel: Channel) -> bool:
-    same = (other.quantity, other.unit) == (channel.quantity, channel.unit)
-    return same and other.name != channel.name
+def _is_comparable(candidate: Channel, channel: Channel) -> bool:
+    same = (candidate.quantity, candidate.unit) == (channel.quantity, channel.unit)
+    return same and candidate.name != channel.name
 
 
-def _problems_of(channel: Channel, x: FloatArray, spread: float, others: list[float]) -> list[ChannelProblem]:
+def _problems_of(channel: Channel, x: FloatArray, spread: float, other_spreads: list[float]) -> list[ChannelProblem]:
     levels = find_levels(x)
-    dead = _dead(channel, x, levels, spread, others)
+    dead = _dead(channel, x, levels, spread, other_spreads)
     if dead is not None:
         return [dead]
     if len(x) < MIN_SAMPLES:
@@ -242,7 +242,7 @@ def _problems_of(channel: Channel, x: FloatArray, spread: float, others: list[fl
 
 
 def _dead(
-    channel: Channel, x: FloatArray, levels: SampleLevels, spread: float, others: list[float]
+    channel: Channel, x: FloatArray, levels: SampleLevels, spread: float, other_spreads: list[float]
 ) -> ChannelProblem | None:
     remedy = "check sensor, cable and input of this channel, and leave it out"
     if levels.n_used == 1:
@@ -251,11 +251,11 @@ def _dead(
         evidence = f"the samples differ, by {np.ptp(x):.2g} at most, too little for a standard deviation"
         return ChannelProblem(channel.name, "dead", 1.0, evidence, remedy)
     # An open input flickers by a step or two of the converter, far below the channels beside it.
-    if not others or levels.n_spanned > 4 or spread > 1e-3 * float(np.median(others)):
+    if not other_spreads or levels.n_spanned > 4 or spread > 1e-3 * float(np.median(other_spreads)):
         return None
     evidence = (
         f"only {levels.n_used} levels, standard deviation {spread:.3g}; "
-        f"the other channels' is {float(np.median(others)):.3g}"
+        f"the other channels' is {float(np.median(other_spreads)):.3g}"
     )
     return ChannelProblem(channel.name, "dead", 1.0, evidence, remedy)
 
@@ -328,7 +328,7 @@ def _quantised(channel: Channel, levels: SampleLevels) -> ChannelProblem | None:
 
 N_BLOCKS = 64
 STEP_DB = 4.0
-LEAST_SAMPLES = 4096
+MIN_SAMPLES_OF_TEST = 4096
 MAINS_HZ = (50.0, 60.0)
 """Frequencies of electric supplies."""
 MAINS_WANDER = 1e-3
@@ -340,8 +340,8 @@ LONGEST_TURNED = 1 << 18
 """Samples in which the direction of time is looked for."""
 
 
-def _doubts_of(channel: Channel, x: FloatArray, rate_hz: float) -> Iterator[ChannelProblem]:
-    if len(x) < LEAST_SAMPLES:
+def _further_problems(channel: Channel, x: FloatArray, rate_hz: float) -> Iterator[ChannelProblem]:
+    if len(x) < MIN_SAMPLES_OF_TEST:
         return
     tests = (_wrapped(channel, x), _stepped(channel, x), _reversed(channel, x, rate_hz), _hum(channel, x, rate_hz))
     yield from (problem for problem in tests if problem is not None)
@@ -362,11 +362,11 @@ def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     before, after = x[starts] - x[starts - 1], x[starts + 2] - x[starts + 1]
     turned = np.sign(x[starts + 1] - x[starts])
     goes_on = (np.sign(before) == -turned) & (np.sign(after) == -turned)
-    beside = np.maximum(np.abs(before), np.abs(after)) / span
+    neighbour_steps = np.maximum(np.abs(before), np.abs(after)) / span
     # Values that wrap around fill the range up to both ends; those of a natural signal thin out towards them.
     place = (x - low) / span
     outer, next_to = (np.count_nonzero(np.abs(place - 0.5) > 0.5 - edge) for edge in (0.01, 0.05))
-    if np.mean(goes_on) < 0.6 or not 0.02 < np.median(beside) < 0.6 or outer < max(20, 0.08 * next_to):
+    if np.mean(goes_on) < 0.6 or not 0.02 < np.median(neighbour_steps) < 0.6 or outer < max(20, 0.08 * next_to):
         return None
     evidence = f"{n} steps from one end of the range, {low:.4g} to {high:.4g}, to the other, and the slope goes on"
     remedy = "export again in a wider number format; nothing can be read from this channel"
@@ -439,13 +439,13 @@ def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | No
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft((x[:n] - np.mean(x[:n], dtype=np.float64)) * window))
     i, step_hz = int(np.argmax(spectrum[1:-1])) + 1, rate_hz / n
-    left, peak, right = spectrum[i - 1 : i + 2]
-    line_hz = (i + 0.5 * (right - left) / max(2 * peak - left - right, 1e-300)) * step_hz
+    below, peak, above = spectrum[i - 1 : i + 2]
+    line_hz = (i + 0.5 * (above - below) / max(2 * peak - below - above, 1e-300)) * step_hz
     share = float(np.sum(spectrum[max(i - 2, 0) : i + 3] ** 2) / max(float(np.sum(spectrum**2)), 1e-300))
     for mains_hz in MAINS_HZ:
         multiple = round(line_hz / mains_hz)
-        beside = abs(line_hz / (max(multiple, 1) * mains_hz) - 1)
-        if 1 <= multiple <= 6 and beside < MAINS_WANDER and share > 0.5 and step_hz < 2.0:
+        deviation = abs(line_hz / (max(multiple, 1) * mains_hz) - 1)
+        if 1 <= multiple <= 6 and deviation < MAINS_WANDER and share > 0.5 and step_hz < 2.0:
             evidence = f"{percent(share)} of the power stands at {line_hz:.5g} Hz, a multiple of {mains_hz:.0f} Hz"
             remedy = "check shield and earthing, if no shaft or mesh turns there; what is weaker drowns in it"
             return ChannelProblem(channel.name, "hum", share, evidence, remedy)

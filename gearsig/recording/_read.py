@@ -199,7 +199,7 @@ def identify(path: Path) -> FileFormat:
     except (OSError, ValueError) as error:
         hint = ""
         if path.parent.is_dir() and path.name:
-            names = [other.name for other in path.parent.iterdir()]
+            names = [sibling.name for sibling in path.parent.iterdir()]
             before = path.name.rpartition("#")[0]
             hint = _columns_hint(path.with_name(before)) if before in names else closest_match_hint(path.name, names)
         reason = getattr(error, "strerror", None) or str(error)

@@ -233,8 +233,11 @@ def one_measurement(table: RawTable, number: int | None, where: str) -> RawTable
     if number is None:
         named = [int(n) for n in re.findall(r"\d+", where) if int(n) in measurements]
         number = named[0] if named else max(measurements)
-        others = ", ".join(f"{where}#{n}" for n in sorted(measurements) if n != number)
-        warnings = (*warnings, f"holds {len(measurements)} measurements: {number} was read; for another, give {others}")
+        further = ", ".join(f"{where}#{n}" for n in sorted(measurements) if n != number)
+        warnings = (
+            *warnings,
+            f"holds {len(measurements)} measurements: {number} was read; for another, give {further}",
+        )
     if number not in measurements:
         raise InputError(f"there is no measurement {number}", where=where, allowed=numbers, remedy="choose one of them")
     speeds = {rpm for name, rpm in table.speeds_rpm.items() if number in map(int, re.findall(r"\d+", name))}

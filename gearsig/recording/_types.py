@@ -289,8 +289,8 @@ class Recording:
         try:
             samples = frozen_array(self.samples, "samples (channel, time)", ndim=2)
         except InputError as error:
-            is_one = isinstance(self.samples, np.ndarray) and self.samples.ndim == 1
-            hint = error.remedy or ("of one channel, give samples[None]" if is_one else "")
+            is_single = isinstance(self.samples, np.ndarray) and self.samples.ndim == 1
+            hint = error.remedy or ("of one channel, give samples[None]" if is_single else "")
             raise InputError(error.what, where=where, allowed=error.allowed, remedy=hint) from None
         if samples.shape[1] == 0:
             raise InputError("there are no samples", where=where, remedy="check that the file was written completely")
