@@ -340,10 +340,10 @@ def standard_path(
             where="teeth",
             remedy="give the smaller gear more teeth",
         )
-    own = (out_1 + out_2 - length) / base_pitch
-    ratio = own if contact_ratio is None else contact_ratio
+    standard_ratio = (out_1 + out_2 - length) / base_pitch
+    ratio = standard_ratio if contact_ratio is None else contact_ratio
     within(ratio, "contact_ratio", 1.0, 2.0, remedy="the model holds for one to two pairs in contact")
-    start = length - out_2 - 0.5 * (ratio - own) * base_pitch
+    start = length - out_2 - 0.5 * (ratio - standard_ratio) * base_pitch
     return PathOfContact(teeth, (rb1, rb2), ratio, base_pitch, max(start, 0.0), length, phase, ramp)
 
 

@@ -97,9 +97,9 @@ def rig_file_beside(recording: str | Path) -> Path | None:
     path = Path(recording)
     if not path.name:
         return None
-    beside = path.with_name(f"{recording_stem(path.name)}.toml")
+    rig_file = path.with_name(f"{recording_stem(path.name)}.toml")
     try:
-        return beside if beside.is_file() else None
+        return rig_file if rig_file.is_file() else None
     except (OSError, ValueError):  # the name is too long, or no name
         return None
 
@@ -171,7 +171,7 @@ def write_rig(rig: Rig, path: str | Path) -> None:
 def _speed(table: Any, where: str) -> SpeedSource | None:
     if not isinstance(table, dict) or not isinstance(table.get("source"), str):
         raise InputError("has no source", where=where, allowed=", ".join((*_SPEED_SOURCES, "none")))
-    source, rest = table["source"], {k: v for k, v in table.items() if k != "source"}
+    source, values = table["source"], {k: v for k, v in table.items() if k != "source"}
     if source == "none":
         return None
     if source == "pulse times":
@@ -187,7 +187,7 @@ def _speed(table: Any, where: str) -> SpeedSource | None:
             allowed=", ".join((*_SPEED_SOURCES, "none")),
             remedy=closest_match_hint(source, _SPEED_SOURCES),
         )
-    return from_table(_SPEED_SOURCES[source], rest, where)  # type: ignore[no-any-return]
+    return from_table(_SPEED_SOURCES[source], values, where)  # type: ignore[no-any-return]
 
 
 def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:

@@ -305,9 +305,9 @@ class GearPair:
     def __post_init__(self) -> None:
         _check_names(self, "name", "driver", "driven")
         for label, teeth in (("driver", self.driver_teeth), ("driven", self.driven_teeth)):
-            what = f"{label} teeth of pair {self.name!r}"
-            if teeth is not None and count(teeth, what, minimum=3, remedy="leave it out if unknown") > MAX_TEETH:
-                raise InputError(f"{what} is {teeth}", allowed=f"3 to {MAX_TEETH}")
+            label_text = f"{label} teeth of pair {self.name!r}"
+            if teeth is not None and count(teeth, label_text, minimum=3, remedy="leave it out if unknown") > MAX_TEETH:
+                raise InputError(f"{label_text} is {teeth}", allowed=f"3 to {MAX_TEETH}")
         for label, value in (("module_mm", self.module_mm), ("face_width_mm", self.face_width_mm)):
             if value is not None:
                 positive(value, f"{label} of pair {self.name!r}", "mm")
@@ -417,9 +417,9 @@ class Sensor:
         if self.quantity:
             one_of(self.quantity, f"quantity of sensor {self.channel!r}", QUANTITIES)
         for label, value in (("scale", self.scale), ("offset", self.offset)):
-            what = f"{label} of sensor {self.channel!r}"
-            if number(value, what) == 0.0 and label == "scale":
-                raise InputError(f"{what} is 0", allowed="a finite number, scale not 0")
+            label_text = f"{label} of sensor {self.channel!r}"
+            if number(value, label_text) == 0.0 and label == "scale":
+                raise InputError(f"{label_text} is 0", allowed="a finite number, scale not 0")
 
 
 MOUNTINGS = ("rigid", "flexible")
