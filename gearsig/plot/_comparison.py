@@ -121,8 +121,8 @@ def _draw_differences(axes: Axes, lines: Sequence[LineLevel]) -> list[Line2D]:
         bounds = np.array([not (line.simulated_is_seen and line.recorded_is_seen) for line in alike])
         looks |= {"markersize": size + 1.5}
         for sign, marker in ((1, "^"), (-1, "v")):
-            which = bounds & (np.sign(y) == sign)
-            axes.plot(x[which], y[which], marker, **looks)  # type: ignore[arg-type]
+            of_sign = bounds & (np.sign(y) == sign)
+            axes.plot(x[of_sign], y[of_sign], marker, **looks)  # type: ignore[arg-type]
     largest = max(6.0, max(abs(line.level.difference_db) for line in lines) * 1.15)
     axes.set_ylim(-largest, largest)
     style.no_offset(axes)
@@ -134,8 +134,8 @@ def difference_bars(axes: Axes, x: FloatArray, levels: Sequence[LevelPair], widt
     y = np.array([level.difference_db for level in levels])
     beyond = np.array([level.is_beyond for level in levels])
     axes.axhline(0.0, color=style.QUIET, linewidth=0.8, zorder=1)
-    for which, alpha in ((beyond, 0.85), (~beyond, 0.3)):
-        axes.bar(x[which], y[which], width, color=style.SIMULATED, alpha=alpha, linewidth=0, zorder=2)
+    for bars, alpha in ((beyond, 0.85), (~beyond, 0.3)):
+        axes.bar(x[bars], y[bars], width, color=style.SIMULATED, alpha=alpha, linewidth=0, zorder=2)
     errors = np.array([BEYOND * level.repeatability_db for level in levels])
     axes.vlines(x, y - errors, y + errors, color=style.INK, linewidth=0.9, zorder=3)
     largest = max(3.0, float(np.max(np.abs(y) + errors, initial=0.0)) * 1.1)

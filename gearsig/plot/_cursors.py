@@ -92,7 +92,7 @@ def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) ->
     only = {
         kind: len({line.element for line in lines if line.kind == kind}) == 1 for kind in ("mesh", "bearing", "hunting")
     }
-    return tuple(_cursor(line, revolutions_per_s, only_one=only.get(line.kind, False)) for line in lines)
+    return tuple(_cursor(line, revolutions_per_s, is_only=only.get(line.kind, False)) for line in lines)
 
 
 def rhythm_cursors(cursors: Iterable[Cursor]) -> tuple[Cursor, ...]:
@@ -133,18 +133,18 @@ def place(
     drawn: list[tuple[Cursor, float]] = []
     for cursor in sorted(cursors, key=importance):
         at = (cursor.position - limits[0]) * scale
-        on_top = any(abs(at - other) < MIN_DISTANCE_IN for _, other in drawn)
+        on_top = any(abs(at - drawn_at) < MIN_DISTANCE_IN for _, drawn_at in drawn)
         if limits[0] <= cursor.position <= limits[1] and not on_top:
             drawn.append((cursor, at))
-    taken: list[LabelPlace] = []
+    places: list[LabelPlace] = []
     result: list[tuple[Cursor, LabelPlace | None]] = []
     for number, (cursor, at) in enumerate(drawn, start=1):
-        waiting = [other for later, other in drawn[number:] if later.label]
-        label = _free_place(taken, waiting, at, cursor.label, width_in) if cursor.label else None
+        waiting = [drawn_at for later, drawn_at in drawn[number:] if later.label]
+        label = _free_place(places, waiting, at, cursor.label, width_in) if cursor.label else None
         if label is not None:
-            taken.append(label)
+            places.append(label)
         result.append((cursor, label))
-    used = sorted({label.row for label in taken})  # rows that stayed empty are no rows
+    used = sorted({label.row for label in places})  # rows that stayed empty are no rows
     return [(cursor, label and replace(label, row=used.index(label.row))) for cursor, label in result]
 
 
@@ -178,13 +178,13 @@ def draw(axes: Axes, placed: Iterable[tuple[Cursor, LabelPlace | None]], *, thro
             )
 
 
-def _cursor(line: OrderLine, scale: float, *, only_one: bool) -> Cursor:
+def _cursor(line: OrderLine, scale: float, *, is_only: bool) -> Cursor:
     label, number = line.label, line.harmonic
     if line.kind == "sideband":
         label = label.partition(line.element)[2].strip().replace("+ ", "+").replace("− ", "−")
         digits = label.lstrip("+−").partition("×")[0]
         number = int(digits) if digits.isdecimal() else number
-    elif only_one:
+    elif is_only:
         label = label.removesuffix(line.element).strip()
     return Cursor(line.order * scale, line.kind, label, number)
 
@@ -198,7 +198,7 @@ def importance(cursor: Cursor) -> tuple[int, int, float]:
 
 
 def _free_place(
-    taken: Sequence[LabelPlace], waiting: Sequence[float], at_in: float, text: str, width_in: float
+    places: Sequence[LabelPlace], waiting: Sequence[float], at_in: float, text: str, width_in: float
 ) -> LabelPlace | None:
     """Return the free place of a label, inside the figure, that bars the fewest lines that wait for theirs.
 
@@ -212,8 +212,8 @@ def _free_place(
         middle = min(max(at_in + shift, half - OVERHANG_IN), width_in + OVERHANG_IN / 2 - half)
         for row in range(N_ROWS):
             new = LabelPlace(row, at_in, middle - half, middle + half)
-            n_barred = 0 if row == N_ROWS - 1 else sum(new.low_in < other < new.high_in for other in waiting)
-            if n_barred < fewest and not any(new.collides(other) for other in taken):
+            n_barred = 0 if row == N_ROWS - 1 else sum(new.low_in < bar_at < new.high_in for bar_at in waiting)
+            if n_barred < fewest and not any(new.collides(bar_at) for bar_at in places):
                 best, fewest = new, n_barred
     return best
 
@@ -253,8 +253,8 @@ def marks_of(findings: Iterable[Finding], shaft: str, n_teeth: int | None = None
     marks = []
     for finding in findings:
         where = finding.where
-        here = where.shaft == shaft or where.gear.rpartition("/")[2] == shaft
-        if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or not here:
+        is_of_shaft = where.shaft == shaft or where.gear.rpartition("/")[2] == shaft
+        if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or not is_of_shaft:
             continue
         angle = where.angle_deg
         if angle is None and where.tooth is not None and n_teeth:

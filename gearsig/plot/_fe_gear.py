@@ -55,9 +55,9 @@ def draw_shaded(
     order = (far[:, None] + np.arange(3)) % 3
     corners = np.take_along_axis(corners[shown], order[:, :, None], axis=1)
     values_at = np.asarray(values)[np.take_along_axis(triangles[shown], order, axis=1)]
-    where, which = _samples(corners)
-    sampled = np.einsum("ij,ij->i", values_at[which], where)
-    places = np.einsum("ijk,ij->ik", corners[which], where).astype(np.int64)
+    where, of_triangle = _samples(corners)
+    sampled = np.einsum("ij,ij->i", values_at[of_triangle], where)
+    places = np.einsum("ijk,ij->ik", corners[of_triangle], where).astype(np.int64)
     inside = np.all((places >= 0) & (places < shape[::-1]), axis=1)
     flat = places[inside, 1] * shape[1] + places[inside, 0]
     counts = np.bincount(flat, minlength=shape[0] * shape[1])
@@ -90,13 +90,13 @@ def _samples(corners: FloatArray) -> tuple[FloatArray, Any]:
     sides = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2)
     n = np.maximum(np.ceil(sides / 0.8), 1.0).astype(np.int64)
     count = (n[:, 0] + 1) * (n[:, 1] + 1)
-    which = np.repeat(np.arange(len(corners)), count)
-    number = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
-    i, j = np.divmod(number, n[which, 1] + 1)
-    inside = i * n[which, 1] + j * n[which, 0] <= n[which, 0] * n[which, 1]
-    which = which[inside]
-    u, v = i[inside] / n[which, 0], j[inside] / n[which, 1]
-    return np.column_stack((1.0 - u - v, u, v)), which
+    triangles = np.repeat(np.arange(len(corners)), count)
+    number = np.arange(len(triangles)) - np.repeat(np.cumsum(count) - count, count)
+    i, j = np.divmod(number, n[triangles, 1] + 1)
+    inside = i * n[triangles, 1] + j * n[triangles, 0] <= n[triangles, 0] * n[triangles, 1]
+    triangles = triangles[inside]
+    u, v = i[inside] / n[triangles, 0], j[inside] / n[triangles, 1]
+    return np.column_stack((1.0 - u - v, u, v)), triangles
 
 
 COLUMNS = 3

@@ -138,14 +138,14 @@ def speed_spectra_figure(
     x = series.checked_axis(frequency_hz, "frequency_hz")
     curves = series.checked_curves(spectra_m, len(x), "spectra_m")
     figure, panels = style.panels((0.97,) * len(curves), top_in=0.45, row_gap_in=0.08, share_x=True)
-    most = max(float(c.max()) for c in curves.values()) * 1e6
-    floor = 1e-5 * most  # five decades below the greatest amplitude
+    largest_um = max(float(c.max()) for c in curves.values()) * 1e6
+    floor = 1e-5 * largest_um  # five decades below the greatest amplitude
     for i, (axes, (name, values)) in enumerate(zip(panels, curves.items(), strict=True)):
         level = np.maximum(values * 1e6, floor)
         axes.fill_between(x, floor, level, color=style.SIMULATED, alpha=0.25, linewidth=0)
         axes.plot(x, level, color=style.SIMULATED, linewidth=style.LINE_PT)
         axes.set_yscale("log")
-        axes.set_ylim(floor, most * 2.0)
+        axes.set_ylim(floor, largest_um * 2.0)
         axes.set_xlim(float(x[0]), float(x[-1]))
         if i < len(mesh_hz):
             for harmonic in range(1, int(x[-1] / mesh_hz[i]) + 1):

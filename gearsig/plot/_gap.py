@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def gap_orders_figure(
-    curves: SpectrumCurves, *, title: str = "", beside: str = "simulated", marked: bool = True
+    curves: SpectrumCurves, *, title: str = "", compared_with: str = "simulated", marked: bool = True
 ) -> Figure:
     """Draw the order spectra of a recording and of what it is compared with, and below them their difference in dB.
 
@@ -36,7 +36,7 @@ def gap_orders_figure(
     curves : SpectrumCurves
     title : str
         Default: the curves' label.
-    beside : str
+    compared_with : str
         What `curves.before` is of: "simulated", or "reference", see `gearsig.gap.against_reference`.
     marked : bool
         Whether lines beyond the structural floor are told from the others.
@@ -58,28 +58,30 @@ def gap_orders_figure(
     for name in names:
         series.checked_values(getattr(curves, name), len(x), name)
     figure, (above, below) = style.panels((2.3, 1.5), top_in=0.66, share_x=True)
-    keys = _draw_spectra(above, x, curves, beside)
+    keys = _draw_spectra(above, x, curves, compared_with)
     _draw_gap(below, x, curves, marked=marked)
     above.set_xlim(float(x[0]), float(x[-1]))
     style.label_axes(above, "", with_unit("peak amplitude", curves.unit))
-    style.label_axes(below, "order of the driver's shaft", "gap (dB)", f"measured over {beside}, against the floors")
+    style.label_axes(
+        below, "order of the driver's shaft", "gap (dB)", f"measured over {compared_with}, against the floors"
+    )
     style.no_offset(below)
     series.head(figure, title or curves.label, keys)
     return figure
 
 
-def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, beside: str) -> list[Line2D]:
+def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, compared_with: str) -> list[Line2D]:
     top = max(float(curves.measured.max()), float(curves.before.max())) or 1.0
     bottom = max(top / 10.0**4.5, 0.3 * float(np.median(curves.floor)))  # what lies deeper is noise
     axes.set_yscale("log")
     axes.set_ylim(bottom, 2.0 * top)
     axes.fill_between(x, bottom, np.maximum(curves.floor, bottom), color=style.FLOOR, alpha=0.25, linewidth=0)
     # Where the effect changes little both simulations coincide: dashes over a wider line show either.
-    name = f"{beside} before" if len(curves.after) else beside
+    name = f"{compared_with} before" if len(curves.after) else compared_with
     lines = []
     for values, colour, width, dashes, label in (
         (curves.measured, style.MEASURED, 1.1, "-", "measured"),
-        (curves.after, style.MESH, 2.0, "-", f"{beside} with the effect"),
+        (curves.after, style.MESH, 2.0, "-", f"{compared_with} with the effect"),
         (curves.before, style.INK, 0.9, (0.0, (3.0, 2.0)), name),
     ):
         if len(values):
@@ -102,12 +104,12 @@ def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves, *, marked: bool
         axes.fill_between(x, -band, band, step="mid", color=style.FLOOR, alpha=0.22, linewidth=0, zorder=1)
     strong = beyond & marked
     for chosen, colour, alpha in ((~strong, style.QUIET, 0.55), (strong, style.FAULT, 0.95)):
-        here = chosen & np.isfinite(before)
-        axes.vlines(x[here], 0.0, before[here], colors=colour, linewidth=1.0, alpha=alpha, zorder=2)
+        is_drawn = chosen & np.isfinite(before)
+        axes.vlines(x[is_drawn], 0.0, before[is_drawn], colors=colour, linewidth=1.0, alpha=alpha, zorder=2)
     if len(curves.after):
         residual = gap_by_order(curves, curves.after)
-        here = beyond & np.isfinite(residual)
-        axes.plot(x[here], residual[here], ".", color=style.MESH, markersize=3.5, zorder=3)
+        is_drawn = beyond & np.isfinite(residual)
+        axes.plot(x[is_drawn], residual[is_drawn], ".", color=style.MESH, markersize=3.5, zorder=3)
     axes.axhline(0.0, color=style.QUIET, linewidth=0.8, zorder=1.5)
     axes.set_ylim(-largest, largest)
 
@@ -278,8 +280,8 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
     above.set_xticks(np.arange(curves.teeth + 1) * 360.0 / max(curves.teeth, 1), minor=True)
     style.label_axes(above, "", with_unit("average", curves.unit))
     style.label_axes(below, f"angle of shaft {shaft} (deg)", with_unit("change", curves.unit))
-    what = f"average over shaft {shaft} without mesh harmonics, sensor {sensor}: recording against reference"
-    series.head(figure, title or what, [new, old, *changed])
+    heading = f"average over shaft {shaft} without mesh harmonics, sensor {sensor}: recording against reference"
+    series.head(figure, title or heading, [new, old, *changed])
     return figure
 
 
@@ -341,21 +343,21 @@ def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Fig
     if not evidence:
         raise InputError("no evidence to draw", allowed="one or more")
     shown = evidence[:10]
-    names = [one.feature for one in shown]
+    names = [row_evidence.feature for row_evidence in shown]
     figure, axes = _rows(names, left_in=3.6, right_in=1.15, row_in=0.44, top_in=0.66)
     rows = np.arange(len(shown))
     floors, observed, predicted = np.array([(e.floor_db, e.observed_db, e.predicted_db) for e in shown]).T
     axes.barh(rows, 2.0 * floors, left=-floors, height=0.8, color=style.FLOOR, alpha=0.2, linewidth=0, zorder=1)
     axes.barh(rows, observed, height=0.6 * BAR, color=style.MEASURED, alpha=0.85, linewidth=0, zorder=2)
     keys = axes.plot([], [], color=style.MEASURED, linewidth=6, label="observed")
-    for row, one in enumerate(shown):
+    for row, row_evidence in enumerate(shown):
         key = axes.plot(
-            [one.predicted_db], [row], "D", markersize=7, markerfacecolor="white", markeredgecolor=style.MESH,
+            [row_evidence.predicted_db], [row], "D", markersize=7, markerfacecolor="white", markeredgecolor=style.MESH,
             markeredgewidth=1.8, zorder=3, label="predicted",
         )  # fmt: skip
         keys += key if not row else []
-        against = ("further", style.QUIET) if one.is_further else ("against", style.FAULT)
-        text, colour = ("for", style.MESH) if one.speaks_for else against
+        against = ("further", style.QUIET) if row_evidence.is_further else ("against", style.FAULT)
+        text, colour = ("for", style.MESH) if row_evidence.speaks_for else against
         _say(axes, row, text, colour=colour)
     keys += axes.plot([], [], color=style.FLOOR, alpha=0.35, linewidth=9, label="structural floor")
     axes.axvline(0.0, color=style.QUIET, linewidth=0.9, zorder=1)
@@ -439,12 +441,12 @@ def _draw_bar(axes: Axes, row: int, start: float, residual: Interval, colour: st
 COLOURS = (style.MEASURED, style.FLOOR, style.SHAFT)
 
 
-def confusion_figure(true: Sequence[str], said: Sequence[str], counts: np.ndarray, *, title: str = "") -> Figure:
+def confusion_figure(true: Sequence[str], answers: Sequence[str], counts: np.ndarray, *, title: str = "") -> Figure:
     """Draw how often each cause was taken for which; shades are shares of a row, numbers are cases.
 
     Parameters
     ----------
-    true, said : sequence of str
+    true, answers : sequence of str
         Rows and columns; what both have in common should come first in both.
     counts : array, (n_true, n_said), whole numbers
     title : str
@@ -459,9 +461,9 @@ def confusion_figure(true: Sequence[str], said: Sequence[str], counts: np.ndarra
         If the table does not fit the names.
     """
     table = np.asarray(counts)
-    if table.shape != (len(true), len(said)):
-        raise InputError(f"counts are {table.shape}", allowed=f"({len(true)}, {len(said)}), as there are names")
-    cells_in = 0.27 * len(said)
+    if table.shape != (len(true), len(answers)):
+        raise InputError(f"counts are {table.shape}", allowed=f"({len(true)}, {len(answers)}), as there are names")
+    cells_in = 0.27 * len(answers)
     width = max(style.WIDTH_IN, 1.75 + cells_in + 0.75)
     figure, (axes,) = style.panels(
         (0.27 * len(true),), left_in=1.75, right_in=width - 1.75 - cells_in, bottom_in=1.5, top_in=0.45, width_in=width
@@ -471,10 +473,10 @@ def confusion_figure(true: Sequence[str], said: Sequence[str], counts: np.ndarra
     for (i, j), n in np.ndenumerate(table):
         if n:
             dark = n / totals[i, 0] > 0.55
-            wrong = true[i] != said[j]
+            wrong = true[i] != answers[j]
             colour = "white" if dark else style.FAULT if wrong else style.INK
             axes.text(j, i, str(n), ha="center", va="center", fontsize=style.SMALL_PT, color=colour)
-    axes.set_xticks(range(len(said)), [_words(name) for name in said], rotation=90)
+    axes.set_xticks(range(len(answers)), [_words(name) for name in answers], rotation=90)
     axes.set_yticks(range(len(true)), [f"{_words(n)} ({t})" for n, t in zip(true, table.sum(axis=1), strict=True)])
     axes.tick_params(length=0)
     axes.grid(visible=False)

@@ -170,10 +170,10 @@ def tooth_figure(
     axes.axvline(0.0, color=style.QUIET, linewidth=0.7, linestyle="-.", zorder=1)
     for number, (label, (crack_x, crack_y)) in enumerate((cracks_mm or {}).items()):
         points = series.checked_values(crack_x, len(crack_x), f"x of {label!r}")
-        beside = series.checked_values(crack_y, len(points), f"y of {label!r}")
-        _draw_crack(axes, beside, points, label, number)
+        crack_across = series.checked_values(crack_y, len(points), f"y of {label!r}")
+        _draw_crack(axes, crack_across, points, label, number)
         if limiting_lines:
-            axes.plot([beside[-1], y[-1]], [points[-1], x[-1]], color=style.FAULT, linewidth=0.7, linestyle=":")
+            axes.plot([crack_across[-1], y[-1]], [points[-1], x[-1]], color=style.FAULT, linewidth=0.7, linestyle=":")
     axes.set_aspect("equal", adjustable="datalim")
     style.label_axes(axes, "across the tooth (mm)", "from the gear's centre (mm)", title)
     style.no_offset(axes)

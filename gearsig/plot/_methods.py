@@ -15,7 +15,7 @@ from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_fig
 from gearsig.plot._phase import bifurcation_figure, divergence_figure, phase_portrait_figure, recurrence_figure
 from gearsig.plot._spectrum import modes_figure, spectrum_figure, speed_figure, time_figure
 
-Asked = ParamSpec("Asked")
+OptionsP = ParamSpec("OptionsP")
 
 
 @singledispatch
@@ -54,11 +54,11 @@ figure_of.register(phase.LyapunovExponent, divergence_figure)
 figure_of.register(phase.RecurrencePlot, recurrence_figure)
 
 
-def _drawn(method: Callable[Asked, object]) -> Callable[Asked, Figure]:
+def _drawn(method: Callable[OptionsP, object]) -> Callable[OptionsP, Figure]:
     """Return the method followed by the figure of its result; arguments and text are those of the method."""
 
     @wraps(method)
-    def figure(*args: Asked.args, **settings: Asked.kwargs) -> Figure:
+    def figure(*args: OptionsP.args, **settings: OptionsP.kwargs) -> Figure:
         return figure_of(method(*args, **settings))
 
     figure.__annotations__ = method.__annotations__ | {"return": "Figure"}

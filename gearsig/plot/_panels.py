@@ -272,11 +272,11 @@ def _colour(colour: Any) -> str:
 
 
 def _number_of(colour: str) -> int | str:
-    known = [each.upper() for each in _CYCLE]
+    known = [colour_code.upper() for colour_code in _CYCLE]
     if colour in known:
         return known.index(colour)
     quiet = (style.QUIET, style.FLOOR, style.INK, style.RULE)
-    return -1 if colour in {each.upper() for each in quiet} else colour
+    return -1 if colour in {colour_code.upper() for colour_code in quiet} else colour
 
 
 def _words_of(axes: Axes) -> str:
@@ -288,8 +288,10 @@ def _x_label(axes: Axes) -> str:
     """Return the name of the x axis; of panels below each other over the same range only the last shows it."""
     left, limits = round(axes.get_position().x0, 2), axes.get_xlim()
     figure = axes.get_figure(root=True)
-    alike = [each for each in (figure.axes if figure is not None else ()) if each.get_xlim() == limits]
-    names = [each.get_xlabel() for each in (axes, *alike) if round(each.get_position().x0, 2) == left]
+    alike = [
+        panel_axes for panel_axes in (figure.axes if figure is not None else ()) if panel_axes.get_xlim() == limits
+    ]
+    names = [panel_axes.get_xlabel() for panel_axes in (axes, *alike) if round(panel_axes.get_position().x0, 2) == left]
     return next(filter(None, names), "")
 
 
@@ -433,8 +435,8 @@ def _drawn_series(axes: Axes) -> Iterator[_Series]:
             continue
         corners = [np.asarray(path.vertices, dtype=np.float64) for path in collection.get_paths()]
         known = levels is not None and np.size(levels) == len(corners)
-        each = np.ravel(np.asarray(levels, dtype=np.float64)) if known else np.full(len(corners), np.nan)
-        repeated = np.repeat(each, [len(places) for places in corners])
+        level_of_cell = np.ravel(np.asarray(levels, dtype=np.float64)) if known else np.full(len(corners), np.nan)
+        repeated = np.repeat(level_of_cell, [len(places) for places in corners])
         joined = np.concatenate([np.empty((0, 2)), *corners])
         yield row(name, joined[:, 0], joined[:, 1], repeated)
 

@@ -175,7 +175,7 @@ def embedding_figure(information: MutualInformation, dimension: EmbeddingDimensi
 
 
 def divergence_figure(exponent: LyapunovExponent, *, title: str = "", height_in: float = 3.4) -> Figure:
-    """Draw the divergence curve with its fitted stretch, line and saturation."""
+    """Draw the divergence curve with its fitted segment, line and saturation."""
     figure, (axes,) = style.panels((height_in - 0.97,), top_in=0.42)
     axes.plot(exponent.times_s, exponent.log_distance, color=style.MEASURED, linewidth=1.2)
     axes.axhline(exponent.saturation_log_distance, color=style.FLOOR, linewidth=0.8, linestyle="--")
@@ -221,7 +221,7 @@ def display_unit(unit: str, size: float) -> tuple[float, str]:
     >>> display_unit("m/s", 2e-4), display_unit("", 2e-4), display_unit("rad", 3.0)
     ((1000000.0, 'µm/s'), (1000000.0, '10^-6'), (1.0, 'rad'))
     """
-    base, _, rest = unit.partition("/")
+    base, _, denominator = unit.partition("/")
     if not size or not isfinite(size) or (base != "m" and FEW_DIGITS[0] <= size < FEW_DIGITS[1]):
         return 1.0, unit
     if base != "m":
@@ -230,7 +230,7 @@ def display_unit(unit: str, size: float) -> tuple[float, str]:
     if size >= 0.5:
         return 1.0, unit
     prefix, factor = ("m", 1e3) if size >= 5e-4 else ("µ", 1e6)
-    return factor, prefix + "m" + (f"/{rest}" if rest else "")
+    return factor, prefix + "m" + (f"/{denominator}" if denominator else "")
 
 
 FEW_DIGITS = 0.02, 1e5
@@ -247,7 +247,7 @@ def bifurcation_figure(
 ) -> Figure:
     """Draw every Poincaré point over the parameter, and the standard deviation of the motion below.
 
-    Stretches whose section repeats are named by their period in cycles above, those of each branch in its colour. With
+    Segments whose section repeats are named by their period in cycles above, those of each branch in its colour. With
     a second branch both are drawn; where they hold different motions is shaded, see `coexistence_ranges`.
 
     Parameters
@@ -330,7 +330,7 @@ def _draw_branch(axes: Axes, branch: BifurcationDiagram, factor: float, looks: t
 
 
 def _runs_of_equal_period(diagram: BifurcationDiagram) -> list[tuple[float, float, int]]:
-    """Stretches of neighbouring values with one period, those that repeat and are wide enough to be named."""
+    """Segments of neighbouring values with one period, those that repeat and are wide enough to be named."""
     width = float(np.ptp(diagram.values))
     runs: list[tuple[float, float, int]] = []
     for value, period in zip(diagram.values, diagram.periods, strict=True):

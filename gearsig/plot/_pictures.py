@@ -415,7 +415,7 @@ def _placed(cursors: Sequence[Cursor], limits: tuple[float, float], width: int) 
         half = LETTER * len(cursor.label[:28]) / 2 + 3
         if not LEFT <= x <= width - RIGHT or x + half > width or x - half < 0:
             continue
-        row = next((i for i, taken in enumerate(rows) if all(x + half < a or x - half > b for a, b in taken)), None)
+        row = next((i for i, spans in enumerate(rows) if all(x + half < a or x - half > b for a, b in spans)), None)
         if row is not None:
             rows[row].append((x - half, x + half))
             placed.append((cursor, row))

@@ -57,10 +57,10 @@ def checked_curves(curves: Mapping[str, FloatArray], n: int, name: str, *, gaps:
     return {label: checked_values(values, n, f"{name}[{label!r}]", gaps=gaps) for label, values in curves.items()}
 
 
-def check_number(n: int, what: str, most: int = MAX_CURVES) -> None:
+def check_number(n: int, problem: str, n_max: int = MAX_CURVES) -> None:
     """Refuse none, or more than a figure can tell apart."""
-    if not 1 <= n <= most:
-        raise InputError(what, allowed=f"1 to {most}")
+    if not 1 <= n <= n_max:
+        raise InputError(problem, allowed=f"1 to {n_max}")
 
 
 def checked_values(values: FloatArray, n: int, name: str, *, gaps: bool = False) -> FloatArray:
@@ -137,7 +137,7 @@ def legend_row(
 
 
 def shade(axes: Axes, limits: tuple[float, float], colour: str = style.FLOOR, alpha: float = 0.14) -> None:
-    """Shade a stretch of the axis behind the data."""
+    """Shade a segment of the axis behind the data."""
     axes.axvspan(*limits, facecolor=colour, alpha=alpha, linewidth=0, zorder=0.5)
 
 
@@ -183,7 +183,7 @@ def headline(figure: Figure, title: str) -> None:
 
 
 def thin(x: FloatArray, y: FloatArray, n_points: int = N_POINTS) -> tuple[FloatArray, FloatArray]:
-    """Return the line with at most `n_points` points, the smallest and largest value of every stretch among them.
+    """Return the line with at most `n_points` points, the smallest and largest value of every segment among them.
 
     Parameters
     ----------

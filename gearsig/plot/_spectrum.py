@@ -222,8 +222,8 @@ def speed_panel(shaft_angle: ShaftAngle) -> LinePanel:
     shaft_angle : ShaftAngle
     """
     low, high = shaft_angle.speed_range_rpm
-    least = MIN_SPEED_SPAN * max(abs(shaft_angle.mean_speed_rpm), 1.0)
-    margin = max(0.06 * (high - low), (least - (high - low)) / 2)
+    min_span = MIN_SPEED_SPAN * max(abs(shaft_angle.mean_speed_rpm), 1.0)
+    margin = max(0.06 * (high - low), (min_span - (high - low)) / 2)
     line = ChartLine(shaft_angle.time_s, 60.0 * shaft_angle.speed_rev_per_s, "speed")
     limits = (low - margin, high + margin)
     return LinePanel([line], "time (s)", "speed (rpm)", limits, x_limits=(shaft_angle.start_s, shaft_angle.end_s))
@@ -312,7 +312,7 @@ def trend_figure(
     *,
     names: Sequence[str] = (),
     highlighted: Sequence[str] = (),
-    most: int = 6,
+    n_max: int = 6,
 ) -> Figure:
     """Draw one panel of dots per indicator, one row per recording.
 
@@ -323,7 +323,7 @@ def trend_figure(
     recordings : mapping
         Name of the recording → its indicators. Undefined (nan) values are left out.
     names : sequence of str
-        Indicators to draw; empty: the first `most` that occur. One without any value gets no panel.
+        Indicators to draw; empty: the first `n_max` that occur. One without any value gets no panel.
     highlighted : sequence of str
         Recordings drawn in the colour of faults.
 
@@ -332,7 +332,7 @@ def trend_figure(
     Figure
     """
     defined = dict.fromkeys(i.name for items in recordings.values() for i in items if isfinite(i.value))
-    shown = [name for name in names or defined if name in defined][:most]
+    shown = [name for name in names or defined if name in defined][:n_max]
     n_columns = max(1, min(3, len(shown)))
     n_rows = max(1, -(-len(shown) // n_columns))
     figure, panels = style.panels(
@@ -448,15 +448,15 @@ def _digits(value: float, n: int) -> str:
 
 
 def _limits_within(
-    limits: tuple[float, float] | None, low: float, high: float, least: float, name: str
+    limits: tuple[float, float] | None, low: float, high: float, min_span: float, name: str
 ) -> tuple[float, float]:
     """Return limits within the axis, wide enough for two points."""
     if limits is None:
         return low, high
     cut = max(low, float(limits[0])), min(high, float(limits[1]))
-    if not cut[1] - cut[0] >= least:
+    if not cut[1] - cut[0] >= min_span:
         raise InputError(
             f"{name} is {limits[0]:g} to {limits[1]:g}",
-            allowed=f"ascending, between {low:g} and {high:g}, {least:g} apart",
+            allowed=f"ascending, between {low:g} and {high:g}, {min_span:g} apart",
         )
     return cut

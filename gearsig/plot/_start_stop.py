@@ -49,7 +49,7 @@ def start_stop_figure(examined: motions.StartStop, *, title: str = "") -> Figure
     examined : StartStop
     title : str
     """
-    figure, (over, plane, loop) = _below_a_wide_one((2.0, 3.0), right_in=0.85)
+    figure, (over, plane, loop) = _panels_below_a_wide_one((2.0, 3.0), right_in=0.85)
     drawn = [(examined, style.MEASURED)]
     _draw_speeds(over, drawn, title or examined.motion.source or "start–stop motion")
     for segment in examined.segments.segments:
@@ -86,7 +86,7 @@ def start_stop_pair_figure(
         Compression on the drive flank over equal parts of the mesh cycle, in µm, healthy and faulty.
     title : str
     """
-    figure, (over, plane, loop, profile, teeth) = _below_a_wide_one((2.3, 2.3, 2.3))
+    figure, (over, plane, loop, profile, teeth) = _panels_below_a_wide_one((2.3, 2.3, 2.3))
     drawn = [(healthy, HEALTHY), (faulty, FAULTY)]
     _draw_speeds(over, drawn, title or "healthy beside faulty")
     _draw_planes(plane, drawn)
@@ -113,15 +113,15 @@ def start_stop_pair_figure(
     return figure
 
 
-def _below_a_wide_one(heights_in: Sequence[float], *, right_in: float = 0.2) -> tuple[Figure, list[Axes]]:
+def _panels_below_a_wide_one(heights_in: Sequence[float], *, right_in: float = 0.2) -> tuple[Figure, list[Axes]]:
     """Return two columns of panels, of which the first row is one panel."""
     figure, axes = style.panels(heights_in, (1.0, 1.0), right_in=right_in, top_in=0.75, row_gap_in=0.95)
     axes.pop(1).remove()
     place = axes[0].get_subplotspec()
     assert place is not None  # noqa: S101 - it is in a grid
     axes[0].set_subplotspec(place.get_gridspec()[0, :])
-    for each in axes:
-        style.no_offset(each)
+    for panel in axes:
+        style.no_offset(panel)
     return figure, axes
 
 
@@ -254,7 +254,7 @@ def impacts_figure(
     """
     if not impacts:
         raise InputError("there are no impacts to draw", allowed="at least one")
-    figure, (over_time, by_tooth, bounce) = _below_a_wide_one((2.4, 2.4))
+    figure, (over_time, by_tooth, bounce) = _panels_below_a_wide_one((2.4, 2.4))
     has_energy = bool(np.isfinite([i.energy_j for i in impacts]).all())
     lines = []
     for flank, (colour, name, marker) in FLANKS.items():

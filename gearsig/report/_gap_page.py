@@ -430,7 +430,10 @@ def _against_reference(report: GapReport) -> Iterator[GapFigure]:
         yield GapFigure(
             "where",
             plot.gap_orders_figure(
-                view, beside="reference", marked=report.is_beyond, title=f"{curves.label}: recording against reference"
+                view,
+                compared_with="reference",
+                marked=report.is_beyond,
+                title=f"{curves.label}: recording against reference",
             ),
             "Above, lines in the grey repeatability floor say nothing. Below, what has changed since the reference, "
             f"line by line. {_beyond_text(report, view)}",

@@ -118,7 +118,9 @@ def test_lines_beyond_the_structural_floor_are_orange() -> None:
 
 def test_what_is_compared_with_has_its_name() -> None:
     view = against_reference(REPORT.spectra[0])
-    assert {"measured", "reference", "repeatability floor"} <= set(texts(gap_orders_figure(view, beside="reference")))
+    assert {"measured", "reference", "repeatability floor"} <= set(
+        texts(gap_orders_figure(view, compared_with="reference"))
+    )
     assert "simulated" in texts(gap_orders_figure(replace(REPORT.spectra[0], after=np.zeros(0))))
     assert "simulated before" in texts(gap_orders_figure(REPORT.spectra[0]))
 
