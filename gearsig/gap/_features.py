@@ -257,7 +257,7 @@ RACES = {"outer": ("outer", 1.0), "inner": ("inner", 1.0), "ball": ("spin", 2.0)
 def floor_ratio(power: FloatArray) -> FloatArray:
     """Return each line's power over its neighbourhood's median, lines of noise being exponentially distributed.
 
-    Medians of adjoining stretches are joined by straight lines: a running median costs a hundred times as much.
+    Medians of adjoining segments are joined by straight lines: a running median costs a hundred times as much.
     """
     n_segments = max(1, power.shape[-1] // FLOOR_WIDTH)
     width = power.shape[-1] // n_segments
