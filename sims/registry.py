@@ -50,17 +50,17 @@ _ROOMS = ("cracked", "effects", "forging", "gear_pair", "machine", "measure", "m
 
 def sources_digest() -> str:
     """Return a short hash of the code that simulates: kept results of another state are not taken for this one's."""
-    from sims.effects import own_files
+    from sims.effects import user_files
 
-    of_users = sha256(b"".join(path.read_bytes() for path in own_files())).hexdigest()[:8] if own_files() else ""
+    of_users = sha256(b"".join(path.read_bytes() for path in user_files())).hexdigest()[:8] if user_files() else ""
     return _listed_sources() + of_users
 
 
 @cache
 def _listed_sources() -> str:
-    here = Path(__file__).parent
+    sims_folder = Path(__file__).parent
     digest = sha256()
     for room in _ROOMS:
-        for path in sorted((here / room).rglob("*.py")):
-            digest.update(path.relative_to(here).as_posix().encode() + b"\0" + path.read_bytes())
+        for path in sorted((sims_folder / room).rglob("*.py")):
+            digest.update(path.relative_to(sims_folder).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]

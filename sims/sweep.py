@@ -344,13 +344,13 @@ def claimed(folder: Path, definition: Mapping[str, Any], name: str = DEFINITION,
 
 def _check_same(definition: Path, text: str, kind: str) -> None:
     try:
-        there, asked = json.loads(definition.read_text(encoding="utf-8")), json.loads(text)
+        kept, requested = json.loads(definition.read_text(encoding="utf-8")), json.loads(text)
     except ValueError:
         raise InputError(
             f"is not the definition of a {kind}", where=str(definition), remedy="choose another folder"
         ) from None
-    if there != asked:
-        differing = [key for key in asked if not isinstance(there, dict) or there.get(key) != asked[key]]
+    if kept != requested:
+        differing = [key for key in requested if not isinstance(kept, dict) or kept.get(key) != requested[key]]
         raise InputError(
             f"holds another {kind}: {', '.join(differing) or 'its definition'} differs",
             where=str(definition.parent),

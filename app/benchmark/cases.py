@@ -25,7 +25,7 @@ from sims.blind import (
     draw_case,
     labels,
     record_case,
-    write_seen,
+    write_visible,
 )
 from sims.cracked import cracked_gap_simulator
 from sims.effects import effect
@@ -163,7 +163,7 @@ class Plan:
             made = record_case(case)
             label = labels(case, made)
         if folder is not None:
-            write_seen(made, folder)
+            write_visible(made, folder)
         return _truth(label, made)
 
 
@@ -281,7 +281,7 @@ def record_same(plan: Plan, planned: PlannedCase, case: BlindCase) -> tuple[Case
         conditions=tuple(run(c, added, 1 + i) for i, c in enumerate(case.conditions)),
         references=tuple(run(c, [], 1 + n + i) for i, c in enumerate(case.references)),
         twins=tuple(run(c, [], 1 + i) for i, c in enumerate(case.conditions)) if added else (),
-        places=tuple(_place(one, case) for one in added),
+        places=tuple(_place(setting, case) for setting in added),
     )
     return made, _labels(case, planned, added, made)
 
@@ -308,12 +308,12 @@ def _place(added: Added, case: BlindCase) -> dict[str, Any]:
 
 
 def _labels(case: BlindCase, planned: PlannedCase, added: list[Added], made: CaseRecordings) -> dict[str, Any]:
-    def of_effect(one: Added, place: Mapping[str, Any]) -> dict[str, Any]:
-        known = effect(one.name)
+    def of_effect(setting: Added, place: Mapping[str, Any]) -> dict[str, Any]:
+        known = effect(setting.name)
         return {
-            "name": one.name,
+            "name": setting.name,
             "group": known.group,
-            "severity": one.severity,
+            "severity": setting.severity,
             "unit": known.severity.unit,
             "level": planned.level,
             "resembles": "",
@@ -323,7 +323,7 @@ def _labels(case: BlindCase, planned: PlannedCase, added: list[Added], made: Cas
     return {
         "role": case.role,
         "kind": case.kind,
-        "effects": [of_effect(one, place) for one, place in zip(added, made.places, strict=True)],
+        "effects": [of_effect(setting, place) for setting, place in zip(added, made.places, strict=True)],
         "has_reference": bool(case.references),
         "conditions": [{"true_rpm": c.true_rpm, "true_nm": c.true_nm} for c in case.conditions],
         "pair": {"z1": case.rig.pair.z1, "z2": case.rig.pair.z2, "module_mm": case.rig.pair.module_mm},

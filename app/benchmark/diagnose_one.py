@@ -12,18 +12,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.benchmark.answer import Answer, answer_of, to_text
-from app.benchmark.diagnosers import VisibleCase, diagnoser, read_seen
+from app.benchmark.diagnosers import VisibleCase, diagnoser, read_visible
 from gearsig.cache import write_text
 from gearsig.errors import GearsigError
 
 ANSWERS = "answers.json"
 
 
-def answered(name: str, seen: VisibleCase) -> Answer:
+def answered(name: str, case: VisibleCase) -> Answer:
     """Return one diagnoser's answer; every error becomes a reason."""
     started, cpu = time.perf_counter(), _cpu_s()
     try:
-        report = diagnoser(name)(seen)
+        report = diagnoser(name)(case)
     except GearsigError as error:
         return Answer("", seconds=time.perf_counter() - started, cpu_seconds=_cpu_s() - cpu, error=str(error))
     except (Exception, SystemExit) as error:  # noqa: BLE001 - one case must not stop the others; the reason is passed on
@@ -34,8 +34,8 @@ def answered(name: str, seen: VisibleCase) -> Answer:
 
 def main(names: Sequence[str]) -> None:
     """Answer with each diagnoser in turn and write the answers, whole or not at all."""
-    seen = read_seen(Path.cwd())
-    answers = {name: answered(name, seen) for name in names}
+    case = read_visible(Path.cwd())
+    answers = {name: answered(name, case) for name in names}
     write_text(Path(ANSWERS), to_text(answers))
 
 

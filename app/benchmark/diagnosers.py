@@ -68,7 +68,7 @@ class VisibleCase:
         return tuple(reduce_recording(recording) for recording in self.references)
 
 
-def read_seen(folder: Path) -> VisibleCase:
+def read_visible(folder: Path) -> VisibleCase:
     """Read condition_1.h5, reference_1.h5 … with the rig files beside them."""
     conditions, references = (
         tuple(read_recording(p, rig=read_rig(p.with_suffix(".toml"))) for p in sorted(folder.glob(f"{stem}_*.h5")))
@@ -122,22 +122,22 @@ def folders_of(name: str) -> tuple[Path, ...]:
     return tuple(Path(place).absolute().parent for place in spec.submodule_search_locations or origin)
 
 
-def diagnose(seen: VisibleCase, model: str = "cracked") -> GapReport:
+def diagnose(case: VisibleCase, model: str = "cracked") -> GapReport:
     """Diagnose a case with the product itself; what is kept for its rig lies with the case and goes with it."""
     from gearsig.gap import diagnose_gap
     from sims.registry import gap_simulator
 
     return diagnose_gap(
-        seen.recordings,
+        case.recordings,
         gap_simulator(model),
-        references=seen.references,
+        references=case.references,
         cache=Path.cwd() / "kept",
     )
 
 
-def diagnose_drive(seen: VisibleCase) -> GapReport:
+def diagnose_drive(case: VisibleCase) -> GapReport:
     """Diagnose a case of starts and stops with the product itself."""
-    return diagnose(seen, "forging")
+    return diagnose(case, "forging")
 
 
 # --------------------
@@ -170,14 +170,14 @@ def bare_report(
     """
     where = options or {}
     ranked = sorted(probabilities.items(), key=lambda item: -item[1])
-    likeliest = {NONE: GapOutcome.NO_GAP, UNKNOWN: GapOutcome.UNKNOWN}.get(ranked[0][0], GapOutcome.EFFECT)
+    of_first = {NONE: GapOutcome.NO_GAP, UNKNOWN: GapOutcome.UNKNOWN}.get(ranked[0][0], GapOutcome.EFFECT)
     causes = tuple(_cause(name, p, where.get(name, {})) for name, p in ranked)
     return GapReport(
         rig="",
         simulator=simulator,
         conditions=(),
         references=(),
-        outcome=outcome or likeliest,
+        outcome=outcome or of_first,
         causes=causes,
         size=_NOTHING,
         repeatability=0.0,
@@ -204,21 +204,23 @@ def _cause(name: str, probability: float, options: Mapping[str, str]) -> GapCaus
 # --------------------
 
 
-def diagnose_forest(seen: VisibleCase) -> GapReport:
+def diagnose_forest(case: VisibleCase) -> GapReport:
     """Return the calibrated probabilities of the forests, what may be said of them, and the shaft that shows it."""
     from gearsig.gap import attribute, conditions_of, determined_options
     from sims.cracked import cracked_gap_simulator
 
     simulator = cracked_gap_simulator()
-    twin = simulator.twin_of(seen.rig)
-    recordings, references = ([PreparedRecording(r) for r in given] for given in (seen.recordings, seen.references))
+    twin = simulator.twin_of(case.rig)
+    recordings, references = (
+        [PreparedRecording(r) for r in given_recordings] for given_recordings in (case.recordings, case.references)
+    )
     conditions, _ = conditions_of(recordings, references, twin)
-    weighed = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=0)
-    probabilities = weighed.probabilities()
+    attribution = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=0)
+    probabilities = attribution.probabilities()
     groups = {name: effect.group for name, effect in simulator.gap_effects().items()}
     changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
     shafts = {name: determined_options(name, changes, teeth) for name in probabilities}
-    return bare_report("forest", probabilities, shafts, weighed.calibration.outcome(probabilities, groups))
+    return bare_report("forest", probabilities, shafts, attribution.calibration.outcome(probabilities, groups))
 
 
 # --------------------
@@ -233,11 +235,11 @@ They are public, and stand here since the diagnosing process imports nothing tha
 """
 
 
-def diagnose_majority(seen: VisibleCase) -> GapReport:  # noqa: ARG001 - that is the point of it
+def diagnose_majority(case: VisibleCase) -> GapReport:  # noqa: ARG001 - that is the point of it
     """Return the shares; the likeliest is "none"."""
-    of_each = (SHARES["single"] + SHARES["pair"]) / len(effects())
+    per_effect = (SHARES["single"] + SHARES["pair"]) / len(effects())
     return bare_report(
-        "majority", {NONE: SHARES["none"], UNKNOWN: SHARES["unknown"], **dict.fromkeys(effects(), of_each)}
+        "majority", {NONE: SHARES["none"], UNKNOWN: SHARES["unknown"], **dict.fromkeys(effects(), per_effect)}
     )
 
 
@@ -246,16 +248,16 @@ def diagnose_majority(seen: VisibleCase) -> GapReport:  # noqa: ARG001 - that is
 # --------------------
 
 
-def diagnose_unseen(seen: VisibleCase) -> GapReport:
+def diagnose_unseen(case: VisibleCase) -> GapReport:
     """Diagnose a case with the product, but for what was learned from the independent rig's development gears."""
     with without_machines_of(INDEPENDENT):
-        return diagnose(seen)
+        return diagnose(case)
 
 
-def diagnose_forest_unseen(seen: VisibleCase) -> GapReport:
+def diagnose_forest_unseen(case: VisibleCase) -> GapReport:
     """Return what the forests say of a case without what was learned from those gears."""
     with without_machines_of(INDEPENDENT):
-        return diagnose_forest(seen)
+        return diagnose_forest(case)
 
 
 # --------------------
@@ -317,12 +319,12 @@ USUAL: dict[str, tuple[float, float, float]] = {
 # --------------------
 
 
-def diagnose_rules(seen: VisibleCase) -> GapReport:
+def diagnose_rules(case: VisibleCase) -> GapReport:
     """Return the rules' strengths as probabilities, by exponentials; conditions count alike."""
     strongest: dict[str, tuple[float, str]] = {NONE: (MIN_STRENGTH, "")}
-    each = list(_deviations(seen))
+    deviations_of = list(_deviations(case))
     for cause, signs in textbook_rules(map(as_gap_effect, effects().values())):
-        by_side = [rule_strengths(signs, deviations) for deviations in each]
+        by_side = [rule_strengths(signs, deviations) for deviations in deviations_of]
         for side in by_side[0]:
             strength = float(np.mean([strengths[side] for strengths in by_side]))
             if strength > strongest.get(cause, (-np.inf, ""))[0]:
@@ -333,11 +335,11 @@ def diagnose_rules(seen: VisibleCase) -> GapReport:
     return bare_report("rules", {cause: weight / total for cause, weight in weights.items()}, options)
 
 
-def _deviations(seen: VisibleCase) -> Iterator[dict[str, float]]:
+def _deviations(case: VisibleCase) -> Iterator[dict[str, float]]:
     """Yield, for each condition, how far every feature of the table is from usual, in spreads."""
-    for i, recording in enumerate(seen.reduced):
+    for i, recording in enumerate(case.reduced):
         values = dict(zip(*once(recording), strict=True))
-        before = dict(zip(*once(seen.reduced_references[i]), strict=True)) if seen.reduced_references else None
+        before = dict(zip(*once(case.reduced_references[i]), strict=True)) if case.reduced_references else None
         deviations = dict.fromkeys(values, 0.0)  # what is usual is known of the table's features alone
         for name, (usual, spread, change) in USUAL.items():
             for side in SIDES:

@@ -151,24 +151,24 @@ def _tell(report: GapReport, written: tuple[Path, ...]) -> None:
     from gearsig.report import gap_text
 
     typer.echo(gap_text(report))
-    for notice in report.notices:
-        typer.echo(f"Note: {notice}", err=True)
-    page, *others = written
-    typer.echo(f"Open {page} in a browser; beside it: {', '.join(path.name for path in others)}.")
+    for message in report.notices:
+        typer.echo(f"Note: {message}", err=True)
+    page, *further_files = written
+    typer.echo(f"Open {page} in a browser; beside it: {', '.join(path.name for path in further_files)}.")
     if report.twin_toml:
-        twin = shlex.quote(str(others[-1]))
-        run = f"{_own_effects(report)}gearsig simulate {report.simulator} --preset {twin} -o twin.h5"
+        twin = shlex.quote(str(further_files[-1]))
+        run = f"{_user_effects(report)}gearsig simulate {report.simulator} --preset {twin} -o twin.h5"
         typer.echo(f"Run the simulator with the effect: {run}")
 
 
-def _own_effects(report: GapReport) -> str:
+def _user_effects(report: GapReport) -> str:
     """Return what must stand before a command that needs an effect of the user's own."""
-    from sims.effects import VARIABLE, is_own, own_files
+    from sims.effects import VARIABLE, is_user_effect, user_files
 
     fitted = report.causes[0].fitted
-    if fitted is None or not is_own(fitted.name):
+    if fitted is None or not is_user_effect(fitted.name):
         return ""
-    return f"{VARIABLE}={shlex.quote(os.pathsep.join(map(str, own_files())))} "
+    return f"{VARIABLE}={shlex.quote(os.pathsep.join(map(str, user_files())))} "
 
 
 def _print_effects(model: str) -> None:
@@ -178,7 +178,7 @@ def _print_effects(model: str) -> None:
     from rich.table import Table
 
     from gearsig.gap import DriveSimulator, load_learned, severity_unit
-    from sims.effects import is_own
+    from sims.effects import is_user_effect
     from sims.registry import gap_simulator
 
     table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
@@ -191,7 +191,7 @@ def _print_effects(model: str) -> None:
         where = ", ".join(kind.replace("_", " ") for kind in effect.shows_in)
         group = "" if effect.group == last else effect.group
         last = effect.group
-        notes = ["your own"] if is_own(effect.name) else []
+        notes = ["your own"] if is_user_effect(effect.name) else []
         notes += ["tried, not recognised"] if effect.name not in learned else []
         note = f"\n  ({': '.join(notes)})" if notes else ""
         table.add_row(group, f"{effect.name}\n  {effect.title}{note}", severity_unit(effect.unit) or "–", where)

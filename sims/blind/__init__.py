@@ -24,7 +24,7 @@ Making cases
     without the fault, so that the true place and size of the change can be measured. All recordings of a case are of
     one assembly, begun wherever it stood: what is fixed to a shaft turns with it, and teeth keep their partners. With
     `encoder_counts` per revolution each gear carries an encoder (``input encoder``, ``output encoder``; deg).
-`write_seen(made, folder)`
+`write_visible(made, folder)`
     Writes a folder for the diagnosing side: ``condition_1.h5``, with two conditions ``condition_2.h5``, with
     references ``reference_1.h5`` (same operating point as ``condition_1.h5``) and so on; each beside a rig file of the
     same name that states its nominal speed and torque; and ``rig.toml``, which is condition_1's. Channels: ``a1``,
@@ -53,7 +53,7 @@ Names: `CATALOGUE` (19), `MECHANICAL` (16 of them), `OUTSIDE_CATALOGUE` (10). Fo
 `RunCondition`, `SHAFTS`.
 """
 
-from sims.blind._cases import BlindCase, CaseRecordings, Fault, draw_case, labels, record_case, write_seen
+from sims.blind._cases import BlindCase, CaseRecordings, Fault, draw_case, labels, record_case, write_visible
 from sims.blind._changes import (
     CATALOGUE,
     EVERY,
@@ -128,5 +128,5 @@ __all__ = [
     "stiffness_matrix",
     "teeth_of",
     "wear_shape",
-    "write_seen",
+    "write_visible",
 ]

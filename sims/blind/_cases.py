@@ -155,8 +155,8 @@ def _draw_faults(
         return ()
     if kind == "pair":
         first = str(rng.choice(MECHANICAL))
-        others = [name for name in CATALOGUE if CATALOGUE[name].group != CATALOGUE[first].group]
-        names = [first, str(rng.choice(others))]
+        other_groups = [name for name in CATALOGUE if CATALOGUE[name].group != CATALOGUE[first].group]
+        names = [first, str(rng.choice(other_groups))]
     elif kind == "unknown":
         alike = [n for n, c in OUTSIDE_CATALOGUE.items() if bool(c.resembles) == (rng.random() < 0.5)] or list(
             OUTSIDE_CATALOGUE
@@ -231,7 +231,7 @@ FILE_TIME = 1_700_000_000
 """Every file is given the same time: when it was made says what it took to make it."""
 
 
-def write_seen(made: CaseRecordings, folder: Path) -> None:
+def write_visible(made: CaseRecordings, folder: Path) -> None:
     """Write what the diagnosing side may see, and nothing else.
 
     condition_1.h5 (and _2), reference_1.h5 … if there are any, each with a rig file of the same name that states its

@@ -10,7 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from sims.blind._rig import SHAFTS, BlindRig, SensorResonance, SpurPair, texture
-from sims.blind._scene import BlindMotion, Scene, Train, coloured_noise, path_response, with_course
+from sims.blind._scene import BlindMotion, Scene, Train, coloured_noise, path_response, with_speed_profile
 
 Place = Mapping[str, str | int | float]
 Span = Callable[[BlindRig], tuple[float, float]]
@@ -227,7 +227,7 @@ def _fluctuation(scene: Scene, severity: float, choice: np.random.Generator) -> 
         swing = np.sin(2 * pi * first * (t + later)) + 0.4 * np.sin(2 * pi * second * (t + later) + phase)
         return np.asarray(1 + severity / 100 * swing)
 
-    with_course(scene, factor)
+    with_speed_profile(scene, factor)
     return {"frequency_hz": round(float(first), 3)}
 
 
@@ -621,8 +621,8 @@ def _warm(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 def _turns_to_tooth(pair: SpurPair, tooth: int) -> int:
     """Turns of gear 1 after which its tooth 0 meets tooth 0 of gear 2, if now it meets `tooth`."""
     g = gcd(pair.z1, pair.z2)
-    others = pair.z2 // g
-    return -tooth // g * pow(pair.z1 // g, -1, others) % others
+    n_mates = pair.z2 // g
+    return -tooth // g * pow(pair.z1 // g, -1, n_mates) % n_mates
 
 
 def _stain(scene: Scene, severity: float, choice: np.random.Generator) -> Place:

@@ -280,15 +280,15 @@ class SpurPair:
         corner at polar angle ψ and radius r touches an involute with β = ψ − inv(r). The gap is r_b times the
         difference from where conjugate motion has put the flank.
         """
-        other = 1 - flank
-        rb, rb_other, ra_other = self.base_radii_m[flank], self.base_radii_m[other], self.tip_radii_m[other]
-        ra_other -= tip_loss_m
+        mate = 1 - flank
+        rb, rb_mate, ra_mate = self.base_radii_m[flank], self.base_radii_m[mate], self.tip_radii_m[mate]
+        ra_mate -= tip_loss_m
         a, alpha = self.centre_distance_m, self.alpha
-        rho_other = sqrt(ra_other**2 - rb_other**2)
-        rho = a * sin(alpha) - rho_other
+        rho_mate = sqrt(ra_mate**2 - rb_mate**2)
+        rho = a * sin(alpha) - rho_mate
         contact = np.array([rb * cos(alpha) + rho * sin(alpha), rb * sin(alpha) - rho * cos(alpha)])
-        chi = np.arctan2(contact[1], contact[0] - a) - distance_m / rb_other
-        x, y = a + ra_other * np.cos(chi), ra_other * np.sin(chi)
+        chi = np.arctan2(contact[1], contact[0] - a) - distance_m / rb_mate
+        x, y = a + ra_mate * np.cos(chi), ra_mate * np.sin(chi)
         roll = np.sqrt(np.maximum((x**2 + y**2) / rb**2 - 1, 0.0))
         needed = np.arctan2(y, x) - (roll - np.arctan(roll))
         return np.asarray(np.maximum(rb * (alpha - (rho - distance_m) / rb - needed), 0.0))

@@ -158,7 +158,7 @@ def scene_of(rig: BlindRig, condition: RunCondition) -> Scene:
     made, pair = rig.tolerances, rig.pair
     omega_1 = condition.true_rpm * pi / 30
     force_n = condition.true_nm / pair.base_radii_m[0]
-    speed = _speed_course(rig, condition, omega_1, rng)
+    speed = _speed_profile(rig, condition, omega_1, rng)
     torque = [
         (where, order, share * rig.rated_nm * (pair.z2 / pair.z1 if where else 1.0), phase)
         for where, order, share, phase in made.torque_share
@@ -210,7 +210,7 @@ def _mounted_paths(rig: BlindRig, condition: RunCondition) -> list[list[SensorRe
     ]
 
 
-def _speed_course(rig: BlindRig, condition: RunCondition, omega_1: float, rng: np.random.Generator) -> Matrix:
+def _speed_profile(rig: BlindRig, condition: RunCondition, omega_1: float, rng: np.random.Generator) -> Matrix:
     """Reference speed and its rate of change, (n, 2), every GRID_S: a slow wander."""
     t = np.arange(0, condition.duration_s + WARM_UP_S + 1, GRID_S)
     profile, later = np.ones_like(t), rng.uniform(0, 20)
@@ -219,7 +219,7 @@ def _speed_course(rig: BlindRig, condition: RunCondition, omega_1: float, rng: n
     return np.column_stack([omega_1 * profile, np.gradient(omega_1 * profile, GRID_S)])
 
 
-def with_course(scene: Scene, factor: Callable[[FloatArray], FloatArray]) -> None:
+def with_speed_profile(scene: Scene, factor: Callable[[FloatArray], FloatArray]) -> None:
     """Multiply the reference speed by a function of time."""
     t = np.arange(len(scene.speed)) * GRID_S
     omega = scene.speed[:, 0] * factor(t)
@@ -230,8 +230,8 @@ def run(scene: Scene, *, sub_steps: int = SUB_STEPS) -> BlindMotion:
     """March the scene through its warm-up and its duration."""
     rate_hz = 2 * scene.rig.sampling_rate_hz
     n_lead = round(LEAD_S * rate_hz)
-    n_out, n_before, *rest = march_arguments(scene, sub_steps)
-    whole = march(n_out + n_lead, n_before - n_lead, *rest)
+    n_out, n_before, *state = march_arguments(scene, sub_steps)
+    whole = march(n_out + n_lead, n_before - n_lead, *state)
     out = whole[n_lead:]
     return BlindMotion(rate_hz, whole[:n_lead, :4].T, out[:, :4].T, out[:, 4:7].T, out[:, 7:9].T, out[:, 9], out[:, 10])
 
@@ -377,9 +377,9 @@ def accelerations(scene: Scene, motion: BlindMotion) -> FloatArray:
     rows = []
     for i, chain in enumerate(scene.rig.chains):
         c, s = np.cos(chain.angle), np.sin(chain.angle)
-        own, other = (c * force[2 * k] + s * force[2 * k + 1] for k in (i, 1 - i))
+        along, across = (c * force[2 * k] + s * force[2 * k + 1] for k in (i, 1 - i))
         body = c * (x_c - parts.height_m * rock) + s * (y_c + parts.seat_x_m[i] * rock)
-        through = path_response(own + chain.crosstalk * other, motion.rate_hz, scene.paths[i])
+        through = path_response(along + chain.crosstalk * across, motion.rate_hz, scene.paths[i])
         rows.append(body + through[n_lead:])
     return np.array(rows)
 

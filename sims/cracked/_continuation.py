@@ -69,8 +69,8 @@ class SteadyRun:
     def rate_of_transmission_error_mps(self) -> FloatArray:
         """Rate of r_b1 θ1 − r_b2 θ2."""
         pair, response = self.machine.mesh.pair, self.response
-        one = pair.driver.base_radius_mm * response["driver angle velocity"]
-        rate: FloatArray = 1e-3 * (one - pair.driven.base_radius_mm * response["driven angle velocity"])
+        driver_mps = pair.driver.base_radius_mm * response["driver angle velocity"]
+        rate: FloatArray = 1e-3 * (driver_mps - pair.driven.base_radius_mm * response["driven angle velocity"])
         return rate
 
     @property
@@ -155,16 +155,16 @@ class Branch:
 
     def _prepared(self, value: float, rng: np.random.Generator) -> ReadyPair:
         point = self.sweep.points()[self.sweep.axes[0].values.index(value)]
-        own = self.sweep.at(point)
-        operation = operation_of(own.model, own.preset, own.speed_rpm, own.torque_nm)
-        setup = SimulationSetup(own.preset, own.parameters, own.effects, operation)
-        return CrackedPair().prepare(setup, rng, sampling_rate_hz=own.sampling_rate_hz)
+        settings = self.sweep.at(point)
+        operation = operation_of(settings.model, settings.preset, settings.speed_rpm, settings.torque_nm)
+        setup = SimulationSetup(settings.preset, settings.parameters, settings.effects, operation)
+        return CrackedPair().prepare(setup, rng, sampling_rate_hz=settings.sampling_rate_hz)
 
-    def _wanted(self) -> tuple[str, ...]:
-        own = [self.signal] if self.signal in SIGNALS else []
-        rates = [f"{name} velocity" for name in own if name in COORDINATES]
+    def _signals_needed(self) -> tuple[str, ...]:
+        signals = [self.signal] if self.signal in SIGNALS else []
+        rates = [f"{name} velocity" for name in signals if name in COORDINATES]
         return tuple(
-            dict.fromkeys((*_ANGLE, "driven angle velocity", TRANSMISSION_ERROR, "mesh_force_n", *own, *rates))
+            dict.fromkeys((*_ANGLE, "driven angle velocity", TRANSMISSION_ERROR, "mesh_force_n", *signals, *rates))
         )
 
     def _settled(
@@ -183,7 +183,7 @@ class Branch:
             ready.operation,
             duration_s=settle_s + duration_s,
             rng=machine_rng,
-            signals=self._wanted(),
+            signals=self._signals_needed(),
             start_s=-settle_s,
             step_s=step,
             stride=max(int(min(1.0 / MIN_MOTION_HZ, cycle_s / MIN_PER_CYCLE) / step), 1),
@@ -199,7 +199,7 @@ class Branch:
             rng=rng,
             sampling_rate_hz=self.sweep.sampling_rate_hz,
             duration_s=duration_s,
-            also=self._wanted(),
+            also=self._signals_needed(),
             first=first,
         )
 

@@ -157,12 +157,14 @@ def stored_energy(k, curves, rows, pitch, delta, late, cycles, rough):
         pair, s = newest - place_of_slice // k.n_slices, place_of_slice % k.n_slices
         progress = cycles - pair - k.slice_late[s]
         weight = engagement_and_slope(progress, late, k.contact_ratio, k.ramp)[0]
-        one, two = pair % k.teeth[0], pair % k.teeth[1]
-        compliance = cubic(curves[rows[0, one]], k.table_start, k.table_step, progress)
-        compliance += cubic(curves[rows[1, two]], k.table_start, k.table_step, progress)
+        tooth_1, tooth_2 = pair % k.teeth[0], pair % k.teeth[1]
+        compliance = cubic(curves[rows[0, tooth_1]], k.table_start, k.table_step, progress)
+        compliance += cubic(curves[rows[1, tooth_2]], k.table_start, k.table_step, progress)
         compliance *= k.n_slices
-        shape = cubic(curves[rows[2, one]], k.table_start, k.table_step, progress) + pitch[0, one] + k.slice_gap[s]
-        shape += cubic(curves[rows[3, two]], k.table_start, k.table_step, progress) + pitch[1, two]
+        shape = (
+            cubic(curves[rows[2, tooth_1]], k.table_start, k.table_step, progress) + pitch[0, tooth_1] + k.slice_gap[s]
+        )
+        shape += cubic(curves[rows[3, tooth_2]], k.table_start, k.table_step, progress) + pitch[1, tooth_2]
         depth = delta - rough - shape
         if weight > 0.0 and depth > 0.0:
             force, _ = pair_force(depth, compliance, k.contact_coefficient, k.load_dependent, 1.0)
@@ -388,9 +390,25 @@ def kinetic_energy(k, v, q):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def integrate(  # noqa: PLR0915  four stages written out
-    k, curves, rows, pitch, q, v, set_angle, start, step, n_steps, stride, speed, torque, rough, select, found, energies
+    k,
+    curves,
+    rows,
+    pitch,
+    q,
+    v,
+    set_angle,
+    start,
+    step,
+    n_steps,
+    stride,
+    speed,
+    torque,
+    rough,
+    select,
+    output,
+    energies,
 ):
-    """Run `n_steps` steps from time `start`; fill `found` with the selected signals at every `stride`-th step.
+    """Run `n_steps` steps from time `start`; fill `output` with the selected signals at every `stride`-th step.
 
     k, curves, rows, pitch : see `sims.cracked`.
     q, v, set_angle : (16,), (16,), (1,); left at the last step's state, for the next call to go on from.
@@ -398,7 +416,7 @@ def integrate(  # noqa: PLR0915  four stages written out
     rough : phasors of a roughness locked to time at `start`, stepped by half of `step`, left at the end; see
         `TimeLockedRoughness`.
     select : places of the wanted signals in `sims.cracked.SIGNALS`.
-    found : (n_out, n_selected).
+    output : (n_out, n_selected).
     energies : (n_out,) or (0,): total energy in J, not computed where empty.
     Returns the number of rows that were filled: fewer where the state is no longer finite.
     """
@@ -437,7 +455,7 @@ def integrate(  # noqa: PLR0915  four stages written out
                 signals[53 + 2 * row] = -held_x / k.bearing_stiffness[row]
                 signals[54 + 2 * row] = -held_y / k.bearing_stiffness[row]
             for i in range(select.shape[0]):
-                found[n_rows, i] = signals[select[i]]
+                output[n_rows, i] = signals[select[i]]
             if energies.shape[0] > 0:
                 late, turned = place_of_entry(k, q)
                 energies[n_rows] = potential_energy(k, curves, rows, pitch, q, late, turned, h0)

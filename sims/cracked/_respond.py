@@ -513,15 +513,15 @@ def respond(
     return Response(start_s, step * stride, kept, step, energies, last)
 
 
-def _first_state(ready: PreparedRun, given: PairState | None) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _first_state(ready: PreparedRun, state: PairState | None) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return copies, which the kernel overwrites, of coordinates, velocities and the set angle."""
-    if given is None:
+    if state is None:
         return ready.q, ready.v, ready.q[:1].copy()
-    if given.q.shape != ready.q.shape or given.v.shape != ready.v.shape:
+    if state.q.shape != ready.q.shape or state.v.shape != ready.v.shape:
         raise InputError(
-            f"a state of {given.q.size} coordinates", where="first", allowed=f"{ready.q.size}: another run's last"
+            f"a state of {state.q.size} coordinates", where="first", allowed=f"{ready.q.size}: another run's last"
         )
-    return given.q.copy(), given.v.copy(), np.array([given.set_angle_rad])
+    return state.q.copy(), state.v.copy(), np.array([state.set_angle_rad])
 
 
 def _place(name: str) -> int:

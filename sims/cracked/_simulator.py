@@ -174,12 +174,12 @@ class CrackedTwin(PairTwin):
         """The model that runs the twin."""
         return CrackedPair()
 
-    def _step_s(self, own: Preset) -> float:
+    def _step_s(self, preset: Preset) -> float:
         """Step of the integrator: that of the healthy machine, so that effects leave the drawn noise as it is.
 
         It is longer than that of a single simulation; the accelerations miss 2 to 4 parts in a thousand.
         """
-        healthy = self._prepared(replace(own, effects=()), np.random.default_rng(0))
+        healthy = self._prepared(replace(preset, effects=()), np.random.default_rng(0))
         return default_step_s(healthy.machine, healthy.operation, STEP_ANGLE_RAD)
 
 

@@ -30,14 +30,14 @@ from sims.machine import Machine
 VARIABLE = "GEARSIG_EFFECTS"
 
 
-def own_files() -> tuple[Path, ...]:
+def user_files() -> tuple[Path, ...]:
     """Return the files of one's own effects."""
     return tuple(Path(text) for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text)
 
 
-def with_own_file(path: Path) -> str:
+def with_user_file(path: Path) -> str:
     """Return the variable's value with a further file."""
-    files = dict.fromkeys([*map(str, own_files()), str(path.resolve())])
+    files = dict.fromkeys([*map(str, user_files()), str(path.resolve())])
     return os.pathsep.join(files)
 
 
@@ -69,7 +69,7 @@ def loaded(path: Path) -> Effect:
 
 def _changed(
     path: Path,
-    own: Effect,
+    user_effect: Effect,
     machine: Machine,
     severity: float,
     options: Options,
@@ -83,14 +83,16 @@ def _changed(
         If it fails, or returns no machine.
     """
     try:
-        changed = own.change(machine, severity, options, rng)
+        changed = user_effect.change(machine, severity, options, rng)
     except GearsigError:
         raise
     except (Exception, SystemExit) as error:  # anything: it is somebody else's program
-        raise InputError(f"the effect {own.name!r} fails ({type(error).__name__}: {error})", where=str(path)) from error
+        raise InputError(
+            f"the effect {user_effect.name!r} fails ({type(error).__name__}: {error})", where=str(path)
+        ) from error
     if not isinstance(changed, Machine):
         raise InputError(
-            f"the effect {own.name!r} returns {type(changed).__name__} and no machine",
+            f"the effect {user_effect.name!r} returns {type(changed).__name__} and no machine",
             where=str(path),
             remedy="let change return the machine, as sims/effects/tooth_wear.py does",
         )
@@ -107,7 +109,7 @@ def effects() -> dict[str, Effect]:
         If a file of one's own effect cannot be used.
     """
     by_name = dict(_listed())
-    for path in own_files():
+    for path in user_files():
         further = loaded(path)
         if further.name in by_name:
             raise InputError(
@@ -131,7 +133,7 @@ def add_effect(path: str | Path) -> Effect:
         If it cannot be used, or an effect of that name is there already.
     """
     before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = with_own_file(Path(path))
+    os.environ[VARIABLE] = with_user_file(Path(path))
     effects.cache_clear()
     try:
         effects()
@@ -145,7 +147,7 @@ def add_effect(path: str | Path) -> Effect:
     return effect(loaded(Path(path)).name)
 
 
-def is_own(name: str) -> bool:
+def is_user_effect(name: str) -> bool:
     """Whether an effect is none of this package's."""
     return name in effects() and name not in _listed()
 

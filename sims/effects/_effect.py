@@ -309,8 +309,8 @@ class Effect:
         names = [option.name for option in self.options]
         for name in options:
             known_name(name, names, f"{self.name} has no option {name!r}")
-        given = {o: options.get(o.name, o.default) for o in self.options}
-        return {o.name: o.check(value, self.name) for o, value in given.items() if value is not None}
+        values = {o: options.get(o.name, o.default) for o in self.options}
+        return {o.name: o.check(value, self.name) for o, value in values.items() if value is not None}
 
 
 def _about_typical(effect: Effect) -> PlausibleRange:

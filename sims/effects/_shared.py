@@ -164,7 +164,7 @@ def with_mesh_field(machine: Machine, name: str, index: int, value: object) -> M
 def with_tooth_fault(machine: Machine, faults: str, index: int, fault: RootCrack | ToothSpall | ToothChip) -> Machine:
     """Return the machine with one more of the mesh's `faults` ("cracks", …) on a gear; a tooth has one of a kind."""
     present: tuple[RootCrack | ToothSpall | ToothChip, ...] = mesh_field(machine, faults, index)
-    if any(other.tooth == fault.tooth for other in present):
+    if any(present_fault.tooth == fault.tooth for present_fault in present):
         word = faults.removesuffix("s")
         raise InputError(
             f"tooth {fault.tooth + 1} of the {GEARS[index]} gear already has a {word}",
@@ -222,7 +222,7 @@ def angle_or_drawn_deg(options: Options, rng: np.random.Generator) -> float:
     return float(options.get("angle_deg", drawn))
 
 
-def vector_sum(length: float, angle_deg: float, other_length: float, other_angle_deg: float) -> tuple[float, float]:
+def vector_sum(length: float, angle_deg: float, second_length: float, second_angle_deg: float) -> tuple[float, float]:
     """Length and angle of the sum; the angle from 0 to 360°.
 
     Examples
@@ -230,7 +230,7 @@ def vector_sum(length: float, angle_deg: float, other_length: float, other_angle
     >>> [round(x, 9) for x in vector_sum(3.0, 0.0, 4.0, 90.0)]
     [5.0, 53.130102354]
     """
-    total = _vector(length, angle_deg) + _vector(other_length, other_angle_deg)
+    total = _vector(length, angle_deg) + _vector(second_length, second_angle_deg)
     return abs(total), degrees(atan2(total.imag, total.real)) % 360.0
 
 

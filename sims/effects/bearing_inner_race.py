@@ -6,7 +6,7 @@ import numpy as np
 
 from sims.effects import _shared as shared
 from sims.effects._effect import Effect, Options, PlausibleRange, Severity
-from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, race_knocks
+from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, race_impacts
 from sims.machine import Machine
 
 
@@ -18,7 +18,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """Knocks when elements pass the defect, louder in the load zone, that is once per turn."""
-    return race_knocks(scene, size, rng, "BPFI")
+    return race_impacts(scene, size, rng, "BPFI")
 
 
 EFFECT = Effect(

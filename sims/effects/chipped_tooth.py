@@ -22,7 +22,7 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
     """A missing corner: load is lost, the next tooth takes it with a blow."""
     side = book.draw_side(rng)
     window, place = book.tooth_window(scene, side, float(rng.uniform(0.5, 1.2)), rng)
-    blow = book.tooth_knocks(scene, side, place, 0.08, rng)
+    blow = book.tooth_impacts(scene, side, place, 0.08, rng)
     return book.Signature(
         book.swollen(book.sign(rng) * size * rng.uniform(0.3, 1.2), window),
         book.late_tooth(scene, size * rng.uniform(0.3, 1.2), window, rng),

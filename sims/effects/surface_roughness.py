@@ -24,18 +24,18 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     return replace(machine, roughness=replace(machine.roughness, rms_um=rms_um, locked_to=locked_to))
 
 
-def _locked_to(now: Roughness, asked: str) -> str:
-    if asked in (_AS_IT_IS, now.locked_to):
+def _locked_to(now: Roughness, requested: str) -> str:
+    if requested in (_AS_IT_IS, now.locked_to):
         return now.locked_to
     # Otherwise a vanishing severity would change the profile that is already there.
     if now.rms_um > 0:
         raise InputError(
-            f"the flanks already have {now.rms_um:g} µm, locked to {now.locked_to!r}, and {asked!r} was asked for",
+            f"the flanks already have {now.rms_um:g} µm, locked to {now.locked_to!r}, and {requested!r} was asked for",
             where="locked_to of surface_roughness",
             allowed=f"{_AS_IT_IS!r} or {now.locked_to!r}",
             remedy="change the model's own roughness",
         )
-    return asked
+    return requested
 
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:

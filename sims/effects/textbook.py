@@ -103,7 +103,9 @@ def passings(scene: SyntheticScene, order: float, phase: float = 0.0) -> FloatAr
     return np.flatnonzero(np.diff(np.floor(scene.revolutions * order + phase)) > 0).astype(np.float64)
 
 
-def knocks(order: float, jitter: float, scene: SyntheticScene, rng: np.random.Generator, by: float = 0.0) -> FloatArray:
+def impact_train(
+    order: float, jitter: float, scene: SyntheticScene, rng: np.random.Generator, by: float = 0.0
+) -> FloatArray:
     """Return knocks `order` times per revolution, their size swinging at the order `by`."""
     places = passings(scene, order, rng.uniform())
     if len(places) > 1:
@@ -299,7 +301,7 @@ def _gears_change(values: FloatArray, gains: FloatArray, signature: Signature, s
 
 
 def _about_the_mesh(values: FloatArray, gains: FloatArray, scene: SyntheticScene) -> FloatArray:
-    """Return a vibration with each stretch about a mesh harmonic `gains` times as large; shaft lines as they are."""
+    """Return a vibration with each segment about a mesh harmonic `gains` times as large; shaft lines as they are."""
     turns_hz = (scene.revolutions[-1] - scene.revolutions[0]) / (scene.time_s[-1] - scene.time_s[0])
     mesh_orders = np.fft.rfftfreq(len(values), 1.0 / scene.sampling_rate_hz) / (turns_hz * scene.teeth[0])
     logs = np.interp(mesh_orders, [0.3, *range(1, len(gains) + 1)], [0.0, *np.log(gains)])
@@ -367,7 +369,7 @@ def tooth_window(
     return window, place
 
 
-def tooth_knocks(
+def tooth_impacts(
     scene: SyntheticScene, side: int, place: float, scatter: float, rng: np.random.Generator, of: int = 1
 ) -> FloatArray:
     """Return knocks when a tooth meshes, `of` of them a fraction of a pitch apart, in standard deviations at most 1."""
@@ -422,10 +424,10 @@ def modulated(
     )
 
 
-def race_knocks(scene: SyntheticScene, size: float, rng: np.random.Generator, name: str) -> Signature:
+def race_impacts(scene: SyntheticScene, size: float, rng: np.random.Generator, name: str) -> Signature:
     """Knocks when elements pass the defect; on the inner race louder in the load zone, that is once per turn."""
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
     order = bearing[name] * float(rng.uniform(0.985, 1.0))
     by = bearing["shaft"] if name == "BPFI" else 0.0
-    vibration = knocks(order, log_uniform(rng, 0.001, 0.02), scene, rng, by=by)
+    vibration = impact_train(order, log_uniform(rng, 0.001, 0.02), scene, rng, by=by)
     return Signature(added=(1.5 * size * vibration / max(float(vibration.std()), 1e-12),))

@@ -24,7 +24,7 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
     """A pit: short blows when the flank enters and leaves it, different each time; the mesh hardly notices."""
     side = book.draw_side(rng)
     window, place = book.tooth_window(scene, side, float(rng.uniform(0.3, 0.8)), rng)
-    blows = book.tooth_knocks(scene, side, place, float(rng.uniform(0.05, 0.4)), rng, of=2)
+    blows = book.tooth_impacts(scene, side, place, float(rng.uniform(0.05, 0.4)), rng, of=2)
     return book.Signature(
         book.swollen(book.sign(rng) * 0.4 * size * rng.uniform(), window), None, (4.0 * size * blows,)
     )

@@ -146,9 +146,9 @@ def phased_rows(masters: Masters, gear: CyclicGear, n: int) -> tuple[ComplexArra
     return np.vstack((hub, masters.rows)).astype(np.complex128), turn
 
 
-def _with_nodes(masters: Masters, chosen: IntArray, n_own: int) -> Masters:
-    sectors, nodes = np.divmod(chosen, n_own)
-    rows = np.zeros((3 * len(chosen), 3 * n_own))
+def _with_nodes(masters: Masters, chosen: IntArray, n_nodes: int) -> Masters:
+    sectors, nodes = np.divmod(chosen, n_nodes)
+    rows = np.zeros((3 * len(chosen), 3 * n_nodes))
     for k, node in enumerate(nodes):
         rows[3 * k + np.arange(3), 3 * node + np.arange(3)] = 1.0
     return Masters(

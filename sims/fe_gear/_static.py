@@ -146,11 +146,11 @@ def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad, spread: Sp
     row = flank_rows(gear.mesh, grid, spread, gear.own_places, 3 * len(gear.own_nodes))[0]
     total = np.zeros((gear.n_sectors, gear.mesh.n_nodes, 3))
     pairs = modes.multiplicity(gear.n_sectors)
-    for which, hertz in enumerate(modes.frequencies_hz):
-        for sine in (False, True)[: int(pairs[which])]:
-            shape = modes.shapes[:, which].imag if sine else modes.shapes[:, which].real
+    for mode, hertz in enumerate(modes.frequencies_hz):
+        for sine in (False, True)[: int(pairs[mode])]:
+            shape = modes.shapes[:, mode].imag if sine else modes.shapes[:, mode].real
             share = load.force_n * float(row @ shape) / (2.0 * np.pi * hertz) ** 2
-            total += share * mode_field(gear, modes, which, sine=sine)
+            total += share * mode_field(gear, modes, mode, sine=sine)
     return total
 
 
@@ -215,12 +215,12 @@ def discretisation_error(
 
 def _by_diameter(modes: CyclicModes) -> dict[tuple[int, int], float]:
     """Frequencies by nodal diameters and rank among those with as many; rigid motions left out."""
-    seen: Counter[int] = Counter()
+    counts: Counter[int] = Counter()
     frequencies = {}
     for hertz, n in zip(modes.frequencies_hz, modes.nodal_diameters, strict=True):
-        seen[int(n)] += 1
+        counts[int(n)] += 1
         if hertz > 1.0:
-            frequencies[int(n), seen[int(n)]] = float(hertz)
+            frequencies[int(n), counts[int(n)]] = float(hertz)
     return frequencies
 
 
@@ -289,9 +289,9 @@ def _vtk_order() -> IntArray:
 
 def _shared_numbers(mesh: SectorMesh, n_sectors: int) -> IntArray:
     """Number of each sector's nodes, (n_sectors, n_nodes): the high side is the low side of the next sector."""
-    own = np.setdiff1d(np.arange(mesh.n_nodes), mesh.high_side)
+    nodes = np.setdiff1d(np.arange(mesh.n_nodes), mesh.high_side)
     number = np.empty((n_sectors + 1, mesh.n_nodes), dtype=np.int64)
-    number[:, own] = np.arange(len(own)) + len(own) * np.arange(n_sectors + 1)[:, None]
+    number[:, nodes] = np.arange(len(nodes)) + len(nodes) * np.arange(n_sectors + 1)[:, None]
     last = 0 if n_sectors == mesh.blank.n_teeth else n_sectors
     number[:-1, mesh.high_side] = number[[*range(1, n_sectors), last]][:, mesh.low_side]
     shared = number[:-1]
@@ -301,8 +301,8 @@ def _shared_numbers(mesh: SectorMesh, n_sectors: int) -> IntArray:
 
 def _turns(mesh: SectorMesh, n_sectors: int) -> FloatArray:
     angle = mesh.blank.pitch_angle_rad * np.arange(n_sectors)
-    c, s, zero, one = np.cos(angle), np.sin(angle), 0.0 * angle, 0.0 * angle + 1.0
-    rows = ((c, -s, zero), (s, c, zero), (zero, zero, one))
+    c, s, zero, unit = np.cos(angle), np.sin(angle), 0.0 * angle, 0.0 * angle + 1.0
+    rows = ((c, -s, zero), (s, c, zero), (zero, zero, unit))
     return np.array([[list(column) for column in row] for row in rows]).transpose(2, 0, 1)
 
 

@@ -270,7 +270,7 @@ class Schedule:
         return np.unique(np.round(np.concatenate([[0.0], inside, [duration_s]]), 12))
 
     def straight(self, start_s: float, end_s: float) -> FloatArray:
-        """Start time, then value and slope of torque, brake and press over one stretch."""
+        """Start time, then value and slope of torque, brake and press over one segment."""
         values = [start_s]
         for profile in (self.torque_nm, self.brake_nm, self.press_nm):
             first, last = (float(profile.at(time)) for time in (start_s, end_s))

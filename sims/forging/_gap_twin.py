@@ -92,8 +92,8 @@ class ForgingTwin:
     def run(self, added: Sequence[Added] = ()) -> Recording:
         """Return a recording of `N_CYCLES` cycles."""
         parameters = self.parameters
-        for each in added:
-            parameters = _with_wrong_value(each, parameters)
+        for setting in added:
+            parameters = _with_wrong_value(setting, parameters)
         operation = Operation.steady(self.point.speed_rpm, self.point.torque_nm)
         return ForgingManipulator().simulate(
             SimulationSetup("", parameters, _settings(added), operation),
@@ -240,7 +240,9 @@ def forging_gap_simulator() -> ForgingGapSimulator:
 def _settings(added: Sequence[Added]) -> tuple[EffectSetting, ...]:
     """Return the catalogue's settings; none of what is a parameter's wrong value."""
     return tuple(
-        EffectSetting(each.name, each.severity, dict(each.options)) for each in added if each.name not in _WRONG_VALUES
+        EffectSetting(setting.name, setting.severity, dict(setting.options))
+        for setting in added
+        if setting.name not in _WRONG_VALUES
     )
 
 
@@ -250,8 +252,8 @@ def _with_wrong_value(added: Added, parameters: Parameters) -> Parameters:
     if added.name == "load_inertia":
         return {**parameters, "wheel_inertia_kg_m2": float(parameters["wheel_inertia_kg_m2"]) * factor}
     if added.name == "load_friction":
-        both = ("load_friction_nm", "load_viscous_nm_s_per_rad")
-        return {**parameters, **{key: float(parameters[key]) * factor for key in both}}
+        names = ("load_friction_nm", "load_viscous_nm_s_per_rad")
+        return {**parameters, **{key: float(parameters[key]) * factor for key in names}}
     if added.name == "torque_gain":  # what was read off the recording was misread as well
         read = ("brake_nm", "drag_nm", "drag_viscous_nm_s_per_rad")
         return {**parameters, **{key: float(parameters[key]) / factor for key in read}, "torque_gain": factor}

@@ -1,4 +1,4 @@
-"""Compiled: runs the drive through one stretch of straight profiles, and finds every contact gained or lost."""
+"""Compiled: runs the drive through one segment of straight profiles, and finds every contact gained or lost."""
 
 # mypy: allow-untyped-defs, allow-untyped-calls
 
@@ -90,13 +90,13 @@ def reach(k, angle, flank):
     if flank < 0 or k.is_worn == 0.0:
         return k.half_backlash, 0.0
     p, slope = position(k, angle, flank, younger_pair(k, angle, flank))
-    least, change = 1e9, 0.0
+    smallest, change = 1e9, 0.0
     for i in range(2):
         if -0.5 * k.ramp < p + i < k.contact_ratio + 0.5 * k.ramp:
             depth, over = worn_off(k, p + i, flank)
-            if depth < least:
-                least, change = depth, over * slope
-    return k.half_backlash + least, change
+            if depth < smallest:
+                smallest, change = depth, over * slope
+    return k.half_backlash + smallest, change
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -129,9 +129,9 @@ def stored_energy(k, angle, q, flank, younger):
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def bristle(v, z, static_ratio, stribeck, presliding, bristle_time):
     """Force over its sliding level, and dz/dt; see `sims.forging.Bristle`."""
-    near_rest = exp(-((v / stribeck) ** 2))
-    rate = (v - abs(v) * z / (1.0 + (static_ratio - 1.0) * near_rest)) / presliding
-    return z + bristle_time * near_rest * rate, rate
+    stribeck_weight = exp(-((v / stribeck) ** 2))
+    rate = (v - abs(v) * z / (1.0 + (static_ratio - 1.0) * stribeck_weight)) / presliding
+    return z + bristle_time * stribeck_weight * rate, rate
 
 
 # Compiled: the equations of motion of the drive.
@@ -292,14 +292,16 @@ DONE, TOO_MANY_CONTACTS, STUCK = 0, 1, 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def integrate(k, y, mode, t, t_end, first_step, profile, absolute, relative, interval, select, counts, found, contacts):
-    """Run from t to `t_end`; fill rows of `found` at multiples of `interval` and rows of `contacts`.
+def integrate(
+    k, y, mode, t, t_end, first_step, profile, absolute, relative, interval, select, counts, output, contacts
+):
+    """Run from t to `t_end`; fill rows of `output` at multiples of `interval` and rows of `contacts`.
 
     y : states, left at the end's.
     mode : flank (−1, 0, 1), younger pair, damping of the contact; left at the end's.
     profile : start time, then value and slope of torque, brake and press.
     select : places of the wanted signals in `sims.forging.SIGNALS`.
-    counts : rows filled so far in `found` and in `contacts` (an unfinished contact is the last row), steps taken,
+    counts : rows filled so far in `output` and in `contacts` (an unfinished contact is the last row), steps taken,
         steps refused; continued.
     Returns the last step's length and a status.
     """
@@ -326,8 +328,8 @@ def integrate(k, y, mode, t, t_end, first_step, profile, absolute, relative, int
         changes = next_flank != mode[0]
         if changes:
             h = _to_event(k, y, t, h, mode, profile, stages, end, out, next_flank)
-        if counts[0] < found.shape[0] and counts[0] * interval <= t + h:
-            _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, found, spare)
+        if counts[0] < output.shape[0] and counts[0] * interval <= t + h:
+            _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, output, spare)
         t += h
         copy(end, y)
         if mode[0] != 0.0:
@@ -348,11 +350,11 @@ def integrate(k, y, mode, t, t_end, first_step, profile, absolute, relative, int
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, found, spare):
-    """Fill the rows of `found` whose times lie within a step."""
+def _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, output, spare):
+    """Fill the rows of `output` whose times lie within a step."""
     extra, row = np.empty(N_OUT), np.empty(N_SIGNALS)
     at = spare[0]
-    while counts[0] < found.shape[0] and counts[0] * interval <= t + h:
+    while counts[0] < output.shape[0] and counts[0] * interval <= t + h:
         x = (counts[0] * interval - t) / h
         for i in range(y.shape[0]):
             at[i] = within_step(y, h, stages, x, i)
@@ -361,7 +363,7 @@ def _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, foun
         row[N_OUT] = energy(k, at, mode[0], mode[1])
         row[N_OUT + 1], row[N_OUT + 2], row[N_OUT + 3] = at[8], at[9], at[10]
         for i in range(select.shape[0]):
-            found[counts[0], i] = row[select[i]]
+            output[counts[0], i] = row[select[i]]
         counts[0] += 1
 
 

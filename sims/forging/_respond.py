@@ -200,7 +200,7 @@ class _DriveRun:
     mode: FloatArray
     counts: NDArray[np.int64]
     select: NDArray[np.int64]
-    found: FloatArray
+    output: FloatArray
     contacts: FloatArray
     interval_s: float
     step_s: float = 1e-6
@@ -227,13 +227,13 @@ class _DriveRun:
         return cls(k, y, mode, counts, select, np.full((n, len(select)), np.nan), contacts, interval_s)
 
     def advance(self, begin_s: float, end_s: float, profile: FloatArray, tolerance: float) -> None:
-        """Integrate over one stretch of straight profiles."""
+        """Integrate over one segment of straight profiles."""
         from sims.forging._kernels import DONE, integrate
 
         absolute = ABSOLUTE * (tolerance / TOLERANCE)
         self.step_s, status = integrate(
             self.k, self.y, self.mode, begin_s, end_s, min(self.step_s, 1e-5), profile, absolute, tolerance,
-            self.interval_s, self.select, self.counts, self.found, self.contacts,
+            self.interval_s, self.select, self.counts, self.output, self.contacts,
         )  # fmt: skip
         if status != DONE or not np.isfinite(self.y).all():
             raise _failure(status, end_s)
@@ -241,8 +241,8 @@ class _DriveRun:
     def response(self, signals: Sequence[str]) -> DriveResponse:
         """Return what was kept."""
         filled = int(self.counts[0])
-        self.found[filled:] = self.found[filled - 1]  # rounding may leave the last point just beyond the end
-        kept = {name: np.ascontiguousarray(self.found[:, i]) for i, name in enumerate(signals)}
+        self.output[filled:] = self.output[filled - 1]  # rounding may leave the last point just beyond the end
+        kept = {name: np.ascontiguousarray(self.output[:, i]) for i, name in enumerate(signals)}
         contacts = self.contacts[: self.counts[1]].copy()
         return DriveResponse(self.interval_s, kept, contacts, int(self.counts[2]), int(self.counts[3]))
 

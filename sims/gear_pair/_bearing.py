@@ -129,8 +129,8 @@ def _defect(support: BearingSupport) -> tuple[int, float, float, float]:
     n = bearing.n_rolling_elements or 1
     outer = defect.race == "outer"
     spacing = pi * (pitch + ball if outer else pitch - ball) / n
-    taken = (defect.length_mm + 2.0 * RACE_EDGE_MM) / spacing + 6.0 * defect.spacing_jitter
-    if taken > 1.0:
+    share = (defect.length_mm + 2.0 * RACE_EDGE_MM) / spacing + 6.0 * defect.spacing_jitter
+    if share > 1.0:
         longest = spacing * (1.0 - 6.0 * defect.spacing_jitter) - 2.0 * RACE_EDGE_MM
         raise InputError(
             f"length_mm of the defect in {bearing.name!r} is {defect.length_mm:g} mm: it holds two elements at once",

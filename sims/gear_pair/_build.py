@@ -161,8 +161,8 @@ def _path(bearing: int, direction: tuple[float, float], factor: float, housing: 
     return ModalPath(_along(bearing, direction, 1.0), tuple(modes))
 
 
-def _along(bearing: int, direction: tuple[float, float], gain: float, what: str = "") -> dict[str, float]:
-    return {f"bearing {bearing} {axis}{what}": gain * part for axis, part in zip("xy", direction, strict=True)}
+def _along(bearing: int, direction: tuple[float, float], gain: float, suffix: str = "") -> dict[str, float]:
+    return {f"bearing {bearing} {axis}{suffix}": gain * part for axis, part in zip("xy", direction, strict=True)}
 
 
 def _tachometer(

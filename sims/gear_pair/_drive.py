@@ -78,13 +78,13 @@ def total_inertia_kg_m2(machine: Machine) -> float:
 
 def governor_nm_s_per_rad(machine: Machine) -> float:
     """G of the drive; an ordinary one suits what it turns."""
-    given = machine.drive.governor_nm_s_per_rad
-    return 2.0 * total_inertia_kg_m2(machine) / RECOVERY_S if given is None else given
+    stated = machine.drive.governor_nm_s_per_rad
+    return 2.0 * total_inertia_kg_m2(machine) / RECOVERY_S if stated is None else stated
 
 
-def _rows(items: list[tuple[float, float, float]], what: str) -> FloatArray:
+def _rows(items: list[tuple[float, float, float]], kind: str) -> FloatArray:
     if len(items) > MAX_LINES:
-        raise InputError(f"{len(items)} {what}", allowed=f"at most {MAX_LINES}")
+        raise InputError(f"{len(items)} {kind}", allowed=f"at most {MAX_LINES}")
     rows = np.zeros((MAX_LINES, 3))
     rows[: len(items)] = np.array(items, dtype=np.float64).reshape(-1, 3)
     return rows
@@ -115,7 +115,7 @@ def friction_fields(machine: Machine, operation: Operation, force_n: float) -> d
     """Values of `FRICTION_FIELDS` at the set mesh force."""
     mesh, pair = machine.mesh, machine.mesh.pair
     log10_oil, oil_constant = oil_terms(machine.lubrication.viscosity_cp, machine.roughness.rms_um)
-    one, two = mesh.material_1, mesh.material_2
+    material_1, material_2 = mesh.material_1, mesh.material_2
     sliding = greatest_sliding_mps(machine, operation.speed_rpm.largest * pi / 30.0)
     lightest = min(w.mass_kg for w in machine.wheels)
     return {
@@ -128,7 +128,10 @@ def friction_fields(machine: Machine, operation: Operation, force_n: float) -> d
         "dry_friction": machine.lubrication.dry_coefficient,
         "width": mesh.face_width_m,
         "reduced_modulus": reduced_modulus_pa(
-            one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio
+            material_1.youngs_modulus_pa,
+            material_1.poisson_ratio,
+            material_2.youngs_modulus_pa,
+            material_2.poisson_ratio,
         ),
         "log10_oil": log10_oil,
         "oil_constant": oil_constant,

@@ -256,18 +256,18 @@ def _pickup(rig: Rig, shafts: tuple[str, str]) -> Pickup:
 
 def _sensors(rig: Rig, bearings: Sequence[Bearing], tacho: str) -> tuple[SensorSeat, ...]:
     """Return a seat for each of the rig's accelerometers: where its position says, else one bearing after another."""
-    told = [s for s in rig.sensors if s.quantity == "acceleration" and s.channel != tacho][:MAX_RIG_SENSORS]
-    if not told:
-        told_names = {s.channel for s in rig.sensors} | {tacho}
-        names = [n for n in ("a1", "a2", "a3", "a4") if n not in told_names][:2]
+    rig_sensors = [s for s in rig.sensors if s.quantity == "acceleration" and s.channel != tacho][:MAX_RIG_SENSORS]
+    if not rig_sensors:
+        rig_channels = {s.channel for s in rig.sensors} | {tacho}
+        names = [n for n in ("a1", "a2", "a3", "a4") if n not in rig_channels][:2]
         return tuple(SensorSeat(name, number) for name, number in zip(names, SEAT_ORDER, strict=False))
-    taken: list[tuple[int, str]] = []
+    places: list[tuple[int, str]] = []
     seats = []
-    for sensor in told:
+    for sensor in rig_sensors:
         direction = "horizontal" if "horizontal" in sensor.position.lower() else "vertical"
         likely = [*_near(sensor.position.lower(), bearings), *SEAT_ORDER]
-        number = next((n for n in likely if (n, direction) not in taken), likely[0])
-        taken.append((number, direction))
+        number = next((n for n in likely if (n, direction) not in places), likely[0])
+        places.append((number, direction))
         seats.append(SensorSeat(sensor.channel, number, direction, sensor.position))
     return tuple(seats)
 
@@ -281,11 +281,11 @@ def _near(position: str, bearings: Sequence[Bearing]) -> list[int]:
 
 def further_seats(installed: Installed) -> tuple[SensorSeat, ...]:
     """Return upright sensors over the bearings that have none."""
-    taken = {seat.bearing for seat in installed.sensors}
+    occupied = {seat.bearing for seat in installed.sensors}
     names = {seat.channel for seat in installed.sensors} | {installed.pickup.channel}
     seats = []
     for number, bearing in enumerate(installed.bearings, 1):
-        if number not in taken:
+        if number not in occupied:
             name = f"further {number}"
             while name in names:
                 name += "'"

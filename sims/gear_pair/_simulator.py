@@ -37,8 +37,8 @@ def check_load(machine: Machine, operation: Operation) -> None:
     """Refuse a torque that would break the teeth: far beyond, the linear model means nothing."""
     pair = machine.mesh.pair
     section_m2 = pair.face_width_mm * pair.driver.module_mm * 1e-6
-    most_nm = BREAKING_STRESS_PA * section_m2 * pair.driver.pitch_radius_mm * 1e-3
-    within(operation.torque_nm.largest, "torque_nm", 0.0, float(f"{most_nm:.2g}"), "N m")
+    breaking_nm = BREAKING_STRESS_PA * section_m2 * pair.driver.pitch_radius_mm * 1e-3
+    within(operation.torque_nm.largest, "torque_nm", 0.0, float(f"{breaking_nm:.2g}"), "N m")
 
 
 @dataclass(frozen=True)

@@ -96,8 +96,8 @@ def specimen_parameters(nominal: Nominal, rng: np.random.Generator) -> dict[str,
         diameter = nominal.pitch_diameters_mm[side]
         parameters[f"runout_{name}_um"] = RUNOUT_SHARE * runout_tolerance_um(nominal.module_mm, diameter) * _spread(rng)
         parameters[f"unbalance_{name}_g_mm"] = UNBALANCE_UM * usual_mass_kg(nominal, side) * _spread(rng)
-        for what in ("runout", "unbalance"):
-            parameters[f"{what}_angle_{name}_deg"] = float(rng.uniform(0.0, 360.0))
+        for quantity in ("runout", "unbalance"):
+            parameters[f"{quantity}_angle_{name}_deg"] = float(rng.uniform(0.0, 360.0))
     return parameters
 
 
@@ -137,8 +137,8 @@ def body_gain(bearing_stiffness_n_per_m: float, mass_kg: float, mounts_hz: float
 
 def _shift(teeth: int, pressure_angle_deg: float) -> float:
     """Least profile shift without undercut, in modules: (z_min − z)/z_min, z_min = 2/sin²α of the rack."""
-    least = 2.0 / sin(radians(pressure_angle_deg)) ** 2
-    return max(0.0, (least - teeth) / least)
+    min_teeth = 2.0 / sin(radians(pressure_angle_deg)) ** 2
+    return max(0.0, (min_teeth - teeth) / min_teeth)
 
 
 def _tool_tip_radius(pressure_angle_deg: float) -> float:
@@ -198,8 +198,8 @@ class PairTwin:
     def key(self) -> str:
         """Model, state of its code, and what is known of the rig."""
         known = {name: value for name, value in rig_to_dict(self.rig).items() if name not in ("name", "sources")}
-        told = repr(known) + (repr(self.further) if self.further else "") + ("quiet" if self.is_quiet else "")
-        return f"{self.model} {sources_digest()} {sha256(told.encode()).hexdigest()[:16]}"
+        text = repr(known) + (repr(self.further) if self.further else "") + ("quiet" if self.is_quiet else "")
+        return f"{self.model} {sources_digest()} {sha256(text.encode()).hexdigest()[:16]}"
 
     @property
     def pair_model(self) -> PairModel[Any]:
@@ -261,8 +261,8 @@ class PairTwin:
     def candidates(self, name: str) -> Sequence[Added]:
         """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
         plausible = effect(name).plausible_range
-        which = range(plausible.n_severities)
-        return self._settings(name, [(options, which) for options in plausible.choices(self._facts)])
+        indices = range(plausible.n_severities)
+        return self._settings(name, [(options, indices) for options in plausible.choices(self._facts)])
 
     def further_settings(self, name: str) -> Sequence[Added]:
         """Return further settings, with which a tooth's fault takes another course over the engagement."""
@@ -270,11 +270,11 @@ class PairTwin:
 
     def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[int]]]) -> list[Added]:
         """Return each set of options with some of its severities."""
-        n, found = effect(name).plausible_range.n_severities, []
-        for options, which in chosen:
+        n, settings = effect(name).plausible_range.n_severities, []
+        for options, indices in chosen:
             severities = np.geomspace(*effect(name).plausible_severities(self._facts, options), n)
-            found += [Added(name, float(f"{severities[i]:.4g}"), options) for i in which]
-        return found
+            settings += [Added(name, float(f"{severities[i]:.4g}"), options) for i in indices]
+        return settings
 
     def with_further_sensors(self) -> tuple[Self, Mapping[str, str]]:
         """Return the machine with an upright sensor over each bearing that has none, and those channels' places."""
@@ -329,7 +329,7 @@ class PairTwin:
                 *(f"{name}: usual, the rig does not tell" for name in self.nominal.assumed),
             ),
             does_not_represent=("the real machine's own flanks, tolerances and housing",),
-            parameters=MappingProxyType(as_plain(self._own_parameters(values))),
+            parameters=MappingProxyType(as_plain(self._model_parameters(values))),
             speed_rpm=point.speed_rpm,
             torque_nm=point.torque_nm,
             effects=tuple(EffectSetting(a.name, a.severity, dict(a.options)) for a in added),
@@ -368,11 +368,11 @@ class PairTwin:
         ready: ReadyPair = self.pair_model.prepare(SimulationSetup(preset), rng, sampling_rate_hz=sampling_rate_hz)
         return ready
 
-    def _step_s(self, own: Preset) -> float:
+    def _step_s(self, preset: Preset) -> float:
         """Longest step of the integrator."""
         raise NotImplementedError
 
-    def _own_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
+    def _model_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
         """Return what is usual in the model's own parameters."""
         return values
 

@@ -158,9 +158,9 @@ class AntiAlias:
         start = max(0, floor((first * down / up - half / up) / down) * down)
         stop = min(signals.shape[1], ceil((first + n_samples) * down / up + half / up) + 1)
         skipped = start // down * up
-        stretch = signals[:, start:stop]
+        segment = signals[:, start:stop]
         # The stubs know only named windows; an array of coefficients is documented.
-        sampled: FloatArray = resample_poly(stretch, up, down, axis=1, window=taps)  # type: ignore[call-overload]
+        sampled: FloatArray = resample_poly(segment, up, down, axis=1, window=taps)  # type: ignore[call-overload]
         return sampled[:, first - skipped : first - skipped + n_samples]
 
 
@@ -328,12 +328,12 @@ class MeasurementChain:
         rate = self.sampling_rate_hz
         low, high = covered(motion.n_steps, motion.step_s, rate, self.anti_alias.reach_s(rate) + motion.step_s)
         first = max(low, ceil(lead_s * rate - 1e-9))
-        most = high - first + 1
-        n_samples = most if duration_s is None else round(positive(duration_s, "duration_s", "s") * rate)
-        if n_samples < 1 or n_samples > most:
+        n_max = high - first + 1
+        n_samples = n_max if duration_s is None else round(positive(duration_s, "duration_s", "s") * rate)
+        if n_samples < 1 or n_samples > n_max:
             lasts_s = motion.n_steps * motion.step_s
             raise InputError(
-                f"the motion lasts {lasts_s:g} s, of which {max(most, 0) / rate:g} s can be recorded",
+                f"the motion lasts {lasts_s:g} s, of which {max(n_max, 0) / rate:g} s can be recorded",
                 where="duration_s",
                 allowed="at least one sample and no more than that",
                 remedy="simulate longer: MeasurementChain.simulated_s tells how long",

@@ -145,10 +145,10 @@ class Encoder:
 
     def read_deg(self, angle_rad: FloatArray, rng: np.random.Generator | None = None) -> FloatArray:
         """Reading at the given shaft angles; without `rng` free of noise."""
-        seen_rev = angle_rad / (2 * np.pi) + self.runout_deg / 360.0 * np.sin(angle_rad)
+        read_rev = angle_rad / (2 * np.pi) + self.runout_deg / 360.0 * np.sin(angle_rad)
         if rng is not None and self.noise_deg:
-            seen_rev = seen_rev + self.noise_deg / 360.0 * rng.standard_normal(np.shape(angle_rad))
-        counts = np.floor(seen_rev * self.counts_per_revolution)
+            read_rev = read_rev + self.noise_deg / 360.0 * rng.standard_normal(np.shape(angle_rad))
+        counts = np.floor(read_rev * self.counts_per_revolution)
         if self.wraps:
             counts = np.mod(counts, self.counts_per_revolution)
         reading: FloatArray = counts * (360.0 / self.counts_per_revolution)

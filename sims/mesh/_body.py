@@ -16,7 +16,7 @@ _RESOLVED = 40.0  # harmonics times the root's half angle: what follows adds les
 
 
 def body_compliance(
-    gear: GearGeometry, material: Material, load_angle_rad: FloatArray, other_rad: FloatArray, offset: int
+    gear: GearGeometry, material: Material, load_angle_rad: FloatArray, deflected_rad: FloatArray, offset: int
 ) -> FloatArray:
     """Deflection of a tooth along its force by the body, for 1 N on 1 m of face width on a tooth `offset` further on.
 
@@ -31,7 +31,7 @@ def body_compliance(
     ----------
     gear : GearGeometry
     material : Material
-    load_angle_rad, other_rad : array, (n,)
+    load_angle_rad, deflected_rad : array, (n,)
         α_m of the tooth that moves, and of the tooth that is loaded.
     offset : int
         k, teeth from the loaded one towards where its force pushes. 0: the tooth itself, which
@@ -54,7 +54,7 @@ def body_compliance(
     theta = root_half_angle_rad(gear)
     ratio = gear.root_radius_mm / gear.bore_mm
     arc = arc_compliance(ratio, theta, 2.0 * pi * offset / gear.teeth, material.poisson_ratio)
-    moved, loaded = _root_loads(gear, load_angle_rad), _root_loads(gear, other_rad)
+    moved, loaded = _root_loads(gear, load_angle_rad), _root_loads(gear, deflected_rad)
     result: FloatArray = np.einsum("in,ij,jn->n", moved, arc, loaded) / material.youngs_modulus_pa
     return result
 

@@ -126,13 +126,13 @@ def wear_profile(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> F
     Source: J. F. Archard, Contact and rubbing of flat surfaces, Journal of Applied Physics 24 (1953), for the law.
     """
     ends = contact_ends_mm(pair, side)
-    most = float(np.max(_specific_sliding(pair, side, np.array(ends))))
-    result: FloatArray = _specific_sliding(pair, side, np.clip(roll_length_mm, *ends)) / most
+    largest = float(np.max(_specific_sliding(pair, side, np.array(ends))))
+    result: FloatArray = _specific_sliding(pair, side, np.clip(roll_length_mm, *ends)) / largest
     return result
 
 
 def _specific_sliding(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> FloatArray:
-    own, mate = (pair.driver, pair.driven) if side == 1 else (pair.driven, pair.driver)
-    rho = np.maximum(np.asarray(roll_length_mm, dtype=np.float64), MIN_RADIUS * own.module_mm)
-    result: FloatArray = np.abs(1.0 - own.teeth / mate.teeth * (pair.action_length_mm - rho) / rho)
+    gear, mate = (pair.driver, pair.driven) if side == 1 else (pair.driven, pair.driver)
+    rho = np.maximum(np.asarray(roll_length_mm, dtype=np.float64), MIN_RADIUS * gear.module_mm)
+    result: FloatArray = np.abs(1.0 - gear.teeth / mate.teeth * (pair.action_length_mm - rho) / rho)
     return result

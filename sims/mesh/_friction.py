@@ -98,7 +98,7 @@ def friction_coefficient(
     Source: H. Xu, *Development of a generalized mechanical efficiency prediction methodology for gear pairs*,
     dissertation, The Ohio State University, 2005.
     """
-    given = {
+    inputs = {
         "slide_to_roll": np.abs(_checked(slide_to_roll, "slide_to_roll", signed=True)),
         "pressure_gpa": _checked(pressure_gpa, "pressure_gpa"),
         "viscosity_cp": np.asarray(positive(viscosity_cp, "viscosity_cp", "cP")),
@@ -107,14 +107,14 @@ def friction_coefficient(
         "radius_m": _checked(radius_m, "radius_m", above_zero=True),
     }
     raw = _regression(
-        given["slide_to_roll"],
-        given["pressure_gpa"],
-        given["viscosity_cp"],
-        given["roughness_um"],
-        given["entrainment_mps"],
-        given["radius_m"],
+        inputs["slide_to_roll"],
+        inputs["pressure_gpa"],
+        inputs["viscosity_cp"],
+        inputs["roughness_um"],
+        inputs["entrainment_mps"],
+        inputs["radius_m"],
     )
-    return FrictionResult(np.minimum(raw, MAX_FRICTION), raw > MAX_FRICTION, _range_notes(given))
+    return FrictionResult(np.minimum(raw, MAX_FRICTION), raw > MAX_FRICTION, _range_notes(inputs))
 
 
 def line_contact_pressure_gpa(
@@ -160,14 +160,14 @@ def _regression(
     return mu
 
 
-def _range_notes(given: dict[str, FloatArray]) -> tuple[str, ...]:
+def _range_notes(inputs: dict[str, FloatArray]) -> tuple[str, ...]:
     notes = []
     for name, (low, high, unit) in _LIMITS.items():
-        least, most = float(np.min(given[name])), float(np.max(given[name]))
+        smallest, largest = float(np.min(inputs[name])), float(np.max(inputs[name]))
         # No load and no sliding give exactly zero friction: that is no extrapolation.
-        if name == "pressure_gpa" and least == 0.0:
-            least = low
-        for value, outside in ((least, least < low), (most, most > high)):
+        if name == "pressure_gpa" and smallest == 0.0:
+            smallest = low
+        for value, outside in ((smallest, smallest < low), (largest, largest > high)):
             if outside:
                 notes.append(
                     f"{name} reaches {value:.4g} {unit}; the friction regression holds for {low:g} to {high:g} {unit}"
@@ -357,20 +357,22 @@ def friction_over_mesh(
 
 
 def _reduced_modulus_pa(mesh: GearMesh) -> float:
-    one, two = mesh.material_1, mesh.material_2
-    return reduced_modulus_pa(one.youngs_modulus_pa, one.poisson_ratio, two.youngs_modulus_pa, two.poisson_ratio)
+    material_1, material_2 = mesh.material_1, mesh.material_2
+    return reduced_modulus_pa(
+        material_1.youngs_modulus_pa, material_1.poisson_ratio, material_2.youngs_modulus_pa, material_2.poisson_ratio
+    )
 
 
 def _speeds_and_radius(
     mesh: GearMesh, mesh_cycles: FloatArray, speed_rpm: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rolling speeds of both flanks in m/s and the radius of relative curvature in m, (n, n_slots)."""
-    pair, least = mesh.pair, MIN_RADIUS * mesh.pair.driver.module_mm
+    pair, min_radius_mm = mesh.pair, MIN_RADIUS * mesh.pair.driver.module_mm
     newest = np.floor(mesh_cycles + mesh.ramp / 2.0)
     progress = (mesh_cycles - newest)[:, None] + np.arange(mesh.n_slots) - mesh.overlap_ratio / 2.0
     if mesh.overlap_ratio:
         progress = np.clip(progress, 0.0, pair.contact_ratio)
-    rho_1, rho_2 = (np.maximum(rho, least) * 1e-3 for rho in pair.contact_radii_mm(progress))
+    rho_1, rho_2 = (np.maximum(rho, min_radius_mm) * 1e-3 for rho in pair.contact_radii_mm(progress))
     omega_1 = speed_rpm * pi / 30.0
     omega_2 = omega_1 * pair.driver.teeth / pair.driven.teeth
     return omega_1 * rho_1, omega_2 * rho_2, rho_1 * rho_2 / (rho_1 + rho_2)

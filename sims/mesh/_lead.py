@@ -214,12 +214,12 @@ def standard_stiffness(pair: PairGeometry, helix_angle_deg: float = 0.0) -> Stan
     Source: ISO 6336-1:2006, *Calculation of load capacity of spur and helical gears – Basic principles*, clause 9.3.
     """
     beta = radians(helix_angle_deg)
-    one, two = sorted((pair.driver, pair.driven), key=lambda gear: gear.teeth)
-    z1, z2 = (gear.teeth / cos(beta) ** 3 for gear in (one, two))
-    x1, x2 = (gear.profile_shift / cos(beta) for gear in (one, two))
+    gear_1, gear_2 = sorted((pair.driver, pair.driven), key=lambda gear: gear.teeth)
+    z1, z2 = (gear.teeth / cos(beta) ** 3 for gear in (gear_1, gear_2))
+    x1, x2 = (gear.profile_shift / cos(beta) for gear in (gear_1, gear_2))
     q = 0.04723 + 0.15551 / z1 + 0.25791 / z2 - 0.00635 * x1 - 0.11654 * x1 / z1 - 0.00193 * x2
     q += -0.24188 * x2 / z2 + 0.00529 * x1**2 + 0.00182 * x2**2
-    normal = normal_section(one, helix_angle_deg)
+    normal = normal_section(gear_1, helix_angle_deg)
     rack = (1.0 + 0.5 * (1.2 - normal.dedendum)) * (1.0 - 0.02 * (20.0 - normal.pressure_angle_deg))
     single = 0.8 * rack * cos(beta) / q
     return StandardStiffness(single, single * (0.75 * pair.contact_ratio + 0.25))

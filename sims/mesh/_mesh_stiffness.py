@@ -411,8 +411,8 @@ def _equilibrium(
 def _tangents(table: MeshTable, compliance: FloatArray, weight: FloatArray, forces: FloatArray) -> FloatArray:
     """dN/dδ of each pair that carries a force."""
     carrying = forces > 0.0
-    own = np.where(carrying, forces / np.where(weight > 0.0, weight, 1.0), 1.0)
-    contact = table.slice_contact * (0.9 * own**-0.1 if table.load_dependent else 1.0)
+    pair_forces = np.where(carrying, forces / np.where(weight > 0.0, weight, 1.0), 1.0)
+    contact = table.slice_contact * (0.9 * pair_forces**-0.1 if table.load_dependent else 1.0)
     return np.where(carrying, weight / (compliance + contact), 0.0)
 
 
@@ -463,10 +463,10 @@ def out_of_place(cycles, middle, teeth, pitch):  # type: ignore[no-untyped-def]
     past = np.floor(cycles - middle)
     z1, z2 = float(teeth[0]), float(teeth[1])
     coming = past + 1.0
-    here = pitch[0, int(past - z1 * np.floor(past / z1))] + pitch[1, int(past - z2 * np.floor(past / z2))]
+    now = pitch[0, int(past - z1 * np.floor(past / z1))] + pitch[1, int(past - z2 * np.floor(past / z2))]
     later = pitch[0, int(coming - z1 * np.floor(coming / z1))] + pitch[1, int(coming - z2 * np.floor(coming / z2))]
     part, slope = _smooth(cycles - middle - past)
-    return here + part * (later - here), slope * (later - here)
+    return now + part * (later - now), slope * (later - now)
 
 
 @njit(cache=True)
@@ -588,15 +588,16 @@ def fill_pairs(
         for j in range(compliance.shape[1]):
             k, s = newest - j // n_slices, j % n_slices
             progress = mesh_cycles[row] - k - late[s]
-            one, two = k % teeth[0], k % teeth[1]
+            tooth_1, tooth_2 = k % teeth[0], k % teeth[1]
             weight[row, j] = engagement(progress, contact_ratio, ramp)
             if weight[row, j] == 0.0 and n_slices > 1:  # far beyond the table, too
-                compliance[row, j], separation[row, j] = n_slices * curves[of[0, one], 1], 0.0
+                compliance[row, j], separation[row, j] = n_slices * curves[of[0, tooth_1], 1], 0.0
                 continue
             compliance[row, j] = n_slices * (
-                cubic(curves[of[0, one]], start, step, progress) + cubic(curves[of[1, two]], start, step, progress)
+                cubic(curves[of[0, tooth_1]], start, step, progress)
+                + cubic(curves[of[1, tooth_2]], start, step, progress)
             )
-            missing = cubic(flanks[flank_of[0, one]], start, step, progress) + cubic(
-                flanks[flank_of[1, two]], start, step, progress
+            missing = cubic(flanks[flank_of[0, tooth_1]], start, step, progress) + cubic(
+                flanks[flank_of[1, tooth_2]], start, step, progress
             )
-            separation[row, j] = missing + pitch[0, one] + pitch[1, two] + gap[s]
+            separation[row, j] = missing + pitch[0, tooth_1] + pitch[1, tooth_2] + gap[s]

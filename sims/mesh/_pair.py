@@ -133,9 +133,9 @@ class PairGeometry:
 
     @cached_property
     def _tight_angle_rad(self) -> float:
-        one, two = self.driver, self.driven
-        alpha = one.pressure_angle_rad
-        shift = 2.0 * (one.profile_shift + two.profile_shift) * tan(alpha) / (one.teeth + two.teeth)
+        gear_1, gear_2 = self.driver, self.driven
+        alpha = gear_1.pressure_angle_rad
+        shift = 2.0 * (gear_1.profile_shift + gear_2.profile_shift) * tan(alpha) / (gear_1.teeth + gear_2.teeth)
         value = float(involute(alpha)) + shift
         if value < 0.0:
             raise InputError("the sum of the profile shifts is too negative for these teeth", allowed="inv α_w above 0")
@@ -168,11 +168,11 @@ class PairGeometry:
                 )
 
     def _check_clearance(self) -> None:
-        for one, two in ((self.driver, self.driven), (self.driven, self.driver)):
-            clearance = self.centre_distance - one.tip_radius_mm - two.root_radius_mm
+        for gear, mate in ((self.driver, self.driven), (self.driven, self.driver)):
+            clearance = self.centre_distance - gear.tip_radius_mm - mate.root_radius_mm
             if clearance <= 0.0:
                 raise InputError(
-                    f"the tip of the gear of {one.teeth} teeth cuts {-clearance:.3g} mm into its mate's root",
+                    f"the tip of the gear of {gear.teeth} teeth cuts {-clearance:.3g} mm into its mate's root",
                     allowed="a tip clearance above 0",
                     remedy="lower the addendum or raise the mate's dedendum",
                 )
@@ -230,13 +230,13 @@ def curvature_radius_mm(pair: PairGeometry, roll_length_mm: FloatArray | float) 
     return result
 
 
-def contact_half_width_mm(pair: PairGeometry, one: Material, two: Material) -> float:
+def contact_half_width_mm(pair: PairGeometry, material_1: Material, material_2: Material) -> float:
     """Half the width of the zone of contact along the flank, a = 2 R p/E*, at the pitch point and 1 GPa.
 
     Source: K. L. Johnson, *Contact Mechanics*, 1985, ch. 4.
     """
     radius = float(curvature_radius_mm(pair, pair.pitch_point_radius_mm))
-    flexibility = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus_pa for m in (one, two))
+    flexibility = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus_pa for m in (material_1, material_2))
     return 2.0 * radius * WORKING_PRESSURE_PA * flexibility
 
 

@@ -154,8 +154,8 @@ def friction_compliance(
     along = (place.x_mm * 1e-3 - sections.x) * sine + place.y_mm * 1e-3 * cosine
     lever, shear, axial = (along, sine**2, cosine**2) if along_itself else (normal, sine * cosine, -sine * cosine)
     bending = np.sum(12.0 * lever * along / height**3 * sections.dx, axis=1)
-    stretch = (2.0 * SHEAR_FACTOR * (1.0 + material.poisson_ratio) * shear + axial)[:, 0]
-    result: FloatArray = (bending + stretch * np.sum(sections.dx / height, axis=1)) / material.youngs_modulus_pa
+    shear_and_axial = (2.0 * SHEAR_FACTOR * (1.0 + material.poisson_ratio) * shear + axial)[:, 0]
+    result: FloatArray = (bending + shear_and_axial * np.sum(sections.dx / height, axis=1)) / material.youngs_modulus_pa
     return result
 
 
@@ -247,7 +247,7 @@ def _gauss(n: int) -> tuple[FloatArray, FloatArray]:
 CONTACT_LAWS = ("linear", "load-dependent")
 
 
-def linear_contact_compliance(one: Material, two: Material, face_width_m: float) -> float:
+def linear_contact_compliance(material_1: Material, material_2: Material, face_width_m: float) -> float:
     """1/k_h of two cylinders by the common linear form, 4 (1 − ν²)/(π E b), in m/N.
 
     It depends neither on load nor on curvature and is stiffer than a real contact at working load.
@@ -255,18 +255,18 @@ def linear_contact_compliance(one: Material, two: Material, face_width_m: float)
     Source: D. C. H. Yang, J. Y. Lin, Hertzian damping, tooth friction and bending elasticity in gear impact dynamics,
     Journal of Mechanisms, Transmissions, and Automation in Design 109 (1987).
     """
-    flexibility = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus_pa for m in (one, two))
+    flexibility = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus_pa for m in (material_1, material_2))
     return 2.0 * flexibility / (pi * face_width_m)
 
 
-def load_dependent_contact_coefficient(one: Material, two: Material, face_width_m: float) -> float:
+def load_dependent_contact_coefficient(material_1: Material, material_2: Material, face_width_m: float) -> float:
     """B of the approach δ = B F^0.9 of a line contact, B = 1.275/(E^0.9 b^0.8), in m/N^0.9.
 
     E is the harmonic mean of the two moduli.
 
     Source: A. Palmgren, *Ball and Roller Bearing Engineering* (1959), for the exponents; 1.275 as used for steel gears.
     """
-    e = 2.0 / (1.0 / one.youngs_modulus_pa + 1.0 / two.youngs_modulus_pa)
+    e = 2.0 / (1.0 / material_1.youngs_modulus_pa + 1.0 / material_2.youngs_modulus_pa)
     return float(1.275 / (e**0.9 * face_width_m**0.8))
 
 
@@ -502,8 +502,8 @@ class GearMesh:
     def side(self, number: int) -> MeshSide:
         """Return gear 1, the driver, or gear 2, the driven one, with what is its own."""
         if number == 1:
-            one = (self.pair.driver, self.material_1, self.flank_1, self.roughness_1)
-            return MeshSide(*one, self.cracks_1, self.spalls_1, self.chips_1)
+            driver_side = (self.pair.driver, self.material_1, self.flank_1, self.roughness_1)
+            return MeshSide(*driver_side, self.cracks_1, self.spalls_1, self.chips_1)
         two = (self.pair.driven, self.material_2, self.flank_2, self.roughness_2)
         return MeshSide(*two, self.cracks_2, self.spalls_2, self.chips_2)
 
@@ -566,12 +566,12 @@ class GearMesh:
         weight = weight * (smooth_step(leaving) if self.ramp else leaving)
         alone = replace(self, body="separate")
         bodies = [alone.gear_compliance(number, at.ravel()).reshape(at.shape) for number in (1, 2)]
-        own = self.contact_compliance + bodies[0] + bodies[1]
+        direct = self.contact_compliance + bodies[0] + bodies[1]
         coupling = [self._coupling(number, at, places) for number in (1, 2)]
-        both = weight[:, :, None] * (coupling[0] + coupling[1])
-        forces = np.linalg.solve(both + own[:, :, None] * np.eye(len(places)), weight[:, :, None])[:, :, 0]
+        mutual = weight[:, :, None] * (coupling[0] + coupling[1])
+        forces = np.linalg.solve(mutual + direct[:, :, None] * np.eye(len(places)), weight[:, :, None])[:, :, 0]
         moved = [np.einsum("nj,nj->n", c[:, middle], forces) for c in coupling]  # by the neighbours, for δ = 1
-        result: FloatArray = own[:, middle] * moved[side - 1] / (1.0 - moved[0] - moved[1])
+        result: FloatArray = direct[:, middle] * moved[side - 1] / (1.0 - moved[0] - moved[1])
         return result
 
     def _coupling(self, side: int, at: FloatArray, places: NDArray[np.int64]) -> FloatArray:

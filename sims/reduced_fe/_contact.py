@@ -173,7 +173,7 @@ class ContactTable:
     start, step : float
         Least ζ, and distance of the columns (1/`POINTS_PER_PITCH`). One column lies beyond either end, for cubics.
     contact_ratio : float
-    own : array, (n, n_slices, n_slices)
+    direct : array, (n, n_slices, n_slices)
         Compliance between the slices of a pair, both gears together, m/N.
     cross : array, (n_offsets, n, n_slices, n_slices)
         Between a pair at ζ (first slice) and the pair that entered o + 1 pitches earlier (second), m/N.
@@ -191,7 +191,7 @@ class ContactTable:
     start: float
     step: float
     contact_ratio: float
-    own: FloatArray
+    direct: FloatArray
     cross: FloatArray
     corner_m: FloatArray
     extra: ToothRows
@@ -202,7 +202,7 @@ class ContactTable:
     @property
     def progress(self) -> FloatArray:
         """ζ of the columns."""
-        result: FloatArray = self.start + self.step * np.arange(-1, len(self.own) - 1)
+        result: FloatArray = self.start + self.step * np.arange(-1, len(self.direct) - 1)
         return result
 
     def column(self, progress: float) -> int:
@@ -212,19 +212,19 @@ class ContactTable:
     @property
     def n_slices(self) -> int:
         """Slices of the face width."""
-        return int(self.own.shape[1])
+        return int(self.direct.shape[1])
 
     @property
     def n_slots(self) -> int:
         """Most pairs that may touch at once, corners included."""
-        return floor((len(self.own) - 3) * self.step) + 1
+        return floor((len(self.direct) - 3) * self.step) + 1
 
     @property
     def arrays(self) -> tuple[FloatArray | NDArray[np.int64], ...]:
         """In the order in which kernels take them; one of each kind for both gears, the driver's rows first."""
         of = np.vstack((self.extra.of, self.separation.of))
         extra, separation = self.extra.rows, self.separation.rows
-        return self.own, self.cross, self.corner_m, extra, separation, of, self.pitch_m, self.hertz
+        return self.direct, self.cross, self.corner_m, extra, separation, of, self.pitch_m, self.hertz
 
 
 def contact_table(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, compliance: ToothCompliance) -> ContactTable:
@@ -251,9 +251,9 @@ def contact_table(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, compli
     n = n_before + ceil((pair.contact_ratio + mesh.overlap_ratio + MARGIN) * POINTS_PER_PITCH) + 3
     step = 1.0 / POINTS_PER_PITCH
     progress = -MARGIN + step * np.arange(-1, n - 1)
-    own_progress = slice_progress(pair, mesh.lead, z_m, progress)
-    inside = np.clip(own_progress, 0.0, pair.contact_ratio)
-    own, cross = _compliances(gears, mesh, progress, compliance)
+    slices_progress = slice_progress(pair, mesh.lead, z_m, progress)
+    inside = np.clip(slices_progress, 0.0, pair.contact_ratio)
+    direct, cross = _compliances(gears, mesh, progress, compliance)
     faults = [fault_compliance_rows(gears[side - 1], mesh, side, inside[:, 0]) for side in (1, 2)]
     tables = [separation_table(mesh, inside[:, s]) for s in (range(len(z_m)) if mesh.overlap_ratio else (0,))]
     separation, pitch_m = tables[0]
@@ -263,9 +263,9 @@ def contact_table(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, compli
         start=-MARGIN,
         step=step,
         contact_ratio=pair.contact_ratio,
-        own=own,
+        direct=direct,
         cross=cross,
-        corner_m=corner_separation_m(pair, own_progress) + mesh.lead.gap_m(z_m * 1e3 / pair.face_width_mm),
+        corner_m=corner_separation_m(pair, slices_progress) + mesh.lead.gap_m(z_m * 1e3 / pair.face_width_mm),
         extra=tooth_rows(*faults, share_first=True),
         separation=separation._replace(rows=np.ascontiguousarray(np.broadcast_to(rows, (*rows.shape[:2], len(z_m))))),
         pitch_m=pitch_m,
@@ -302,24 +302,26 @@ def _compliances(
     """Own and cross compliance of both gears together; see `ContactTable`."""
     n, n_slices = len(progress), len(gears[0].grid.z_m)
     n_offsets = floor((n - 1) / POINTS_PER_PITCH)
-    own = np.zeros((n, n_slices, n_slices))
+    direct = np.zeros((n, n_slices, n_slices))
     cross = np.zeros((n_offsets, n, n_slices, n_slices))
-    own_progress = slice_progress(mesh.pair, mesh.lead, gears[0].grid.z_m, progress)
-    here = rolls_rad(mesh.pair, own_progress)
-    for gear, sign, roll, side in zip(gears, SIGNS, here, (0, 1), strict=True):
+    slices_progress = slice_progress(mesh.pair, mesh.lead, gears[0].grid.z_m, progress)
+    rolls = rolls_rad(mesh.pair, slices_progress)
+    for gear, sign, roll, side in zip(gears, SIGNS, rolls, (0, 1), strict=True):
         block = _between(gear, [0], compliance)
         if mesh.overlap_ratio:
-            each = _over_both(gear.grid.roll_rad, block, roll, roll)
+            block_direct = _over_both(gear.grid.roll_rad, block, roll, roll)
             itself = np.einsum("hshs->hs", block)  # a slice is at one height, whatever the others'
-            each[:, range(each.shape[1]), range(each.shape[1])] = over_height(gear.grid.roll_rad, itself, roll)
-            own += each
+            block_direct[:, range(block_direct.shape[1]), range(block_direct.shape[1])] = over_height(
+                gear.grid.roll_rad, itself, roll
+            )
+            direct += block_direct
         else:
-            own += _along_diagonal(gear.grid.roll_rad, block, roll[:, 0])
+            direct += _along_diagonal(gear.grid.roll_rad, block, roll[:, 0])
         for o in range(min(n_offsets, gear.n_offsets - 1)):
-            older = rolls_rad(mesh.pair, own_progress + o + 1.0)[side]
+            older = rolls_rad(mesh.pair, slices_progress + o + 1.0)[side]
             block = _between(gear, [0, -sign * (o + 1)], compliance)
             cross[o] += _over_both(gear.grid.roll_rad, block, roll, older)
-    return own, cross
+    return direct, cross
 
 
 def _between(gear: ReducedGear, teeth: list[int], compliance: ToothCompliance) -> FloatArray:
@@ -377,8 +379,8 @@ def mirrors(table: ContactTable) -> bool:
     if not np.allclose(table.corner_m, table.corner_m[:, ::-1], rtol=1e-9, atol=1e-16) or table.n_slices < 2:
         return False
     return all(
-        bool(np.max(np.abs(c - c[..., ::-1, ::-1])) <= ALIKE * np.max(np.abs(table.own)))
-        for c in (table.own, table.cross, table.extra.rows)
+        bool(np.max(np.abs(c - c[..., ::-1, ::-1])) <= ALIKE * np.max(np.abs(table.direct)))
+        for c in (table.direct, table.cross, table.extra.rows)
     )
 
 
@@ -396,7 +398,7 @@ def folded(table: ContactTable) -> ContactTable:
 
     return replace(
         table,
-        own=grouped(table.own),
+        direct=grouped(table.direct),
         cross=grouped(table.cross),
         extra=table.extra._replace(rows=grouped(table.extra.rows)),
         corner_m=table.corner_m @ mean,
@@ -545,8 +547,11 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
         if i > last:
             break
         t = place - int(place)
-        one, two = int(pair - teeth[0] * np.floor(pair / teeth[0])), int(pair - teeth[1] * np.floor(pair / teeth[1]))
-        a, b = rows[2, one], rows[3, two]
+        tooth_1, tooth_2 = (
+            int(pair - teeth[0] * np.floor(pair / teeth[0])),
+            int(pair - teeth[1] * np.floor(pair / teeth[1])),
+        )
+        a, b = rows[2, tooth_1], rows[3, tooth_2]
         nearest = reach
         for s in range(corner.shape[1]):
             e0 = corner[i - 1, s] + separation[a, i - 1, s] + separation[b, i - 1, s]
@@ -555,9 +560,9 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
             e3 = corner[i + 2, s] + separation[a, i + 2, s] + separation[b, i + 2, s]
             # The cubic with the slopes (e2 − e0)/2 and (e3 − e1)/2: continuous slopes, as the contact's damping needs.
             c1, c2, c3 = 0.5 * (e2 - e0), e0 - 2.5 * e1 + 2.0 * e2 - 0.5 * e3, 1.5 * (e1 - e2) + 0.5 * (e3 - e0)
-            here = e1 + t * (c1 + t * (c2 + t * c3)) + pitch[0, one] + pitch[1, two]
-            apart[n, s], slope[n, s] = here, (c1 + t * (2.0 * c2 + t * 3.0 * c3)) / step
-            nearest = min(nearest, here)
+            separation_m = e1 + t * (c1 + t * (c2 + t * c3)) + pitch[0, tooth_1] + pitch[1, tooth_2]
+            apart[n, s], slope[n, s] = separation_m, (c1 + t * (2.0 * c2 + t * 3.0 * c3)) / step
+            nearest = min(nearest, separation_m)
         if nearest < reach:
             pairs[n], columns[n], parts[n] = pair, i, t
             n += 1
@@ -565,18 +570,21 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
-def fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r):
+def fill_compliance(n, pairs, columns, parts, teeth, direct, cross, extra, rows, r):
     """Fill r[p·n_s + s, q·n_s + t] with the compliance between slices of the near pairs; both triangles."""
-    n_s = own.shape[1]
+    n_s = direct.shape[1]
     for p in range(n):
         i, t = columns[p], parts[p]
         pair = pairs[p]
-        one, two = int(pair - teeth[0] * np.floor(pair / teeth[0])), int(pair - teeth[1] * np.floor(pair / teeth[1]))
-        a, b = rows[0, one], rows[1, two]
+        tooth_1, tooth_2 = (
+            int(pair - teeth[0] * np.floor(pair / teeth[0])),
+            int(pair - teeth[1] * np.floor(pair / teeth[1])),
+        )
+        a, b = rows[0, tooth_1], rows[1, tooth_2]
         at = p * n_s
         for s in range(n_s):
             for u in range(n_s):
-                r[at + s, at + u] = own[i, s, u] + t * (own[i + 1, s, u] - own[i, s, u])
+                r[at + s, at + u] = direct[i, s, u] + t * (direct[i + 1, s, u] - direct[i, s, u])
         for row in (a, b):
             if row > 0:  # a faulty tooth
                 for s in range(n_s):
@@ -595,17 +603,20 @@ def fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
-def compliance_slope_energy(n, pairs, columns, teeth, own, cross, extra, rows, step, force):
+def compliance_slope_energy(n, pairs, columns, teeth, direct, cross, extra, rows, step, force):
     """½ Nᵀ (∂R/∂ζ) N of the near pairs, in J per base pitch."""
-    n_s, total = own.shape[1], 0.0
+    n_s, total = direct.shape[1], 0.0
     for p in range(n):
-        i, pair, at = columns[p], pairs[p], p * own.shape[1]
-        one, two = int(pair - teeth[0] * np.floor(pair / teeth[0])), int(pair - teeth[1] * np.floor(pair / teeth[1]))
-        a, b = rows[0, one], rows[1, two]
+        i, pair, at = columns[p], pairs[p], p * direct.shape[1]
+        tooth_1, tooth_2 = (
+            int(pair - teeth[0] * np.floor(pair / teeth[0])),
+            int(pair - teeth[1] * np.floor(pair / teeth[1])),
+        )
+        a, b = rows[0, tooth_1], rows[1, tooth_2]
         for s in range(n_s):
             line = 0.0
             for u in range(n_s):
-                line += (own[i + 1, s, u] - own[i, s, u]) * force[at + u]
+                line += (direct[i + 1, s, u] - direct[i, s, u]) * force[at + u]
             for row in (a, b):
                 if row > 0:
                     for u in range(n_s):
@@ -830,9 +841,9 @@ def _separations(table: ContactTable, mesh: GearMesh, cycles: FloatArray) -> Flo
         pair = newest - slot
         progress = cycles - pair
         inside = progress <= table.progress[-1]
-        one, two = (np.mod(pair[inside], z).astype(int) for z in teeth_of(mesh))
-        total = table.pitch_m[0, one] + table.pitch_m[1, two]
-        for i, (a, b) in enumerate(zip(table.separation.of[0, one], table.separation.of[1, two], strict=True)):
+        tooth_1, tooth_2 = (np.mod(pair[inside], z).astype(int) for z in teeth_of(mesh))
+        total = table.pitch_m[0, tooth_1] + table.pitch_m[1, tooth_2]
+        for i, (a, b) in enumerate(zip(table.separation.of[0, tooth_1], table.separation.of[1, tooth_2], strict=True)):
             whole = (table.corner_m + table.separation.rows[a] + table.separation.rows[b]).min(axis=1)
             total[i] += np.interp(progress[inside][i], table.progress, whole)
         apart[inside, slot] = total
@@ -860,7 +871,7 @@ class ContactState(NamedTuple):
 
 def contact_state(table: ContactTable, mesh: GearMesh, force_n: float, mesh_cycles: float) -> ContactState:
     """Solve the contact at one mesh angle and return what a linear model about it needs."""
-    own, cross, corner, extra, separation, rows, pitch, hertz = table.arrays
+    direct, cross, corner, extra, separation, rows, pitch, hertz = table.arrays
     slots, n_s = table.n_slots, table.n_slices
     pairs, parts = np.zeros(slots), np.zeros(slots)
     apart, slope = np.zeros((slots, n_s)), np.zeros((slots, n_s))
@@ -869,7 +880,7 @@ def contact_state(table: ContactTable, mesh: GearMesh, force_n: float, mesh_cycl
     near = (at, table.start, table.step, corner, separation, rows, pitch, teeth, 1e9)
     n = near_pairs(*near, pairs, columns, parts, apart, slope)
     r = np.zeros((slots * n_s, slots * n_s))
-    fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r)
+    fill_compliance(n, pairs, columns, parts, teeth, direct, cross, extra, rows, r)
     _, force, _ = _solved(table, mesh, np.array([at]), np.array([force_n]), by_force=True)
     carried = force[0, 0, :n].ravel()
     small = SMALL_PART * force_n / n_s
@@ -899,15 +910,15 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
     delta : (n_c, n_loads) δ in m, or the total force.
     force, tangent : (n_c, n_loads, n_slots, n_slices) N, and dN/dδ; slot j is pair ⌊c − start⌋ − j.
     """
-    own, cross, corner, extra, separation, rows, pitch, hertz = arrays
-    n_s = own.shape[1]
-    most = n_slots * n_s
+    direct, cross, corner, extra, separation, rows, pitch, hertz = arrays
+    n_s = direct.shape[1]
+    n_max = n_slots * n_s
     pairs, parts = np.empty(n_slots), np.empty(n_slots)
     apart, slope = np.empty((n_slots, n_s)), np.empty((n_slots, n_s))
     columns = np.empty(n_slots, dtype=np.int64)
-    r, a = np.empty((most, most)), np.empty((most, most))
-    approach, n_at, w, x, unit = np.empty(most), np.empty(most), np.empty(most), np.empty(most), np.empty(most)
-    order = np.empty(most, dtype=np.int64)
+    r, a = np.empty((n_max, n_max)), np.empty((n_max, n_max))
+    approach, n_at, w, x, unit = np.empty(n_max), np.empty(n_max), np.empty(n_max), np.empty(n_max), np.empty(n_max)
+    order = np.empty(n_max, dtype=np.int64)
     for row in range(cycles.shape[0]):
         # Pairs near contact at this mesh angle, and the compliance between their slices.
         n = near_pairs(
@@ -915,7 +926,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
         )
         if n <= 0:
             return False
-        fill_compliance(n, pairs, columns, parts, teeth, own, cross, extra, rows, r)
+        fill_compliance(n, pairs, columns, parts, teeth, direct, cross, extra, rows, r)
         # The first load starts from no force, where the nearest flanks touch; each further one from the one before.
         nearest = 1e9
         for p in range(n):

@@ -88,10 +88,10 @@ def torsional_mode(
         Mesh angles in a cycle.
     """
     pair_constants = constants(pair, operation) if ready is None else ready
-    frequency, contact, others_damping = _torsional(pair, pair_constants, operation, one_mesh_cycle(n_points)).mean(
+    frequency, contact, other_damping = _torsional(pair, pair_constants, operation, one_mesh_cycle(n_points)).mean(
         axis=0
     )
-    return TorsionalMode(float(frequency), float(contact), float(others_damping))
+    return TorsionalMode(float(frequency), float(contact), float(other_damping))
 
 
 def torsional_curve_hz(pair: FlexiblePair, operation: Operation, mesh_cycles: FloatArray) -> FloatArray:
@@ -104,15 +104,15 @@ def _torsional(
 ) -> FloatArray:
     """Frequency, contact part and damping ratio of others at each mesh angle, (n_c, 3)."""
     rates = np.concatenate([side.damping_rate for side in pair_constants.sides])
-    found = []
+    modes = []
     for c in mesh_cycles:
         squares, shapes, rows, stiff = _squares(pair, pair_constants, operation, c)
         energy = np.einsum("ij,ik,kj->j", rows @ shapes, stiff, rows @ shapes)
         part = energy / np.maximum(squares, (2.0 * pi * MIN_TORSIONAL_HZ) ** 2)
         mode = int(np.argmax(part))
         omega = float(np.sqrt(squares[mode]))
-        found.append((omega / (2.0 * pi), part[mode], float(rates @ shapes[:, mode] ** 2) / (2.0 * omega)))
-    return np.array(found)
+        modes.append((omega / (2.0 * pi), part[mode], float(rates @ shapes[:, mode] ** 2) / (2.0 * omega)))
+    return np.array(modes)
 
 
 def _squares(
@@ -131,17 +131,17 @@ def contact_rows(
     """Return ∂D/∂η of the points that touch under the set torque, (n, n_modes), and their stiffness, (n, n)."""
     force = max(operation.torque_nm.largest / pair_constants.base_radius_m[0], MIN_FORCE_N)
     at = contact_state(pair_constants.table, pair.machine.mesh, force, cycles)
-    one, two = pair_constants.sides
-    turn, n = pair_constants.turn(), one.n_modes
+    driver, driven = pair_constants.sides
+    turn, n = pair_constants.turn(), driver.n_modes
     rows = np.zeros((len(at.force_n), 2 * n))
     for point, (number, column, part) in enumerate(zip(at.pair, at.column, at.part, strict=True)):
-        for index, side in enumerate((one, two)):
+        for index, side in enumerate((driver, driven)):
             tooth = int(number % pair_constants.record["teeth"][index])
             s = point % pair_constants.table.n_slices
-            seen = (1.0 - part) * side.rows[column, s] + part * side.rows[column + 1, s]
+            in_sector = (1.0 - part) * side.rows[column, s] + part * side.rows[column + 1, s]
             cosine, sine = turn[index, tooth]
-            c, d = np.split(seen[side.n_single :], 2)
-            full = np.concatenate((seen[: side.n_single], cosine * c - sine * d, sine * c + cosine * d))
+            c, d = np.split(in_sector[side.n_single :], 2)
+            full = np.concatenate((in_sector[: side.n_single], cosine * c - sine * d, sine * c + cosine * d))
             rows[point, index * n : index * n + len(full)] = full
     touching = at.force_n > 0.0
     rows = rows[touching]

@@ -207,8 +207,8 @@ def stress_intensity(
         force = share_torque(cracked, torque_nm, cycles).pair_forces_n[np.arange(len(cycles)), slot]
         slope = np.maximum(over_height(gear.grid.roll_rad, release, roll), 0.0)
         k = force * np.sqrt(stiffness * slope / (2.0 * mesh.face_width_m))
-        most = int(np.argmax(k))
-        rows.append((float(k[most]) * 1e-6, float(force[most]), float(cycles[most])))
+        worst = int(np.argmax(k))
+        rows.append((float(k[worst]) * 1e-6, float(force[worst]), float(cycles[worst])))
     k_values, forces, at = np.array(rows).T
     return StressIntensity(depths, k_values, forces, at)
 

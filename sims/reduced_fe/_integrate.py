@@ -244,22 +244,22 @@ N_EXTRAS = 14
 
 def room(shape: tuple[int, ...], n_modes: int, n_rows: int) -> tuple[Any, ...]:
     """Return what `march` writes to besides its results, nothing of which is kept; shape: (n_slots, n_slices)."""
-    n_slots, most = shape[0], shape[0] * shape[1]
+    n_slots, n_max = shape[0], shape[0] * shape[1]
     places = np.empty(n_slots), np.empty(n_slots), np.empty(shape), np.empty(shape)
-    integers = np.empty(n_slots, dtype=np.int64), np.empty(most, dtype=np.int64)
-    squares = np.empty((most, most)), np.empty((most, most))
-    points = (*(np.empty(most) for _ in range(4)), np.empty(most), np.zeros(most), np.empty(most), np.empty(most))
+    integers = np.empty(n_slots, dtype=np.int64), np.empty(n_max, dtype=np.int64)
+    squares = np.empty((n_max, n_max)), np.empty((n_max, n_max))
+    points = (*(np.empty(n_max) for _ in range(4)), np.empty(n_max), np.zeros(n_max), np.empty(n_max), np.empty(n_max))
     seen = tuple(np.empty(n_rows) for _ in range(3))
     modes = tuple(np.empty((2, n_modes)) for _ in range(6))
-    return places, integers, squares, points, seen, modes, np.zeros(N_EXTRAS + n_slots + most)
+    return places, integers, squares, points, seen, modes, np.zeros(N_EXTRAS + n_slots + n_max)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
 def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scratch that they share
     k, arrays, rows, turn, coefficients, modal, inputs, rigid, back_row, state, speed, torque, time, step, n_steps,
-    stride, precise, lines, found, energies, scratch,
+    stride, precise, lines, output, energies, scratch,
 ):  # fmt: skip
-    """Run `n_steps` steps; fill `found` with the wanted signals at every `stride`-th.
+    """Run `n_steps` steps; fill `output` with the wanted signals at every `stride`-th.
 
     k : record, see `sims.reduced_fe`.
     arrays : see `ContactTable.arrays`.
@@ -277,12 +277,12 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
     lines : (kinds (n,), factors (n, 2, n_modes), set factors (n,)): wanted signals; kind 0, 1, 2: displacement,
         velocity, acceleration; 3 + i: extra i = mesh force, back force, mesh cycles, nearest depth, torque of moving
         contact on the driver, friction, then the force of each slot, then of each of its slices.
-    found : (n_out, n). energies : (n_out,) or (0,).
+    output : (n_out, n). energies : (n_out,) or (0,).
     scratch : see `room`.
     Returns the number of rows filled, fewer where the solution burst.
     """
     q, v, f, f_before, held, held_root, held_pair, rest = state
-    own, cross, corner, extra, separation, table_rows, pitch, hertz = arrays
+    direct, cross, corner, extra, separation, table_rows, pitch, hertz = arrays
     kinds, factors, set_factors = lines
     n_slots, n_s = held.shape
     n_modes = q.shape[1]
@@ -326,7 +326,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
                 k, n, rows, turn, q1, v1, pairs, columns, parts, apart, slope, off, seen, moving, approach,
                 viscous, along,
             )  # fmt: skip
-            fill_compliance(n, pairs, columns, parts, k.teeth, own, cross, extra, table_rows, r)
+            fill_compliance(n, pairs, columns, parts, k.teeth, direct, cross, extra, table_rows, r)
             done, m = solve_contacts(r, n * n_s, approach, hertz, k.small, force, root, enough, order, a, x)
             if done < 0:
                 return n_out
@@ -339,7 +339,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
                 along_cycles += elastic[i] * along[i]
             if k.moving_force:
                 along_cycles -= compliance_slope_energy(
-                    n, pairs, columns, k.teeth, own, cross, extra, table_rows, k.column_step, elastic
+                    n, pairs, columns, k.teeth, direct, cross, extra, table_rows, k.column_step, elastic
                 )
                 along_torque = -k.cycles_per_rad * along_cycles
             off_1, across_1 = k.runout[0] * sin(phi_1), k.runout[0] * cos(phi_1)
@@ -386,7 +386,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             _bounce(k, rigid, v)
         rest[1] = touches
         # The wanted signals of this step.
-        if number % stride == 0 and n_out < found.shape[0]:
+        if number % stride == 0 and n_out < output.shape[0]:
             extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - margin, along_torque
             extras[5] = rubbing
             _yields(k, inputs, q, angle, load, extras)
@@ -394,13 +394,13 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             _accelerations(q, v, f, modal, q1)  # scratch until the next step
             for line in range(kinds.shape[0]):
                 if kinds[line] >= 3:
-                    found[n_out, line] = extras[kinds[line] - 3]
+                    output[n_out, line] = extras[kinds[line] - 3]
                 elif kinds[line] == 2:
-                    found[n_out, line] = set_factors[line] * rate1 + seen_in(factors, line, q1)
+                    output[n_out, line] = set_factors[line] * rate1 + seen_in(factors, line, q1)
                 elif kinds[line] == 1:
-                    found[n_out, line] = set_factors[line] * w1 + seen_in(factors, line, v)
+                    output[n_out, line] = set_factors[line] * w1 + seen_in(factors, line, v)
                 else:
-                    found[n_out, line] = set_factors[line] * angle + seen_in(factors, line, q)
+                    output[n_out, line] = set_factors[line] * angle + seen_in(factors, line, q)
             if energies.shape[0] > 0:
                 energies[n_out] = _energy(k, q, v, modal, inputs, angle, load, r, n * n_s, force, back, hertz)
             n_out += 1
@@ -498,8 +498,8 @@ def _rubbing(k, n, n_s, pairs, cycles, force, omega, slip_x):
         for s in range(n_s):
             carried += force[p * n_s + s]
         if carried > 0.0:
-            one, two, three = friction_of_pair(k, carried, cycles - pairs[p], omega, slip_x)
-            rubbing, moment_1, moment_2 = rubbing + one, moment_1 + two, moment_2 + three
+            pair_force, pair_moment_1, pair_moment_2 = friction_of_pair(k, carried, cycles - pairs[p], omega, slip_x)
+            rubbing, moment_1, moment_2 = rubbing + pair_force, moment_1 + pair_moment_1, moment_2 + pair_moment_2
     return rubbing, moment_1, moment_2
 
 

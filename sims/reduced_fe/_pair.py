@@ -91,19 +91,19 @@ def rolling_fields(
     """
     _check_load(machine, operation)
     springs = np.zeros((4, 2, 2))
-    given, play = np.zeros((4, 2)), np.zeros((4, 2))
+    yield_m, play = np.zeros((4, 2)), np.zeros((4, 2))
     for row, (support, load) in enumerate(zip(machine.bearings, loads_n, strict=True)):
         for spring in bearing_springs(support, load):
             springs[row] += spring.n_per_m * np.outer(spring.direction, spring.direction)
-        given[row] = load / support.stiffness_n_per_m
+        yield_m[row] = load / support.stiffness_n_per_m
         if support.clearance_um > 0.0:
             play[row] = support.clearance_um * 1e-6 * load / np.hypot(*load)
-    fields = {"bearing_yield": given, "bearing_play": play, "bearing_spring": springs}
+    fields = {"bearing_yield": yield_m, "bearing_play": play, "bearing_spring": springs}
     return bearing_fields(machine, force_n, rng) | fields
 
 
 def _check_load(machine: Machine, operation: Operation) -> None:
-    least = float(np.min(operation.torque_nm.values))
+    smallest_nm = float(np.min(operation.torque_nm.values))
     if any(b.law == "hertzian" for b in machine.bearings):
         raise InputError(
             "bearings of flexible gears are springs about their load",
@@ -112,9 +112,10 @@ def _check_load(machine: Machine, operation: Operation) -> None:
             remedy="take the model 'cracked'",
         )
     loose = next((b for b in machine.bearings if b.clearance_um > 0.0), None)
-    if loose is not None and least <= 0.0:
+    if loose is not None and smallest_nm <= 0.0:
         raise InputError(
-            f"torque_nm falls to {least:g} N m and {loose.bearing.name!r} has clearance: the shaft would lift in it",
+            f"torque_nm falls to {smallest_nm:g} N m and {loose.bearing.name!r} has clearance: "
+            "the shaft would lift in it",
             where="clearance_um",
             allowed="a torque above 0 all the time, or no clearance",
             remedy="take the model 'cracked', whose bearings let the shaft lift",
@@ -183,14 +184,14 @@ def without_hub(
     table: ContactTable, mesh: GearMesh, gears: tuple[ReducedGear, ReducedGear], hubs: tuple[HubSprings, HubSprings]
 ) -> ContactTable:
     """Return the table with the hubs' places given: less what flanks move by the springs of their hubs."""
-    own, cross = table.own.copy(), table.cross.copy()
+    direct, cross = table.direct.copy(), table.cross.copy()
     for index, (gear, hub) in enumerate(zip(gears, hubs, strict=True)):
-        here = hub.seen_from_the_line_of_action(gear, mesh, index, table.progress)
-        own -= np.einsum("nsc,ntc,c->nst", here, here, 1.0 / hub.compliance)
+        of_hub = hub.seen_from_the_line_of_action(gear, mesh, index, table.progress)
+        direct -= np.einsum("nsc,ntc,c->nst", of_hub, of_hub, 1.0 / hub.compliance)
         for o in range(len(cross)):
             older = hub.seen_from_the_line_of_action(gear, mesh, index, table.progress + o + 1.0)
-            cross[o] -= np.einsum("nsc,ntc,c->nst", here, older, 1.0 / hub.compliance)
-    return replace(table, own=own, cross=cross)
+            cross[o] -= np.einsum("nsc,ntc,c->nst", of_hub, older, 1.0 / hub.compliance)
+    return replace(table, direct=direct, cross=cross)
 
 
 # One side of the pair as modes: rotor, shaft, bearings, hub, the gear's body, and its elastic modes.
@@ -328,8 +329,8 @@ def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> Retain
 def residual_compliance(gear: ReducedGear, teeth: list[int], kept: RetainedModes) -> FloatArray:
     """Free compliance less that of the kept modes, C − Σ φφᵀ/ω²."""
     modes = np.hstack([gear.modes_at(t)[kept.all] for t in teeth]) / gear.angular_frequencies_rad_s[kept.all, None]
-    rest: FloatArray = gear.compliance_m_per_n(teeth) - modes.T @ modes
-    return rest
+    residual: FloatArray = gear.compliance_m_per_n(teeth) - modes.T @ modes
+    return residual
 
 
 def build_side(
@@ -371,24 +372,24 @@ def build_side(
     rows = rows - np.einsum("nsc,sg,cj->ngj", at_hub, mean, stretched / springs.compliance[:, None])
     silent = np.max(np.abs(rows), axis=(0, 1)) < 1e-9 * np.max(np.abs(rows))
     line = [np.flatnonzero(~silent), np.flatnonzero(silent)]
-    others = np.concatenate((kept.single[alone], kept.pairs[:, 0], kept.pairs[:, 1]))
-    elastic_omega = gear.angular_frequencies_rad_s[others]
+    elastic_modes = np.concatenate((kept.single[alone], kept.pairs[:, 0], kept.pairs[:, 1]))
+    elastic_omega = gear.angular_frequencies_rad_s[elastic_modes]
 
     def joined(train: FloatArray, rest: FloatArray) -> FloatArray:
         """Modes that stand alone, pairs, silent ones; modes along the last axis."""
         return np.concatenate((train[..., line[0]], rest, train[..., line[1]]), axis=-1)
 
-    zero = np.zeros(len(others))
+    zero = np.zeros(len(elastic_modes))
     turning = np.zeros(mass.shape[0])
     turning[[ROTOR, GEAR, HUB]] = 1.0 if index == 0 else 1.0 / machine.ratio
     forces = _input_places(len(shapes), -(mass @ turning)) @ shapes
     return FlexibleSide(
         omega_rad_s=joined(np.sqrt(squares), elastic_omega),
         damping_rate=joined(rate, 2.0 * body_damping_ratio * elastic_omega),
-        shapes=joined(shapes[: len(COORDINATES)], np.zeros((len(COORDINATES), len(others)))),
-        inputs=joined(forces, np.zeros((len(INPUTS), len(others)))),
+        shapes=joined(shapes[: len(COORDINATES)], np.zeros((len(COORDINATES), len(elastic_modes)))),
+        inputs=joined(forces, np.zeros((len(INPUTS), len(elastic_modes)))),
         hub=joined(base_m * shapes[HUB], zero),
-        rows=np.ascontiguousarray(np.concatenate((rows[:, :, line[0]], elastic[:, :, others]), axis=2)),
+        rows=np.ascontiguousarray(np.concatenate((rows[:, :, line[0]], elastic[:, :, elastic_modes]), axis=2)),
         rigid=joined(rigid, zero),
         diameters=SIGNS[index] * gear.nodal_diameters[kept.pairs[:, 0]].astype(np.float64),
         n_single=len(line[0]) + len(alone),
@@ -400,8 +401,8 @@ def _elastic_rows(machine: Machine, index: int, gear: ReducedGear, table: Contac
     """∂D/∂q of all elastic modes at tooth 0, (n, n_groups, n_modes): minus the push displacement."""
     roll = slice_rolls_rad(gear, machine.mesh, index, table.progress)
     flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK]
-    each = over_height(gear.grid.roll_rad, np.moveaxis(flank, 0, -1), roll)
-    result: FloatArray = -np.einsum("nsm,sg->ngm", each, mean)
+    of_slices = over_height(gear.grid.roll_rad, np.moveaxis(flank, 0, -1), roll)
+    result: FloatArray = -np.einsum("nsm,sg->ngm", of_slices, mean)
     return result
 
 
@@ -409,13 +410,13 @@ def hub_inertia(machine: Machine, index: int, gear: ReducedGear) -> tuple[float,
     """Mass (kg) and moment of inertia (kg m²) that hub and shaft add to the finite-element body."""
     wheel = machine.wheels[index]
     added = []
-    for what, unit, total, of_body in (
+    for quantity, unit, total, of_body in (
         ("mass", "kg", wheel.mass_kg, gear.mass_kg),
         ("inertia", "kg m^2", wheel.inertia_kg_m2, gear.polar_inertia_kg_m2),
     ):
         if total < of_body * (1.0 - INERTIA_TOLERANCE):
             raise InputError(
-                f"{what} of the {('driver', 'driven gear')[index]} is {total:.4g} {unit}",
+                f"{quantity} of the {('driver', 'driven gear')[index]} is {total:.4g} {unit}",
                 allowed=f"at least {of_body:.4g} {unit}, that of the toothed body alone",
             )
         added.append(max(total - of_body, 0.0))

@@ -76,11 +76,13 @@ def growth(
     nothing, same = np.zeros_like(qq), np.eye(len(qq))
     extrapolated = np.hstack((nothing, nothing, 2.0 * same, -same))
     free_q, free_v = np.hstack((qq, qv, q0, nothing)), np.hstack((vq, vv, v0, nothing))
-    seen = free_q + q1 @ extrapolated + float(pair_constants.record["damping_time"]) * (free_v + v1 @ extrapolated)
+    extrapolated_motion = (
+        free_q + q1 @ extrapolated + float(pair_constants.record["damping_time"]) * (free_v + v1 @ extrapolated)
+    )
     worst = 0.0
     for cycles in one_mesh_cycle(N_POINTS):
         rows, stiff = contact_rows(pair, pair_constants, operation, cycles)
-        force = -rows.T @ stiff @ rows @ seen
+        force = -rows.T @ stiff @ rows @ extrapolated_motion
         step = np.vstack(
             (free_q + q1 @ force, free_v + v1 @ force, force, np.hstack((nothing, nothing, same, nothing)))
         )
@@ -297,9 +299,9 @@ def _lines(
 
 def _place(pair_constants: FlexiblePairConstants, name: str, factors: FloatArray) -> float:
     """Fill the modal factors of a place; return that of the set angle."""
-    one, two = pair_constants.sides
+    driver, driven = pair_constants.sides
     if name == TRANSMISSION_ERROR:
-        factors[0], factors[1] = one.hub, -two.hub
+        factors[0], factors[1] = driver.hub, -driven.hub
         return 0.0
     number = MOVING.index(name)
     if number < 4:

@@ -410,11 +410,11 @@ class ReducedTwin(PairTwin):
         """The model that runs the twin."""
         return ReducedPair()
 
-    def _own_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
+    def _model_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
         return twin_parameters(values, self.nominal.teeth)
 
-    def _step_s(self, own: Preset) -> float:
-        del own
+    def _step_s(self, preset: Preset) -> float:
+        del preset
         return TWIN_STEP_S
 
 

@@ -15,7 +15,7 @@ import pytest
 from app.benchmark import diagnosers, run
 from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage, from_text, to_text
 from app.benchmark.cases import BLIND, SAME, Plan, PlannedCase
-from app.benchmark.diagnosers import DIAGNOSERS, USUAL, diagnoser, read_seen
+from app.benchmark.diagnosers import DIAGNOSERS, USUAL, diagnoser, read_visible
 from app.benchmark.run import ANSWERS_FOLDER, BenchmarkRequest, diagnosed, environment, run_benchmark, state_of_code
 from app.cli.main import main
 from gearsig.cache import FOLDERS
@@ -77,7 +77,7 @@ def everything_but_samples(folder):
 def test_cases_of_different_kind_differ_in_their_samples_only(folders):
     healthy, *others = (everything_but_samples(folder) for folder, _ in folders.values())
     assert all(other == healthy for other in others)
-    values = [read_seen(folder).recordings[0].values("a1") for folder, _ in folders.values()]
+    values = [read_visible(folder).recordings[0].values("a1") for folder, _ in folders.values()]
     assert all((values[0] != other).any() for other in values[1:])
 
 
@@ -121,7 +121,7 @@ def test_the_diagnosing_process_finds_no_label(folders):
 
 def test_the_diagnosing_simulator_makes_the_same_cases_too(tmp_path):
     truth = SHORT.make(case("single", "eccentricity", SAME), tmp_path)
-    seen = read_seen(tmp_path)
+    seen = read_visible(tmp_path)
     assert len(seen.recordings) == len(seen.references) == 1
     assert seen.recordings[0].truth is None
     assert [e["name"] for e in truth.labels["effects"]] == ["eccentricity"]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sims.blind import RunCondition, draw_case, draw_rig, measure, record_case, run, scene_of, write_seen
+from sims.blind import RunCondition, draw_case, draw_rig, measure, record_case, run, scene_of, write_visible
 
 N_ROUNDS = 6
 
@@ -33,7 +33,7 @@ def one_case(seed: int) -> tuple[float, float]:
     )
     with tempfile.TemporaryDirectory() as folder:
         began = time.process_time()
-        write_seen(record_case(case), Path(folder))
+        write_visible(record_case(case), Path(folder))
         spent = time.process_time() - began
     return spent, 2 * sum(c.duration_s for c in case.conditions) + sum(c.duration_s for c in case.references)
 

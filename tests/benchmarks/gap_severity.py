@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from app.benchmark.cases import Plan, PlannedCase
-from app.benchmark.diagnosers import VisibleCase, read_seen
+from app.benchmark.diagnosers import VisibleCase, read_visible
 from gearsig.errors import GearsigError
 from gearsig.gap import GapEffect, Interval, conditions_of, try_effects
 from gearsig.prepared import PreparedRecording
@@ -39,7 +39,7 @@ def fitted(plan: Plan, planned: PlannedCase) -> Fitted | None:
     """Try the true effect of a case; None where it is not tried, or the twin comes no nearer with it."""
     with tempfile.TemporaryDirectory() as name:
         effects = plan.make(planned, Path(name)).labels["effects"]
-        seen = read_seen(Path(name))
+        seen = read_visible(Path(name))
     (one,) = effects
     known = gap_simulator("cracked").gap_effects()[one["name"]]
     if known.is_nuisance or one["unit"].partition(" of ")[0] != (known.unit or "1"):

@@ -17,7 +17,7 @@ from math import sqrt
 
 import numpy as np
 
-from app.studies.crack_severity import RELIEF_ERROR, CrackCase, draw_case, draw_other_fault
+from app.studies.crack_severity import RELIEF_ERROR, CrackCase, draw_case, draw_tooth_fault
 from app.studies.drawn_rigs import simulate_rig
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.recording import Recording
@@ -134,7 +134,7 @@ def print_kinds(cases: list[CrackCase], seed: int, *, with_reference: bool) -> N
         reference = case.reference if with_reference else None
         if case.drawn.depth_mm > 0:
             rows[CRACKED][said(ask(case.recording, reference))] += 1
-        other = draw_other_fault(case.drawn, np.random.default_rng([seed, i, 2]))
+        other = draw_tooth_fault(case.drawn, np.random.default_rng([seed, i, 2]))
         if other is not None:
             kind, damaged = other
             rows[kind][said(ask(damaged, reference))] += 1

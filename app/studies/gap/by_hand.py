@@ -116,17 +116,17 @@ def _strange_order(rng: np.random.Generator, low: float, high: float) -> float:
 def _rolling_element(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     slip = 1.0 - rng.uniform(0.0, 0.015)
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
-    return textbook.knocks(2.0 * bearing["BSF"] * slip, 0.02, scene, rng, by=bearing["FTF"] * slip)
+    return textbook.impact_train(2.0 * bearing["BSF"] * slip, 0.02, scene, rng, by=bearing["FTF"] * slip)
 
 
-def _strange_knocks(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    return textbook.knocks(_strange_order(rng, 1, 12), float(rng.uniform(0.002, 0.05)), scene, rng)
+def _strange_impacts(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+    return textbook.impact_train(_strange_order(rng, 1, 12), float(rng.uniform(0.002, 0.05)), scene, rng)
 
 
 def _once_per_revolution(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """A loose key or coupling: longer than a tooth, and not of one mesh."""
     order = 1.0 if rng.uniform() < 0.5 else scene.teeth[0] / scene.teeth[1]
-    return textbook.knocks(order * float(rng.choice((1.0, 2.0))), 0.01, scene, rng)
+    return textbook.impact_train(order * float(rng.choice((1.0, 2.0))), 0.01, scene, rng)
 
 
 def _strange_tone(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
@@ -150,7 +150,7 @@ def _whirl(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArr
     return np.asarray(np.sum(waves, axis=0))
 
 
-def _other_machine(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _neighbouring_machine(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Lines at fixed frequencies, and their multiples."""
     first = log_uniform(rng, 17.0, 900.0)
     waves = [np.sin(2 * np.pi * k * first * scene.time_s + rng.uniform(0, 6)) / k for k in range(1, 6)]
@@ -166,15 +166,15 @@ def _inverter(scene: textbook.SyntheticScene, rng: np.random.Generator) -> Float
     return wave
 
 
-def _own_clock(scene: textbook.SyntheticScene, turn_hz: float, rng: np.random.Generator) -> FloatArray:
+def _asynchronous(scene: textbook.SyntheticScene, turn_hz: float, rng: np.random.Generator) -> FloatArray:
     """Return the revolutions of a neighbour's shaft, whose speed wanders a little."""
     unsteady = rng.uniform(0.0, 0.004) * np.sin(2 * np.pi * rng.uniform(0.05, 1.0) * scene.time_s + rng.uniform(0, 6))
     return np.asarray(np.cumsum(turn_hz * (1.0 + unsteady)) * (scene.time_s[1] - scene.time_s[0]))
 
 
-def _other_gear(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _neighbouring_gear(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """A neighbour's gear, pump or fan: multiples of its teeth or blades, modulated by its shaft, and that shaft."""
-    turns = _own_clock(scene, log_uniform(rng, 4.0, 60.0), rng)
+    turns = _asynchronous(scene, log_uniform(rng, 4.0, 60.0), rng)
     teeth, steep = float(rng.integers(3, 60)), rng.uniform(0.5, 2.0)
     waves = [np.cos(2 * np.pi * k * teeth * turns + rng.uniform(0, 6)) / k**steep for k in range(1, 5)]
     swell = 1.0 + rng.uniform(0.0, 0.8) * np.cos(2 * np.pi * turns + rng.uniform(0, 6))
@@ -191,7 +191,7 @@ def _loose_foot(scene: textbook.SyntheticScene, rng: np.random.Generator) -> Flo
 
 def _belt(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Slaps by a clock of their own, nearly regular, each nearly as hard."""
-    passed = _own_clock(scene, log_uniform(rng, 3.0, 60.0), rng)
+    passed = _asynchronous(scene, log_uniform(rng, 3.0, 60.0), rng)
     at = np.flatnonzero(np.diff(np.floor(passed)) > 0).astype(np.float64)
     scatter = rng.uniform(0.0, 0.02) * float(np.median(np.diff(at))) if len(at) > 1 else 0.0
     at = at + scatter * rng.standard_normal(len(at))
@@ -206,7 +206,7 @@ def _motor_field(scene: textbook.SyntheticScene, rng: np.random.Generator) -> Fl
     return np.asarray(beat * np.sum(waves, axis=0))
 
 
-def _random_knocks(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
+def _random_impacts(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Now and then, as of loose parts, or in great number, as of bubbles that collapse."""
     n = max(3, int(scene.time_s[-1] * log_uniform(rng, 1.0, 400.0)))
     places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
@@ -237,18 +237,18 @@ def _bad_contact(scene: textbook.SyntheticScene, rng: np.random.Generator) -> Fl
 
 FOREIGN: dict[str, Callable[[textbook.SyntheticScene, np.random.Generator], FloatArray]] = {
     "rolling element": _rolling_element,
-    "knocks at a strange order": _strange_knocks,
+    "knocks at a strange order": _strange_impacts,
     "knocks once per revolution": _once_per_revolution,
     "tone at a strange order": _strange_tone,
     "ghost line": _ghost,
     "whirl": _whirl,
-    "another machine": _other_machine,
+    "another machine": _neighbouring_machine,
     "inverter": _inverter,
-    "gear of another machine": _other_gear,
+    "gear of another machine": _neighbouring_gear,
     "loose foot": _loose_foot,
     "belt": _belt,
     "motor field": _motor_field,
-    "random knocks": _random_knocks,
+    "random knocks": _random_impacts,
     "swelling noise": _swelling_noise,
     "steady noise": _steady_noise,
     "bad contact": _bad_contact,

@@ -11,7 +11,7 @@ import pytest
 
 from gearsig.recording import read_recording
 from gearsig.rig import read_rig
-from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE, BlindCase, draw_case, labels, record_case, write_seen
+from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE, BlindCase, draw_case, labels, record_case, write_visible
 
 WORDS = [*CATALOGUE, *OUTSIDE_CATALOGUE, "severity", "seed", "twin", "sims", "blind", "none\"", "single",
          "unknown_effect",
@@ -33,7 +33,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[BlindCase, P
     for wishes in ({"kind": "none"}, {"effect": "root_crack"}, {"effect": "coupling_knock"}, {"effect": "clipping"}):
         case = short_case(5, **wishes)
         recorded, seen = record_case(case), tmp_path_factory.mktemp("seen")
-        write_seen(recorded, seen)
+        write_visible(recorded, seen)
         made.append((case, seen, labels(case, recorded)))
     return made
 

@@ -12,7 +12,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
-from sims.effects import VARIABLE, EffectSetting, add_effect, effect, effects, is_own, with_effects
+from sims.effects import VARIABLE, EffectSetting, add_effect, effect, effects, is_user_effect, with_effects
 from sims.registry import gap_simulator, sources_digest
 from tests.sims.machines import spur_pair_machine
 
@@ -55,7 +55,11 @@ def test_it_takes_its_place_in_the_catalogue_and_changes_machines(file: Path) ->
     assert effects()["hissing_seal"] is effect("hissing_seal")
     assert [name for name in effects() if name != "hissing_seal"] == before
     assert list(effects()).index("hissing_seal") == list(effects()).index("misalignment") - 1  # by group, then by name
-    assert (is_own("hissing_seal"), is_own("misalignment"), is_own("nothing")) == (True, False, False)
+    assert (is_user_effect("hissing_seal"), is_user_effect("misalignment"), is_user_effect("nothing")) == (
+        True,
+        False,
+        False,
+    )
     assert sources_digest() != digest
     machine = with_effects(spur_pair_machine(), [EffectSetting("hissing_seal", 3.0)], np.random.default_rng(0))
     assert {c.background.rms_mps2 for c in machine.chain.channels} == {3.0}

@@ -95,7 +95,7 @@ def test_a_tooth_whose_slices_move_as_one_is_spring_and_hertz_in_series():
     found = mesh_maps((gear, gear), mesh, np.array([5.0]), table.progress[column : column + 1], support="free")
     assert np.count_nonzero(found.pair_forces_n) == 1
     hertz = load_dependent_contact_coefficient(mesh.material_1, mesh.material_2, mesh.face_width_m)
-    expected = table.own[column].mean() * force + hertz * force**0.9
+    expected = table.direct[column].mean() * force + hertz * force**0.9
     assert found.transmission_error_m[0, 0] == pytest.approx(expected, rel=1e-4)
 
 
