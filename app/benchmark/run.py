@@ -115,7 +115,7 @@ def run_benchmark(
     done: list[Done] = []
     running = Running()
     with process_pool(workers) as makers, ThreadPoolExecutor(workers) as threads:
-        futures = [threads.submit(_one, request, case, folder, makers, running) for case in request.plan.cases()]
+        futures = [threads.submit(_run_case, request, case, folder, makers, running) for case in request.plan.cases()]
         try:
             for future in as_completed(futures):
                 done.append(future.result())
@@ -125,10 +125,12 @@ def run_benchmark(
             for future in futures:
                 future.cancel()
             running.stop()
-    return sorted(done, key=lambda one: one.planned.number)
+    return sorted(done, key=lambda done_case: done_case.planned.number)
 
 
-def _one(request: BenchmarkRequest, planned: PlannedCase, folder: Path, makers: Executor, running: Running) -> Done:
+def _run_case(
+    request: BenchmarkRequest, planned: PlannedCase, folder: Path, makers: Executor, running: Running
+) -> Done:
     kept = folder / ANSWERS_FOLDER / f"case_{planned.number:04d}.json"
     if (known := _kept_answers(kept, request.diagnosers)) is not None:
         return Done(planned, makers.submit(request.plan.make, planned, None).result(), known)
@@ -172,7 +174,7 @@ def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None
         text=True,
     )
     try:
-        _, said = process.communicate(timeout=MAX_S)
+        _, output = process.communicate(timeout=MAX_S)
     except subprocess.TimeoutExpired:
         return dict.fromkeys(names, Answer("", seconds=MAX_S, error=f"no answer within {MAX_S:g} s"))
     finally:
@@ -181,7 +183,7 @@ def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None
     if not by_itself:
         raise KeyboardInterrupt
     if process.returncode != 0:
-        last = said.strip().rpartition("\n")[2]
+        last = output.strip().rpartition("\n")[2]
         return dict.fromkeys(names, Answer("", error=f"the process ended with {process.returncode}: {last}"))
     return from_text((folder / ANSWERS).read_text(encoding="utf-8"))
 

@@ -131,22 +131,22 @@ def measure(
 
 
 def _timed(method: TimedMethod, longest_s: float) -> tuple[Timing, ...]:
-    own, limit, others = Timing("gearsig"), Timing(method.limit), dict[str, Timing]()
+    gearsig, limit, alternatives = Timing("gearsig"), Timing(method.limit), dict[str, Timing]()
     for n in method.lengths:
         case = method.case(n)
-        runs = {own.name: case.run}
+        runs = {gearsig.name: case.run}
         for name, rival in case.rivals.items():
-            timing = others.setdefault(name, Timing(name))
+            timing = alternatives.setdefault(name, Timing(name))
             if find_spec(name.split(".")[0]) is None:
                 timing.reason = "not installed"
             elif max(timing.seconds.values(), default=0.0) <= longest_s:
                 runs[name] = rival
         best = _best({**runs, limit.name: case.limit})
-        for timing in (own, limit, *(others[name] for name in runs if name in others)):
+        for timing in (gearsig, limit, *(alternatives[name] for name in runs if name in alternatives)):
             timing.seconds[n], result = best[timing.name]
-            if timing.name in others and case.alike is not None:
-                timing.difference = _difference(*case.alike(best[own.name][1], result))
-    return own, *others.values(), limit
+            if timing.name in alternatives and case.alike is not None:
+                timing.difference = _difference(*case.alike(best[gearsig.name][1], result))
+    return gearsig, *alternatives.values(), limit
 
 
 def _best(runs: Mapping[str, Run]) -> dict[str, tuple[float, Any]]:
@@ -163,18 +163,18 @@ def _best(runs: Mapping[str, Run]) -> dict[str, tuple[float, Any]]:
         for name, run in runs.items():
             start = time.process_time()
             run()
-            taken = time.process_time() - start
-            best[name], spent[name] = min(best[name], taken), spent[name] + taken
+            passed_s = time.process_time() - start
+            best[name], spent[name] = min(best[name], passed_s), spent[name] + passed_s
         n_rounds += 1
     return {name: (seconds, first[name][1]) for name, seconds in best.items()}
 
 
-def _difference(own: Any, other: Any) -> float:
+def _difference(ours: Any, theirs: Any) -> float:
     """Return the rms difference in the middle of two results over the rms, after the best common factor.
 
     Programs scale differently and take for granted different things beyond the ends.
     """
-    a, b = np.asarray(own), np.asarray(other)
+    a, b = np.asarray(ours), np.asarray(theirs)
     n = min(a.shape[-1], b.shape[-1])
     a, b = (x[..., n // 5 : n - n // 5].ravel() for x in (a, b))
     factor = np.vdot(b, a) / np.vdot(b, b).real
@@ -233,8 +233,8 @@ def _envelope(n: int) -> TimedCase:
         squared: FloatArray = np.abs(signal.hilbert(signal.sosfiltfilt(sections, x))) ** 2
         return squared
 
-    def alike(own: Any, other: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return own.values, signal.resample(other, len(own.values))
+    def alike(ours: Any, theirs: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return ours.values, signal.resample(theirs, len(ours.values))
 
     return TimedCase(
         lambda: band_envelope(x, RATE_HZ, band),
@@ -277,16 +277,16 @@ def _stft(n: int) -> TimedCase:
     from gearsig.timefreq import stft
 
     x, n_window, step = trial_signal(n), 1024, 64
-    other = ShortTimeFFT(np.hanning(n_window + 1)[:-1], step, RATE_HZ, scale_to="magnitude")
+    transform = ShortTimeFFT(np.hanning(n_window + 1)[:-1], step, RATE_HZ, scale_to="magnitude")
     blocks = np.lib.stride_tricks.sliding_window_view(x, n_window)[::step]
 
-    def alike(own: Any, theirs: NDArray[np.complex128]) -> tuple[Any, Any]:
+    def alike(ours: Any, theirs: NDArray[np.complex128]) -> tuple[Any, Any]:
         # Moduli: each counts its phase from elsewhere. Both have frames at whole steps.
-        return np.abs(own.values), np.abs(theirs)[:, -other.p_min :]
+        return np.abs(ours.values), np.abs(theirs)[:, -transform.p_min :]
 
     return TimedCase(
         lambda: stft(x, RATE_HZ, window_length=n_window / RATE_HZ, step=step),
-        {"scipy.signal.ShortTimeFFT": lambda: other.stft(x)},
+        {"scipy.signal.ShortTimeFFT": lambda: transform.stft(x)},
         lambda: fft.rfft(blocks, axis=1),
         alike,
     )
@@ -325,9 +325,9 @@ def _morlet(n: int) -> TimedCase:
     )
 
 
-def _moduli(own: Any, other: Any) -> tuple[Any, Any]:
+def _moduli(ours: Any, theirs: Any) -> tuple[Any, Any]:
     """Return the moduli of two transforms; of the other one each line with the mean of ours, as each scales them."""
-    a, b = np.abs(own), np.abs(other)
+    a, b = np.abs(ours), np.abs(theirs)
     return a, b * (a.mean(axis=1) / b.mean(axis=1))[:, None]
 
 
@@ -363,7 +363,7 @@ def _squeezed(n: int) -> TimedCase:
         lambda: run("gearsig"),
         {"ssqueezepy.ssq_cwt": lambda: run("ssqueezepy")},
         _copies(2 * n * 16 * np.log2(70), np.complex128),
-        lambda own, other: (inverse(own), inverse(other)),
+        lambda ours, theirs: (inverse(ours), inverse(theirs)),
     )
 
 
@@ -391,7 +391,7 @@ def _modes(n: int) -> TimedCase:
         lambda: vmd(x, RATE_HZ, settings).waveforms,
         {"vmdpy": by_vmdpy, "pysdkit.VMD": by_pysdkit},
         _copies(n_iterations * 3 * n, np.complex128),
-        lambda own, other: (by_rate(own), by_rate(np.asarray(other))),
+        lambda ours, theirs: (by_rate(ours), by_rate(np.asarray(theirs))),
     )
 
 
@@ -450,7 +450,7 @@ def _vold_kalman(n: int) -> TimedCase:
         lambda: track_vold_kalman(y, RATE_HZ, track, bandwidth_hz=20.0, mirror=False).orders[0].envelope,
         {"scipy.sparse.linalg.spsolve": by_sparse_solve},
         _copies(2 * n, np.complex128),
-        lambda own, other: (np.abs(own), np.abs(other)),
+        lambda ours, theirs: (np.abs(ours), np.abs(theirs)),
     )
 
 
@@ -540,23 +540,23 @@ METHODS = (
 def rows(results: Sequence[TimedMethodResult]) -> Iterator[dict[str, str | float | int]]:
     """Yield a row for each program beside gearsig, at the greatest length that both did."""
     for result in results:
-        own, *others, limit = result.timings
-        for other in others:
-            n = max(other.seconds, default=max(own.seconds))
-            theirs = other.seconds.get(n, float("nan"))
+        gearsig, *alternatives, limit = result.timings
+        for alternative in alternatives:
+            n = max(alternative.seconds, default=max(gearsig.seconds))
+            theirs = alternative.seconds.get(n, float("nan"))
             yield {
                 "method": result.method.name,
-                "instead": other.name,
+                "instead": alternative.name,
                 "n": n,
-                "gearsig_s": own.seconds[n],
+                "gearsig_s": gearsig.seconds[n],
                 "instead_s": theirs,
-                "ratio": theirs / own.seconds[n],
-                "difference": other.difference,
-                "exponent": own.exponent,
-                "instead_exponent": other.exponent,
-                "over_limit": own.seconds[n] / limit.seconds[n],
+                "ratio": theirs / gearsig.seconds[n],
+                "difference": alternative.difference,
+                "exponent": gearsig.exponent,
+                "instead_exponent": alternative.exponent,
+                "over_limit": gearsig.seconds[n] / limit.seconds[n],
                 "limit": limit.name,
-                "reason": other.reason,
+                "reason": alternative.reason,
             }
 
 

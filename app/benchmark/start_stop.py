@@ -68,8 +68,8 @@ class DrivePlan(Plan):
 
     def make(self, planned: PlannedCase, folder: Path | None) -> Truth:
         """Make a case; write what may be seen into `folder` (None: nowhere); return the truth."""
-        asked = planned.kind, planned.effect or "", planned.level
-        case = drawn_case(self.role, self.seed, planned.number, asked, with_reference=planned.with_reference)
+        fault = planned.kind, planned.effect or "", planned.level
+        case = drawn_case(self.role, self.seed, planned.number, fault, with_reference=planned.with_reference)
         if folder is not None:
             from gearsig.recording import write_recording
             from gearsig.rig import write_rig
@@ -97,18 +97,18 @@ def _labels(case: DriveCase) -> dict[str, Any]:
     }
 
 
-def drawn_case(role: str, seed: int, number: int, asked: tuple[str, str, float], *, with_reference: bool) -> DriveCase:
+def drawn_case(role: str, seed: int, number: int, fault: tuple[str, str, float], *, with_reference: bool) -> DriveCase:
     """Return a case of a plan: kind, effect and level as asked, all else from the seed and the case's number."""
-    kind, effect, level = asked
+    kind, effect, level = fault
     rng = np.random.default_rng([seed, 1, number])
     return draw_case(rng, role, kind=kind, effect=effect, level=level, with_reference=with_reference)
 
 
 def labelled_recordings(
-    role: str, seed: int, number: int, asked: tuple[str, str, float]
+    role: str, seed: int, number: int, fault: tuple[str, str, float]
 ) -> tuple[dict[str, Any], Recording, Recording | None]:
     """Return label, recording and healthy reference of a case for calibration."""
-    case = drawn_case(role, seed, number, asked, with_reference=True)
+    case = drawn_case(role, seed, number, fault, with_reference=True)
     made = record_case(case)
     return label_of(case), made.recording, made.reference
 

@@ -102,8 +102,8 @@ def _bearing_shaft(options: Mapping[str, Any]) -> str:
 
 def _order(order: float, options: Mapping[str, Any], places: tuple[AnsweredPlace, ...]) -> bool:
     """Orders of the input shaft: of the setting, or of the first place."""
-    said = [float(options["order"])] if "order" in options else [o for p in places[:1] for o in p.orders]
-    return any(abs(value - order) <= ORDER_TOLERANCE * order for value in said)
+    stated_orders = [float(options["order"])] if "order" in options else [o for p in places[:1] for o in p.orders]
+    return any(abs(value - order) <= ORDER_TOLERANCE * order for value in stated_orders)
 
 
 # --------------------

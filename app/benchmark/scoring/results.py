@@ -109,7 +109,7 @@ def figures_table(
     return Table(title, note, ("", *columns), tuple(rows))
 
 
-def beside_table(result: BenchmarkResult) -> Table:
+def alternatives_table(result: BenchmarkResult) -> Table:
     """Return the same figures of the diagnosers beside, on the very same cases."""
     names = result.wanted.diagnosers
     parts = (("without", WITHOUT), ("with", WITH))
@@ -181,7 +181,7 @@ def markdown(result: BenchmarkResult, command: str, date: datetime) -> str:
         "",
         *(markdown_table(same) if (same := same_table(result)) is not None else ()),
         "",
-        *markdown_table(beside_table(result)),
+        *markdown_table(alternatives_table(result)),
         "",
         *cost_lines(result),
     ]
@@ -275,7 +275,9 @@ def confusions_table(result: BenchmarkResult) -> Table:
     confusions = Counter(
         (r.truths[0] if r.kind != "unknown" else r.effects[0], r.first) for r in rows if r.first not in r.truths
     )
-    table = [(true, said or "no answer", str(n), _common(true, said)) for (true, said), n in confusions.most_common()]
+    table = [
+        (true, answer or "no answer", str(n), _common(true, answer)) for (true, answer), n in confusions.most_common()
+    ]
     return Table(
         "What was taken for what",
         "In common: kinds of features in which theory expects both.",
@@ -284,17 +286,17 @@ def confusions_table(result: BenchmarkResult) -> Table:
     )
 
 
-def _common(true: str, said: str) -> str:
+def _common(true: str, answer: str) -> str:
     from sims.effects import effects
 
-    if said == NONE:
+    if answer == NONE:
         return "too weak to stand out of the floor"
     if true in OUTSIDE_CATALOGUE:
-        return "made to be mistaken for it" if OUTSIDE_CATALOGUE[true].resembles == said else ""
+        return "made to be mistaken for it" if OUTSIDE_CATALOGUE[true].resembles == answer else ""
     known = effects()
-    if true in known and said in known:
-        return ", ".join(kind.replace("_", " ") for kind in known[true].shows_in if kind in known[said].shows_in)
-    return "not explained well enough" if said == UNKNOWN else ""
+    if true in known and answer in known:
+        return ", ".join(kind.replace("_", " ") for kind in known[true].shows_in if kind in known[answer].shows_in)
+    return "not explained well enough" if answer == UNKNOWN else ""
 
 
 def confusion_counts(result: BenchmarkResult) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray]:
@@ -303,11 +305,11 @@ def confusion_counts(result: BenchmarkResult) -> tuple[tuple[str, ...], tuple[st
     if result.strengths_known:
         rows = [r for r in rows if r.kind == "none" or r.strength >= STRONG]
     true = (*CATALOGUE, NONE, UNKNOWN)
-    said = (*true, "no answer") if any(not r.first for r in rows) else true
-    counts = np.zeros((len(true), len(said)), dtype=np.int64)
+    answers = (*true, "no answer") if any(not r.first for r in rows) else true
+    counts = np.zeros((len(true), len(answers)), dtype=np.int64)
     for row in rows:
-        counts[true.index(row.truths[0]), said.index(row.first or "no answer")] += 1
-    return true, said, counts
+        counts[true.index(row.truths[0]), answers.index(row.first or "no answer")] += 1
+    return true, answers, counts
 
 
 COLUMNS = (
@@ -391,14 +393,14 @@ def cases_csv(result: BenchmarkResult, cases: Sequence[Done]) -> str:
                     _number(row.strength),
                     *(int(row.has_reference), row.n_conditions, pair["z1"], pair["z2"]),
                     *(name, row.answer.outcome, row.first),
-                    *_said(row),
+                    *_answer_cells(row),
                     *(f"{row.answer.seconds:.2f}", f"{row.answer.cpu_seconds:.2f}", row.answer.error),
                 ]
             )
     return text.getvalue()
 
 
-def _said(row: Row) -> tuple[str, ...]:
+def _answer_cells(row: Row) -> tuple[str, ...]:
     answer: Answer = row.answer
     first = f"{row.confidence:.4f}" if answer.causes else ""
     second = row.ranked[1] if len(row.ranked) > 1 else ""
@@ -419,7 +421,7 @@ def page(result: BenchmarkResult, command: str, date: datetime) -> str:
         Section("Are the probabilities true?", " ".join(cost_lines(result)[1:]), pictures=_calibration(result)),
         _section(effects_table(result)),
         _section(parts_table(result)),
-        _section(beside_table(result)),
+        _section(alternatives_table(result)),
         *([_section(same)] if (same := same_table(result)) is not None else []),
         _failures(result),
     ]
@@ -437,14 +439,14 @@ def _section(table: Table, title: str = "") -> Section:
 
 
 def _summary(result: BenchmarkResult) -> str:
-    said = []
+    sentences = []
     for name in (WITHOUT, WITH):
         part = result.part(name)
         top, false = part.scores["top_1"], part.scores["named_on_none"]
         if top.n:
             wrong = f"; an effect is named on {percent(false.value)} of healthy cases" if false.n else ""
-            said.append(f"{name}: {percent(top.value)} of mechanical effects right{wrong}")
-    return f"{'. '.join(text[0].upper() + text[1:] for text in said)}." if said else "No mechanical effects."
+            sentences.append(f"{name}: {percent(top.value)} of mechanical effects right{wrong}")
+    return f"{'. '.join(text[0].upper() + text[1:] for text in sentences)}." if sentences else "No mechanical effects."
 
 
 def _provenance(result: BenchmarkResult, command: str) -> list[tuple[str, str]]:
@@ -464,8 +466,8 @@ def _confusion_picture(result: BenchmarkResult) -> Picture:
     from gearsig.plot import confusion_figure
 
     strong = f", faults of at least {STRONG:g} structural floors" if result.strengths_known else ""
-    true, said, counts = confusion_counts(result)
-    figure = confusion_figure(true, said, counts, title=f"Cases by what it was and what was said{strong}")
+    true, answers, counts = confusion_counts(result)
+    figure = confusion_figure(true, answers, counts, title=f"Cases by what it was and what was said{strong}")
     return embed(
         figure,
         "Rows are what it was, with the number of cases; what lies off the diagonal was mistaken.",

@@ -248,9 +248,9 @@ def macro_f1(rows: Rows) -> float:
     a case are left out.
     """
     true = Counter(name for row in rows for name in row.truths)
-    said = Counter(row.first for row in rows)
+    answered = Counter(row.first for row in rows)
     hits = Counter(row.first for row in rows if row.first in row.truths)
-    f1_scores = [2.0 * hits[name] / (true[name] + said[name]) for name in MECHANICAL if true[name]]
+    f1_scores = [2.0 * hits[name] / (true[name] + answered[name]) for name in MECHANICAL if true[name]]
     return sum(f1_scores) / len(f1_scores) if f1_scores else float("nan")
 
 
@@ -439,9 +439,9 @@ def scores(rows: Rows, seed: int, figures: Sequence[Figure] = FIGURES) -> dict[s
     return {f.key: f.measure(rows, np.random.default_rng(seed)) if rows else NOTHING for f in figures}
 
 
-def strong_only(rows: Rows, least: float) -> list[Row]:
+def strong_only(rows: Rows, min_strength: float) -> list[Row]:
     """Return the cases whose fault is this strong, and those without one."""
-    return [row for row in rows if row.kind == "none" or row.strength >= least]
+    return [row for row in rows if row.kind == "none" or row.strength >= min_strength]
 
 
 def judgement(score: Score, target: float, *, is_least: bool) -> str:
@@ -531,18 +531,18 @@ class BenchmarkResult:
         )
 
 
-def judge(wanted: BenchmarkRequest, cases: Sequence[Done]) -> BenchmarkResult:
+def judge(request: BenchmarkRequest, cases: Sequence[Done]) -> BenchmarkResult:
     """Score all answers."""
     floors = known_floors([done.truth for done in cases if done.planned.source == BLIND])
-    rows = {name: rows_of(cases, name, floors) for name in wanted.diagnosers}
-    first = rows[wanted.diagnosers[0]]
-    parts = score_parts(wanted, rows, PARTS, FIGURES, (True, False))
+    rows = {name: rows_of(cases, name, floors) for name in request.diagnosers}
+    first = rows[request.diagnosers[0]]
+    parts = score_parts(request, rows, PARTS, FIGURES, (True, False))
     confidence = [r.confidence for r in first if r.source == BLIND and is_one_answer(r)]
     return BenchmarkResult(
-        wanted,
+        request,
         rows,
         parts,
-        error_by_chance(confidence, np.random.default_rng(wanted.plan.seed)),
+        error_by_chance(confidence, np.random.default_rng(request.plan.seed)),
         any(isfinite(row.strength) for row in first),
     )
 
