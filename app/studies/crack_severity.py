@@ -132,7 +132,7 @@ def draw_case(seed: int, index: int, *, for_the_check: bool, even: bool = False)
         return None
 
 
-def draw_other_fault(drawn: DrawnRig, rng: np.random.Generator) -> tuple[str, Recording] | None:
+def draw_tooth_fault(drawn: DrawnRig, rng: np.random.Generator) -> tuple[str, Recording] | None:
     """Draw and simulate a chip or a spall on the tooth that has the crack otherwise; return its kind and the recording.
 
     None where the gears do not allow its size.
@@ -152,14 +152,16 @@ def draw_other_fault(drawn: DrawnRig, rng: np.random.Generator) -> tuple[str, Re
         return None
 
 
-def observe(case: CrackCase, other: tuple[str, Recording] | None = None, relief_error: float = 0.0) -> CaseFeatures:
+def observe(
+    case: CrackCase, other_fault: tuple[str, Recording] | None = None, relief_error: float = 0.0
+) -> CaseFeatures:
     """Return what a case shows, without any fitted model.
 
     Parameters
     ----------
     case : CrackCase
-    other : (str, Recording) or None
-        See `draw_other_fault`.
+    other_fault : (str, Recording) or None
+        See `draw_tooth_fault`.
     relief_error : float
         Of the tip relief that the estimator is told, relative.
     """
@@ -179,8 +181,8 @@ def observe(case: CrackCase, other: tuple[str, Recording] | None = None, relief_
     compared, alone, good = seen(now, healthy), seen(now, None), seen(healthy, None)
     gear = ("driver", "driven").index(drawn.gear)
     looks = {(CRACKED, WITH_REFERENCE): _looks(compared[gear]), (CRACKED, ALONE): _looks(alone[gear])}
-    if other is not None:
-        kind, damaged = other[0], lines(other[1])
+    if other_fault is not None:
+        kind, damaged = other_fault[0], lines(other_fault[1])
         looks[kind, WITH_REFERENCE] = _looks(seen(damaged, healthy)[gear])
         looks[kind, ALONE] = _looks(seen(damaged, None)[gear])
     return CaseFeatures(
@@ -254,7 +256,7 @@ class Cases:
 
 def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
     """Fit detection, depth and spread to all cases, and quantiles to errors of models that did not see the case."""
-    rest = [i for i, name in enumerate(FEATURES) if name not in RISING and (relief_known or name not in RELIEF)]
+    linear = [i for i, name in enumerate(FEATURES) if name not in RISING and (relief_known or name not in RELIEF)]
     mean, scale = cases.features.mean(axis=0), cases.features.std(axis=0)
     z = (cases.features - mean) / scale
     healthy = (cases.healthy - mean) / scale
@@ -264,9 +266,9 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
     taught = z @ detection >= np.quantile(healthy_scores, 1.0 - TAUGHT)
     y = np.log(cases.percent)
     knots = np.quantile(z[taught][:, _SHAPED], _KNOTS, axis=0).T
-    depth, spread = _depth_and_spread(z[taught], y[taught], knots, rest)
+    depth, spread = _depth_and_spread(z[taught], y[taught], knots, linear)
     intercept, coefficients, slopes = depth
-    precision = _precision(z[taught], rest)
+    precision = _precision(z[taught], linear)
     distances = np.sqrt(np.einsum("ij,jk,ik->i", z[taught], precision, z[taught]))
     return DepthModel(
         mean=mean,
@@ -276,7 +278,7 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
         knots=knots,
         slopes=slopes,
         spread=spread,
-        quantiles=_conformal(_errors_of_others(z[taught], y[taught], knots, rest)),
+        quantiles=_conformal(_cross_validation_errors(z[taught], y[taught], knots, linear)),
         detection=detection,
         threshold=threshold,
         healthy_scores=healthy_scores,
@@ -289,9 +291,9 @@ def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
 
 
 def _depth_and_spread(
-    z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]
+    z: FloatArray, y: FloatArray, knots: FloatArray, linear: list[int]
 ) -> tuple[tuple[float, FloatArray, FloatArray], FloatArray]:
-    depth = _depth_weights(z, y, knots, rest)
+    depth = _depth_weights(z, y, knots, linear)
     return depth, _spread_weights(z, np.abs(y - _predicted(depth, z, knots)))
 
 
@@ -300,7 +302,7 @@ def _predicted(depth: tuple[float, FloatArray, FloatArray], z: FloatArray, knots
     return np.asarray(intercept + z @ coefficients + _curves(z, knots) @ slopes.ravel())
 
 
-def _errors_of_others(z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]) -> FloatArray:
+def _cross_validation_errors(z: FloatArray, y: FloatArray, knots: FloatArray, linear: list[int]) -> FloatArray:
     """Return (y − ŷ)/σ of each case by the model fitted to the other nine tenths of the cases.
 
     R. F. Barber, E. J. Candès, A. Ramdas, R. J. Tibshirani, "Predictive inference with the jackknife+", 2021 (CV+).
@@ -309,7 +311,7 @@ def _errors_of_others(z: FloatArray, y: FloatArray, knots: FloatArray, rest: lis
     fold = np.arange(len(y)) % _FOLDS
     for k in range(_FOLDS):
         out = fold == k
-        depth, spread = _depth_and_spread(z[~out], y[~out], knots, rest)
+        depth, spread = _depth_and_spread(z[~out], y[~out], knots, linear)
         sigma = np.maximum(spread[0] + z[out] @ spread[1:], MIN_SPREAD)
         scaled[out] = (y[out] - _predicted(depth, z[out], knots)) / sigma
     return scaled
@@ -340,19 +342,19 @@ def _curves(z: FloatArray, knots: FloatArray) -> FloatArray:
 
 
 def _depth_weights(
-    z: FloatArray, y: FloatArray, knots: FloatArray, rest: list[int]
+    z: FloatArray, y: FloatArray, knots: FloatArray, linear: list[int]
 ) -> tuple[float, FloatArray, FloatArray]:
     """Ridge regression: rising curves of what the depth is read from, and straight lines of the rest."""
     from scipy.optimize import lsq_linear
 
-    columns = np.c_[np.ones(len(z)), _curves(z, knots), z[:, rest]]
+    columns = np.c_[np.ones(len(z)), _curves(z, knots), z[:, linear]]
     n, n_curves = columns.shape[1], knots.size // 2 * 3
     rows = np.vstack([columns, np.sqrt(_RIDGE) * np.eye(n)[1:]])
     low = np.full(n, -np.inf)
     low[1 : 1 + n_curves] = 0.0
     result = lsq_linear(rows, np.r_[y, np.zeros(n - 1)], bounds=(low, np.full(n, np.inf))).x
     coefficients = np.zeros(z.shape[1])
-    coefficients[rest] = result[1 + n_curves :]
+    coefficients[linear] = result[1 + n_curves :]
     return float(result[0]), coefficients, np.maximum(result[1 : 1 + n_curves], 0.0).reshape(-1, 3)
 
 
@@ -367,9 +369,9 @@ def _spread_weights(z: FloatArray, error: FloatArray) -> FloatArray:
     return spread
 
 
-def _precision(z: FloatArray, rest: list[int]) -> FloatArray:
+def _precision(z: FloatArray, linear: list[int]) -> FloatArray:
     """Inverse covariance of the features that the depth is read from; 0 for the others."""
-    used = sorted([*_SHAPED, *rest])
+    used = sorted([*_SHAPED, *linear])
     precision = np.zeros((z.shape[1], z.shape[1]))
     precision[np.ix_(used, used)] = np.linalg.inv(np.cov(z[:, used].T) + 1e-3 * np.eye(len(used)))
     return precision
@@ -425,22 +427,22 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--to", type=Path, default=FILE)
     parser.add_argument("--state", default="", help="the simulator's commit, for the provenance")
-    given = parser.parse_args()
-    observed = observe_all(given.cases, given.processes)
-    text = json.dumps(calibration_of(observed, given.cases, given.state), indent=1)
-    given.to.write_text(text + "\n", encoding="utf-8")
-    typer.echo(f"{len(observed)} of {given.cases} cases; written to {given.to}")
+    arguments = parser.parse_args()
+    observed = observe_all(arguments.cases, arguments.processes)
+    text = json.dumps(calibration_of(observed, arguments.cases, arguments.state), indent=1)
+    arguments.to.write_text(text + "\n", encoding="utf-8")
+    typer.echo(f"{len(observed)} of {arguments.cases} cases; written to {arguments.to}")
 
 
 def observe_all(n_cases: int, n_processes: int) -> list[tuple[int, CaseFeatures]]:
     """Return what the drawn cases show, by their index; some cannot be made, or show too few mesh harmonics."""
-    from app.studies.crack_severity import observe_one
+    from app.studies.crack_severity import observe_case
 
-    answers = answers_of(observe_one, range(n_cases), n_processes)
+    answers = answers_of(observe_case, range(n_cases), n_processes)
     return [(index, answer) for index, answer in answers if isinstance(answer, CaseFeatures)]
 
 
-def observe_one(index: int) -> CaseFeatures | str:
+def observe_case(index: int) -> CaseFeatures | str:
     """Return what one case shows, or why it shows nothing."""
     case = draw_case(SEED, index, for_the_check=False, even=index % EVEN_EVERY == EVEN_EVERY - 1)
     if case is None:
@@ -448,7 +450,7 @@ def observe_one(index: int) -> CaseFeatures | str:
     rng = np.random.default_rng([SEED, index, 0, 1])
     relief_error = float(rng.uniform(-RELIEF_ERROR, RELIEF_ERROR))
     try:
-        return observe(case, draw_other_fault(case.drawn, rng), relief_error)
+        return observe(case, draw_tooth_fault(case.drawn, rng), relief_error)
     except RefusalError as refusal:
         return str(refusal)
 
@@ -485,22 +487,22 @@ def cases_of(observed: Sequence[tuple[int, CaseFeatures]], kind: str) -> Cases:
 
 def kind_of(observed: Sequence[tuple[int, CaseFeatures]], way: str, model: DepthModel) -> KindModel:
     """Return the model of the kind, from the events that are seen."""
-    seen = [
+    vectors = [
         (kind, kind_vector(*looks))
         for _, o in observed
         for (kind, name), looks in o.looks.items()
         if name == way and (kind != CRACKED or o.percent > 0) and model.score(looks[0]) >= model.threshold
     ]
-    return fit_kind(np.array([vector for _, vector in seen]), [kind for kind, _ in seen])
+    return fit_kind(np.array([vector for _, vector in vectors]), [kind for kind, _ in vectors])
 
 
 def _median_lag(observed: Sequence[tuple[int, CaseFeatures]], model: DepthModel) -> float:
-    seen = [
+    lags = [
         o.lag_pitches
         for _, o in observed
         if o.percent > 0 and model.score(o.with_reference[o.gear]) >= model.threshold and np.isfinite(o.lag_pitches)
     ]
-    return float(np.median(seen))
+    return float(np.median(lags))
 
 
 def _reach(observed: Sequence[CaseFeatures]) -> dict[str, list[float]]:

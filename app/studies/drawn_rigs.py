@@ -121,10 +121,10 @@ def draw_rig(rng: np.random.Generator, *, for_the_check: bool, even: bool = Fals
     speed = _speed_rpm(rng, teeth)
     gear = str(rng.choice(("driver", "driven")))
     z = teeth[0] if gear == "driver" else teeth[1]
-    least, most = DEPTHS_OF_THE_CHECK_MM if for_the_check else DEPTHS_MM
-    depth = rng.uniform(least, min(most, DEEPEST_SHARE * deepest_crack_mm(GearGeometry(z, module))))
+    shallowest, deepest = DEPTHS_OF_THE_CHECK_MM if for_the_check else DEPTHS_MM
+    depth = rng.uniform(shallowest, min(deepest, DEEPEST_SHARE * deepest_crack_mm(GearGeometry(z, module))))
     healthy = rng.uniform() < (HEALTHY_SHARE_OF_THE_CHECK if for_the_check else HEALTHY_SHARE)
-    parameters = _gears(rng, teeth, module, width, load) | _rest(rng, module, teeth)
+    parameters = _gears(rng, teeth, module, width, load) | _further_parameters(rng, module, teeth)
     if even:
         parameters |= _even_teeth(rng)
         torque *= rng.uniform(0.4, 1.0)
@@ -200,7 +200,7 @@ def _even_teeth(rng: np.random.Generator) -> dict[str, ParameterValue]:
     }
 
 
-def _rest(rng: np.random.Generator, module: float, teeth: tuple[int, int]) -> dict[str, ParameterValue]:
+def _further_parameters(rng: np.random.Generator, module: float, teeth: tuple[int, int]) -> dict[str, ParameterValue]:
     """Bearings, shafts and rotors; larger gears sit in larger machines."""
     size = module / 2.0
     inertia = 2e-3 * size**4 * (sum(teeth) / 80.0) ** 3
@@ -343,7 +343,7 @@ def _with_path(machine: Machine, drawn: DrawnRig) -> Machine:
 
 def _with_modes(channel: MeasuredChannel, bearing: int, drawn: DrawnRig) -> MeasuredChannel:
     gain = drawn.sensor_gain
-    own = tuple(channel.path.direct[f"bearing {bearing} {axis}"] for axis in "xy")
+    channel_direct = tuple(channel.path.direct[f"bearing {bearing} {axis}"] for axis in "xy")
     modes = tuple(
         PathMode(
             mode.frequency_hz,
@@ -351,7 +351,7 @@ def _with_modes(channel: MeasuredChannel, bearing: int, drawn: DrawnRig) -> Meas
             {
                 f"bearing {i + 1} {axis} yield": gain * mode.gain * mode.shape[bearing - 1] * mode.shape[i] * direction
                 for i in range(4)
-                for axis, direction in zip("xy", _direction(mode, own), strict=True)
+                for axis, direction in zip("xy", _direction(mode, channel_direct), strict=True)
             },
         )
         for mode in drawn.modes

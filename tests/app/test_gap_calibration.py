@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.studies.gap.calibrate import FALSE_ON_NONE, WeighedCase, fit_calibration
+from app.studies.gap.calibrate import FALSE_ON_NONE, AttributedCase, fit_calibration
 from gearsig.gap import NONE, UNKNOWN, GapCalibration
 
 CAUSES = ("root_crack", "eccentricity", "unbalance", NONE, UNKNOWN)
 
 
-def drawn(n: int, truth: GapCalibration, seed: int = 3) -> list[WeighedCase]:
+def drawn(n: int, truth: GapCalibration, seed: int = 3) -> list[AttributedCase]:
     """Cases whose causes are drawn from the probabilities that `truth` gives."""
     rng = np.random.default_rng(seed)
     cases = []
@@ -20,7 +20,7 @@ def drawn(n: int, truth: GapCalibration, seed: int = 3) -> list[WeighedCase]:
         scores = {name: float(rng.uniform(-1.0, 1.0)) for name in CAUSES[:3]}
         size = float(np.exp(rng.uniform(-1.0, 1.5)))
         p = truth.probabilities(forest, scores, size)
-        cases.append(WeighedCase((str(rng.choice(list(p), p=list(p.values()))),), forest, scores, size))
+        cases.append(AttributedCase((str(rng.choice(list(p), p=list(p.values()))),), forest, scores, size))
     return cases
 
 

@@ -63,7 +63,7 @@ BIAS_SCATTER = 0.3
 
 
 @dataclass(frozen=True)
-class WeighedCase:
+class AttributedCase:
     """One case: what the forests and the trials said, and the truth.
 
     Parameters
@@ -90,7 +90,7 @@ class WeighedCase:
         return calibration.probabilities(self.forest, self.scores, self.size, self.n_conditions)
 
 
-def fit_calibration(cases: Sequence[WeighedCase], several: Sequence[WeighedCase] = ()) -> GapCalibration:
+def fit_calibration(cases: Sequence[AttributedCase], several: Sequence[AttributedCase] = ()) -> GapCalibration:
     """Fit sharpness, what trials say and all biases by likelihood; then the threshold for naming an effect.
 
     Parameters
@@ -122,7 +122,7 @@ def fit_calibration(cases: Sequence[WeighedCase], several: Sequence[WeighedCase]
     return replace(fitted, named_from=_named_from(fitted, cases))
 
 
-def log_loss(calibration: GapCalibration, cases: Sequence[WeighedCase]) -> float:
+def log_loss(calibration: GapCalibration, cases: Sequence[AttributedCase]) -> float:
     """Return −mean ln p of what is true."""
     right = [sum(p.get(t, 0.0) for t in c.truths) for c in cases for p in (c.by(calibration),)]
     return float(-np.mean(np.log(np.maximum(right, 1e-9))))
@@ -136,7 +136,7 @@ def _calibration(x: FloatArray, effects: Sequence[str]) -> GapCalibration:
     )
 
 
-def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:
+def _named_from(fitted: GapCalibration, cases: Sequence[AttributedCase]) -> float:
     """Return the least probability of effects together from which naming keeps both false rates."""
     without = [
         (rate, [c.by(fitted) for c in cases if c.truths == (cause,)])
@@ -144,7 +144,10 @@ def _named_from(fitted: GapCalibration, cases: Sequence[WeighedCase]) -> float:
     ]
     for threshold in THRESHOLDS:
         named = replace(fitted, named_from=threshold)
-        if all(sum(named.outcome(p) in NAMING for p in found) <= rate * len(found) for rate, found in without):
+        if all(
+            sum(named.outcome(p) in NAMING for p in healthy_cases) <= rate * len(healthy_cases)
+            for rate, healthy_cases in without
+        ):
             return threshold
     return THRESHOLDS[-1]
 
@@ -160,7 +163,7 @@ PER_EFFECT, PER_NO_EFFECT = 24, 96
 """Rows of each simulator: of each effect, and of healthy machines and of unknown changes; a case in five is either."""
 
 
-def cases_of(population: Population, simulator: str, *, with_reference: bool) -> tuple[list[WeighedCase], ...]:
+def cases_of(population: Population, simulator: str, *, with_reference: bool) -> tuple[list[AttributedCase], ...]:
     """Return the cases of one simulator's machines, by forests without it: of one condition, and of two.
 
     Only machines of some simulators were recorded at two operating points with the same effect.
@@ -174,9 +177,11 @@ def cases_of(population: Population, simulator: str, *, with_reference: bool) ->
         drawn += rng.permutation(rows)[:n].tolist()
     pairs = two_conditions(population, rng.permutation(rows_of_simulator)) if simulator in AT_TWO_POINTS else []
     with without_machines_of(simulator):
-        single = [_weighed(population, (row,), simulator, with_reference=with_reference) for row in drawn]
-        both = [_weighed(population, rows, simulator, with_reference=with_reference) for rows in pairs]
-    return single, both
+        single = [_attributed(population, (row,), simulator, with_reference=with_reference) for row in drawn]
+        pairs_of_conditions = [
+            _attributed(population, rows, simulator, with_reference=with_reference) for rows in pairs
+        ]
+    return single, pairs_of_conditions
 
 
 def two_conditions(population: Population, rows: Iterable[int]) -> list[tuple[int, int]]:
@@ -195,17 +200,19 @@ def two_conditions(population: Population, rows: Iterable[int]) -> list[tuple[in
     ]
 
 
-def _weighed(population: Population, rows: tuple[int, ...], simulator: str, *, with_reference: bool) -> WeighedCase:
+def _attributed(
+    population: Population, rows: tuple[int, ...], simulator: str, *, with_reference: bool
+) -> AttributedCase:
     learned = load_learned()
     changes = [_change(population, learned, row, with_reference=with_reference) for row in rows]
     loads = [float(population.loads_n_per_mm[row]) for row in rows]
     recogniser = learned.recognisers[with_reference]
-    return weighed_case(str(population.causes[rows[0]]), changes, loads, recogniser, simulator)
+    return attributed_case(str(population.causes[rows[0]]), changes, loads, recogniser, simulator)
 
 
-def weighed_case(
+def attributed_case(
     cause: str, changes: Sequence[Features], loads: Sequence[float], recogniser: Recogniser, simulator: str
-) -> WeighedCase:
+) -> AttributedCase:
     """Return what forests say of one machine's change at one or several operating points, without trials.
 
     Parameters
@@ -220,7 +227,7 @@ def weighed_case(
     by_condition = [recogniser.probabilities(c, load, effects) for c, load in zip(changes, loads, strict=True)]
     forest = joint_probabilities(by_condition, list(loads), recogniser.causes)
     size = max(gap_size(change, recogniser.floor).structural.value for change in changes)
-    return WeighedCase((cause,), forest, {}, size, len(changes), simulator)
+    return AttributedCase((cause,), forest, {}, size, len(changes), simulator)
 
 
 def _change(population: Population, learned: Learned, row: int, *, with_reference: bool) -> Features:
@@ -241,28 +248,29 @@ STRONG = 3.0
 """Structural floors from which an effect counts as strong."""
 
 
-def table(calibration: GapCalibration, cases: Sequence[WeighedCase]) -> list[str]:
+def table(calibration: GapCalibration, cases: Sequence[AttributedCase]) -> list[str]:
     """Return a line for each simulator and one for all: of strong effects, and of all."""
     named = [*dict.fromkeys(case.simulator for case in cases)]
     rows = [(name, [case for case in cases if case.simulator == name]) for name in named]
     return [_line(name, calibration, some) for name, some in [*rows, ("all", list(cases))]]
 
 
-def _line(name: str, calibration: GapCalibration, cases: Sequence[WeighedCase]) -> str:
+def _line(name: str, calibration: GapCalibration, cases: Sequence[AttributedCase]) -> str:
     effects = cracked_gap_simulator().gap_effects()
     groups = {name: effect.group for name, effect in effects.items()} | {NONE: NONE, UNKNOWN: UNKNOWN}
-    said = [(case, case.by(calibration)) for case in cases]
-    strong = [(c, p) for c, p in said if c.size >= STRONG and c.truths[0] not in (NONE, UNKNOWN)]
+    answers = [(case, case.by(calibration)) for case in cases]
+    strong = [(c, p) for c, p in answers if c.size >= STRONG and c.truths[0] not in (NONE, UNKNOWN)]
     first = [next(iter(p)) == c.truths[0] for c, p in strong]
     two = [c.truths[0] in list(p)[:2] for c, p in strong]
-    group = [_likeliest_group(p, groups) == groups[c.truths[0]] for c, p in strong]
-    sure = [next(iter(p)) in c.truths for c, p in said if max(p.values()) >= 0.9]
+    group = [_most_probable_group(p, groups) == groups[c.truths[0]] for c, p in strong]
+    sure = [next(iter(p)) in c.truths for c, p in answers if max(p.values()) >= 0.9]
     healthy, unknown = (
-        [calibration.outcome(p, groups) in NAMING for c, p in said if c.truths == (cause,)] for cause in (NONE, UNKNOWN)
+        [calibration.outcome(p, groups) in NAMING for c, p in answers if c.truths == (cause,)]
+        for cause in (NONE, UNKNOWN)
     )
     return (
         f"{name}: strong {len(strong)}: likeliest {_share(first)}, two {_share(two)}, group {_share(group)}; "
-        f"said with 0.9 {len(sure)}, right {_share(sure)}; calibration error {calibration_error(said):.3f}; "
+        f"said with 0.9 {len(sure)}, right {_share(sure)}; calibration error {calibration_error(answers):.3f}; "
         f"named on healthy {_share(healthy)}, on unknown {_share(unknown)}; log loss {log_loss(calibration, cases):.3f}"
     )
 
@@ -271,33 +279,35 @@ def _share(values: Sequence[bool]) -> str:
     return f"{np.mean(values):.2f}" if values else "-"
 
 
-def _likeliest_group(probabilities: Mapping[str, float], groups: Mapping[str, str]) -> str:
+def _most_probable_group(probabilities: Mapping[str, float], groups: Mapping[str, str]) -> str:
     together: dict[str, float] = {}
     for name, p in probabilities.items():
         together[groups[name]] = together.get(groups[name], 0.0) + p
     return max(together, key=together.__getitem__)
 
 
-def calibration_error(said: Sequence[tuple[WeighedCase, Mapping[str, float]]], n_bins: int = 10) -> float:
+def calibration_error(answers: Sequence[tuple[AttributedCase, Mapping[str, float]]], n_bins: int = 10) -> float:
     """Return Σ_b n_b/n |share right − mean probability| of the likeliest, over equal bins of its probability."""
-    likeliest = np.array([max(p.values()) for _, p in said])
-    right = np.array([next(iter(p)) in case.truths for case, p in said], dtype=float)
-    bins = np.minimum((likeliest * n_bins).astype(int), n_bins - 1)
-    parts = [abs(float(np.sum(right[bins == b] - likeliest[bins == b]))) for b in range(n_bins)]
-    return sum(parts) / len(likeliest) if len(likeliest) else 0.0
+    largest = np.array([max(p.values()) for _, p in answers])
+    right = np.array([next(iter(p)) in case.truths for case, p in answers], dtype=float)
+    bins = np.minimum((largest * n_bins).astype(int), n_bins - 1)
+    parts = [abs(float(np.sum(right[bins == b] - largest[bins == b]))) for b in range(n_bins)]
+    return sum(parts) / len(largest) if len(largest) else 0.0
 
 
 def main() -> None:
     """Weigh the population's machines, fit, write, and print how good that is."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--to", type=Path, default=CALIBRATION_FILE)
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     population = load_population()
     values: dict[str, Any] = {}
     n_cases = 0
     for name, with_reference in (("with_reference", True), ("without_reference", False)):
-        found = [cases_of(population, s, with_reference=with_reference) for s in np.unique(population.simulators)]
-        single, several = ([case for one in found for case in one[i]] for i in (0, 1))
+        by_simulator = [
+            cases_of(population, s, with_reference=with_reference) for s in np.unique(population.simulators)
+        ]
+        single, several = ([case for cases in by_simulator for case in cases[i]] for i in (0, 1))
         fitted = fit_calibration(single, several)
         values[name] = fitted.to_mapping()
         n_cases += len(single) + len(several)
@@ -305,7 +315,7 @@ def main() -> None:
         typer.echo("\n".join(table(fitted, single)))
         typer.echo("two conditions:\n" + "\n".join(table(fitted, several)))
     values["provenance"] = {"made_by": "python -m app.studies.gap.calibrate", "seed": SEED, "n_cases": n_cases}
-    given.to.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+    arguments.to.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -198,17 +198,21 @@ def _scored(cases: Sequence[_Case], recogniser: Recogniser, n: int) -> str:
         if case.cause in (NONE, UNKNOWN) or case.size < STRONG:
             continue
         ratios = {}
-        for cause in {one.cause for one in cases} - {UNKNOWN}:
-            own = [one for one in cases if one.machine == case.machine and one.cause == cause and one is not case]
-            drawn = [own[i] for i in rng.permutation(len(own))[:n]]
+        for cause in {labelled_case.cause for labelled_case in cases} - {UNKNOWN}:
+            same_cause = [
+                labelled_case
+                for labelled_case in cases
+                if labelled_case.machine == case.machine and labelled_case.cause == cause and labelled_case is not case
+            ]
+            drawn = [same_cause[i] for i in rng.permutation(len(same_cause))[:n]]
             if drawn:
-                given = np.array([one.row for one in drawn])
-                ratios[cause] = labelled_support(recogniser.labels.log_ratios(case.row, given, cause))
-        found = with_labelled(case.probabilities, ratios, {})
-        first = next(iter(found))
+                rows = np.array([labelled_case.row for labelled_case in drawn])
+                ratios[cause] = labelled_support(recogniser.labels.log_ratios(case.row, rows, cause))
+        posterior = with_labelled(case.probabilities, ratios, {})
+        first = next(iter(posterior))
         right.append(first == case.cause)
-        sure += [first == case.cause] if found[first] >= 0.9 else []
-        loss.append(-np.log(max(found[case.cause], 1e-9)))
+        sure += [first == case.cause] if posterior[first] >= 0.9 else []
+        loss.append(-np.log(max(posterior[case.cause], 1e-9)))
     return (
         f"likeliest right {np.mean(right):.2f} of {len(right)}; said with 0.9 {len(sure)}, right "
         f"{np.mean(sure) if sure else 0.0:.2f}; log loss {np.mean(loss):.2f}"
@@ -226,15 +230,15 @@ def main() -> None:
     simulation.add_argument("--simulator", choices=list(_MAKE), action="append", help="default: all of these")
     simulation.add_argument("--to", type=Path, required=True)
     steps.add_parser("score", help="diagnose them").add_argument("raw", type=Path)
-    given = parser.parse_args()
-    if given.step == "score":
-        score(given.raw)
+    arguments = parser.parse_args()
+    if arguments.step == "score":
+        score(arguments.raw)
         return
-    jobs = [(name, i) for i in range(given.machines) for name in given.simulator or _MAKE]
+    jobs = [(name, i) for i in range(arguments.machines) for name in arguments.simulator or _MAKE]
     samples: list[PopulationSample] = []
     for _, new_samples in answers_of(of_job, jobs, 2):
         samples += new_samples
-        write(given.to, samples)
+        write(arguments.to, samples)
 
 
 if __name__ == "__main__":

@@ -61,9 +61,11 @@ def _root_crack(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault
     softer = (1.0 - log_uniform(rng, 0.15, 0.75)) ** -2.2 - 1.0
     lever = np.clip(0.35 + 0.65 * shape.heights[side], 0.1, 1.1)
     at_pitch = sum(float(np.interp(0.0, shape.path, teeth)) for teeth in shape.teeth_m_per_n) / 0.7
-    own = 0.35 * shape.pair_m_per_n**2 / at_pitch * softer * lever**2
-    beside = np.full(N_PATH, 0.006 * shape.pair_m_per_n * softer)
-    return LumpedFault(compliances=[(side, tooth, own), (side, tooth - 1, beside), (side, tooth + 1, beside)])
+    at_tooth = 0.35 * shape.pair_m_per_n**2 / at_pitch * softer * lever**2
+    at_neighbours = np.full(N_PATH, 0.006 * shape.pair_m_per_n * softer)
+    return LumpedFault(
+        compliances=[(side, tooth, at_tooth), (side, tooth - 1, at_neighbours), (side, tooth + 1, at_neighbours)]
+    )
 
 
 def _tooth_spall(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
@@ -155,10 +157,10 @@ def _misalignment(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFau
     angle = log_uniform(rng, 0.5e-3, 4e-3)
     force = rig.loads_nm[0] / shape.base_radii[1]
     opened = angle * rig.face_mm * 1e-3 / (2.0 * force * shape.pair_m_per_n)
-    left = 1.0 / (1.0 + 0.3 * opened) if opened < 1.0 else max(0.77 * opened**-0.5, 0.15)
+    remaining = 1.0 / (1.0 + 0.3 * opened) if opened < 1.0 else max(0.77 * opened**-0.5, 0.15)
     strength = (1e3 * angle) ** 1.3
     return LumpedFault(
-        softened=min(left, 0.9999),
+        softened=min(remaining, 0.9999),
         wobble=min(0.12, 30.0 * angle),
         phase=rng.uniform(0, 2 * pi),
         drive={"coupling_n": strength * rig.module_mm / 2.0, "coupling_nm": 4e-4 * strength},
@@ -336,7 +338,7 @@ LIGHT = 4
 """Every so many machines one that is hardly loaded."""
 
 
-def one_lumped(index: int) -> list[PopulationSample]:
+def lumped_samples(index: int) -> list[PopulationSample]:
     """Return the samples of one drawn machine, the same faults at both of its points."""
     rng = np.random.default_rng([SEED, 4, index])
     rig = LumpedRig.drawn(rng, light=index % LIGHT == LIGHT - 1)
@@ -364,11 +366,11 @@ def _at(rig: LumpedRig, point: int, levels: FloatArray, faults: list[tuple[str, 
     number, torque_nm = FIRST_RIG + 2 * index + point, rig.torque_nm(point)
     rng = np.random.default_rng([SEED, 4, index, point])
     reference = record(rig, point, LumpedDay.drawn(rig, rng), LumpedFault(), rng, healthy_levels=levels)
-    here, known = reduced(reference, number), rig_of(reference)
+    point_of, known = reduced(reference, number), rig_of(reference)
     run = CrackedTwin(known, nominal_of(known)).run(
-        OperatingCondition(60.0 * here.speed_hz, torque_nm),
+        OperatingCondition(60.0 * point_of.speed_hz, torque_nm),
         seed=number,
-        duration_s=run_length_s(here),
+        duration_s=run_length_s(point_of),
         sampling_rate_hz=reference.sampling_rate_hz,
         noise=1,
     )
@@ -386,4 +388,4 @@ def _at(rig: LumpedRig, point: int, levels: FloatArray, faults: list[tuple[str, 
         for name in map(str, rng.choice(made_by_hand(healthy, torque_nm), N_BY_HAND, replace=False)):
             yield name, BY_HAND, 0.0, with_signature(healthy, name, rng)[0], torque_nm
 
-    return reference, with_channels_of(reduce_recording(run, known), here), compared()
+    return reference, with_channels_of(reduce_recording(run, known), point_of), compared()

@@ -168,7 +168,7 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
     n_out, n_mean = 0, 0
     for i in range(n):
         k, part = i // SLOW, (i % SLOW) / SLOW
-        wanted = set_speed[k] + part * (set_speed[k + 1] - set_speed[k])
+        set_now = set_speed[k] + part * (set_speed[k + 1] - set_speed[k])
         # mesh
         th1, th2, w1, w2 = q[1], q[2], v[1], v[2]
         e1, e1_phase = bodies.runout[0]
@@ -196,11 +196,11 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
                 continue
             soft = c1[at] + t * (c1[at + 1] - c1[at]) + c2[at] + t * (c2[at + 1] - c2[at]) + mesh.hertz_m_per_n
             stiffness = softened / soft
-            one = stiffness * deflection * (0.93 + 0.07 * min(deflection / mesh.usual_m, 3.0))
-            one += mesh.damping_s * stiffness * rate * min(1.0, deflection * 1e6)
-            if one > 0.0:
-                friction = mesh.friction * one * s / np.sqrt(s * s + mesh.turning_m**2)
-                force += one
+            pair_force = stiffness * deflection * (0.93 + 0.07 * min(deflection / mesh.usual_m, 3.0))
+            pair_force += mesh.damping_s * stiffness * rate * min(1.0, deflection * 1e6)
+            if pair_force > 0.0:
+                friction = mesh.friction * pair_force * s / np.sqrt(s * s + mesh.turning_m**2)
+                force += pair_force
                 rubbing += friction
                 moment_1 += friction * (rb1 * TAN + s)
                 moment_2 += friction * (rb2 * TAN - s)
@@ -211,7 +211,7 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
         # shafts
         twist_in = bodies.shaft_n_m[0] * (q[0] - th1) + bodies.shaft_damping[0] * (v[0] - w1)
         twist_out = bodies.shaft_n_m[1] * (th2 - q[3]) + bodies.shaft_damping[1] * (w2 - v[3])
-        torque = drive.motor_nm + drive.follows * (wanted - v[0]) + motor[k] + part * (motor[k + 1] - motor[k])
+        torque = drive.motor_nm + drive.follows * (set_now - v[0]) + motor[k] + part * (motor[k + 1] - motor[k])
         torque += drive.ripple_nm * np.cos(drive.ripple_order * q[0] + drive.ripple_phase)
         twist_in += drive.coupling_nm * np.cos(2.0 * q[0] + drive.coupling_phase)
         braking = drive.load_nm + load[k] + part * (load[k + 1] - load[k])
@@ -228,7 +228,7 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
             vx, vy = v[4 + 2 * side] - v[8] + v[10] * ry, v[5 + 2 * side] - v[9] - v[10] * rx
             turned = th1 if side == 0 else -th2
             kind, shaft, angle, half_width, depth = bearings.defect
-            here = kind if shaft == side + 1 else 0.0
+            shaft_kind = kind if shaft == side + 1 else 0.0
             fx, fy = _balls(
                 x,
                 y,
@@ -236,7 +236,7 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
                 bearings.n_balls[side],
                 bearings.ball_n_per_m15[side],
                 bearings.clearance_m[side],
-                here,
+                shaft_kind,
                 angle + (turned if kind == 2.0 else 0.0),
                 half_width,
                 depth,
@@ -247,16 +247,20 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
             sign = -1.0 if side == 0 else 1.0
             size, phase = bodies.unbalance[side]
             speed = v[1 + side]
-            other_x = sign * (force * nx - rubbing * ny) + size * speed * speed * np.cos(turned + phase)
-            other_y = sign * (force * ny + rubbing * nx) + size * speed * speed * np.sin(turned + phase)
+            other_force_x = sign * (force * nx - rubbing * ny) + size * speed * speed * np.cos(turned + phase)
+            other_force_y = sign * (force * ny + rubbing * nx) + size * speed * speed * np.sin(turned + phase)
             if side == 0:
                 c = drive.coupling_phase
-                other_x += drive.coupling_n * (0.5 * np.cos(th1 + c) + np.cos(2 * th1 + c) + 0.3 * np.cos(3 * th1 + c))
-                other_y += drive.coupling_n * (0.5 * np.sin(th1 + c) + np.sin(2 * th1 + c) + 0.3 * np.sin(3 * th1 + c))
-                other_x += drive.whirl_n * np.cos(drive.whirl_order * th1)
-                other_y += drive.whirl_n * np.sin(drive.whirl_order * th1)
-            a[4 + 2 * side] = (fx + other_x) / bodies.mass[side]
-            a[5 + 2 * side] = (fy + other_y) / bodies.mass[side] - 9.81
+                other_force_x += drive.coupling_n * (
+                    0.5 * np.cos(th1 + c) + np.cos(2 * th1 + c) + 0.3 * np.cos(3 * th1 + c)
+                )
+                other_force_y += drive.coupling_n * (
+                    0.5 * np.sin(th1 + c) + np.sin(2 * th1 + c) + 0.3 * np.sin(3 * th1 + c)
+                )
+                other_force_x += drive.whirl_n * np.cos(drive.whirl_order * th1)
+                other_force_y += drive.whirl_n * np.sin(drive.whirl_order * th1)
+            a[4 + 2 * side] = (fx + other_force_x) / bodies.mass[side]
+            a[5 + 2 * side] = (fy + other_force_y) / bodies.mass[side] - 9.81
             pressed_x -= fx
             pressed_y -= fy
             moment -= rx * fy - ry * fx
@@ -340,8 +344,8 @@ class LumpedRig:
         line_load = float(np.exp(u(np.log(30.0), np.log(300.0)))) if not light else u(8, 22)
         radii = np.array(teeth) * module_mm / 2e3
         load = line_load * face_mm * radii[1]
-        other_speed = speed * rng.choice([u(0.55, 0.8), u(1.25, 1.5)])
-        other_load = load * (u(1.2, 1.5) if light else rng.choice([u(0.5, 0.75), u(1.3, 1.6)]))
+        second_speed = speed * rng.choice([u(0.55, 0.8), u(1.25, 1.5)])
+        second_load = load * (u(1.2, 1.5) if light else rng.choice([u(0.5, 0.75), u(1.3, 1.6)]))
         # One factor for all of a machine's teeth: who cuts good pitches cuts good profiles as well.
         quality = u(0.6, 1.3)
 
@@ -362,10 +366,12 @@ class LumpedRig:
                 u(3, 9) * inertia[1] + 0.006 + 6e-4 * load,
             ]
         )
-        beside = 3.0 * inertia
-        shafts = (2.0 * pi * np.array([u(60, 180), u(40, 140)])) ** 2 * ends * beside / (ends + beside)
+        coupled_inertia = 3.0 * inertia
+        shafts = (
+            (2.0 * pi * np.array([u(60, 180), u(40, 140)])) ** 2 * ends * coupled_inertia / (ends + coupled_inertia)
+        )
         # Bearings as large as the greater load asks for; their pitch leaves a gap between the balls.
-        size = max(1.0, (max(load, other_load) / radii[1] / 1500.0) ** 0.5)
+        size = max(1.0, (max(load, second_load) / radii[1] / 1500.0) ** 0.5)
         balls = []
         for _ in range(2):
             n, d = int(rng.integers(8, 12)), u(7, 10) * min(size, 2.2)
@@ -418,8 +424,8 @@ class LumpedRig:
             teeth,
             module_mm,
             face_mm,
-            (speed, float(other_speed)),
-            (float(load), float(other_load)),
+            (speed, float(second_speed)),
+            (float(load), float(second_load)),
             int(rng.choice([20000, 25600])),
             float(rng.choice([50.0, 50.0, 60.0])),
             tuple(balls),
@@ -655,9 +661,9 @@ def record(
     """
     forces, turned = _motion(rig, point, day, fault, rng, duration_s)
     rate = rig.rate_hz * OVERSAMPLING[rig.rate_hz] / (OVERSAMPLING[rig.rate_hz] // 2)
-    heard = _heard(rig, day, fault, forces, rate, rng)
+    sensed = _sensed_motion(rig, day, fault, forces, rate, rng)
     lead, n = round(SETTLING_S * rate), round(duration_s * rig.rate_hz)
-    values = signal.resample_poly(heard[lead - 400 :], 1, 2, axis=0, window=("kaiser", 9.0))[200 : 200 + n].T
+    values = signal.resample_poly(sensed[lead - 400 :], 1, 2, axis=0, window=("kaiser", 9.0))[200 : 200 + n].T
     values = values * day.gain[:, None]
     levels = values.std(axis=1) if healthy_levels is None else healthy_levels
     values = values + levels[:, None] * _noise_and_hum(rig, fault, n, rng)
@@ -812,8 +818,8 @@ def _bodies_of(rig: LumpedRig, day: LumpedDay, fault: LumpedFault) -> LumpedBodi
     mounts = np.array([housing, housing, roll]) * (2 * pi * n["mount_hz"] * [day.mounts, day.mounts, 1.0]) ** 2
     mount_damping = 2.0 * n["mount_damping_ratio"] * np.sqrt(mounts * [housing, housing, roll])
     half = 0.5 * apart * cos(float(n["centre_line_rad"])), 0.5 * apart * sin(float(n["centre_line_rad"]))
-    beside = 3.0 * inertia[1:3]
-    reduced = inertia[[0, 3]] * beside / (inertia[[0, 3]] + beside)
+    coupled_inertia = 3.0 * inertia[1:3]
+    reduced = inertia[[0, 3]] * coupled_inertia / (inertia[[0, 3]] + coupled_inertia)
     balance = mass * n["balance_mps"] / (rig.speeds_rpm[0] * pi / 30.0 * np.array([1.0, ratio]))
     runout = [n["runout_m"][side] + fault.runout_m.get(side, 0.0) for side in range(2)]
     unbalance = [balance[side] + fault.unbalance_kg_m.get(side, 0.0) for side in range(2)]
@@ -841,7 +847,7 @@ def _polar(value: complex) -> tuple[float, float]:
     return float(abs(value)), float(np.angle(value))
 
 
-def _heard(
+def _sensed_motion(
     rig: LumpedRig, day: LumpedDay, fault: LumpedFault, motion: FloatArray, rate: float, rng: np.random.Generator
 ) -> FloatArray:
     """Return what sensors feel of bearing forces through the modes, and of the housing, (n, n_sensors)."""
@@ -851,23 +857,23 @@ def _heard(
     forces = motion[:, :4] - motion[:, :4].mean(axis=0)
     forces = forces + float(n["rolling_noise"]) * forces.std() * rng.standard_normal(forces.shape) * (1, 0.8, 1, 0.8)
     foot = motion[:, 8] + 0.6 * motion[:, 7]
-    heard = np.zeros((len(motion), len(rig.directions)))
+    sensed = np.zeros((len(motion), len(rig.directions)))
     for k, f in enumerate(mode_hz):
         omega = 2.0 * rate * tan(pi * f / rate)
         filtered = signal.bilinear([1.0, 0.0, 0.0], [1.0, 2.0 * ratio[k] * omega, omega**2], rate)
         pushed = n["mode_at_foot"][k] * foot - forces @ n["mode_at_bearings"][k]
         answer = signal.lfilter(*filtered, pushed / n["mode_kg"][k])
-        heard += answer[:, None] * (n["mode_at_sensors"] * day.mode_shape)[:, k]
+        sensed += answer[:, None] * (n["mode_at_sensors"] * day.mode_shape)[:, k]
     apart = rig.module_mm * 1e-3 * sum(rig.teeth) / 2.0
     for i, direction in enumerate(rig.directions):
         x, y, roll = DIRECTIONS[direction]
-        heard[:, i] += x * motion[:, 4] + y * motion[:, 5] + roll * apart * motion[:, 6]
+        sensed[:, i] += x * motion[:, 4] + y * motion[:, 5] + roll * apart * motion[:, 6]
     if fault.loose_sensor is not None:
         row, f, damping = fault.loose_sensor
         omega = 2 * pi * f
         mount = signal.bilinear([2 * damping * omega, omega**2], [1.0, 2 * damping * omega, omega**2], rate)
-        heard[:, row % heard.shape[1]] = signal.lfilter(*mount, heard[:, row % heard.shape[1]])
-    return heard
+        sensed[:, row % sensed.shape[1]] = signal.lfilter(*mount, sensed[:, row % sensed.shape[1]])
+    return sensed
 
 
 def _noise_and_hum(rig: LumpedRig, fault: LumpedFault, n: int, rng: np.random.Generator) -> FloatArray:

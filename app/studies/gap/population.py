@@ -22,8 +22,8 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from app.studies.gap.lumped import LUMPED, one_lumped
-from app.studies.gap.quasi_static import QUASI_STATIC, one_static
+from app.studies.gap.lumped import LUMPED, lumped_samples
+from app.studies.gap.quasi_static import QUASI_STATIC, static_samples
 from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
 from app.studies.pool import answers_of
 from gearsig.gap import BY_HAND, INDEPENDENT, LEARNED_FILE, learn, load_population, population_file, write_learned
@@ -35,8 +35,8 @@ _SAMPLES_OF: dict[str, Callable[[int], list[PopulationSample]]] = {
     CRACKED.name: partial(one_rig, CRACKED),
     REDUCED.name: partial(one_rig, REDUCED),
     INDEPENDENT: one_case,
-    QUASI_STATIC: one_static,
-    LUMPED: one_lumped,
+    QUASI_STATIC: static_samples,
+    LUMPED: lumped_samples,
 }
 """What a machine's number makes, by simulator."""
 
@@ -57,18 +57,22 @@ def main() -> None:
     packing.add_argument("--to", type=Path, default=population_file())
     learning = steps.add_parser("learn", help="write what a diagnosis asks of the population")
     learning.add_argument("--to", type=Path, default=LEARNED_FILE)
-    given = vars(parser.parse_args())
-    if given["step"] == "pack":
-        pack(given["raw"], given["to"])
-    elif given["step"] == "learn":
-        write_learned(learn(load_population()), given["to"])
-        typer.echo(f"{given['to'].stat().st_size / 1e6:.2f} MB")
-    elif given["step"] == "simulate":
-        simulate(jobs_of({name: given[name.replace("-", "_")] for name in MACHINES}), given["processes"], given["to"])
+    arguments = vars(parser.parse_args())
+    if arguments["step"] == "pack":
+        pack(arguments["raw"], arguments["to"])
+    elif arguments["step"] == "learn":
+        write_learned(learn(load_population()), arguments["to"])
+        typer.echo(f"{arguments['to'].stat().st_size / 1e6:.2f} MB")
+    elif arguments["step"] == "simulate":
+        simulate(
+            jobs_of({name: arguments[name.replace("-", "_")] for name in MACHINES}),
+            arguments["processes"],
+            arguments["to"],
+        )
     else:
         with TemporaryDirectory() as folder:
             raw = Path(folder) / "raw.npz"
-            simulate(jobs_of(MACHINES), given["processes"], raw)
+            simulate(jobs_of(MACHINES), arguments["processes"], raw)
             pack([raw], population_file())
         write_learned(learn(load_population()), LEARNED_FILE)
 
@@ -108,21 +112,21 @@ TABLES = {
 def pack(paths: Sequence[Path], to: Path) -> None:
     """Read raw tables, write one packed table."""
     raw = [np.load(path, allow_pickle=False) for path in paths]
-    tables = {name: _rounded(np.concatenate([one[key] for one in raw])) for name, key in TABLES.items()}
-    rigs = np.concatenate([one["rig"] for one in raw]).astype(np.int64)
+    tables = {name: _rounded(np.concatenate([sample[key] for sample in raw])) for name, key in TABLES.items()}
+    rigs = np.concatenate([sample["rig"] for sample in raw]).astype(np.int64)
     simulated_rigs, first = np.unique(rigs, return_index=True)  # one twin for all recordings of a machine
     for name in ("simulated", "simulated_scatter"):
-        tables[name] = _rounded(np.concatenate([one[name] for one in raw])[first])
+        tables[name] = _rounded(np.concatenate([sample[name] for sample in raw])[first])
     to.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(
         to,
         allow_pickle=False,
         rigs=rigs,
         simulated_rigs=simulated_rigs,
-        simulators=np.concatenate([one["simulator"] for one in raw]),
-        causes=np.concatenate([one["label"] for one in raw]),
-        by_hand=np.concatenate([one["detail"] for one in raw]) == BY_HAND,
-        loads_n_per_mm=np.concatenate([one["load_n_per_mm"] for one in raw]).astype(np.float32),
+        simulators=np.concatenate([sample["simulator"] for sample in raw]),
+        causes=np.concatenate([sample["label"] for sample in raw]),
+        by_hand=np.concatenate([sample["detail"] for sample in raw]) == BY_HAND,
+        loads_n_per_mm=np.concatenate([sample["load_n_per_mm"] for sample in raw]).astype(np.float32),
         change_names=raw[0]["change_names"],
         feature_names=raw[0]["feature_names"],
         **tables,

@@ -140,7 +140,9 @@ class Path:
             sqrt((0.5 * z * module + module) ** 2 - b**2) - b * tan(alpha) for z, b in zip(teeth, base, strict=True)
         ]
         # An undercut mate ends the path where its involute begins.
-        beyond = [min(own, other * tan(alpha)) for own, other in zip(beyond, reversed(base), strict=True)]
+        beyond = [
+            min(reach, base_length * tan(alpha)) for reach, base_length in zip(beyond, reversed(base), strict=True)
+        ]
         return cls(sum(beyond) / pitch_m, beyond[1] / pitch_m, pitch_m)
 
     @property
@@ -246,7 +248,7 @@ class QuasiStaticState:
         Coefficient; width over which it turns round at the pitch point, in base pitches.
     restless_m : float
         Standard deviation of a separation that never repeats.
-    knocks : list of function
+    impacts : list of function
         Of the driver's angle (revolutions), time (s), and generator: forces (n,) on a bearing.
     play : float
         Of the bearings, over what their static load presses out.
@@ -269,7 +271,7 @@ class QuasiStaticState:
     friction: float
     reversal: float
     restless_m: float
-    knocks: list[Callable[[FloatArray, FloatArray, np.random.Generator], FloatArray]]
+    impacts: list[Callable[[FloatArray, FloatArray, np.random.Generator], FloatArray]]
     play: float
     passing: float
     wander: list[tuple[float, float, float]]
@@ -388,7 +390,7 @@ class StaticMachine:
             friction=rng.uniform(0.02, 0.07),
             reversal=rng.uniform(0.02, 0.3),
             restless_m=log_uniform(rng, 1e-3, 2e-2) * unit,
-            knocks=[],
+            impacts=[],
             play=log_uniform(rng, 0.01, 0.3),
             passing=self.rig.bearings[0].orders()["BPFO"],
             wander=[
@@ -471,8 +473,8 @@ def _band(machine: StaticMachine, centre: float, width: float, edge: float) -> F
 def _root_crack(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
     """A tooth that gives way, the more the nearer to its tip the force is; a deep one stays bent."""
     side, tooth = _tooth(machine, rng)
-    least, power, softer = rng.uniform(0.0, 0.5), rng.uniform(0.5, 3.0), log_uniform(rng, 0.05, 5.0)
-    state.weak[side][tooth] += softer * (least + (1.0 - least) * _towards_tip(machine, side) ** power)
+    at_root, power, softer = rng.uniform(0.0, 0.5), rng.uniform(0.5, 3.0), log_uniform(rng, 0.05, 5.0)
+    state.weak[side][tooth] += softer * (at_root + (1.0 - at_root) * _towards_tip(machine, side) ** power)
     if rng.uniform() < 0.3:
         state.gaps_m[side][tooth] += log_uniform(rng, 0.02, 0.5) * machine.rated_m * textbook.sign(rng)
 
@@ -620,7 +622,7 @@ def _race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Genera
         pulse = np.hanning(max(3, round(width / step)) + 2)
         return np.asarray(np.convolve(force, pulse, mode="same"))
 
-    state.knocks.append(knock)
+    state.impacts.append(knock)
 
 
 def _outer_race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
@@ -726,9 +728,9 @@ def record(
     first, rows = round(LEAD_S * machine.rate_hz), []
     lasting = slice(first, first + int(machine.drawn.duration_s * machine.rate_hz))
     for channel in range(N_CHANNELS):
-        row = _heard(structure, channel, motions, rate)[lasting]
+        row = _sensed_motion(structure, channel, motions, rate)[lasting]
         if levels is not None:
-            inside = _heard(structure, channel, {INSIDE: rng.standard_normal(len(time))}, rate)[lasting]
+            inside = _sensed_motion(structure, channel, {INSIDE: rng.standard_normal(len(time))}, rate)[lasting]
             row = row + inside * (machine.inside_share[channel] * levels[channel] / inside.std())
         if state.paths:
             row = state.paths[channel].of(row, machine.rate_hz)
@@ -765,16 +767,16 @@ def _motions(
     """Return the motion that enters the structure on each way, m."""
     path, cycle = machine.path, turns * machine.drawn.teeth[0]
 
-    def waves(found: Sequence[Wave]) -> FloatArray:
+    def waves(waves_of: Sequence[Wave]) -> FloatArray:
         angles = [2 * np.pi * turns * order for order in machine.shaft_orders]
-        return sum((size * np.cos(n * angles[side] + phase) for side, n, size, phase in found), np.zeros(len(turns)))
+        return sum((size * np.cos(n * angles[side] + phase) for side, n, size, phase in waves_of), np.zeros(len(turns)))
 
     first = (0, 0)
     gaps = meeting(cycle, path, (state.gaps_m[0], state.gaps_m[1]), first)
     weak = meeting(cycle, path, (state.weak[0], state.weak[1]), first)
     inside = is_in_reach(cycle, path)
-    own = at_places(cycle, path, machine.stiffness_n_per_m) * (1.0 - state.soft_spots)
-    stiffness = np.where(inside, own * np.maximum(1.0 + waves(state.stiffness), 0.05) / (1.0 + weak), 1e-3)
+    pair_stiffness = at_places(cycle, path, machine.stiffness_n_per_m) * (1.0 - state.soft_spots)
+    stiffness = np.where(inside, pair_stiffness * np.maximum(1.0 + waves(state.stiffness), 0.05) / (1.0 + weak), 1e-3)
     load = machine.load_n * day.torque_factor * np.maximum(1.0 + waves(state.load), 0.02)
     error, carried = static_contact(stiffness, np.where(inside, gaps, OUT_OF_REACH_M), load)
     mean = float(machine.stiffness_n_per_m.mean()) * path.ratio
@@ -785,8 +787,8 @@ def _motions(
     mesh = error + waves(state.runout_m) + state.restless_m * rng.standard_normal(len(turns))
     pressed = load / mean
     mesh = _through_play(pressed, mesh - mesh.mean() + shafts, state, turns) - shafts
-    knocked = sum((knock(turns, time, rng) for knock in state.knocks), np.zeros(len(turns))) / mean
-    return {MESH: mesh, SHAFTS: shafts, FRICTION: rubbing, BEARINGS: knocked}
+    impact_motion = sum((knock(turns, time, rng) for knock in state.impacts), np.zeros(len(turns))) / mean
+    return {MESH: mesh, SHAFTS: shafts, FRICTION: rubbing, BEARINGS: impact_motion}
 
 
 def _through_play(pressed: FloatArray, moving: FloatArray, state: QuasiStaticState, turns: FloatArray) -> FloatArray:
@@ -796,7 +798,7 @@ def _through_play(pressed: FloatArray, moving: FloatArray, state: QuasiStaticSta
     return np.asarray(np.sign(total) * (np.hypot(total, play) - play))
 
 
-def _heard(structure: Structure, channel: int, motions: dict[int, FloatArray], rate: float) -> FloatArray:
+def _sensed_motion(structure: Structure, channel: int, motions: dict[int, FloatArray], rate: float) -> FloatArray:
     """Return a channel's acceleration at the recording's rate."""
     from scipy.fft import irfft, rfft, rfftfreq
     from scipy.signal.windows import tukey
@@ -806,9 +808,9 @@ def _heard(structure: Structure, channel: int, motions: dict[int, FloatArray], r
     kept = frequency < 0.48 * rate / FINER
     lines = np.zeros(len(frequency), dtype=np.complex128)
     # A step from the last sample to the first would be the loudest blow of the whole recording.
-    both_ends = tukey(n, 2.0 * SETTLING_S * rate / n)
+    window = tukey(n, 2.0 * SETTLING_S * rate / n)
     for way, motion in motions.items():
-        settled = both_ends * (motion - motion.mean())
+        settled = window * (motion - motion.mean())
         lines[kept] += rfft(settled)[kept] * structure.accelerations(channel, frequency[kept], way)
     m = n // FINER
     return np.asarray(irfft(lines[: m // 2 + 1], m) * (m / n))
@@ -844,7 +846,7 @@ FIRST_RIG = 200_000
 N_HEALTHY, N_FOREIGN, N_BY_HAND, N_PATHS = 2, 2, 3, 2
 
 
-def one_static(index: int) -> list[PopulationSample]:
+def static_samples(index: int) -> list[PopulationSample]:
     """Return the samples of one drawn machine."""
     rig = FIRST_RIG + index
 

@@ -332,12 +332,12 @@ def _condition(
 
 def reduced_twin(recording: Recording, rig: int, torque_nm: float) -> ReducedRecording:
     """Return the run of the twin at a recording's speed and the stated torque, reduced, under its channels' names."""
-    here, known = reduced(recording, rig), rig_of(recording)
+    reduced_recording, known = reduced(recording, rig), rig_of(recording)
     simulated = CrackedTwin(known, nominal_of(known)).run(
-        OperatingCondition(60.0 * here.speed_hz, torque_nm),
+        OperatingCondition(60.0 * reduced_recording.speed_hz, torque_nm),
         seed=rig,
-        duration_s=run_length_s(here),
+        duration_s=run_length_s(reduced_recording),
         sampling_rate_hz=recording.sampling_rate_hz,
         noise=1,
     )
-    return with_channels_of(reduce_recording(simulated, known), here)
+    return with_channels_of(reduce_recording(simulated, known), reduced_recording)

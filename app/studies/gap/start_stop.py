@@ -53,8 +53,8 @@ def collect(role: str, seed: int, number: int, plan: tuple[str, str, float]) -> 
     ways = [] if healthy is None else [[read_cycles(healthy)]]
     for references in ways if needs_reference(plan[1]) else [*ways, []]:
         compared = compare_drive(now, references, simulator)
-        seen = compared.evidence(predict(compared, simulator.gap_effects()))
-        rows.append(({**label, "with_reference": bool(references)}, seen))
+        evidence = compared.evidence(predict(compared, simulator.gap_effects()))
+        rows.append(({**label, "with_reference": bool(references)}, evidence))
     return rows
 
 
@@ -65,17 +65,17 @@ def truth_of(label: Mapping[str, Any]) -> str:
 
 def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     """Return floors and calibration of all cases with a reference, or of all without, as plain values."""
-    healthy = [seen for label, seen in rows if label["kind"] == "none"]
+    healthy = [evidence for label, evidence in rows if label["kind"] == "none"]
     whole = DriveFloor.of_healthy(
-        np.array([seen.whole for seen in healthy]), np.array([seen.scatter for seen in healthy])
+        np.array([evidence.whole for evidence in healthy]), np.array([evidence.scatter for evidence in healthy])
     )
-    halves = [(fold.fitted_to, HALF * seen.scatter) for seen in healthy for fold in seen.folds]
+    halves = [(fold.fitted_to, HALF * evidence.scatter) for evidence in healthy for fold in evidence.folds]
     half = DriveFloor.of_healthy(np.array([change for change, _ in halves]), np.array([error for _, error in halves]))
-    weighed = [
-        (truth_of(label), attribute_drive([seen], with_reference=label["with_reference"], floors=(whole, half)))
-        for label, seen in rows
+    attributions = [
+        (truth_of(label), attribute_drive([evidence], with_reference=label["with_reference"], floors=(whole, half)))
+        for label, evidence in rows
     ]
-    calibration = fit_calibration(weighed)
+    calibration = fit_calibration(attributions)
     return {
         "whole": whole.to_dict(),
         "half": half.to_dict(),
@@ -83,18 +83,18 @@ def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def fit_calibration(weighed: Sequence[tuple[str, Attribution[FittedDriveCause]]]) -> GapCalibration:
+def fit_calibration(attributions: Sequence[tuple[str, Attribution[FittedDriveCause]]]) -> GapCalibration:
     """Fit sharpness, weight of the shrink and both biases to what was true: least −log p, drawn to the start."""
     from scipy.optimize import minimize
 
     def loss(values: FloatArray) -> float:
         calibration = _calibration(values)
-        logs = [np.log(max(w.probabilities(calibration).get(t, 0.0), MIN_SHARE)) for t, w in weighed]
+        logs = [np.log(max(w.probabilities(calibration).get(t, 0.0), MIN_SHARE)) for t, w in attributions]
         return float(-np.mean(logs) + RIDGE * np.sum((values - np.array(START)) ** 2))
 
     solution = minimize(loss, np.array(START), method="Nelder-Mead", options={"maxiter": 400, "xatol": 1e-3})
     calibration = _calibration(solution.x)
-    healthy = [w.probabilities(calibration) for t, w in weighed if t == NONE]
+    healthy = [w.probabilities(calibration) for t, w in attributions if t == NONE]
     named = sorted(1.0 - p[NONE] - p[UNKNOWN] for p in healthy)
     limit = float(np.quantile(named, 1.0 - FALSE_ALARMS, method="higher")) if named else MIN_NAMED
     return _calibration(solution.x, float(np.clip(limit, MIN_NAMED, MAX_NAMED)))
@@ -112,15 +112,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=71)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--numbers", default="", help="of the planned cases, e.g. 0-38,140-177; default: all")
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     rows: list[Row] = []
-    plan = planned(asked.cases, asked.seed)
-    with ProcessPoolExecutor(asked.processes) as pool:
-        chosen = numbers_of(asked.numbers, len(plan))
-        futures = [pool.submit(collect, ROLE, asked.seed, i, plan[i]) for i in chosen]
+    plan = planned(arguments.cases, arguments.seed)
+    with ProcessPoolExecutor(arguments.processes) as pool:
+        chosen = numbers_of(arguments.numbers, len(plan))
+        futures = [pool.submit(collect, ROLE, arguments.seed, i, plan[i]) for i in chosen]
         for future in as_completed(futures):
             rows += future.result()
-    write_floors(rows, asked.seed, f"{asked.numbers or 'all'} of {len(plan)} planned")
+    write_floors(rows, arguments.seed, f"{arguments.numbers or 'all'} of {len(plan)} planned")
 
 
 def numbers_of(text: str, n_planned: int) -> list[int]:
@@ -139,8 +139,8 @@ def write_floors(rows: Sequence[Row], seed: int, drawn: str) -> None:
 def floors_of(rows: Sequence[Row], seed: int, drawn: str = "all") -> dict[str, Any]:
     """Return the content of the floors' file."""
     parts = {
-        name: [row for row in rows if bool(row[0]["with_reference"]) is wanted]
-        for name, wanted in (("with_reference", True), ("without_reference", False))
+        name: [row for row in rows if bool(row[0]["with_reference"]) is with_reference]
+        for name, with_reference in (("with_reference", True), ("without_reference", False))
     }
     n_cases = len(parts["with_reference"])
     n_healthy = sum(label["kind"] == "none" for label, _ in parts["with_reference"])
@@ -152,7 +152,7 @@ def floors_of(rows: Sequence[Row], seed: int, drawn: str = "all") -> dict[str, A
         "drawn": drawn,
         "made_by": "sims.blind_drive",
     }
-    return {"provenance": provenance, **{name: fit_part(found) for name, found in parts.items()}}
+    return {"provenance": provenance, **{name: fit_part(rows_of_part) for name, rows_of_part in parts.items()}}
 
 
 if __name__ == "__main__":

@@ -196,12 +196,14 @@ def named(known: KnownToothErrors, rows: FloatArray) -> tuple[NDArray[np.str_], 
     return np.array(TOOTH_FAULTS)[levels.argmax(axis=1)], weights.max(axis=1) / weights.sum(axis=1)
 
 
-def _told(title: str, truth: NDArray[np.str_], likeliest: NDArray[np.str_], probability: FloatArray) -> None:
-    right, sure = truth == likeliest, probability >= 0.9
-    one_tooth = truth != "pitch_error"
+def _print_accuracy(
+    title: str, truth: NDArray[np.str_], named_fault: NDArray[np.str_], probability: FloatArray
+) -> None:
+    right, sure = truth == named_fault, probability >= 0.9
+    is_single = truth != "pitch_error"
     of_each = ", ".join(f"{name} {np.mean(right[truth == name]):.2f}" for name in TOOTH_FAULTS if (truth == name).any())
     typer.echo(
-        f"{title}: right {right.mean():.2f} of {len(right)} ({of_each}; of one tooth {right[one_tooth].mean():.2f}); "
+        f"{title}: right {right.mean():.2f} of {len(right)} ({of_each}; of one tooth {right[is_single].mean():.2f}); "
         f"said with 0.9 {sure.sum()}, right {right[sure].mean() if sure.any() else float('nan'):.2f}"
     )
 
@@ -219,14 +221,14 @@ def blind(n_each: int) -> None:
         case = draw_case(rng, "development", kind="single", effect=fault, level=level, with_reference=True)
         recorded = record_case(case, encoder_counts=ENCODER_COUNTS)
         for now, reference in zip(recorded.conditions, recorded.references, strict=True):
-            said = tooth_error_evidence(now, reference)
-            if said is None or said.is_unlike_any:
+            evidence = tooth_error_evidence(now, reference)
+            if evidence is None or evidence.is_unlike_any:
                 unlike += 1
                 continue
-            likeliest = max(said.log_likelihoods, key=said.log_likelihoods.__getitem__)
-            rows.append((fault, likeliest, said.probabilities[likeliest]))
+            named_fault = max(evidence.log_likelihoods, key=evidence.log_likelihoods.__getitem__)
+            rows.append((fault, named_fault, evidence.probabilities[named_fault]))
     columns = [np.array(column) for column in zip(*rows, strict=True)]
-    _told(f"independent rig, {unlike} unlike any or not seen", columns[0], columns[1], columns[2])
+    _print_accuracy(f"independent rig, {unlike} unlike any or not seen", columns[0], columns[1], columns[2])
 
 
 def main() -> None:
@@ -235,16 +237,18 @@ def main() -> None:
     parser.add_argument("--each", type=int, default=600, help="faults of each kind and simulator")
     parser.add_argument("--blind", type=int, default=0, help="faults of each kind on the independent rig")
     parser.add_argument("--to", type=Path, default=TOOTH_ERRORS_FILE)
-    given = parser.parse_args()
-    by_simulator = {name: known_tooth_errors_of(name, given.each) for name in SIMULATORS}
-    for name, left_out in by_simulator.items():
+    arguments = parser.parse_args()
+    by_simulator = {name: known_tooth_errors_of(name, arguments.each) for name in SIMULATORS}
+    for name, held_out in by_simulator.items():
         (fitted_to,) = (known for title, known in by_simulator.items() if title != name)
-        _told(f"{name} left out", left_out.faults, *named(fitted_to, left_out.descriptors))
+        _print_accuracy(f"{name} left out", held_out.faults, *named(fitted_to, held_out.descriptors))
     rows = np.concatenate([known.descriptors for known in by_simulator.values()]).astype(np.float16)
     faults = np.concatenate([known.faults for known in by_simulator.values()])
-    write_whole(given.to, lambda file: np.savez_compressed(file, allow_pickle=False, descriptors=rows, faults=faults))
-    if given.blind:
-        blind(given.blind)
+    write_whole(
+        arguments.to, lambda file: np.savez_compressed(file, allow_pickle=False, descriptors=rows, faults=faults)
+    )
+    if arguments.blind:
+        blind(arguments.blind)
 
 
 if __name__ == "__main__":

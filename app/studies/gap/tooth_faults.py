@@ -83,14 +83,14 @@ class Answered:
 
 def drawn_cases(plan: Plan, n_rigs: int) -> Iterator[tuple[int, BlindCase]]:
     """Yield so many cases with their numbers, each of another rig under load, shortened to `LONGEST_S`."""
-    number = found = 0
-    while found < n_rigs:
+    number = n_drawn = 0
+    while n_drawn < n_rigs:
         number += 1
         case = plan.draw(PlannedCase(number, "blind", "single", TOOTH_FAULTS[0], LEVELS[0], True, 1))
         first = case.conditions[0]
         rig = case.rig.description(first.stated_rpm, first.stated_nm)
         if tooth_load_n_per_mm(rig.pairs[0], first.true_nm) >= MIN_LOAD_N_PER_MM:
-            found += 1
+            n_drawn += 1
             yield number, case
 
 
@@ -136,26 +136,26 @@ def independent(plan: Plan, number: int) -> Iterator[Recorded]:
             yield Recorded(name, severity, now.with_name(f"{name} {level}"), reference.with_name("healthy"))
 
 
-def answered(one: Recorded, rig: Rig, cache: Path) -> Answered:
+def answered(recorded: Recorded, rig: Rig, cache: Path) -> Answered:
     """Diagnose one recording as far as its likeliest causes."""
     simulator = cracked_gap_simulator()
     known, twin = simulator.gap_effects(), simulator.twin_of(rig)
-    now, reference = PreparedRecording(one.now.with_rig(rig)), PreparedRecording(one.reference.with_rig(rig))
+    now, reference = PreparedRecording(recorded.now.with_rig(rig)), PreparedRecording(recorded.reference.with_rig(rig))
     conditions, _ = conditions_of([now], [reference], twin)
     attribution = attribute(conditions, known, TOOTH_FAULTS, twin, cache, lambda _what, _done: None)
     before, after = (a.probabilities() for a in (replace(attribution, tried={}), attribution))
-    trial = attribution.tried.get(one.name)
-    said = None if trial is None else trial.severity
-    if one.name == "root_crack" and isinstance(depth := _crack(now, reference), CrackEstimate):
-        said = Interval(depth.depth_mm, *depth.interval_mm)
+    trial = attribution.tried.get(recorded.name)
+    severity = None if trial is None else trial.severity
+    if recorded.name == "root_crack" and isinstance(depth := _crack(now, reference), CrackEstimate):
+        severity = Interval(depth.depth_mm, *depth.interval_mm)
     match = None if trial is None else trial.match
     return Answered(
-        one.name,
-        one.severity,
+        recorded.name,
+        recorded.severity,
         _among(before),
         _among(after),
         0.0 if match is None else match.correlation,
-        said,
+        severity,
     )
 
 
@@ -171,18 +171,20 @@ def _among(probabilities: dict[str, float]) -> dict[str, float]:
     return {name: probabilities[name] / total for name in TOOTH_FAULTS}
 
 
-def told(rows: Sequence[Answered]) -> Iterator[str]:
+def report_lines(rows: Sequence[Answered]) -> Iterator[str]:
     """Yield the table: by fault and all, forests alone and with waveforms."""
     for name in (*TOOTH_FAULTS, "all"):
-        own = [row for row in rows if name in (row.name, "all")]
-        if not own:
+        of_effect = [row for row in rows if name in (row.name, "all")]
+        if not of_effect:
             continue
         parts = []
-        for said in ([row.forests for row in own], [row.both for row in own]):
-            right = sum(max(p, key=p.__getitem__) == row.name for p, row in zip(said, own, strict=True))
-            loss = float(np.mean([-np.log(max(p[row.name], 1e-9)) for p, row in zip(said, own, strict=True)]))
-            parts.append(f"{right:3} of {len(own):3}, log loss {loss:.2f}")
-        held = [row.said.low <= row.severity <= row.said.high for row in own if row.said is not None]
+        for probabilities in ([row.forests for row in of_effect], [row.both for row in of_effect]):
+            right = sum(max(p, key=p.__getitem__) == row.name for p, row in zip(probabilities, of_effect, strict=True))
+            loss = float(
+                np.mean([-np.log(max(p[row.name], 1e-9)) for p, row in zip(probabilities, of_effect, strict=True)])
+            )
+            parts.append(f"{right:3} of {len(of_effect):3}, log loss {loss:.2f}")
+        held = [row.said.low <= row.severity <= row.said.high for row in of_effect if row.said is not None]
         yield (f"{name:14} forests {parts[0]}; with waveforms {parts[1]}; severity held {sum(held)} of {len(held)}")
 
 
@@ -194,19 +196,19 @@ def main() -> None:
     parser.add_argument("--rigs", type=int, default=6)
     parser.add_argument("--seed", type=int, default=8101)
     parser.add_argument("--role", default="development")
-    given = parser.parse_args()
-    plan, rows = Plan(1000, given.seed, given.role, reference="with", longest_s=LONGEST_S), []
-    for number, case in drawn_cases(plan, given.rigs):
+    arguments = parser.parse_args()
+    plan, rows = Plan(1000, arguments.seed, arguments.role, reference="with", longest_s=LONGEST_S), []
+    for number, case in drawn_cases(plan, arguments.rigs):
         first = case.conditions[0]
         rig = case.rig.description(first.stated_rpm, first.stated_nm)
-        is_blind = given.source == "blind"
-        recorded = independent(plan, number) if is_blind else simulated(case, given.source, given.seed + number)
+        is_blind = arguments.source == "blind"
+        recorded = independent(plan, number) if is_blind else simulated(case, arguments.source, arguments.seed + number)
         with tempfile.TemporaryDirectory() as cache:
-            for one in recorded:
+            for recorded_fault in recorded:
                 try:
-                    row = answered(one, rig, Path(cache))
+                    row = answered(recorded_fault, rig, Path(cache))
                 except RefusalError as error:
-                    typer.echo(f"refused: {one.name}: {error}")
+                    typer.echo(f"refused: {recorded_fault.name}: {error}")
                     continue
                 rows.append(row)
                 interval = (
@@ -215,7 +217,7 @@ def main() -> None:
                 p = ", ".join(f"{name} {value:.2f}" for name, value in row.both.items())
                 true = f"{number:3} {row.name:14}{row.severity:8.3g}"
                 typer.echo(f"{true}  {interval:28} ρ {row.correlation:.2f}  {p}")
-    for line in told(rows):
+    for line in report_lines(rows):
         typer.echo(line)
 
 
