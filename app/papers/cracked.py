@@ -106,8 +106,8 @@ def friction_curves() -> tuple[FloatArray, dict[str, FloatArray]]:
     slot = np.floor(cycles + mesh.ramp / 2.0).astype(int)
     curves = {}
     for roughness in ROUGHNESS_UM:
-        found = friction_over_mesh(mesh, TORQUE_NM, RPM, viscosity, roughness, cycles)
-        signed = found.coefficient * np.sign(found.sliding_mps)
+        friction = friction_over_mesh(mesh, TORQUE_NM, RPM, viscosity, roughness, cycles)
+        signed = friction.coefficient * np.sign(friction.sliding_mps)
         curves[rq(roughness)] = signed[np.arange(len(cycles)), np.minimum(slot, mesh.n_slots - 1)]
     return cycles, curves
 
@@ -129,10 +129,11 @@ def friction_roughness() -> Figure:
 def _friction() -> PaperFigure:
     largest = [float(np.abs(values).max()) for values in friction_curves()[1].values()]
     rise, surge = largest[2] / largest[1], largest[3] / largest[2]
-    said = ", ".join(f"{mu:.3f}" for mu in largest)
+    values = ", ".join(f"{mu:.3f}" for mu in largest)
     claim = judged(
         "the coefficient varies little for Rq of 0 to 0.84 µm and is great above",
-        f"at most {said} at 0, 0.45, 0.84 and 1.40 µm: × {rise:.2f} up to 0.84 µm, × {surge:.2f} from there to 1.40 µm",
+        f"at most {values} at 0, 0.45, 0.84 and 1.40 µm: × {rise:.2f} up to 0.84 µm, "
+        f"× {surge:.2f} from there to 1.40 µm",
         agrees=surge > 1.5 * rise,
         because="the regression's exp(S) does not surge for this oil",
     )
@@ -186,7 +187,7 @@ def backlash_roughness() -> Figure:
 
 def _backlash() -> PaperFigure:
     _, _, _, amplitudes, lines = backlash_lines()
-    worst = max(abs(found / published - 1.0) for found, published in zip(lines, PUBLISHED_LINES_HZ, strict=True))
+    worst = max(abs(line / published - 1.0) for line, published in zip(lines, PUBLISHED_LINES_HZ, strict=True))
     claim = judged(
         "lines at 17.9, 26.9, 39.4, 59.1, 89.6, 133.4, 200.5, 300.8, 451.2, 667.7, 1016 and 1524 Hz",
         f"twelve lines, within {100 * worst:.1f} % of them",
@@ -215,13 +216,13 @@ def pairs_with_friction(roughness_um: float, cycles: FloatArray, *, squared: boo
     """
     rig = machine()
     mesh, pair = rig.mesh, rig.mesh.pair
-    own = mesh_stiffness(mesh, cycles).pairs_n_per_m
-    found = friction_over_mesh(mesh, TORQUE_NM, RPM, rig.lubrication.viscosity_cp, roughness_um, cycles)
+    pairs = mesh_stiffness(mesh, cycles).pairs_n_per_m
+    friction = friction_over_mesh(mesh, TORQUE_NM, RPM, rig.lubrication.viscosity_cp, roughness_um, cycles)
     newest = np.floor(cycles + mesh.ramp / 2.0)
-    progress = np.clip((cycles - newest)[:, None] + np.arange(own.shape[1]), 0.0, pair.contact_ratio)
-    mu = found.coefficient * np.sign(found.sliding_mps)  # above 0 in approach: stiffer
-    added = np.zeros(own.shape)
-    for slot in range(own.shape[1]):
+    progress = np.clip((cycles - newest)[:, None] + np.arange(pairs.shape[1]), 0.0, pair.contact_ratio)
+    mu = friction.coefficient * np.sign(friction.sliding_mps)  # above 0 in approach: stiffer
+    added = np.zeros(pairs.shape)
+    for slot in range(pairs.shape[1]):
         rho = pair.contact_radii_mm(progress[:, slot])
         for gear, material, r in zip((pair.driver, pair.driven), (mesh.material_1, mesh.material_2), rho, strict=True):
             normal, itself = (
@@ -230,8 +231,8 @@ def pairs_with_friction(roughness_um: float, cycles: FloatArray, *, squared: boo
             )
             m = mu[:, slot]
             added[:, slot] += -2.0 * m * normal + m**2 * itself if squared else -m * normal
-    carries = own > 0.0
-    return np.where(carries, 1.0 / (1.0 / np.where(carries, own, 1.0) + added), 0.0)
+    carries = pairs > 0.0
+    return np.where(carries, 1.0 / (1.0 / np.where(carries, pairs, 1.0) + added), 0.0)
 
 
 def stiffness_with_friction(roughness_um: float, cycles: FloatArray, *, squared: bool = False) -> FloatArray:
@@ -269,8 +270,8 @@ def _friction_inside() -> PaperFigure:
         heading="",
     )
     change = shown[rq(1.40)] / shown[rq(0.0)] - 1.0
-    one = np.flatnonzero(single & (cycles < 1.0))
-    first, last = float(change[one[0]]), float(change[one[-1]])
+    of_single = np.flatnonzero(single & (cycles < 1.0))
+    first, last = float(change[of_single[0]]), float(change[of_single[-1]])
     double = ~single & (cycles % 1.0 > 0.05) & (cycles % 1.0 < ratio - 1.0 - 0.05)
     means = [
         100.0 * float(np.mean(values[double] / shown[rq(0.0)][double] - 1.0)) for values in list(shown.values())[1:]
@@ -345,13 +346,13 @@ def _stiffness_by_elements() -> list[float]:
     rig, gear = machine(), ready_gear("z55_m2")
     pair = rig.mesh.pair
     at = np.linspace(0.82, 0.95, 40)
-    own = mesh_stiffness(rig.mesh, at + CRACKED_TOOTH).total_n_per_m
+    tooth_by_tooth = mesh_stiffness(rig.mesh, at + CRACKED_TOOTH).total_n_per_m
     roll = pair.contact_radii_mm(at)[0] / pair.driver.base_radius_mm
-    found = [float(own.mean())]
+    means = [float(tooth_by_tooth.mean())]
     for depth in CRACKS_MM[1:]:
         added = crack_added_m_per_n(gear, RootCrack(float(depth), 45.0)).mean(axis=(1, 2))
-        found.append(float(np.mean(1.0 / (1.0 / own + np.interp(roll, gear.grid.roll_rad, added)))))
-    return found
+        means.append(float(np.mean(1.0 / (1.0 / tooth_by_tooth + np.interp(roll, gear.grid.roll_rad, added)))))
+    return means
 
 
 def _crack_laws() -> PaperFigure:
@@ -512,11 +513,11 @@ def _friction_force() -> PaperFigure:
 # Cracks in time and over time and frequency: figures 16, 18 and 20.
 
 
-def felt_until(cycles: FloatArray, change: FloatArray, least: float) -> float:
-    """Mesh cycles from the cracked tooth's entry until the change stays below `least` for a whole mesh cycle."""
+def felt_until(cycles: FloatArray, change: FloatArray, threshold: float) -> float:
+    """Mesh cycles from the cracked tooth's entry until the change stays below `threshold` for a whole mesh cycle."""
     last = 0.0
     while last < 30.0:
-        above = cycles[(cycles > last) & (cycles <= last + 1.0) & (np.abs(change) > least)]
+        above = cycles[(cycles > last) & (cycles <= last + 1.0) & (np.abs(change) > threshold)]
         if not len(above):
             break
         last = float(above.max())
@@ -536,8 +537,8 @@ def crack_reach(signal: str = "driver y acceleration") -> tuple[FloatArray, dict
     cycles = (revolutions - 5.0 - CRACKED_TOOTH / n_teeth) * n_teeth
     # Of an acceleration that of its rms, of a transmission error that of its swing.
     size = np.std(healthy) if "acceleration" in signal else np.ptp(healthy)
-    least = FELT * float(size)
-    reach = {name: felt_until(cycles, a - healthy, least) for name, a in values.items() if name != named(0)}
+    threshold = FELT * float(size)
+    reach = {name: felt_until(cycles, a - healthy, threshold) for name, a in values.items() if name != named(0)}
     return revolutions, values, reach
 
 

@@ -63,17 +63,17 @@ def estimated(mode: str, preset_name: str = PRESETS[0]) -> ForceEstimate:
     return estimate_forces(measure_motion(recording(mode, preset_name)))
 
 
-def _relative(found: ForceEstimate, model: str, reference: str = FROM_TORQUE) -> float:
-    return 100.0 * found.error(model, reference).relative_rms
+def _relative(estimate: ForceEstimate, model: str, reference: str = FROM_TORQUE) -> float:
+    return 100.0 * estimate.error(model, reference).relative_rms
 
 
-def _why_not_as_printed(found: ForceEstimate) -> str:
+def _why_not_as_printed(estimate: ForceEstimate) -> str:
     """Say what the printed inertia term adds, and how much of the formula's error that is."""
-    motion, contact = found.motion, found.motion.contact
+    motion, contact = estimate.motion, estimate.motion.contact
     r1, r2 = motion.path.base_radii_m
     pinion_kg, load_kg = contact.driver_inertia_kg_m2 / r1**2, (contact.driven_inertia_kg_m2 or 0.0) / r2**2
     added = load_kg * motion.compression_acceleration_mps2 - pinion_kg * r1 * motion.driver_acceleration_rad_s2
-    error = found.forces_n[AS_PRINTED] - found.references_n[FROM_TORQUE]
+    error = estimate.forces_n[AS_PRINTED] - estimate.references_n[FROM_TORQUE]
     explained = 1.0 - float(np.mean((error - added) ** 2) / np.mean(error**2))
     return (
         "it is an identity of two free bodies, with the other sign. A torque on the pinion's shaft moves the pinion, "
@@ -83,35 +83,35 @@ def _why_not_as_printed(found: ForceEstimate) -> str:
 
 
 def _force(mode: str, answers: str) -> PaperFigure:
-    found = estimated(mode)
-    other = estimated(mode, PRESETS[1])
-    own, hunt, printed = (_relative(found, model) for model in (PIECEWISE, HUNT_CROSSLEY, AS_PRINTED))
+    estimate = estimated(mode)
+    rigid = estimated(mode, PRESETS[1])
+    piecewise, hunt, printed = (_relative(estimate, model) for model in (PIECEWISE, HUNT_CROSSLEY, AS_PRINTED))
     claims = [
         judged(
             "the piecewise model agrees with the force from the measured torque",
-            f"{own:.2g} % rms (rigid Table 1 stiffness: {_relative(other, PIECEWISE):.2g} %), the teeth alone "
-            f"{_relative(found, TEETH, TOOTH_FORCE):.2g} % of the simulated tooth force",
-            agrees=own < 5.0,
+            f"{piecewise:.2g} % rms (rigid Table 1 stiffness: {_relative(rigid, PIECEWISE):.2g} %), the teeth alone "
+            f"{_relative(estimate, TEETH, TOOTH_FORCE):.2g} % of the simulated tooth force",
+            agrees=piecewise < 5.0,
         ),
         judged(
             "its errors are smaller than those of Hunt–Crossley",
-            f"{own:.2g} % against {hunt:.3g} %",
-            agrees=own < 0.5 * hunt,
+            f"{piecewise:.2g} % against {hunt:.3g} %",
+            agrees=piecewise < 0.5 * hunt,
         ),
         judged(
             "the formula as printed, with m₀q̈ of the impacted body, fits",
             f"{printed:.0f} % rms",
             agrees=printed < 5.0,
             partly=printed < hunt,
-            because=_why_not_as_printed(found),
+            because=_why_not_as_printed(estimate),
         ),
     ]
-    time = found.motion.time_s
+    time = estimate.motion.time_s
     shown = (time < 1.4) if mode == "start-stop" else (time < 0.6)
     forces = {
-        "torque / rb1": found.references_n[FROM_TORQUE][shown],
-        "piecewise": found.forces_n[PIECEWISE][shown],
-        "Hunt–Crossley": found.forces_n[HUNT_CROSSLEY][shown],
+        "torque / rb1": estimate.references_n[FROM_TORQUE][shown],
+        "piecewise": estimate.forces_n[PIECEWISE][shown],
+        "Hunt–Crossley": estimate.forces_n[HUNT_CROSSLEY][shown],
     }
     errors = {name: forces[name] - forces["torque / rb1"] for name in ("piecewise", "Hunt–Crossley")}
     figure = curves_figure(
@@ -129,7 +129,7 @@ def _force(mode: str, answers: str) -> PaperFigure:
     )
     if mode == "start-stop":
         after = (time > 1.0) & (time < 3.0)
-        reverse = found.references_n[FROM_TORQUE][after]
+        reverse = estimate.references_n[FROM_TORQUE][after]
         lowest, delay_ms = float(reverse.min()), 1e3 * (float(time[after][np.argmin(reverse)]) - 1.0)
         claims.append(
             judged(
@@ -176,8 +176,8 @@ def _why_not_in_the_table(by_formula: float) -> str:
 
 
 def _parameters() -> PaperFigure:
-    found = estimated("start-stop")
-    contact, path = found.motion.contact, found.motion.path
+    estimate = estimated("start-stop")
+    contact, path = estimate.motion.contact, estimate.motion.path
     claims = (
         within_part(
             "contact ratio 1.749",

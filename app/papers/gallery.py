@@ -52,8 +52,11 @@ class Claim:
     @property
     def judgement(self) -> str:
         """The verdict with its sign and its reason."""
-        said, joint = f"{SIGNS[self.verdict]} {self.verdict}", ", because " if self.verdict == "does not" else ": "
-        return f"{said}{joint}{self.because}" if self.because and self.verdict != "agrees" else said
+        verdict_text, joint = (
+            f"{SIGNS[self.verdict]} {self.verdict}",
+            ", because " if self.verdict == "does not" else ": ",
+        )
+        return f"{verdict_text}{joint}{self.because}" if self.because and self.verdict != "agrees" else verdict_text
 
 
 def judged(statement: str, found: str, *, agrees: bool, partly: bool = False, because: str = "") -> Claim:
@@ -63,10 +66,10 @@ def judged(statement: str, found: str, *, agrees: bool, partly: bool = False, be
     )
 
 
-def within_part(statement: str, published: float, found: float, unit: str, *, part: float, because: str = "") -> Claim:
+def within_part(statement: str, published: float, value: float, unit: str, *, part: float, because: str = "") -> Claim:
     """Return a claim that agrees within a part of the published number, and in part within three times that."""
-    away = abs(found / published - 1.0)
-    text = f"{found:.4g} {unit} ({100.0 * (found / published - 1.0):+.2g} %)"
+    away = abs(value / published - 1.0)
+    text = f"{value:.4g} {unit} ({100.0 * (value / published - 1.0):+.2g} %)"
     return judged(statement, text, agrees=away <= part, partly=away <= 3.0 * part, because=because)
 
 
@@ -169,13 +172,13 @@ def write_paper(found: Paper, folder: Path, *, command: str = "") -> tuple[Path,
     return tuple(paths)
 
 
-def _claims_json(found: Paper) -> str:
+def _claims_json(paper: Paper) -> str:
     def rows() -> Iterator[dict[str, str]]:
-        for item in found.figures:
+        for item in paper.figures:
             for claim in item.claims:
                 yield {"figure": item.name, "answers": item.answers, **vars(claim)}
 
-    about = {"paper": found.name, "source": found.source, "machine": found.machine, "summary": found.summary}
+    about = {"paper": paper.name, "source": paper.source, "machine": paper.machine, "summary": paper.summary}
     return json.dumps(
-        {**about, "claims": list(rows()), "unanswered": dict(found.unanswered)}, ensure_ascii=False, indent=2
+        {**about, "claims": list(rows()), "unanswered": dict(paper.unanswered)}, ensure_ascii=False, indent=2
     )

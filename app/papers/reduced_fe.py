@@ -106,16 +106,18 @@ def _drop(study: Study) -> Claim:
     bare = _pair({"hub_inertia_driver_kg_m2": 0.0, "hub_inertia_driven_kg_m2": 0.0})[0]
     at_load = Operation.steady(4100.0, study.torque_nm)
     curves = study.angle_hz, reduced_fe.eigenfrequencies_hz(bare, at_load, study.angle_cycles)
-    said, depths = [], []
+    gear_texts, depths = [], []
     for hz, gears in zip(curves, ("with the hubs", "without"), strict=True):
         above = hz[:, hz[0] > 1000.0]
         curve = above[:, int(np.argmax(np.ptp(above, axis=0) / above.mean(axis=0)))]
         low = study.angle_cycles[curve < 0.95 * curve.max()] * 360.0 / study.n_teeth
         depths.append(float(1.0 - curve.min() / curve.max()))
-        said.append(f"{gears} from {curve.max():.0f} to {curve.min():.0f} Hz, at {low.min():.1f} to {low.max():.1f}°")
+        gear_texts.append(
+            f"{gears} from {curve.max():.0f} to {curve.min():.0f} Hz, at {low.min():.1f} to {low.max():.1f}°"
+        )
     return judged(
         "a drop of some curves near 3500 to 4000 Hz at 5 to 10 degrees",
-        f"the flanks' mode drops where one pair carries: {'; '.join(said)}",
+        f"the flanks' mode drops where one pair carries: {'; '.join(gear_texts)}",
         agrees=False,
         partly=min(depths) > 0.05,
         because="the drop and its angle agree; its frequency is that of the gears' inertia, which is not stated",
@@ -165,8 +167,8 @@ def _relieved_jumps(study: Study) -> tuple[str, bool]:
         reduced_fe.speed_sweep(pair, study.torque_nm, *ends, SWEEP_S, step_s=step_s).jump_hz(low, high)
         for ends in ((900.0, 4100.0), (4100.0, 900.0))
     ]
-    said = " and ".join("no jump" if jump is None else f"{jump:.0f} Hz" for jump in jumps)
-    return f"{said} at {study.torque_nm:g} N m ({RELIEF_UM:g} µm over {RELIEF_MM:g} mm)", any(
+    jump_text = " and ".join("no jump" if jump is None else f"{jump:.0f} Hz" for jump in jumps)
+    return f"{jump_text} at {study.torque_nm:g} N m ({RELIEF_UM:g} µm over {RELIEF_MM:g} mm)", any(
         jump is not None for jump in jumps
     )
 
@@ -178,7 +180,7 @@ def _sweeps(study: Study, drawn: dict[str, Figure]) -> PaperFigure:
         low, high = (part * study.natural_hz[torque] for part in RANGE)
         peak = (up.peak_hz(low, high) + down.peak_hz(low, high)) / 2.0
         jumps = [sweep.jump_hz(low, high) for sweep in (up, down)]
-        said = ", ".join("no jump" if jump is None else f"a jump at {jump:.0f} Hz" for jump in jumps)
+        jump_text = ", ".join("no jump" if jump is None else f"a jump at {jump:.0f} Hz" for jump in jumps)
         claims += [
             within_part(
                 "the primary resonance lies at 2700 Hz",
@@ -190,7 +192,7 @@ def _sweeps(study: Study, drawn: dict[str, Figure]) -> PaperFigure:
             ),
             judged(
                 "hysteretic jumps in sweeps up and down",
-                f"{torque:g} N m, up and down: {said}",
+                f"{torque:g} N m, up and down: {jump_text}",
                 agrees=any(jump is not None for jump in jumps),
                 partly=jumps_relieved,
                 because=f"flawless flanks hardly part at 8 % of damping; with tip relief, up and down: {relieved}",
@@ -317,20 +319,20 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
     # What the modes leave out, and what the reduction leaves out between the heights whose static answer it keeps.
     error = {f"{name}, full less modal": full[name] - modal[name] for name in full}
     between, body, n_heights = _between_heights(pair, mesh, force, lambda field: shown(field)["von Mises"])
-    left = float(np.sqrt(np.mean(error["von Mises, full less modal"] ** 2) / np.mean(full["von Mises"] ** 2)))
+    residual_share = float(np.sqrt(np.mean(error["von Mises, full less modal"] ** 2) / np.mean(full["von Mises"] ** 2)))
     title = f"{force:.0f} N on one tooth, bore held, {mesh.n_dof} degrees of freedom"
     static = plot.stress_maps_figure(view.points_mm, view.triangles, full, near_mm=near, title=f"Static: {title}")
     by_modes = plot.stress_maps_figure(
         view.points_mm, view.triangles, modal, near_mm=near, title=f"{N_MODES} modes alone: {title}"
     )
-    rest = plot.stress_maps_figure(
+    error_maps = plot.stress_maps_figure(
         view.points_mm, view.triangles, error, near_mm=near, title=f"Full less {N_MODES} modes: {title}"
     )
     # Four angles of a mesh cycle: two with both pairs in contact, two with one, as the contact ratio lies below two.
-    moving, both = {}, []
+    moving, n_contacts = {}, []
     for row in (0, 2, 5, 7):
         field, forces = contacts(row)
-        both.append(len(forces))
+        n_contacts.append(len(forces))
         words = " and ".join(f"{f:.0f} N" for f in forces)
         moving[f"mesh cycle {maps.mesh_cycles[row]:.2f}: {words}"] = shown(field)["von Mises"]
     track = plot.stress_maps_figure(
@@ -352,25 +354,25 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
     )
     patterns = judged(
         "static and modal maps show the same contact patterns",
-        f"von Mises stress differs by {percent(left)} rms",
-        agrees=left < 0.1,
-        partly=left < 1.0,
+        f"von Mises stress differs by {percent(residual_share)} rms",
+        agrees=residual_share < 0.1,
+        partly=residual_share < 1.0,
         because="a local contact needs the static rest besides the modes, which the reduction keeps",
     )
     small = judged(
         "the error of the reduced model stays small",
         f"{100 * between:.1f} % rms halfway between two of the {n_heights} heights whose static answer the reduction "
         f"keeps, {100 * body:.1f} % where stress is below half the greatest; at those heights none; {N_MODES} modes "
-        f"alone: {percent(left)}",
+        f"alone: {percent(residual_share)}",
         agrees=between < 0.1,
         partly=body < 0.1,
         because="the patch under the contact lies elsewhere than at the heights kept",
     )
     peaks = judged(
         "two peaks where two pairs share the load, one where one carries",
-        f"{', '.join(map(str, both))} contacts at the four angles",
-        agrees=set(both) == {1, 2},
-        partly=2 in both,
+        f"{', '.join(map(str, n_contacts))} contacts at the four angles",
+        agrees=set(n_contacts) == {1, 2},
+        partly=2 in n_contacts,
         because="none of the angles lies where one pair carries",
     )
     words = "radial, tangential, shear and von Mises stress"
@@ -379,7 +381,7 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
         PaperFigure(
             "stress_modal", "Figures 8 to 14 and 18 to 110, modal maps", f"{words} by modes", by_modes, (patterns,)
         ),
-        PaperFigure("stress_error", "Figures 6, 7 and 11, errors", "what modes alone leave out", rest, (small,)),
+        PaperFigure("stress_error", "Figures 6, 7 and 11, errors", "what modes alone leave out", error_maps, (small,)),
         PaperFigure("stress_moving", "Figure 7, contacts that move", "stress over a mesh cycle", track, (peaks,)),
     ]
 
@@ -400,10 +402,10 @@ def compute(on_progress: Progress) -> Paper:
     )  # fmt: skip
     drawn = dict(figures(study, "50/50 teeth"))
     on_progress("kinematics", 0.6)
-    found = [*_maps(study, drawn), _frequencies(study, drawn), _sweeps(study, drawn), _spectra(study, drawn)]
-    found.append(_kinematics(pair, torque_nm, step_s))
+    paper_figures = [*_maps(study, drawn), _frequencies(study, drawn), _sweeps(study, drawn), _spectra(study, drawn)]
+    paper_figures.append(_kinematics(pair, torque_nm, step_s))
     on_progress("stress", 0.7)
-    found += _stress(pair, torque_nm)
+    paper_figures += _stress(pair, torque_nm)
     on_progress("done", 1.0)
     machine = "preset flexible_50_50; bore, torques and hub inertia are chosen, the study states none"
-    return Paper("reduced-fe", "Flexible gear wheels", SOURCE, machine, tuple(found), UNANSWERED)
+    return Paper("reduced-fe", "Flexible gear wheels", SOURCE, machine, tuple(paper_figures), UNANSWERED)
