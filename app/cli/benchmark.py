@@ -73,7 +73,7 @@ def gap(
 
     wished = "both" if reference is None else "with" if reference else "without"
     if one_of(model, "model", ("cracked", "forging")) == "forging":
-        _refuse_others(
+        _refuse_options(
             same_simulator=same_simulator,
             diagnosers=bool(diagnosers),
             longest=longest is not None,
@@ -138,9 +138,9 @@ def speed(
         typer.echo(f"{paths[0]} (table), {paths[1].name} (its numbers).")
 
 
-def _refuse_others(**given: bool) -> None:
-    for name, is_given in given.items():
-        if is_given:
+def _refuse_options(**given: bool) -> None:
+    for name, is_set in given.items():
+        if is_set:
             option = name.replace("_", "-").removesuffix("s")
             raise InputError(f"--{option} is given with --model forging", remedy=f"leave --{option} out")
 

@@ -71,20 +71,20 @@ SECONDS_BETWEEN_LINES = 10.0
 
 def _progress_lines(stage: str, n: int | None) -> Callable[..., None]:
     """Return what says how far a long command is, in lines for a log file; quick ones say nothing."""
-    began_s = said_s = monotonic()
+    began_s = printed_s = monotonic()
     now, whole = stage, 1.0 if n is None else float(n)
 
     def show(completed: float, stage: str | None = None, total: float | None = None) -> None:
-        nonlocal said_s, now, whole
+        nonlocal printed_s, now, whole
         now, whole = stage or now, total or whole
         passed_s = monotonic() - began_s
-        if monotonic() - said_s < SECONDS_BETWEEN_LINES:
+        if monotonic() - printed_s < SECONDS_BETWEEN_LINES:
             return
-        said_s = monotonic()
+        printed_s = monotonic()
         share = percent(completed) if n is None else f"{completed:.0f} of {whole:.0f}"
-        left_s = passed_s * (whole - completed) / completed if completed else 0.0
-        rest = f", {left_s:.0f} s left" if completed else ""
-        typer.echo(f"{now}: {share} after {passed_s:.0f} s{rest}", err=True)
+        remaining_s = passed_s * (whole - completed) / completed if completed else 0.0
+        remaining_text = f", {remaining_s:.0f} s left" if completed else ""
+        typer.echo(f"{now}: {share} after {passed_s:.0f} s{remaining_text}", err=True)
 
     return show
 

@@ -54,12 +54,17 @@ def _run(port: int, *, browser: bool) -> NoReturn:
     from app.dashboard.theme import THEME_OPTIONS
 
     net_util.get_external_ip = lambda: None  # it would ask a server elsewhere who we are, to judge a foreign origin
-    own = (
+    server_options = (
         f"server.port={port}",
         f"server.headless={str(not browser).lower()}",
         f"server.corsAllowedOrigins=http://localhost:{port}",
     )
-    sys.argv = ["streamlit", "run", str(MAIN_PAGE), *(f"--{option}" for option in (*OPTIONS, *THEME_OPTIONS, *own))]
+    sys.argv = [
+        "streamlit",
+        "run",
+        str(MAIN_PAGE),
+        *(f"--{option}" for option in (*OPTIONS, *THEME_OPTIONS, *server_options)),
+    ]
     sys.exit(streamlit_cli.main())
 
 

@@ -89,12 +89,15 @@ def add(
     opened = options.open_rig(rig)
     passed_over = list[PassedOver]()
     stated: dict[str, Any] = {"machine": machine, "point": point, "date": date, "rig": opened}
-    found = origins(places, pattern=pattern, **stated, on_passed_over=passed_over.append)
+    listed = origins(places, pattern=pattern, **stated, on_passed_over=passed_over.append)
     if dry_run and json:
-        seen = {"recordings": [_origin_json(origin) for origin in found], "passed_over": _left_out_json(passed_over)}
-        typer.echo(json_text.dumps(seen, indent=1, ensure_ascii=False))
+        answer = {
+            "recordings": [_origin_json(origin) for origin in listed],
+            "passed_over": _passed_over_json(passed_over),
+        }
+        typer.echo(json_text.dumps(answer, indent=1, ensure_ascii=False))
     else:
-        _show_origins(found, len(found) if dry_run else N_SHOWN, err=not dry_run)
+        _show_origins(listed, len(listed) if dry_run else N_SHOWN, err=not dry_run)
     if passed_over:
         _say(passed_over_text(passed_over))
     if dry_run:
@@ -110,9 +113,9 @@ def add(
     with ExitStack() as stack:
         workers = stack.enter_context(options.open_cluster(cluster))
         try:
-            show = stack.enter_context(progress_bar("analysing", len(found)))
+            show = stack.enter_context(progress_bar("analysing", len(listed)))
             result = fleet.add(
-                found,
+                listed,
                 rig=opened,
                 sampling_rate_hz=fs,
                 speed=options.stated_speed(speed_rpm, None, 1),
@@ -130,7 +133,7 @@ def add(
             raise typer.Exit(EXIT_INTERRUPTED) from None
         _show_added(replace(result, passed_over=tuple(passed_over)), store, workers, json=json)
     if result.failures:
-        raise typer.Exit(EXIT_INPUT_ERROR if len(result.failures) == len(found) else EXIT_SOME_FAILED)
+        raise typer.Exit(EXIT_INPUT_ERROR if len(result.failures) == len(listed) else EXIT_SOME_FAILED)
 
 
 @fleet_app.command()
@@ -197,18 +200,18 @@ def trend(
     if json:
         typer.echo(json_text.dumps([_trend_json(t) for t in trends], indent=1, ensure_ascii=False))
         return
-    for one in trends:
-        typer.echo(repr(one))
+    for series in trends:
+        typer.echo(repr(series))
         rows = [
             (
                 row["level"] if not row["in_baseline"] else "baseline",
                 f"{row['date']:%Y-%m-%d %H:%M}",
                 *(_number(row[name]) for name in ("value", "expected", "high", "alarm", "speed_rpm", "load_nm")),
             )
-            for row in one.table.to_dict("records")
+            for row in series.table.to_dict("records")
         ]
-        unit = f" ({one.unit})" if one.unit else ""
-        _table(("", "date", f"{one.name}{unit}", "expected", "limit", "alarm", "rpm", "N m"), rows, styles=_STYLES)
+        unit = f" ({series.unit})" if series.unit else ""
+        _table(("", "date", f"{series.name}{unit}", "expected", "limit", "alarm", "rpm", "N m"), rows, styles=_STYLES)
 
 
 @fleet_app.command()
@@ -383,20 +386,20 @@ def _table(
     console.print(table)
 
 
-def _show_origins(found: list[Origin], n_shown: int, *, err: bool) -> None:
+def _show_origins(listed: list[Origin], n_shown: int, *, err: bool) -> None:
     from gearsig.fleet import origin_rows
 
-    _table(("file", "machine", "point", "date"), origin_rows(found[:n_shown]), styles={}, err=err)
-    if len(found) > n_shown:
-        typer.echo(f"… and {len(found) - n_shown} more; --dry-run shows them all", err=err)
+    _table(("file", "machine", "point", "date"), origin_rows(listed[:n_shown]), styles={}, err=err)
+    if len(listed) > n_shown:
+        typer.echo(f"… and {len(listed) - n_shown} more; --dry-run shows them all", err=err)
 
 
 def _origin_json(origin: Origin) -> dict[str, Any]:
     return {name: str(value) if name in ("path", "date") else value for name, value in vars(origin).items()}
 
 
-def _left_out_json(files: Sequence[PassedOver]) -> list[dict[str, str]]:
-    return [{"file": str(each.path), "reason": each.reason} for each in files]
+def _passed_over_json(files: Sequence[PassedOver]) -> list[dict[str, str]]:
+    return [{"file": str(file.path), "reason": file.reason} for file in files]
 
 
 def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json: bool) -> None:
@@ -410,7 +413,7 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
             "known": result.n_known,
             "taken_by_others": result.n_elsewhere,
             "failures": failures,
-            "passed_over": _left_out_json(result.passed_over),
+            "passed_over": _passed_over_json(result.passed_over),
             "ran": ran,
         }
         typer.echo(json_text.dumps(summary, indent=1, ensure_ascii=False))

@@ -74,11 +74,13 @@ def flexible(
         natural = study.natural_hz[torque]
         jumps = [sweep.jump_hz(RANGE[0] * natural, RANGE[1] * natural) for sweep in (up, down)]
         peaks = [sweep.peak_hz(RANGE[0] * natural, RANGE[1] * natural) for sweep in (up, down)]
-        said = [
+        sweep_texts = [
             f"greatest at {peak:.0f} Hz, {'no jump' if jump is None else f'jump at {jump:.0f} Hz'}"
             for peak, jump in zip(peaks, jumps, strict=True)
         ]
-        typer.echo(f"{torque:g} N·m: torsional mode {natural:.0f} Hz; sweep up: {said[0]}; sweep down: {said[1]}")
+        typer.echo(
+            f"{torque:g} N·m: torsional mode {natural:.0f} Hz; sweep up: {sweep_texts[0]}; sweep down: {sweep_texts[1]}"
+        )
 
 
 def _range(text: str) -> tuple[float, float]:

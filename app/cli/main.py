@@ -56,8 +56,8 @@ USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 """Base of all errors of Typer's parser, which it does not export; since version 0.20 it is no longer Click's."""
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(is_requested: bool) -> None:
+    if is_requested:
         typer.echo(f"gearsig {__version__}")
         raise typer.Exit
 
@@ -96,10 +96,10 @@ def _stop_tidily() -> None:
 
 def _usage_text(error: Exception) -> str:
     """Return an error of the parser in one line; empty where it has printed the help instead."""
-    what = " ".join(str(getattr(error, "format_message", error.__str__)()).rstrip(".").split())
+    problem = " ".join(str(getattr(error, "format_message", error.__str__)()).rstrip(".").split())
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "gearsig"
-    return f"gearsig: {what}{' See' if what.endswith('?') else '; see'} {command} --help" if what else ""
+    return f"gearsig: {problem}{' See' if problem.endswith('?') else '; see'} {command} --help" if problem else ""
 
 
 if __name__ == "__main__":

@@ -286,7 +286,7 @@ def read_effect(text: str) -> EffectSetting:
     """Return the setting of "root_crack=2mm,gear=driven,tooth=5"."""
     from sims.effects import EffectSetting, effect
 
-    first, *rest = text.split(",")
+    first, *assignments = text.split(",")
     name = first.partition("=")[0].strip()
     definition = effect(name)
     s = definition.severity
@@ -297,7 +297,7 @@ def read_effect(text: str) -> EffectSetting:
             remedy=f"write for example {name}={s.typical:g}{s.unit.replace(' ', '')}",
         )
     severity = quantity(first.partition("=")[2], s.unit, f"{s.name} of {name}")
-    return EffectSetting(name, severity, read_effect_options(definition, rest))
+    return EffectSetting(name, severity, read_effect_options(definition, assignments))
 
 
 def read_effect_options(effect: Effect, texts: Sequence[str]) -> dict[str, float | str]:

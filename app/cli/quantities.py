@@ -102,8 +102,8 @@ def _worth(stated: str, unit: str, text: str, name: str) -> float:
             return float(f"{kind[stated_unit] / kind[target_unit]:.15g}")  # 1000 mm in a m, not 1000.0000000000001
     if not unit:
         raise InputError(f"{name} is {text!r}", allowed="a number without unit")
-    others = [u for kind in fitting for u in kind if u != target_unit]
-    also = f" (or {', '.join(others)})" if others else ""
+    fitting_units = [u for kind in fitting for u in kind if u != target_unit]
+    also = f" (or {', '.join(fitting_units)})" if fitting_units else ""
     raise InputError(f"{name} is {text!r}, in {stated!r}", remedy=f"give it in {unit}{also}")
 
 

@@ -137,8 +137,8 @@ def _model_text(simulator: Simulator) -> str:
     if simulator.effects:
         parts.append("Effects (--effect NAME=SEVERITY,OPTION=VALUE,…)")
         parts.append("\n\n".join(_effect_text(effect(name)) for name in simulator.effects))
-    others = [name for name in effects() if name not in simulator.effects]
-    lacking = [f"{', '.join(others)}: not represented."] if others else []
+    missing_effects = [name for name in effects() if name not in simulator.effects]
+    lacking = [f"{', '.join(missing_effects)}: not represented."] if missing_effects else []
     if lacking or simulator.meaningless:
         parts.append("Effects without a meaning here")
         parts += [_wrapped(text, "  ", "  ") for text in (*lacking, *simulator.meaningless)]

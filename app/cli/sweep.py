@@ -172,19 +172,20 @@ def _print_bifurcation(request: BifurcationRequest, values: Values, output: Path
     from app import bifurcation as study
 
     paths = study.write_results(request, values, output)
-    reasons = [(name, one) for name, kept in values.items() for one in kept if one.reason]
-    for name, one in reasons[:MAX_REASONS]:
-        typer.echo(f"{study.NAMES[name]}, {one.value:g}: {one.reason}", err=True)
+    reasons = [(name, point) for name, kept in values.items() for point in kept if point.reason]
+    for name, point in reasons[:MAX_REASONS]:
+        typer.echo(f"{study.NAMES[name]}, {point.value:g}: {point.reason}", err=True)
     if len(reasons) > MAX_REASONS:
         typer.echo(f"… and {len(reasons) - MAX_REASONS} more: see {paths[2].name}", err=True)
     unit = study.parameter_words(request.branch)[1]
     for name, kept in values.items():
         points = study.measured_of(kept)
-        periods = sorted({one.period for one in points})
-        seen = ", ".join("none within 16 cycles" if p == 0 else str(p) for p in periods)
-        most = max((one.separated_share for one in points), default=0.0)
+        periods = sorted({point.period for point in points})
+        period_text = ", ".join("none within 16 cycles" if p == 0 else str(p) for p in periods)
+        largest = max((point.separated_share for point in points), default=0.0)
         typer.echo(
-            f"{study.NAMES[name]}: {len(points)} values; periods in cycles: {seen}; teeth apart up to {percent(most)}"
+            f"{study.NAMES[name]}: {len(points)} values; periods in cycles: {period_text}; "
+            f"teeth apart up to {percent(largest)}"
         )
         for line in study.motion_lines(kept, unit):
             typer.echo(f"  {line}")
@@ -215,13 +216,13 @@ def read_axis(model: Simulator, text: str) -> Axis:
     from sims.simulator import parameter
     from sims.sweep import Axis
 
-    name, sign, rest = text.partition("=")
+    name, sign, values_text = text.partition("=")
     name = {"speed": "speed_rpm", "torque": "torque_nm"}.get(name.strip(), name.strip())
     if not sign:
         raise InputError(
             f"{text!r} is not NAME=VALUES", where="--vary", remedy="write for example speed=300..1500rpm:10"
         )
-    items = [item.strip() for item in rest.split(",")]
+    items = [item.strip() for item in values_text.split(",")]
     settings = [item for item in items if "=" in item]
     values = [item for item in items if "=" not in item]
     if name in model.effects:
