@@ -83,7 +83,7 @@ def main_table(result: BenchmarkResult) -> Table:
 
 def same_table(result: BenchmarkResult) -> Table | None:
     """Return the figures of the diagnosing simulator's own cases and the drop from them; None if there are none."""
-    if not result.wanted.plan.same_simulator:
+    if not result.request.plan.same_simulator:
         return None
     rows = []
     for figure in FIGURES:
@@ -111,7 +111,7 @@ def figures_table(
 
 def alternatives_table(result: BenchmarkResult) -> Table:
     """Return the same figures of the diagnosers beside, on the very same cases."""
-    names = result.wanted.diagnosers
+    names = result.request.diagnosers
     parts = (("without", WITHOUT), ("with", WITH))
     columns = {f"{name}, {word}": result.part(part, diagnoser=name) for name in names for word, part in parts}
     words = {"majority": "majority: always the commonest answer", "rules": "rules: a table of textbook signatures"}
@@ -173,7 +173,7 @@ def _basis(result: BenchmarkResult) -> str:
 
 def markdown(result: BenchmarkResult, command: str, date: datetime) -> str:
     """Return the tables for a README, with date, version and command."""
-    plan = result.wanted.plan
+    plan = result.request.plan
     text = [
         f"{plan.n_cases} blind cases, {plan.role}; gearsig {__version__}, {date:%d %B %Y}; `{command}`.",
         "",
@@ -362,7 +362,7 @@ def scores_json(result: BenchmarkResult, command: str, date: datetime) -> str:
         "version": __version__,
         "date": date.isoformat(timespec="seconds"),
         "command": command,
-        "benchmark": result.wanted.definition(),
+        "benchmark": result.request.definition(),
         "strengths_known": result.strengths_known,
         "calibration_error_by_chance": rounded(result.chance_error),
     }
@@ -450,12 +450,12 @@ def _summary(result: BenchmarkResult) -> str:
 
 
 def _provenance(result: BenchmarkResult, command: str) -> list[tuple[str, str]]:
-    plan = result.wanted.plan
+    plan = result.request.plan
     shares = ", ".join(f"{percent(part)} {kind}" for kind, part in SHARES.items())
     return [
         ("command", command),
         ("cases", f"{plan.n_cases}, role {plan.role}, seed {plan.seed}; {shares}"),
-        ("code", result.wanted.code + ("" if state_of_code() == result.wanted.code else CHANGED)),
+        ("code", result.request.code + ("" if state_of_code() == result.request.code else CHANGED)),
         ("blindness", "each case diagnosed by a fresh process that is given recordings and rig files only"),
         ("strength", "change between a case and its twin without the fault, sized like the whole gap"),
         ("one diagnosis", cost_lines(result)[0]),

@@ -497,7 +497,7 @@ class BenchmarkResult:
 
     Parameters
     ----------
-    wanted : BenchmarkRequest
+    request : BenchmarkRequest
     rows : mapping
         Diagnoser → its rows.
     parts : tuple of Part
@@ -508,7 +508,7 @@ class BenchmarkResult:
     figures : tuple of Figure
     """
 
-    wanted: BenchmarkRequest
+    request: BenchmarkRequest
     rows: Mapping[str, Sequence[Row]]
     parts: tuple[Part, ...]
     chance_error: float
@@ -518,7 +518,7 @@ class BenchmarkResult:
     @property
     def judged(self) -> str:
         """The diagnoser under judgement."""
-        return self.wanted.diagnosers[0]
+        return self.request.diagnosers[0]
 
     def part(self, name: str, *, diagnoser: str = "", source: str = BLIND, strong: bool | None = None) -> Part:
         """Return a part; `strong` None: strong faults only, where strength is known."""
