@@ -284,6 +284,15 @@ def envelope_bands(sampling_rate_hz: float) -> tuple[tuple[float, float], ...]:
 
     Several bands are searched instead of one chosen by its kurtosis: the kurtosis of a gearbox is as often that of the
     gears, and the family of lines itself says which band carries it.
+
+    Parameters
+    ----------
+    sampling_rate_hz : float
+
+    Returns
+    -------
+    tuple of (float, float)
+        Lower and upper edge, Hz; coarse bands first.
     """
     top = 0.45 * sampling_rate_hz
     low = min(LOWEST_BAND_HZ, top / 4)

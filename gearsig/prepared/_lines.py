@@ -163,12 +163,33 @@ class Comb:
 
 
 def over_floor_db(amplitude: float, floor: float) -> float:
-    """Return 20 lg(amplitude/floor), of vanishing amplitudes and floors too."""
+    """Return 20 lg(amplitude/floor) in dB, of vanishing amplitudes and floors too.
+
+    Parameters
+    ----------
+    amplitude, floor : float
+        In one unit; below 1e-300 they count as that.
+    """
     return 20 * float(np.log10(max(amplitude, 1e-300) / max(floor, 1e-300)))
 
 
 def lines_over_floor(spectrum: Spectrum, floor: FloatArray) -> LinesOverFloor:
-    """Return the excess of each line of an amplitude spectrum over its floor."""
+    """Return how far each line of an amplitude spectrum stands above its floor, ln(P/P₀) = 2 ln(A/A₀).
+
+    Of a line and its two neighbours the largest counts, as a tone between two lines is lower in each.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Amplitudes A.
+    floor : array, (n_lines,)
+        A₀, root of the mean noise power at each line, in the spectrum's unit.
+
+    Returns
+    -------
+    LinesOverFloor
+        With no line masked.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         log_ratio = spectrum.values / floor
         np.fmax(log_ratio, 1.0, out=log_ratio)  # nothing over nothing counts as 1
@@ -180,7 +201,20 @@ def lines_over_floor(spectrum: Spectrum, floor: FloatArray) -> LinesOverFloor:
 
 
 def lines_over_noise_floor(spectrum: Spectrum, highest: float | None = None) -> LinesOverFloor:
-    """Return an amplitude spectrum's lines, up to `highest`, against its local noise floor."""
+    """Return an amplitude spectrum's lines against its local noise floor, see `gearsig.spectra.noise_floor`.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Amplitudes.
+    highest : float or None
+        Position up to which lines are looked at, in the axis' unit; None: all.
+
+    Returns
+    -------
+    LinesOverFloor
+        With no line masked.
+    """
     floor = noise_floor(spectrum, highest=highest).values
     return lines_over_floor(spectrum.head(len(floor)), floor)
 
@@ -231,7 +265,22 @@ def best_comb(
 
 
 def comb_at(excess: LinesOverFloor, fundamental: float, multiples: NDArray[np.int_], p_value: float) -> Comb:
-    """Return the family of the given multiples of a fundamental that was found by other means."""
+    """Return the family of the given multiples of a fundamental that was found by other means.
+
+    Parameters
+    ----------
+    excess : LinesOverFloor
+    fundamental : float
+        In the axis' unit; it is refined on the lines.
+    multiples : array of int, (n,)
+    p_value : float
+        Of the means by which it was found.
+
+    Returns
+    -------
+    Comb
+        Its score is the sum of the lines' log ratios.
+    """
     fitted = _described(excess, np.zeros(len(multiples)), multiples, fundamental, 0.0, p_value)
     lines = excess.lines_at(multiples * fitted.fundamental)
     return replace(fitted, score=float(excess.scores()[lines].sum()))
@@ -245,7 +294,20 @@ def independent_trials(n_candidates: int) -> int:
 def score_needed(excess: LinesOverFloor, n_terms: int, low: float, high: float, probability: float) -> float:
     """Return the score that the best family between `low` and `high` reaches by chance with `probability` only.
 
-    Infinite if even lines that all count in full would be likelier than that.
+    Parameters
+    ----------
+    excess : LinesOverFloor
+    n_terms : int
+        Lines of a family.
+    low, high : float
+        Range of fundamentals, in the axis' unit.
+    probability : float
+        Of one such score or a higher one among all fundamentals.
+
+    Returns
+    -------
+    float
+        Sum of log ratios; infinite if even lines that all count in full would be likelier than that.
     """
     n_candidates = int((high - low) * 3 * n_terms / excess.spectrum.resolution) + 2
     tail = np.cumsum(excess.sum_density(n_terms)[::-1])[::-1]
@@ -310,7 +372,16 @@ def _sharpest(excess: LinesOverFloor, origins: FloatArray, factors: NDArray[np.i
 
 
 def tail_probability(excess: LinesOverFloor, n_terms: int, score: float) -> float:
-    """Return P(sum of n_terms independent draws from the unmasked lines >= score)."""
+    """Return P(sum of n_terms independent draws from the unmasked lines >= score).
+
+    Parameters
+    ----------
+    excess : LinesOverFloor
+    n_terms : int
+        Lines of a family.
+    score : float
+        Sum of their log ratios.
+    """
     # Draws were floored to their cell, so the sum may lie half a cell per term higher than its cell says.
     threshold = int(np.floor((score - n_terms * _STEP / 2) / _STEP))
     return min(max(float(excess.sum_density(n_terms)[max(threshold, 0) :].sum()), 0.0), 1.0)
@@ -489,7 +560,15 @@ def strongest_window(energies: FloatArray) -> tuple[int, float]:
 
 
 def turned_lines(lines: ComplexArray, shift_rev: float) -> ComplexArray:
-    """Return the lines of an average turned forward: x[n] e^{−2πi n s}, order 0 first on the last axis."""
+    """Return the lines of an average turned forward, x[n] e^{−2πi n s}.
+
+    Parameters
+    ----------
+    lines : array, (..., n_orders)
+        x, complex; order 0 first on the last axis.
+    shift_rev : float
+        s, revolutions by which the average comes later.
+    """
     turned: ComplexArray = lines * np.exp(-2j * np.pi * np.arange(lines.shape[-1]) * shift_rev)
     return turned
 
@@ -535,6 +614,17 @@ def best_shift(cross: ComplexArray, is_possible: Callable[[FloatArray], NDArray[
 
 
 def circular_correlation(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Return Σ_i x[i + s] y[i] for each shift s in samples, of two periods of one length: `np.roll(y, s)` meets x."""
+    """Return Σ_i x[i + s] y[i] for each shift s in samples: where it is largest, `np.roll(y, s)` meets x.
+
+    Parameters
+    ----------
+    x, y : array, (n,)
+        One period each.
+
+    Returns
+    -------
+    array, (n,)
+        In the product of both units, shift 0 first.
+    """
     correlation: FloatArray = np.fft.irfft(np.fft.rfft(x) * np.conj(np.fft.rfft(y)), len(x))
     return correlation
