@@ -85,7 +85,23 @@ class GearEvidence:
 def pair_lines(
     recording: Recording | PreparedRecording, rig: Rig | None, pair: GearPair, channels: Sequence[str]
 ) -> tuple[ShaftLines, ...]:
-    """Return the lines of both shafts, the driver's first."""
+    """Return the lines of both shafts' synchronous averages, the driver's first.
+
+    Parameters
+    ----------
+    recording : Recording or PreparedRecording
+    rig : Rig or None
+        None: the recording's own.
+    pair : GearPair
+        The pair whose teeth are looked at.
+    channels : sequence of str
+        Acceleration; their lines keep this order.
+
+    Returns
+    -------
+    tuple of ShaftLines
+        See `shaft_lines`.
+    """
     prepared = prepare(recording, rig)
     return tuple(shaft_lines(prepared, pair, shaft, channels) for shaft in (pair.driver, pair.driven))
 
@@ -100,6 +116,24 @@ def gear_evidence(
     """Return the most conspicuous tooth of either gear, in what differs from the healthy gear where there is one.
 
     Mesh energies that the event is compared with are the geometric mean of both recordings'.
+
+    Parameters
+    ----------
+    now : sequence of ShaftLines
+        Of both shafts.
+    healthy : sequence of ShaftLines or None
+        Of the healthy machine at the same operating point. None: the tooth is sought among its neighbours.
+    module_mm : float
+        Normal module, mm.
+    load_mpa : float
+        Tangential force at the pitch circle per face width and module, MPa.
+    tip_relief_um : float or None
+        Where it is known, µm.
+
+    Returns
+    -------
+    tuple of GearEvidence
+        The driver's first.
     """
     return tuple(
         _gear_evidence(now, healthy, i, Conditions(module_mm, load_mpa, shaft.order_hz * shaft.teeth, tip_relief_um))
@@ -383,7 +417,23 @@ def root_thickness_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 
 
 
 def percent_per_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.0) -> float:
-    """Return the percentage of the root's thickness that 1 mm of a crack at 45° to the tooth's centre line takes."""
+    """Return the percentage of the root's thickness that 1 mm of a crack takes, 100 sin 45°/s_F.
+
+    The crack runs at 45° to the tooth's centre line.
+
+    Parameters
+    ----------
+    teeth : int
+    module_mm : float
+        Normal module, mm.
+    pressure_angle_deg : float
+        Normal pressure angle, degrees.
+
+    Returns
+    -------
+    float
+        Per cent per mm.
+    """
     return 100.0 * sin(radians(45.0)) / root_thickness_mm(teeth, module_mm, pressure_angle_deg)
 
 

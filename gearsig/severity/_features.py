@@ -91,7 +91,15 @@ def shaft_lines(prepared: PreparedRecording, pair: GearPair, shaft: str, channel
 
 
 def orders_from_mesh(orders: NDArray[np.intp], teeth: int) -> NDArray[np.intp]:
-    """Return how many orders of a shaft lie between each order and the nearest mesh harmonic."""
+    """Return how many orders of a shaft lie between each order and the nearest mesh harmonic, min_k |n − k z|.
+
+    Parameters
+    ----------
+    orders : array of int
+        n, per revolution of the shaft.
+    teeth : int
+        z, of its gear.
+    """
     distance: NDArray[np.intp] = np.abs((orders + teeth // 2) % teeth - teeth // 2)
     return distance
 
@@ -143,6 +151,16 @@ def find_event(shaft: ShaftLines) -> ToothEvent:
 
     Each band's mean square envelope is divided by its median over the revolution before bands and channels are added:
     what a resonance or a gain multiplies, it multiplies at all teeth.
+
+    Parameters
+    ----------
+    shaft : ShaftLines
+        Of a recording, or of its difference from the healthy machine.
+
+    Returns
+    -------
+    ToothEvent
+        Its centre in revolutions from the angle's zero, 0 to 1; its prominence, a ratio of energies.
     """
     energy, median, width = _window_energies(shaft)
     relative = np.divide(energy, median[..., None], out=np.ones_like(energy), where=median[..., None] > 0)
@@ -171,9 +189,19 @@ def _window_energies(shaft: ShaftLines) -> tuple[FloatArray, FloatArray, int]:
 
 
 def band_envelopes(shaft: ShaftLines) -> FloatArray:
-    """Return squared envelopes over one revolution, (n_bands + 1, n_channels, 32 z).
+    """Return squared envelopes over one revolution, of bands one mesh order wide.
 
     e_k(θ) = |Σ_n x[kz + n] e^{2πi nθ}|², |n| <= z/2, without mesh lines, their nearest sidebands and the lowest orders.
+
+    Parameters
+    ----------
+    shaft : ShaftLines
+        x, and z teeth.
+
+    Returns
+    -------
+    array, (n_bands + 1, n_channels, 32 z)
+        In the square of the lines' unit, at equal steps of the shaft's angle; band 0 lies below half the mesh order.
     """
     z = shaft.teeth
     n = _STEPS_PER_TOOTH * z
@@ -336,7 +364,20 @@ def feature_vector(
 
 
 def mesh_energies(shaft: ShaftLines, n_harmonics: int) -> FloatArray:
-    """Return |x[kz]|² for k = 1 …, (n_harmonics, n_channels)."""
+    """Return the energies of the mesh harmonics, |x[kz]|² for k = 1 …
+
+    Parameters
+    ----------
+    shaft : ShaftLines
+        x, and z teeth.
+    n_harmonics : int
+        Largest k.
+
+    Returns
+    -------
+    array, (n_harmonics, n_channels)
+        In the square of the lines' unit.
+    """
     energies: FloatArray = np.abs(shaft.lines[:, shaft.teeth * np.arange(1, n_harmonics + 1)].T) ** 2
     return energies
 
