@@ -147,7 +147,15 @@ class GapCalibration:
 
 
 def score_of(shrink: float, placebo: float) -> float:
-    """Return what an effect's held-out shrink says for it: how much more than its placebos', −1 to 1."""
+    """Return what an effect's held-out shrinkage says for it: s − max(p, 0), cut to −1 … 1.
+
+    Parameters
+    ----------
+    shrink : float
+        Share of the gap that the effect closes on held-out data, 1 − after²/before²; below 0 where the gap grows.
+    placebo : float
+        The same of the effect at wrong orders or on wrong shafts, which close a part by chance.
+    """
     return float(np.clip(shrink - max(placebo, 0.0), -1.0, 1.0))
 
 
@@ -353,6 +361,34 @@ def attribute(
     """Ask the forests and what is labelled, then simulate, fit and score the likeliest effects, `max_tried` at most.
 
     Effects that the forests do not know are tried as well, unless nothing is.
+
+    Parameters
+    ----------
+    conditions : sequence of Condition
+        Of one machine, at one or several operating points.
+    known : mapping
+        Effect → `GapEffect`, of the simulator.
+    effects : sequence of str
+        Those that may be named; empty: all that are known.
+    twin : Twin
+        The simulator, set to the rig.
+    cache : path or None
+        Folder of simulated banks; None: nothing is kept.
+    on_progress : callable
+        Takes what is done, in words, and the part of it that is, 0 to 1.
+    max_tried : int
+        Effects to simulate, likeliest first; 0: none, the forests alone decide.
+    fresh : bool
+        Whether kept banks are made anew.
+    labelled : sequence of LabelledChange
+        Of the same rig.
+    tooth_error_log_likelihoods : mapping
+        Fault of a tooth → ln L of the transmission error's change; empty without encoders.
+
+    Returns
+    -------
+    Attribution
+        Probabilities are computed on demand, see `Attribution.probabilities`.
 
     Raises
     ------

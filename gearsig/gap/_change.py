@@ -74,7 +74,19 @@ def alike_features(now: ReducedRecording, healthy: ReducedRecording) -> Iterator
 
 
 def segment_changes(now: ReducedRecording, healthy: ReducedRecording) -> FloatArray:
-    """Return the changes in dB, (n_channels, n_harmonics, 3); nan where a part does not stand clear of noise."""
+    """Return how each mesh harmonic, what a gear repeats beside it, and what nothing repeats changed.
+
+    Parameters
+    ----------
+    now, healthy : ReducedRecording
+        With the same channels.
+
+    Returns
+    -------
+    array, (n_channels, n_harmonics, 3)
+        dB, within ± `MAX_DB`: `MESH`, `REPEATED`, `NOISE`. nan where
+        a part does not stand clear of noise.
+    """
     rows = []
     for name in now.channels:
         after, before = _segments(now, name), _segments(healthy, name)
@@ -187,7 +199,20 @@ REPEATS = 0.1
 def change_features(now: ReducedRecording, healthy: ReducedRecording) -> Features:
     """Return the differences of all features, and features of the difference of the averages.
 
-    The reference's scatter counts as well: variances of both add.
+    The reference's scatter counts as well: variances of both add, SE² = SE²_now + SE²_healthy, each by the jackknife
+    over blocks of revolutions.
+
+    Parameters
+    ----------
+    now : ReducedRecording
+        The recording.
+    healthy : ReducedRecording
+        The reference, with the same channels, of the same gears.
+
+    Returns
+    -------
+    Features
+        dB, or ten times the decadic logarithm; above 0 where the recording has more.
     """
     (names, after), before = whole_and_parts(now), whole_and_parts(healthy)[1]
     joined, values = _joined(names, after[0] - before[0], now, healthy)
@@ -204,7 +229,19 @@ def change_features(now: ReducedRecording, healthy: ReducedRecording) -> Feature
 
 
 def change_once(now: ReducedRecording, healthy: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
-    """Return names and values of the change features, without their scatter."""
+    """Return the change features without their scatter, as for single simulations, which need none.
+
+    Parameters
+    ----------
+    now, healthy : ReducedRecording
+        As of `change_features`.
+
+    Returns
+    -------
+    names : tuple of str, n of them
+    values : array, (n,)
+        dB, or ten times the decadic logarithm.
+    """
     (names, after), before = once(now), once(healthy)[1]
     return _joined(names, after - before, now, healthy)
 

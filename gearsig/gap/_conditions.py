@@ -124,7 +124,16 @@ class Condition:
 
 
 def run_length_s(now: ReducedRecording) -> float:
-    """Return the length of a simulation that the features can be read from; of a short recording, as long as that."""
+    """Return the length in s of a simulation that the features can be read from.
+
+    Long enough for `MAX_REVOLUTIONS` of the slower shaft; of a recording that has fewer, as many as that, and `LEAD`
+    for the run to settle.
+
+    Parameters
+    ----------
+    now : ReducedRecording
+        The recording that the simulation is compared with.
+    """
     if now.fewest_revolutions < MAX_REVOLUTIONS:
         return (now.fewest_revolutions + LEAD) / _slower_hz(now)
     return max(LONGEST_RUN_S, MAX_REVOLUTIONS / _slower_hz(now))
@@ -164,7 +173,27 @@ def with_channels_of(simulation: ReducedRecording, now: ReducedRecording) -> Red
 def compare(
     now: ReducedRecording, simulation: ReducedRecording, reference: ReducedRecording | None, learned: Learned
 ) -> Features:
-    """Return the change against the reference, or else against the simulation as far as it is credible."""
+    """Return the change against the reference, or else against the simulation as far as it is credible.
+
+    Without a reference it is x − c y: x the recording's features, y the healthy twin's, c the credibility of each feature,
+    0 to 1, learned from machines whose twin is known.
+
+    Parameters
+    ----------
+    now : ReducedRecording
+        The recording.
+    simulation : ReducedRecording
+        The healthy twin at the same operating point.
+    reference : ReducedRecording or None
+        The healthy machine at the same operating point.
+    learned : Learned
+        Has the credibility.
+
+    Returns
+    -------
+    Features
+        dB, or ten times the decadic logarithm, with their standard errors.
+    """
     if reference is not None:
         return change_features(now, reference)
     return difference_features(now, simulation, learned.credibility)

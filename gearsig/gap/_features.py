@@ -464,7 +464,16 @@ class Features:
 def features_of(reduced: ReducedRecording) -> Features:
     """Return a recording's features with their standard errors by the jackknife over blocks of revolutions.
 
-    SE² = (B − 1)/B Σ_b (f_(b) − mean)², f_(b) without block b.
+    SE² = (B − 1)/B Σ_b (f_(b) − mean)², f_(b) without block b of B.
+
+    Parameters
+    ----------
+    reduced : ReducedRecording
+
+    Returns
+    -------
+    Features
+        In the order of the names; dB, or ten times the decadic logarithm.
     """
     names, values = whole_and_parts(reduced)
     without = values[1:]

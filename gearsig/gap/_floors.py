@@ -298,14 +298,30 @@ def t_quantile(degrees: int) -> float:
 
 
 def soft_size(names: Sequence[str], normalised: FloatArray) -> float:
-    """Return [Σ_f (mean_{i∈f} |u_i|⁸)^(4/8)]^(1/4)."""
+    """Return the size of a gap, [Σ_f (mean_{i∈f} |u_i|⁸)^(4/8)]^(1/4), over families f of features.
+
+    It is nearly the largest family's size, and a little more where several changed. See `family_size`.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the n features.
+    normalised : array, (n,)
+        Changes over their floors.
+    """
     sizes = np.array([family_size(normalised[members]) for members in sized_members(names).values()])
     largest = float(sizes.max(initial=0.0))
     return largest * float(np.sum((sizes / largest) ** ACROSS) ** (1 / ACROSS)) if largest > 0.0 else 0.0
 
 
 def family_size(normalised: FloatArray) -> float:
-    """Return (mean |u_i|⁸)^(1/8): nearly the largest; three quarters of it where one of nine moved and no other."""
+    """Return (mean |u_i|⁸)^(1/8): nearly the largest; three quarters of it where one of nine moved and no other.
+
+    Parameters
+    ----------
+    normalised : array, (n,)
+        Changes of a family's features over their floors.
+    """
     largest = float(np.max(np.abs(normalised), initial=0.0))
     if largest == 0.0:
         return 0.0
@@ -315,10 +331,19 @@ def family_size(normalised: FloatArray) -> float:
 def pooled_scatter(change: Features) -> FloatArray:
     """Return standard errors drawn towards their family's median, as a jackknife over few blocks has some by chance.
 
-    s² = (ν0 s0² + ν s²)/(ν0 + ν).
+    s² = (ν0 s0² + ν s²)/(ν0 + ν), s0 the family's median, ν the degrees of freedom, ν0 = `PRIOR_WEIGHT`.
 
     Source: G. K. Smyth, *Linear models and empirical Bayes methods for assessing differential expression in microarray
     experiments* (Statistical Applications in Genetics and Molecular Biology, 2004).
+
+    Parameters
+    ----------
+    change : Features
+
+    Returns
+    -------
+    array, (n,)
+        dB, `MIN_SCATTER_DB` at least before pooling.
     """
     variance = np.maximum(change.scatter, MIN_SCATTER_DB) ** 2
     degrees = _degrees(change)

@@ -195,7 +195,14 @@ def paths_of(
 
 
 def fit_effect(paths: Iterable[EffectPath], observed: Sequence[ObservedChange]) -> Fit:
-    """Return the best fit over all paths of an effect.
+    """Return the best fit over all paths of an effect: that of the least cost, see `fit_path`.
+
+    Parameters
+    ----------
+    paths : iterable of EffectPath
+        The effect with each set of options.
+    observed : sequence of ObservedChange
+        Of one or several conditions.
 
     Raises
     ------
@@ -521,7 +528,19 @@ def own_features(fit: Fit, observed: ObservedChange) -> FloatArray:
 
 
 def fold_fits(paths: Sequence[EffectPath], folds: Sequence[Fold]) -> list[Fit]:
-    """Return an effect's fit to the part of each fold that it is not scored on."""
+    """Return an effect's fit to the part of each fold that it is not scored on.
+
+    Parameters
+    ----------
+    paths : sequence of EffectPath
+        The effect with each set of options.
+    folds : sequence of Fold
+
+    Returns
+    -------
+    list of Fit
+        One per fold.
+    """
     return [fit_effect(paths, fold.fitted) for fold in folds]
 
 

@@ -544,6 +544,25 @@ def try_effects(
     """Simulate each effect at every condition, fit it, and score it on data that it was not fitted to.
 
     Effects that the rig cannot have, for it lacks a bearing, say, are left out.
+
+    Parameters
+    ----------
+    effects : sequence of GapEffect
+    twin : Twin
+        The simulator, set to the rig.
+    conditions : sequence of Condition
+        Operating points of one machine.
+    cache : path or None
+        Folder of simulated banks; None: nothing is kept.
+    on_progress : callable
+        Takes what is done, in words, and the part of it that is, 0 to 1.
+    fresh : bool
+        Whether kept banks are made anew.
+
+    Returns
+    -------
+    dict
+        Effect → how it was tried: its fit, its shrinkage on held-out data, and its waveform where that is of one tooth.
     """
     if not effects:
         return {}

@@ -188,7 +188,15 @@ class GapPlace(Result):
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 90 % interval; `high` is infinite where nothing bounds it."""
+    """A value with its 90 % interval; `high` is infinite where nothing bounds it.
+
+    Parameters
+    ----------
+    value : float
+        In the unit of what it is of.
+    low, high : float
+        Of the interval; low 0 and high infinite: any size fits about as well.
+    """
 
     value: float
     low: float
@@ -334,7 +342,12 @@ class GapCause(Result):
 
 
 def group_probabilities(causes: Sequence[GapCause]) -> dict[str, float]:
-    """Return group → probability of its causes together, likeliest first."""
+    """Return group → probability of its causes together, P(g) = Σ_{c∈g} P(c), largest first.
+
+    Parameters
+    ----------
+    causes : sequence of GapCause
+    """
     by_group: dict[str, float] = {}
     for cause in causes:
         by_group[cause.group] = by_group.get(cause.group, 0.0) + cause.probability
@@ -347,7 +360,18 @@ more of them than anybody would look at."""
 
 
 def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
-    """Return the effects that cannot be told apart: the two likeliest, and more until they are `TOGETHER`."""
+    """Return the effects that cannot be told apart: the two likeliest, and more until they have `TOGETHER` of all.
+
+    Parameters
+    ----------
+    causes : sequence of GapCause
+        Those of no effect and of an unknown one are passed over.
+
+    Returns
+    -------
+    tuple of str
+        Likeliest first, `MAX_RIVALS` at most.
+    """
     effects = sorted((c for c in causes if c.name not in (NONE, UNKNOWN)), key=lambda cause: -cause.probability)
     shares = np.cumsum([cause.probability for cause in effects])
     n = int(np.searchsorted(shares, TOGETHER * shares[-1])) + 1 if effects else 0
