@@ -175,8 +175,8 @@ def compare(
 ) -> Features:
     """Return the change against the reference, or else against the simulation as far as it is credible.
 
-    Without a reference it is x − c y: x the recording's features, y the healthy twin's, c the credibility of each feature,
-    0 to 1, learned from machines whose twin is known.
+    Without a reference it is x − c y: x the recording's features, y the healthy twin's, c the credibility of each
+    feature, 0 to 1, learned from machines whose twin is known.
 
     Parameters
     ----------

@@ -453,13 +453,13 @@ def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[st
     clearest = max(evidences, key=lambda evidence: evidence.rms_um)
     changed = f"The transmission error by the encoders changed by {clearest.rms_um:.2g} µm rms where it changed most"
     if all(evidence.is_unlike_any for evidence in evidences):
-        slower = "At a few revolutions per second or less its course tells crack, spall and chip apart."
+        slower = "At a few revolutions per second or less its profile tells crack, spall and chip apart."
         return [f"{changed}, which at this speed tells no fault from another: the drive swings along. {slower}"]
     levels = ToothErrorEvidence(mean_log_likelihoods(evidences), clearest.rms_um, clearest.gear).probabilities
     ranked = sorted(levels.items(), key=lambda item: -item[1])
     likely = ", ".join(f"{known[name].title} {odds_text(p)}" for name, p in ranked if p >= 0.05 and name in known)
     where = {"driver": ", on the driver", "driven": ", on the driven gear"}.get(clearest.gear, "")
-    return [f"{changed}{where}; by its course alone, all faults of teeth as likely before: {likely}."]
+    return [f"{changed}{where}; by its profile alone, all faults of teeth as likely before: {likely}."]
 
 
 def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect]) -> list[str]:

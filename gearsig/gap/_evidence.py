@@ -106,7 +106,7 @@ DISPLACED = "pitch_error"
 """What may be of one tooth as well."""
 
 TOOTH_FAULTS = (*SINGLE_TOOTH_FAULTS, DISPLACED)
-"""Causes that change one engagement each, with a course of its own: waveforms and encoders tell them apart."""
+"""Causes that change one engagement each, with a profile of its own: waveforms and encoders tell them apart."""
 
 _BURST = ("change.{}.peak", "change.{}.prominence", "tooth.{}.peak", "tooth.{}.prominence", "tooth.{}.kurtosis")
 _ALL_ROUND = ("change.{}.level", "change.{}.elsewhere", "tooth.{}.level", "tooth.{}.elsewhere", "shaft.{}.low")

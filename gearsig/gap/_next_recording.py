@@ -166,7 +166,7 @@ AROUND_A_SHAFT = ("unbalance", "eccentricity", "misalignment")
 HEALTHY_MACHINE = "the same machine when it was healthy"
 STEPS = {
     "healthy": f"{HEALTHY_MACHINE}, at the same speed and load; then only what has changed since counts",
-    "encoders": "encoders on both shafts: no path distorts their transmission error, whose course over one engagement "
+    "encoders": "encoders on both shafts: no path distorts their transmission error, whose profile over one engagement "
     "tells a damaged tooth from a displaced one",
     "slow_loads": f"two loads below {SLOW_RPM:.0f} rpm, at which the gears ring less over one engagement",
     "run_up": "a run-up of the healthy machine, which shows what the path to the sensors and what the gears make of it",

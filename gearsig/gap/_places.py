@@ -201,7 +201,7 @@ class LineLevels:
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Peak:
     words: str
     rise_db: float
     orders: tuple[float, ...]
@@ -256,10 +256,10 @@ def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_d
     levels = _residual_levels(comparison)
     rise = float((levels.now - levels.baseline)[row, min(peak, len(levels.taken) - 1)])
     words = _strange_words(comparison, order)
-    return replace(_line(comparison, _Found(words, rise, (order,), row), 1.0), kind=PlaceKind.LINE)
+    return replace(_line(comparison, _Peak(words, rise, (order,), row), 1.0), kind=PlaceKind.LINE)
 
 
-def _line(comparison: ComparedPair, line: _Found, sign: float) -> LocatedChange:
+def _line(comparison: ComparedPair, line: _Peak, sign: float) -> LocatedChange:
     change = sign * line.rise_db
     title = f"line {line.words} ({hertz(line.orders[0] * comparison.now.speed_hz)}), {by_decibels(change)}"
     return LocatedChange(title, change, line.orders, channel=list(comparison.now.channels)[line.row])
@@ -300,7 +300,7 @@ def _widened(levels: FloatArray) -> FloatArray:
     return widened
 
 
-def _family_or_line(family: _Found, line: _Found) -> _Found:
+def _family_or_line(family: _Peak, line: _Peak) -> _Peak:
     """Return the family if it is heard beside the strongest line, or that line is one of its multiples."""
     harmonic = family.orders[0] / line.orders[0] if family.orders else 0.0
     if family.rise_db < MIN_OF_A_FAMILY_DB or (harmonic > 1.5 and abs(harmonic / round(harmonic) - 1.0) < MISSED):
@@ -310,9 +310,9 @@ def _family_or_line(family: _Found, line: _Found) -> _Found:
     return family if is_multiple or family.rise_db > MIN_SHARE_OF_A_FAMILY * line.rise_db else line
 
 
-def _best_race(comparison: ComparedPair, levels: LineLevels) -> _Found:
+def _best_race(comparison: ComparedPair, levels: LineLevels) -> _Peak:
     """Return the bearing's family whose lines rose most."""
-    races = [_Found("", 0.0, (), 0)]
+    races = [_Peak("", 0.0, (), 0)]
     now, baseline = _widened(levels.now), levels.baseline
     for bearing in comparison.now.frame.bearings:
         for kind, (attribute, factor) in RACES.items():
@@ -320,7 +320,7 @@ def _best_race(comparison: ComparedPair, levels: LineLevels) -> _Found:
             if np.isfinite(order):
                 rise, row, slipped = _family_rise(now - baseline, order, levels)
                 words = f"of the {RACE_WORDS[kind]} of {_bearing(bearing.name)} (order {slipped:.3g})"
-                races.append(_Found(words, rise, _multiples(slipped, N_FAMILY), row))
+                races.append(_Peak(words, rise, _multiples(slipped, N_FAMILY), row))
     return max(races, key=lambda family: family.rise_db)
 
 
@@ -347,7 +347,7 @@ def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[fl
     return float(max(second[row, best], 0.0)), int(row), float(slips[best])
 
 
-def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_Found]:
+def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_Peak]:
     """Return the shafts' families, where the features say that they changed."""
     families, rise = [], _widened(levels.now) - levels.baseline
     for side, order in enumerate(comparison.now.frame.shaft_orders):
@@ -355,7 +355,7 @@ def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_Found]:
         means = rise[:, lines[lines < rise.shape[1]]].mean(axis=1)
         felt = abs(comparison.size[f"envelope.{SIDES[side]}_shaft"]) > 1.0
         words = f"at multiples of {shaft_words(comparison.now.frame, side)}"
-        families.append(_Found(words, float(means.max()) if felt else 0.0, _multiples(order, 3), int(np.argmax(means))))
+        families.append(_Peak(words, float(means.max()) if felt else 0.0, _multiples(order, 3), int(np.argmax(means))))
     return families
 
 
@@ -363,7 +363,7 @@ def _multiples(order: float, n: int) -> tuple[float, ...]:
     return tuple(float(k * order) for k in range(1, n + 1))
 
 
-def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: bool) -> _Found:
+def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: bool) -> _Peak:
     """Return the line that rose most of those at no multiple of a shaft's order."""
     rise = np.where(levels.taken, -np.inf, levels.now - levels.baseline)
     row, line = (int(i) for i in np.unravel_index(int(np.argmax(rise)), rise.shape))
@@ -371,7 +371,7 @@ def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: boo
     if fundamental:
         line = _fundamental(levels.now[row], line)
     order = line * levels.step
-    return _Found(_strange_words(comparison, order), change, (order,), row)
+    return _Peak(_strange_words(comparison, order), change, (order,), row)
 
 
 def _strange_words(comparison: ComparedPair, order: float) -> str:

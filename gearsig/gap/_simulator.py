@@ -119,7 +119,7 @@ class CanBeQuiet(Protocol):
 
 @runtime_checkable
 class HasFurtherSettings(Protocol):
-    """A twin that knows further settings of a tooth's fault, which take another course over the engagement."""
+    """A twin that knows further settings of a tooth's fault, which take another profile over the engagement."""
 
     def further_settings(self, effect: str) -> Sequence[Added]:
         """Return those settings, beside the candidates; none where these show all there is."""

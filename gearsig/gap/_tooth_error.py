@@ -2,9 +2,9 @@
 
 While one tooth is in mesh, a root crack lets it give way all through the engagement, most where it carries alone; a
 spall for a short while about the pitch point; a chip where the tip should carry; a wrong pitch moves all teeth. So the
-change of what that gear adds to the transmission error is described by its course: how long it lasts, how it rises and
+change of what that gear adds to the transmission error is described by its profile: how long it lasts, how it rises and
 falls, where it lies in the mesh cycle. The descriptors' densities were learned from the static contact of simulators
-that describe teeth otherwise than each other (`app.studies.gap.tooth_errors`); a course like none of those, as where
+that describe teeth otherwise than each other (`app.studies.gap.tooth_errors`); a profile like none of those, as where
 the drive's torsion rings, says nothing.
 """
 
@@ -41,8 +41,8 @@ LOWEST_ORDER, HIGHEST_PITCH_ORDER = 3, 8.0
 above which the resolution of encoders is most of what there is."""
 
 STATIC_MESH_HZ = 500.0
-"""Mesh frequency at which a static course counts half, ln L/(1 + f/f0): the faster teeth meet, the more gears and drive
-ring on. Of 31 faults of the independent rig at 250 to 2800 Hz it names 17 rightly of 27, none with 0.9 or more."""
+"""Mesh frequency at which a static profile counts half, ln L/(1 + f/f0): the faster teeth meet, the more gears and
+drive ring on. Of 31 faults of the independent rig at 250 to 2800 Hz it names 17 rightly of 27, none with 0.9 or more."""
 
 MIN_OVER_NOISE = 1.25
 """Of the event's rms over the standard error of one value: the loudest window of noise alone, of which the band keeps
@@ -52,7 +52,7 @@ ALIKE = 0.9
 """Of the larger change, from which the other gear shows it as well."""
 
 FAR = 3.5
-"""Distance in standard deviations, over all descriptors, at which one known course counts as much as none: of 2.5 to
+"""Distance in standard deviations, over all descriptors, at which one known profile counts as much as none: of 2.5 to
 4.5, with simulators left out, what is said with 0.9 is right 93 to 97 times in 100."""
 
 
@@ -141,7 +141,7 @@ def _window_energy(wave: FloatArray) -> FloatArray:
 
 
 def tooth_error_descriptors(change: ToothErrorChange) -> FloatArray:
-    """Return the course of the largest event, 17 numbers on a scale that is logarithmic where they are large.
+    """Return the profile of the largest event, 17 numbers on a scale that is logarithmic where they are large.
 
     Read from the root of the damaged tooth to its tip, as the driver's contact runs: how much of all is in it, and
     over what lies beside; its sign; how long it is above 20, 50 and 80 % of its peak, its spread, skewness and
@@ -205,7 +205,7 @@ class KnownToothErrors:
     """Descriptors of events of known cause, and how likely each fault makes another: a mean of Gaussian kernels.
 
     L(x | fault) = mean_i exp(−|A (x − x_i)|²/2) + b, A the inverse root of the covariance within faults, b the weight
-    of a course like none.
+    of a profile like none.
 
     Source: B. W. Silverman, *Density Estimation for Statistics and Data Analysis*, 1986, chapter 4.
 
@@ -219,7 +219,7 @@ class KnownToothErrors:
     faults: NDArray[np.str_]
 
     def log_likelihoods(self, descriptors: FloatArray) -> dict[str, float]:
-        """Return fault → ln L, of each of `TOOTH_FAULTS`; equal where the course is like none that is known."""
+        """Return fault → ln L, of each of `TOOTH_FAULTS`; equal where the profile is like none that is known."""
         root = self._root()
         apart = np.sum(((self.descriptors - descriptors) @ root) ** 2, axis=1)
         beyond = exp(-0.5 * FAR**2) * len(TOOTH_FAULTS) / len(self.faults)
@@ -294,7 +294,7 @@ class ToothErrorEvidence:
 
     @property
     def is_unlike_any(self) -> bool:
-        """Whether the course is like none that is known, so that nothing is told apart."""
+        """Whether the profile is like none that is known, so that nothing is told apart."""
         return max(self.probabilities.values()) < UNLIKE
 
 

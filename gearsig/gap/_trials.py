@@ -502,7 +502,7 @@ class TriedEffect:
     shrinkage : Shrinkage
         On held-out data.
     match : WaveformMatch or None
-        Of a tooth's fault, with a reference: how well the twin shows its course, and at which severity.
+        Of a tooth's fault, with a reference: how well the twin shows its profile, and at which severity.
     """
 
     name: str
@@ -513,7 +513,7 @@ class TriedEffect:
 
     @property
     def is_shown(self) -> bool:
-        """Whether the twin shows the course of a tooth's fault well."""
+        """Whether the twin shows the profile of a tooth's fault well."""
         return self.match is not None and self.match.is_good
 
     @property

@@ -1,7 +1,7 @@
 """Which fault of a tooth changes the vibration as the recorded one did, and how severe it is: by waveform, not energy.
 
-A crack, a spall and a chip of one tooth put as much energy beside the mesh harmonics as each other, with another course
-over the engagement. That course is in the complex sidebands of the difference from the healthy machine. Each is taken
+A crack, a spall and a chip of one tooth put as much energy beside the mesh harmonics as each other, with another
+profile over the engagement. That profile is in the complex sidebands of the difference from the healthy machine. Each is taken
 relative to the mesh line between them, u_k[i] = D[k z + i]/Y[k z]: that cancels a path that is smooth about a harmonic,
 and where the shaft's angle begins, but for a turn by one angle, u → u exp(−jiφ).
 
@@ -9,7 +9,7 @@ What is observed is taken for the simulated change, t, times a scale, times a ga
 
     u_k[i] = h e_k t_k[i] exp(−j(iφ + 2πkδ)) + r,  h = g √(1 − f),  e_k ~ CN(1, α²),  r ~ CN(0, n + f P_k),
 
-n the noise of the averages, P_k the power observed about harmonic k, f the share of it whose course the twin does not
+n the noise of the averages, P_k the power observed about harmonic k, f the share of it whose profile the twin does not
 show. φ, δ and f are averaged over: whatever has more freedom does not win by that, and a twin that is not like the
 machine leaves f near 1, where all faults are as likely as each other. How good a witness the twin is shows with the
 fault itself, then, and before that on the healthy machine: α is by how much its mesh lines miss the reference's.
@@ -58,7 +58,7 @@ SCALE_SCATTER = 0.7
 """Of ln g where the severity is right: mesh lines of deviating flanks, cracks at other angles, wider chips."""
 
 GOOD = 0.6
-"""Correlation from which a twin is believed to show the course of a fault."""
+"""Correlation from which a twin is believed to show the profile of a fault."""
 
 _N_TURNS = 128
 _SHIFT_PITCHES = 0.04
@@ -278,7 +278,7 @@ def _log_mean(values: FloatArray, axis: int | None = None) -> FloatArray:
 
 @dataclass(frozen=True)
 class WaveformMatch:
-    """How well the simulated course of an effect matches the recorded one.
+    """How well the simulated profile of an effect matches the recorded one.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ class WaveformMatch:
 
     @property
     def is_good(self) -> bool:
-        """Whether the twin shows the course of the fault well enough to tell which it is, and on which gear."""
+        """Whether the twin shows the profile of the fault well enough to tell which it is, and on which gear."""
         return self.correlation >= GOOD
 
 

@@ -550,7 +550,7 @@ class DriveFeature(NamedTuple):
 FEATURES: Mapping[str, DriveFeature] = {
     "play": DriveFeature("play, from drive to back flank", is_level=True),
     "deflection": DriveFeature("deflection of the loaded teeth", is_level=True),
-    "curve": DriveFeature("course of the drive flank over the mesh cycle", PlaceKind.MESH),
+    "curve": DriveFeature("curve of the drive flank over the mesh cycle", PlaceKind.MESH),
     "inertia": DriveFeature("torque per acceleration of the load", is_level=True),
     "load_friction": DriveFeature("torque that turns the load without accelerating it", is_level=True),
     "flank_friction": DriveFeature("friction of the flanks", PlaceKind.MESH),
@@ -582,7 +582,7 @@ class LocatedDriveChange:
     tooth_step_um : float
         Scatter of the changes of all teeth.
     ripple_step : array, (n_orders,)
-        Part of the mean torque that a run's own course may put there.
+        Part of the mean torque that a run's own variation may put there.
     next_tooth_um : float
         Change of the tooth that changed next most: a cracked one must yield more to be seen.
     """

@@ -326,7 +326,7 @@ def _titles(compared: DriveComparison) -> dict[str, str]:
     return {
         "play": f"where the drive stops and the back flank takes over: play {pair('play_um', 'µm')}",
         "deflection": f"under load: teeth yield by {pair('deflection_um', 'µm')}",
-        "curve": f"drive flank, over each mesh cycle: its course differs by {span}",
+        "curve": f"drive flank, over each mesh cycle: its curve differs by {span}",
         "inertia": f"in starts and stops, torque per acceleration of the load: {pair('inertia_kg_m2', 'kg·m²')}",
         "load_friction": f"while the load turns, torque that does not accelerate it: {pair('friction_nm', 'N·m')}",
         "flank_friction": f"loaded flanks, friction coefficient {pair('flank_friction', '')}",
