@@ -103,7 +103,7 @@ def watch(
     n_processes, executor
         See `Fleet.add`.
     stop : callable
-        Asked before each look.
+        Called before each look.
     **how
         What `Fleet.add` takes: pattern, rig, sampling_rate_hz, …
     """

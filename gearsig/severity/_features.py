@@ -364,7 +364,7 @@ def feature_vector(
 
 
 def mesh_energies(shaft: ShaftLines, n_harmonics: int) -> FloatArray:
-    """Return the energies of the mesh harmonics, |x[kz]|² for k = 1 …
+    """Return the energies of the mesh harmonics, |x[kz]|² for k from 1 on.
 
     Parameters
     ----------

@@ -168,8 +168,8 @@ class PlausibleRange:
     n_severities : int
         Worth a try, at even ratios.
     further_settings : callable
-        Further option sets, with which the fault of a tooth takes another course over the engagement, and with which of
-        these severities each is worth a try.
+        Further option sets, with which the fault of a tooth takes another profile over the engagement, and with which
+        of these severities each is worth a try.
     """
 
     low: float

@@ -265,7 +265,7 @@ class PairTwin:
         return self._settings(name, [(options, indices) for options in plausible.choices(self._facts)])
 
     def further_settings(self, name: str) -> Sequence[Added]:
-        """Return further settings, with which a tooth's fault takes another course over the engagement."""
+        """Return further settings, with which a tooth's fault takes another profile over the engagement."""
         return self._settings(name, effect(name).plausible_range.further_settings(self._facts))
 
     def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[int]]]) -> list[Added]:

@@ -65,20 +65,20 @@ class Answered:
     name : str
         The true fault.
     severity : float
-    forests, both : mapping
+    forests, with_waveforms : mapping
         Fault of a tooth → probability among them, without and with waveforms.
     correlation : float
         Of the true fault's waveform.
-    said : Interval or None
+    stated : Interval or None
         The severity that is stated of the true fault.
     """
 
     name: str
     severity: float
     forests: dict[str, float]
-    both: dict[str, float]
+    with_waveforms: dict[str, float]
     correlation: float
-    said: Interval | None
+    stated: Interval | None
 
 
 def drawn_cases(plan: Plan, n_rigs: int) -> Iterator[tuple[int, BlindCase]]:
@@ -178,13 +178,13 @@ def report_lines(rows: Sequence[Answered]) -> Iterator[str]:
         if not of_effect:
             continue
         parts = []
-        for probabilities in ([row.forests for row in of_effect], [row.both for row in of_effect]):
+        for probabilities in ([row.forests for row in of_effect], [row.with_waveforms for row in of_effect]):
             right = sum(max(p, key=p.__getitem__) == row.name for p, row in zip(probabilities, of_effect, strict=True))
             loss = float(
                 np.mean([-np.log(max(p[row.name], 1e-9)) for p, row in zip(probabilities, of_effect, strict=True)])
             )
             parts.append(f"{right:3} of {len(of_effect):3}, log loss {loss:.2f}")
-        held = [row.said.low <= row.severity <= row.said.high for row in of_effect if row.said is not None]
+        held = [row.stated.low <= row.severity <= row.stated.high for row in of_effect if row.stated is not None]
         yield (f"{name:14} forests {parts[0]}; with waveforms {parts[1]}; severity held {sum(held)} of {len(held)}")
 
 
@@ -212,9 +212,11 @@ def main() -> None:
                     continue
                 rows.append(row)
                 interval = (
-                    "" if row.said is None else f"{row.said.value:.3g} ({row.said.low:.3g} to {row.said.high:.3g})"
+                    ""
+                    if row.stated is None
+                    else f"{row.stated.value:.3g} ({row.stated.low:.3g} to {row.stated.high:.3g})"
                 )
-                p = ", ".join(f"{name} {value:.2f}" for name, value in row.both.items())
+                p = ", ".join(f"{name} {value:.2f}" for name, value in row.with_waveforms.items())
                 true = f"{number:3} {row.name:14}{row.severity:8.3g}"
                 typer.echo(f"{true}  {interval:28} ρ {row.correlation:.2f}  {p}")
     for line in report_lines(rows):
