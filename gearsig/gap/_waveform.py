@@ -1,9 +1,9 @@
 """Which fault of a tooth changes the vibration as the recorded one did, and how severe it is: by waveform, not energy.
 
 A crack, a spall and a chip of one tooth put as much energy beside the mesh harmonics as each other, with another
-profile over the engagement. That profile is in the complex sidebands of the difference from the healthy machine. Each is taken
-relative to the mesh line between them, u_k[i] = D[k z + i]/Y[k z]: that cancels a path that is smooth about a harmonic,
-and where the shaft's angle begins, but for a turn by one angle, u → u exp(−jiφ).
+profile over the engagement. That profile is in the complex sidebands of the difference from the healthy machine. Each
+is taken relative to the mesh line between them, u_k[i] = D[k z + i]/Y[k z]: that cancels a path that is smooth about a
+harmonic, and where the shaft's angle begins, but for a turn by one angle, u → u exp(−jiφ).
 
 What is observed is taken for the simulated change, t, times a scale, times a gain of each harmonic, and a rest:
 

@@ -95,9 +95,9 @@ def fit_calibration(cases: Sequence[AttributedCase], several: Sequence[Attribute
 
     Parameters
     ----------
-    cases : sequence of WeighedCase
+    cases : sequence of AttributedCase
         Of one operating condition each.
-    several : sequence of WeighedCase
+    several : sequence of AttributedCase
         Of several: by how much more than one they say is fitted to these, all else kept.
 
     J. C. Platt, "Probabilistic outputs for support vector machines", 1999; C. Guo, G. Pleiss, Y. Sun, K. Q. Weinberger,
