@@ -162,17 +162,20 @@ def score_of(shrink: float, placebo: float) -> float:
 @cache
 def load_gap_calibration(*, with_reference: bool) -> GapCalibration:
     """Return the calibration that comes with this version."""
-    return GapCalibration.from_mapping(_file()["with_reference" if with_reference else "without_reference"])
+    return GapCalibration.from_mapping(
+        calibration_values()["with_reference" if with_reference else "without_reference"]
+    )
 
 
-def is_calibrated() -> bool:
-    """Whether the numbers were fitted to blind cases, or are only a start."""
-    return int(_file()["provenance"]["n_cases"]) > 0
+def is_calibrated(file: Path = CALIBRATION_FILE) -> bool:
+    """Whether a calibration's numbers were fitted to blind cases, or are only a start."""
+    return int(calibration_values(file)["provenance"]["n_cases"]) > 0
 
 
 @cache
-def _file() -> dict[str, Any]:
-    values: dict[str, Any] = json.loads(CALIBRATION_FILE.read_text(encoding="utf-8"))
+def calibration_values(file: Path = CALIBRATION_FILE) -> dict[str, Any]:
+    """Return what a calibration's file holds, "with_reference", "without_reference" and "provenance"."""
+    values: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return values
 
 

@@ -70,7 +70,7 @@ def alike_features(now: ReducedRecording, healthy: ReducedRecording) -> Iterator
         a, b = changes[..., first], changes[..., second]
         yield f"{name}.less", _median(a - b)
         yield f"{name}.apart", _rms(a - b)
-        yield f"{name}.together", _together(a, b)
+        yield f"{name}.together", _agreement(a, b)
 
 
 def segment_changes(now: ReducedRecording, healthy: ReducedRecording) -> FloatArray:
@@ -141,7 +141,7 @@ def _rise(values: FloatArray) -> float:
     return float(finite.mean()) if len(finite) else 0.0
 
 
-def _together(a: FloatArray, b: FloatArray) -> float:
+def _agreement(a: FloatArray, b: FloatArray) -> float:
     """Return 10 (2 Σ ab)/(Σ a² + Σ b² + n): 10 where both changed alike and much, −10 where in opposite directions."""
     is_known = np.isfinite(a) & np.isfinite(b)
     x, y = a[is_known], b[is_known]

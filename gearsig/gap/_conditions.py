@@ -620,7 +620,7 @@ def _condition(
     """Return a recording beside its reference and the healthy twin at its point, and what is worth a remark."""
     name, (now, messages) = recording.recording.name, _reduced(recording)
     facts = facts_of(recording, now, twin)
-    messages += _assumed(recording, facts)
+    messages += _messages_of_recording(recording, facts)
     match, why = matching_reference(now, recording.rig, healthy)
     if match is None or strange_teeth(match.reduced, match.name):  # a healthy one that fits: damage repeats otherwise
         messages += strange_teeth(now, name)
@@ -687,7 +687,7 @@ def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
     return reduced, messages
 
 
-def _assumed(prepared: PreparedRecording, facts: ConditionFacts) -> list[str]:
+def _messages_of_recording(prepared: PreparedRecording, facts: ConditionFacts) -> list[str]:
     """Say what is doubtful of a recording, and what of its operating point was not given."""
     recording = prepared.recording
     texts = [f"{facts.name}: {warning}." for warning in recording.warnings]

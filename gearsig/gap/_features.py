@@ -279,14 +279,14 @@ def cyclic_features(reduced: ReducedRecording, channels: Sequence[ChannelSums]) 
     for side, order in enumerate(frame.shaft_orders):
         yield f"envelope.{SIDES[side]}_shaft", _family(levels, order, N_SHAFT_FAMILY, step, (), 0.0)
     yield "envelope.mesh", _family(levels, float(frame.teeth[0]), 1, step, (), 0.0)
-    yield "envelope.strange", _strange(envelopes, step, known_modulation(frame), first=LOWEST_STRANGE)
+    yield "envelope.strange", _unexplained_excess(envelopes, step, known_modulation(frame), first=LOWEST_STRANGE)
     depth = max(float(c.envelope_power.mean(axis=0)[:, 2:].sum(axis=1).max()) for c in channels)
     yield "envelope.depth", decibel(depth)
     residuals = residual_ratios(reduced, channels)
     levels = excesses(residuals)
     yield from _families(frame, levels, reduced.order_step, known, "line")
     yield "line.half_mesh", _family(levels, frame.teeth[0] / 2.0, 1, reduced.order_step, (), 0.0)
-    yield "line.strange", _strange(residuals, reduced.order_step, known_lines(frame), first=LOWEST_STRANGE)
+    yield "line.strange", _unexplained_excess(residuals, reduced.order_step, known_lines(frame), first=LOWEST_STRANGE)
 
 
 def envelope_ratios(reduced: ReducedRecording, sums: ChannelSums) -> FloatArray:
@@ -342,7 +342,7 @@ def excesses(ratios: FloatArray) -> FloatArray:
     return level
 
 
-def _strange(ratios: FloatArray, step: float, known: Sequence[Known], *, first: float) -> float:
+def _unexplained_excess(ratios: FloatArray, step: float, known: Sequence[Known], *, first: float) -> float:
     """Return the excess in dB of the strongest line that belongs to nothing known."""
     free = free_lines(ratios.shape[1], step, known, first=first)
     return max(decibel(float(ratios[:, free].max())), 0.0) if free.any() else 0.0

@@ -356,21 +356,24 @@ def pooled_scatter(change: Features) -> FloatArray:
 
 
 _N_DRAWS = 2000
-_known: dict[tuple[str, ...], float] = {}
 
 
+@cache
 def independent_whole(names: tuple[str, ...]) -> float:
     """Return the `soft_size` that one in twenty exceeds if features are independent and normal, each at its floor.
 
     A constant of the features' names, found by counting, so the same numbers are drawn each time.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the features.
     """
-    if names not in _known:
-        draws = np.random.default_rng(0).standard_normal((_N_DRAWS, len(names))) / REPEATABLE
-        total = np.zeros(_N_DRAWS)
-        for members in sized_members(names).values():
-            total += np.mean(np.abs(draws[:, members]) ** WITHIN, axis=1) ** (ACROSS / WITHIN)
-        _known[names] = float(np.quantile(total, 1.0 - _TAIL) ** (1 / ACROSS))
-    return _known[names]
+    draws = np.random.default_rng(0).standard_normal((_N_DRAWS, len(names))) / REPEATABLE
+    total = np.zeros(_N_DRAWS)
+    for members in sized_members(names).values():
+        total += np.mean(np.abs(draws[:, members]) ** WITHIN, axis=1) ** (ACROSS / WITHIN)
+    return float(np.quantile(total, 1.0 - _TAIL) ** (1 / ACROSS))
 
 
 def credibility_of(features: FloatArray, simulated: FloatArray) -> FloatArray:

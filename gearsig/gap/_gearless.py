@@ -283,11 +283,11 @@ def causes_of(
         GapCause(NONE, NONE, why if outcome is GapOutcome.NO_GAP else "no damage", "", remainder - unknown),
     ]
     firsts = {GapOutcome.UNKNOWN: UNKNOWN, GapOutcome.NO_GAP: NONE}
-    first = firsts.get(outcome) or RACES[_sure(races)[0].finding.code]
+    first = firsts.get(outcome) or RACES[_significant_races(races)[0].finding.code]
     return tuple(sorted(causes, key=lambda cause: (cause.name != first, -cause.probability))), outcome
 
 
-def _sure(races: Races) -> list[UnexpectedFinding]:
+def _significant_races(races: Races) -> list[UnexpectedFinding]:
     """Return the races whose damage the search is sure of, surest first."""
     faults = [race for race in races.values() if race.finding.kind is Kind.FAULT]
     return sorted(faults, key=lambda race: -race.finding.confidence)
@@ -297,7 +297,7 @@ def _outcome(
     unexpected: Sequence[UnexpectedFinding], races: Races, every: Sequence[ExaminedRecording], rig: Rig
 ) -> tuple[GapOutcome, str]:
     """Return the outcome and its reason."""
-    if _sure(races):
+    if _significant_races(races):
         return GapOutcome.EFFECT, ""
     if unexpected:
         return GapOutcome.UNKNOWN, _why_unknown(unexpected[0], races, rig)

@@ -134,10 +134,10 @@ def _change(
 ) -> LabelledChange:
     prepared = PreparedRecording(labelled.recording)
     key = _key(labelled, shared, ways, channels, twin)
-    kept = None if cache is None else _kept(cache, key, labelled.effect)
+    kept = None if cache is None else _read_kept(cache, key, labelled.effect)
     if kept is not None:
         return kept
-    now = _on(reduce_recording(prepared), channels)
+    now = _with_channels(reduce_recording(prepared), channels)
     facts = facts_of(prepared, now, twin)
     healthy = list(shared) if labelled.reference is None else [read_healthy(PreparedRecording(labelled.reference))[0]]
     match, why = matching_reference(now, prepared.rig, healthy)
@@ -154,7 +154,7 @@ def _change(
     return LabelledChange(labelled.effect, facts.point, changes, key)
 
 
-def _on(reduced: ReducedRecording, channels: Sequence[str]) -> ReducedRecording:
+def _with_channels(reduced: ReducedRecording, channels: Sequence[str]) -> ReducedRecording:
     """Return a recording with those of the diagnosed ones' channels that it has; with all its own where it has none."""
     common = {name: reduced.channels[name] for name in channels if name in reduced.channels}
     return reduced.with_channels(common) if common else reduced
@@ -187,7 +187,7 @@ def _keep(change: LabelledChange, folder: Path) -> None:
     keep(_path(folder, change.key), lambda file: np.savez(file, allow_pickle=False, **arrays))
 
 
-def _kept(folder: Path, key: str, label: str) -> LabelledChange | None:
+def _read_kept(folder: Path, key: str, label: str) -> LabelledChange | None:
     arrays = read_arrays(_path(folder, key), MAX_BYTES)
     if arrays is None:
         return None

@@ -83,7 +83,7 @@ def next_recordings(
     best_sensor = max(d for distances in known for channel, d in distances.items() if channel not in places)
     recordings = []
     for point, distances in at.items():
-        for channel, apart in _worth_naming(distances, places, now, best_sensor):
+        for channel, apart in _informative_sensors(distances, places, now, best_sensor):
             place = places.get(channel, "")
             text = _text(
                 point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in present_points
@@ -110,11 +110,11 @@ def _distances(conditions: Sequence[Condition], first: Reduced | str, second: Re
     """Return the distance of two simulations on the rig's own sensors together, and on each sensor alone."""
     if not (isinstance(first, Reduced) and isinstance(second, Reduced)):
         return {}
-    alone = {name: _apart(conditions, change - second.alone[name]) for name, change in first.alone.items()}
-    return {PRESENT_SENSORS: _apart(conditions, first.change - second.change), **alone}
+    alone = {name: _family_distance(conditions, change - second.alone[name]) for name, change in first.alone.items()}
+    return {PRESENT_SENSORS: _family_distance(conditions, first.change - second.change), **alone}
 
 
-def _worth_naming(
+def _informative_sensors(
     distances: Mapping[str, float], places: Mapping[str, str], now: float, best_sensor: float
 ) -> Iterator[tuple[str, float]]:
     """Yield the rig's own sensors, and the best further one if it shows more than they, where it is worth it."""
@@ -136,7 +136,7 @@ def _text(point: OperatingCondition, place: str, apart: str, now: float, *, is_n
     return f"{where}: there {apart} structural floors apart, {now:.2g} so far."
 
 
-def _apart(conditions: Sequence[Condition], difference: FloatArray) -> float:
+def _family_distance(conditions: Sequence[Condition], difference: FloatArray) -> float:
     """Root of the sum over families of the mean squared difference in floors."""
     n = n_compared(conditions)
     names = conditions[0].change.names[:n]

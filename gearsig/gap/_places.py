@@ -215,7 +215,7 @@ def locate_envelope(comparison: ComparedPair) -> LocatedChange:
         np.concatenate([envelope_ratios(g, g.channels[name]) for name in names]) for g in (now, comparison.baseline)
     ]
     levels = _levels(comparison, ratios, now.cycle_step, comparison.baseline.cycle_step)
-    levels, sign = _upwards(levels, comparison.size[comparison.strongest("envelope.")])
+    levels, sign = _with_rising_change(levels, comparison.size[comparison.strongest("envelope.")])
     family = _family_or_line(_best_race(comparison, levels), _strongest(comparison, levels, fundamental=True))
     family = max(family, *_shafts(comparison, levels), key=lambda candidate: candidate.rise_db)
     bands = now.bands_hz * len(names)
@@ -228,9 +228,9 @@ def locate_envelope(comparison: ComparedPair) -> LocatedChange:
 def locate_line(comparison: ComparedPair) -> LocatedChange:
     """Return which line of the residual changed most: the supply's, a bearing's, or a strange one."""
     strongest = comparison.strongest("line.outer", "line.inner", "line.ball", "line.cage", "line.strange", "hum")
-    levels, sign = _upwards(_residual_levels(comparison), comparison.size[strongest])
+    levels, sign = _with_rising_change(_residual_levels(comparison), comparison.size[strongest])
     line = _strongest(comparison, levels, fundamental=False)
-    if strongest == "hum" or (_is_the_supplys(comparison, line.orders[0]) and comparison.size["hum"] > 1.0):
+    if strongest == "hum" or (_is_mains_order(comparison, line.orders[0]) and comparison.size["hum"] > 1.0):
         return _hum(comparison)
     return _line(comparison, _family_or_line(_best_race(comparison, levels), line), sign)
 
@@ -255,7 +255,7 @@ def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_d
     order = float(orders[peak])
     levels = _residual_levels(comparison)
     rise = float((levels.now - levels.baseline)[row, min(peak, len(levels.taken) - 1)])
-    words = _strange_words(comparison, order)
+    words = _order_words(comparison, order)
     return replace(_line(comparison, _Peak(words, rise, (order,), row), 1.0), kind=PlaceKind.LINE)
 
 
@@ -285,7 +285,7 @@ def _levels(comparison: ComparedPair, ratios: list[FloatArray], step: float, ste
     )
 
 
-def _upwards(levels: LineLevels, size: float) -> tuple[LineLevels, float]:
+def _with_rising_change(levels: LineLevels, size: float) -> tuple[LineLevels, float]:
     """Return the comparison the other way round, and −1, where it went down."""
     if size >= 0:
         return levels, 1.0
@@ -371,10 +371,10 @@ def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: boo
     if fundamental:
         line = _fundamental(levels.now[row], line)
     order = line * levels.step
-    return _Peak(_strange_words(comparison, order), change, (order,), row)
+    return _Peak(_order_words(comparison, order), change, (order,), row)
 
 
-def _strange_words(comparison: ComparedPair, order: float) -> str:
+def _order_words(comparison: ComparedPair, order: float) -> str:
     """Return whose order it is by itself, without a family of multiples."""
     frame, step = comparison.now.frame, 1.5 * comparison.now.order_step
     mesh = frame.teeth[DRIVER]
@@ -402,7 +402,7 @@ def _fundamental(level: FloatArray, line: int) -> int:
     return line
 
 
-def _is_the_supplys(comparison: ComparedPair, order: float) -> bool:
+def _is_mains_order(comparison: ComparedPair, order: float) -> bool:
     speed_hz = comparison.now.speed_hz
     lines = np.array([k * supply for supply in MAINS_HZ for k in range(1, N_HARMONICS + 1)])
     # Twice what a supply wanders: the order was found on a grid of lines, at a mean speed.
@@ -489,7 +489,7 @@ def locate_sidebands(comparison: ComparedPair, side: int) -> LocatedChange | Non
     lines = _largest_lines(now.synchronous[row] - before.synchronous[row], groups[best])
     title = f"sidebands of {shaft_words(frame, side)} about {_times(best + 1)}mesh, {by_decibels(change)}"
     carrier = (best + 1) * teeth
-    title += _how_far_apart([abs(line - carrier) for line in lines])
+    title += _spacing_text([abs(line - carrier) for line in lines])
     orders = tuple(float(line * frame.shaft_orders[side]) for line in lines)
     return LocatedChange(title, change, orders, channel=_channel(comparison, row))
 
@@ -574,7 +574,7 @@ def _largest_lines(moved: FloatArray, lines: list[int]) -> list[int]:
     return [lines[i] for i in order if amounts[i] >= WORTH_NAMING * amounts.max()]
 
 
-def _how_far_apart(offsets: list[int]) -> str:
+def _spacing_text(offsets: list[int]) -> str:
     if max(offsets) <= 2:
         return ", nearest lines only" if max(offsets) == 1 else ", nearest two lines"
     return f", up to {max(offsets)} orders away"
@@ -610,11 +610,11 @@ def locate_band(comparison: ComparedPair) -> LocatedChange:
         return tone
     quantity = "noise" if kind == "band" else "kurtosis of the noise"
     title = f"{quantity} between {band_words(band).replace(' to ', ' and ')}, {by_decibels(change)}"
-    channel = _loudest(comparison, int(number) - 1, kurtosis=kind != "band")
+    channel = _most_changed_channel(comparison, int(number) - 1, kurtosis=kind != "band")
     return LocatedChange(title, change, band_hz=band, channel=channel, follows=kind != "band")
 
 
-def _loudest(comparison: ComparedPair, band: int, *, kurtosis: bool) -> str:
+def _most_changed_channel(comparison: ComparedPair, band: int, *, kurtosis: bool) -> str:
     """Return the channel on which the band changed most."""
 
     def change(name: str) -> float:
@@ -809,7 +809,7 @@ def gap_places(
     comparison = ComparedPair(
         now, baseline, is_reference, _named(change.names, distances), _named(change.names, ratios)
     )
-    members = {family: _telling(change.names, rows) for family, rows in family_members(change.names).items()}
+    members = {family: _located_rows(change.names, rows) for family, rows in family_members(change.names).items()}
     energies = {family: max(family_size(ratios[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
     min_energy = MIN_SHARE * sum(energies.values())
     spots = {family: _spot(comparison, family) for family, energy in energies.items() if energy > min_energy}
@@ -836,7 +836,7 @@ def _merged(places: list[GapPlace]) -> list[GapPlace]:
     return list(merged.values())
 
 
-def _telling(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
+def _located_rows(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
     kept = [row for row in rows if names[row] not in REPEATED and not names[row].startswith("apart.")]
     return np.array(kept, dtype=np.intp)
 

@@ -249,7 +249,7 @@ def fit_recogniser(population: Population, *, with_reference: bool, n_trees: int
         n_jobs=2,
         random_state=_SEED,
     )
-    is_visible = _visible(floor, tables[0], population.causes)
+    is_visible = _is_visible(floor, tables[0], population.causes)
     exchanged = mirrored(floor.names)
     changes, scatter = (np.concatenate([table[is_visible], table[is_visible][:, exchanged]]) for table in tables)
     loads = np.tile(population.loads_n_per_mm[is_visible], 2)
@@ -285,7 +285,7 @@ def even_weights(sources: NDArray[np.str_], causes: NDArray[np.str_]) -> FloatAr
     return weights
 
 
-def _visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str_]) -> NDArray[np.bool_]:
+def _is_visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str_]) -> NDArray[np.bool_]:
     """Return which rows to learn from: an effect that changes nothing would only teach that nothing is that effect."""
     rows = floor.from_centre(floor.names, changes) / floor.of(floor.names)
     sizes = np.array([soft_size(floor.names, row) for row in rows]) / floor.whole_of(floor.names)

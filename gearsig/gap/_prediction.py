@@ -149,7 +149,7 @@ class Fit:
         """Return the fit with the level that suits another condition best; severity and options stay."""
         predicted = self.path.at(np.array([self.severity.value]), observed.condition)[:, 0]
         costs = _squares(observed.distances - predicted, observed.floors) @ _family_weights(self.path.names)
-        way = int(np.argmin(costs + _unusual(self.path)))
+        way = int(np.argmin(costs + _level_costs(self.path)))
         return replace(self, ways={**self.ways, observed.condition: way})
 
     def level_db(self, condition: int) -> float:
@@ -230,10 +230,10 @@ def fit_path(path: EffectPath, observed: Sequence[ObservedChange]) -> Fit:
     largest severity that was simulated fits as well it has no upper end, and where the least does, it begins at 0.
     """
     coarse = path.tried()
-    tried = np.geomspace(*_about(coarse, _near_the_best(path, _costs(path, coarse, observed)[0])), STEPS)
+    tried = np.geomspace(*_bracket(coarse, _is_near_best(path, _costs(path, coarse, observed)[0])), STEPS)
     costs, ways = _costs(path, tried, observed)
-    near = _near_the_best(path, costs)
-    low, high = _about(tried, near)
+    near = _is_near_best(path, costs)
+    low, high = _bracket(tried, near)
     if near[0] and tried[0] == coarse[0]:
         low = 0.0
     if near[-1] and tried[-1] == coarse[-1]:
@@ -244,7 +244,7 @@ def fit_path(path: EffectPath, observed: Sequence[ObservedChange]) -> Fit:
     return Fit(path, Interval(float(tried[best]), low, high), float(costs.min()), fitted)
 
 
-def _near_the_best(path: EffectPath, costs: FloatArray) -> NDArray[np.bool_]:
+def _is_near_best(path: EffectPath, costs: FloatArray) -> NDArray[np.bool_]:
     """Return at which severities the cost has risen by no more than is likely.
 
     That is `INTERVAL_COST`, and as many times more as the best fit misses by.
@@ -254,7 +254,7 @@ def _near_the_best(path: EffectPath, costs: FloatArray) -> NDArray[np.bool_]:
     return near
 
 
-def _about(tried: FloatArray, near: NDArray[np.bool_]) -> tuple[float, float]:
+def _bracket(tried: FloatArray, near: NDArray[np.bool_]) -> tuple[float, float]:
     """Return the first severities on either side of those that are near; the ends where there are none."""
     rows = np.flatnonzero(near)
     return float(tried[max(rows[0] - 1, 0)]), float(tried[min(rows[-1] + 1, len(tried) - 1)])
@@ -271,13 +271,13 @@ def _costs(
     costs, ways = [], []
     for change in observed:
         misses = change.distances - path.at(severities, change.condition)
-        cost_of_way = _squares(misses, change.floors) @ weights + _unusual(path)[:, None]
+        cost_of_way = _squares(misses, change.floors) @ weights + _level_costs(path)[:, None]
         ways.append(cost_of_way.argmin(axis=0))
         costs.append(cost_of_way.min(axis=0))
     return np.mean(costs, axis=0), np.array(ways)
 
 
-def _unusual(path: EffectPath) -> FloatArray:
+def _level_costs(path: EffectPath) -> FloatArray:
     """Return the levels' squares in standard deviations."""
     squares: FloatArray = (np.array(path.levels_db) / LEVEL_SCATTER_DB) ** 2
     return squares
@@ -383,7 +383,7 @@ def transplanted(
     for side in SIDES:
         for name, rose in _STRONGEST.items():
             strongest = name.format(side)
-            moved[strongest] = _risen(
+            moved[strongest] = _prominence_rise(
                 real[strongest], simulated[strongest] + simulated_change[strongest], moved[rose.format(side)]
             )
         moved |= _tooth(f"tooth.{side}", moved, simulated_change, simulated, real)
@@ -407,13 +407,13 @@ def _added(change_db: float, simulated_db: float, real_db: float, gain_db: float
 def _mesh(change: Mapping[str, float], real: Mapping[str, float], level_db: float) -> dict[str, float]:
     """Return the mesh harmonics' changes: what is added comes as much louder, on the harmonics that the machine has."""
     shares = [name for name in change if name.startswith("mesh.share.")]
-    levels = [_louder(change[name] + change["mesh.total"], level_db) for name in shares]
+    levels = [_change_at_level(change[name] + change["mesh.total"], level_db) for name in shares]
     powers = np.array([_power(real[name]) for name in shares])
     total = float(10.0 * np.log10(powers @ [_power(level) for level in levels] / powers.sum()))
     return {"mesh.total": total} | {name: level - total for name, level in zip(shares, levels, strict=True)}
 
 
-def _louder(change_db: float, level_db: float) -> float:
+def _change_at_level(change_db: float, level_db: float) -> float:
     """Return the change in decibels if what is added were louder by a level; what falls, falls alike."""
     return _added(change_db, 0.0, 0.0, level_db)
 
@@ -423,7 +423,7 @@ def _part(change_db: float) -> float:
     return 1.0 - 1.0 / _power(change_db) if change_db > 0.0 else 0.0
 
 
-def _risen(born_db: float, alone_db: float, more_db: float) -> float:
+def _prominence_rise(born_db: float, alone_db: float, more_db: float) -> float:
     """Return by how much the strongest stands out further: as much as it rose, no further than by itself alone."""
     return min(born_db + max(more_db, 0.0), max(alone_db, born_db)) - born_db
 
@@ -443,7 +443,7 @@ def _tooth(
         * (simulated[f"{name}.{detail}"] + change[f"{name}.{detail}"] - real[f"{name}.{detail}"])
         for detail in ("kurtosis", "width", "below_mesh", "centroid")
     }
-    second = _risen(real[f"{name}.second"], simulated[f"{name}.second"] + change[f"{name}.second"], peak)
+    second = _prominence_rise(real[f"{name}.second"], simulated[f"{name}.second"] + change[f"{name}.second"], peak)
     return {f"{name}.prominence": peak - elsewhere, f"{name}.second": second, **shapes}
 
 
@@ -602,7 +602,7 @@ def shrinkage(
         As `fold_fits` returns them, where they are known.
     """
     known = fits or fold_fits(paths, folds)
-    folds, scores = _telling(
+    folds, scores = _folds_that_show(
         folds, [_score(paths, fold, excluded, fit) for fold, fit in zip(folds, known, strict=True)]
     )
     before, after, shrink = np.mean([score.sizes for score in scores], axis=0).tolist()
@@ -617,12 +617,12 @@ def shrinkage(
         float(np.mean([score.placebo for score in scores])),
         held_out,
         n_placebos=max(score.n_placebos for score in scores),
-        elsewhere=_mean([_elsewhere(paths, fold) for fold in folds]),
+        elsewhere=_mean([_shrink_across_conditions(paths, fold) for fold in folds]),
         predicted=max(score.predicted for score in scores),
     )
 
 
-def _telling(folds: Sequence[Fold], scores: Sequence[_Score]) -> tuple[Sequence[Fold], Sequence[_Score]]:
+def _folds_that_show(folds: Sequence[Fold], scores: Sequence[_Score]) -> tuple[Sequence[Fold], Sequence[_Score]]:
     """Return the folds in which the effect shows on the simulator, and their scores; all where it does in none."""
     shown = [i for i, score in enumerate(scores) if score.predicted >= MIN_PREDICTED] or range(len(scores))
     return [folds[i] for i in shown], [scores[i] for i in shown]
@@ -633,7 +633,7 @@ def _mean(values: Sequence[float | None]) -> float | None:
     return float(np.mean(known)) if known else None
 
 
-def _elsewhere(paths: Sequence[EffectPath], fold: Fold) -> float | None:
+def _shrink_across_conditions(paths: Sequence[EffectPath], fold: Fold) -> float | None:
     """Return the shrink where severity and options come from the other conditions alone; None if there is none.
 
     The level comes from the condition's own other revolutions: no other condition knows the path at this speed.

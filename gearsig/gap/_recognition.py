@@ -345,7 +345,7 @@ class Recogniser:
         if self.linear is not None:
             linear_shares = self.linear.probabilities(within_reach(row))
             shares = (1.0 - LINEAR_SHARE) * shares + LINEAR_SHARE * linear_shares
-            shares = shares * self._by_the_rules(change, textbook_rules(effects))
+            shares = shares * self._rule_factors(change, textbook_rules(effects))
         shares = np.maximum(shares, MIN_PROBABILITY)
         return dict(zip(self.causes, (shares / shares.sum()).tolist(), strict=True))
 
@@ -360,7 +360,7 @@ class Recogniser:
         row: FloatArray = input_rows(self.floor, change.values[None], change.scatter[None], np.array([load]))[0]
         return row
 
-    def _by_the_rules(self, change: Features, rules: Iterable[tuple[str, Signs]]) -> FloatArray:
+    def _rule_factors(self, change: Features, rules: Iterable[tuple[str, Signs]]) -> FloatArray:
         """Return the factors of the causes, by how far features are from usual, in standard deviations."""
         names = self.floor.names
         spreads = self.floor.of(names) / REPEATABLE

@@ -243,9 +243,11 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
         now = _reduced_run(run, task.seed, task.added, run.noise if task.added is not None else max(run.noise, 1))
         alone = {}
         if task.further:
-            alone = {name: change_once(_of(now, name), _of(healthy, name))[1] for name in healthy.channels}
+            alone = {
+                name: change_once(_of_channels(now, name), _of_channels(healthy, name))[1] for name in healthy.channels
+            }
             of_the_rig = [name for name in healthy.channels if name not in task.further]
-            now, healthy = _of(now, *of_the_rig), _of(healthy, *of_the_rig)
+            now, healthy = _of_channels(now, *of_the_rig), _of_channels(healthy, *of_the_rig)
         names, values = once(healthy) if task.added is None else ((), np.empty(0))
         sidebands = mesh_sidebands(now, healthy, is_turned=False)
         return Reduced(names, values, *change_once(now, healthy), sidebands, alone)
@@ -253,7 +255,7 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
         return str(error)
 
 
-def _of(reduced: ReducedRecording, *channels: str) -> ReducedRecording:
+def _of_channels(reduced: ReducedRecording, *channels: str) -> ReducedRecording:
     return reduced.with_channels({name: reduced.channels[name] for name in channels})
 
 
@@ -751,14 +753,17 @@ def folds_of(conditions: Sequence[Condition]) -> list[Fold]:
     n, whole = n_compared(conditions), observed_changes(conditions)
     folds = []
     for k, condition in enumerate(conditions):
-        fitted, again = [observation for observation in whole if observation.condition != k], _again(condition, k, n)
+        fitted, again = (
+            [observation for observation in whole if observation.condition != k],
+            _left_out_changes(condition, k, n),
+        )
         changes = [condition.change_of(part) for part in halves(condition.now)]
         first, second = (observed(condition, k, n, change) for change in changes)
         folds += [Fold((*fitted, first), second, again), Fold((*fitted, second), first, again)]
     return folds
 
 
-def _again(condition: Condition, index: int, n: int) -> tuple[tuple[ObservedChange, ...], ...]:
+def _left_out_changes(condition: Condition, index: int, n: int) -> tuple[tuple[ObservedChange, ...], ...]:
     """Return the condition with each block left out: blocks of the recording, then of what it is compared with."""
     base, values = observed(condition, index, n), condition.change.values[:n]
     return tuple(

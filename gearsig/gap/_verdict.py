@@ -28,7 +28,7 @@ from gearsig.gap._words import hardly_predicted, same_load, same_speed, severity
 def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
     """Return one line for each question."""
     if report.is_simulated:
-        return _where(report), _which(report), _how_far(report), _next(report)
+        return _where(report), _which(report), _shrinkage_text(report), _next(report)
     return _where_seen(report), _which_seen(report), NO_SIMULATION, _next_seen(report)
 
 
@@ -86,16 +86,16 @@ def _kind(kind: GapKind) -> str:
 def _kind_and_rivals(report: GapReport, rivals: Sequence[str]) -> str:
     """Return the kind of fault with what of it is likeliest, then what else may be; without a kind, all of them."""
     if report.kind is None:
-        return _either(report, rivals)
+        return _or_text(report, rivals)
     groups = {cause.name: cause.group for cause in report.causes}
     within = [name for name in rivals if groups.get(name) == report.kind.group]
     beyond = [name for name in rivals if name not in within]
     if not within:
-        return _either(report, rivals)
-    return f"{_kind(report.kind)}: {_either(report, within)}{f'; else {_either(report, beyond)}' if beyond else ''}"
+        return _or_text(report, rivals)
+    return f"{_kind(report.kind)}: {_or_text(report, within)}{f'; else {_or_text(report, beyond)}' if beyond else ''}"
 
 
-def _either(report: GapReport, names: Sequence[str]) -> str:
+def _or_text(report: GapReport, names: Sequence[str]) -> str:
     *titles, last = (_titled(report, name) for name in names)
     return f"{', '.join(titles)} or {last}" if titles else last
 
@@ -195,7 +195,7 @@ def _titled(report: GapReport, name: str) -> str:
     return f"{cause.title} ({odds_text(cause.probability)})" if cause is not None else name.replace("_", " ")
 
 
-def _how_far(report: GapReport) -> str:
+def _shrinkage_text(report: GapReport) -> str:
     shrinkage = report.causes[0].shrinkage
     if report.outcome not in NAMING or shrinkage is None:
         return "How far: no effect was added."
@@ -221,14 +221,14 @@ def _next(report: GapReport) -> str:
         return f"Next: {best}"
     if report.outcome in (GapOutcome.UNKNOWN, GapOutcome.UNDECIDED):
         purpose = {"speed": ", which tells orders from resonances"}
-        ways = "".join(f", or another {what}{purpose.get(what, '')}" for what in _not_varied(report)[:1])
+        ways = "".join(f", or another {what}{purpose.get(what, '')}" for what in _unvaried_quantities(report)[:1])
         return f"Next: another sensor nearer to where it is loudest{ways}."
     if report.outcome is GapOutcome.NO_GAP:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
     if sum(cause.shrinkage is not None for cause in report.causes) < 2:
-        ways = " or ".join(_not_varied(report)) or "sensor"
+        ways = " or ".join(_unvaried_quantities(report)) or "sensor"
         return f"Next: another {ways}; no two effects are likely enough to compute which would tell most."
-    where_to_look = _place_of_both(report)
+    where_to_look = _common_place(report)
     look = f"look at {where_to_look}; " if where_to_look else ""
     why = "speed or load that was simulated would put the two likeliest effects further apart"
     if is_settled(report.causes):
@@ -236,14 +236,14 @@ def _next(report: GapReport) -> str:
     return f"Next: {look}no other {why}."
 
 
-def _not_varied(report: GapReport) -> list[str]:
+def _unvaried_quantities(report: GapReport) -> list[str]:
     """Return what of speed and load is the same in all recordings."""
     points = [condition.point for condition in report.conditions]
     same = {"speed": same_speed, "load": same_load}
     return [what for what, is_same in same.items() if all(is_same(points[0], point) for point in points)]
 
 
-def _place_of_both(report: GapReport) -> str:
+def _common_place(report: GapReport) -> str:
     """Return the place that both likeliest effects share, which can be looked at; empty where they have none."""
     first, second = [cause.place for cause in report.causes if cause.name not in (NONE, UNKNOWN)][:2]
     return first if first == second and first.startswith("tooth") else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.gap._attribution import Attribution, GapCalibration
+from gearsig.gap._attribution import Attribution, GapCalibration, calibration_values
 from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
 from gearsig.gap._types import NONE, UNKNOWN, Interval, Shrinkage
 from gearsig.gap.start_stop._cycles import FEATURES, NAMES
@@ -147,20 +146,9 @@ def load_floors(*, with_reference: bool) -> tuple[tuple[DriveFloor, DriveFloor],
 
     The calibration's first probabilities are the shares of the evidence.
     """
-    content = _content()["with_reference" if with_reference else "without_reference"]
+    content = calibration_values(FLOORS_FILE)["with_reference" if with_reference else "without_reference"]
     whole, half = (DriveFloor.from_dict(content[part]) for part in ("whole", "half"))
     return (whole, half), GapCalibration.from_mapping(content)
-
-
-@cache
-def _content() -> dict[str, Any]:
-    content: dict[str, Any] = json.loads(FLOORS_FILE.read_text(encoding="utf-8"))
-    return content
-
-
-def is_drive_calibrated() -> bool:
-    """Whether floors and calibration were fitted to blind cases."""
-    return int(_content()["provenance"]["n_cases"]) > 0
 
 
 @dataclass(frozen=True)

@@ -237,7 +237,7 @@ class DriveComparison:
     @cached_property
     def without(self) -> FloatArray:
         """Changes without each cycle (or each of eight blocks of them), (n_blocks, n): the tooth and order stay."""
-        return np.array([self.change_in(kept, self.spot) for kept in _but_each(self.now.every)])
+        return np.array([self.change_in(kept, self.spot) for kept in _leave_one_out(self.now.every)])
 
     @cached_property
     def scatter(self) -> FloatArray:
@@ -247,7 +247,7 @@ class DriveComparison:
         """
         rows = np.zeros((1, len(NAMES)))
         if (reference := self.reference) is not None:
-            without_blocks = [reference.features(kept) for kept in _but_each(reference.every)]
+            without_blocks = [reference.features(kept) for kept in _leave_one_out(reference.every)]
             rows = np.array(
                 [
                     change_of(self.features, without_block, self.drive.shape, self.spot)
@@ -284,7 +284,7 @@ class DriveComparison:
         )
 
 
-def _but_each(every: tuple[int, ...]) -> list[tuple[int, ...]]:
+def _leave_one_out(every: tuple[int, ...]) -> list[tuple[int, ...]]:
     """Return all cycles but one, for each; or but one of eight blocks."""
     blocks = np.array_split(np.array(every), min(len(every), 8))
     return [tuple(c for c in every if c not in block) for block in blocks]

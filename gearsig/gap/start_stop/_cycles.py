@@ -181,7 +181,7 @@ class PreparedCycles:
             | load_features(self.motion, self.equation, rows),
             ripple=self._ripple(cycles),
             ripple_waves=self.orders * (float(np.median(turned)) if turned else 0.0),
-            impact_mps=self._hardest_mps(cycles),
+            impact_mps=self._max_impact_mps(cycles),
         )
 
     def _ripple(self, cycles: tuple[int, ...]) -> FloatArray:
@@ -206,7 +206,7 @@ class PreparedCycles:
             level += 0.5 * float(np.sum(window * np.abs(torque)))
         return np.abs(total) / level if level > 0.0 else nothing
 
-    def _hardest_mps(self, cycles: tuple[int, ...]) -> float:
+    def _max_impact_mps(self, cycles: tuple[int, ...]) -> float:
         hardest: dict[int, float] = {}
         for impact in self._impacts:
             at = min(round(impact.time_s * self.motion.sampling_rate_hz), len(self.number) - 1)
@@ -607,7 +607,7 @@ def spot_of(now: CycleFeatures, baseline: CycleFeatures) -> LocatedDriveChange:
     waves = np.maximum(np.minimum(now.ripple_waves, baseline.ripple_waves), 1e-3)
     steps = 0.01 * (1.0 + (6.0 / waves) ** 3)
     tooth, order = (int(np.nanargmax(v)) if np.any(np.isfinite(v)) else 0 for v in (teeth, ripple / steps))
-    next_um = max(float(np.nan_to_num(_largest_but(teeth, tooth))), 0.0)
+    next_um = max(float(np.nan_to_num(_largest_except(teeth, tooth))), 0.0)
     return LocatedDriveChange(tooth, order, float(np.hypot(scatter, 0.01 * _deflection(now, baseline))), steps, next_um)
 
 
@@ -644,8 +644,10 @@ def change_of(
     def signed(value: float, step: float) -> float:
         return float(20.0 / np.log(10.0) * np.arcsinh(value / (2.0 * step))) if step > 0.0 else NAN
 
-    next_tooth = signed(_largest_but(teeth, spot.tooth), 1.0)
-    next_ripple = signed(_largest_but(ripple, spot.order, 2), 1.0)  # a run is short: a ripple leaks into orders beside
+    next_tooth = signed(_largest_except(teeth, spot.tooth), 1.0)
+    next_ripple = signed(
+        _largest_except(ripple, spot.order, 2), 1.0
+    )  # a run is short: a ripple leaks into orders beside
     values = {
         "play": level("play_um"),
         "deflection": level("deflection_um"),
@@ -682,7 +684,7 @@ def _projected(curve: FloatArray, shape: FloatArray) -> float:
     return float(np.ptp(shape) * np.sum(s * c) / np.sum(s * s))
 
 
-def _largest_but(values: FloatArray, place: int, n_neighbours: int = 0) -> float:
+def _largest_except(values: FloatArray, place: int, n_neighbours: int = 0) -> float:
     """Return the largest of the others, those beside it left out."""
     remaining = np.delete(values, np.arange(max(place - n_neighbours, 0), min(place + n_neighbours + 1, len(values))))
     return float(np.nanmax(remaining)) if np.any(np.isfinite(remaining)) else NAN

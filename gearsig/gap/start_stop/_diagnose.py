@@ -24,7 +24,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import readable
 from gearsig.gap import _types as types
-from gearsig.gap._attribution import Attribution
+from gearsig.gap._attribution import Attribution, is_calibrated
 from gearsig.gap._evidence import evidence_of_feature
 from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
@@ -33,12 +33,12 @@ from gearsig.gap._verdict import in_order, most_probable_two, named_cause
 from gearsig.gap._words import fitted_words, severity_unit
 from gearsig.gap.start_stop._attribution import (
     CRACK,
+    FLOORS_FILE,
     RIPPLE,
     DriveEvidence,
     FittedDriveCause,
     attribute_drive,
     fit,
-    is_drive_calibrated,
 )
 from gearsig.gap.start_stop._comparison import (
     TORQUE_GAIN,
@@ -235,7 +235,7 @@ def _steps(compared: DriveComparison, evidence: DriveEvidence, cause: GapCause) 
 def _messages(diagnosis: DriveDiagnosis, clearest: DriveComparison, evidence: DriveEvidence) -> Iterator[str]:
     """Say what could not be told, what was taken for granted, and what the recording would not show."""
     effects, every = diagnosis.effects, diagnosis.compared
-    if not is_drive_calibrated():
+    if not is_calibrated(FLOORS_FILE):
         yield "The probabilities are not calibrated yet: take them as a ranking only."
     known = set.intersection(*(set(tellable(c, effects)) for c in every))
     missing = [effects[name].title for name in TRIED if name in effects and name not in known]
