@@ -386,7 +386,7 @@ class Identification(Result, rows="parameters"):
         return parameters[known_name(name, parameters, f"there is no parameter {name!r}")]
 
 
-TOLD = 0.5
+MAX_RELATIVE_HALF_WIDTH = 0.5
 """Half width of the interval over the value beyond which a parameter cannot be told."""
 NORMAL_95 = 1.96
 ONE_FLANK = "only one flank was loaded: play and zero of the angles cannot be told apart; record a stop with a brake"
@@ -513,7 +513,7 @@ def _contact_parameters(motion: PairMotion, fit: RobustFit, *, has_both_flanks: 
 
 def _load_parameters(motion: PairMotion, fit: RobustFit) -> list[FittedParameter]:
     inverse, half = fit.value("inverse inertia"), NORMAL_95 * fit.deviation("inverse inertia")
-    is_told = inverse > 0.0 and half < TOLD * inverse
+    is_told = inverse > 0.0 and half < MAX_RELATIVE_HALF_WIDTH * inverse
     highest = 1.0 / (inverse - half) if inverse > half else float("inf")
     lowest = 1.0 / (inverse + half) if inverse + half > 0.0 else float("inf")
     return [
@@ -523,7 +523,7 @@ def _load_parameters(motion: PairMotion, fit: RobustFit) -> list[FittedParameter
             1.0 / inverse if inverse > 0.0 else float("nan"),
             (lowest, highest),
             is_told,
-            "" if is_told else _why(fit, "inverse inertia"),
+            "" if is_told else _reason_text(fit, "inverse inertia"),
             motion.contact.driven_inertia_kg_m2,
             _alike(fit, "inverse inertia"),
         ),
@@ -536,8 +536,8 @@ def _plain(
     fit: RobustFit, parameter: str, name: str, unit: str, rig_value: float | None, factor: float = 1.0
 ) -> FittedParameter:
     value, half = factor * fit.value(parameter), factor * NORMAL_95 * fit.deviation(parameter)
-    is_told = half < TOLD * abs(value)
-    why = "" if is_told else _why(fit, parameter)
+    is_told = half < MAX_RELATIVE_HALF_WIDTH * abs(value)
+    why = "" if is_told else _reason_text(fit, parameter)
     return FittedParameter(
         name, unit, value, (value - half, value + half), is_told, why, rig_value, _alike(fit, parameter)
     )
@@ -547,9 +547,9 @@ def _stiffness(fit: RobustFit, rig_value: float, *, has_both_flanks: bool) -> Fi
     """Return the stiffness; from one flank a filter ahead of the torque's samples feigns it, twenty times too high."""
     parameter = "log stiffness"
     log_k, half = fit.value(parameter), NORMAL_95 * fit.deviation(parameter)
-    is_told = half < TOLD and has_both_flanks
+    is_told = half < MAX_RELATIVE_HALF_WIDTH and has_both_flanks
     low, middle, high = (float(np.exp(min(v, 700.0))) for v in (log_k - half, log_k, log_k + half))
-    why = "" if is_told else _why(fit, parameter) if has_both_flanks else ONE_ZERO
+    why = "" if is_told else _reason_text(fit, parameter) if has_both_flanks else ONE_ZERO
     return FittedParameter(
         "stiffness_n_per_m_lambda", "N/m^λ", middle, (low, high), is_told, why, rig_value, _alike(fit, parameter)
     )
@@ -558,11 +558,11 @@ def _stiffness(fit: RobustFit, rig_value: float, *, has_both_flanks: bool) -> Fi
 def _restitution(fit: RobustFit, law: str, rig_value: float) -> FittedParameter:
     """Turn c = β v into the restitution of the rig's law; it is told where c is."""
     c, half = fit.value("damping"), NORMAL_95 * fit.deviation("damping")
-    is_told = c > 0.0 and half < TOLD * c
+    is_told = c > 0.0 and half < MAX_RELATIVE_HALF_WIDTH * c
     grid = np.linspace(0.01, 1.0, 2_001)
     factors = np.array([damping_ratio_s_per_m(law, float(e), 1.0) for e in grid])
     low, middle, high = (float(np.interp(v, factors[::-1], grid[::-1])) for v in (c + half, c, c - half))
-    why = "" if is_told else _why(fit, "damping")
+    why = "" if is_told else _reason_text(fit, "damping")
     return FittedParameter("restitution", "", middle, (low, high), is_told, why, rig_value, _alike(fit, "damping"))
 
 
@@ -575,7 +575,7 @@ def _alike(fit: RobustFit, parameter: str) -> str:
     return f"{NAMES_OF_RESULT.get(like, like)} (correlation {sign * correlation:.2f})"
 
 
-def _why(fit: RobustFit, parameter: str) -> str:
+def _reason_text(fit: RobustFit, parameter: str) -> str:
     like = _alike(fit, parameter)
     return "the record hardly depends on it" + (f", and it is mistaken for {like}" if like else "")
 
@@ -643,8 +643,8 @@ def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
     """
     equation = contact_equation(motion)
     fit = equation.solve(with_jackknife=False)
-    single = _alone(equation)
-    residual = _at_equal_places(equation, equation.residuals(fit.values), single)
+    single = _single_contact(equation)
+    residual = _without_common_profile(equation, equation.residuals(fit.values), single)
     tooth = (motion.path.tooth(motion.driver_angle_rad) - 1.0).astype(np.int64)
     n_teeth = motion.path.teeth[0]
     counts = np.bincount(tooth[single], minlength=n_teeth)
@@ -667,11 +667,11 @@ def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
     known = float(np.log(motion.contact.stiffness_n_per_m_lambda))  # one flank hardly tells it from the angles' zero
     deflection = _deflection(equation, fit.value("log stiffness") if equation.has_both_flanks else known, single)
     return YieldingTeeth(
-        1e6 * extra, 1e6 * uncertainty, 1e6 * deflection, counts, _weak(extra, uncertainty, deflection)
+        1e6 * extra, 1e6 * uncertainty, 1e6 * deflection, counts, _weak_teeth(extra, uncertainty, deflection)
     )
 
 
-def _alone(equation: ContactEquation) -> NDArray[np.bool_]:
+def _single_contact(equation: ContactEquation) -> NDArray[np.bool_]:
     """Samples in which one pair carries alone on the drive flank, calm enough for its equation."""
     _, force = equation.motion.torque_and_tooth_force()
     speed = np.abs(equation.motion.driver_speed_rad_s)
@@ -681,7 +681,7 @@ def _alone(equation: ContactEquation) -> NDArray[np.bool_]:
     return alone
 
 
-def _at_equal_places(equation: ContactEquation, residual: FloatArray, single: NDArray[np.bool_]) -> FloatArray:
+def _without_common_profile(equation: ContactEquation, residual: FloatArray, single: NDArray[np.bool_]) -> FloatArray:
     """Take off what all teeth have in common at a place: friction that turns, pairs that come and go."""
     path = equation.motion.path
     edge = path.contact_ratio - 1.0
@@ -701,7 +701,7 @@ def _deflection(equation: ContactEquation, log_stiffness: float, single: NDArray
     return float(np.median(g))
 
 
-def _weak(extra: FloatArray, uncertainty: FloatArray, deflection: float) -> tuple[int, ...]:
+def _weak_teeth(extra: FloatArray, uncertainty: FloatArray, deflection: float) -> tuple[int, ...]:
     stands_out = np.nan_to_num(extra) > np.fmax(CERTAIN * np.nan_to_num(uncertainty, nan=np.inf), MIN_PART * deflection)
     order = np.argsort(-np.nan_to_num(extra, nan=-np.inf))
     return tuple(int(j) + 1 for j in order if stands_out[j])

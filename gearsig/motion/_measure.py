@@ -77,10 +77,10 @@ def role_values(recording: Recording, rig: Rig, role: str, name: str) -> FloatAr
         If the unit is not known or measures something else.
     """
     channel = recording.channels[recording.index(name)]
-    return np.asarray(recording.values(name), dtype=np.float64) * _worth(channel, rig, role.rpartition(" ")[2])
+    return np.asarray(recording.values(name), dtype=np.float64) * _si_scale(channel, rig, role.rpartition(" ")[2])
 
 
-def _worth(channel: Channel, rig: Rig, quantity: str) -> float:
+def _si_scale(channel: Channel, rig: Rig, quantity: str) -> float:
     source = rig.speed
     if quantity == "angle" and isinstance(source, EncoderChannel) and source.channel == channel.name:
         return 2.0 * pi / source.units_per_revolution
@@ -230,7 +230,7 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where
     if len(jumps):
         i = int(jumps[0])
         raise InputError(
-            f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {_when(i, sampling_rate_hz)} "
+            f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {_time_text(i, sampling_rate_hz)} "
             f"({len(jumps)} such jump(s))",
             where=where,
             allowed="an angle that runs on",
@@ -261,8 +261,8 @@ def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where:
     if len(jumps):
         i = int(jumps[0])
         raise InputError(
-            f"channel {name!r} steps by {turns[i]:.3g} revolutions {_when(i, sampling_rate_hz)}: the encoder starts "
-            "again after each revolution",
+            f"channel {name!r} steps by {turns[i]:.3g} revolutions {_time_text(i, sampling_rate_hz)}: the encoder "
+            "starts again after each revolution",
             where=where,
             allowed="an angle that runs on",
             remedy=f"give wraps = true in the rig file, in [speed] or in the [[sensor]] table of {name!r} (force, "
@@ -279,7 +279,7 @@ def _steps(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
     return steps, np.abs(steps - around)
 
 
-def _when(step: int, sampling_rate_hz: float) -> str:
+def _time_text(step: int, sampling_rate_hz: float) -> str:
     return f"from {step / sampling_rate_hz:.6g} to {(step + 1) / sampling_rate_hz:.6g} s"
 
 
