@@ -97,13 +97,13 @@ def align(
         Whether to leave the simulation as it is: both count from a mark.
     """
     x, y = simulated.whole, recorded.whole
-    cross = _cross(x, y)
+    cross = _cross_spectrum(x, y)
     best = best_shift(cross)
     shifts = [
-        best_shift(_cross(a, b))
+        best_shift(_cross_spectrum(a, b))
         for a, b in ((simulated.first, y), (simulated.second, y), (x, recorded.first), (x, recorded.second))
     ]
-    spread = np.hypot(_apart(shifts[0], shifts[1]), _apart(shifts[2], shifts[3])) / 2.0
+    spread = np.hypot(_angle_distance_rev(shifts[0], shifts[1]), _angle_distance_rev(shifts[2], shifts[3])) / 2.0
     certain = None if n_teeth is None else _is_certain(x, y, best, shifts, n_teeth)
     if by_marks:
         gain = float(shift_scores(cross, np.array([best]))[0] - shift_scores(cross, np.zeros(1))[0])
@@ -111,7 +111,7 @@ def align(
     return Alignment(shaft, "correlation", 360.0 * best, 360.0 * float(spread), certain)
 
 
-def _cross(x: ComplexArray, y: ComplexArray) -> ComplexArray:
+def _cross_spectrum(x: ComplexArray, y: ComplexArray) -> ComplexArray:
     """Cross spectrum, each channel over its own size, mean over the channels; the mean value counts for nothing."""
     product = y * np.conj(x)
     product[:, 0] = 0.0
@@ -121,7 +121,7 @@ def _cross(x: ComplexArray, y: ComplexArray) -> ComplexArray:
     return mean
 
 
-def _apart(a: float, b: float) -> float:
+def _angle_distance_rev(a: float, b: float) -> float:
     """Return the distance of two angles, 0 to 0.5 revolutions."""
     return abs((a - b + 0.5) % 1.0 - 0.5)
 
@@ -131,10 +131,10 @@ def _is_certain(x: ComplexArray, y: ComplexArray, best: float, shifts: list[floa
 
     The mesh harmonics are left out of the second test: they say nothing of which tooth is which.
     """
-    if max(_apart(best, shift) for shift in shifts) >= 0.5 / n_teeth:
+    if max(_angle_distance_rev(best, shift) for shift in shifts) >= 0.5 / n_teeth:
         return False
     telling = np.arange(x.shape[1]) % n_teeth != 0
-    alike = shift_scores(_cross(np.where(telling, x, 0.0), np.where(telling, y, 0.0)), np.array([best]))[0]
+    alike = shift_scores(_cross_spectrum(np.where(telling, x, 0.0), np.where(telling, y, 0.0)), np.array([best]))[0]
     return bool(alike > 0.5)  # patterns of different gears reach 0.3 to 0.4 at the best of all teeth
 
 

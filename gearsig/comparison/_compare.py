@@ -255,7 +255,7 @@ def _compare_channel(shared: _Shared, i: int, pair: ChannelPair) -> ChannelCompa
         third_octaves=third_octaves(*third[0], *third[1]),
         shafts=tuple(_compare_shaft(rig, shaft, i, pair, lines) for shaft, lines in shared.lines.items()),
         overall=power_levels(totals[0], totals[1])[0],
-        locked=Locked(*(_locked(shared, side, i, totals[side][:, 0]) for side in (0, 1))),
+        locked=Locked(*(_coherent_share(shared, side, i, totals[side][:, 0]) for side in (0, 1))),
     )
 
 
@@ -302,7 +302,7 @@ def _average(lines: HalvedLines, i: int, n_angles: int, shaft: str, channel: str
     )
 
 
-def _locked(shared: _Shared, side: int, i: int, totals: FloatArray) -> Repeated:
+def _coherent_share(shared: _Shared, side: int, i: int, totals: FloatArray) -> Repeated:
     """Return the share of energy that both halves have in common, line by line: Σ Re(a b*) over the mean square.
 
     The noise of one half has nothing to do with that of the other, and adds nothing. An order of several shafts

@@ -38,7 +38,7 @@ def _is_hidden(line: LineLevel) -> bool:
 
 def verdict_of(channels: Sequence[ChannelComparison]) -> str:
     """Return one sentence per channel on how far the mesh harmonics, or else the shaft orders, are apart."""
-    return " ".join(_head(channel, channels) + _levels_text(channel) for channel in channels)
+    return " ".join(_headline(channel, channels) + _levels_text(channel) for channel in channels)
 
 
 def findings_of(channels: Sequence[ChannelComparison]) -> tuple[str, ...]:
@@ -46,11 +46,13 @@ def findings_of(channels: Sequence[ChannelComparison]) -> tuple[str, ...]:
     texts = []
     for channel in channels:
         if mesh_lines(channel):
-            texts += [_head(channel, channels) + text for text in (*_missing_texts(channel), *_shape_texts(channel))]
+            texts += [
+                _headline(channel, channels) + text for text in (*_missing_texts(channel), *_shape_texts(channel))
+            ]
     return tuple(texts)
 
 
-def _head(channel: ChannelComparison, channels: Sequence[ChannelComparison]) -> str:
+def _headline(channel: ChannelComparison, channels: Sequence[ChannelComparison]) -> str:
     return f"{channel.name}: " if len(channels) > 1 else ""
 
 
@@ -86,7 +88,7 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
         verb = "agree within" if spread <= WITHIN_DB else "differ by up to"
         return (
             f"The unit of one side is not known; after a common gain of {_decibels(-gain)}, simulation and recording "
-            f"{verb} {spread:.1f} dB at {n}{_worst(worst, gain) if spread > WITHIN_DB else ''}."
+            f"{verb} {spread:.1f} dB at {n}{_line_text(worst, gain) if spread > WITHIN_DB else ''}."
         )
     largest = float(np.max(np.abs(differences)))
     if not any(line.level.is_beyond for line in lines):
@@ -94,14 +96,14 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
     if largest <= WITHIN_DB:
         return f"Simulation and recording agree within {largest:.1f} dB at {n}."
     spread = float(np.max(np.abs(differences - gain)))
-    text = f"Simulation and recording differ by up to {largest:.1f} dB at {n}{_worst(worst, 0.0)}"
+    text = f"Simulation and recording differ by up to {largest:.1f} dB at {n}{_line_text(worst, 0.0)}"
     # A common gain beyond 3 dB is named on its own: it is the path's or the sensor's, not the gears'.
     if len(lines) > 1 and abs(gain) > 3.0 and spread < largest:
         text += f"; a common gain of {_decibels(-gain)} would bring them within {spread:.1f} dB"
     return f"{text}."
 
 
-def _worst(line: LineLevel, gain: float) -> str:
+def _line_text(line: LineLevel, gain: float) -> str:
     off = line.level.difference_db - gain
     return f", most at {line.label}, where the simulation is too {'weak' if off < 0 else 'strong'}"
 

@@ -162,7 +162,7 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     for mains_hz in mains:
         lines = lines.without_multiples(mains_hz, skirt=MAINS_TOLERANCE)
         comb = best_comb(lines, low, high, harmonics)
-    telling = None if comb is None else _telling_harmonic(channels, comb.fundamental, hertz)
+    telling = None if comb is None else _distinguishing_harmonic(channels, comb.fundamental, hertz)
     if comb is not None and telling is not None:
         nearer, harmonics = abs(comb.fundamental - hertz) / 2, harmonics[:telling]
         comb = best_comb(lines, hertz - nearer, hertz + nearer, harmonics)
@@ -176,7 +176,7 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     return _at(stated, fundamental_hz, resolution / (3 * len(harmonics)), min(0.95, 1 - comb.p_value))
 
 
-def _telling_harmonic(channels: list[LinesOverFloor], fundamental_hz: float, stated_hz: float) -> int | None:
+def _distinguishing_harmonic(channels: list[LinesOverFloor], fundamental_hz: float, stated_hz: float) -> int | None:
     """Return the lowest harmonic that tells two speeds apart if it is clearly at the stated one, else None.
 
     Higher harmonics of a speed that is off by a line or two may be a race's lines, with the shaft's sidebands about.

@@ -278,7 +278,7 @@ _SUB_BANDS = 4
 """Per mesh harmonic."""
 _MIN_SHARE = 0.1
 """What is left of an energy at least when the background's is taken off: a logarithm follows."""
-_N_OTHER_GATES = 6
+_N_FURTHER_GATES = 6
 
 
 @dataclass(frozen=True)
@@ -401,7 +401,7 @@ def _gated_levels(shaft: ShaftLines, event: ToothEvent, n_harmonics: int) -> tup
     inside = np.abs(angle) * z < GATE_PITCHES / 2
     gate = np.where(inside, np.cos(np.pi * angle * z / GATE_PITCHES) ** 2, 0.0)
     energy = _energy_spectrum(signal * gate)
-    elsewhere = [np.roll(gate, round((0.2 + 0.1 * i) * n)) for i in range(_N_OTHER_GATES)]
+    elsewhere = [np.roll(gate, round((0.2 + 0.1 * i) * n)) for i in range(_N_FURTHER_GATES)]
     background = np.median([_energy_spectrum(signal * g) for g in elsewhere], axis=0)
     edges = np.arange(_SUB_BANDS // 2, round((n_harmonics + 0.5) * _SUB_BANDS) + 1)
     positions = (edges[:-1] + 0.5) / _SUB_BANDS
@@ -469,7 +469,7 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
     size = np.sqrt(np.abs(x) * np.abs(r))
     cross = np.divide(x * np.conj(r), size, out=np.zeros_like(x), where=(size > 0) & used).sum(axis=0)
     is_marked = now.has_mark and healthy.has_mark
-    marks = partial(_is_possible, teeth=now.teeth, whole_teeth=whole_teeth, is_marked=is_marked)
+    marks = partial(_is_allowed_shift, teeth=now.teeth, whole_teeth=whole_teeth, is_marked=is_marked)
     shift = best_shift(cross, marks)
     pattern = np.where(telling_teeth_apart(orders, now.teeth), cross, 0.0)
     agreement = float(shift_scores(pattern, np.array([shift]))[0] / np.abs(pattern).sum()) if np.any(pattern) else 0.0
@@ -477,7 +477,7 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
     return replace(now, lines=x - _matched(turned, x, now.teeth), highest_order=highest), agreement
 
 
-def _is_possible(shifts_rev: FloatArray, teeth: int, *, whole_teeth: bool, is_marked: bool) -> NDArray[np.bool_]:
+def _is_allowed_shift(shifts_rev: FloatArray, teeth: int, *, whole_teeth: bool, is_marked: bool) -> NDArray[np.bool_]:
     """Return which shifts the marks allow."""
     moved = shifts_rev * teeth
     if is_marked:
@@ -561,7 +561,7 @@ def event_shape(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     largest = energy[middle - 3 * pitch // 4 : middle + 3 * pitch // 4].max()
     before, after = energy[middle - 3 * pitch : middle - pitch], energy[middle + pitch : middle + 3 * pitch]
     around = [float(np.log(part.mean() / largest)) for part in (before, after)]
-    return np.array([*around, *_durations(searched, event), slope])
+    return np.array([*around, *_log_durations(searched, event), slope])
 
 
 def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
@@ -592,7 +592,7 @@ def _relative_energy(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     return relative_energy
 
 
-def _durations(searched: ShaftLines, event: ToothEvent) -> tuple[float, float, float]:
+def _log_durations(searched: ShaftLines, event: ToothEvent) -> tuple[float, float, float]:
     """Return the logarithms of width, kurtosis and peak of the energy near the event."""
     z, highest = searched.teeth, min(n_bands(searched), _MAX_HARMONICS) + 0.5
     energy = band_signal(searched, 0.5, highest, event.centre_rev) ** 2
