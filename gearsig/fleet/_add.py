@@ -136,7 +136,7 @@ def add_recordings(
     from gearsig.recording import sha256_of
 
     setups = _setups(options)
-    known = _known(store, recordings, __version__)
+    known = _stored_identities(store, recordings, __version__)
     missing = [origin for origin in recordings if _identity(origin, setups(origin.path)) not in known]
     elsewhere: list[Origin] = []
     unseen: list[Origin] = []  # of known content under a new name or date of change
@@ -323,7 +323,7 @@ def _killed(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
     return _row(job, outcome=FAILED, reason=killed_text("analysed it"), key=""), [], job.origin
 
 
-def _known(store: Store, recordings: Sequence[Origin], version: str) -> set[tuple[Any, ...]]:
+def _stored_identities(store: Store, recordings: Sequence[Origin], version: str) -> set[tuple[Any, ...]]:
     """Return the identities of files that the store holds results of, as far as size and time of change tell."""
     names = {_printable(origin.path) for origin in recordings}
     sql = "SELECT source, n_bytes, mtime_ns, machine, point, date, setup FROM recordings WHERE version = ? " + (

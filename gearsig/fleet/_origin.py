@@ -348,8 +348,8 @@ def matching_origins(
         result.append(
             Origin(
                 path.absolute(),
-                _clean(of_machine[1]),
-                _clean(of_point[1]),
+                _printable_name(of_machine[1]),
+                _printable_name(of_point[1]),
                 moment,
                 of_machine[0],
                 of_point[0],
@@ -372,7 +372,7 @@ def passed_over_text(files: Sequence[PassedOver]) -> str:
     >>> passed_over_text([PassedOver(Path("/data/pump/DE_1.csv"), "does not match the pattern")])
     '1 recording is passed over: pump/DE_1.csv (does not match the pattern)'
     """
-    first = [f"{_clean(Path(*file.path.parts[-2:]).as_posix())} ({file.reason})" for file in files[:N_NAMED]]
+    first = [f"{_printable_name(Path(*file.path.parts[-2:]).as_posix())} ({file.reason})" for file in files[:N_NAMED]]
     n_more = len(files) - len(first)
     more = f"; and {n_more} more" if n_more else ""
     verb = "is" if len(files) == 1 else "are"
@@ -400,7 +400,7 @@ def _first(*choices: tuple[str, object]) -> tuple[str, object]:
     return next(((source, value) for source, value in choices if value), ("none", ""))
 
 
-def _clean(text: object) -> str:
+def _printable_name(text: object) -> str:
     """Return a name of one printable line, as tables and files show it."""
     line = "".join(c if c.isprintable() else " " for c in str(text).encode("utf-8", "replace").decode("utf-8"))
     return " ".join(line.split())[:LONGEST_NAME]

@@ -349,7 +349,7 @@ class Store:
         except Timeout:
             return False
         try:
-            self._remove_left_over()
+            self._remove_stale()
             self.read(lambda connection: self._merge(connection, everything=everything))
         finally:
             lock.release()
@@ -365,7 +365,7 @@ class Store:
             for name in segments
         }
         replaced = sorted({*replaced, *(key for (key,) in connection.execute("FROM replaced").fetchall())})
-        merged = segments if everything else _alike(sizes)
+        merged = segments if everything else _segments_to_merge(sizes)
         if not loose and len(merged) < 2 and not (everything and replaced):
             return
         files = [str(path) for path in loose]
@@ -407,7 +407,7 @@ class Store:
         for path in loose:
             path.unlink(missing_ok=True)
 
-    def _remove_left_over(self) -> None:
+    def _remove_stale(self) -> None:
         """Delete segments that do not count any more; they outlive one merge, for those who still read them."""
         counting, _ = self._manifest()
         for path in (self.folder / SEGMENTS).iterdir():
@@ -417,7 +417,7 @@ class Store:
             remove_parts(folder)
 
 
-def _alike(sizes: dict[str, int]) -> list[str]:
+def _segments_to_merge(sizes: dict[str, int]) -> list[str]:
     """Return the segments of the lowest tier that is full, with all that are smaller; nothing where none is full."""
     tiers = {name: int(log(max(size, 1), TIER)) for name, size in sizes.items()}
     full = [tier for tier in set(tiers.values()) if list(tiers.values()).count(tier) >= TIER]

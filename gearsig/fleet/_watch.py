@@ -60,7 +60,7 @@ class WatchEvent:
 
 
 @dataclass
-class _Seen:
+class _WatchedFile:
     """A file's size and time of change, and since when it has them (monotonic, s)."""
 
     signature: tuple[int, int]
@@ -111,7 +111,7 @@ def watch(
     not_negative(settle_s, "settle_s", "s")
     FilePattern(how.get("pattern", ""))  # one that is no pattern is refused at once
     roots = [Path(place) for place in places]
-    seen: dict[Path, _Seen] = {}
+    seen: dict[Path, _WatchedFile] = {}
     reported: set[Path] = set()
     problems: set[str] = set()
     n_failed = 0
@@ -166,7 +166,7 @@ def _options(how: dict[str, Any]) -> dict[str, Any]:
 
 def _ready(
     roots: list[Path],
-    seen: dict[Path, _Seen],
+    seen: dict[Path, _WatchedFile],
     settle_s: float,
     how: dict[str, Any],
     on_passed_over: Callable[[PassedOver], object],
@@ -181,9 +181,9 @@ def _ready(
         known = seen.get(origin.path)
         if known is None:
             age_s = max(0.0, min(wall_s - origin.mtime_ns / 1e9, settle_s))  # an old file need not be waited for
-            known = seen[origin.path] = _Seen(signature, now_s - age_s)
+            known = seen[origin.path] = _WatchedFile(signature, now_s - age_s)
         elif known.signature != signature:
-            known = seen[origin.path] = _Seen(signature, now_s)
+            known = seen[origin.path] = _WatchedFile(signature, now_s)
         if known.is_done:
             continue
         if now_s - known.since_s >= settle_s:

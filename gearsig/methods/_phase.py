@@ -45,7 +45,7 @@ def _lowest_hz(prepared: PreparedRecording, channel: str = "") -> tuple[float, s
     return float(f"{low:.3g}"), why
 
 
-def _suggested(prepared: PreparedRecording, channel: str) -> str:
+def _rhythm_text(prepared: PreparedRecording, channel: str) -> str:
     low, why = _lowest_hz(prepared, channel)
     return f"{low:.3g}, {why}"
 
@@ -57,7 +57,7 @@ def _lock(prepared: PreparedRecording, pair: str, shaft: str) -> phase.CycleLock
     return phase.find_lock(prepared.recording, pair=pair, shaft=shaft, rig=prepared.rig, angle=prepared.shaft_angle)
 
 
-def _unsteady(prepared: PreparedRecording) -> tuple[str, ...]:
+def _speed_messages(prepared: PreparedRecording) -> tuple[str, ...]:
     angle = angle_or_none(prepared)
     # a section is one of one motion only while the speed varies by less than 5 %
     if angle is None or angle.is_steady(0.05):
@@ -143,7 +143,7 @@ def _phase_plane(
                 "point; scatter is noise, modulation, or motion that does not repeat."
             ),
         ),
-        warnings=_unsteady(prepared) if section is not None else (),
+        warnings=_speed_messages(prepared) if section is not None else (),
     )
 
 
@@ -254,7 +254,7 @@ def _portrait(
     section, warnings = None, [*messages]
     try:
         section = phase.poincare_section(path, _lock(prepared, pair, shaft), phase_cycles=place)
-        warnings += _unsteady(prepared)
+        warnings += _speed_messages(prepared)
     except RefusalError as refusal:
         warnings.append(f"there is no Poincaré section: {refusal}")
     return MethodAnswer(
@@ -397,14 +397,14 @@ def _kind(
                 "“undecided” are then the right answers."
             ),
         ),
-        warnings=_unsteady(prepared),
+        warnings=_speed_messages(prepared),
     )
 
 
 LOW = MethodOption(
     "lowest_hz", "Lowest frequency (Hz)", "number", None,
     "Integration magnifies whatever is slow. Too low, noise turns into drift; too high, slow motion is bent.",
-    unit="Hz", minimum=0.0, known=_suggested,
+    unit="Hz", minimum=0.0, known=_rhythm_text,
 )  # fmt: skip
 HIGH = MethodOption(
     "highest_hz", "Highest frequency (Hz)", "number", None,

@@ -428,7 +428,7 @@ def _coherence(
                 f"Stationary noise exceeds **{mean.level:.3g}** in 1 line of {odds}."
             ),
         ),
-        notes=_words_about(peaks, cursors, spectrum.resolution),
+        notes=_cursor_texts(peaks, cursors, spectrum.resolution),
     )
 
 
@@ -445,7 +445,7 @@ def _above_noise(mean: spectra.EnhancedEnvelope, cursors: Sequence[Cursor]) -> d
     return peaks
 
 
-def _words_about(peaks: dict[Cursor, float], cursors: Sequence[Cursor], resolution: float) -> tuple[str, ...]:
+def _cursor_texts(peaks: dict[Cursor, float], cursors: Sequence[Cursor], resolution: float) -> tuple[str, ...]:
     if not peaks:
         return ("No line of a shaft or bearing stands above noise's level.",)
     # A bearing line whose peak lies on a multiple of a shaft's speed may be a mesh or its sidebands.

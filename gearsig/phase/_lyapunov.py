@@ -53,7 +53,7 @@ def rosenstein(points: FloatArray, theiler: int, n_steps: int, *, across: bool =
     block = _blocks(references, len(points))
     sums, counts = np.zeros((N_BLOCKS, n_steps)), np.zeros((N_BLOCKS, n_steps))
     mean_log_distance(points, references, near, block, across, sums, counts)
-    return _curve(sums, counts, _unrelated(points, theiler, last_axis=False), len(references))
+    return _curve(sums, counts, _unrelated_log_distance(points, theiler, last_axis=False), len(references))
 
 
 def kantz(points: FloatArray, theiler: int, n_steps: int) -> Divergence:
@@ -80,7 +80,7 @@ def kantz(points: FloatArray, theiler: int, n_steps: int) -> Divergence:
     block = _blocks(references[used], len(points))
     sums, counts = np.zeros((N_BLOCKS, n_steps)), np.zeros((N_BLOCKS, n_steps))
     log_mean_distance(points, references[used], starts, near[used][apart[used]], block, sums, counts)
-    return _curve(sums, counts, _unrelated(points, theiler, last_axis=True), int(np.count_nonzero(used)))
+    return _curve(sums, counts, _unrelated_log_distance(points, theiler, last_axis=True), int(np.count_nonzero(used)))
 
 
 def _library(points: FloatArray, n_steps: int) -> tuple[IndexArray, IndexArray]:
@@ -93,7 +93,7 @@ def _blocks(references: IndexArray, n: int) -> IndexArray:
     return np.minimum(references * N_BLOCKS // n, N_BLOCKS - 1)
 
 
-def _unrelated(points: FloatArray, theiler: int, *, last_axis: bool) -> float:
+def _unrelated_log_distance(points: FloatArray, theiler: int, *, last_axis: bool) -> float:
     """Mean logarithm of the distance of points far apart in time: pairs by the golden ratio, spread over all delays."""
     n = len(points)
     firsts = spaced(n, N_UNRELATED)

@@ -75,16 +75,16 @@ def nearest_apart(
     open_ = np.flatnonzero(index < 0)
     n_equal = 0
     if len(open_) and len(library) > _FIRST_LOOK:
-        distance[open_], index[open_], n_equal = _walked(
+        distance[open_], index[open_], n_equal = _nearest_by_walk(
             tree, library, points[references[open_]], references[open_], theiler, norm, equal_counts=equal_counts
         )
         open_ = np.flatnonzero(index < 0)
     if len(open_) > 0.5 * len(references):
-        raise _no_return(len(open_) / len(references), theiler, exact=n_equal > len(open_) // 2)
+        raise _no_neighbour_error(len(open_) / len(references), theiler, exact=n_equal > len(open_) // 2)
     return distance, index
 
 
-def _walked(
+def _nearest_by_walk(
     tree: Any,
     library: IndexArray,
     points: FloatArray,
@@ -141,7 +141,7 @@ def _flat(tree: Any) -> tuple[IndexArray, IndexArray]:
     return np.array(rows, dtype=np.intp), np.asarray(tree.indices, dtype=np.intp)
 
 
-def _no_return(share: float, theiler: int, *, exact: bool) -> RefusalError:
+def _no_neighbour_error(share: float, theiler: int, *, exact: bool) -> RefusalError:
     if exact:
         return RefusalError(
             "the path comes back to exactly the same points: it is periodic, or its resolution is too coarse",

@@ -313,7 +313,7 @@ def _rows(
     return figure, axes
 
 
-def _say(axes: Axes, row: int, text: str, below: str = "", colour: str = style.INK) -> None:
+def _write_beyond(axes: Axes, row: int, text: str, below: str = "", colour: str = style.INK) -> None:
     """Write right of a row, beyond the panel; a quiet line below."""
     place, up = axes.get_yaxis_transform(), 0.17 if below else 0.0
     style.put_text(axes, 1.02, row - up, text, colour=colour, n_max=24, fontweight="bold", va="center", transform=place)
@@ -358,7 +358,7 @@ def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Fig
         keys += key if not row else []
         against = ("further", style.QUIET) if row_evidence.is_further else ("against", style.FAULT)
         text, colour = ("for", style.MESH) if row_evidence.speaks_for else against
-        _say(axes, row, text, colour=colour)
+        _write_beyond(axes, row, text, colour=colour)
     keys += axes.plot([], [], color=style.FLOOR, alpha=0.35, linewidth=9, label="structural floor")
     axes.axvline(0.0, color=style.QUIET, linewidth=0.9, zorder=1)
     reach = float(np.max(np.abs([floors, observed, predicted])))
@@ -398,7 +398,7 @@ def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title:
     figure, axes = _rows(names, left_in=3.0, right_in=1.6, row_in=0.46, top_in=0.4)
     axes.axvspan(0.0, 1.0, facecolor=style.FLOOR, alpha=0.16, linewidth=0, zorder=0.5)
     axes.axvline(1.0, color=style.FLOOR, linewidth=0.9, zorder=1)
-    _draw_whole(axes, 0, steps[0].left, style.FAULT)
+    _draw_residual(axes, 0, steps[0].left, style.FAULT)
     for row, (last, step) in enumerate(pairwise(steps), start=1):
         before, after = last.left.value, step.left.value
         sign, colour = ("−", style.MESH) if after <= before else ("+", style.FAULT)  # a larger gap in faults' colour
@@ -407,9 +407,9 @@ def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title:
             ends = [y - 0.5 + BAR / 2, y + 0.5 - BAR / 2]
             axes.plot([x, x], ends, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1.5)
         share = abs(100.0 * (1.0 - after / before)) if before > 0 else 0.0
-        _say(axes, row, f"{sign}{abs(after - before):.2g}", f"{sign}{share:.0f} % of the gap", colour)
+        _write_beyond(axes, row, f"{sign}{abs(after - before):.2g}", f"{sign}{share:.0f} % of the gap", colour)
     if n > 1:
-        _draw_whole(axes, n, steps[-1].left, style.MEASURED)
+        _draw_residual(axes, n, steps[-1].left, style.MEASURED)
     axes.set_xlim(0.0, 1.06 * max(1.2, *(step.left.high for step in steps)))
     scored = f", on {held_out}" if held_out else ""
     style.label_axes(axes, f"gap (structural floors{scored}; 90 % intervals)", "", title)
@@ -417,9 +417,9 @@ def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title:
     return figure
 
 
-def _draw_whole(axes: Axes, row: int, residual: Interval, colour: str) -> None:
+def _draw_residual(axes: Axes, row: int, residual: Interval, colour: str) -> None:
     _draw_bar(axes, row, 0.0, residual, colour)
-    _say(axes, row, f"{residual.value:.2g}", f"{residual.low:.2g} to {residual.high:.2g}")
+    _write_beyond(axes, row, f"{residual.value:.2g}", f"{residual.low:.2g} to {residual.high:.2g}")
     axes.get_yticklabels()[row].set_fontweight("bold")
 
 

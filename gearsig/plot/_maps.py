@@ -60,7 +60,7 @@ def order_map_figure(
     _draw_levels(axes, x, y, decibels(values, order_map.scaling), order_map.unit)
     speed.set_ylim(float(y[0]), float(y[-1]))
     speed.plot(order_map.speed_rpm, order_map.time_s, color=style.MEASURED, linewidth=1.2)
-    _spare_the_right_end(speed)
+    _hide_last_tick_label(speed)
     limits = (float(x[0]), float(x[-1]))
     draw(axes, place(cursors, limits, style.size_in(axes)[0]), through=False)
     style.label_axes(axes, order_map.axis_label)
@@ -92,7 +92,7 @@ def draw_level_map(axes: Axes, at: FloatArray, positions: FloatArray, level: Flo
         style.number_decades(axes.yaxis)
 
 
-def _spare_the_right_end(axes: Axes) -> None:
+def _hide_last_tick_label(axes: Axes) -> None:
     """Leave out a number that would run into those of the panel on the right."""
     from matplotlib.ticker import MaxNLocator
 

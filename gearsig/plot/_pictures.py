@@ -186,7 +186,7 @@ def svg_panel(
     ends = [end for line in panel.lines for end in (float(line.x[0]), float(line.x[-1]))]
     limits = panel.x_limits or (min(ends), max(ends))
     shown = [_columns(line, limits) for line in panel.lines]
-    low, high = panel.limits or _about([y for _, y in shown], logarithmic=panel.logarithmic)
+    low, high = panel.limits or _padded_range([y for _, y in shown], logarithmic=panel.logarithmic)
     labels, n_rows = _placed(panel.cursors, limits, width)
     top, height = 8 + ROW * n_rows + (16 if len(panel.lines) > 1 else 0), height or 170
     frame = _Panel(LEFT, top, width - LEFT - RIGHT, height, limits, (low, high), panel.logarithmic)
@@ -449,7 +449,7 @@ def _columns(line: ChartLine, limits: tuple[float, float], n_columns: int = N_CO
     return x[at], y[at]
 
 
-def _about(curves: Sequence[FloatArray], *, logarithmic: bool) -> tuple[float, float]:
+def _padded_range(curves: Sequence[FloatArray], *, logarithmic: bool) -> tuple[float, float]:
     values = np.concatenate([curve[np.isfinite(curve)] for curve in curves] or [np.zeros(1)])
     if logarithmic and (values > 0).any():
         high = float(values.max())

@@ -103,7 +103,7 @@ def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
     return Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, facecolor="white")
 
 
-def _dress(axes: Axes) -> None:
+def _apply_common_look(axes: Axes) -> None:
     """Give axes the common look: quiet ticks and rules, no box."""
     axes.set_facecolor("none")
     axes.spines[["top", "right"]].set_visible(False)
@@ -169,7 +169,7 @@ def panels(
     for row in range(n_rows):
         for column in range(n_columns):
             axes = figure.add_subplot(grid[row, column], sharex=result[column] if share_x and row else None)
-            _dress(axes)
+            _apply_common_look(axes)
             if share_x:
                 axes.tick_params(labelbottom=row == n_rows - 1)
             result.append(axes)

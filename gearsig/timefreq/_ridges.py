@@ -33,7 +33,7 @@ def ridge_power(power: FloatArray, *, squeezed: bool) -> FloatArray:
     return np.maximum(summed, 0.0)  # the running sum may round below zero
 
 
-def _surroundings(power: FloatArray, n_reach: int) -> FloatArray:
+def _local_median_power(power: FloatArray, n_reach: int) -> FloatArray:
     """Return the median power of the lines around each cell, in means over a few columns."""
     from scipy.ndimage import median_filter
 
@@ -60,7 +60,7 @@ def ridge_scores(power: FloatArray, n_reach: int) -> FloatArray:
     largest = float(power.max())
     if largest <= 0:
         return np.zeros_like(power)
-    floor = np.maximum(_FLOOR_OVER_MEDIAN * _surroundings(power, n_reach), _FLOOR_UNDER_TOP * largest)
+    floor = np.maximum(_FLOOR_OVER_MEDIAN * _local_median_power(power, n_reach), _FLOOR_UNDER_TOP * largest)
     top = power >= maximum_filter1d(power, 2 * n_reach + 1, axis=0, mode="constant")
     height = np.where(top, power / (power + floor), 0.0)
     result = np.zeros_like(height)
@@ -76,7 +76,7 @@ _N_FIT = 24
 _MIN_FIT = 4
 _OF_MEETING = 8
 """A slope is read over so large a share of the meeting that it must tell about."""
-_SEEN_FROM = (3.0, 2.2, 1.6, 1.2, 1.0)
+_MEETING_GAPS = (3.0, 2.2, 1.6, 1.2, 1.0)
 """Gaps at which a meeting is looked at; from afar, the paths there are known better."""
 _VALLEY = 0.8
 """Share of the power beside it below which nothing crosses; where two cross, it is above 0.95, in any phase."""
@@ -142,11 +142,11 @@ def untangled(
 def _settled_from_afar(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
     """Return the meetings, each in the widest of several gaps that leaves columns to compare on both sides."""
     settled: list[Meeting] = []
-    for share in _SEEN_FROM:
+    for share in _MEETING_GAPS:
         for meeting in meetings(a, b, share * gap):
             room = min(meeting.start, len(a) - meeting.stop)
             known = any(m.start <= meeting.start and meeting.stop <= m.stop for m in settled)
-            if not known and room >= (_N_FIT if share > _SEEN_FROM[-1] else _MIN_FIT):
+            if not known and room >= (_N_FIT if share > _MEETING_GAPS[-1] else _MIN_FIT):
                 settled.append(meeting)
     return settled
 
