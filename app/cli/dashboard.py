@@ -40,9 +40,9 @@ def dashboard(
     # main.py lists the pages. Streamlit would take a folder called "pages" for a list of its own until main.py has run
     # once, and show that instead to who opens a page by its address first.
     PagesManager.uses_pages_directory = False
-    _without_advertisement()
+    _hide_streamlit_offers()
     with TemporaryDirectory(prefix="gearsig-") as folder:
-        _say_where_the_server_is(Path(folder))
+        _tell_page_its_server(Path(folder))
         compiled.begin()
         _run(port, browser=browser)
 
@@ -68,7 +68,7 @@ def _run(port: int, *, browser: bool) -> NoReturn:
     sys.exit(streamlit_cli.main())
 
 
-def _without_advertisement() -> None:
+def _hide_streamlit_offers() -> None:
     """Keep Streamlit from offering its own add-ons over the page; older versions have no such module."""
     from importlib import import_module
     from importlib.util import find_spec
@@ -79,7 +79,7 @@ def _without_advertisement() -> None:
         skills.are_skills_installed = lambda *_, **__: True
 
 
-def _say_where_the_server_is(folder: Path) -> None:
+def _tell_page_its_server(folder: Path) -> None:
     """Let the first page name the server, in a copy of it in that folder.
 
     On an address with a path, /analysis, Streamlit's script looks for its server below that path first, and the browser

@@ -120,7 +120,7 @@ def gap(
         report = _diagnosed(request, model, cache, fresh=fresh)
         ran = workers.text() if workers else ""
     written = write_results(report, output, command=typed_command())
-    _tell(report, written)
+    _print_summary(report, written)
     if ran:
         typer.echo(f"It ran {ran}.")
 
@@ -147,7 +147,7 @@ def _diagnosed(request: GapRequest, model: str, cache: Path | None, *, fresh: bo
         )
 
 
-def _tell(report: GapReport, written: tuple[Path, ...]) -> None:
+def _print_summary(report: GapReport, written: tuple[Path, ...]) -> None:
     from gearsig.report import gap_text
 
     typer.echo(gap_text(report))

@@ -71,7 +71,7 @@ def _root(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; an error of the user's input is one line on standard error and exit code 2."""
-    _stop_tidily()
+    _end_on_sigterm()
     try:
         sys.exit(app(args=list(arguments) if arguments is not None else None, standalone_mode=False))
     except USAGE_ERROR as error:  # a wrong option or argument: left alone, Typer draws a frame of several lines
@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(0)
 
 
-def _stop_tidily() -> None:
+def _end_on_sigterm() -> None:
     """Let SIGTERM end a command as Ctrl-C does: what it began is tidied up."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -67,7 +67,7 @@ def quantity(text: str, unit: str, name: str) -> float:
     (500.0, True)
     """
     value, stated = split_quantity(text, unit, name)
-    return value if not stated else value * _worth(stated, unit, text, name)
+    return value if not stated else value * _scale_of_unit(stated, unit, text, name)
 
 
 def span(text: str, unit: str, name: str) -> tuple[float, float]:
@@ -91,9 +91,9 @@ def split_quantity(text: str, unit: str, name: str) -> tuple[float, str]:
     return float(match[1]), match[2]
 
 
-def _worth(stated: str, unit: str, text: str, name: str) -> float:
+def _scale_of_unit(stated: str, unit: str, text: str, name: str) -> float:
     """How many of `unit` the given unit is worth."""
-    stated_unit, target_unit = _spelt(stated), _spelt(unit)
+    stated_unit, target_unit = _normalised_unit(stated), _normalised_unit(unit)
     if stated_unit == target_unit:
         return 1.0
     fitting = [kind for kind in _KINDS if target_unit in kind]
@@ -107,7 +107,7 @@ def _worth(stated: str, unit: str, text: str, name: str) -> float:
     raise InputError(f"{name} is {text!r}, in {stated!r}", remedy=f"give it in {unit}{also}")
 
 
-def _spelt(unit: str) -> str:
+def _normalised_unit(unit: str) -> str:
     """One spelling for all: no blanks, dots or carets, u for µ, deg for °, sqrt for √."""
     for sign, plain in (("µ", "u"), ("μ", "u"), ("°", "deg"), ("√", "sqrt"), ("²", "2"), ("³", "3")):
         unit = unit.replace(sign, plain)
@@ -133,7 +133,7 @@ def read_profile(text: str, name: str, unit: str, duration_s: float) -> Profile:
     if text.strip().lower().endswith(".csv"):
         path = Path(text.strip())
         profile = read_profile_file(path, name)
-        for held in _held(profile, duration_s):
+        for held in _span_messages(profile, duration_s):
             typer.echo(f"Note: {path.name}: {held}", err=True)
         return profile
     if ".." in text:
@@ -141,7 +141,7 @@ def read_profile(text: str, name: str, unit: str, duration_s: float) -> Profile:
     return Profile.constant(quantity(text, unit, name))
 
 
-def _held(profile: Profile, duration_s: float) -> list[str]:
+def _span_messages(profile: Profile, duration_s: float) -> list[str]:
     """Return what is said of a profile that does not span the recording."""
     first_s, last_s = float(profile.times_s[0]), float(profile.times_s[-1])
     begins = f"begins at {first_s:g} s; its first value is held from 0 s"

@@ -118,7 +118,7 @@ def make_report(
                     methods=methods,
                 )
         except KeyboardInterrupt:
-            typer.echo(f"gearsig: stopped after {so_far} files; {_kept(output, before)}", err=True)
+            typer.echo(f"gearsig: stopped after {so_far} files; {_present_text(output, before)}", err=True)
             raise typer.Exit(EXIT_INTERRUPTED) from None
         ran = workers.text() if workers else ""
     for entry in result.entries:
@@ -132,7 +132,7 @@ def make_report(
     return EXIT_SOME_FAILED if result.entries else EXIT_INPUT_ERROR
 
 
-def _kept(output: Path, was_there: bool) -> str:
+def _present_text(output: Path, was_there: bool) -> str:
     """Say what an interrupted report left; a new folder without pages is taken away."""
     pages = [page for page in output.glob("*.html") if page.name != "index.html"] if output.is_dir() else []
     if pages:

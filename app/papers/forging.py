@@ -67,7 +67,7 @@ def _relative(estimate: ForceEstimate, model: str, reference: str = FROM_TORQUE)
     return 100.0 * estimate.error(model, reference).relative_rms
 
 
-def _why_not_as_printed(estimate: ForceEstimate) -> str:
+def _reason_not_as_printed(estimate: ForceEstimate) -> str:
     """Say what the printed inertia term adds, and how much of the formula's error that is."""
     motion, contact = estimate.motion, estimate.motion.contact
     r1, r2 = motion.path.base_radii_m
@@ -103,7 +103,7 @@ def _force(mode: str, answers: str) -> PaperFigure:
             f"{printed:.0f} % rms",
             agrees=printed < 5.0,
             partly=printed < hunt,
-            because=_why_not_as_printed(estimate),
+            because=_reason_not_as_printed(estimate),
         ),
     ]
     time = estimate.motion.time_s

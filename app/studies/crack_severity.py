@@ -180,11 +180,11 @@ def observe(
     now, healthy = lines(case.recording), lines(case.reference)
     compared, alone, good = seen(now, healthy), seen(now, None), seen(healthy, None)
     gear = ("driver", "driven").index(drawn.gear)
-    looks = {(CRACKED, WITH_REFERENCE): _looks(compared[gear]), (CRACKED, ALONE): _looks(alone[gear])}
+    looks = {(CRACKED, WITH_REFERENCE): _kind_features(compared[gear]), (CRACKED, ALONE): _kind_features(alone[gear])}
     if other_fault is not None:
         kind, damaged = other_fault[0], lines(other_fault[1])
-        looks[kind, WITH_REFERENCE] = _looks(seen(damaged, healthy)[gear])
-        looks[kind, ALONE] = _looks(seen(damaged, None)[gear])
+        looks[kind, WITH_REFERENCE] = _kind_features(seen(damaged, healthy)[gear])
+        looks[kind, ALONE] = _kind_features(seen(damaged, None)[gear])
     return CaseFeatures(
         drawn=drawn,
         gear=gear,
@@ -199,7 +199,7 @@ def observe(
     )
 
 
-def _looks(evidence: GearEvidence) -> tuple[FloatArray, FloatArray]:
+def _kind_features(evidence: GearEvidence) -> tuple[FloatArray, FloatArray]:
     return evidence.features, evidence.shape
 
 

@@ -288,7 +288,7 @@ def simulate_rig(
     ready = _prepared(model, drawn, operation, draws)
     machine = with_effects(_with_path(ready.machine, drawn), [*settings, *further], draws)
     machine = _with_fixed_flanks(machine, [drawn.seed, 77 + flanks])
-    rng, lead_rev = _beginning(drawn, run)
+    rng, lead_rev = _random_start(drawn, run)
     lead_s = lead_rev * 60.0 / drawn.speed_rpm
     asked: dict[str, Any] = {
         "rng": rng,
@@ -316,10 +316,10 @@ def _prepared(model: str, drawn: DrawnRig, operation: Operation, rng: np.random.
 
 def turns_before(drawn: DrawnRig, run: int) -> int:
     """Return the whole turns of the driver that a run's recording leaves out at its beginning."""
-    return _beginning(drawn, run)[1] if run else 0
+    return _random_start(drawn, run)[1] if run else 0
 
 
-def _beginning(drawn: DrawnRig, run: int) -> tuple[np.random.Generator, int]:
+def _random_start(drawn: DrawnRig, run: int) -> tuple[np.random.Generator, int]:
     """Return a run's generator and the first it draws: whole turns before the recording."""
     rng = np.random.default_rng([drawn.seed, run])
     return rng, int(rng.integers(0, MAX_LEAD_REV))

@@ -106,7 +106,7 @@ def another_day(drawn: DrawnRig, rng: np.random.Generator) -> OperatingDay:
         return OperatingDay(replace(drawn, parameters=parameters), speed, torque, (1.0, 1.0), wander)
     first, second = np.exp(GAIN_SCATTER * rng.standard_normal(2))
     # Where the whole housing moves, it matters little how a sensor sits.
-    modes = tuple(_mounted_anew(mode, rng) if mode.frequency_hz > MOUNTS_HZ[1] else mode for mode in drawn.modes)
+    modes = tuple(_remounted(mode, rng) if mode.frequency_hz > MOUNTS_HZ[1] else mode for mode in drawn.modes)
     return OperatingDay(
         replace(drawn, parameters=parameters, modes=modes), speed, torque, (float(first), float(second)), wander
     )
@@ -120,7 +120,7 @@ def _wander(drawn: DrawnRig, rng: np.random.Generator) -> EffectSetting:
     return EffectSetting("speed_fluctuation", percent * today, {"frequency_hz": frequency_hz})
 
 
-def _mounted_anew(mode: DrawnHousingMode, rng: np.random.Generator) -> DrawnHousingMode:
+def _remounted(mode: DrawnHousingMode, rng: np.random.Generator) -> DrawnHousingMode:
     return replace(
         mode,
         frequency_hz=mode.frequency_hz * float(np.exp(MODE_SCATTER * rng.standard_normal())),
@@ -187,7 +187,7 @@ class Ordinary:
         return cls(
             seed,
             tuple(
-                float(_through(row, path, reference.sampling_rate_hz).std())
+                float(_filtered(row, path, reference.sampling_rate_hz).std())
                 for row, path in zip(reference.samples, paths, strict=True)
             ),
             tuple(paths),
@@ -218,7 +218,7 @@ class Ordinary:
         samples = recording.samples.copy()
         for k, i in enumerate(vibrations(recording)):
             machine_rng, scale = np.random.default_rng([self.seed, 12, i]), self.scales[i]
-            values = _through(samples[i], self.paths[i], recording.sampling_rate_hz)
+            values = _filtered(samples[i], self.paths[i], recording.sampling_rate_hz)
             for signature in signatures:
                 values = signature.on(values, scene, machine_rng, scale)
             if changed_paths:
@@ -282,7 +282,7 @@ def _paths(seed: int, scene: textbook.SyntheticScene, n_channels: int) -> list[t
     return [(0 if flat else steep, mesh_hz * corner * log_uniform(rng, 0.6, 1.6)) for _ in range(n_channels)]
 
 
-def _through(values: FloatArray, path: tuple[int, float], rate_hz: float) -> FloatArray:
+def _filtered(values: FloatArray, path: tuple[int, float], rate_hz: float) -> FloatArray:
     from scipy.signal import butter, sosfilt
 
     steep, corner_hz = path
