@@ -308,13 +308,13 @@ def predict(
 
 
 @njit(cache=True)
-def look(seen: np.ndarray, q: np.ndarray, p: np.ndarray, u: np.ndarray, v: np.ndarray) -> None:
+def look(outputs: np.ndarray, q: np.ndarray, p: np.ndarray, u: np.ndarray, v: np.ndarray) -> None:
     """Displacements and velocities that the forces depend on."""
-    for r in range(seen.shape[0]):
+    for r in range(outputs.shape[0]):
         a, b = 0.0, 0.0
         for m in range(q.shape[0]):
-            a += seen[r, m] * q[m]
-            b += seen[r, m] * p[m]
+            a += outputs[r, m] * q[m]
+            b += outputs[r, m] * p[m]
         u[r], v[r] = a, b
 
 
@@ -326,7 +326,7 @@ def add_mesh(
     pairs: np.ndarray,
     number: np.ndarray,
     shapes: np.ndarray,
-    seen: np.ndarray,
+    outputs: np.ndarray,
 ) -> None:
     """Add mesh force and friction to the modal forces: friction pushes off the line of action, with its levers."""
     side, torque_1, torque_2 = 0.0, 0.0, 0.0
@@ -337,7 +337,7 @@ def add_mesh(
         torque_2 -= rub * (number[RHO_SUM] - pairs[i, RHO])
     off_x, off_y = side * number[LINE_Y], -side * number[LINE_X]
     for m in range(f.shape[0]):
-        f[m] += shapes[1, m] * torque_1 + shapes[2, m] * torque_2 - seen[0, m] * force
+        f[m] += shapes[1, m] * torque_1 + shapes[2, m] * torque_2 - outputs[0, m] * force
         f[m] += off_x * (shapes[6, m] - shapes[4, m]) + off_y * (shapes[7, m] - shapes[5, m])
 
 
@@ -346,7 +346,7 @@ def keep(
     row: np.ndarray, held: np.ndarray, force: float, modal: Modal, q: np.ndarray, p: np.ndarray, f: np.ndarray
 ) -> None:
     """Fill one row of the output."""
-    _, shapes, seen, omega, zeta = modal
+    _, shapes, outputs, omega, zeta = modal
     row[0], row[1], row[2], row[3] = held[0], held[1], held[2], held[3]
     row[4:10] = 0.0
     row[10] = force
@@ -354,9 +354,9 @@ def keep(
         rate = f[m] - 2.0 * zeta[m] * omega[m] * p[m] - omega[m] ** 2 * q[m]
         for i in range(3):
             row[4 + i] += shapes[8 + i, m] * rate
-        row[7] += seen[1, m] * q[m]
-        row[8] += seen[2, m] * q[m]
-        row[9] += seen[0, m] * q[m]
+        row[7] += outputs[1, m] * q[m]
+        row[8] += outputs[2, m] * q[m]
+        row[9] += outputs[0, m] * q[m]
 
 
 @njit(cache=True)
@@ -367,24 +367,24 @@ def march(
 ) -> np.ndarray:  # fmt: skip
     """March from modal state `q`, `p`; every `stride` steps a row of `N_OUT` values, after `n_before` rows unkept.
 
-    `modal`: step coefficients, shapes, seen, ω, ζ. `supports`: steady forces, bearing stiffness, clearance, unbalance.
+    `modal`: step coefficients, shapes, outputs, ω, ζ. `supports`: steady forces, bearings, clearance, unbalance.
     `lines`: run-out, wobble, torque, sway, rows of shaft, order, amplitude, phase (and direction). `speed`: reference
     speed of the motor and its rate of change.
     """
-    steps, shapes, seen, _, _ = modal
+    steps, shapes, outputs, _, _ = modal
     steady, bearing_k, clearance, unbalance = supports
     runout, wobble, torque, sway = lines
-    n, n_seen = shapes.shape[0], seen.shape[0]
+    n, n_outputs = shapes.shape[0], outputs.shape[0]
     out = np.empty((n_out, N_OUT))
     f, f_new, q_new, p_new, push = np.zeros(n), np.zeros(n), q.copy(), p.copy(), np.zeros(n)
-    u, v, held, pairs = np.zeros(n_seen), np.zeros(n_seen), np.zeros(4), np.zeros((MAX_PAIRS, 5))
+    u, v, held, pairs = np.zeros(n_outputs), np.zeros(n_outputs), np.zeros(4), np.zeros((MAX_PAIRS, 5))
     pointers = np.zeros(all_trains[0].shape[0], dtype=np.int64)
-    gamma, gamma_v = (seen[0] ** 2 * steps[5]).sum(), (seen[0] ** 2 * steps[7]).sum()
+    gamma, gamma_v = (outputs[0] ** 2 * steps[5]).sum(), (outputs[0] ** 2 * steps[7]).sum()
     force, behind = 0.0, 0.0
     for step in range((n_before + n_out) * stride + 1):
         if step > 0:
             predict(steps, q, p, f, q_new, p_new)
-        look(seen, q_new, p_new, u, v)
+        look(outputs, q_new, p_new, u, v)
         # Turned to the tooth it meets with, the driven shaft is turned as a whole, from the gear to the brake.
         u[2] += number[PHASE_2]
         u[8] += number[PHASE_2]
@@ -406,11 +406,11 @@ def march(
                 a += shapes[d, m] * push[d]
             f_new[m] = a
             if step > 0:
-                x_free += seen[0, m] * steps[5, m] * (a - f[m])
-                v_free += seen[0, m] * steps[7, m] * (a - f[m])
+                x_free += outputs[0, m] * steps[5, m] * (a - f[m])
+                v_free += outputs[0, m] * steps[7, m] * (a - f[m])
         first = 1.0 if step > 0 else 0.0
         force = mesh_force(force, first * gamma, first * gamma_v, x_free - shift, v_free, h, n_pairs, pairs, number)
-        add_mesh(f_new, force, n_pairs, pairs, number, shapes, seen)
+        add_mesh(f_new, force, n_pairs, pairs, number, shapes, outputs)
         for m in range(n):
             if step > 0:
                 q_new[m] += steps[5, m] * (f_new[m] - f[m])

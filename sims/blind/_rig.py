@@ -23,8 +23,8 @@ from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft, T
 Matrix = NDArray[np.float64]
 MOTOR, GEAR_1, GEAR_2, LOAD, X1, Y1, X2, Y2, XC, YC, ROCK = range(11)
 N_DOF = 11
-N_SEEN = 9
-"""Rows of `Modes.seen`: line-of-action compression, θ1, θ2, bearing 1 x y, bearing 2 x y, motor and load angle."""
+N_OUTPUTS = 9
+"""Rows of `ModalForm.outputs`: line-of-action compression, θ1, θ2, bearing 1 x y, bearing 2 x y, motor and load angle."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class ModalForm:
     omega: Matrix
     zeta: Matrix
     shapes: Matrix
-    seen: Matrix
+    outputs: Matrix
     mass: Matrix
     stiffness: Matrix
 
@@ -69,9 +69,9 @@ def mass_matrix(parts: Parts) -> Matrix:
     return np.diag([*parts.inertia_kgm2, m1, m1, m2, m2, *casing])
 
 
-def seen_rows(parts: Parts) -> Matrix:
-    """Rows that turn displacements into what the forces depend on, (N_SEEN, N_DOF)."""
-    rows = np.zeros((N_SEEN, N_DOF))
+def output_rows(parts: Parts) -> Matrix:
+    """Rows that turn displacements into what the forces depend on, (N_OUTPUTS, N_DOF)."""
+    rows = np.zeros((N_OUTPUTS, N_DOF))
     n_x, n_y = np.cos(parts.line_angle), np.sin(parts.line_angle)
     rows[0, [GEAR_1, GEAR_2]] = parts.base_radii_m[0], -parts.base_radii_m[1]
     rows[0, [X1, Y1, X2, Y2]] = n_x, n_y, -n_x, -n_y
@@ -84,7 +84,7 @@ def seen_rows(parts: Parts) -> Matrix:
 
 def stiffness_matrix(parts: Parts) -> Matrix:
     """Springs of shafts, bearings and foundation, (N_DOF, N_DOF); no mesh."""
-    seen = seen_rows(parts)
+    outputs = output_rows(parts)
     k = np.zeros((N_DOF, N_DOF))
     for (a, b), value in zip(((MOTOR, GEAR_1), (GEAR_2, LOAD)), parts.shaft_nm_per_rad, strict=True):
         twist = np.zeros(N_DOF)
@@ -92,7 +92,7 @@ def stiffness_matrix(parts: Parts) -> Matrix:
         k += value * np.outer(twist, twist)
     for i in range(2):
         for j in range(2):
-            row = seen[3 + 2 * i + j]
+            row = outputs[3 + 2 * i + j]
             k += parts.bearing_n_per_m[i][j] * np.outer(row, row)
     k[XC, XC] += parts.foundation_n_per_m[0]
     k[YC, YC] += parts.foundation_n_per_m[1]
@@ -107,7 +107,7 @@ def modes_of(parts: Parts) -> ModalForm:
     omega = np.sqrt(np.maximum(squares, 0.0))
     zeta = np.array(parts.damping_ratios, dtype=float)
     omega[:2] = zeta[:2] = 0.0
-    return ModalForm(omega, zeta, np.ascontiguousarray(shapes), seen_rows(parts) @ shapes, m, k)
+    return ModalForm(omega, zeta, np.ascontiguousarray(shapes), output_rows(parts) @ shapes, m, k)
 
 
 def step_coefficients(modes: ModalForm, step_s: float) -> Matrix:
@@ -131,7 +131,7 @@ def step_coefficients(modes: ModalForm, step_s: float) -> Matrix:
 
 def static_shape(modes: ModalForm, mesh_n_per_m: float, forces: Matrix) -> Matrix:
     """Displacements under constant forces that balance over the mesh, (N_DOF,); gear 1 is kept from turning."""
-    mesh = np.linalg.lstsq(modes.shapes.T, modes.seen[0], rcond=None)[0]
+    mesh = np.linalg.lstsq(modes.shapes.T, modes.outputs[0], rcond=None)[0]
     k = modes.stiffness + mesh_n_per_m * np.outer(mesh, mesh)
     k[GEAR_1, GEAR_1] += 1e-3 * mesh_n_per_m * mesh[GEAR_1] ** 2
     return np.asarray(np.linalg.solve(k, forces))

@@ -254,7 +254,7 @@ def march_arguments(scene: Scene, sub_steps: int, **numbers: float) -> tuple[Any
         sub_steps // 2,
         step_s,
         number,
-        (step_coefficients(modes, step_s), modes.shapes, modes.seen, modes.omega, modes.zeta),
+        (step_coefficients(modes, step_s), modes.shapes, modes.outputs, modes.omega, modes.zeta),
         q,
         p,
         (steady, np.array(rig.parts.bearing_n_per_m), np.array(scene.clearance_m), np.array(scene.unbalance)),

@@ -309,7 +309,7 @@ def _compliances(
     for gear, sign, roll, side in zip(gears, SIGNS, rolls, (0, 1), strict=True):
         block = _between(gear, [0], compliance)
         if mesh.overlap_ratio:
-            block_direct = _over_both(gear.grid.roll_rad, block, roll, roll)
+            block_direct = _compliance_between(gear.grid.roll_rad, block, roll, roll)
             itself = np.einsum("hshs->hs", block)  # a slice is at one height, whatever the others'
             block_direct[:, range(block_direct.shape[1]), range(block_direct.shape[1])] = over_height(
                 gear.grid.roll_rad, itself, roll
@@ -320,7 +320,7 @@ def _compliances(
         for o in range(min(n_offsets, gear.n_offsets - 1)):
             older = rolls_rad(mesh.pair, slices_progress + o + 1.0)[side]
             block = _between(gear, [0, -sign * (o + 1)], compliance)
-            cross[o] += _over_both(gear.grid.roll_rad, block, roll, older)
+            cross[o] += _compliance_between(gear.grid.roll_rad, block, roll, older)
     return direct, cross
 
 
@@ -338,7 +338,7 @@ def _along_diagonal(roll: FloatArray, block: FloatArray, at: FloatArray) -> Floa
     return over_height(roll, block[heights, :, heights, :], at)
 
 
-def _over_both(roll: FloatArray, block: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
+def _compliance_between(roll: FloatArray, block: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
     """Compliance between slices at two heights each, (n, n_slices, n_slices)."""
     from scipy.interpolate import RectBivariateSpline
 

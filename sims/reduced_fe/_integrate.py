@@ -94,7 +94,7 @@ def on_input(inputs, side, number, w):
 
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
-def seen_in(factors, line, w):
+def signal_of_modes(factors, line, w):
     """Signal `line` of modal coordinates w of both sides."""
     total = 0.0
     for side in range(2):
@@ -396,11 +396,11 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
                 if kinds[line] >= 3:
                     output[n_out, line] = extras[kinds[line] - 3]
                 elif kinds[line] == 2:
-                    output[n_out, line] = set_factors[line] * rate1 + seen_in(factors, line, q1)
+                    output[n_out, line] = set_factors[line] * rate1 + signal_of_modes(factors, line, q1)
                 elif kinds[line] == 1:
-                    output[n_out, line] = set_factors[line] * w1 + seen_in(factors, line, v)
+                    output[n_out, line] = set_factors[line] * w1 + signal_of_modes(factors, line, v)
                 else:
-                    output[n_out, line] = set_factors[line] * angle + seen_in(factors, line, q)
+                    output[n_out, line] = set_factors[line] * angle + signal_of_modes(factors, line, q)
             if energies.shape[0] > 0:
                 energies[n_out] = _energy(k, q, v, modal, inputs, angle, load, r, n * n_s, force, back, hertz)
             n_out += 1

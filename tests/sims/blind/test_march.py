@@ -16,9 +16,9 @@ from sims.blind import (
     march_arguments,
     mass_matrix,
     modes_of,
+    output_rows,
     run,
     scene_of,
-    seen_rows,
     step_coefficients,
     stiffness_matrix,
 )
@@ -112,7 +112,7 @@ def energy_swing(sub_steps: int) -> float:
     steady, bearing_k, clearance, unbalance = args[SUPPORTS]
     args[SUPPORTS] = (zero(steady), bearing_k, zero(clearance), zero(unbalance))
     args[LINES] = tuple(np.zeros((0, rows.shape[1])) for rows in args[LINES])
-    _, _, seen, omega, _ = args[MODAL]
+    _, _, outputs, omega, _ = args[MODAL]
     h, k, backlash = base.soft_m, base.mesh_stiffness_n_per_m(), scene.backlash_m
 
     def stored(x: float) -> float:
@@ -120,7 +120,7 @@ def energy_swing(sub_steps: int) -> float:
         return float(k * (0.5 * (x * np.hypot(x, h) + h * h * np.arcsinh(x / h)) - h * x))
 
     def energy() -> float:
-        x = float(seen[0] @ args[Q])
+        x = float(outputs[0] @ args[Q])
         moving = 0.5 * (args[P] ** 2).sum() + 0.5 * (omega**2 * args[Q] ** 2).sum()
         return float(moving) + stored(x) + stored(-x - backlash)
 
@@ -155,10 +155,10 @@ def test_forces_balance() -> None:
     np.testing.assert_allclose(on_2, force * along + weight * base.parts.rotor_mass_kg[1], atol=0.04 * force)
 
 
-def test_seen_rows_match_a_rigid_turn() -> None:
+def test_output_rows_match_a_rigid_turn() -> None:
     """Gears that roll together compress nothing; a casing that moves with its rotors loads no bearing."""
     parts = rig().parts
-    rows = seen_rows(parts)
+    rows = output_rows(parts)
     turn = np.zeros(11)
     turn[[1, 2]] = parts.base_radii_m[1], parts.base_radii_m[0]
     assert abs(rows[0] @ turn) < 1e-15
