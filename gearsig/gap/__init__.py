@@ -21,9 +21,9 @@ from gearsig.gap._change import (
     beyond_the_mesh,
     change_features,
     change_once,
+    contrast_rows,
     difference_features,
     mirrored,
-    seen_rows,
     segment_changes,
 )
 from gearsig.gap._conditions import (
@@ -318,6 +318,7 @@ __all__ = [
     "compare",
     "compare_waveform",
     "conditions_of",
+    "contrast_rows",
     "counted_against",
     "credibility_of",
     "determined_options",
@@ -385,7 +386,6 @@ __all__ = [
     "run_length_s",
     "same_condition",
     "score_of",
-    "seen_rows",
     "segment_changes",
     "severity_unit",
     "shaft_signs",

@@ -437,7 +437,7 @@ _OF_ALL = (
 )
 
 
-def seen_rows(names: Sequence[str], distances: FloatArray) -> FloatArray:
+def contrast_rows(names: Sequence[str], distances: FloatArray) -> FloatArray:
     """Return part of the rows that a forest is fitted to.
 
     Simulators and machines agree on which lines an effect moves and in which direction, not on how far: beside the

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gearsig.cache import read_arrays, write_whole
 from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
-from gearsig.gap._change import beyond_the_mesh, counted_from_the_mesh, seen_rows
+from gearsig.gap._change import beyond_the_mesh, contrast_rows, counted_from_the_mesh
 from gearsig.gap._features import Features
 from gearsig.gap._floors import REPEATABLE, StructuralFloor
 from gearsig.gap._simulator import GapEffect
@@ -389,12 +389,12 @@ def input_rows(
     names = [floor.names[i] for i in kept]
     distances = floor.from_centre(floor.names, changes)[:, kept]
     scatters = np.hypot(floor.of(names) / REPEATABLE, scatter[:, kept])
-    held = seen_rows(names, beyond_the_mesh(names, distances) / scatters)
+    held = contrast_rows(names, beyond_the_mesh(names, distances) / scatters)
     further = np.ones(held.shape[1], dtype=bool)
     further[: 2 * len(names)] = np.tile(counted_from_the_mesh(names) != 0.0, 2)  # the others are as they were
     return np.column_stack(
         [
-            seen_rows(names, distances / scatters),
+            contrast_rows(names, distances / scatters),
             held[:, further],
             np.log10(np.maximum(loads_n_per_mm, MIN_LOAD_N_PER_MM)),
         ]

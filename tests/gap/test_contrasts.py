@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearsig.gap import load_learned, mirrored, seen_rows
+from gearsig.gap import contrast_rows, load_learned, mirrored
 
 NAMES = load_learned().change_names
 FEATURES = load_learned().feature_names
@@ -25,11 +25,11 @@ def test_shares_do_not_depend_on_the_size_of_the_whole_change_much(names: tuple[
     rows = np.zeros((2, n))
     rows[:, names.index("sideband.driver.1")] = 10.0, 40.0
     rows[:, names.index("shaft.driver.1")] = -5.0, -20.0
-    seen = seen_rows(names, rows)
+    seen = contrast_rows(names, rows)
     shares = seen[:, n : 2 * n]
     assert np.abs(shares).max() == 1.0
     assert shares[0] == pytest.approx(shares[1], abs=0.1)
 
 
 def test_what_did_not_change_is_zero() -> None:
-    assert not seen_rows(NAMES, np.zeros((1, len(NAMES)))).any()
+    assert not contrast_rows(NAMES, np.zeros((1, len(NAMES)))).any()
