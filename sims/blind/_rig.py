@@ -24,7 +24,7 @@ Matrix = NDArray[np.float64]
 MOTOR, GEAR_1, GEAR_2, LOAD, X1, Y1, X2, Y2, XC, YC, ROCK = range(11)
 N_DOF = 11
 N_OUTPUTS = 9
-"""Rows of `ModalForm.outputs`: line-of-action compression, θ1, θ2, bearing 1 x y, bearing 2 x y, motor and load angle."""
+"""Rows of `ModalForm.outputs`: line-of-action compression, θ1, θ2, bearing 1 x y, bearing 2 x y, motor, load."""
 
 
 @dataclass(frozen=True)
