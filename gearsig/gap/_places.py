@@ -201,7 +201,7 @@ class LineLevels:
 
 
 @dataclass(frozen=True)
-class _Peak:
+class _StrongestRise:
     words: str
     rise_db: float
     orders: tuple[float, ...]
@@ -256,10 +256,10 @@ def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_d
     levels = _residual_levels(comparison)
     rise = float((levels.now - levels.baseline)[row, min(peak, len(levels.taken) - 1)])
     words = _order_words(comparison, order)
-    return replace(_line(comparison, _Peak(words, rise, (order,), row), 1.0), kind=PlaceKind.LINE)
+    return replace(_line(comparison, _StrongestRise(words, rise, (order,), row), 1.0), kind=PlaceKind.LINE)
 
 
-def _line(comparison: ComparedPair, line: _Peak, sign: float) -> LocatedChange:
+def _line(comparison: ComparedPair, line: _StrongestRise, sign: float) -> LocatedChange:
     change = sign * line.rise_db
     title = f"line {line.words} ({hertz(line.orders[0] * comparison.now.speed_hz)}), {by_decibels(change)}"
     return LocatedChange(title, change, line.orders, channel=list(comparison.now.channels)[line.row])
@@ -300,7 +300,7 @@ def _widened(levels: FloatArray) -> FloatArray:
     return widened
 
 
-def _family_or_line(family: _Peak, line: _Peak) -> _Peak:
+def _family_or_line(family: _StrongestRise, line: _StrongestRise) -> _StrongestRise:
     """Return the family if it is heard beside the strongest line, or that line is one of its multiples."""
     harmonic = family.orders[0] / line.orders[0] if family.orders else 0.0
     if family.rise_db < MIN_OF_A_FAMILY_DB or (harmonic > 1.5 and abs(harmonic / round(harmonic) - 1.0) < MISSED):
@@ -310,9 +310,9 @@ def _family_or_line(family: _Peak, line: _Peak) -> _Peak:
     return family if is_multiple or family.rise_db > MIN_SHARE_OF_A_FAMILY * line.rise_db else line
 
 
-def _best_race(comparison: ComparedPair, levels: LineLevels) -> _Peak:
+def _best_race(comparison: ComparedPair, levels: LineLevels) -> _StrongestRise:
     """Return the bearing's family whose lines rose most."""
-    races = [_Peak("", 0.0, (), 0)]
+    races = [_StrongestRise("", 0.0, (), 0)]
     now, baseline = _widened(levels.now), levels.baseline
     for bearing in comparison.now.frame.bearings:
         for kind, (attribute, factor) in RACES.items():
@@ -320,7 +320,7 @@ def _best_race(comparison: ComparedPair, levels: LineLevels) -> _Peak:
             if np.isfinite(order):
                 rise, row, slipped = _family_rise(now - baseline, order, levels)
                 words = f"of the {RACE_WORDS[kind]} of {_bearing(bearing.name)} (order {slipped:.3g})"
-                races.append(_Peak(words, rise, _multiples(slipped, N_FAMILY), row))
+                races.append(_StrongestRise(words, rise, _multiples(slipped, N_FAMILY), row))
     return max(races, key=lambda family: family.rise_db)
 
 
@@ -347,7 +347,7 @@ def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[fl
     return float(max(second[row, best], 0.0)), int(row), float(slips[best])
 
 
-def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_Peak]:
+def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_StrongestRise]:
     """Return the shafts' families, where the features say that they changed."""
     families, rise = [], _widened(levels.now) - levels.baseline
     for side, order in enumerate(comparison.now.frame.shaft_orders):
@@ -355,7 +355,9 @@ def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_Peak]:
         means = rise[:, lines[lines < rise.shape[1]]].mean(axis=1)
         felt = abs(comparison.size[f"envelope.{SIDES[side]}_shaft"]) > 1.0
         words = f"at multiples of {shaft_words(comparison.now.frame, side)}"
-        families.append(_Peak(words, float(means.max()) if felt else 0.0, _multiples(order, 3), int(np.argmax(means))))
+        families.append(
+            _StrongestRise(words, float(means.max()) if felt else 0.0, _multiples(order, 3), int(np.argmax(means)))
+        )
     return families
 
 
@@ -363,7 +365,7 @@ def _multiples(order: float, n: int) -> tuple[float, ...]:
     return tuple(float(k * order) for k in range(1, n + 1))
 
 
-def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: bool) -> _Peak:
+def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: bool) -> _StrongestRise:
     """Return the line that rose most of those at no multiple of a shaft's order."""
     rise = np.where(levels.taken, -np.inf, levels.now - levels.baseline)
     row, line = (int(i) for i in np.unravel_index(int(np.argmax(rise)), rise.shape))
@@ -371,7 +373,7 @@ def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: boo
     if fundamental:
         line = _fundamental(levels.now[row], line)
     order = line * levels.step
-    return _Peak(_order_words(comparison, order), change, (order,), row)
+    return _StrongestRise(_order_words(comparison, order), change, (order,), row)
 
 
 def _order_words(comparison: ComparedPair, order: float) -> str:
