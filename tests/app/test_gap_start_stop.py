@@ -98,9 +98,9 @@ def test_what_is_left_is_told_on_cycles_that_the_severity_was_not_fitted_to(wide
     assert (before.label, after.label) == ("before", "more backlash")
     assert after.left.value < 0.3 * before.left.value
     # Where the half that is fitted to shows twice as much, twice as much is taken off the other half.
-    seen = wider.seen[0]
-    double = replace(seen, folds=tuple(replace(fold, fitted_to=2.0 * fold.fitted_to) for fold in seen.folds))
-    same, too_much = drive_report(replace(wider, seen=(double,))).steps
+    evidence = wider.evidence[0]
+    double = replace(evidence, folds=tuple(replace(fold, fitted_to=2.0 * fold.fitted_to) for fold in evidence.folds))
+    same, too_much = drive_report(replace(wider, evidence=(double,))).steps
     assert same == before
     assert too_much.left.value == pytest.approx(before.left.value, rel=0.3)
 
