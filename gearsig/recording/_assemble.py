@@ -9,8 +9,9 @@ import numpy as np
 
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 from gearsig.recording._limits import check_memory
-from gearsig.recording._table import NumberArray, RawTable, rate_of_time, seconds_per_unit
+from gearsig.recording._table import RawColumn, RawTable, rate_of_time, seconds_per_unit
 from gearsig.recording._types import RPM_UNITS, Channel, Provenance, Recording, quantity_of
 from gearsig.rig import ConstantSpeed, Rig, SpeedChannel, SpeedSource
 
@@ -70,7 +71,7 @@ def _checked(table: RawTable, source: str) -> RawTable:
     doubled = [name for name, n in counts.items() if n > 1]
     if doubled:
         raise InputError(
-            f"column name(s) {', '.join(map(repr, doubled))} occur more than once",
+            f"column names occur more than once: {', '.join(map(repr, doubled))}",
             where=source,
             allowed="names that differ",
             remedy="rename the columns",
@@ -96,8 +97,9 @@ def _checked(table: RawTable, source: str) -> RawTable:
     columns = table.columns if table.time is None else (table.time, *table.columns)
     for column in columns:
         if column.values.dtype.kind not in "fiub" or column.values.ndim != 1:
+            dimensions = counted(column.values.ndim, "dimension")
             raise InputError(
-                f"channel {column.name!r} holds {column.values.dtype} values of {column.values.ndim} dimension(s)",
+                f"channel {column.name!r} holds {column.values.dtype} values of {dimensions}",
                 where=source,
                 allowed="real numbers over time",
                 remedy="export the time signal",
@@ -138,6 +140,14 @@ def _sampling_rate(
         file_hz = timed_hz
     else:
         positive(file_hz, f"{source}: sampling rate in the file", "Hz", remedy="correct it there")
+    if file_hz is None and len(table.columns) == 1 and _looks_like_times(table.columns[0]):
+        raise InputError(
+            f"the only column, {table.columns[0].name!r}, rises from each value to the next, as times of pulses do and "
+            "no vibration",
+            where=source,
+            allowed="a signal over time",
+            remedy=f"{PULSE_TIMES}; if it is a signal, name its unit in a header, as angle [rad], and give --fs",
+        )
     if explicit_hz is not None:
         chosen_hz = positive(explicit_hz, f"{source}: sampling rate given", "Hz", remedy="give --fs above zero")
         if file_hz is not None and differ(chosen_hz, file_hz):
@@ -152,8 +162,6 @@ def _sampling_rate(
         )
     if file_hz is None and rig_hz is None:
         remedy = "give --fs or sampling_rate_hz in the rig file"
-        if len(table.columns) == 1 and _looks_like_times(table.columns[0].values):
-            remedy = f"the only column increases all along: {PULSE_TIMES}; if it is a signal, {remedy}"
         raise InputError("states no sampling rate", where=source, allowed="above 0 Hz", remedy=remedy)
     if file_hz is not None and rig_hz is not None and differ(file_hz, rig_hz):
         text = f"the rig states a sampling rate of {rig_hz:g} Hz, the file {file_hz:.9g} Hz: the file's was taken"
@@ -161,9 +169,14 @@ def _sampling_rate(
     return file_hz or rig_hz or 0.0, ()
 
 
-def _looks_like_times(values: NumberArray) -> bool:
-    """Whether numbers increase from each to the next, from zero or later on, as times of pulses do and no vibration."""
-    return len(values) > 2 and bool(values[0] >= 0) and bool(np.all(np.diff(values.astype(np.float64)) > 0))
+def _looks_like_times(column: RawColumn) -> bool:
+    """Whether numbers of no known quantity increase from each to the next, from zero or later on.
+
+    As times of pulses do and no vibration: of n noise values one order in n! increases, of ten one in 3.6 million.
+    """
+    values = column.values.astype(np.float64)
+    unknown = (column.quantity or quantity_of(column.name, column.unit)) == "unknown"
+    return unknown and len(values) >= 10 and bool(values[0] >= 0) and bool(np.all(np.diff(values) > 0))
 
 
 def _stack(table: RawTable, source: str) -> FloatArray:
@@ -180,7 +193,7 @@ def _stack(table: RawTable, source: str) -> FloatArray:
         if len(bad):
             place = table.row_place(int(bad[0]))
             raise InputError(
-                f"channel {column.name!r} holds {len(bad)} NaN or infinite value(s), the first at {place}",
+                f"channel {column.name!r} holds {counted(len(bad), 'NaN or infinite value')}, the first at {place}",
                 where=source,
                 allowed="finite numbers",
                 remedy="cut out the gap or interpolate it before the analysis, knowingly",

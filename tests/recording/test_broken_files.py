@@ -242,7 +242,7 @@ def test_text_beside_numbers_is_not_unpacked(tmp_path):
     from pyarrow import parquet
 
     texts = pa.DictionaryArray.from_arrays(pa.array(np.zeros(40_000, np.int32)), pa.array(["x" * 50_000]))
-    parquet.write_table(pa.table({"a": np.arange(40_000.0), "text": texts}), tmp_path / "x.parquet")
+    parquet.write_table(pa.table({"a": -np.arange(40_000.0), "text": texts}), tmp_path / "x.parquet")
     most = pa.default_memory_pool().max_memory()
     assert read_recording(tmp_path / "x.parquet", sampling_rate_hz=1.0).channel_names == ("a",)
     assert pa.default_memory_pool().max_memory() < most + 50e6  # the texts are 2 GB

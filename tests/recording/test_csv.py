@@ -175,7 +175,7 @@ def test_jitter_below_one_percent_is_fine(tmp_path):
         (["a,b", "1,2", "3,4", "5,6,7"], "line 4 has 3 of 2 columns"),
         (["a,b", "1,2", "3,4", "5,nan"], "'b' holds 1 NaN.*line 4"),
         (["a,b", "1,2", "3,4", "inf,6"], "'a' holds 1 NaN.*line 4"),
-        (["a,a", "1,2", "3,4"], "'a' occur more than once"),
+        (["a,a", "1,2", "3,4"], "occur more than once: 'a'"),
         (["a,b"], "no line of numbers"),
         (["<html><body>1,2"], "HTML"),
         (["time", "1", "2", "3"], "only column"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.recording import read_pulse_times
+from gearsig.recording import read_pulse_times, read_recording
 
 
 def test_seconds_and_milliseconds(tmp_path):
@@ -40,3 +40,12 @@ def test_pulses_per_revolution(tmp_path):
     (tmp_path / "p.csv").write_text("1\n2\n")
     with pytest.raises(InputError, match="pulses_per_revolution is 0"):
         read_pulse_times(tmp_path / "p.csv", 0)
+
+
+def test_a_signal_that_rises_all_along_is_known_by_its_unit(tmp_path):
+    times_s = np.cumsum(np.random.default_rng(1).uniform(0.03, 0.05, 200))
+    np.savetxt(tmp_path / "p.csv", times_s)
+    with pytest.raises(InputError, match=r"times of pulses .*--tach-times"):
+        read_recording(tmp_path / "p.csv", sampling_rate_hz=1000.0)
+    np.savetxt(tmp_path / "angle.csv", times_s, header="angle [rad]", comments="")
+    assert read_recording(tmp_path / "angle.csv", sampling_rate_hz=1000.0).n_samples == 200

@@ -96,14 +96,15 @@ def test_a_reference_whose_columns_are_conditions(runs):
         analyze(whole, reference=other)
 
 
-def test_pulse_times_that_are_analysed_as_a_recording(tmp_path, capsys):
+@pytest.mark.parametrize("rate", [(), ("--fs", "25600")])
+def test_pulse_times_that_are_analysed_as_a_recording(tmp_path, capsys, rate):
     times = tmp_path / "pulses.csv"
     times.write_text("\n".join(f"{t:.6f}" for t in np.cumsum(np.linspace(0.1, 0.02, 300)) + 2.3))
     with pytest.raises(SystemExit) as stopped:
-        main(["analyze", str(times)])
+        main(["analyze", str(times), *rate])
     assert stopped.value.code == 2
     err = capsys.readouterr().err
-    assert "pulses.csv: states no sampling rate" in err
+    assert "pulses.csv: the only column, 'ch1', rises" in err
     assert "--tach-times FILE" in err
     assert "--fs" in err
 
