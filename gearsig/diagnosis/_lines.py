@@ -245,33 +245,53 @@ def detect_lines(signals: AnalysisSignals, trains: Sequence[float] = ()) -> list
 
 def _mains(signals: AnalysisSignals) -> Finding | None:
     """Look for lines at the mains frequency and its first multiples that no shaft explains."""
+    found = mains_lines(signals)
+    if found is None:
+        return None
+    name, mains, line = found
+    return Finding(
+        "mains-hum",
+        Kind.NOTICE,
+        f"Lines of the {mains:.0f} Hz mains stand in channel {name}.",
+        Where((name,), frequency_hz=mains),
+        line.strength("noise floor of the spectrum"),
+        confidence=0.8,
+        confidence_basis="two of the first three multiples within 0.1 Hz",
+        surer="Switch the machine off and record again: hum stays.",
+    )
+
+
+def mains_lines(
+    signals: AnalysisSignals, scale: float = 1.0, slower: Sequence[float] = (1.0,)
+) -> tuple[str, float, PlacedLine] | None:
+    """Return the channel, the frequency and the first line of the mains, None where they do not stand out.
+
+    Parameters
+    ----------
+    signals : AnalysisSignals
+    scale : float
+        True sampling rate over the stated one: the lines are sought at 1/scale of their frequency.
+    slower : sequence of float
+        Stated speed over speeds that the shafts may turn at: what is a multiple of one of them is no mains line.
+    """
     for name, spectrum in signals.spectra.items():
-        if spectrum.resolution > 0.5:
+        if spectrum.resolution * scale > 0.5:
             continue  # a mains line is then not told from a shaft's
-        excess = lines_over_noise_floor(spectrum, 4.0 * max(MAINS_HZ))
+        excess = lines_over_noise_floor(spectrum, 4.0 * max(MAINS_HZ) / scale)
         for mains in MAINS_HZ:
-            lines = [line_at(excess, k * mains, 0.1) for k in (1, 2, 3)]
-            near = [line for k, line in enumerate(lines, 1) if line and abs(line.position - k * mains) <= 0.1]
+            places = [k * mains / scale for k in (1, 2, 3)]
+            lines = [line_at(excess, place, 0.1 / scale) for place in places]
+            near = [x for x, place in zip(lines, places, strict=True) if x and abs(x.position - place) <= 0.1 / scale]
             clear = [line for line in near if line.ratio_db > UNEXPLAINED_DB]
-            if len(clear) >= 2 and not _is_synchronous(signals, mains):
-                floor = "noise floor of the spectrum"
-                return Finding(
-                    "mains-hum",
-                    Kind.NOTICE,
-                    f"Lines of the {mains:.0f} Hz mains stand in channel {name}.",
-                    Where((name,), frequency_hz=mains),
-                    lines[0].strength(floor) if lines[0] is not None else None,
-                    confidence=0.8,
-                    confidence_basis="two of the first three multiples within 0.1 Hz",
-                    surer="Switch the machine off and record again: hum stays.",
-                )
+            if len(clear) >= 2 and not any(_is_synchronous(signals, places[0], times) for times in slower):
+                return name, mains, lines[0] or clear[0]
     return None
 
 
-def _is_synchronous(signals: AnalysisSignals, hertz: float) -> bool:
+def _is_synchronous(signals: AnalysisSignals, hertz: float, slower: float = 1.0) -> bool:
     if signals.angle is None:
         return False
-    order = hertz / signals.frequency_per_order_hz
+    order = slower * hertz / signals.frequency_per_order_hz
     # Also a half and a third of each: wheels that are not described often turn at those.
     candidates = [o / part for o in signals.known_shaft_orders.values() for part in (1, 2, 3)]
     return any(abs(order / o - round(order / o)) * o < 0.01 for o in candidates)
@@ -279,7 +299,7 @@ def _is_synchronous(signals: AnalysisSignals, hertz: float) -> bool:
 
 def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding | None:
     """Return the strongest order line that is no multiple of a known shaft's order, and no bearing's."""
-    best: tuple[float, str, int] | None = None
+    best: tuple[float, str, int, LinesOverFloor] | None = None
     foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
     for name, excess in signals.order_excess.items():
         for order in signals.known_shaft_orders.values():
@@ -299,12 +319,15 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
         height = np.where(clear & ~excess.masked & (spectrum.positions > 0.2), spectrum.values, 0.0)
         i = int(np.argmax(height))
         if height[i] > 0 and (best is None or height[i] > best[0]):
-            best = (float(height[i]), name, i)
+            best = (float(height[i]), name, i, excess)
     if best is None:
         return None
-    line = PlacedLine.at(signals.order_excess[best[1]], best[2])
-    where, excess = signals.where(line.position, best[1]), signals.order_excess[best[1]]
+    _, channel, i, excess = best
+    line, where = PlacedLine.at(excess, i), signals.where(float(excess.spectrum.positions[i]), channel)
+    hunting = _hunting_multiple(signals, line.position, 1.5 * excess.spectrum.resolution)
     origin = combination(signals, line.position, excess.spectrum, trains)
+    if not origin and hunting is not None and _is_among_multiples(excess, line.position, hunting[0]):
+        origin = hunting[1]
     title = (
         "The strongest line of no single shaft or mesh" if origin else "The strongest line of no known shaft or mesh"
     )
@@ -313,10 +336,11 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
         "unexplained-line",
         Kind.NOTICE,
         f"{title}: {origin}." if origin else f"{title}.",
-        replace(where, order_shaft=signals.order_excess[best[1]].spectrum.shaft),
+        replace(where, order_shaft=excess.spectrum.shaft),
         line.strength("noise floor"),
         0.95,
         _UNKNOWN_CAUSE,
+        evidence=() if origin or hunting is None else (f"It is near {hunting[1]}, as chance may have it.",),
         surer="A run-up: a line of fixed frequency is a resonance or electrical, one of fixed order a shaft's.",
     )
 
@@ -329,7 +353,6 @@ def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trai
     """Say which combination of known orders a line is; empty where it is none, or so many would be that one fits.
 
     Impacts of order q that a mesh modulates, or is modulated by, stand at h·mesh ± k·q, and a shaft's order beside.
-    Multiples of the hunting-tooth order belong to both gears together: each pair of teeth has its own meeting.
 
     Parameters
     ----------
@@ -361,13 +384,43 @@ def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trai
         text = min(inside, key=lambda one: abs(inside[one] - order), default="")
         if text and abs(inside[text] - order) <= near:
             return text
+    return ""
+
+
+def _hunting_multiple(signals: AnalysisSignals, order: float, near: float) -> tuple[float, str] | None:
+    """Return the hunting-tooth order of which a multiple is near an order, and that multiple in words.
+
+    It belongs to both gears together: each pair of teeth has its own meeting.
+    """
     for pair in signals.rig.pairs:
         hunting = hunting_tooth_order(signals.rig, pair)
-        if hunting is not None and 2 * near <= BY_CHANCE * hunting:
-            n = round(order / hunting)
-            if abs(order - n * hunting) <= near:
-                return f"{n}× the hunting-tooth order of {pair.name}, of both its gears together"
-    return ""
+        if hunting is not None and abs(order - (n := round(order / hunting)) * hunting) <= near:
+            return hunting, f"{n}× the hunting-tooth order of {pair.name}, of both its gears together"
+    return None
+
+
+def _is_among_multiples(excess: LinesOverFloor, order: float, fundamental: float) -> bool:
+    """Whether a line is a multiple of an order by more than chance: its neighbours among the multiples stand out, too.
+
+    Multiples of a low order are dense, and one is near any line. Ten of them to either side must stand higher over the
+    floor in sum than the same comb does anywhere between, as chance does once in twenty times or less.
+
+    Parameters
+    ----------
+    excess : LinesOverFloor
+        What is explained already is masked.
+    order : float
+        Of the line.
+    fundamental : float
+    """
+    resolution, n = excess.spectrum.resolution, round(order / fundamental)
+    if 3 * resolution > BY_CHANCE * fundamental:
+        return False
+    beside = fundamental * np.array([k for k in range(max(1, n - 10), n + 11) if k != n])
+    offsets = np.arange(round(fundamental / resolution)) * resolution
+    sums = np.array([excess.scores()[excess.lines_at(beside + offset)].sum() for offset in offsets])
+    is_between = np.minimum(offsets, fundamental - offsets) > 4 * resolution
+    return bool(sums[~is_between].max() > sums[is_between].max())
 
 
 N_COMBINED = 3

@@ -1,4 +1,7 @@
-"""A sampling rate that is wrong: everything then lies a factor beside the place where speed and geometry put it."""
+"""A wrong sampling rate or stated speed: everything lies a factor beside the place where speed and geometry put it.
+
+Orders are the same with either, so that both are said. A clock decides: the mains, whose frequency is known.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,11 @@ from numpy.typing import NDArray
 
 from gearsig.angle import ShaftAngle, comb_elsewhere
 from gearsig.checks import FloatArray
-from gearsig.diagnosis._lines import speed_is_confirmed
+from gearsig.diagnosis._lines import mains_lines, speed_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
 from gearsig.diagnosis._types import CannotTell, Finding, Kind
 from gearsig.prepared import STATED_SPEED_TOLERANCE, LinesOverFloor
-from gearsig.recording import Recording
-from gearsig.rig import ConstantSpeed, EncoderChannel, Rig, TachometerChannel
+from gearsig.rig import ConstantSpeed, EncoderChannel, TachometerChannel
 
 SAMPLING_RATE = "sampling-rate-doubtful"
 """Code of the finding; it opens the verdict."""
@@ -74,7 +76,7 @@ NAMED_AS_WELL = 0.35
 def detect_sampling_rate(
     signals: AnalysisSignals, angle: ShaftAngle | CannotTell, envelopes: Sequence[BandEnvelope]
 ) -> Finding | None:
-    """Say that the sampling rate is probably wrong, and by which factor, None where nothing speaks for it.
+    """Say that sampling rate or speed is probably wrong, and by which factor, None where nothing speaks for it.
 
     With gears, their comb of mesh lines and sidebands is sought at other multiples of the stated speed. Without, the
     strongest lines are explained by shafts and races at each of the usual factors; a tachometer or encoder is compared
@@ -83,7 +85,7 @@ def detect_sampling_rate(
     recording, rig = signals.recording, signals.rig
     source = recording.speed_source
     if isinstance(source, TachometerChannel | EncoderChannel) and isinstance(angle, ShaftAngle):
-        return _beside_nominal(recording, rig, angle)
+        return _beside_nominal(signals, angle)
     if rig.pairs:
         return _by_gears(signals, angle)
     if isinstance(source, ConstantSpeed) and signals.angle is not None:
@@ -91,21 +93,63 @@ def detect_sampling_rate(
     return None
 
 
-def _finding(recording: Recording, factor: float, evidence: str, surer: str, others: Sequence[float] = ()) -> Finding:
-    """Return the finding that the true rate is `factor` times the stated one, or one of the others."""
-    stated_hz = recording.sampling_rate_hz
-    times = f"{factor:.4g} times" if factor > 1 else f"1/{1 / factor:.4g} of"
-    as_well = f"; {' or '.join(f'{other * stated_hz:.6g} Hz' for other in others)} nearly as well" if others else ""
+def _finding(
+    signals: AnalysisSignals,
+    factor: float,
+    stated_rpm: float,
+    evidence: str,
+    also: Sequence[str] = (),
+    others: Sequence[float] = (),
+) -> Finding:
+    """Return the finding that the true rate is `factor` times the stated one, or the stated speed that times the true.
+
+    Parameters
+    ----------
+    signals : AnalysisSignals
+    factor : float
+    stated_rpm : float
+        Speed that was stated for the machine.
+    evidence : str
+    also : sequence of str
+        What else may be wrong and do the same.
+    others : sequence of float
+        Further factors that explain nearly as much.
+    """
+    stated_hz = signals.recording.sampling_rate_hz
+    factors = (factor, *others)
+    hertz, rpm = [f"{x * stated_hz:.6g} Hz" for x in factors], [f"{stated_rpm / x:.5g} rpm" for x in factors]
+    rate = f"{hertz[0]}, {_times(factor)} the stated {stated_hz:.6g} Hz"
+    speed = f"{rpm[0]}, {_times(1 / factor)} the stated {stated_rpm:.5g} rpm"
+    # The mains show which of the two is right; where a shaft turns at their frequency as well, they show nothing.
+    scales = (1.0, factor)
+    right, wrong = (mains_lines(signals, scale, scales) if signals.angle else None for scale in scales)
+    if wrong and not right:
+        what, fits, nearly = "sampling rate", rate, hertz[1:]
+        clock = f"Lines of the mains stand at {wrong[1]:.0f} Hz and multiples with {hertz[0]} only."
+        surer = "Check the sampling rate."
+    elif right and not wrong:
+        what, fits, nearly = " or ".join(["stated speed", *also]), speed, rpm[1:]
+        clock = f"Lines of the mains stand at {right[1]:.0f} Hz and multiples: the sampling rate is right."
+        surer = f"Check the {what}."
+    else:
+        what, fits = ", ".join(["sampling rate", *also]) + " or stated speed", f"{rate}, or {speed}"
+        nearly = [f"{a} or {b}" for a, b in zip(hertz[1:], rpm[1:], strict=True)]
+        clock = "Orders are the same with either, and no lines of the mains tell which."
+        surer = f"Check the stated speed first, which is quickly measured, then the {' and '.join(['rate', *also])}."
     return Finding(
         SAMPLING_RATE,
         Kind.DATA_PROBLEM,
-        f"The sampling rate is probably wrong: {factor * stated_hz:.6g} Hz, {times} the stated {stated_hz:.6g} Hz, "
-        f"would fit best{as_well}.",
+        f"The {what} is probably wrong: {fits}, would fit best{'; ' if nearly else ''}"
+        f"{', or '.join(nearly)}{' nearly as well' if nearly else ''}.",
         confidence=0.9,
-        confidence_basis="what the factor explains that the stated rate does not",
-        evidence=(evidence,),
+        confidence_basis="what the factor explains that the stated figures do not",
+        evidence=(evidence, clock),
         surer=surer,
     )
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.4g} times" if factor > 1 else f"1/{1 / factor:.4g} of"
 
 
 def _usual(factor: float, tolerance: float) -> float | None:
@@ -114,8 +158,9 @@ def _usual(factor: float, tolerance: float) -> float | None:
     return min(near, key=lambda f: abs(factor / f - 1), default=None)
 
 
-def _beside_nominal(recording: Recording, rig: Rig, angle: ShaftAngle) -> Finding | None:
+def _beside_nominal(signals: AnalysisSignals, angle: ShaftAngle) -> Finding | None:
     """Compare a speed measured by the recording's own clock with the nominal one."""
+    rig = signals.rig
     nominal_rpm = rig.nominal_speed_rpm(angle.shaft if angle.shaft in rig.shaft_names else "")
     if not nominal_rpm:
         return None
@@ -124,8 +169,8 @@ def _beside_nominal(recording: Recording, rig: Rig, angle: ShaftAngle) -> Findin
     if factor is None:
         return None
     evidence = f"The shaft turns at {angle.mean_speed_rpm:.5g} rpm by this clock, {ratio:.3g} times the nominal speed."
-    other = "or the pulses per revolution" if isinstance(recording.speed_source, TachometerChannel) else "or the speed"
-    return _finding(recording, factor, evidence, f"Check the sampling rate, {other}: orders are right with either.")
+    pulses = ("pulses per revolution",) if isinstance(signals.recording.speed_source, TachometerChannel) else ()
+    return _finding(signals, factor, nominal_rpm, evidence, pulses)
 
 
 def _by_gears(signals: AnalysisSignals, angle: ShaftAngle | CannotTell) -> Finding | None:
@@ -133,14 +178,15 @@ def _by_gears(signals: AnalysisSignals, angle: ShaftAngle | CannotTell) -> Findi
     if isinstance(angle, ShaftAngle):
         if not isinstance(recording.speed_source, ConstantSpeed) or speed_is_confirmed(signals):
             return None
+        stated_rpm: float | None = 60.0 * signals.frequency_per_order_hz
         elsewhere = signals.comb_elsewhere
     else:
         stated_rpm = rig.nominal_speed_rpm()
         elsewhere = comb_elsewhere(recording, rig, stated_rpm) if stated_rpm else None
     factor = None if elsewhere is None else _usual(1 / elsewhere.factor, STATED_SPEED_TOLERANCE)
-    if elsewhere is None or factor is None:
+    if stated_rpm is None or elsewhere is None or factor is None:
         return None
-    return _finding(recording, factor, elsewhere.text, "Check the sampling rate first, then speed and teeth.")
+    return _finding(signals, factor, stated_rpm, elsewhere.text, ("number of teeth",))
 
 
 # --------------------
@@ -303,6 +349,15 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         at = at if at is not None else parts if factor == 1.0 else races
         return _log_p(strong_to(highest), factor, shafts, at, tolerance)
 
+    def of_one_part(factor: float) -> float:
+        """Return the least of one race at a factor; without races, of a part of any order: what is near fractions."""
+        if not races:
+            return _of_a_stranger(strong_to(ranges[factor]), shafts, factor)
+        return min(evidence(factor, ranges[factor], at=[race]) for race in races)
+
+    def has_stranger(highest: float, enough: float) -> bool:
+        return _of_a_stranger(strong_to(highest), shafts) <= enough
+
     def has_plain_lines() -> bool:
         """Whether shafts, or one race beside them, explain the strongest lines at the stated rate."""
         strong = strong_to(HIGHEST_ORDER)
@@ -330,11 +385,18 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     best = min(sums.values())
     if best > ENOUGH_EVIDENCE:
         return None
-    # The smallest factor that explains nearly as much as the best: its multiples do so, too, with more places. Of a
-    # rate that is too low one damaged race tells more than all, whose places cover much of the range.
-    factor = min(f for f in factors if sums[f] <= AS_GOOD * best)
+    # The smallest factor that explains nearly as much as the best: its multiples do so, too, with more places. One of
+    # the usual factors goes before ratios to common rates, which are many. Of a rate that is too low one damaged race
+    # tells more than all, whose places cover much of the range.
+    as_good = [f for f in factors if sums[f] <= AS_GOOD * best]
+    factor = min([f for f in as_good if f in usual] or as_good)
+    # Beside a lower rate, with more of the spectrum and more places, the strongest lines decide: at that rate hardly
+    # any is where the stated one puts a shaft's or a race's. Where no race is described, one or another part may
+    # knock: it asks for no mistake at all, and its order may be near a fraction of the shaft's.
+    if has_plain_lines() if factor < 1 else not races and has_stranger(ranges[factor], AS_GOOD * best):
+        return None
     for milder in sorted(f for f in factors if f in usual and 1 < f < factor):
-        of_one = min((evidence(milder, ranges[milder], at=[race]) for race in races), default=0.0)
+        of_one = of_one_part(milder)
         if of_one <= AS_GOOD * best:
             factor, sums[milder] = milder, of_one
             break
@@ -346,10 +408,6 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     by_one_race = min((evidence(1.0, ranges[factor], at=[race]) for race in races), default=0.0)
     if factor > 1 and by_one_race - of_shafts <= ENOUGH_OF_EACH and by_one_race <= BY_ONE_RACE * sums[factor]:
         return None
-    # Beside a lower rate, with more of the spectrum and more places, the strongest lines decide: at that rate hardly
-    # any is where the stated one puts a shaft's or a race's.
-    if factor < 1 and has_plain_lines():
-        return None
     stated = evidence(1.0, ranges[factor])
     by_shafts = evidence(1.0, ranges[factor], CLOSE_TOLERANCE, ())
     if by_shafts <= sums[factor] or stated < SHARE_OF_STATED * sums[factor]:
@@ -358,29 +416,30 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     if factor < 1 and races:
         # Multiples of the shaft's order are blades or poles as well, and what is at no part's place is a stranger.
         of_races = explained - evidence(factor, highest, at=())
-        if of_races > ENOUGH_OF_EACH or _of_a_stranger(strong_to(highest), shafts) <= explained:
+        if of_races > ENOUGH_OF_EACH or has_stranger(highest, explained):
             return None
     close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
     factor = min(close, key=lambda f: evidence(f, highest, CLOSE_TOLERANCE))
-    as_well_rpm = 60.0 * signals.frequency_per_order_hz / factor
     return _finding(
-        signals.recording,
+        signals,
         factor,
+        60.0 * signals.frequency_per_order_hz,
         f"The strongest lines of {len(spectra)} spectra then lie at orders of shafts and races (lg p "
-        f"{explained:.0f} in sum); at the stated rate they do not ({stated:.0f}).",
-        f"Check sampling rate and speed: {as_well_rpm:.5g} rpm at the stated rate would explain the lines as well.",
-        others[:2],
+        f"{explained:.0f} in sum); with what is stated they do not ({stated:.0f}).",
+        others=others[:2],
     )
 
 
-def _of_a_stranger(strong: Sequence[StrongLines], shafts: Sequence[float]) -> float:
-    """Return lg p of shafts and one part of unknown order, that of a strong line, at the stated rate.
+def _of_a_stranger(strong: Sequence[StrongLines], shafts: Sequence[float], factor: float = 1.0) -> float:
+    """Return lg p of shafts and one part of unknown order, that of a strong line, at a factor times the stated rate.
 
-    Where something strange knocks and no more, that is likelier than a rate that puts it on a shaft or a race.
+    Its impacts are as strong all along, or modulated by the shaft. Where something strange knocks and no more, that is
+    likelier than a rate that puts it on a shaft or a race.
     """
     orders = sorted({round(float(order), 2) for x in strong for order in x.orders if order > 0.3})
-    sums = (_log_p(strong, 1.0, shafts, [(order, 0.0)], CLOSE_TOLERANCE) for order in orders)
-    return min(sums, default=0.0) + log10(max(len(orders), 1))
+    tried = [(factor * order, sideband) for order in orders for sideband in (0.0, *shafts)]
+    sums = (_log_p(strong, factor, shafts, [part], CLOSE_TOLERANCE) for part in tried)
+    return min(sums, default=0.0) + log10(max(len(tried), 1))
 
 
 def _factors(stated_hz: float, *, with_parts: bool) -> tuple[list[float], list[float]]:

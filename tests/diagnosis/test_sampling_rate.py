@@ -1,17 +1,17 @@
 """A sampling rate that is stated wrongly is told, with the factor that fits; one that is right is never doubted."""
 
 from dataclasses import replace
-from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gearsig.diagnosis import analyze
 from gearsig.recording import read_recording
-from gearsig.rig import Bearing, OperatingPoint, TachometerChannel
-from tests.diagnosis.machines import GOOD, MOTOR, MOTOR_RATE_HZ, codes, finding, motor, record
+from gearsig.rig import Bearing, ConstantSpeed, OperatingPoint, TachometerChannel
+from tests.diagnosis.machines import GOOD, MOTOR, MOTOR_HZ, MOTOR_RATE_HZ, codes, finding, motor, record
 from tests.kinematic.speed import ConstantProfile
+from tests.measured import BEARING, DATA, needs_data
 
-DATA = Path(__file__).parents[3] / "shared" / "data"
 CODE = "sampling-rate-doubtful"
 
 
@@ -35,6 +35,28 @@ def test_that_is_right_in_a_short_record_whose_race_is_nearly_a_fraction_of_the_
     assert CODE not in codes(analyze(replace(motor("BPFI", 1).between(0.0, 2.5), rig=rig)))
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_race_that_nobody_described_is_no_wrong_rate(seed: int) -> None:
+    """Its order is near 27/5: at five times the rate all its lines would be multiples of the shaft's order."""
+    recording = replace(motor("BPFI", seed), rig=replace(MOTOR, bearings=()))
+    assert CODE not in codes(analyze(recording))
+
+
+def test_a_wrong_speed_is_as_likely_as_a_wrong_rate_but_for_the_mains() -> None:
+    recording = replace(motor("BPFI", 1), sampling_rate_hz=1.1 * MOTOR_RATE_HZ)  # 33 Hz: no multiple is near 50 Hz
+    t = np.arange(recording.n_samples) / recording.sampling_rate_hz
+    hum = sum(0.5 * np.cos(2 * np.pi * k * 50.0 * t) for k in (1, 2, 3))
+    turns_rpm, rate_hz = 1.1 * 60.0 * MOTOR_HZ, recording.sampling_rate_hz
+    rate, speed = f"{rate_hz:g} Hz", f"{int(turns_rpm)}"
+    for x in (0.0, hum):
+        recording = replace(recording, samples=recording.samples + x, speed=ConstantSpeed(turns_rpm, "motor"))
+        slow = finding(analyze(replace(recording, sampling_rate_hz=rate_hz / 4)), CODE).title
+        fast = finding(analyze(replace(recording, speed=ConstantSpeed(4 * turns_rpm, "motor"))), CODE).title
+        assert rate in slow
+        assert speed in fast
+        assert ("rpm" in slow, " Hz" in fast) == ((True, True) if x is not hum else (False, False))
+
+
 @pytest.mark.parametrize("times", [0.5, 10.0])
 def test_of_gears_with_a_nominal_speed(times: float) -> None:
     recording = record(replace(GOOD, speed=ConstantProfile(1320.0)))
@@ -55,7 +77,22 @@ def test_by_a_tachometer() -> None:
     assert CODE not in codes(analyze(replace(recording, rig=rig)))
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")
+@needs_data
+@pytest.mark.parametrize("race", ["InnerRaceFault_vload_3", "OuterRaceFault_vload_4"])
+def test_of_a_measured_race_that_nobody_described(race: str) -> None:
+    speed = ConstantSpeed(1500.0)
+    assert CODE not in codes(analyze(read_recording(DATA / f"bearing_races/{race}.mat", speed=speed)))
+
+
+@needs_data
+def test_of_a_measured_race_ten_times_too_low() -> None:
+    """No common rate, of which there are many, is named before the usual factor."""
+    recording = read_recording(DATA / "bearing_races/OuterRaceFault_vload_4.mat", rig=BEARING)
+    stated = analyze(replace(recording, sampling_rate_hz=recording.sampling_rate_hz / 10))
+    assert f"{recording.sampling_rate_hz:g} Hz" in finding(stated, CODE).title.split("would fit best")[0]
+
+
+@needs_data
 @pytest.mark.parametrize(
     ("name", "right_hz", "stated_hz"),
     [

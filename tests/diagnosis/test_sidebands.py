@@ -14,8 +14,8 @@ from gearsig.diagnosis import Analysis, Finding, Kind, Outcome, analyze, modulat
 from gearsig.diagnosis import Modulation as Found
 from gearsig.orders import order_spectrum
 from gearsig.prepared import LinesOverFloor, lines_over_noise_floor, neighbour_level, neighbour_levels
-from gearsig.recording import Recording
-from gearsig.rig import GearPair, Rig, Shaft, TachometerChannel
+from gearsig.recording import Channel, Recording
+from gearsig.rig import ConstantSpeed, GearPair, Rig, Shaft, TachometerChannel
 from sims.measure import ColouredNoise, Tachometer
 from tests.kinematic.model import (
     KinematicModel,
@@ -248,7 +248,7 @@ def test_pulses_of_which_there_are_twice_as_many_are_doubted() -> None:
     assert any("pulses_per_revolution may be wrong" in text for text in finding.evidence)
 
 
-def test_the_level_beside_a_line_is_that_of_the_noise() -> None:
+def test_the_neighbour_level_a_line_is_that_of_the_noise() -> None:
     spectrum = excess_of(0.0, 0.0, 1).spectrum
     everywhere = neighbour_levels(spectrum)
     for order in (5.0, 27.0, 40.3):
@@ -257,3 +257,22 @@ def test_the_level_beside_a_line_is_that_of_the_noise() -> None:
         assert beside == pytest.approx(everywhere[i])
         assert beside == pytest.approx(float(excess_of(0.0, 0.0, 1).floor[i]), rel=0.7)
     assert neighbour_level(spectrum, 27.0, outer_lines=4) is None
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_line_is_called_a_multiple_of_the_hunting_tooth_order_only_among_others_of_them(seed: int) -> None:
+    """27 and 45 teeth meet again after five turns: a tone at a multiple is alone, teeth that differ make many lines."""
+    rng, rate_hz, turns_hz, hunting = np.random.default_rng(seed), 4096.0, 20.0, 0.2
+    turns = turns_hz * np.arange(round(20.0 * rate_hz)) / rate_hz
+    mesh, noise = np.cos(2 * pi * 27 * turns), rng.normal(size=len(turns))
+    strange = 4.0 * np.cos(2 * pi * 278 * hunting * turns)
+    phases = rng.uniform(0, 2 * pi, 40)
+    differing = sum(np.cos(2 * pi * (k + 1) * hunting * turns + phase) for k, phase in enumerate(phases))
+    machine = replace(rig(27, 45), speed=ConstantSpeed(60 * turns_hz, "in"))
+    lines = []
+    for x in (20 * mesh + strange + noise, 20 * mesh * (1 + 0.1 * differing) + noise):
+        recording = Recording(x[None, :], rate_hz, (Channel("a1", "acceleration", "m/s^2"),), rig=machine)
+        lines += found(analyze(recording), "unexplained-line")
+    alone, among = (line.title for line in lines)
+    assert "no known shaft" in alone
+    assert "hunting-tooth order" in among
