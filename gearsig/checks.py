@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 
 FloatArray = NDArray[np.floating[Any]]
 T = TypeVar("T")
@@ -181,7 +182,9 @@ def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> F
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         masked = int(np.sum(np.ma.getmaskarray(values)))
         remedy = "fill or cut out what is masked, knowingly"
-        raise InputError(f"{name} holds {masked} masked value(s)", allowed="an array of numbers", remedy=remedy)
+        raise InputError(
+            f"{name} holds {counted(masked, 'masked value')}", allowed="an array of numbers", remedy=remedy
+        )
     try:
         array: FloatArray = np.asarray(values)
         if array.dtype not in (np.float32, np.float64):
@@ -192,12 +195,12 @@ def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> F
             raise
         raise InputError(f"{name} does not hold numbers ({error})", allowed="an array of numbers") from error
     if array.ndim != ndim:
-        raise InputError(f"{name} has shape {array.shape}", allowed=f"an array of {ndim} dimension(s)")
+        raise InputError(f"{name} has shape {array.shape}", allowed=f"an array of {counted(ndim, 'dimension')}")
     if finite and not _is_finite(array):
         bad = int(np.size(array) - np.isfinite(array).sum())
         first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(
-            f"{name} holds {bad} NaN or infinite value(s), the first at index {first}",
+            f"{name} holds {counted(bad, 'NaN or infinite value')}, the first at index {first}",
             allowed="finite numbers",
             remedy="cut out the gap or interpolate it before the analysis, knowingly",
         )

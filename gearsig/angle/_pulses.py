@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gearsig.angle._types import ShaftAngle, monotone_slopes
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
 from gearsig.errors import InputError, RefusalError
-from gearsig.formatting import percent
+from gearsig.formatting import counted, percent
 
 
 @dataclass(frozen=True)
@@ -501,14 +501,14 @@ def pulse_train_angle(
     t = frozen_array(times_s, "tachometer pulse times", ndim=1).astype(np.float64)
     n_per_rev = count(pulses_per_revolution, "pulses_per_revolution")
     _check_order(t)
-    counted = count_pulses(t)
-    _check_faults(counted, len(t))
+    train = count_pulses(t)
+    _check_faults(train, len(t))
     tick = clock_tick(t) if tick_s is None else float(tick_s)
-    kept = counted.times_s
-    pulses = counted.counts.astype(np.float64)
+    kept = train.times_s
+    pulses = train.counts.astype(np.float64)
     late_s = kept[late_pulses(kept, pulses, tick)] if tick > 0 and len(kept) > 5 else kept[:0]
     if tick > 0:
-        breaks = np.searchsorted(kept, counted.pauses_s)
+        breaks = np.searchsorted(kept, train.pauses_s)
         pulses = np.maximum.accumulate(fit_within_ticks(kept, pulses, tick, breaks))
     revolutions = pulses / n_per_rev
     return ShaftAngle(
@@ -518,8 +518,8 @@ def pulse_train_angle(
         monotone_slopes(kept, revolutions),
         "pulses",
         relative_speed_uncertainty=_uncertainty(kept, tick),
-        quality=max(0.0, 1.0 - 5.0 * (len(counted.spurious_s) + counted.n_missed) / len(t)),
-        notes=_notes(counted, len(t), tick, late_s),
+        quality=max(0.0, 1.0 - 5.0 * (len(train.spurious_s) + train.n_missed) / len(t)),
+        notes=_notes(train, len(t), tick, late_s),
     )
 
 
@@ -540,19 +540,19 @@ def _check_order(t: FloatArray) -> None:
         )
 
 
-def _check_faults(counted: PulseCount, n_pulses: int) -> None:
+def _check_faults(train: PulseCount, n_pulses: int) -> None:
     remedy = "check threshold, hysteresis and pulses_per_revolution, or estimate the speed from the vibration"
-    if len(counted.open_gaps_s):
+    if len(train.open_gaps_s):
         raise RefusalError(
-            f"after {counted.open_gaps_s[0]:.4g} s pulses are missing and their number cannot be told from the "
-            f"neighbouring speed ({len(counted.open_gaps_s)} such gap(s))",
+            f"after {train.open_gaps_s[0]:.4g} s pulses are missing and their number cannot be told from the "
+            f"neighbouring speed ({counted(len(train.open_gaps_s), 'such gap')})",
             remedy="analyse the parts before and after by themselves; " + remedy,
         )
-    n_faulty = len(counted.spurious_s) + counted.n_missed
+    n_faulty = len(train.spurious_s) + train.n_missed
     # A tenth of the pulses: a 36-1 or 60-2 tooth wheel stays below, and so does an occasional glitch.
     if n_faulty > 0.1 * n_pulses + 1:
         raise RefusalError(
-            f"{len(counted.spurious_s)} spurious and {counted.n_missed} missed pulses among {n_pulses} are too many "
+            f"{len(train.spurious_s)} spurious and {train.n_missed} missed pulses among {n_pulses} are too many "
             "to trust the rest",
             remedy=remedy,
         )
@@ -573,14 +573,14 @@ def _uncertainty(t: FloatArray, tick_s: float) -> float:
     return max(5e-5, float(np.sqrt(2.0) * timing_s / (t[-1] - t[0])))
 
 
-def _notes(counted: PulseCount, n_pulses: int, tick_s: float, late_s: FloatArray) -> tuple[str, ...]:
+def _notes(train: PulseCount, n_pulses: int, tick_s: float, late_s: FloatArray) -> tuple[str, ...]:
     clock = f"pulse times are quantised to {tick_s * 1e6:.4g} µs; the angle is smoothed within half of that"
     places = (
-        (f"{len(counted.spurious_s)} of {n_pulses} pulses were spurious and left out", counted.spurious_s),
-        (f"{counted.n_missed} missed pulse(s) were counted in", counted.missed_s),
-        (f"the machine stands still or nearly so within {len(counted.pauses_s)} interval(s)", counted.pauses_s),
+        (f"{len(train.spurious_s)} of {n_pulses} pulses were spurious and left out", train.spurious_s),
+        (f"{counted(train.n_missed, 'missed pulse')} counted in", train.missed_s),
+        (f"the machine stands still or nearly so within {counted(len(train.pauses_s), 'interval')}", train.pauses_s),
         (clock, np.empty(int(tick_s > 0))),
-        (f"{len(late_s)} single pulse(s) lie more than that off their neighbours and are bridged", late_s),
+        (f"{counted(len(late_s), 'single pulse')} more than that off the neighbours, bridged", late_s),
     )
     return tuple(text if text == clock else f"{text}: {_at(times)}" for text, times in places if len(times))
 

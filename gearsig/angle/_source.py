@@ -13,6 +13,7 @@ from gearsig.angle._tachless import estimate_shaft_angle
 from gearsig.angle._types import ShaftAngle
 from gearsig.checks import not_negative, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.recording import Recording, check_recording
 from gearsig.rig import (
     ConstantSpeed,
@@ -102,7 +103,7 @@ def _from_tachometer(recording: Recording, source: TachometerChannel) -> ShaftAn
     edges = tachometer_edges(recording, source)
     if len(edges.times_s) < 2:
         raise InputError(
-            f"the tachometer has {len(edges.times_s)} pulse(s) in {recording.duration_s:.4g} s",
+            f"the tachometer has {counted(len(edges.times_s), 'pulse')} in {recording.duration_s:.4g} s",
             where=f"channel {source.channel!r}",
             allowed="at least two",
             remedy=f"the machine stands, or the threshold of {edges.threshold:.4g} does not fit the signal, which runs "

@@ -12,6 +12,7 @@ from gearsig.diagnosis._reference import beside_reference
 from gearsig.diagnosis._types import Analysis, CannotTell, Finding, Kind, Strength, Where, cannot_tell
 from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.indicators import Indicator
 from gearsig.motion import Burst, MotionSegments, StartStop
 from gearsig.recording import Recording
@@ -115,7 +116,7 @@ def _motion_finding(segments: MotionSegments) -> Finding:
         "start-stop",
         Kind.INFORMATION,
         f"The machine starts and stops: {segments.summary}, at rest for {100.0 * segments.standing_part:.3g} % of the "
-        f"time, {segments.n_reversals} change(s) of direction, up to {top_rpm:.4g} rpm.",
+        f"time, {counted(segments.n_reversals, 'change')} of direction, up to {top_rpm:.4g} rpm.",
         evidence=tuple(
             f"{'forwards' if s.direction > 0 else 'backwards'} from {s.start_s:.4g} to {s.end_s:.4g} s by "
             f"{s.turned_rad / (2.0 * np.pi):.4g} revolutions"
@@ -132,7 +133,7 @@ def _left_out(segments: MotionSegments, examined: StartStop | None) -> Finding:
     return cannot_tell(
         "stationary-methods-left-out",
         f"{what} are not examined: spectra, orders and averages want a speed that lasts.",
-        evidence=(f"the speed falls to zero {len(segments.stops_s)} time(s){back}",),
+        evidence=(f"the speed falls to zero {counted(len(segments.stops_s), 'time')}{back}",),
         surer="A recording in continuous rotation, some tens of revolutions at a steady speed.",
     )
 
@@ -279,7 +280,8 @@ def _burst_finding(
     return Finding(
         "vibration-blows",
         Kind.NOTICE,
-        f"{len(blows)} blow(s) in {name}, the hardest with {hardest.peak:.3g} {unit} at {hardest.time_s:.5g} s.",
+        f"{counted(len(blows), 'blow')} in {name}, the hardest with {hardest.peak:.3g} {unit} "
+        f"at {hardest.time_s:.5g} s.",
         Where(channels=(name,), shaft=rig.reference_shaft, angle_deg=float(np.degrees(angle) % 360.0)),
         evidence=("only blows of more than a third of the hardest, at least 4 ms apart, are counted",),
     )

@@ -29,6 +29,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 from gearsig.indicators._amplitude import Indicator, is_constant, standardised_moment
 from gearsig.orders import SynchronousAverage, check_average
 
@@ -397,8 +398,10 @@ def _trend(
         return [(n, float("nan"), "", signal.kind, empty) for n in (name, f"{name}*")]
     good = list(history) if healthy is None else [h for h, ok in zip(history, healthy, strict=True) if ok]
     alone = f"trend indicator without earlier records: the kurtosis of {of}"
-    note = f"trend indicator over {len(history)} earlier record(s)" if history else alone
-    star = f"over the variance of {len(good)} healthy record(s)" if good else "undefined: needs healthy records"
+    note = f"trend indicator over {counted(len(history), 'earlier record')}" if history else alone
+    star = (
+        f"over the variance of {counted(len(good), 'healthy record')}" if good else "undefined: needs healthy records"
+    )
     return [
         (name, function(signal, history), "", signal.kind, note),
         (f"{name}*", function(signal, good, star=True), "", signal.kind, star),

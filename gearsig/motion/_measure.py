@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, instance_of, known_name, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.motion._types import PairMotion, stands
 from gearsig.recording import Channel, Recording, check_recording
 from gearsig.rig import SIDES, EncoderChannel, GearPair, PathOfContact, Rig, check_rig, contact_pair, path_of_contact
@@ -231,7 +232,7 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where
         i = int(jumps[0])
         raise InputError(
             f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {_time_text(i, sampling_rate_hz)} "
-            f"({len(jumps)} such jump(s))",
+            f"({counted(len(jumps), 'such jump')})",
             where=where,
             allowed="an angle that runs on",
             remedy="cut the recording there; lost counts make all later forces wrong",

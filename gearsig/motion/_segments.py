@@ -387,7 +387,7 @@ def segment_order_spectrum(
             )
     if not spectra:
         raise RefusalError(f"no segment {direction} holds a whole block", remedy="give fewer revolutions per block")
-    return _mean(spectra, per_revolution, unit, f"{source}, {len(spectra)} segment(es) {direction}", shaft)
+    return _mean(spectra, per_revolution, unit, f"{source}, {counted(len(spectra), 'segment')} {direction}", shaft)
 
 
 def steps_of_angle(

@@ -21,6 +21,7 @@ from gearsig.angle import (
 )
 from gearsig.checks import FloatArray, count, listed, not_negative, one_of
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.orders._types import AverageLines, LineScaling, SynchronousAverage, lines_of_revolution
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
@@ -53,7 +54,7 @@ def whole_revolutions(signal: AngleSignal, channel: str, *, minimum: int = 1) ->
     n_rev = max(0, (len(x) - start) // per_rev)
     if n_rev < minimum:
         raise RefusalError(
-            f"only {n_rev} whole revolution(s) of shaft {signal.shaft_angle.shaft!r}, {minimum} needed",
+            f"only {counted(n_rev, 'whole revolution')} of shaft {signal.shaft_angle.shaft!r}, {minimum} needed",
             remedy="record longer or at a higher speed",
         )
     revolutions: FloatArray = x[start : start + n_rev * per_rev].reshape(n_rev, per_rev)

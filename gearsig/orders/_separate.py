@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, freeze, instance_of, listed
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.orders._types import SynchronousAverage
 from gearsig.results import Result
 
@@ -93,7 +94,8 @@ def separate(
     full = _line_mask(len(average.values), [*shaft_orders, *sidebands])
     if full[: highest + 1].all():
         raise RefusalError(
-            f"mesh harmonics of {gears} teeth with {n_sidebands} sideband(s) cover all {highest} orders of the average",
+            f"mesh harmonics of {gears} teeth with {counted(n_sidebands, 'sideband')} cover all {highest} orders of "
+            "the average",
             remedy="take fewer sidebands or harmonics, or a higher sampling rate",
         )
     lines = np.fft.rfft(average.values)

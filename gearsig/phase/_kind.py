@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, not_negative
 from gearsig.errors import GearsigError, InputError
+from gearsig.formatting import counted
 from gearsig.phase._embedding import chosen_delay, delay_embedding, embedding_dimension
 from gearsig.phase._lyapunov import largest_lyapunov_exponent
 from gearsig.phase._section import CycleLock, check_lock, poincare_section, section_period
@@ -253,9 +254,8 @@ def kind_of_motion(
     section = poincare_section(portrait, lock)
     period = section_period(section, tolerance=tolerance)
     if period:
-        shown_by = (
-            f"the section repeats after {period} cycle(s) of the {lock.name}, within {tolerance:g} of the path's size"
-        )
+        after = f"the section repeats after {counted(period, 'cycle')} of the {lock.name}"
+        shown_by = f"{after}, within {tolerance:g} of the path's size"
         return MotionKind("periodic" if period == 1 else "subharmonic", period, (shown_by,), section)
     evidence = [f"the section of {section.n_points} points does not repeat within 16 cycles of the {lock.name}"]
     test = _answer(lambda: zero_one_test_of_section(section, damping=0.0 if noise_free else 1.0), "0–1 test", evidence)

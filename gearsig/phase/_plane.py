@@ -9,6 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, positive, within
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.phase._types import PhasePortrait, checked_series
 from gearsig.recording import Recording
 from gearsig.spectra import named_signal
@@ -181,7 +182,9 @@ def phase_plane(
     low, high = _band(low_cut_hz, high_cut_hz, rate, n_times)
     n_lost = n_unsettled(rate, low)
     if low == 0.0 and len(x) < 4 * n_lost:
-        raise InputError(f"values has {len(x)} sample(s)", allowed=f"at least {4 * n_lost}", remedy="record longer")
+        raise InputError(
+            f"values has {counted(len(x), 'sample')}", allowed=f"at least {4 * n_lost}", remedy="record longer"
+        )
     if low > 0.0 and len(x) - 2 * n_lost < MIN_PERIODS * rate / low:
         need = lowest_low_cut_hz(1.0) / low
         raise RefusalError(

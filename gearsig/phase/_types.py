@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, freeze, frozen_array, instance_of, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.results import Result
 
 BoolArray = NDArray[np.bool_]
@@ -432,7 +433,9 @@ def checked_series(values: FloatArray, *, minimum: int, name: str = "values") ->
     x = frozen_array(values, name, ndim=1)
     if len(x) < minimum:
         raise InputError(
-            f"{name} has {len(x)} sample(s)", allowed=f"at least {minimum}", remedy="record longer or ask for less"
+            f"{name} has {counted(len(x), 'sample')}",
+            allowed=f"at least {minimum}",
+            remedy="record longer or ask for less",
         )
     low, high = float(x.min()), float(x.max())
     if high - low <= 8.0 * np.finfo(x.dtype).eps * max(abs(low), abs(high)):

@@ -9,6 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._series import thin
@@ -65,9 +66,9 @@ def mesh_stiffness_figure(
     if single_pair is not None:
         low, high = series.checked_limits(single_pair, "single_pair")
         inside = (x >= low) & (x <= high)
-        if np.count_nonzero(inside) < 2:
+        if (n_inside := int(np.count_nonzero(inside))) < 2:
             raise InputError(
-                f"single_pair, {low:g} to {high:g}, holds {np.count_nonzero(inside)} point(s) of mesh_cycles",
+                f"single_pair, {low:g} to {high:g}, holds {counted(n_inside, 'point')} of mesh_cycles",
                 allowed="at least 2",
                 remedy="give a finer axis or a region on it",
             )

@@ -9,6 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, frozen_array
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 from gearsig.plot import _style as style
 from gearsig.plot._style import plain
 
@@ -41,7 +42,9 @@ def checked_axis(values: FloatArray, name: str) -> FloatArray:
     """Return an ascending axis of at least two points."""
     axis = frozen_array(values, name, ndim=1)
     if len(axis) < 2 or not bool((axis[1:] > axis[:-1]).all()):
-        raise InputError(f"{name} has {len(axis)} value(s) that do not all ascend", allowed="two or more, ascending")
+        raise InputError(
+            f"{name} has {counted(len(axis), 'value')} that do not all ascend", allowed="two or more, ascending"
+        )
     return axis
 
 

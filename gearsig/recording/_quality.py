@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.formatting import percent
+from gearsig.formatting import counted, percent
 from gearsig.recording._types import Channel, Recording
 
 
@@ -295,7 +295,7 @@ def _stuck(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProb
     longest = int(np.argmax(np.where(long, lengths, 0)))
     share = float(lengths[long].sum() / len(x))
     evidence = (
-        f"{int(long.sum())} run(s) of equal samples, the longest {lengths[longest]} samples "
+        f"{counted(int(long.sum()), 'run')} of equal samples, the longest {lengths[longest]} samples "
         f"from sample {starts[longest]} at {x[starts[longest]]:g}; 99 % of the runs are no longer than {usual:.0f}"
     )
     remedy = "check for dropouts of the measurement chain or a machine at rest, and cut these parts out"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, SPEED_NAMES, plain_name
 from gearsig.rig import ConstantSpeed, SpeedSource
 
@@ -190,7 +191,7 @@ def one_condition(table: RawTable, number: int, where: str) -> RawTable:
     columns, times = _conditions(table)
     if not 1 <= number <= len(columns):
         raise InputError(
-            f"condition {number} is asked for; beside the time there are {len(columns)} column(s)",
+            f"condition {number} is asked for; beside the time there are {counted(len(columns), 'column')}",
             where=where,
             allowed=", ".join(condition_numbers(table)),
             remedy="count the columns from 1, without the time",
@@ -298,7 +299,7 @@ def rate_of_time(values: NumberArray, scale_s: float, where: str, row_place: Cal
     t: FloatArray = np.asarray(values, dtype=np.float64)
     if len(t) < 2:
         raise InputError(
-            f"the time column has {len(t)} value(s)",
+            f"the time column has {counted(len(t), 'value')}",
             where=where,
             allowed="at least two",
             remedy="the file was cut off; copy or export it again",

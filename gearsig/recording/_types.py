@@ -310,7 +310,7 @@ class Recording:
         doubled = sorted({name for name in names if names.count(name) > 1})
         if doubled:
             raise InputError(
-                f"channel name(s) {', '.join(doubled)} occur more than once", where=where, remedy="rename the columns"
+                f"channel names occur more than once: {', '.join(doubled)}", where=where, remedy="rename the columns"
             )
         instance_of(self.truth, Mapping | None, f"{where}: truth")
         if self.truth is not None:

@@ -68,7 +68,7 @@ def shaft_ratios(rig: Rig) -> dict[str, float]:
         if not touching:
             names = ", ".join(repr(p.name) for p in waiting)
             raise InputError(
-                f"pair(s) {names} share no shaft with the rest of the gear train",
+                f"pairs that share no shaft with the rest of the gear train: {names}",
                 where="rig",
                 remedy="use the same shaft name where two gears sit on one shaft, or describe two rigs",
             )
@@ -526,7 +526,7 @@ class Rig:
             doubled = sorted({n for n in names if names.count(n) > 1})
             if doubled:
                 raise InputError(
-                    f"{kind} name(s) {', '.join(doubled)} occur more than once", remedy="give each its own name"
+                    f"{kind} names occur more than once: {', '.join(doubled)}", remedy="give each its own name"
                 )
         for pair in self.pairs:
             for shaft in (pair.driver, pair.driven):

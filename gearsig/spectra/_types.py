@@ -24,7 +24,7 @@ from gearsig.checks import (
     within,
 )
 from gearsig.errors import InputError
-from gearsig.formatting import axis_label
+from gearsig.formatting import axis_label, counted
 from gearsig.recording import Recording, check_recording
 from gearsig.results import Result
 
@@ -283,7 +283,9 @@ def checked_signal(values: FloatArray, *, minimum: int = 2) -> FloatArray:
     """Return `values` as a one-dimensional finite array with at least `minimum` samples."""
     x = frozen_array(values, "values", ndim=1)
     if len(x) < minimum:
-        raise InputError(f"values has {len(x)} sample(s)", allowed=f"at least {minimum}", remedy="record longer")
+        raise InputError(
+            f"values has {counted(len(x), 'sample')}", allowed=f"at least {minimum}", remedy="record longer"
+        )
     return x
 
 

@@ -118,8 +118,8 @@ def test_a_reversing_machine_without_contact_data_is_recognised_too() -> None:
     for rig in (None, Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(pair,))):
         found = {f.code: f for f in analyze(swinging(rig)).findings}
         assert {"start-stop", "stationary-methods-left-out", "contact-not-described"} <= set(found)
-        assert "change(s) of direction" in found["start-stop"].title
-        assert "0 change(s)" not in found["start-stop"].title
+        assert "changes of direction" in found["start-stop"].title
+        assert "0 changes" not in found["start-stop"].title
 
 
 def test_a_speed_channel_tells_as_well() -> None:

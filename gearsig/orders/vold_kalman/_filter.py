@@ -390,5 +390,5 @@ def _time_notes(
     )
     never = [repr(name) for name, is_settled in zip(tracks.names, settled, strict=True) if not is_settled.any()]
     if never:
-        notes.append(f"the recording is too short for order(s) {', '.join(never)} to settle: widen the band")
+        notes.append(f"the recording is too short for some orders to settle, widen the band: {', '.join(never)}")
     return notes

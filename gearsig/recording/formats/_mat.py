@@ -291,7 +291,7 @@ def _load(path: Path) -> tuple[dict[str, Any], list[str]]:
     notes = []
     if doubled:
         names = ", ".join(doubled)
-        notes.append(f"variable(s) {names} stand in the file more than once: the copy that is not all zeros was taken")
+        notes.append(f"variables stand in the file more than once, the copy that is not all zeros was taken: {names}")
     if differ:
         notes.append(f"the copies of {', '.join(differ)} differ: the last was taken")
     return chosen, notes

@@ -70,7 +70,7 @@ def _read(path: Path) -> RawTable:
     time: NumberArray = max(signals, key=lambda s: len(s.samples)).timestamps
     kept = [s for s in signals if np.array_equal(s.timestamps, time)]
     slower = [str(s.name) for s in signals if not np.array_equal(s.timestamps, time)]
-    notes = (f"channel(s) at other times were left out: {', '.join(slower[:8])}",) if slower else ()
+    notes = (f"channels at other times were left out: {', '.join(slower[:8])}",) if slower else ()
     return RawTable(_columns(kept), READER, time=RawColumn("time", time, "s"), warnings=notes)
 
 

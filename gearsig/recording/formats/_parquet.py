@@ -48,7 +48,7 @@ def read_parquet(path: Path, part: slice | None = None) -> RawTable:
     doubled = [f.name for f in kept if f.name not in values]
     if doubled:
         raise InputError(
-            f"column name(s) {', '.join(sorted(set(doubled)))} occur more than once",
+            f"column names occur more than once: {', '.join(sorted(set(doubled)))}",
             where=where,
             remedy="rename the columns",
         )
@@ -57,7 +57,7 @@ def read_parquet(path: Path, part: slice | None = None) -> RawTable:
             metadata[OWN_NAME.encode()].decode(errors="replace"), list(values.values()), READER, where
         )
     left_out = [f.name for f in schema if f not in numeric]
-    notes = (f"column(s) {', '.join(left_out[:8])} hold no numbers and were left out",) if left_out else ()
+    notes = (f"columns that hold no numbers were left out: {', '.join(left_out[:8])}",) if left_out else ()
     columns = tuple(_column(f, values[f.name]) for f in kept)
     return RawTable(columns, READER, sampling_rate_hz=_stated_rate(metadata), warnings=notes)
 

@@ -55,7 +55,7 @@ def read_tdms(path: Path, part: slice | None = None) -> RawTable:
                 channels[name] = np.asarray(channel[part or slice(None)])
                 units[name] = str(channel.properties.get("unit_string", ""))
                 rates_hz |= _waveform_rate(channel, name, where) or _stated_rates(channel.properties, name)
-    notes = (f"channel(s) {', '.join(left_out[:8])} hold no numbers and were left out",) if left_out else ()
+    notes = (f"channels that hold no numbers were left out: {', '.join(left_out[:8])}",) if left_out else ()
     return table_from_arrays(NamedArrays(channels, {}, units, rates_hz, notes), READER, where)
 
 

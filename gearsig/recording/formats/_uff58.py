@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 from gearsig.recording._limits import check_memory
 from gearsig.recording._table import RawColumn, RawTable
 from gearsig.recording.formats._format import FileFormat
@@ -52,7 +53,7 @@ def read_uff58(path: Path) -> RawTable:
     signals = [s for s in sets if int(s.get("func_type", 0)) in (0, TIME_RESPONSE) and not np.iscomplexobj(s["data"])]
     if not signals:
         raise InputError(
-            f"holds {len(sets)} function(s), none of them a time signal",
+            f"holds {counted(len(sets), 'function')}, none of them a time signal",
             where=where,
             allowed="data set 58 with function type 1 (time response)",
             remedy="export the time signals, not spectra",
