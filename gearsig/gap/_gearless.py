@@ -449,7 +449,7 @@ def diagnose_gearless(
     def examine(recording: PreparedRecording) -> tuple[ExaminedRecording, list[str]]:
         name = recording.recording.name
         tell(f"analysing {name}", 0.2 + 0.7 * next(done) / len(recordings))
-        return examined(name, _with_bearings(recording), healthy), []
+        return _beyond_reference(recording, examined(name, _with_bearings(recording), healthy)), []
 
     every = readable(recordings, examine, "recording", left_out)
     hint = () if references else (NO_REFERENCE,)
@@ -476,6 +476,26 @@ def diagnose_gearless(
             *(text for item in every for text in item.notices),
         ),
     )
+
+
+def _beyond_reference(recording: PreparedRecording, alone: ExaminedRecording) -> ExaminedRecording:
+    """Leave out faults and suspicions that the reference gives as much reason for, measured in the same band of both.
+
+    What is barely suspected in one recording is often just missed in another of the same machine.
+    """
+    claims = (Kind.FAULT, Kind.SUSPICION)
+    if alone.reference is None or not any(part.finding.kind in claims for part in alone.unexpected):
+        return alone
+    beside = analyze(recording, reference=alone.reference.recording)
+    now = {(f.code, f.where): f for f in beside.findings}
+    kept, notices = [], list(alone.notices)
+    for part in alone.unexpected:
+        finding = now.get((part.finding.code, part.finding.where), part.finding)
+        if part.finding.kind in claims and finding.kind is not part.finding.kind:
+            notices.append(f"{alone.name}: {finding.title.rstrip('.')}. {finding.evidence[-1]}")
+        else:
+            kept.append(part)
+    return replace(alone, unexpected=tuple(kept), notices=tuple(notices))
 
 
 def _loose_shafts(rig: Rig) -> list[str]:

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from gearsig.gap import GapOutcome, attribute, conditions_of, twin_rig, with_stage, within_the_floor
+from gearsig.gap import GapOutcome, attribute, conditions_of, diagnose_gap, twin_rig, with_stage, within_the_floor
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording, read_recording
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft, read_rig
 from gearsig.severity import NoCrackSeen, estimate_crack
 from sims.registry import gap_simulator
+from tests.measured import BY_NAME, needs_data
+from tests.measured import RECORDINGS as MEASURED_RECORDINGS
 
 ROOT = Path(__file__).parents[2]
 MEASURED = ROOT.parent / "shared" / "data"
@@ -55,6 +57,8 @@ RECORDINGS = {
     "measured pair, channel 14": lambda: measured("gear_pair_23_46/3027_217_Data_Chan14.mat", PAIR),
     "measured gearbox, healthy": lambda: measured(next_file("h"), with_stage(TWO_STAGES, "first")),
     "measured gearbox, broken tooth": lambda: measured(next_file("b"), with_stage(TWO_STAGES, "second")),
+    "measured gearbox, healthy, second stage": lambda: measured(next_file("h"), with_stage(TWO_STAGES, "second")),
+    "measured gearbox, broken tooth, first stage": lambda: measured(next_file("b"), with_stage(TWO_STAGES, "first")),
 }
 
 
@@ -91,3 +95,23 @@ def test_two_halves_of_one_recording_have_no_crack(name: str) -> None:
     pair = replace(known, module_mm=known.module_mm or 2.0, face_width_mm=known.face_width_mm or 20.0)
     rig = replace(first.rig, pairs=(pair,), operating_point=replace(first.rig.operating_point, torque_nm=50.0))
     assert isinstance(estimate_crack(second.with_rig(rig), reference=first.with_rig(rig)), NoCrackSeen)
+
+
+@needs_data
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(one.name, marks=() if "unbalance" in one.name else pytest.mark.slow)
+        for one in MEASURED_RECORDINGS
+        if one.rig is not None and not one.rig.pairs
+    ],
+)
+def test_two_halves_of_one_recording_without_gears_are_no_gap(name: str) -> None:
+    """A damaged machine is no healthy reference: it is said to be none, and not compared with."""
+    parts = halves(BY_NAME[name].read())
+    for reference, part in (parts, parts[::-1]):
+        report = diagnose_gap([part], gap_simulator("cracked"), references=[reference])
+        if report.references:
+            assert report.outcome is GapOutcome.NO_GAP, report.places
+        else:
+            assert any("not healthy" in notice for notice in report.notices)
