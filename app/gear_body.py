@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearsig.checks import FloatArray, count, within
+from gearsig.formatting import counted
 from gearsig.plot import gear_mesh_figure, gear_modes_figure, gear_stress_figure
 from gearsig.report import made_folder
 from sims import fe_gear
@@ -229,7 +230,7 @@ def label(study: GearBodyStudy, k: int) -> str:
     """Frequency and kind of mode k."""
     n = int(study.modes.nodal_diameters[k])
     whole = fe_gear.rigid_part(study.gear, study.modes, k)
-    kind = whole or f"{n} nodal diameter{'s' if n != 1 else ''}"
+    kind = whole or f"{counted(n, 'nodal diameter')}"
     return f"{study.modes.frequencies_hz[k]:.1f} Hz, {kind}"
 
 

@@ -12,6 +12,7 @@ import typer
 
 from app.cli.quantities import quantity
 from gearsig.errors import InputError
+from gearsig.formatting import counted
 
 if TYPE_CHECKING:
     from gearsig.motion import PairMotion
@@ -269,7 +270,7 @@ def clear_other_versions(model: str | None) -> None:
         raise InputError(f"--fresh is given, but the model {model} keeps nothing", remedy="leave out --fresh")
     gone = forget_other_versions()
     if gone:
-        typer.echo(f"{len(gone)} file{'s' if len(gone) > 1 else ''} of another version cleared away", err=True)
+        typer.echo(f"{counted(len(gone), 'file')} of another version cleared away", err=True)
 
 
 def read_parameter(chosen: Simulator, text: str) -> tuple[str, ParameterValue]:

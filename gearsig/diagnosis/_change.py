@@ -34,7 +34,7 @@ from gearsig.diagnosis._types import (
     cannot_tell,
 )
 from gearsig.errors import InputError, RefusalError
-from gearsig.formatting import named, percent, signed
+from gearsig.formatting import counted, named, percent, signed
 from gearsig.orders import order_map
 from gearsig.prepared import envelope_bands
 from gearsig.rig import order_lines
@@ -531,7 +531,7 @@ def _changed(changes: Sequence[LevelChange], off: float) -> Finding:
     texts = [", ".join(f"{c.label} {signed(c.change_db)} dB" for c in (risen or fallen)[:4])]
     rest = len(risen or fallen) - 4
     texts += [f"{rest} more up" if risen else f"{rest} more down"] if rest > 0 else []
-    texts += [f"{len(fallen)} level{'s' if len(fallen) > 1 else ''} down"] if risen and fallen else []
+    texts += [f"{counted(len(fallen), 'level')} down"] if risen and fallen else []
     repeats = max(0.1, *(c.repeatability_db for c in (risen or fallen)[:4]))
     first = max(risen or fallen, key=lambda c: abs(c.change_db))
     value, floor = (10 ** (level / 20) for level in (first.level_db, first.reference_db))

@@ -137,7 +137,7 @@ def beside_reference(
 
 def _beside(finding: Finding, reference: Analysis, measured: LevelChange | None) -> Finding:
     earlier = in_reference(finding, reference)
-    text = _then(finding, reference)
+    text = _then(finding, earlier)
     if measured is not None:
         is_new = measured.is_change and measured.change_db > 0
         if earlier is None and not is_new:
@@ -166,8 +166,7 @@ def in_reference(finding: Finding, reference: Analysis) -> Earlier | None:
     return Earlier(alike[0], False, None) if alike else None  # levels elsewhere are of another size
 
 
-def _then(finding: Finding, reference: Analysis) -> str:
-    earlier = in_reference(finding, reference)
+def _then(finding: Finding, earlier: Earlier | None) -> str:
     if earlier is None or not (earlier.is_comparable or _is_placed(finding)):
         return "The reference does not show it."
     if not earlier.is_comparable:

@@ -12,6 +12,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint
 from gearsig.diagnosis import read_whole
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.gap._labelled import LabelledRecording
 from gearsig.gap._types import NONE, UNKNOWN
 from gearsig.recording import Recording
@@ -113,7 +114,7 @@ def _check_files(request: GapRequest) -> None:
     n, n_torques = len(request.recordings), len(request.torques_nm)
     if n_torques > 1 and n_torques != n:
         raise InputError(
-            f"{n_torques} torques are given for {n} recording{'s' if n > 1 else ''}",
+            f"{n_torques} torques are given for {counted(n, 'recording')}",
             allowed="one for all, or one for each, in their order" if n > 1 else "one",
         )
 

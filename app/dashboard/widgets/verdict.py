@@ -13,7 +13,7 @@ from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.spectrum import show_ring, show_spectrum
 from gearsig.diagnosis import BEARING_PARTS, CHANGED, Analysis, Finding, Kind, Outcome
-from gearsig.formatting import enumerated, signed
+from gearsig.formatting import counted, enumerated, signed
 from gearsig.plot import ChartLine, LinePanel, marks_of, with_unit
 from gearsig.report import (
     FindingCard,
@@ -82,7 +82,7 @@ def _show_words(analysis: Analysis) -> None:
     facts = [
         f"**{as_typed(recording.provenance.source)}**",
         as_typed(machine) or ("machine without a name" if is_described else "machine not described"),
-        f"{n} channel{'s' if n != 1 else ''}",
+        f"{counted(n, 'channel')}",
         f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz",
     ]
     with st.container(horizontal=True, vertical_alignment="center"):
