@@ -8,7 +8,7 @@ import numpy as np
 
 from gearsig.comparison._sides import MIN_REVOLUTIONS, ComparedSide
 from gearsig.comparison._types import Alignment, ChannelComparison, LineLevel
-from gearsig.formatting import percent
+from gearsig.formatting import percent, signed, with_minus
 
 WITHIN_DB = 3.0
 """Levels this close are called agreement: a factor of √2."""
@@ -87,7 +87,7 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
         spread = float(np.max(np.abs(differences - gain)))
         verb = "agree within" if spread <= WITHIN_DB else "differ by up to"
         return (
-            f"The unit of one side is not known; after a common gain of {_decibels(-gain)}, simulation and recording "
+            f"The unit of one side is not known; after a common gain of {signed(-gain)} dB, simulation and recording "
             f"{verb} {spread:.1f} dB at {n}{_line_text(worst, gain) if spread > WITHIN_DB else ''}."
         )
     largest = float(np.max(np.abs(differences)))
@@ -99,7 +99,7 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
     text = f"Simulation and recording differ by up to {largest:.1f} dB at {n}{_line_text(worst, 0.0)}"
     # A common gain beyond 3 dB is named on its own: it is the path's or the sensor's, not the gears'.
     if len(lines) > 1 and abs(gain) > 3.0 and spread < largest:
-        text += f"; a common gain of {_decibels(-gain)} would bring them within {spread:.1f} dB"
+        text += f"; a common gain of {signed(-gain)} dB would bring them within {spread:.1f} dB"
     return f"{text}."
 
 
@@ -141,7 +141,9 @@ def _shape_texts(channel: ChannelComparison) -> list[str]:
         if shaft.best_correlation < MIN_REPEATED:
             loose.append(name)
         else:
-            parts.append(f"{_number(shaft.correlation.value)}{name} ({_number(shaft.best_correlation)} is possible)")
+            parts.append(
+                f"{with_minus(f'{shaft.correlation.value:.2f}')}{name} ({shaft.best_correlation:.2f} is possible)"
+            )
     texts = [f"The synchronous averages correlate by {', '.join(parts)}."] if parts else []
     if loose:
         texts.append(
@@ -156,14 +158,6 @@ def _shape_texts(channel: ChannelComparison) -> list[str]:
             f"{percent(locked.simulated.value)} of the simulation's."
         ),
     ]
-
-
-def _number(value: float) -> str:
-    return f"{value:.2f}".replace("-", "−")
-
-
-def _decibels(value: float) -> str:
-    return f"{value:+.1f} dB".replace("-", "−")
 
 
 SAME_SPEED, OTHER_SPEED = 0.03, 0.10
@@ -242,7 +236,7 @@ def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:
     texts = []
     for alignment in alignments:
         if alignment.method == "marks" and alignment.gain > 0.1:
-            turned = f"{alignment.best_shift_deg:+.4g}°".replace("-", "−")
+            turned = with_minus(f"{alignment.best_shift_deg:+.4g}°")
             texts.append(
                 f"The averages{_of([alignment])} are aligned by their marks; with the simulation turned by {turned} "
                 f"they would correlate better by {alignment.gain:.2f}. A simulation's mark need not sit where the "

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
+from gearsig.formatting import with_minus
 from gearsig.gap import AngleCurves, AverageCurves, Evidence, GapStep, Interval, SpectrumCurves, gap_by_order, is_beyond
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
@@ -223,7 +224,7 @@ def _rings(axes: PolarAxes, top: float) -> None:
         radius = float(_radius(np.array([value]), top)[0])
         colour = style.QUIET if value == 0 else style.RULE
         axes.plot(ring, np.full_like(ring, radius), color=colour, linewidth=0.8, zorder=1)
-        text = "0 dB" if value == 0 else f"{value:+.0f} dB".replace("-", "−")
+        text = "0 dB" if value == 0 else with_minus(f"{value:+.0f} dB")
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.8}
         axes.text(
             np.pi * 1.25, radius, text, ha="center", va="center", fontsize=style.SMALL_PT - 1, color=style.QUIET,

@@ -24,7 +24,7 @@ from gearsig.comparison import (
     mesh_lines,
     missing_words,
 )
-from gearsig.formatting import readable, rounded, spreadsheet_cell
+from gearsig.formatting import readable, rounded, signed, spreadsheet_cell, with_minus
 from gearsig.plot import Captioned, Cursor, Picture, embed, unit_text
 from gearsig.report._files import render
 from gearsig.report._json import Layout, document, plain
@@ -105,7 +105,7 @@ def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftCom
     from gearsig.plot import average_overlay_figure
 
     name = shaft.shaft or "the shaft"
-    correlation = f"{shaft.correlation.value:.3f}".replace("-", "−")
+    correlation = with_minus(f"{shaft.correlation.value:.3f}")
     figure = average_overlay_figure(
         shaft.recorded,
         shaft.simulated,
@@ -193,7 +193,7 @@ def alignment_texts(comparison: Comparison) -> list[str]:
         certain = alignment.tooth_is_certain
         sure = {None: "", True: ", the same tooth in both", False: ", to a whole number of teeth only"}[certain]
         within = "" if certain is False else f" ± {alignment.repeatability_deg:.2g}°"
-        turned = f"{alignment.shift_deg:+.4g}°".replace("-", "−")
+        turned = with_minus(f"{alignment.shift_deg:+.4g}°")
         texts.append(f"{name}by correlation, simulation turned by {turned}{within}{sure}")
     return texts
 
@@ -252,7 +252,8 @@ def _level_row(label: str, level: LevelPair, line: LineLevel | None = None) -> s
     words = "" if line is None else missing_words(line)
     missing = f"  {words}" if words else ""
     return (
-        f"{label[:30]:<30} {level.recorded_db:>10.1f} {level.simulated_db:>10.1f} {level.difference_db:>+11.1f} "
+        f"{label[:30]:<30} {with_minus(f'{level.recorded_db:.1f}'):>10} {with_minus(f'{level.simulated_db:.1f}'):>10} "
+        f"{signed(level.difference_db):>11} "
         f"± {2 * level.repeatability_db:.1f}{missing}"
     )
 
@@ -367,9 +368,9 @@ def _line_row(line: LineLevel) -> LevelRow:
     return LevelRow(
         line.label,
         readable(line.order, 6),
-        _number(level.recorded_db),
-        _number(level.simulated_db),
-        _signed(level.difference_db),
+        with_minus(f"{level.recorded_db:.1f}"),
+        with_minus(f"{level.simulated_db:.1f}"),
+        signed(level.difference_db),
         f"{2 * level.repeatability_db:.1f}",
         missing_words(line),
         level.is_beyond,
@@ -399,23 +400,15 @@ def _provenance(comparison: Comparison, command: str, date: datetime) -> Rows:
 
 
 def _difference(level: LevelPair) -> str:
-    return f"{_signed(level.difference_db)} ± {2 * level.repeatability_db:.1f} dB"
+    return f"{signed(level.difference_db)} ± {2 * level.repeatability_db:.1f} dB"
 
 
 def _repeated(figure: Repeated) -> str:
-    return f"{_number(figure.value, 3)} ± {2 * figure.repeatability:.2g}"
+    return f"{with_minus(f'{figure.value:.3f}')} ± {2 * figure.repeatability:.2g}"
 
 
 def _percent(figure: Repeated) -> str:
     return f"{100 * figure.value:.1f} ± {200 * figure.repeatability:.1f} %"
-
-
-def _number(value: float, n_decimals: int = 1) -> str:
-    return f"{value:.{n_decimals}f}".replace("-", "−")
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.1f}".replace("-", "−")
 
 
 # A comparison as JSON, in a schema that stays.

@@ -34,7 +34,7 @@ from app.benchmark.scoring.scores import (
 )
 from gearsig import __version__
 from gearsig.cache import write_text
-from gearsig.formatting import percent, rounded
+from gearsig.formatting import percent, rounded, with_minus
 from gearsig.gap import NONE, UNKNOWN
 from gearsig.plot import Picture, embed
 from gearsig.report import Section, benchmark_html
@@ -137,7 +137,7 @@ def cell(figure: Figure, score: Score, *, with_n: bool = True) -> str:
     if figure.is_share:
         return f"{percent(score.value)} ({100 * score.low:.0f}–{100 * score.high:.0f}){n}"
     interval = f" ({score.low:.2f}–{score.high:.2f})" if isfinite(score.low) else ""
-    return f"{score.value:.2f}{interval}{n}".replace("-", "−")
+    return with_minus(f"{score.value:.2f}{interval}{n}")
 
 
 def target_cell(figure: Figure, score: Score, column: int) -> str:
@@ -156,7 +156,7 @@ def _drop(figure: Figure, same: Score, blind: Score) -> str:
         return NO_CASES
     drop = blind.value - same.value
     text = f"{100 * drop:+.0f} points" if figure.is_share else f"{drop:+.2f}"
-    return text.replace("-", "−")
+    return with_minus(text)
 
 
 def _basis(result: BenchmarkResult) -> str:
