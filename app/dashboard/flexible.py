@@ -120,7 +120,7 @@ def show_gear() -> None:
     with st.expander("Numbers", key="gear numbers"):
         st.markdown("  \n".join(as_typed(line) for line in gear_body.lines(study)))
     st.caption(
-        f"A coarse mesh, so that it turns smoothly{'; Numbers say how' if study.discretisation else ''}. "
+        f"A coarse mesh, so that it turns smoothly{': Numbers says how coarse' if study.discretisation else ''}. "
         f"{gear_body.PEAKS if shown == stress else 'The motion is drawn much too large.'}"
     )
 

@@ -47,7 +47,7 @@ def test_publications_are_said_in_the_pages_own_words() -> None:
 def test_a_gear_is_shown_with_its_modes_and_stress() -> None:
     page = AppTest.from_file(str(MAIN), default_timeout=300).switch_page("pages/flexible.py").run()
     assert not page.exception
-    assert "Numbers say how coarse" in page.caption[-1].value
+    assert "Numbers says how coarse" in page.caption[-1].value
     assert not any("gearsig" in caption.value for caption in page.caption)
     shown = page.selectbox(key="gear shown")
     assert len(shown.options) == 7
