@@ -37,10 +37,6 @@ class InputError(GearsigError, ValueError):
         super().__init__(_one_line(text))
 
 
-class NotStatedError(InputError):
-    """Something that has to be known was not stated; nothing that was given is wrong."""
-
-
 class RefusalError(GearsigError):
     """The data do not allow an answer; the input is well formed all the same.
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import FloatArray, positive
-from gearsig.errors import InputError, NotStatedError
+from gearsig.errors import InputError
 from gearsig.formatting import counted
 from gearsig.recording._limits import check_memory
 from gearsig.recording._table import RawColumn, RawTable, rate_of_time, seconds_per_unit
@@ -162,7 +162,7 @@ def _sampling_rate(
         )
     if file_hz is None and rig_hz is None:
         remedy = "give --fs or sampling_rate_hz in the rig file"
-        raise NotStatedError("states no sampling rate", where=source, allowed="above 0 Hz", remedy=remedy)
+        raise InputError("states no sampling rate", where=source, allowed="above 0 Hz", remedy=remedy)
     if file_hz is not None and rig_hz is not None and differ(file_hz, rig_hz):
         text = f"the rig states a sampling rate of {rig_hz:g} Hz, the file {file_hz:.9g} Hz: the file's was taken"
         return file_hz, (text,)

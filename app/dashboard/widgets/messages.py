@@ -10,7 +10,7 @@ import streamlit as st
 
 from app.dashboard.theme import as_typed
 from gearsig.diagnosis import CannotTell
-from gearsig.errors import GearsigError, InputError, NotStatedError
+from gearsig.errors import GearsigError, InputError
 
 FORM_TABLES = {"shaft": "Shafts", "pair": "Gear pairs", "bearing": "Bearings", "sensor": "Sensors"}
 """What the form of the machine calls the lists of a rig file."""
@@ -62,7 +62,7 @@ _FILE = re.compile(r"(?:rig|rig\.toml)|[^\[\]]*: (\w+)")
 
 
 def show_error(error: GearsigError) -> None:
-    """Show an error of the input, or what is still to be stated; texts in it may come from the file."""
+    """Show an error of the input; texts in it may come from the file."""
     if not isinstance(error, InputError):
         st.error(as_typed(in_page_words(str(error))), icon=":material/help:")
         return
@@ -72,10 +72,7 @@ def show_error(error: GearsigError) -> None:
         lines.append(f"Allowed: {as_typed(in_page_words(error.allowed))}")
     if error.remedy:
         lines.append(f"What to do: {as_typed(in_page_words(error.remedy))}")
-    if isinstance(error, NotStatedError):
-        st.info("\n\n".join(lines), icon=":material/help:")
-    else:
-        st.error("\n\n".join(lines), icon=":material/error:")
+    st.error("\n\n".join(lines), icon=":material/error:")
 
 
 def place_in_form(where: str) -> str:
