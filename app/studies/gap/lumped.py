@@ -13,7 +13,7 @@ from math import pi
 
 import numpy as np
 
-from app.studies.gap.by_hand import made_by_hand, rig_of, with_foreign_vibration, with_signature
+from app.studies.gap.by_hand import made_by_hand, with_foreign_vibration, with_signature
 from app.studies.gap.lumped_rig import (
     N_PATH,
     LumpedDay,
@@ -22,20 +22,15 @@ from app.studies.gap.lumped_rig import (
     LumpedRig,
     record,
 )
-from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, reduced, samples_of
+from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, reduced_twin, samples_of
 from gearsig.checks import FloatArray
 from gearsig.gap import (
     BY_HAND,
     NONE,
     UNKNOWN,
-    OperatingCondition,
-    reduce_recording,
-    run_length_s,
-    with_channels_of,
 )
-from sims.cracked import CrackedTwin
 from sims.effects import ONE_TOOTH_SHARE
-from sims.machine import log_uniform, nominal_of
+from sims.machine import log_uniform
 
 LUMPED = "lumped"
 
@@ -366,14 +361,6 @@ def _at(rig: LumpedRig, point: int, levels: FloatArray, faults: list[tuple[str, 
     number, torque_nm = FIRST_RIG + 2 * index + point, rig.torque_nm(point)
     rng = np.random.default_rng([SEED, 4, index, point])
     reference = record(rig, point, LumpedDay.drawn(rig, rng), LumpedFault(), rng, healthy_levels=levels)
-    point_of, known = reduced(reference, number), rig_of(reference)
-    run = CrackedTwin(known, nominal_of(known)).run(
-        OperatingCondition(60.0 * point_of.speed_hz, torque_nm),
-        seed=number,
-        duration_s=run_length_s(point_of),
-        sampling_rate_hz=reference.sampling_rate_hz,
-        noise=1,
-    )
 
     def compared() -> Iterator[Recorded]:
         healthy = reference
@@ -388,4 +375,4 @@ def _at(rig: LumpedRig, point: int, levels: FloatArray, faults: list[tuple[str, 
         for name in map(str, rng.choice(made_by_hand(healthy, torque_nm), N_BY_HAND, replace=False)):
             yield name, BY_HAND, 0.0, with_signature(healthy, name, rng)[0], torque_nm
 
-    return reference, with_channels_of(reduce_recording(run, known), point_of), compared()
+    return reference, reduced_twin(reference, number, torque_nm), compared()
