@@ -523,8 +523,9 @@ def neighbour_levels(spectrum: Spectrum) -> FloatArray:
 # calibration was made so: what a resonance multiplies, it multiplies at all teeth.
 #
 # Two alignments use the scores, and differ as well. `estimate_crack` and the gap diagnosis compare the same gears:
-# they try whole teeth, where a mark fixes the phase of the mesh, and only lines that tell teeth apart count. `compare`
-# turns a simulation of any gears onto a recording, by any angle, and mesh lines count, too.
+# they try whole teeth, or none, where marks say so, and a part of a tooth about them; slow orders do not count, in
+# which unbalance differs from day to day. `compare` turns a simulation of any gears onto a recording, by any angle and
+# all orders.
 
 
 def sliding_mean(values: FloatArray, width: int) -> FloatArray:
