@@ -449,7 +449,7 @@ def diagnose_gearless(
     def examine(recording: PreparedRecording) -> tuple[ExaminedRecording, list[str]]:
         name = recording.recording.name
         tell(f"analysing {name}", 0.2 + 0.7 * next(done) / len(recordings))
-        return _beyond_reference(recording, examined(name, _with_bearings(recording), healthy)), []
+        return _beyond_reference(recording, examined(name, _with_bearings(recording), healthy), references), []
 
     every = readable(recordings, examine, "recording", left_out)
     hint = () if references else (NO_REFERENCE,)
@@ -478,7 +478,9 @@ def diagnose_gearless(
     )
 
 
-def _beyond_reference(recording: PreparedRecording, alone: ExaminedRecording) -> ExaminedRecording:
+def _beyond_reference(
+    recording: PreparedRecording, alone: ExaminedRecording, references: Sequence[PreparedRecording]
+) -> ExaminedRecording:
     """Leave out faults and suspicions that the reference gives as much reason for, measured in the same band of both.
 
     What is barely suspected in one recording is often just missed in another of the same machine.
@@ -486,7 +488,9 @@ def _beyond_reference(recording: PreparedRecording, alone: ExaminedRecording) ->
     claims = (Kind.FAULT, Kind.SUSPICION)
     if alone.reference is None or not any(part.finding.kind in claims for part in alone.unexpected):
         return alone
-    beside = analyze(recording, reference=alone.reference.recording)
+    # The prepared one: what its own analysis has resampled and averaged is there.
+    reference = next(prepared for prepared in references if prepared.recording is alone.reference.recording)
+    beside = analyze(recording, reference=reference)
     now = {(f.code, f.where): f for f in beside.findings}
     kept, notices = [], list(alone.notices)
     for part in alone.unexpected:
