@@ -34,9 +34,9 @@ from gearsig.comparison import (
     missing_words,
 )
 from gearsig.errors import InputError, RefusalError
-from gearsig.formatting import axis_label
+from gearsig.formatting import axis_label, unit_text
 from gearsig.gap import OperatingCondition
-from gearsig.plot import ChartLine, LinePanel, unit_text, with_unit
+from gearsig.plot import ChartLine, LinePanel, with_unit
 from gearsig.prepared import refined_angle
 from gearsig.recording import Recording
 from gearsig.report import (

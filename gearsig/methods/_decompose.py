@@ -21,7 +21,7 @@ from gearsig.decompose import (
     vmd,
 )
 from gearsig.errors import InputError
-from gearsig.formatting import readable
+from gearsig.formatting import readable, unit_text
 from gearsig.indicators import kurtosis
 from gearsig.methods._table import (
     LINES,
@@ -36,7 +36,7 @@ from gearsig.methods._table import (
     waveforms_of,
 )
 from gearsig.methods._timefreq import NAMES, levels_answer, levels_of
-from gearsig.plot import ChartLine, Cursor, LinePanel, above_zero, series_colours, unit_text, with_unit
+from gearsig.plot import ChartLine, Cursor, LinePanel, above_zero, series_colours, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.spectra import band_envelope
 from gearsig.timefreq import UniformSignal

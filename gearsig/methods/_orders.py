@@ -10,7 +10,7 @@ import numpy as np
 from gearsig import plot
 from gearsig.diagnosis import RecordBlocks
 from gearsig.errors import GearsigError
-from gearsig.formatting import readable
+from gearsig.formatting import readable, unit_text
 from gearsig.methods._spectra import cursors_of, highest_order
 from gearsig.methods._table import (
     HIGHEST,
@@ -23,7 +23,7 @@ from gearsig.methods._table import (
     waveforms_of,
 )
 from gearsig.orders import OrderMap, TrackedOrder, frequency_map, order_map, track_orders, track_vold_kalman
-from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibels, unit_text, with_unit
+from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibels, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.rig import order_lines
 
@@ -230,7 +230,7 @@ def _vold_kalman(
         panels=(panel,),
         facts=(
             (
-                f"The residual has an rms of **{readable(residual)} {plot.unit_text(unit)}**: "
+                f"The residual has an rms of **{readable(residual)} {unit_text(unit)}**: "
                 f"{100.0 * residual**2 / power:.3g} % of the energy. Expected error of the solution: "
                 f"{separation.expected_error:.1g} of the largest component."
             ),

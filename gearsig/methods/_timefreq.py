@@ -10,7 +10,7 @@ import numpy as np
 from gearsig import plot, timefreq
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.formatting import axis_label
+from gearsig.formatting import axis_label, unit_text
 from gearsig.methods._spectra import cursors_of
 from gearsig.methods._table import (
     LINES,
@@ -23,7 +23,7 @@ from gearsig.methods._table import (
     waveforms_of,
 )
 from gearsig.orders import order_spectrum
-from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibels, unit_text, with_unit
+from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibels, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.timefreq import Morse, Ridge, TimeFrequencyMap, UniformSignal, WaveletPackets
 

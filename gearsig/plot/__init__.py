@@ -1,6 +1,5 @@
 """Figures of results; no arithmetic beyond display units."""
 
-from gearsig.formatting import unit_text
 from gearsig.plot._average import average_figure, polar_figure
 from gearsig.plot._comparison import average_overlay_figure, band_levels_figure, order_overlay_figure
 from gearsig.plot._cursors import (
@@ -244,7 +243,6 @@ __all__ = [
     "time_frequency_figure",
     "tooth_figure",
     "trend_figure",
-    "unit_text",
     "value_limits",
     "vmd",
     "with_unit",

@@ -24,8 +24,8 @@ from gearsig.comparison import (
     mesh_lines,
     missing_words,
 )
-from gearsig.formatting import readable, rounded, signed, spreadsheet_cell, with_minus
-from gearsig.plot import Captioned, Cursor, Picture, embed, unit_text
+from gearsig.formatting import readable, rounded, signed, spreadsheet_cell, unit_text, with_minus
+from gearsig.plot import Captioned, Cursor, Picture, embed
 from gearsig.report._files import render
 from gearsig.report._json import Layout, document, plain
 

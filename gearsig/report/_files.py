@@ -136,7 +136,7 @@ def render(template: str, **values: Any) -> str:
 def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    from gearsig.plot import unit_text
+    from gearsig.formatting import unit_text
 
     environment = Environment(
         loader=PackageLoader("gearsig.report"),

@@ -12,8 +12,8 @@ from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.errors import InputError
 from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, counts_text, fleet_changes, trends_text
-from gearsig.formatting import readable
-from gearsig.plot import Picture, fleet_trend_picture, unit_text
+from gearsig.formatting import readable, unit_text
+from gearsig.plot import Picture, fleet_trend_picture
 from gearsig.report._files import render
 from gearsig.report._pdf import compiled, put_picture, write_pdf
 

@@ -18,9 +18,9 @@ from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.diagnosis import Analysis, Kind, Outcome
 from gearsig.fleet import date_in_name
-from gearsig.formatting import percent, readable, spreadsheet_cell
+from gearsig.formatting import percent, readable, spreadsheet_cell, unit_text
 from gearsig.indicators import Indicator
-from gearsig.plot import unit_text, with_unit
+from gearsig.plot import with_unit
 from gearsig.report._files import render
 from gearsig.report._pdf import compiled, write_pdf
 from gearsig.report._sections import css_class, headline_of

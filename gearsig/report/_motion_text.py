@@ -20,7 +20,7 @@ from textwrap import fill
 
 import numpy as np
 
-from gearsig.formatting import readable
+from gearsig.formatting import readable, unit_text
 from gearsig.gap import severity_unit
 from gearsig.motion import (
     AngleProfile,
@@ -31,7 +31,6 @@ from gearsig.motion import (
     StartStop,
     acceleration_limit_rad_s2,
 )
-from gearsig.plot import unit_text
 from gearsig.report._json import document, members
 from gearsig.spectra import Spectrum
 

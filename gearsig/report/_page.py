@@ -16,10 +16,10 @@ from gearsig.cache import write_text
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import CHANGED, Analysis, ChannelAnalysis, Finding, Kind, Where, changes, with_known_angle
 from gearsig.errors import RefusalError
-from gearsig.formatting import readable
+from gearsig.formatting import readable, unit_text
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
-from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed, order_cursors, unit_text
+from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed, order_cursors
 from gearsig.prepared import circular_correlation
 from gearsig.recording import SI_FACTORS
 from gearsig.report._files import render

@@ -31,9 +31,8 @@ from gearsig.diagnosis import (
     Where,
     changes,
 )
-from gearsig.formatting import counted, named, percent, readable, signed, with_minus
+from gearsig.formatting import counted, named, percent, readable, signed, unit_text, with_minus
 from gearsig.indicators import Indicator
-from gearsig.plot import unit_text
 from gearsig.rig import Bearing, GearPair, Rig
 
 Rows = tuple[tuple[str, str], ...]

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from gearsig.plot import decibels, plain, unit_text, with_unit
+from gearsig.formatting import unit_text
+from gearsig.plot import decibels, plain, with_unit
 
 
 def test_decibels_of_amplitudes_and_powers():

@@ -112,8 +112,8 @@ def effect_text(setting: EffectSetting) -> str:
 
 def shown_unit(unit: str) -> str:
     """Write a unit of the catalogue as people read it."""
+    from gearsig.formatting import unit_text
     from gearsig.gap import severity_unit
-    from gearsig.plot import unit_text
 
     return unit_text(severity_unit(unit))
 

@@ -16,7 +16,7 @@ from app.dashboard.theme import one_line, palette
 from app.dashboard.widgets.charts import download
 from app.dashboard.widgets.messages import FORM_LABELS, FORM_TABLES, show_error
 from gearsig.errors import GearsigError, InputError
-from gearsig.plot import unit_text
+from gearsig.formatting import unit_text
 from gearsig.rig import QUANTITIES, Rig, bearing_catalogue, order_lines, rig_from_dict
 
 if TYPE_CHECKING:

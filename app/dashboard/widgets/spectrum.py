@@ -20,7 +20,7 @@ from app.dashboard.widgets.charts import (
     show_svg,
 )
 from gearsig.diagnosis import Analysis, ChannelAnalysis
-from gearsig.formatting import readable
+from gearsig.formatting import readable, unit_text
 from gearsig.orders import SynchronousAverage
 from gearsig.plot import (
     AngleMark,
@@ -32,7 +32,6 @@ from gearsig.plot import (
     marks_of,
     polar_figure,
     svg_ring,
-    unit_text,
     value_limits,
     with_unit,
 )

@@ -27,7 +27,7 @@ from gearsig import plot
 from gearsig.angle import resample_to_angle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
 from gearsig.errors import GearsigError, InputError
-from gearsig.formatting import csv_text
+from gearsig.formatting import csv_text, unit_text
 from gearsig.indicators import Indicator
 from gearsig.methods import METHODS
 from gearsig.orders import OrderMap, frequency_map, order_map
@@ -177,7 +177,7 @@ def _show_quality(analysis: Analysis) -> None:
     table = {
         "channel": recording.channel_names,
         "quantity": [c.quantity.replace("_", " ") for c in recording.channels],
-        "unit": [plot.unit_text(c.unit) or "not known" for c in recording.channels],
+        "unit": [unit_text(c.unit) or "not known" for c in recording.channels],
         "position": [c.position for c in recording.channels],
         "smallest": [float(row.min()) for row in recording.samples],
         "mean": [float(row.mean(dtype=np.float64)) for row in recording.samples],
@@ -244,7 +244,7 @@ def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[Indicator
         {
             "indicator": i.name,
             "value": i.value,
-            "unit": plot.unit_text(i.unit),
+            "unit": unit_text(i.unit),
             "channel": i.channel,
             "of": i.gear or i.bearing or i.shaft or i.band,
             "computed on": i.computed_on,
@@ -298,7 +298,7 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
         y,
         shown_map.axis_label,
         "time (s)" if along == "Time" else "speed (rpm)",
-        f"dB re 1 {plot.unit_text(shown_map.unit)}",
+        f"dB re 1 {unit_text(shown_map.unit)}",
         lines=rays if along == "Speed" else (),
         cursors=cursors if lines == "Order" else (),
     )
