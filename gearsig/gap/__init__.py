@@ -15,6 +15,7 @@ from gearsig.gap._attribution import (
     with_likelihoods,
     with_unknown_shared,
 )
+from gearsig.gap._burst import burst_features
 from gearsig.gap._change import (
     alike_features,
     apart_features,
@@ -311,6 +312,7 @@ __all__ = [
     "background_orders",
     "banks_of",
     "beyond_the_mesh",
+    "burst_features",
     "change_features",
     "change_once",
     "check_steady",

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from gearsig.checks import FloatArray
+from gearsig.gap._burst import burst_features, clearness
 from gearsig.gap._features import (
     Feature,
     Features,
@@ -304,6 +305,13 @@ def _patterns(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[Name
         )
     yield from apart_features(now, healthy)
     yield from alike_features(now, healthy)
+    bursts = []
+    for side, (turned, _) in enumerate(differences):
+        n = turned.lines.shape[1]
+        averages = zip(now.averages(side), healthy.averages(side), strict=True)
+        noise = np.array([after.noise[:n] + before.noise[:n] for after, before in averages])
+        bursts.append((turned.lines, noise, turned.teeth))
+    yield from burst_features(*max(bursts, key=lambda burst: clearness(*burst)))
 
 
 def turned_difference(now: ReducedRecording, healthy: ReducedRecording, side: int) -> tuple[ShaftLines, float]:

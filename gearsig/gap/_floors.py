@@ -31,6 +31,7 @@ _KIND = {
     "tooth": PlaceKind.TOOTH,
     "change": PlaceKind.TOOTH,
     "surprise": PlaceKind.TOOTH,
+    "burst": PlaceKind.TOOTH,
     "envelope": PlaceKind.ENVELOPE,
     "line": PlaceKind.LINE,
     "hum": PlaceKind.LINE,
@@ -41,7 +42,7 @@ _KIND = {
 }
 """Family of features, or a single feature → the kind of place that it speaks of."""
 
-UNPREDICTED = ("surprise.", "apart.", "alike.")
+UNPREDICTED = ("surprise.", "apart.", "alike.", "burst.")
 """Features, the last ones, that hang on noise and sensors: no simulation predicts them, no size is made of them."""
 
 _KINDS = {

@@ -839,7 +839,7 @@ def _merged(places: list[GapPlace]) -> list[GapPlace]:
 
 
 def _located_rows(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
-    kept = [row for row in rows if names[row] not in REPEATED and not names[row].startswith("apart.")]
+    kept = [row for row in rows if names[row] not in REPEATED and not names[row].startswith(("apart.", "burst."))]
     return np.array(kept, dtype=np.intp)
 
 

@@ -372,6 +372,10 @@ class Recogniser:
         return factors
 
 
+MAX_SHARE_DB = 10.0
+"""What is counted as 1 of a burst's shares, so that they are within `LINEAR_REACH`."""
+
+
 def input_rows(
     floor: StructuralFloor, changes: FloatArray, scatter: FloatArray, loads_n_per_mm: FloatArray
 ) -> FloatArray:
@@ -381,10 +385,10 @@ def input_rows(
     come twice, as they changed and as far as that holds both relative to the mesh and by itself. Where two averages
     can be subtracted, what a tooth did is in the difference: the change of either average's own figures is left out.
     Against a simulation, of the speed only how much it swings counts: how steadily it does, beside the tachometer's
-    jitter, says more of the tachometer.
+    jitter, says more of the tachometer. A burst's shares are a shape, and no size that noise adds to: they stand alone.
     """
     patterns = any(name.startswith("surprise.") for name in floor.names)
-    left_out = "tooth." if patterns else ("speed.drift", "speed.swing_line")
+    left_out = ("tooth.", "burst.") if patterns else ("speed.drift", "speed.swing_line")
     kept = [i for i, name in enumerate(floor.names) if not name.startswith(left_out)]
     names = [floor.names[i] for i in kept]
     distances = floor.from_centre(floor.names, changes)[:, kept]
@@ -396,6 +400,7 @@ def input_rows(
         [
             contrast_rows(names, distances / scatters),
             held[:, further],
+            changes[:, [i for i, name in enumerate(floor.names) if name.startswith("burst.")]] / MAX_SHARE_DB,
             np.log10(np.maximum(loads_n_per_mm, MIN_LOAD_N_PER_MM)),
         ]
     )

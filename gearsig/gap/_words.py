@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isclose
 
+from gearsig.gap._burst import ECHO_LAGS_PITCHES, N_QUARTERS
 from gearsig.gap._reduction import GearFrame, ReducedRecording
 from gearsig.gap._simulator import OperatingCondition
 from gearsig.gap._types import Evidence, GapCause, PlaceKind, Shrinkage
@@ -147,12 +148,23 @@ _ALIKE = {
     for a, b in (("mesh", "repeated"), ("repeated", "noise"), ("mesh", "noise"))
     for suffix, said in (("less", "the former over the latter"), ("apart", "apart"), ("together", "changed alike"))
 }
+_BURST_WAYS = {"plain": "as it is", "even": "magnitudes made even"}
+_BURST = (
+    {f"course.{i}": f"share of quarter pitch {i}" for i in range(N_QUARTERS)}
+    | {f"echo.{i}": f"autocorrelation at lag {lag:.2f} pitches" for i, lag in enumerate(ECHO_LAGS_PITCHES)}
+    | {"elsewhere": "share further away"}
+)
 _OTHER = {
     "mesh.total": "mesh harmonics together",
     "mesh.half": "half mesh orders",
     "apart.mesh": "mesh harmonics, difference between sensors",
     "apart.floor": "floor, difference between sensors",
     **{f"alike.{key}": f"about the mesh harmonics: {words}" for key, words in _ALIKE.items()},
+    **{
+        f"burst.{way}.{key}": f"burst of a tooth, {said}: {words}"
+        for way, said in _BURST_WAYS.items()
+        for key, words in _BURST.items()
+    },
     "floor.total": "floor, all bands",
     "floor.to_signal": "floor over the whole signal",
     "raw.level": "level of the whole signal",

@@ -42,7 +42,7 @@ def test_from_the_slider_to_the_analysis_and_back(laboratory: playwright.Page) -
         laboratory.get_by_role("tab", name=name, exact=True).click()
         settle(laboratory)
         laboratory.locator(".figure svg, .js-plotly-plot").first.wait_for()
-    laboratory.get_by_role("button", name="Open in the analysis page").click()
+    laboratory.get_by_role("button", name="Open in Analysis").click()
     laboratory.locator(".strip").first.wait_for()
     laboratory.get_by_text("published_55_75_root_crack_2.h5").first.wait_for()
     laboratory.get_by_text("5 s at 20480 Hz").first.wait_for()

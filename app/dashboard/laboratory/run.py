@@ -308,7 +308,7 @@ def show_saving(setup: Setup, lengths_s: Sequence[float] = ()) -> None:
                 type="primary",
             )
             st.caption("A zip with the recording, its rig file, and what was put in (truth).")
-        if st.button("Open in the analysis page", icon=":material/troubleshoot:"):
+        if st.button("Open in Analysis", icon=":material/troubleshoot:"):
             with st.spinner("Simulating the recording …"):
                 state.open_simulated(chosen_of(setup))
             st.switch_page(state.ANALYSIS_PAGE)
