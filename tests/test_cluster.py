@@ -167,7 +167,7 @@ def test_reports_sweeps_and_bifurcations_lose_a_worker_and_nothing_else(schedule
         assert len(opened.lost()) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.filterwarnings("ignore")
 def test_a_gap_study_loses_a_worker_and_nothing_else(scheduler, tmp_path, capsys):
     """Its trials run on the cluster; one of two workers is killed as soon as it has simulated for a second."""
@@ -201,6 +201,7 @@ def test_a_gap_study_loses_a_worker_and_nothing_else(scheduler, tmp_path, capsys
     assert "was killed" not in json.dumps(found)
 
 
+@pytest.mark.slow
 def test_what_is_no_scheduler_is_said():
     with pytest.raises(InputError, match="no Dask scheduler"), cluster("tcp://127.0.0.1:9"):
         pass

@@ -159,7 +159,7 @@ def test_a_rotor_with_more_unbalance_has_changed_first_of_all() -> None:
         assert analysis.shaft_angle.mean_speed_rpm == pytest.approx(speed_rpm, abs=1.5)  # type: ignore[union-attr]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("name", [one.name for one in RECORDINGS])
 def test_the_halves_of_a_recording_are_alike(name: str) -> None:
     first, second = halves(BY_NAME[name].read())

@@ -79,6 +79,7 @@ METHODS = {
 }
 
 
+@pytest.mark.slow
 def test_four_threads_get_what_one_gets(recording, angle):
     """Two threads begin with one method, two with another: the same kernels and different ones run at once."""
     alone = {name: method(recording, angle) for name, method in METHODS.items()}

@@ -119,6 +119,7 @@ def test_the_diagnosing_process_finds_no_label(folders):
     assert sum(c.probability for c in answers["rules"].causes) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_the_diagnosing_simulator_makes_the_same_cases_too(tmp_path):
     truth = SHORT.make(case("single", "eccentricity", SAME), tmp_path)
     seen = read_visible(tmp_path)
@@ -140,7 +141,7 @@ def test_the_same_cases_have_the_same_gears_conditions_and_effects():
     assert ours["conditions"] == [{key: c[key] for key in kept} for c in theirs["conditions"]]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_stopped_run_leaves_answers_and_goes_on(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(run, "state_of_code", lambda: "the same")  # others may be at work on it
     wanted = BenchmarkRequest(SHORT, ("rules", "majority"))
@@ -293,6 +294,7 @@ def test_the_state_of_the_code_hangs_on_the_code_and_not_on_where_it_lies(tmp_pa
     assert state_of_code() != states[1]
 
 
+@pytest.mark.slow
 def test_sigterm_leaves_answers_only(tmp_path):
     target, temporary, told = tmp_path / "out", tmp_path / "temporary", tmp_path / "lingering"
     temporary.mkdir()

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard.fleet import STORE, example_store
@@ -53,6 +54,7 @@ def test_an_empty_store_says_how_to_fill_it(tmp_path):
     assert "gearsig fleet add" in shown_text(opened(tmp_path / "empty"))
 
 
+@pytest.mark.slow
 def test_an_empty_page_shows_an_example_whose_damaged_machines_are_alarms(tmp_path):
     page = opened(tmp_path / "nothing")
     press(page, "See an example")
@@ -64,6 +66,7 @@ def test_an_empty_page_shows_an_example_whose_damaged_machines_are_alarms(tmp_pa
     assert "gearsig fleet add" in shown_text(page)
 
 
+@pytest.mark.slow
 def test_a_link_to_the_example_shows_it_in_another_session(tmp_path):
     folder = {STORE: str(tmp_path / "nothing")}
     page = press(at("fleet", {}, **folder), "See an example")

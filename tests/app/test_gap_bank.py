@@ -174,6 +174,7 @@ def test_a_stop_ends_it_and_leaves_nothing(tmp_path: Path, processes: int) -> No
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_bank() -> None:
     assert same(bank(processes=2), bank(processes=1))
 

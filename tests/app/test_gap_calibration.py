@@ -24,7 +24,7 @@ def drawn(n: int, truth: GapCalibration, seed: int = 3) -> list[AttributedCase]:
     return cases
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize(("sharpness", "weight"), [(0.6, 2.0), (1.3, 0.5)])
 def test_the_drawn_calibration_is_found(sharpness: float, weight: float) -> None:
     truth = GapCalibration(sharpness, weight, 0.2, 0.7, -0.5, 0.5, 0.65, sharper=0.4, none_slope=-1.0)
@@ -37,6 +37,7 @@ def test_the_drawn_calibration_is_found(sharpness: float, weight: float) -> None
     assert fitted.none_slope == pytest.approx(-1.0, abs=0.4)
 
 
+@pytest.mark.slow
 def test_few_healthy_cases_get_an_effect() -> None:
     cases = drawn(1500, GapCalibration(1.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.65))
     fitted = fit_calibration(cases)

@@ -156,6 +156,7 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
     assert "what was chosen before" in text_of(page)
 
 
+@pytest.mark.slow
 def test_a_result_is_shown_again_after_a_reload(stub, tmp_path, monkeypatch) -> None:
     stub()
     page = wait_for_the_end(press(opened(), "Diagnose"))

@@ -110,6 +110,7 @@ def test_a_reference_that_is_damaged_itself_is_not_used() -> None:
     assert any("not healthy" in notice for notice in report.notices)
 
 
+@pytest.mark.slow
 def test_impacts_of_no_known_part_stay_unknown() -> None:
     strange = diagnosed(recording(5.9))
     assert strange.outcome is GapOutcome.UNKNOWN

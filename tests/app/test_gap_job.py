@@ -54,6 +54,7 @@ def test_the_result_is_the_report_and_its_files(job):
     assert 0.5 < job.progress[1] <= 1.0
 
 
+@pytest.mark.slow
 def test_a_users_own_app_in_the_working_folder_breaks_nothing(tmp_path, monkeypatch):
     for name, value in environment(tmp_path).items():
         monkeypatch.setenv(name, value)

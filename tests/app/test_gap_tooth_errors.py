@@ -14,7 +14,7 @@ def known() -> dict[str, KnownToothErrors]:
     return {name: known_tooth_errors_of(name, 100) for name in SIMULATORS}
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("left_out", [*SIMULATORS])
 def test_faults_of_a_simulator_left_out_are_named(known: dict[str, KnownToothErrors], left_out: str) -> None:
     """By chance one in four; 0.84 and 0.80 with 600 of each, a third of the pitch errors of one tooth."""

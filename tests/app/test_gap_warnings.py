@@ -67,6 +67,7 @@ def with_wrong_teeth() -> ReducedRecording:
     return reduce_recording(recording(0, 1), replace(rig(), pairs=(pair,)))
 
 
+@pytest.mark.slow
 def test_another_specimen_is_noticed_and_a_damaged_gear_is_not_another_machine() -> None:
     healthy = gathered(0, 0)
     assert strange_pattern(gathered(0, 1), healthy, "now") == []
@@ -127,6 +128,7 @@ def test_recording_and_reference_exchanged_are_noticed_by_the_sign_of_the_change
     assert exchanged(gathered(3, 1), healthy, "now") == []  # another specimen is no exchange
 
 
+@pytest.mark.slow
 def test_a_reference_with_a_fault_is_told() -> None:
     damaged = recording(0, 1, chipped=True)
     _, _, warnings = unexpected_findings(*prepared(recording(0, 2)), prepared(recording(0, 3), damaged))
@@ -180,6 +182,7 @@ def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> No
         conditions_of(prepared(replace(whole, samples=samples)), (), twin())
 
 
+@pytest.mark.slow
 def test_what_was_not_given_of_the_operating_point_is_told() -> None:
     whole = recording(0, 1).with_name("now")
     _, notices = conditions_of(prepared(whole), (), twin())

@@ -50,7 +50,7 @@ def test_mesh_modes_stress_and_reductions_are_written(tmp_path, monkeypatch):
     assert any(name.startswith("mode_1_") for name in points)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_gear_of_another_version_is_named_until_it_is_cleared_away(tmp_path, monkeypatch):
     monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path / "kept"))
     arguments = ("-o", str(tmp_path / "out"), *SMALL, "--dof", "5000", "--modes", "4", "--reduce")
@@ -95,6 +95,7 @@ def test_what_cannot_be_is_refused(tmp_path, arguments, said):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_coarse_gear_on_springs_says_how_coarse_it_is(tmp_path):
     found = _run(
         "-o", str(tmp_path / "out"), "--dof", "5000", "--held", "springs", "--twist", "1e5Nm/rad", "--modes", "9"

@@ -61,6 +61,7 @@ def test_the_crack_slider_shows_the_faulty_machine_in_every_view() -> None:
         assert len(figures(page)) + len(page.get("plotly_chart")) == CHARTS[tab], tab
 
 
+@pytest.mark.slow
 def test_every_effect_has_a_slider_that_switches_it_on() -> None:
     page = opened()
     others = [name for name in effects() if name != "root_crack"]

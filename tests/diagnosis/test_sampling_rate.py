@@ -92,16 +92,17 @@ def test_of_a_measured_race_ten_times_too_low() -> None:
     assert f"{recording.sampling_rate_hz:g} Hz" in finding(stated, CODE).title.split("would fit best")[0]
 
 
+@pytest.mark.slow
 @needs_data
 @pytest.mark.parametrize(
     ("name", "right_hz", "stated_hz"),
     [
-        pytest.param("normal_0", 48_000, 12_000, marks=pytest.mark.slow),
-        pytest.param("IR021_0", 12_000, 48_000, marks=pytest.mark.slow),
+        ("normal_0", 48_000, 12_000),
+        ("IR021_0", 12_000, 48_000),
         ("OR007@6_0", 12_000, 25_600),
-        pytest.param("OR007@6_0", 12_000, 30_720, marks=pytest.mark.slow),
-        pytest.param("IR021_0", 12_000, 30_720, marks=pytest.mark.slow),
-        pytest.param("normal_0", 48_000, 4_800, marks=pytest.mark.slow),
+        ("OR007@6_0", 12_000, 30_720),
+        ("IR021_0", 12_000, 30_720),
+        ("normal_0", 48_000, 4_800),
     ],
 )
 def test_of_a_measured_motor(name: str, right_hz: int, stated_hz: int) -> None:

@@ -148,6 +148,7 @@ def _adding(store: Path, data: Path, n_processes: int = 1) -> "subprocess.Popen[
     return subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": root})
 
 
+@pytest.mark.slow
 def test_two_processes_share_a_folder_and_add_each_recording_once(make_recordings, tmp_path):
     data = make_recordings("pump 1", [1.0 + 0.01 * i for i in range(16)])
     running = [_adding(tmp_path / "store", data) for _ in range(2)]
@@ -158,6 +159,7 @@ def test_two_processes_share_a_folder_and_add_each_recording_once(make_recording
     assert sum(counts) == 16
 
 
+@pytest.mark.slow
 def test_what_was_killed_goes_on_where_it_was(make_recordings, tmp_path):
     data, store = make_recordings("pump 1", [1.0 + 0.01 * i for i in range(24)]), tmp_path / "store"
     process = _adding(store, data)

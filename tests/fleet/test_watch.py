@@ -85,6 +85,7 @@ def test_a_copy_that_stalled_fails_once_and_is_mended(tmp_path):
     assert list(open_fleet(tmp_path / "store").recordings()["outcome"]) == ["cannot tell"]
 
 
+@pytest.mark.slow
 def test_two_watches_and_a_restart_take_each_recording_once(tmp_path):
     random = np.random.default_rng(0)
     for day in range(1, 9):

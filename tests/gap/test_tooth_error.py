@@ -64,6 +64,7 @@ def recorded(*settings: EffectSetting) -> Recording:
     return CrackedPair().simulate(setup, np.random.default_rng(1), sampling_rate_hz=20480.0, duration_s=5.0)
 
 
+@pytest.mark.slow
 def test_encoders_name_a_crack_at_low_speed() -> None:
     healthy = recorded()
     said = tooth_error_evidence(recorded(EffectSetting("root_crack", 3.0, {"gear": "driver", "tooth": 7.0})), healthy)

@@ -183,6 +183,7 @@ def test_trend_skips_undefined_values_and_empty_recordings():
     assert _drawn(trend_figure({})) == []
 
 
+@pytest.mark.slow
 def test_figures_can_be_made_in_threads_and_leave_nothing(spectrum_of):
     spectrum = spectrum_of(np.random.default_rng(0).rayleigh(size=3000))
 

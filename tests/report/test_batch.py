@@ -67,6 +67,7 @@ def test_one_broken_file_does_not_stop_the_rest(recordings, broken, tmp_path):
     assert {path.name for path in (tmp_path / "out").iterdir()} == made
 
 
+@pytest.mark.slow
 def test_local_processes_give_the_same_as_one(recordings, broken, tmp_path):
     files = [*recordings, broken]
     alone = report_many(files, tmp_path / "a", n_processes=1)
@@ -194,6 +195,7 @@ def script(tmp_path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_only_its_own_file(script, tmp_path):
     command = [sys.executable, script, tmp_path / "out", "a.csv", "killer.csv", "b.csv"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)

@@ -33,6 +33,7 @@ def with_pair(recording: Recording, **changes: object) -> Recording:
     return replace(recording, rig=replace(recording.rig, pairs=(pair,)))
 
 
+@pytest.mark.slow
 def test_estimates_rise_with_the_depth(answers: Answers) -> None:
     found = [crack(answers[depth]) for depth in DEPTHS_MM]
     depths = [f.depth_mm for f in found]

@@ -39,7 +39,7 @@ def read(folder, file):
     return read_recording(folder / file, rig=read_rig(folder / f"{file.split('.')[0]}.toml"))
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("file", FILES)
 def test_made_again_the_samples_are_the_same(file, made_again):
     old, new = read(FOLDER, file), read(made_again, file)
@@ -51,7 +51,7 @@ def test_made_again_the_samples_are_the_same(file, made_again):
         np.testing.assert_allclose(a, b, atol=1.01 * step + 1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_made_again_the_truth_names_the_same_files(made_again):
     written = {path.name for path in made_again.iterdir()}
     assert written == {"truth.json", *FILES, *(f"{file.split('.')[0]}.toml" for file in FILES)}

@@ -182,6 +182,7 @@ def test_an_axis_needs_different_finite_values(values: tuple[float, ...]) -> Non
         Axis("speed_rpm", values)
 
 
+@pytest.mark.slow
 def test_processes_give_what_one_process_gives(tmp_path: Path) -> None:
     """The whole way with the model itself: spawned processes, and the seeds of the grid."""
     sweep = Sweep(

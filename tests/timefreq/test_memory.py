@@ -36,6 +36,7 @@ def settings_of(transform) -> dict[str, object]:
     return {"n_columns": 200, "lowest": 30.0, "highest": 240.0, "n_per_octave": 8}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transform", MAPS, ids=lambda f: f.__name__)
 def test_memory_hardly_grows_with_the_length(transform) -> None:
     peak_bytes(transform, 4096)  # what is loaded and compiled on first use

@@ -163,6 +163,7 @@ def test_single_precision_gives_the_same(crossing):
     assert np.mean(np.abs(a - b) > 1e-3) < 1e-3
 
 
+@pytest.mark.slow
 def test_threads_at_once_get_what_one_gets(crossing):
     signal, _ = crossing(noise=0.2)
 

@@ -9,7 +9,7 @@ from gearsig.recording import Recording
 from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE, draw_case, record_case
 from tests.sims.blind.order_domain import distance_db
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.study
 
 SEED = {"backlash": 6}
 """Backlash shows where the brake's pull turns the torque round: not on every rig."""

@@ -83,6 +83,7 @@ def test_the_slowest_decay_is_the_drive_s_recovery_or_that_of_the_least_damped_m
     assert slowest_decay_s(loose, OPERATION) > 1.0
 
 
+@pytest.mark.slow
 def test_the_softening_jump_of_a_lightly_loaded_pair():
     """Tooth separation softens the mesh: the resonance bends to lower speeds, and two motions exist below it.
 

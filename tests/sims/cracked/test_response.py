@@ -206,6 +206,7 @@ def test_fractal_lines_show_and_grow_with_roughness(rough_runs: dict[float, Resp
             assert heights[1] < heights[2] < heights[3]
 
 
+@pytest.mark.slow
 def test_backlash_has_the_roughness_it_is_given(rough_runs: dict[float, Response]) -> None:
     for rms, response in rough_runs.items():
         assert np.std(response["backlash_change_m"]) == pytest.approx(1e-6 * rms, rel=0.05, abs=1e-12)

@@ -335,6 +335,7 @@ def order_one(unbalance_g_mm: float, machine: CrackedTwin) -> float:
     return float(driver_orders(Added("unbalance", unbalance_g_mm, {"gear": "driver"}), machine)[1])
 
 
+@pytest.mark.slow
 def test_on_its_mounts_a_quiet_machine_shakes_as_force_over_mass_and_in_proportion_to_an_unbalance() -> None:
     quiet = twin().quiet()
     little, much = (order_one(u, quiet) for u in (80.0, 320.0))
@@ -345,6 +346,7 @@ def test_on_its_mounts_a_quiet_machine_shakes_as_force_over_mass_and_in_proporti
     assert order_one(320.0, twin()) < 0.05 * much  # on rigid ground
 
 
+@pytest.mark.slow
 def test_on_its_mounts_a_quiet_machine_pitches_under_a_coupling_s_moment_twice_a_turn() -> None:
     quiet = twin().quiet()
     slight, strong = (driver_orders(Added("misalignment", beta, {"shaft": "driver"}), quiet) for beta in (1.0, 4.0))

@@ -100,7 +100,7 @@ def test_the_whole_gear_with_one_cracked_sector_agrees() -> None:
     np.testing.assert_allclose(ring, whole, rtol=1e-8)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_between_solved_depths_and_widths_the_table_is_that_of_the_crack() -> None:
     """A ready-made gear's shipped table against solutions of its own, between depths: within 2 %."""
     gear = ready_gear("z50_m3")
@@ -138,7 +138,7 @@ def test_cracks_of_other_gears_are_kept_on_disk(tmp_path, monkeypatch) -> None:
         crack_added_m_per_n(ready_gear("z50_m3"), RootCrack(9.0, 45.0))
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_shipped_cracks_are_what_their_script_makes() -> None:
     gear = ready_gear("z50_m3")
     n_heights, n_slices = gear.grid.shape[1:]

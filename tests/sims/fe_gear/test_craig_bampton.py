@@ -114,7 +114,7 @@ def test_more_slices_than_layers_of_nodes_are_refused() -> None:
         craig_bampton(small_cyclic().mesh)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_paper_gear_to_229_degrees_of_freedom() -> None:
     """Below 0.05 % in the first 20 frequencies, subspace MAC above 0.999."""
     accuracy = craig_bampton(sector_mesh(PAPER, mesh_size_for(PAPER, 277_200))).accuracy

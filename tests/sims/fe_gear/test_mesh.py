@@ -99,6 +99,7 @@ def test_five_thousand_degrees_of_freedom_are_a_gear_of_first_order(blank: GearB
     assert quality.volume_m3 == pytest.approx(quality.true_volume_m3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_what_a_coarse_mesh_misses_is_measured_against_a_finer_one() -> None:
     """75 teeth with 5000 degrees of freedom, the coarsest: first frequency within 8 %, teeth too stiff by a quarter."""
     gear = CyclicGear(sector_mesh(READY["z75_m2"], mesh_size_for(READY["z75_m2"], 5000)))

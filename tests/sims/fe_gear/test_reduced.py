@@ -259,7 +259,7 @@ def test_ready_made_gears_are_small_and_whole(name: str) -> None:
     assert modes.shape == (gear.n_modes, gear.grid.n_points)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_ready_made_gear_is_what_its_script_makes() -> None:
     kept, again = ready_gear("z50_m3"), reduce_gear(PAPER, PLAN)
     for name in ARRAYS:

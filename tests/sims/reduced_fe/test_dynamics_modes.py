@@ -88,7 +88,7 @@ def test_the_torsional_mode_is_that_of_two_inertias_on_the_mesh_spring():
     assert torsional_mode(pair, OPERATION).frequency_hz == pytest.approx(expected, rel=0.03)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_patches_smooth_the_pair_that_single_nodes_make_drop(pair):
     """Beside the section, which nodes hardly touch: at lines of nodes the mode drops and ripples, at patches not.
 

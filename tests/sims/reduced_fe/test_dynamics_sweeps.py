@@ -34,6 +34,7 @@ def light_sweeps():
     )
 
 
+@pytest.mark.slow
 def test_light_damping_loses_contact_and_jumps_with_hysteresis(light_sweeps):
     up, down = light_sweeps
     for sweep in light_sweeps:
@@ -72,7 +73,7 @@ def test_relieved_tips_lose_contact_and_jump_with_the_source_damping():
     assert jumps[1] < jumps[0] - 60.0
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_six_million_steps_have_converged():
     """Rms at 5 µs against half the step, over the whole sweep with contact loss on, both ways."""
     pair = pair_of("light_damping_50_50")
