@@ -10,31 +10,37 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.fft import ifft
-from scipy.ndimage import convolve1d, uniform_filter1d
 
 from gearsig.checks import FloatArray
-from gearsig.gap._features import NamedValue
+from gearsig.gap._features import NamedValue, decibel
 from gearsig.gap._reduction import ComplexArray
 
 STEPS_PER_PITCH = 64
 HIGHEST_MESH_ORDER = 10
 """Above it sensors hear their own resonances; `STEPS_PER_PITCH` are three times what that many orders need."""
 
-MIN_HALF_MESH_ORDER = 0.5
-"""Mesh orders, below which a machine moves as a whole."""
+LOWEST_MESH_ORDER = 0.5
+"""At and below which a machine moves as a whole."""
 
 PEAK_PITCHES = 0.25
 """Within which the loudest part of a burst is sought, and by which its course is counted."""
 
 COURSE_PITCHES = (-1.5, 3.0)
-N_QUARTERS = 18
+"""From the loudest part on; so are the ranges below. A tooth carries for one to two pitches, and what it strikes rings
+on."""
+
+N_QUARTERS = round((COURSE_PITCHES[1] - COURSE_PITCHES[0]) / PEAK_PITCHES)
+
 ECHO_LAGS_PITCHES = np.arange(0.3, 2.15, 0.15)
-ECHO_REACH_PITCHES = (-2.2, 2.8)
+ECHO_PITCHES = (-2.2, 2.8)
+"""Range whose autocorrelation is taken, smoothed over `SMOOTH_STEPS`."""
+
 SMOOTH_STEPS = 6
-ALL_OF_IT_PITCHES = (-2.0, 3.5)
+NEAR_PITCHES = (-2.0, 3.5)
+"""Beyond which energy is elsewhere."""
 
 LEAST_SHARE, LEAST_ECHO = 1e-4, 1e-3
+"""Added before the logarithm: smaller ones are noise."""
 
 WAYS = ("plain", "even")
 """As the lines are, or with their magnitudes made even over a mesh order: the path's resonances weigh less then."""
@@ -43,7 +49,7 @@ WAYS = ("plain", "even")
 def burst_lines(highest: int, teeth: int) -> np.ndarray:
     """Return the orders of a shaft that single teeth show in: neither the mesh's own nor the lowest ones."""
     orders = np.arange(min(highest, HIGHEST_MESH_ORDER * teeth))
-    kept: np.ndarray = orders[(orders > MIN_HALF_MESH_ORDER * teeth) & (orders % teeth != 0)]
+    kept: np.ndarray = orders[(orders > LOWEST_MESH_ORDER * teeth) & (orders % teeth != 0)]
     return kept
 
 
@@ -69,6 +75,8 @@ def burst_features(lines: ComplexArray, noise: FloatArray, teeth: int) -> Iterat
         Power of the noise on them.
     teeth : int
     """
+    from scipy.ndimage import convolve1d, uniform_filter1d
+
     for way in WAYS:
         by_channel = [_energy(*channel, teeth, even=way == "even") for channel in zip(lines, noise, strict=True)]
         energy, width = np.mean(by_channel, axis=0), round(PEAK_PITCHES * STEPS_PER_PITCH)
@@ -77,20 +85,21 @@ def burst_features(lines: ComplexArray, noise: FloatArray, teeth: int) -> Iterat
         course = _cut(energy, COURSE_PITCHES).reshape(N_QUARTERS, width).sum(axis=1)
         shares = course / max(float(course.sum()), 1e-300)
         for i, share in enumerate(shares):
-            yield f"burst.{way}.course.{i}", _tenfold_log(share + LEAST_SHARE)
-        smooth = convolve1d(_cut(energy, ECHO_REACH_PITCHES), _window(SMOOTH_STEPS), mode="reflect")
+            yield f"burst.{way}.course.{i}", decibel(share + LEAST_SHARE)
+        smooth = convolve1d(_cut(energy, ECHO_PITCHES), _window(SMOOTH_STEPS), mode="reflect")
         whole = max(float(np.sum(smooth**2)), 1e-300)
         for i, lag in enumerate((ECHO_LAGS_PITCHES * STEPS_PER_PITCH).astype(int)):
-            yield (
-                f"burst.{way}.echo.{i}",
-                _tenfold_log(float(np.sum(smooth[:-lag] * smooth[lag:])) / whole + LEAST_ECHO),
-            )
-        elsewhere = max(1.0 - float(_cut(energy, ALL_OF_IT_PITCHES).sum()), 0.0)
-        yield f"burst.{way}.elsewhere", _tenfold_log(elsewhere + LEAST_ECHO)
+            echo = float(np.sum(smooth[:-lag] * smooth[lag:])) / whole
+            yield f"burst.{way}.echo.{i}", decibel(echo + LEAST_ECHO)
+        elsewhere = max(1.0 - float(_cut(energy, NEAR_PITCHES).sum()), 0.0)
+        yield f"burst.{way}.elsewhere", decibel(elsewhere + LEAST_ECHO)
 
 
 def _energy(lines: ComplexArray, noise: FloatArray, teeth: int, *, even: bool) -> FloatArray:
     """Return the envelope's square over one revolution, `STEPS_PER_PITCH` steps per pitch; its sum is 1."""
+    from scipy.fft import ifft
+    from scipy.ndimage import convolve1d
+
     kept = burst_lines(len(lines), teeth)
     spectrum = np.zeros(STEPS_PER_PITCH * teeth, dtype=np.complex128)
     spectrum[kept] = lines[kept]
@@ -112,7 +121,3 @@ def _cut(energy: FloatArray, pitches: tuple[float, float]) -> FloatArray:
     """Return what lies between two angles from the first step, counted round."""
     first, end = (int(pitch * STEPS_PER_PITCH) for pitch in pitches)
     return energy[np.arange(first, end) % len(energy)]
-
-
-def _tenfold_log(share: float) -> float:
-    return float(10.0 * np.log10(share))

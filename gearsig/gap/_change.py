@@ -284,12 +284,15 @@ def _joined(
 def _patterns(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[NamedValue]:
     """Yield the tooth features of the difference of the averages, turned so that the same teeth meet."""
     differences = [turned_difference(now, healthy, side) for side in (DRIVER, DRIVEN)]
+    bursts = []
     for side, (turned, agreement) in enumerate(differences):
         residuals, n = difference_residuals(now, turned, side), turned.lines.shape[1]
         pairs = [(now.average(name, side), healthy.average(name, side)) for name in now.channels]
+        noise = np.array([after.noise[:n] + before.noise[:n] for after, before in pairs])
+        bursts.append((turned.lines, noise, turned.teeth))
         noises = [
-            (after.noise[:n] + before.noise[:n])[lines[:n] != 0].sum() / 2.0 / after.mesh_power
-            for lines, (after, before) in zip(residuals, pairs, strict=True)
+            of_lines[lines[:n] != 0].sum() / 2.0 / after.mesh_power
+            for lines, of_lines, (after, _) in zip(residuals, noise, pairs, strict=True)
         ]
         longer = min(average.longer for pair in pairs for average in pair)
         yield from pattern_features(f"change.{SIDES[side]}", residuals, turned.teeth, float(np.mean(noises)), longer)
@@ -305,12 +308,6 @@ def _patterns(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[Name
         )
     yield from apart_features(now, healthy)
     yield from alike_features(now, healthy)
-    bursts = []
-    for side, (turned, _) in enumerate(differences):
-        n = turned.lines.shape[1]
-        averages = zip(now.averages(side), healthy.averages(side), strict=True)
-        noise = np.array([after.noise[:n] + before.noise[:n] for after, before in averages])
-        bursts.append((turned.lines, noise, turned.teeth))
     yield from burst_features(*max(bursts, key=lambda burst: clearness(*burst)))
 
 

@@ -372,8 +372,8 @@ class Recogniser:
         return factors
 
 
-MAX_SHARE_DB = 10.0
-"""What is counted as 1 of a burst's shares, so that they are within `LINEAR_REACH`."""
+BURST_UNIT_DB = 10.0
+"""Of a burst's shares: counted in it, they are within `LINEAR_REACH`."""
 
 
 def input_rows(
@@ -400,7 +400,7 @@ def input_rows(
         [
             contrast_rows(names, distances / scatters),
             held[:, further],
-            changes[:, [i for i, name in enumerate(floor.names) if name.startswith("burst.")]] / MAX_SHARE_DB,
+            changes[:, [i for i, name in enumerate(floor.names) if name.startswith("burst.")]] / BURST_UNIT_DB,
             np.log10(np.maximum(loads_n_per_mm, MIN_LOAD_N_PER_MM)),
         ]
     )

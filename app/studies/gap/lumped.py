@@ -24,11 +24,7 @@ from app.studies.gap.lumped_rig import (
 )
 from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, reduced_twin, samples_of
 from gearsig.checks import FloatArray
-from gearsig.gap import (
-    BY_HAND,
-    NONE,
-    UNKNOWN,
-)
+from gearsig.gap import BY_HAND, NONE, UNKNOWN
 from sims.effects import ONE_TOOTH_SHARE
 from sims.machine import log_uniform
 
