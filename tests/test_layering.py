@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -60,7 +61,10 @@ def imported_modules(path: Path) -> set[str]:
     return imports_of(path.read_text(encoding="utf-8"), name_of(path))
 
 
-IMPORTS = {name_of(p): imported_modules(p) for p in FILES}
+@cache
+def imports() -> dict[str, set[str]]:
+    """Return the modules that each file imports: parsed once, and not while tests are collected."""
+    return {name_of(p): imported_modules(p) for p in FILES}
 
 
 def starts_with(modules: set[str], *prefixes: str) -> set[str]:
@@ -69,7 +73,7 @@ def starts_with(modules: set[str], *prefixes: str) -> set[str]:
 
 def offences(wrong: Callable[[str, set[str]], set[str]]) -> dict[str, set[str]]:
     """Return what `wrong` finds among each file's imports, by file."""
-    found = {name: wrong(name, modules) for name, modules in IMPORTS.items()}
+    found = {name: wrong(name, modules) for name, modules in imports().items()}
     return {name: modules for name, modules in found.items() if modules}
 
 

@@ -17,6 +17,7 @@ ANALYSIS_PAGE = Path(__file__).parent / "pages" / "analysis.py"
 OF_LABORATORY = "Laboratory"
 """Origin of a recording that the laboratory made."""
 _CHOSEN, _SIMULATED, _FILES, _OPENED, _TOKENS = "chosen", "simulated", "kept files", "opened files", "tokens"
+_GAP_STARTS = "gap starts"
 Content = Path | memoryview
 """Of a file: on this machine, or in memory."""
 
@@ -129,6 +130,16 @@ def simulated() -> Chosen | None:
     """Return the recording that the laboratory made last in this session."""
     result: Chosen | None = st.session_state.get(_SIMULATED)
     return result
+
+
+def start_gap() -> None:
+    """Have the gap page diagnose what is chosen there as soon as it opens."""
+    st.session_state[_GAP_STARTS] = True
+
+
+def take_start_of_gap() -> bool:
+    """Return whether the gap page is to start by itself, once."""
+    return bool(st.session_state.pop(_GAP_STARTS, False))
 
 
 def carry_over(key: str, default: object = None) -> None:

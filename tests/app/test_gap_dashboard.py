@@ -156,6 +156,15 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
     assert "what was chosen before" in text_of(page)
 
 
+def test_the_start_page_s_example_needs_one_click(stub) -> None:
+    stub(**{SECONDS: "1"})
+    page = AppTest.from_file(str(MAIN), default_timeout=60).run()
+    page.button(key="try gap").click().run()
+    page.switch_page("pages/gap.py").run()  # AppTest does not follow a switch
+    assert [button.label for button in page.button if button.disabled] == ["Diagnose"]
+    assert "tooth 21 of the driver (93 %)" in text_of(wait_for_the_end(page))
+
+
 @pytest.mark.slow
 def test_a_result_is_shown_again_after_a_reload(stub, tmp_path, monkeypatch) -> None:
     stub()

@@ -19,7 +19,7 @@ import numpy as np
 import streamlit as st
 
 import gearsig.gap
-from app.dashboard import address
+from app.dashboard import address, state
 from app.dashboard.gap.choice import Choice, files_of
 from app.dashboard.theme import as_typed, capitalised, one_line
 from app.dashboard.widgets.charts import (
@@ -115,6 +115,8 @@ def show_running(choice: Choice) -> Finished | None:
     GearsigError
         Why the job that has just ended has no result, or why none could be started.
     """
+    if state.take_start_of_gap() and choice.recordings and kept_result(choice) is None:
+        _start(choice)
     running: _Running | None = st.session_state.get(_JOB)
     failed: GearsigError | None = st.session_state.pop(_REFUSED, None)
     if running is not None and not running.job.is_running:

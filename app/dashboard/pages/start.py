@@ -83,8 +83,8 @@ TO_TRY: tuple[tuple[str, str, str, Callable[[], str], str], ...] = (
     ),
     (
         "Why does my simulation differ?",
-        "Recordings against a simulation of their rig: where they differ, which effect is missing, what it explains.",
-        "Open the gap diagnosis",
+        "A recording against the simulation of its rig: where they differ, which effect is missing, what it explains.",
+        "Find the reason",
         two_spectra,
         "gap",
     ),
@@ -110,6 +110,8 @@ def show() -> None:
                 if st.button(label, type="primary", width="stretch", key=f"try {page}"):
                     if page == "analysis":
                         open_sample("damaged_tooth")
+                    elif page == "gap":
+                        state.start_gap()
                     st.switch_page(state.ANALYSIS_PAGE.with_name(f"{page}.py"))
     show_samples()
 
