@@ -151,7 +151,7 @@ def _print_summary(report: GapReport, written: tuple[Path, ...]) -> None:
     from gearsig.report import gap_text
 
     typer.echo(gap_text(report))
-    for message in report.notices:
+    for message in report.notes:
         typer.echo(f"Note: {message}", err=True)
     page, *further_files = written
     typer.echo(f"Open {page} in a browser; beside it: {', '.join(path.name for path in further_files)}.")

@@ -582,7 +582,7 @@ def readable(
     ----------
     recordings : sequence of PreparedRecording
     read : callable
-        Returns what is wanted of a recording, and remarks.
+        Returns what is wanted of a recording, and notes.
     kind : str
         What the recordings are called.
     messages : list of str
@@ -669,7 +669,7 @@ def check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> N
 
 
 def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
-    """Return a recording reduced without its dead channels, and remarks."""
+    """Return a recording reduced without its dead channels, and notes."""
     recording, name, messages = prepared.recording, prepared.recording.name, list[str]()
     dead = {p.channel: p for p in find_problems(recording) if p.kind == "dead"}
     live = [channel for channel in recording.vibration_names() if channel not in dead]

@@ -262,7 +262,7 @@ def diagnose_gap(
             simulated_healthy=clearest.simulated if reference is not None else None,
         ),
         averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recording.recording)),
-        notices=(
+        notes=(
             *uncalibrated,
             *(() if labels is None else (labels.text,)),
             *left_out,

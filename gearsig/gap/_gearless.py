@@ -109,7 +109,7 @@ class ExaminedRecording:
         Of the healthy machine at its speed.
     unexpected : tuple of UnexpectedFinding
         Most important first.
-    notices : tuple of str
+    notes : tuple of str
     """
 
     name: str
@@ -117,7 +117,7 @@ class ExaminedRecording:
     angle: ShaftAngle
     reference: Analysis | None
     unexpected: tuple[UnexpectedFinding, ...]
-    notices: tuple[str, ...]
+    notes: tuple[str, ...]
 
     @property
     def is_healthy(self) -> bool:
@@ -278,7 +278,7 @@ def causes_of(
             why if outcome is GapOutcome.UNKNOWN else "something else",
             "",
             unknown,
-            remarks=_messages(strange[0]) if strange and outcome is GapOutcome.UNKNOWN else (),
+            notes=_messages(strange[0]) if strange and outcome is GapOutcome.UNKNOWN else (),
         ),
         GapCause(NONE, NONE, why if outcome is GapOutcome.NO_GAP else "no damage", "", remainder - unknown),
     ]
@@ -338,7 +338,7 @@ def _race(effect: GapEffect, part: UnexpectedFinding | None, rig: Rig, *, scale:
         return named_cause(effect.name, 0.0, {effect.name: effect})
     finding = part.finding
     cause = named_cause(effect.name, scale * finding.confidence, {effect.name: effect}, bearings_text(finding, rig))
-    return replace(cause, remarks=_messages(finding))
+    return replace(cause, notes=_messages(finding))
 
 
 def _messages(finding: Finding) -> tuple[str, ...]:
@@ -466,14 +466,14 @@ def diagnose_gearless(
         ),
         causes=causes,
         spectra=_spectra(unexpected, every),
-        notices=(
+        notes=(
             NOT_SIMULATED,
             HOW_SURE,
             *hint,
             *left_out,
             *_loose_shafts(rig),
             *_limits(unexpected, every),
-            *(text for item in every for text in item.notices),
+            *(text for item in every for text in item.notes),
         ),
     )
 
@@ -492,14 +492,14 @@ def _beyond_reference(
     reference = next(prepared for prepared in references if prepared.recording is alone.reference.recording)
     beside = analyze(recording, reference=reference)
     now = {(f.code, f.where): f for f in beside.findings}
-    kept, notices = [], list(alone.notices)
+    kept, notes = [], list(alone.notes)
     for part in alone.unexpected:
         finding = now.get((part.finding.code, part.finding.where), part.finding)
         if part.finding.kind in claims and finding.kind is not part.finding.kind:
-            notices.append(f"{alone.name}: {finding.title.rstrip('.')}. {finding.evidence[-1]}")
+            notes.append(f"{alone.name}: {finding.title.rstrip('.')}. {finding.evidence[-1]}")
         else:
             kept.append(part)
-    return replace(alone, unexpected=tuple(kept), notices=tuple(notices))
+    return replace(alone, unexpected=tuple(kept), notes=tuple(notes))
 
 
 def _loose_shafts(rig: Rig) -> list[str]:
@@ -585,11 +585,11 @@ HIGHEST_HARMONIC, SAME_ORDER = 40, 1e-3
 def unexpected_findings(
     recording: PreparedRecording, references: Sequence[PreparedRecording]
 ) -> tuple[list[UnexpectedFinding], list[str], list[str]]:
-    """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; remarks; warnings.
+    """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; notes; warnings.
 
     The catalogue's effects are compared by features of known places; a strange family is one feature among a hundred
     there and easily lost. The analysis looks for it by itself. A strange line and a family that may well be chance are
-    remarks; a fault of the reference is a doubt about everything else.
+    notes; a fault of the reference is a doubt about everything else.
     """
     name = recording.recording.name
     try:

@@ -802,7 +802,7 @@ def steps_of(
     added: list[TriedEffect] = []
     for name in names:
         remaining = _remaining_gap(conditions, folds, [*added, tried[name]])
-        if added and remaining.value > (1.0 - WORTH_IT) * steps[-1].left.value:
+        if added and remaining.value > (1.0 - WORTH_IT) * steps[-1].remaining.value:
             break
         added.append(tried[name])
         title = next(c.title for c in causes if c.name == name)

@@ -323,7 +323,7 @@ class GapCause(Result):
     evidence : tuple of Evidence
         Strongest first, for and against.
     is_nuisance : bool
-    remarks : tuple of str
+    notes : tuple of str
         What speaks for and against it in words, where no simulation predicts anything.
     """
 
@@ -338,7 +338,7 @@ class GapCause(Result):
     shrinkage: Shrinkage | None = None
     evidence: tuple[Evidence, ...] = ()
     is_nuisance: bool = False
-    remarks: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def group_probabilities(causes: Sequence[GapCause]) -> dict[str, float]:
@@ -427,7 +427,7 @@ class GapStep:
     """One bar of the waterfall: what is left of the whole gap once `label` is added, on held-out data."""
 
     label: str
-    left: Interval
+    remaining: Interval
 
 
 @dataclass(frozen=True)
@@ -556,7 +556,7 @@ class GapReport(Result, rows="causes"):
     angles : tuple of AngleCurves
     averages : tuple of AverageCurves
         Empty where there is no reference.
-    notices : tuple of str
+    notes : tuple of str
         What the reader should know.
     warnings : tuple of str
         What must be checked first, where there is strong evidence of it: a wrong rig file, or recording and reference
@@ -585,7 +585,7 @@ class GapReport(Result, rows="causes"):
     spectra: tuple[SpectrumCurves, ...] = ()
     angles: tuple[AngleCurves, ...] = ()
     averages: tuple[AverageCurves, ...] = ()
-    notices: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     twin_toml: str = field(default="", repr=False)
     warnings: tuple[str, ...] = ()
     labelled: LabelledFacts | None = None

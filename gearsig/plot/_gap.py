@@ -399,19 +399,19 @@ def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title:
     figure, axes = _rows(names, left_in=3.0, right_in=1.6, row_in=0.46, top_in=0.4)
     axes.axvspan(0.0, 1.0, facecolor=style.FLOOR, alpha=0.16, linewidth=0, zorder=0.5)
     axes.axvline(1.0, color=style.FLOOR, linewidth=0.9, zorder=1)
-    _draw_residual(axes, 0, steps[0].left, style.FAULT)
+    _draw_residual(axes, 0, steps[0].remaining, style.FAULT)
     for row, (last, step) in enumerate(pairwise(steps), start=1):
-        before, after = last.left.value, step.left.value
+        before, after = last.remaining.value, step.remaining.value
         sign, colour = ("−", style.MESH) if after <= before else ("+", style.FAULT)  # a larger gap in faults' colour
-        _draw_bar(axes, row, before, step.left, colour)
+        _draw_bar(axes, row, before, step.remaining, colour)
         for x, y in ((before, row - 0.5), (after, row + 0.5)):
             ends = [y - 0.5 + BAR / 2, y + 0.5 - BAR / 2]
             axes.plot([x, x], ends, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1.5)
         share = abs(100.0 * (1.0 - after / before)) if before > 0 else 0.0
         _write_beyond(axes, row, f"{sign}{abs(after - before):.2g}", f"{sign}{share:.0f} % of the gap", colour)
     if n > 1:
-        _draw_residual(axes, n, steps[-1].left, style.MEASURED)
-    axes.set_xlim(0.0, 1.06 * max(1.2, *(step.left.high for step in steps)))
+        _draw_residual(axes, n, steps[-1].remaining, style.MEASURED)
+    axes.set_xlim(0.0, 1.06 * max(1.2, *(step.remaining.high for step in steps)))
     scored = f", on {held_out}" if held_out else ""
     style.label_axes(axes, f"gap (structural floors{scored}; 90 % intervals)", "", title)
     style.no_offset(axes)

@@ -28,7 +28,7 @@ from gearsig.gap import (
 )
 from gearsig.report._json import Json, Layout, from_plain, plain
 
-SCHEMA, SCHEMA_VERSION = "gearsig.gap", 2
+SCHEMA, SCHEMA_VERSION = "gearsig.gap", 3
 FLOORS = "structural floors"
 
 
@@ -82,7 +82,7 @@ def gap_to_dict(report: GapReport) -> Json:
 
 def _state_units(result: Json) -> None:
     """Put the unit beside each value, which in the report stands elsewhere or is always the same."""
-    for interval in (result["size"], *(step["left"] for step in result["steps"])):
+    for interval in (result["size"], *(step["remaining"] for step in result["steps"])):
         interval["unit"] = FLOORS
     for curves in result["angles"]:
         curves["unit"] = "1"
@@ -111,12 +111,18 @@ def gap_schema() -> Json:
     return schema
 
 
-VERSION_1 = {"doubts": "warnings", "foretold": "predicted"}
-"""Member of version 1 → what it is called now."""
+OLD_NAMES = {
+    "doubts": "warnings",
+    "foretold": "predicted",
+    "notices": "notes",
+    "remarks": "notes",
+    "left": "remaining",
+}
+"""Member of version 1 or 2 → what it is called now."""
 
 
 def _renamed(members: Json) -> Json:
-    return {VERSION_1.get(name, name): value for name, value in members.items()}
+    return {OLD_NAMES.get(name, name): value for name, value in members.items()}
 
 
 def read_gap_json(path: str | Path) -> GapReport:
@@ -134,7 +140,7 @@ def read_gap_json(path: str | Path) -> GapReport:
     Raises
     ------
     InputError
-        If the file cannot be read, or is no gap report of this version or the one before.
+        If the file cannot be read, or is no gap report of this version or an earlier one.
     """
     where = Path(path).name
     try:
@@ -144,8 +150,8 @@ def read_gap_json(path: str | Path) -> GapReport:
     except (ValueError, RecursionError):  # some text, or brackets without end
         raise InputError("is not JSON", where=where, remedy="`gearsig gap` writes gap.json") from None
     stated = (content.get("schema"), content.get("schema_version")) if isinstance(content, dict) else (None, None)
-    if stated not in ((SCHEMA, 1), (SCHEMA, SCHEMA_VERSION)):
-        raise InputError("is no gap report", where=where, allowed=f"schema {SCHEMA}, versions 1 and {SCHEMA_VERSION}")
+    if stated not in [(SCHEMA, version) for version in range(1, SCHEMA_VERSION + 1)]:
+        raise InputError("is no gap report", where=where, allowed=f"schema {SCHEMA}, versions 1 to {SCHEMA_VERSION}")
     try:
         return gap_from_dict(content)
     except InputError as error:

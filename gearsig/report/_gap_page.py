@@ -185,7 +185,7 @@ def detailed_causes(report: GapReport) -> tuple[GapCause, ...]:
     Without a simulation, the causes of which there is something to say, unknown among them.
     """
     if not report.is_simulated:
-        return tuple(cause for cause in report.causes if cause.remarks)
+        return tuple(cause for cause in report.causes if cause.notes)
     if report.outcome is GapOutcome.NO_GAP:
         return ()
     return tuple(cause for cause in report.causes if cause.name not in (NONE, UNKNOWN))[:N_DETAILED]
@@ -200,7 +200,7 @@ def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
         _bar(cause.probability),
         severity_text(cause),
         cause.place,
-        (cause.remarks or _statements(cause.shrinkage)) if detailed else (),
+        (cause.notes or _statements(cause.shrinkage)) if detailed else (),
         tuple(_evidence_row(evidence) for evidence in cause.evidence) if detailed else (),
     )
 
@@ -270,13 +270,13 @@ def inseparable_text(report: GapReport) -> str:
 
 def step_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
     """Return the steps of the waterfall: what is left, its interval, and how much less than before the step."""
-    before = (None, *(step.left for step in report.steps))
+    before = (None, *(step.remaining for step in report.steps))
     return tuple(
         (
             step.label,
-            readable(step.left.value, 2),
-            f"{readable(step.left.low, 2)} to {readable(step.left.high, 2)}",
-            "" if last is None else signed(step.left.value - last.value, n_decimals=2),
+            readable(step.remaining.value, 2),
+            f"{readable(step.remaining.low, 2)} to {readable(step.remaining.high, 2)}",
+            "" if last is None else signed(step.remaining.value - last.value, n_decimals=2),
         )
         for step, last in zip(report.steps, before, strict=False)
     )

@@ -86,12 +86,12 @@ def test_the_gap_shrinks_on_held_out_revolutions(report: GapReport) -> None:
     assert shrinkage is not None
     assert shrinkage.shrink.value > 0.6
     assert shrinkage.placebo < 0.3
-    before, after = (step.left.value for step in report.steps[:2])
+    before, after = (step.remaining.value for step in report.steps[:2])
     assert after < before
 
 
 def test_it_says_whether_it_is_calibrated_and_keeps_the_twin(report: GapReport, tmp_path: Path) -> None:
-    assert any("not calibrated" in notice for notice in report.notices) or is_calibrated()
+    assert any("not calibrated" in notice for notice in report.notes) or is_calibrated()
     file = tmp_path / "twin.toml"
     file.write_text(report.twin_toml, encoding="utf-8")
     assert [s.name for s in preset("cracked", str(file)).effects] == ["eccentricity"]
@@ -130,17 +130,17 @@ def test_accelerations_in_g_are_compared_in_si_units_and_unknown_units_are_told(
     expected, seen = (once(reduce_recording(given, rig()))[1] for given in (recording, in_g))
     assert seen == pytest.approx(expected, abs=1e-6)
     bare = replace(recording, channels=tuple(replace(c, unit="") for c in recording.channels))
-    _, notices = conditions_of([PreparedRecording(bare)], (), gap_simulator("cracked").twin_of(rig()))
-    assert any("is no acceleration in a known unit" in notice for notice in notices)
+    _, notes = conditions_of([PreparedRecording(bare)], (), gap_simulator("cracked").twin_of(rig()))
+    assert any("is no acceleration in a known unit" in notice for notice in notes)
 
 
 def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
-    now, notices = reduce_recording(run(noise=1), rig()), list[str]()
+    now, notes = reduce_recording(run(noise=1), rig()), list[str]()
     first, *others = now.channels
     reference = now.with_channels({first: now.channels[first]})
     healthy = [HealthyReference(reference, rig(), "healthy.h5")]
-    assert list(with_common_channels(now, reference, healthy, "now", notices).channels) == [first]
-    assert notices == [f"now: {', '.join(others)} is left out, for the reference has no such channel."]
+    assert list(with_common_channels(now, reference, healthy, "now", notes).channels) == [first]
+    assert notes == [f"now: {', '.join(others)} is left out, for the reference has no such channel."]
 
 
 def test_what_does_not_bring_the_twin_nearer_says_neither_place_nor_severity(report: GapReport) -> None:

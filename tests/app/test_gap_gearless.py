@@ -57,7 +57,7 @@ def diagnosed(now: Recording, *references: Recording, rig: Rig = RIG, effects: S
     assert sum(report.groups.values()) == pytest.approx(1.0)
     assert not report.is_simulated
     assert (report.steps, report.angles, report.twin_toml) == ((), (), "")
-    assert any("nothing was simulated" in notice for notice in report.notices)
+    assert any("nothing was simulated" in notice for notice in report.notes)
     jsonschema.Draft202012Validator(gap_schema()).validate(gap_to_dict(report))
     page = gap_page_html(report)
     assert "structural floor" not in page
@@ -77,7 +77,7 @@ def test_a_damaged_race_is_named_with_its_place(order: str, name: str) -> None:
     assert place.band_hz[0] < 4500.0
     assert place.band_hz[1] > 3500.0
     assert cause.severity is None
-    assert any("harmonics of" in text for text in cause.remarks)
+    assert any("harmonics of" in text for text in cause.notes)
     assert "at most" in report.verdict[1]
     assert report.verdict[2].startswith("How far: cannot be told")
     assert len(report.spectra[0].before) == 0
@@ -87,7 +87,7 @@ def test_noise_names_nothing_and_proves_nothing() -> None:
     report = diagnosed(recording())
     assert (report.outcome, report.places) == (GapOutcome.UNKNOWN, ())
     assert "might not have" in report.verdict[1]
-    assert any("cannot be told" in notice and "now:" in notice for notice in report.notices)
+    assert any("cannot be told" in notice and "now:" in notice for notice in report.notes)
 
 
 def test_against_a_healthy_reference_that_is_alike_there_is_no_gap() -> None:
@@ -107,7 +107,7 @@ def test_a_reference_that_is_damaged_itself_is_not_used() -> None:
     report = diagnosed(recording(ORDERS["BPFO"]), recording(ORDERS["BPFO"], seed=1))
     assert report.causes[0].name == "bearing_outer_race"
     assert report.references == ()
-    assert any("not healthy" in notice for notice in report.notices)
+    assert any("not healthy" in notice for notice in report.notes)
 
 
 @pytest.mark.slow
@@ -153,7 +153,7 @@ def test_several_recordings_say_which_shows_it() -> None:
     )
     assert report.causes[0].name == "bearing_outer_race"
     assert report.places[0].title.endswith(", in loud")
-    assert any(notice.startswith("quiet: no lines of the outer race") for notice in report.notices)
+    assert any(notice.startswith("quiet: no lines of the outer race") for notice in report.notes)
 
 
 def test_one_of_several_that_is_too_short_is_left_out() -> None:
@@ -162,7 +162,7 @@ def test_one_of_several_that_is_too_short_is_left_out() -> None:
     report = diagnose_gap([short, whole], gap_simulator("cracked"))
     assert report.causes[0].name == "bearing_outer_race"
     assert [one.name for one in report.conditions] == ["whole"]
-    assert any(n.startswith("short: ") and n.endswith("this recording is left out.") for n in report.notices)
+    assert any(n.startswith("short: ") and n.endswith("this recording is left out.") for n in report.notes)
 
 
 @pytest.mark.parametrize(
@@ -219,7 +219,7 @@ def test_a_shaft_of_unknown_speed_may_be_what_knocks() -> None:
     assert report.outcome is GapOutcome.UNKNOWN
     assert "no shaft and no bearing of known speed explains, perhaps shaft output (" in report.places[0].title
     assert "it may turn with shaft output" in report.verdict[1]
-    assert any("speed of shaft output" in notice for notice in report.notices)
+    assert any("speed of shaft output" in notice for notice in report.notes)
     known = diagnosed(recording(0.617 * 4))
     assert "no shaft and no bearing explains (" in known.places[0].title
-    assert "output" not in " ".join((*known.verdict, *known.notices))
+    assert "output" not in " ".join((*known.verdict, *known.notes))

@@ -96,13 +96,13 @@ def wider():
 def test_what_is_left_is_told_on_cycles_that_the_severity_was_not_fitted_to(wider):
     before, after = drive_report(wider).steps
     assert (before.label, after.label) == ("before", "more backlash")
-    assert after.left.value < 0.3 * before.left.value
+    assert after.remaining.value < 0.3 * before.remaining.value
     # Where the half that is fitted to shows twice as much, twice as much is taken off the other half.
     evidence = wider.evidence[0]
     double = replace(evidence, folds=tuple(replace(fold, fitted_to=2.0 * fold.fitted_to) for fold in evidence.folds))
     same, too_much = drive_report(replace(wider, evidence=(double,))).steps
     assert same == before
-    assert too_much.left.value == pytest.approx(before.left.value, rel=0.3)
+    assert too_much.remaining.value == pytest.approx(before.remaining.value, rel=0.3)
 
 
 @pytest.mark.parametrize("outcome", [GapOutcome.NO_GAP, GapOutcome.UNKNOWN, GapOutcome.UNDECIDED])
@@ -125,7 +125,7 @@ def test_a_healthy_drive_has_no_gap_and_it_is_said_what_would_not_show():
     assert report.outcome is GapOutcome.NO_GAP
     assert report.causes[0].name == NONE
     assert not report.twin_toml
-    told = next(text for text in report.notices if "would not show" in text)
+    told = next(text for text in report.notes if "would not show" in text)
     depth = float(told.partition("crack in a tooth root below ")[2].split()[0])
     assert 1.0 < depth < 8.0
     assert "more backlash below" in told
@@ -148,7 +148,7 @@ def test_without_torque_the_play_can_still_be_told():
     report = diagnosed(without_torque(now), without_torque(healthy))
     ranked = [c.name for c in report.causes if c.severity is not None]
     assert set(ranked) == WITHOUT_TORQUE
-    assert any("no torque was recorded in now" in notice for notice in report.notices)
+    assert any("no torque was recorded in now" in notice for notice in report.notes)
     assert report.causes[0].name == "backlash"
 
 
@@ -157,7 +157,7 @@ def test_a_second_recording_without_torque_is_told_about():
     first, second = made(7, ("backlash", 150.0)), without_torque(made(8, ("backlash", 150.0)))
     report = diagnose_gap([first.with_name("first"), second.with_name("second")], SIMULATOR, references=[made(9)])
     assert {c.name for c in report.causes if c.severity is not None} == WITHOUT_TORQUE
-    told = next(text for text in report.notices if text.startswith("Not weighed, as no torque was recorded in second:"))
+    told = next(text for text in report.notes if text.startswith("Not weighed, as no torque was recorded in second:"))
     assert "crack in a tooth root" in told
 
 

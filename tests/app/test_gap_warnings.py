@@ -151,22 +151,22 @@ def test_a_refusal_names_the_recording_that_is_too_short() -> None:
 def test_one_of_several_references_that_cannot_be_read_is_left_out() -> None:
     whole = recording(0, 1)
     short = replace(whole, samples=whole.samples[:, :4000]).with_name("the short one")
-    (condition,), notices = conditions_of(
+    (condition,), notes = conditions_of(
         prepared(whole),
         prepared(short, whole),
         twin(),
     )
     assert condition.reference is not None
-    assert any(n.startswith("the short one") and n.endswith("this reference is left out.") for n in notices)
+    assert any(n.startswith("the short one") and n.endswith("this reference is left out.") for n in notes)
 
 
 def test_one_of_several_recordings_that_is_too_short_is_left_out_and_told() -> None:
     whole = recording(0, 1).with_name("now")
     short = replace(whole, samples=whole.samples[:, :2000]).with_name("the short one")
     for given in ((short, whole), (whole, short)):
-        (condition,), notices = conditions_of(prepared(*given), (), twin())
+        (condition,), notes = conditions_of(prepared(*given), (), twin())
         assert condition.facts.name == "now"
-        assert any(n.startswith("the short one: ") and n.endswith("this recording is left out.") for n in notices)
+        assert any(n.startswith("the short one: ") and n.endswith("this recording is left out.") for n in notes)
 
 
 def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> None:
@@ -174,9 +174,9 @@ def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> No
     first, *_ = whole.vibration_names()
     samples = whole.samples.copy()
     samples[whole.channel_names.index(first)] = 0.0
-    (condition,), notices = conditions_of(prepared(replace(whole, samples=samples)), (), twin())
+    (condition,), notes = conditions_of(prepared(replace(whole, samples=samples)), (), twin())
     assert first not in condition.now.channels
-    assert any(f"channel {first} is dead" in notice for notice in notices)
+    assert any(f"channel {first} is dead" in notice for notice in notes)
     samples[: len(whole.vibration_names())] = 0.0
     with pytest.raises(RefusalError, match="now: no vibration channel is live"):
         conditions_of(prepared(replace(whole, samples=samples)), (), twin())
@@ -185,11 +185,11 @@ def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> No
 @pytest.mark.slow
 def test_what_was_not_given_of_the_operating_point_is_told() -> None:
     whole = recording(0, 1).with_name("now")
-    _, notices = conditions_of(prepared(whole), (), twin())
-    assert not any("not given" in notice or "tachometer" in notice for notice in notices)
+    _, notes = conditions_of(prepared(whole), (), twin())
+    assert not any("not given" in notice or "tachometer" in notice for notice in notes)
     point = replace(rig().operating_point, torque_nm=None)
-    _, notices = conditions_of(prepared(whole.with_rig(replace(rig(), operating_point=point))), (), twin())
-    assert any(notice.startswith("now: the torque is not given; ") for notice in notices)
+    _, notes = conditions_of(prepared(whole.with_rig(replace(rig(), operating_point=point))), (), twin())
+    assert any(notice.startswith("now: the torque is not given; ") for notice in notes)
     idle = replace(rig(), operating_point=replace(rig().operating_point, torque_nm=0.0))
     with pytest.raises(RefusalError, match="now: the rig file states a torque of 0"):
         conditions_of(prepared(whole.with_rig(idle)), (), twin())

@@ -62,7 +62,7 @@ def effect_report(rig: str = RIG, simulator: str = "cracked") -> GapReport:
         ),
         angles=(angles("input", 55, tooth=21), angles("output", 75)),
         averages=(average("input", 55, tooth=21), average("output", 75)),
-        notices=("The mean torque is the rig file's; it was not measured.",),
+        notes=("The mean torque is the rig file's; it was not measured.",),
         twin_toml=TWIN,
     )
 
@@ -113,7 +113,7 @@ def unknown_report() -> GapReport:
         spectra=tuple(replace(s, after=np.zeros(0)) for s in report.spectra),
         angles=tuple(replace(a, after=np.zeros(0)) for a in report.angles),
         twin_toml="",
-        notices=("The rig file names no bearing: bearing orders could not be tried.",),
+        notes=("The rig file names no bearing: bearing orders could not be tried.",),
         warnings=("condition_1.h5: the teeth do not fit.",),
     )
 
@@ -132,7 +132,7 @@ def no_gap_report() -> GapReport:
         steps=(),
         next_recordings=(),
         twin_toml="",
-        notices=(),
+        notes=(),
         spectra=tuple(
             replace(s, after=np.zeros(0), measured=1.05 * s.before, reference=s.before) for s in report.spectra
         ),
@@ -169,9 +169,9 @@ def gearless_report() -> GapReport:
         band_hz=(614.0, 1255.0),
         channel="a1",
     )
-    remarks = ("6 of 6 harmonics of 3.2097 stand out in the envelope of a1.", "At most 81 %: chance of it < 1e-6.")
+    notes = ("6 of 6 harmonics of 3.2097 stand out in the envelope of a1.", "At most 81 %: chance of it < 1e-6.")
     outer = GapCause(
-        "bearing_outer_race", "bearing", "spall on an outer race", "mm", 0.81, place="bearing 1", remarks=remarks
+        "bearing_outer_race", "bearing", "spall on an outer race", "mm", 0.81, place="bearing 1", notes=notes
     )
     rest = (
         GapCause("unknown", "unknown", "something else", "", 0.095),
@@ -192,7 +192,7 @@ def gearless_report() -> GapReport:
         causes=(outer, *rest),
         groups={"bearing": 0.81, "unknown": 0.095, "none": 0.095},
         spectra=(curves,),
-        notices=("The rig has no gear pair: nothing was simulated.",),
+        notes=("The rig has no gear pair: nothing was simulated.",),
     )
 
 

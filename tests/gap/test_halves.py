@@ -114,4 +114,4 @@ def test_two_halves_of_one_recording_without_gears_are_no_gap(name: str) -> None
         if report.references:
             assert report.outcome is GapOutcome.NO_GAP, report.places
         else:
-            assert any("not healthy" in notice for notice in report.notices)
+            assert any("not healthy" in notice for notice in report.notes)

@@ -168,8 +168,8 @@ def test_a_fault_of_ones_own_is_a_class_and_what_was_read_is_kept(tmp_path: Path
         *(LabelledRecording(named(record(seed=i), f"{i}"), NONE) for i in (4, 5)),
     ]
     read = partial(labelled_changes, labelled, healthy, conditions, twin, tmp_path)
-    changes, remarks = read()
-    assert remarks == []
+    changes, notes = read()
+    assert notes == []
     again, _ = read()
     assert len(list(tmp_path.glob("labelled-*.npz"))) == 4
     for one, other in zip(changes, again, strict=True):

@@ -38,13 +38,13 @@ def test_of_several_pairs_one_must_be_asked_for() -> None:
 
 def test_the_twin_has_one_pair_at_its_own_speed_and_torque() -> None:
     train = with_stage(TRAIN, "stage")
-    alone, remarks = twin_rig(train)
+    alone, notes = twin_rig(train)
     assert [pair.name for pair in alone.pairs] == ["stage"]
     assert [bearing.name for bearing in alone.bearings] == ["b1", "b2"]
     ratio = (37 / 23) * (61 / 19)
     assert alone.nominal_speed_rpm("in") == pytest.approx(100.0 * ratio)
     assert alone.nominal_torque_nm("in") == pytest.approx(400.0 / ratio)
-    assert len(remarks) == 1
+    assert len(notes) == 1
     gap_simulator("cracked").twin_of(alone)
     assert twin_rig(RIG) == (RIG, [])
 
@@ -55,8 +55,8 @@ def test_teeth_alone_are_enough_and_a_stated_torque_says_how_large_the_gears_are
     light = replace(bare, operating_point=OperatingPoint("in", torque_nm=2.0))
     modules = []
     for rig in (light, bare, heavy):
-        alone, remarks = twin_rig(rig)
-        assert len(remarks) == 1
+        alone, notes = twin_rig(rig)
+        assert len(notes) == 1
         assert "module_mm" in alone.assumed
         gap_simulator("cracked").twin_of(alone)
         modules.append(alone.pairs[0].module_mm)

@@ -87,7 +87,7 @@ def test_nothing_of_the_report_is_lost():
 
 def test_names_that_others_rely_on():
     found = gap_to_dict(effect_report())
-    assert (found["schema"], found["schema_version"]) == ("gearsig.gap", 2)
+    assert (found["schema"], found["schema_version"]) == ("gearsig.gap", 3)
     first = found["causes"][0]
     assert (first["name"], first["probability"], first["severity"]["unit"]) == ("root_crack", 0.88, "mm")
     assert first["fitted"]["options"] == {"gear": "driver", "tooth": 21.0}

@@ -78,7 +78,7 @@ def test_the_four_answers_stand_on_top(pages, outcome):
         assert 0 <= place < 900, answer
     for cause in report.causes:
         assert cause.title in text
-    for notice in report.notices:
+    for notice in report.notes:
         assert notice in text
 
 
@@ -159,11 +159,11 @@ def evil_report(text):
         groups={text: 0.5},
         conditions=(ConditionFacts(text, OperatingCondition(1500.0, 60.0), 1.0, 1.0, 1.0),),
         references=(text,),
-        steps=tuple(GapStep(text, step.left) for step in report.steps),
+        steps=tuple(GapStep(text, step.remaining) for step in report.steps),
         next_recordings=tuple(replace(n, text=text, separates=(text, text)) for n in report.next_recordings),
         spectra=tuple(replace(s, label=text, unit=text) for s in report.spectra),
         angles=tuple(replace(a, shaft=text, unit=text) for a in report.angles),
-        notices=(text,),
+        notes=(text,),
     )
 
 
@@ -284,6 +284,6 @@ def test_warnings_stand_right_under_the_verdict(pages):
     report = replace(without_curves(effect_report()), warnings=(doubt,))
     text = text_of(gap_page_html(report))
     last = report.verdict[-1].partition(": ")[2]
-    assert text.index(last[1:]) < text.index(f"Check first {doubt}") < text.index(report.notices[0])
+    assert text.index(last[1:]) < text.index(f"Check first {doubt}") < text.index(report.notes[0])
     assert gap_text(report).splitlines()[4] == f"Check first: {doubt}"
     assert "Check first" not in text_of(pages["effect"])

@@ -43,10 +43,25 @@ def test_reports_of_earlier_versions_have_no_reference_curves():
     assert not any(one.is_further for cause in again.causes for one in cause.evidence)
 
 
-def test_reports_of_version_1_call_some_members_otherwise(tmp_path):
+OF_VERSION_2 = {"remaining": "left"}
+OF_VERSION_1 = {**OF_VERSION_2, "warnings": "doubts", "predicted": "foretold"}
+
+
+@pytest.mark.parametrize(("version", "names"), [(1, OF_VERSION_1), (2, OF_VERSION_2)])
+def test_reports_of_earlier_versions_call_some_members_otherwise(tmp_path, version, names):
     report = replace(effect_report(), warnings=("check the rig",))
-    text = json.dumps(gap_to_dict(report)).replace('"warnings":', '"doubts":').replace('"predicted":', '"foretold":')
-    (tmp_path / "gap.json").write_text(text.replace('"schema_version": 2', '"schema_version": 1'))
+
+    def renamed(content, within=""):
+        if isinstance(content, list):
+            return [renamed(member, within) for member in content]
+        if not isinstance(content, dict):
+            return content
+        notes = "remarks" if within == "causes" else "notices"
+        return {{**names, "notes": notes}.get(k, k): renamed(member, k) for k, member in content.items()}
+
+    found = {**renamed(gap_to_dict(report)), "schema_version": version}
+    assert "notices" in found
+    (tmp_path / "gap.json").write_text(json.dumps(found))
     assert gap_to_dict(read_gap_json(tmp_path / "gap.json")) == gap_to_dict(report)
 
 
@@ -61,8 +76,8 @@ def test_null_is_nan():
         pytest.param(("size", "value"), 10**400, r"report\.size\.value is too large", id="too large"),
         (("size", "low"), "7", r"report\.size\.low is '7', not number or null"),
         (("rig",), ["a"], r"report\.rig is \['a'\], not string"),
-        (("notices",), "abc", "report.notices is 'abc', not array"),
-        (("notices", 0), 3, r"report\.notices\[0\] is 3, not string"),
+        (("notes",), "abc", "report.notes is 'abc', not array"),
+        (("notes", 0), 3, r"report\.notes\[0\] is 3, not string"),
         (("groups", "unknown"), "much", "report.groups.unknown is 'much'"),
         (("places", 0, "tooth"), "<b>", r"report\.places\[0\]\.tooth is '<b>', not integer or null"),
         (("places", 0, "tooth"), True, r"tooth is True"),
@@ -97,8 +112,8 @@ def test_members_that_later_versions_add_are_passed_over(tmp_path):
         "",
         "[]",
         "{}",
+        '{"schema": "gearsig.gap", "schema_version": 4}',
         '{"schema": "gearsig.gap", "schema_version": 3}',
-        '{"schema": "gearsig.gap", "schema_version": 2}',
         "[" * 100_000,
     ],
 )

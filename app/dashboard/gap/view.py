@@ -311,9 +311,9 @@ def _show_panels(report: GapReport) -> None:
         for cause in report.causes
         if cause.probability >= LEAST
     ]
-    largest = max((step.left.value for step in report.steps), default=1.0) or 1.0
+    largest = max((step.remaining.value for step in report.steps), default=1.0) or 1.0
     steps = [
-        (step.label if i == 0 else f"+ {step.label}", step.left.value / largest, f"{step.left.value:.2g}")
+        (step.label if i == 0 else f"+ {step.label}", step.remaining.value / largest, f"{step.remaining.value:.2g}")
         for i, step in enumerate(report.steps)
     ]
     about = {
@@ -356,7 +356,7 @@ def _show_remarks(report: GapReport) -> None:
     advice = condition_advice(report)
     if advice:
         st.caption(as_typed(advice))
-    show_warnings(report.notices, quiet=True)
+    show_warnings(report.notes, quiet=True)
 
 
 def _show_downloads(finished: Finished) -> None:

@@ -162,7 +162,7 @@ def drive_report(diagnosis: DriveDiagnosis) -> GapReport:
         else (),
         spectra=_torque_curves(compared, fitted),
         angles=_tooth_curves(compared, fitted, fits),
-        notices=tuple(_messages(diagnosis, compared, evidence)),
+        notes=tuple(_messages(diagnosis, compared, evidence)),
         twin_toml="" if fitted is None else compared.drive.twin.preset_toml(fitted, note),
     )
 
