@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from gearsig.diagnosis._signals import AnalysisSignals
 from gearsig.diagnosis._types import Finding, Kind, Strength, Where
-from gearsig.indicators import ZONE_LIMITS_MM_PER_S, Indicator, vibration_zone
+from gearsig.formatting import percent
+from gearsig.indicators import ZONE_LIMITS_MM_PER_S, Indicator, velocity_band_hz, velocity_shares, vibration_zone
 from gearsig.rig import MachineSize
 
 VIBRATION_ZONE = "vibration-zone"
@@ -17,6 +18,15 @@ MEANINGS = {
     "C": "not fit for long service: find the cause at the next opportunity",
     "D": "severe enough to damage the machine",
 }
+DOMINANT = 0.7
+"""Share of the squared velocity from which one source makes it."""
+
+N_MESH_HARMONICS = 5
+CAUSES = {
+    "1×": "unbalance, a bent shaft, misalignment or a resonance",
+    "2×": "misalignment, looseness or a resonance; at twice the mains frequency a motor's field",
+    "mesh": "load, worn or uneven teeth, misaligned gears or a resonance",
+}
 SPEED_RANGE_RPM = (120.0, 30_000.0)
 """Of the standard."""
 
@@ -24,12 +34,12 @@ SPEED_RANGE_RPM = (120.0, 30_000.0)
 def detect_vibration_zone(signals: AnalysisSignals, found: Iterable[Indicator]) -> list[Finding]:
     """Judge the largest overall velocity by machine group and mounting, or say why the standard does not apply.
 
-    Nothing is said of machines whose rig file has no [machine].
+    Of machines whose rig file has no [machine] only what makes most of it is said.
     """
     machine = signals.rig.machine
-    if machine is None:
-        return []
     velocities = [i for i in found if i.name == "overall velocity"]
+    if machine is None:
+        return [_without_zone(signals, max(velocities, key=lambda i: i.value))] if velocities else []
     reason = _why_not(machine, signals, velocities)
     if reason:
         title = f"The zones of {STANDARD} are not applicable: {reason}."
@@ -38,6 +48,7 @@ def detect_vibration_zone(signals: AnalysisSignals, found: Iterable[Indicator]) 
     group, mounting = machine.group or 0, machine.mounting
     limits = ZONE_LIMITS_MM_PER_S[group, mounting]
     zone = vibration_zone(largest.value, group, mounting)
+    source, causes = _source(signals, largest)
     size = (
         f"{machine.power_kw:g} kW"
         if machine.shaft_height_mm is None
@@ -51,18 +62,65 @@ def detect_vibration_zone(signals: AnalysisSignals, found: Iterable[Indicator]) 
     ]
     if signals.rig.pairs:
         evidence.append("Of the machine that the gears drive or are driven by; gear units themselves: ISO 20816-9.")
+    evidence += _possible(source, causes)
+    above = f"; {source}" if source and zone in "CD" else ""
     return [
         Finding(
             VIBRATION_ZONE,
             Kind.NOTICE if zone in "CD" else Kind.INFORMATION,
             f"Overall vibration {largest.value:.3g} mm/s rms in channel {largest.channel}: zone {zone} of {STANDARD} "
-            f"(group {group}, {mounting}), {MEANINGS[zone]}.",
+            f"(group {group}, {mounting}), {MEANINGS[zone]}{above}.",
             Where((largest.channel,)),
             Strength(largest.value, "mm/s", limit, "boundary of the zone", against="a boundary of"),
             confidence_basis="direct measurement",
             evidence=tuple(evidence),
         )
     ]
+
+
+def _without_zone(signals: AnalysisSignals, largest: Indicator) -> Finding:
+    """Return the overall velocity of a machine whose zones are not known, and what makes most of it."""
+    source, causes = _source(signals, largest)
+    return Finding(
+        "overall-velocity",
+        Kind.INFORMATION,
+        f"Overall vibration {largest.value:.3g} mm/s rms in channel {largest.channel}, {largest.band}"
+        f"{f'; {source}' if source else ''}.",
+        Where((largest.channel,)),
+        confidence_basis="direct measurement",
+        evidence=(*_possible(source, causes), f"Zones of {STANDARD} need [machine] in the rig file."),
+    )
+
+
+def _possible(source: str, causes: str) -> list[str]:
+    return [f"{causes[0].upper()}{causes[1:]} can do that."] if source else []
+
+
+def _source(signals: AnalysisSignals, velocity: Indicator) -> tuple[str, str]:
+    """Return which source makes most of an overall velocity, and what may be behind it; empty where no single one does.
+
+    Of sources there are the first two orders of each shaft, and each gear pair's mesh harmonics.
+    """
+    if signals.angle is None:
+        return "", ""
+    per_order_hz = signals.frequency_per_order_hz
+    places = {
+        (f"{k}×", f"{k} × shaft {name or 'speed'}"): [k * order * per_order_hz]
+        for name, order in signals.known_shaft_orders.items()
+        for k in (1, 2)
+    }
+    for name, order in signals.known_mesh_orders.items():
+        places["mesh", f"the mesh harmonics of gear pair {name}"] = [
+            k * order * per_order_hz for k in range(1, N_MESH_HARMONICS + 1)
+        ]
+    channel = next(channel for channel in signals.recording.channels if channel.name == velocity.channel)
+    words = {text: hertz for (_, text), hertz in places.items()}
+    band_hz = velocity_band_hz(signals.angle.mean_speed_rpm)
+    shares = velocity_shares(signals.spectra[channel.name], channel, words, band_hz)
+    kind, text = max(places, key=lambda place: shares[place[1]], default=("", ""))
+    if shares.get(text, 0.0) < DOMINANT:
+        return "", ""
+    return f"{percent(shares[text])} of its power is at {text}", CAUSES[kind]
 
 
 def _why_not(machine: MachineSize, signals: AnalysisSignals, velocities: list[Indicator]) -> str:

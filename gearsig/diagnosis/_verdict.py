@@ -62,7 +62,7 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
         return " ".join(filter(None, (doubt, changed, zone)))  # with a change, the reference was compared
     said = _said(others, has_reference=has_reference)
     if zone and said.startswith(NO_FAULT):
-        said = f"{zone} What causes it does not show.{said.removeprefix(NO_FAULT)}"
+        said = f"{zone} What is wrong does not show.{said.removeprefix(NO_FAULT)}"
         zone = ""
     return " ".join(filter(None, (doubt, changed, said, zone, unchanged, unfit)))
 

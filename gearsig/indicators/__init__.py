@@ -44,6 +44,8 @@ from gearsig.indicators._overall import (
     ZONE_LIMITS_MM_PER_S,
     overall_indicators,
     overall_velocity_mm_per_s,
+    velocity_band_hz,
+    velocity_shares,
     vibration_zone,
 )
 
@@ -85,5 +87,7 @@ __all__ = [
     "sideband_level_factor",
     "skewness",
     "time_indicators",
+    "velocity_band_hz",
+    "velocity_shares",
     "vibration_zone",
 ]

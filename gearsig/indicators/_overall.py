@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from math import ceil, floor
 
 import numpy as np
@@ -22,6 +22,9 @@ SLOW_RPM, SLOW_LOWEST_HZ = 600.0, 2.0
 
 MIN_PERIODS = 10
 """Of the lowest frequency, in a recording: its lines are then apart from the mean."""
+
+SAME_FREQUENCY = 0.005
+"""Relative: a speed that is stated, and one that wanders a little."""
 
 HIGH_BAND_HZ = (1000.0, 10_000.0)
 """Where bearings ring, and gears and unbalance hardly do."""
@@ -83,13 +86,49 @@ def overall_velocity_mm_per_s(
         raise InputError(
             f"it is {len(x) / sampling_rate_hz:.3g} s long", where=where, allowed=f"{MIN_PERIODS / low_hz:g} s or more"
         )
-    spectrum = spectrum or amplitude_spectrum(x, sampling_rate_hz)
-    inside = slice(*np.searchsorted(spectrum.positions, (low_hz, np.nextafter(high_hz, np.inf))))
+    _, mean_square = _velocity_lines(spectrum or amplitude_spectrum(x, sampling_rate_hz), quantity, band_hz)
+    return 1e3 * factor * float(np.sqrt(mean_square.sum()))
+
+
+def velocity_shares(
+    spectrum: Spectrum, channel: Channel, places_hz: Mapping[str, Sequence[float]], band_hz: tuple[float, float]
+) -> dict[str, float]:
+    """Return which share of the squared overall velocity lies about the frequencies of each place, 0 to 1.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        `amplitude_spectrum` of an acceleration or a velocity.
+    channel : Channel
+    places_hz : mapping
+        Name of a place → its frequencies; a line counts within two lines of them, or half a per cent.
+    band_hz : (float, float)
+        See `velocity_band_hz`.
+    """
+    hertz, mean_square = _velocity_lines(spectrum, channel.quantity, band_hz)
+    total = float(mean_square.sum())
+    shares = {}
+    for name, frequencies in places_hz.items():
+        is_there = np.zeros(len(hertz), dtype=bool)
+        for frequency in frequencies:
+            is_there |= np.abs(hertz - frequency) <= max(2.0 * spectrum.resolution, SAME_FREQUENCY * frequency)
+        shares[name] = float(mean_square[is_there].sum()) / total if total > 0.0 else 0.0
+    return shares
+
+
+def _velocity_lines(spectrum: Spectrum, quantity: str, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Return the frequencies within a band, and what each line adds to the mean square velocity."""
+    inside = slice(*np.searchsorted(spectrum.positions, (band_hz[0], np.nextafter(band_hz[1], np.inf))))
     amplitude, hertz = spectrum.values[inside], spectrum.positions[inside]
     if quantity == "acceleration":
         amplitude = amplitude / (2 * np.pi * hertz)
-    mean_square = 0.5 * float(np.square(amplitude).sum()) * spectrum.resolution / spectrum.noise_bandwidth
-    return 1e3 * factor * float(np.sqrt(mean_square))
+    return hertz, 0.5 * np.square(amplitude) * spectrum.resolution / spectrum.noise_bandwidth
+
+
+def velocity_band_hz(speed_rpm: float | None) -> tuple[float, float]:
+    """Return the band of the overall velocity, wider for slow machines (ISO 20816-3)."""
+    low_hz, high_hz = VELOCITY_BAND_HZ
+    return (SLOW_LOWEST_HZ if speed_rpm is not None and speed_rpm < SLOW_RPM else low_hz), high_hz
 
 
 def vibration_zone(velocity_mm_per_s: float, group: int, mounting: str) -> str:
@@ -140,8 +179,7 @@ def overall_indicators(
     """
     from scipy.fft import irfft, rfft
 
-    low_hz = SLOW_LOWEST_HZ if speed_rpm is not None and speed_rpm < SLOW_RPM else VELOCITY_BAND_HZ[0]
-    band_hz = (low_hz, VELOCITY_BAND_HZ[1])
+    band_hz = velocity_band_hz(speed_rpm)
     try:
         velocity = overall_velocity_mm_per_s(values, sampling_rate_hz, channel, band_hz, spectrum=spectrum)
     except InputError:

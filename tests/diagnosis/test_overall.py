@@ -51,8 +51,37 @@ def test_not_applicable(machine: MachineSize, speed_rpm: float, unit: str) -> No
     assert "vibration-zone" not in said
 
 
-def test_nothing_is_said_of_machines_that_are_not_described() -> None:
-    assert not any("vibration-zone" in code for code in codes(analyze(motor(9.0, replace(MOTOR, machine=None)))))
+@pytest.mark.parametrize(("order", "said"), [(1.0, "1 × shaft motor"), (2.0, "2 × shaft motor"), (3.7, "")])
+def test_what_makes_most_of_the_velocity_is_said(order: float, said: str) -> None:
+    at_once = motor(6.0)
+    t = np.arange(at_once.n_samples) / FS_HZ
+    hertz = order * 1480.0 / 60
+    x = 2 * np.pi * hertz * 8e-3 * np.sqrt(2) * np.cos(2 * np.pi * hertz * t) + 0.01 * np.random.default_rng(0).normal(
+        size=len(t)
+    )
+    stated = finding(analyze(replace(at_once, samples=x[None, :])), "vibration-zone")
+    assert (f"100 % of its power is at {said}." in stated.title) is bool(said)
+    assert any(
+        "resonance can do that" in text or "a motor's field can do that" in text for text in stated.evidence
+    ) is (bool(said))
+
+
+def test_no_single_source_is_named_where_two_share_the_velocity() -> None:
+    both = motor(6.0)
+    t = np.arange(both.n_samples) / FS_HZ
+    hertz = 2 * 1480.0 / 60
+    x = both.samples + 2 * np.pi * hertz * 6e-3 * np.sqrt(2) * np.cos(2 * np.pi * hertz * t)
+    assert "of its power" not in finding(analyze(replace(both, samples=x)), "vibration-zone").title
+
+
+def test_of_machines_that_are_not_described_only_what_makes_most_of_it_is_said() -> None:
+    analysis = analyze(motor(9.0, replace(MOTOR, machine=None)))
+    assert not any("vibration-zone" in code for code in codes(analysis))
+    stated = finding(analysis, "overall-velocity")
+    assert stated.title == (
+        "Overall vibration 9 mm/s rms in channel a1, 10 to 1000 Hz; 100 % of its power is at 1 × shaft motor."
+    )
+    assert stated.title not in analysis.verdict
 
 
 @pytest.mark.parametrize(
