@@ -169,7 +169,7 @@ class PlausibleRange:
         Worth a try, at even ratios.
     further_settings : callable
         Further option sets, with which the fault of a tooth takes another profile over the engagement, and with which
-        of these severities each is worth a try.
+        of these severities each is worth a try, counted from 0; 0.5 lies halfway between the first two, in logarithms.
     """
 
     low: float
@@ -180,7 +180,7 @@ class PlausibleRange:
     drawn: Callable[[MachineFacts, np.random.Generator], Options] = lambda _machine, _rng: {}
     largest: Scale = lambda _machine, _options: float("inf")
     n_severities: int = 3
-    further_settings: Callable[[MachineFacts], Sequence[tuple[Options, Sequence[int]]]] = lambda _machine: ()
+    further_settings: Callable[[MachineFacts], Sequence[tuple[Options, Sequence[float]]]] = lambda _machine: ()
 
 
 # --------------------

@@ -30,6 +30,9 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
     )
 
 
+EVERY_HALF = (0.0, 0.5, 1.0, 1.5, 2.0)
+"""Severities, counted from the least."""
+
 EFFECT = Effect(
     name="chipped_tooth",
     group="tooth-local",
@@ -42,7 +45,7 @@ EFFECT = Effect(
     "sidebands of that shaft, ringing resonances, envelope lines at multiples of its order. Small chips lie in double "
     "contact and show little.",
     shows_in=("tooth_window", "envelope_orders", "mesh_sidebands", "resonances"),
-    # The pair lets go a pitch earlier for each module: half of what lies between two severities that are tried, about.
+    # The pair lets go a pitch earlier for each module: half of what lies between the largest two that are tried.
     moves_pitches=0.16,
     change=change,
     options=(
@@ -60,10 +63,11 @@ EFFECT = Effect(
             **shared.any_tooth(machine, rng),
             "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0))),
         },
-        # Without its whole tip a tooth carries nothing there; with most of it left, nearly as much as ever.
+        # Without its whole tip a tooth carries nothing there; with most of it left, nearly as much as ever. The height
+        # says where in the engagement that is, so that heights are tried twice as close as other severities.
         further_settings=lambda machine: [
-            (options, (0, 1, 2))
-            for percent in (35.0, 100.0)
+            (options, places)
+            for percent, places in ((35.0, EVERY_HALF), (85.0, (0.5, 1.5)), (100.0, EVERY_HALF))
             for options in shared.first_teeth(machine, width_percent=percent)
         ],
     ),

@@ -268,12 +268,13 @@ class PairTwin:
         """Return further settings, with which a tooth's fault takes another profile over the engagement."""
         return self._settings(name, effect(name).plausible_range.further_settings(self._facts))
 
-    def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[int]]]) -> list[Added]:
-        """Return each set of options with some of its severities."""
-        n, settings = effect(name).plausible_range.n_severities, []
-        for options, indices in chosen:
-            severities = np.geomspace(*effect(name).plausible_severities(self._facts, options), n)
-            settings += [Added(name, float(f"{severities[i]:.4g}"), options) for i in indices]
+    def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[float]]]) -> list[Added]:
+        """Return each set of options with some of its severities, counted from 0; 0.5 lies between the first two."""
+        last, settings = effect(name).plausible_range.n_severities - 1, []
+        for options, places in chosen:
+            low, high = effect(name).plausible_severities(self._facts, options)
+            severities = [low * (high / low) ** (place / last) for place in places]
+            settings += [Added(name, float(f"{severity:.4g}"), options) for severity in severities]
         return settings
 
     def with_further_sensors(self) -> tuple[Self, Mapping[str, str]]:
