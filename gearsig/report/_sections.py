@@ -321,12 +321,13 @@ def setting_text(name: str, value: str | float | int | None) -> str:
 
 
 def reference_text(reference: Analysis | None) -> str:
-    """Return which recording was compared with; empty without one. A reference that is not healthy itself is told."""
+    """Return which recording was compared with; empty without one. What the reference itself shows is told."""
     if reference is None:
         return ""
     text = f"Compared with {reference.recording.provenance.source or 'a reference'}"
-    if reference.outcome in (Outcome.FAULT, Outcome.SUSPICION):
-        return f"{text}, which is not healthy itself: {reference.verdict}"
+    itself = {Outcome.FAULT: "is not healthy itself", Outcome.SUSPICION: "gives a suspicion itself"}
+    if reference.outcome in itself:
+        return f"{text}, which {itself[reference.outcome]}: {reference.verdict}"
     return f"{text}."
 
 
