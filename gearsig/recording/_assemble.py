@@ -206,7 +206,7 @@ def _speed(
 ) -> tuple[SpeedSource | None, tuple[str, ...]]:
     """Return the speed source: the argument's, what measures it, what the file states, what the rig states."""
     if speed is not None or table.is_own_layout:
-        return speed or table.speed, ()
+        return (table.speed, ()) if speed is None else (speed, _contradicted(speed, table, rig))
     known = None if rig is None else rig.speed
     measured = known is not None and not isinstance(known, ConstantSpeed)
     if table.speed is not None and not isinstance(table.speed, ConstantSpeed):
@@ -224,3 +224,18 @@ def _speed(
             return None, ()
         text = f"the rig states a speed of {known.speed_rpm:g} rpm, the file {of_file:g} rpm: the file's was taken"
     return ConstantSpeed(of_file, known.shaft if known is not None else ""), (text,)
+
+
+def _contradicted(given: SpeedSource, table: RawTable, rig: Rig | None) -> tuple[str, ...]:
+    """Say what else states a constant speed, where it differs from the one that was given and taken."""
+    if not isinstance(given, ConstantSpeed):
+        return ()
+    stated = {"file": table.speed, "rig": None if rig is None else rig.speed}
+    others = [
+        f"the {name} states {source.speed_rpm:g} rpm"
+        for name, source in stated.items()
+        if isinstance(source, ConstantSpeed)
+        and (source.shaft == given.shaft or "" in (source.shaft, given.shaft))
+        and abs(source.speed_rpm - given.speed_rpm) > 1e-3 * source.speed_rpm
+    ]
+    return (f"the speed {given.speed_rpm:g} rpm was given and taken; {' and '.join(others)}",) if others else ()

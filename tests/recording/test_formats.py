@@ -67,6 +67,16 @@ class TestMat5:
         measured = Rig(speed=TachometerChannel("tacho"))
         assert read_recording(tmp_path / "x.mat", rig=measured).speed_source == TachometerChannel("tacho")
 
+    def test_a_given_speed_that_file_or_rig_contradict_is_said(self, tmp_path):
+        savemat(tmp_path / "x.mat", {"DE_time": X, "RPM": 1796, "fs": 50.0})
+        rig = Rig(shafts=(Shaft("motor"),), speed=ConstantSpeed(1750.0, "motor"))
+        r = read_recording(tmp_path / "x.mat", rig=rig, speed=ConstantSpeed(1500.0))
+        assert r.speed == ConstantSpeed(1500.0)
+        conflict = "the speed 1500 rpm was given and taken; the file states 1796 rpm and the rig states 1750 rpm"
+        assert conflict in r.warnings
+        r = read_recording(tmp_path / "x.mat", speed=ConstantSpeed(1796.5))  # as the file, but for its digits
+        assert not any("1796" in warning for warning in r.warnings)
+
     def test_times_beside_their_channels(self, tmp_path):
         t = np.arange(1000) / 50
         names = {"Data1_AI_1": X, "Data1_time_AI_1": t, "Data1_AI_2": Y, "Data1_time_AI_2": t}
