@@ -44,7 +44,11 @@ _SHOWN: dict[str, tuple[str, str, str]] = {
     "two_stage": ("Two-stage gearbox", "An inner race on the middle shaft, seen by three sensors.", ""),
     "run_up": ("Run-up", "Mesh harmonics cross a resonance on the way from 600 to 3000 rpm.", ""),
     "no_tachometer": ("Without tachometer", "The speed is found in the vibration itself.", ""),
-    "eccentric_wheel": ("Eccentric wheel", "Sidebands a shaft order apart; no fault is claimed from them alone.", ""),
+    "eccentric_wheel": (
+        "Eccentric wheel",
+        "Sidebands a shaft order apart, grown beside the healthy gearbox: a suspicion, as they alone prove no fault.",
+        "healthy.h5",
+    ),
     "healthy": ("Healthy gearbox", "What a machine in good order looks like, and what cannot be told of it.", ""),
     "root_crack_0mm": ("No crack", "The reference of the four cracks.", ""),
     **{f"root_crack_{k}mm": (f"Root crack, {k} mm", _CRACK, "root_crack_0mm.h5") for k in (1, 3, 4)},

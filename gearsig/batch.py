@@ -59,6 +59,7 @@ class _Job:
     speed: SpeedSource | None
     command: str
     reference: Path | None = None
+    reference_rate_hz: float | None = None
     torque_nm: float | None = None
     is_reference: bool = False
     made_of: str = ""
@@ -79,6 +80,7 @@ def report_many(
     on_progress: Progress | None = None,
     command: str = "",
     reference: str | Path | Mapping[Path, Path] | None = None,
+    reference_rate_hz: float | None = None,
     torque_nm: float | None = None,
     pdf: bool = False,
     methods: Sequence[str] | None = None,
@@ -116,6 +118,8 @@ def report_many(
     reference : str, Path, mapping or None
         Recording of the same machine when it was healthy; all are compared with it but itself. Of several machines a
         mapping of recordings to theirs.
+    reference_rate_hz : float or None
+        Sampling rate of the reference, where it differs and neither it nor a rig file beside it states it.
     torque_nm : float or None
         For the depth of cracks, instead of the rig's operating point.
     pdf : bool
@@ -170,11 +174,12 @@ def report_many(
         is_healthy = file.resolve() in healthy_files
         compared = None if is_healthy else healthy.get(file.resolve())
         path = folder / f"{page}.html"
-        facts = (rig, sampling_rate_hz, speed, command)
+        stated_hz = reference_rate_hz if is_healthy and reference_rate_hz is not None else sampling_rate_hz
+        facts = (rig, stated_hz, speed, command)
         jobs.append(
             _Job(
-                file, name, path, *facts, compared, torque_nm, is_reference=is_healthy, pdf=pdf, methods=chosen,
-                memory_bytes=memory_bytes,
+                file, name, path, *facts, compared, reference_rate_hz if compared else None, torque_nm,
+                is_reference=is_healthy, pdf=pdf, methods=chosen, memory_bytes=memory_bytes,
             )
         )  # fmt: skip
     made_of = _made_of()
@@ -228,10 +233,12 @@ def _made_of() -> Callable[[_Job], str]:
     def made_of(job: _Job) -> str:
         try:
             beside = rig_file_beside(job.path) if job.rig is None else None
-            files = [state(path) for path in (job.path, beside, job.reference) if path is not None]
+            then = rig_file_beside(job.reference) if job.reference is not None else None
+            files = [state(path) for path in (job.path, beside, job.reference, then) if path is not None]
         except OSError:
             return ""
         parts = [__version__, files, job.name, repr(job.rig), repr(job.speed), job.sampling_rate_hz, job.torque_nm]
+        parts.append(job.reference_rate_hz)
         return hashlib.sha256(
             json.dumps([*parts, job.is_reference, job.methods, job.memory_bytes]).encode("utf-8", "surrogateescape")
         ).hexdigest()
@@ -270,7 +277,9 @@ def _report_one(job: _Job) -> Entry | Failure:
         rig = read_rig(beside) if beside is not None else job.rig
         given: dict[str, Any] = {"sampling_rate_hz": job.sampling_rate_hz, "speed": job.speed}
         given["memory_bytes"] = job.memory_bytes
-        reference = None if job.reference is None else read_reference(job.reference, rig, **given)
+        reference = None
+        if job.reference is not None:
+            reference = read_reference(job.reference, rig, reference_rate_hz=job.reference_rate_hz, **given)
         found = analyze_file(job.path, rig, reference=reference, torque_nm=job.torque_nm, **given)
         analysis = found.as_one() if isinstance(found, LongAnalysis) else found
         mark = recording_mark(job.path)

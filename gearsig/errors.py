@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
 
 class GearsigError(Exception):
     """Base of every error that gearsig raises on purpose."""
@@ -51,6 +55,37 @@ class RefusalError(GearsigError):
     def __init__(self, reason: str, *, remedy: str = "") -> None:
         self.reason, self.remedy = reason, remedy
         super().__init__(_one_line(f"{reason}; {remedy}" if remedy else reason))
+
+
+@contextmanager
+def options_named(names: Mapping[str, str]) -> Iterator[None]:
+    """Let errors that are raised inside name the options of another record in their remedies.
+
+    Parameters
+    ----------
+    names : mapping
+        Option of the command line → the one that does the same for the record that is read.
+
+    Examples
+    --------
+    >>> with options_named({"--fs": "--sim-fs"}):
+    ...     raise InputError("states no sampling rate", where="model.csv", remedy="give --fs")
+    Traceback (most recent call last):
+    ...
+    gearsig.errors.InputError: model.csv: states no sampling rate; give --sim-fs
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(
+            error.what, where=error.where, allowed=error.allowed, remedy=_with_options(error.remedy, names)
+        ) from None
+    except RefusalError as error:
+        raise RefusalError(error.reason, remedy=_with_options(error.remedy, names)) from None
+
+
+def _with_options(text: str, names: Mapping[str, str]) -> str:
+    return re.sub(r"--[a-z-]*[a-z]", lambda found: names.get(found[0], found[0]), text)
 
 
 def _one_line(text: str) -> str:

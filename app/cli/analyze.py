@@ -20,6 +20,7 @@ def analyze(
     tach_times: options.TachometerTimesOption = None,
     pulses_per_revolution: options.PulsesOption = 1,
     reference: options.ReferenceOption = None,
+    reference_fs: options.ReferenceRateOption = None,
     torque: options.TorqueOption = None,
     json: options.JsonOption = False,
     indicators: Annotated[bool, typer.Option("--indicators", help="Print the table of indicators as well.")] = False,
@@ -43,7 +44,7 @@ def analyze(
         healthy = None
         if reference is not None:
             stated = options.stated_speed(speed_rpm, None, 1)  # pulse times belong to the other recording
-            healthy = read_reference(reference, machine, speed=stated, **given)
+            healthy = read_reference(reference, machine, speed=stated, reference_rate_hz=reference_fs, **given)
         result = analyze_file(
             recording,
             machine,
@@ -71,6 +72,7 @@ def crack(
     recording: Annotated[Path, typer.Argument(help="Recording of a spur gear pair at steady speed.")],
     rig: options.RigOption = None,
     reference: options.ReferenceOption = None,
+    reference_fs: options.ReferenceRateOption = None,
     torque: options.TorqueOption = None,
     tip_relief: Annotated[
         str | None,
@@ -97,7 +99,7 @@ def crack(
     machine = options.open_rig(rig, recording)
     estimate = estimate_crack(
         options.open_recording(recording, machine, fs, speed),
-        reference=options.open_reference(reference, machine, fs, speed_rpm),
+        reference=options.open_reference(reference, machine, fs, speed_rpm, reference_fs),
         torque_nm=options.torque_of(torque),
         tip_relief_um=quantity(tip_relief, "um", "--tip-relief") if tip_relief else None,
         channels=tuple(dict.fromkeys(channel or ())),

@@ -9,7 +9,7 @@ import typer
 
 from app.cli import options
 from app.cli.console import typed_command
-from gearsig.errors import InputError
+from gearsig.errors import InputError, options_named
 
 if TYPE_CHECKING:
     from gearsig.comparison import Comparison
@@ -102,13 +102,13 @@ def open_simulation(
 
     The recording's rig then gives the gears only: its sensors' scales and its tachometer belong to the measurement.
     """
-    from gearsig.comparison import for_simulation
+    from gearsig.comparison import SIMULATION_OPTIONS, for_simulation
 
     opened_rig = options.open_rig(rig, path)
+    its_rig = opened_rig if opened_rig is not None or machine is None else for_simulation(machine)
     speed = options.stated_speed(speed_rpm, None, 1)
-    if opened_rig is not None or machine is None:
-        return options.open_recording(path, opened_rig, sampling_rate_hz, speed)
-    return options.open_recording(path, for_simulation(machine), sampling_rate_hz, speed)
+    with options_named(SIMULATION_OPTIONS):
+        return options.open_recording(path, its_rig, sampling_rate_hz, speed)
 
 
 def read_pair(text: str, simulated: Recording, recorded: Recording) -> tuple[str, str]:

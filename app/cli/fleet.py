@@ -67,6 +67,7 @@ def add(
     fs: options.SamplingRateOption = None,
     speed_rpm: options.SpeedOption = None,
     reference: options.ReferenceOption = None,
+    reference_fs: options.ReferenceRateOption = None,
     torque: options.TorqueOption = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Show machine, point and date of each recording; analyse nothing.")
@@ -120,6 +121,7 @@ def add(
                 sampling_rate_hz=fs,
                 speed=options.stated_speed(speed_rpm, None, 1),
                 reference=reference,
+                reference_rate_hz=reference_fs,
                 torque_nm=options.torque_of(torque),
                 memory_bytes=1e9 * memory,
                 n_processes=workers.n_workers if workers else jobs,

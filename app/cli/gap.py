@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli.console import progress_bar, typed_command
-from app.cli.options import ClusterOption, SamplingRateOption, SpeedOption, clear_other_versions, open_cluster
+from app.cli.options import (
+    ClusterOption,
+    ReferenceRateOption,
+    SamplingRateOption,
+    SpeedOption,
+    clear_other_versions,
+    open_cluster,
+)
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,7 +37,8 @@ def gap(
         Path | None,
         typer.Option(
             "--rig",
-            help="Rig file (TOML) of all recordings. NAME.toml beside a recording overrides its speed and torque.",
+            help="Rig file (TOML) of all recordings. NAME.toml beside a recording overrides its speed, torque, "
+            "sensors and sampling rate.",
         ),
     ] = None,
     model: Annotated[str, typer.Option("--model", help="Simulator to compare with.")] = "cracked",
@@ -40,6 +48,7 @@ def gap(
             "--reference", metavar="HEALTHY", help="Recording of the same rig when it was healthy; repeatable."
         ),
     ] = None,
+    reference_fs: ReferenceRateOption = None,
     torque: Annotated[
         list[str] | None,
         typer.Option("--torque", metavar="N", help="Of the input shaft, e.g. 60Nm: one for all, or one for each."),
@@ -110,6 +119,7 @@ def gap(
         learn=learn,
         stage=stage,
         speed_rpm=speed_rpm,
+        reference_rate_hz=reference_fs,
     )
     check_folder(output)
     if cache is not None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli.quantities import quantity
-from gearsig.errors import InputError
+from gearsig.errors import InputError, options_named
 from gearsig.formatting import counted
 
 if TYPE_CHECKING:
@@ -48,8 +48,13 @@ ReferenceOption = Annotated[
         "--reference",
         metavar="FILE",
         help="Recording of the same machine when it was healthy: same sensors, speed and load. --fs holds for it as "
-        "well, unless a rig file beside it (NAME.toml) states a sampling rate.",
+        "well, unless --reference-fs or a rig file beside it (NAME.toml) states its sampling rate; its sensors and "
+        "speed source are those of that rig file, too.",
     ),
+]
+ReferenceRateOption = Annotated[
+    float | None,
+    typer.Option("--reference-fs", metavar="HZ", help="Sampling rate of the reference, like --fs."),
 ]
 TorqueOption = Annotated[
     str | None,
@@ -138,15 +143,20 @@ def open_recording(
 
 
 def open_reference(
-    path: Path | None, rig: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
+    path: Path | None,
+    rig: Rig | None,
+    sampling_rate_hz: float | None,
+    speed_rpm: float | None,
+    reference_rate_hz: float | None,
 ) -> Recording | None:
     """Read the recording of the healthy machine, if one is given; pulse times belong to the other recording."""
     if path is None:
         return None
-    from gearsig.diagnosis import rig_and_rate_of_reference
+    from gearsig.diagnosis import REFERENCE_OPTIONS, rig_and_rate_of_reference
 
-    its_rig, rate_hz = rig_and_rate_of_reference(path, rig, sampling_rate_hz)
-    return open_recording(path, its_rig, rate_hz, stated_speed(speed_rpm, None, 1))
+    its_rig, rate_hz = rig_and_rate_of_reference(path, rig, sampling_rate_hz, reference_rate_hz)
+    with options_named(REFERENCE_OPTIONS):
+        return open_recording(path, its_rig, rate_hz, stated_speed(speed_rpm, None, 1))
 
 
 def torque_of(text: str | None) -> float | None:

@@ -144,14 +144,16 @@ def _size(content: Content) -> int:
 
 def read_and_analyze(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
     """Read rig, recording and reference, and analyse; of recordings longer than memory their most telling parts."""
-    from gearsig.diagnosis import LongAnalysis, analyze_file, read_usual_part
+    from gearsig.diagnosis import LongAnalysis, analyze_file, read_usual_part, rig_and_rate_of_reference
 
     rig = read_rig_text(request.rig_text, request.rig_name)
     given: dict[str, Any] = {"sampling_rate_hz": request.sampling_rate_hz, "speed": _constant(request.speed_rpm)}
     then = None
     if reference is not None:
         with _as_file(reference, request.reference_name) as path:
-            then = _named(read_usual_part(path, rig, **given), request.reference_name)
+            its_rig, rate_hz = rig_and_rate_of_reference(path, rig, request.sampling_rate_hz)
+            read = read_usual_part(path, its_rig, **{**given, "sampling_rate_hz": rate_hz})
+            then = _named(read, request.reference_name)
     with _as_file(content, request.name) as path:
         found = analyze_file(path, rig, reference=then, torque_nm=request.torque_nm, **given)
     analysis = found.as_one() if isinstance(found, LongAnalysis) else found

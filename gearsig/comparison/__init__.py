@@ -3,7 +3,7 @@
 from gearsig.comparison._averages import HalvedLines, frac, tooth_powers, waveform
 from gearsig.comparison._compare import ALIGN, compare
 from gearsig.comparison._lines import band_powers, order_band_limits, third_octave_limits, third_octaves
-from gearsig.comparison._sides import for_simulation
+from gearsig.comparison._sides import SIMULATION_OPTIONS, for_simulation
 from gearsig.comparison._types import (
     BEYOND,
     Agreement,
@@ -23,6 +23,7 @@ __all__ = [
     "ALIGN",
     "BEYOND",
     "MIN_REPEATED",
+    "SIMULATION_OPTIONS",
     "STEADY",
     "Agreement",
     "BandLevel",

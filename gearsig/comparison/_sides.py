@@ -9,7 +9,7 @@ import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray, listed, short
-from gearsig.errors import InputError, RefusalError
+from gearsig.errors import InputError, RefusalError, options_named
 from gearsig.orders import first_whole_sample
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import SI_FACTORS, Channel, Recording, find_problems
@@ -17,6 +17,10 @@ from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource
 
 MIN_REVOLUTIONS = 8
 """Of a shaft: four in each half. Fewer leave other shafts' orders in its average, and say nothing of scatter."""
+
+
+SIMULATION_OPTIONS = {"--fs": "--sim-fs", "--speed-rpm": "--sim-speed-rpm", "--rig": "--sim-rig"}
+"""Options of the command line → those that state the same of the simulation."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +109,8 @@ def make_side(
 def _reference_ratio(prepared: PreparedRecording, shaft: str, side_name: str) -> float:
     """Return revolutions of the shaft that the result counts orders of, per revolution of this side's reference."""
     try:
-        angle = prepared.followed_angle
+        with options_named(SIMULATION_OPTIONS if side_name == "simulation" else {}):
+            angle = prepared.followed_angle
     except RefusalError as refusal:
         raise RefusalError(
             f"the speed of the {side_name} is not known: {refusal.reason}", remedy=refusal.remedy

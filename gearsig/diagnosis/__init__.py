@@ -1,6 +1,6 @@
 """From signals and indicators to findings in words and numbers."""
 
-from gearsig.diagnosis._analyze import analyze, with_known_angle
+from gearsig.diagnosis._analyze import analyze, named_alike, only_channel_taken, with_known_angle
 from gearsig.diagnosis._bearing import smallest_depth
 from gearsig.diagnosis._bearing_families import (
     BEARING_PARTS,
@@ -24,6 +24,7 @@ from gearsig.diagnosis._long import (
 )
 from gearsig.diagnosis._modulation import Modulation, modulation_of
 from gearsig.diagnosis._reference import (
+    REFERENCE_OPTIONS,
     Earlier,
     IndicatorChange,
     beside_reference,
@@ -56,6 +57,7 @@ __all__ = [
     "BEARING_PARTS",
     "CHANGED",
     "MEMORY_BYTES",
+    "REFERENCE_OPTIONS",
     "SAME_BEARING_ORDER",
     "SURER_WITH",
     "WHAT_WOULD_HELP",
@@ -90,6 +92,8 @@ __all__ = [
     "localise",
     "long_overview",
     "modulation_of",
+    "named_alike",
+    "only_channel_taken",
     "outcome_of",
     "ranked",
     "read_reference",

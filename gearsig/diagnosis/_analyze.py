@@ -105,8 +105,8 @@ def analyze(
     healthy = None if reference is None else prepare(reference, prepared.recording.rig, name="reference")
     renamed: list[Finding] = []
     if healthy is not None:
-        given, healthy = healthy.recording, _named_alike(prepared.recording, healthy)
-        renamed = _only_channel_taken(given, healthy.recording)
+        given, healthy = healthy.recording, named_alike(prepared.recording, healthy)
+        renamed = only_channel_taken(given, healthy.recording)
         _check_reference(prepared.recording, healthy.recording)
     analysis, _ = _examined(prepared, settings or AnalysisSettings(), healthy, torque_nm, on_stage or (lambda _: None))
     return replace(analysis, findings=(*analysis.findings, *renamed)) if renamed else analysis
@@ -364,7 +364,7 @@ def _check_vibration(recording: Recording) -> None:
         )
 
 
-def _named_alike(recording: Recording, healthy: PreparedRecording) -> PreparedRecording:
+def named_alike(recording: Recording, healthy: PreparedRecording) -> PreparedRecording:
     """Return the reference with the recording's names of channels that differ by a record's number only.
 
     Where both have only one vibration channel, it is taken for the same one under any other name. The renamed one is
@@ -390,7 +390,7 @@ def _renamed(prepared: PreparedRecording, names: Mapping[str, str]) -> PreparedR
     return prepared.keep(("diagnosis", "renamed", channels), lambda: prepare(replace(recording, channels=channels)))
 
 
-def _only_channel_taken(reference: Recording, renamed: Recording) -> list[Finding]:
+def only_channel_taken(reference: Recording, renamed: Recording) -> list[Finding]:
     """Say that a reference's only vibration channel was taken for the recording's, where their names differ."""
     before, after = reference.vibration_names(), renamed.vibration_names()
     if before == after or len(before) != 1:

@@ -18,10 +18,10 @@ import numpy as np
 from gearsig.checks import FloatArray, freeze, instance_of, positive
 from gearsig.diagnosis._analyze import analyze
 from gearsig.diagnosis._blocks import RecordBlocks, record_blocks
-from gearsig.diagnosis._reference import rig_and_rate_of_reference
+from gearsig.diagnosis._reference import REFERENCE_OPTIONS, rig_and_rate_of_reference
 from gearsig.diagnosis._types import Analysis, Finding, Kind, Outcome
 from gearsig.diagnosis._verdict import ranked
-from gearsig.errors import InputError
+from gearsig.errors import InputError, options_named
 from gearsig.formatting import file_label
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording, check_memory
@@ -227,6 +227,7 @@ def read_reference(
     *,
     memory_bytes: float = MEMORY_BYTES,
     sampling_rate_hz: float | None = None,
+    reference_rate_hz: float | None = None,
     speed: SpeedSource | None = None,
 ) -> PreparedRecording:
     """Read the recording of a healthy machine once, also for many that are compared with it; of a long one a part.
@@ -241,14 +242,17 @@ def read_reference(
     memory_bytes : float
         What the analysis of both may take; the reference may take half of it.
     sampling_rate_hz, speed
-        As in `read_recording`; pulse times belong to the other recording.
+        Stated for the recording that is compared, as in `read_recording`; pulse times belong to it alone.
+    reference_rate_hz : float or None
+        Sampling rate of the reference, where it differs.
     """
     check_rig(rig)
     file = Path(instance_of(path, str | PathLike, "path", remedy="of a recording in memory, analyze takes it itself"))
     modified_ns = file.stat().st_mtime_ns if file.is_file() else 0
     own_speed = None if isinstance(speed, PulseTimes) else speed
-    its_rig, rate_hz = rig_and_rate_of_reference(file, rig, sampling_rate_hz)
-    return _read_reference(file, its_rig, memory_bytes / 2, rate_hz, own_speed, modified_ns)
+    its_rig, rate_hz = rig_and_rate_of_reference(file, rig, sampling_rate_hz, reference_rate_hz)
+    with options_named(REFERENCE_OPTIONS):
+        return _read_reference(file, its_rig, memory_bytes / 2, rate_hz, own_speed, modified_ns)
 
 
 @lru_cache(maxsize=1)

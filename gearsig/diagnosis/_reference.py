@@ -11,7 +11,7 @@ from gearsig.diagnosis._types import MIN_CHANGE_DB, REFERENCE_UNFIT, Analysis, F
 from gearsig.errors import InputError
 from gearsig.formatting import signed
 from gearsig.indicators import Indicator
-from gearsig.rig import Rig
+from gearsig.rig import Rig, SpeedSource
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,12 @@ class Earlier:
     change_db: float | None
 
 
+REFERENCE_OPTIONS = {"--fs": "--reference-fs"}
+"""Options of the command line → those that state the same of the reference."""
+
+
 def rig_and_rate_of_reference(
-    path: str | Path, rig: Rig | None, stated_hz: float | None
+    path: str | Path, rig: Rig | None, stated_hz: float | None, reference_rate_hz: float | None = None
 ) -> tuple[Rig | None, float | None]:
     """Return (rig, sampling rate) of the healthy reference of a recording, by the rig file beside the reference.
 
@@ -57,39 +61,58 @@ def rig_and_rate_of_reference(
     path : str or Path
         Of the reference.
     rig : Rig or None
-        Of the recording: it holds for the reference, but for torque and sampling rate that the file beside it states.
+        Of the recording: it holds for the reference, but for what the file beside it states of the measurement:
+        sensors, speed source, sampling rate, torque.
     stated_hz : float or None
         Sampling rate that was stated for the recording: it holds for the reference, unless that file states one.
+    reference_rate_hz : float or None
+        Sampling rate that was stated for the reference.
 
     Raises
     ------
     InputError
-        If that rig file has gears with other teeth.
+        If that rig file has gears with other teeth, or tells the speed of another shaft.
     """
     from gearsig.rig import read_rig, rig_file_beside
 
     beside = rig_file_beside(path)
     rig_beside = read_rig(beside) if beside is not None else None
-    rate_hz = stated_hz if rig_beside is None or rig_beside.sampling_rate_hz is None else None
-    return _rig_at_reference(path, rig, rig_beside), rate_hz
+    its_rig = rig if rig_beside is None else _rig_at_reference(path, rig or Rig(), rig_beside)
+    if reference_rate_hz is not None:
+        return its_rig, reference_rate_hz
+    return its_rig, stated_hz if rig_beside is None or rig_beside.sampling_rate_hz is None else None
 
 
-def _rig_at_reference(path: str | Path, rig: Rig | None, rig_beside: Rig | None) -> Rig | None:
-    if rig_beside is None or rig is None:
-        return rig
-    if rig_beside.sampling_rate_hz is not None:
-        rig = replace(rig, sampling_rate_hz=rig_beside.sampling_rate_hz)
-    if not rig_beside.pairs:
-        return rig
+def _rig_at_reference(path: str | Path, rig: Rig, rig_beside: Rig) -> Rig:
+    """Return the recording's machine with what the file beside the reference states of the measurement."""
     teeth, others = (", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in r.pairs) for r in (rig, rig_beside))
-    if teeth != others:
+    if rig.pairs and rig_beside.pairs and teeth != others:
         raise InputError(
             f"the reference is of another machine: its rig file says teeth {others}, the recording's {teeth}",
             where=Path(path).name,
             remedy="give a recording of the same machine when it was healthy",
         )
+    its_rig = rig.with_measurement_of(replace(rig_beside, speed=_speed_at_reference(path, rig, rig_beside.speed)))
     point, then = rig.operating_point, rig_beside.operating_point
-    return replace(rig, operating_point=replace(point, torque_nm=then.torque_nm)) if then.shaft == point.shaft else rig
+    if not rig_beside.pairs or then.shaft != point.shaft:
+        return its_rig
+    return replace(its_rig, operating_point=replace(point, torque_nm=then.torque_nm))
+
+
+def _speed_at_reference(path: str | Path, rig: Rig, speed: SpeedSource | None) -> SpeedSource | None:
+    """Return the speed source of the file beside the reference, on the shaft whose orders are compared."""
+    if speed is None or speed.shaft in ("", rig.reference_shaft):
+        return speed
+    if not rig.shafts:
+        return replace(speed, shaft="")
+    if rig.speed is None:  # the recording itself tells its speed, and so may the reference
+        return None
+    raise InputError(
+        f"its rig file tells the speed of shaft {speed.shaft!r}, the recording's that of {rig.reference_shaft!r}",
+        where=Path(path).name,
+        allowed="the same shaft, as orders are compared",
+        remedy="let [speed] name the same shaft in both rig files",
+    )
 
 
 def changes(analysis: Analysis) -> tuple[IndicatorChange | None, ...]:
@@ -111,7 +134,8 @@ def reference_unfit(reference: Analysis) -> Finding:
         f"Not compared with {name}: {reason.title if reason is not None else reference.verdict}",
         confidence_basis="what the reference's own analysis says",
         evidence=reason.evidence if reason is not None else (),
-        surer="State the reference's sampling rate and speed in a rig file beside it (NAME.toml), or take another one.",
+        surer="State the reference's sampling rate with --reference-fs, or rate and speed in a rig file beside it "
+        "(NAME.toml), or take another one.",
     )
 
 

@@ -48,6 +48,8 @@ class AnalysisOptions:
         Instead of the rig's operating point.
     memory_bytes : float
         What the analysis of one recording may take; of a longer one, see `gearsig.diagnosis.analyze_file`.
+    reference_rate_hz : float or None
+        Sampling rate of the reference, where it differs.
     """
 
     rig: Rig | None = None
@@ -56,6 +58,7 @@ class AnalysisOptions:
     reference: Path | None = None
     torque_nm: float | None = None
     memory_bytes: float = 2e9
+    reference_rate_hz: float | None = None
 
 
 @dataclass(frozen=True)
@@ -207,7 +210,8 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
         reading["memory_bytes"] = options.memory_bytes
         reference = None
         if options.reference is not None and options.reference.resolve() != path.resolve():
-            reference = read_reference(options.reference, rig, **reading)
+            rate_hz = options.reference_rate_hz
+            reference = read_reference(options.reference, rig, reference_rate_hz=rate_hz, **reading)
         result = analyze_file(path, rig, reference=reference, torque_nm=options.torque_nm, **reading)
         analysis = result.as_one() if isinstance(result, LongAnalysis) else result
         if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # of parts no hash is taken
@@ -369,7 +373,9 @@ def _setups(options: AnalysisOptions) -> Callable[[Path], str]:
     from gearsig.recording import sha256_of
 
     reference = sha256_of(options.reference) if options.reference is not None else ""
-    shared = [reference, options.sampling_rate_hz, options.torque_nm, repr(options.speed)]
+    shared: list[object] = [reference, options.sampling_rate_hz, options.torque_nm, repr(options.speed)]
+    if options.reference_rate_hz is not None:
+        shared.append(options.reference_rate_hz)
 
     @cache
     def of_rig_file(path: Path) -> object:
@@ -377,6 +383,10 @@ def _setups(options: AnalysisOptions) -> Callable[[Path], str]:
             return rig_to_dict(read_rig(path))
         except InputError as error:
             return str(error)
+
+    beside = rig_file_beside(options.reference) if options.reference is not None else None
+    if beside is not None:
+        shared.append(of_rig_file(beside))
 
     @cache
     def setup(path: Path) -> str:

@@ -153,6 +153,7 @@ class Fleet:
         speed: SpeedSource | None = None,
         reference: str | Path | None = None,
         torque_nm: float | None = None,
+        reference_rate_hz: float | None = None,
         memory_bytes: float = 2e9,
         n_processes: int | None = None,
         executor: Executor | None = None,
@@ -169,7 +170,7 @@ class Fleet:
             Files, folders with sub-folders, "folder/*.csv"; or what `gearsig.fleet.origins` found, for a look first.
         pattern, machine, point, date
             See `gearsig.fleet.origins`.
-        rig, sampling_rate_hz, speed, reference, torque_nm, memory_bytes
+        rig, sampling_rate_hz, speed, reference, torque_nm, reference_rate_hz, memory_bytes
             As for `gearsig.batch.report_many`; None: what files and rig files say.
         n_processes : int or None
             Local processes; None: one per processor.
@@ -192,9 +193,8 @@ class Fleet:
         if paths or not listed:
             stated: dict[str, Any] = {"machine": machine, "point": point, "date": date, "rig": rig}
             listed += origins(paths, pattern=pattern, **stated, on_passed_over=passed_over.append)
-        options = AnalysisOptions(
-            rig, sampling_rate_hz, speed, Path(reference) if reference is not None else None, torque_nm, memory_bytes
-        )
+        healthy = Path(reference) if reference is not None else None
+        options = AnalysisOptions(rig, sampling_rate_hz, speed, healthy, torque_nm, memory_bytes, reference_rate_hz)
         result = add_recordings(
             self._store, listed, options, n_processes=n_processes, executor=executor, on_progress=on_progress
         )

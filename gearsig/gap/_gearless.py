@@ -20,6 +20,8 @@ from gearsig.diagnosis import (
     Outcome,
     analyze,
     in_reference,
+    named_alike,
+    only_channel_taken,
 )
 from gearsig.errors import RefusalError
 from gearsig.formatting import enumerated, named, percent, signed
@@ -141,8 +143,8 @@ def analysed(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
 
 
 def _with_bearings(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
-    """Analyse a recording whose bearings must be examined, as there is nothing else."""
-    analysis_and_angle = analysed(recording)
+    """Analyse a recording, once, whose bearings must be examined, as there is nothing else."""
+    analysis_and_angle = recording.keep(("gap", "analysed"), lambda: analysed(recording))
     for finding in analysis_and_angle[0].findings:
         if finding.code in ("all-channels-dead", "bearings-not-examined"):
             raise RefusalError(finding.title, remedy=finding.surer or "check the measurement chain")
@@ -209,20 +211,25 @@ def _rise_db(finding: Finding, earlier: Earlier) -> float | None:
 def _reference(
     name: str, analysis_and_angle: tuple[Analysis, ShaftAngle], references: Sequence[tuple[Analysis, ShaftAngle]]
 ) -> tuple[Analysis | None, list[str]]:
-    """Return the healthy reference at the recording's speed, or none and why."""
+    """Return the healthy reference at the recording's speed, and what it cannot be asked; or none and why."""
     if not references:
         return None, []
     analysis, angle = analysis_and_angle
     speed = angle.mean_speed_rpm
     nearest, its_angle = min(references, key=lambda candidate: abs(candidate[1].mean_speed_rpm - speed))
+    channels = {c.channel for c in analysis.channels}
+    missing = sorted(channels - {c.channel for c in nearest.channels})
     why = ""
     if abs(its_angle.mean_speed_rpm / speed - 1.0) > LARGEST_SPEED_DIFFERENCE:
         why = f"no reference is within {percent(LARGEST_SPEED_DIFFERENCE)} of its speed"
-    elif missing := {c.channel for c in analysis.channels} - {c.channel for c in nearest.channels}:
-        why = f"the reference has no channel {', '.join(sorted(missing))}"
+    elif len(missing) == len(channels):
+        why = f"the reference has no channel {', '.join(missing)}"
     elif nearest.outcome is Outcome.FAULT:
         why = f"the reference at its speed is not healthy ({nearest.findings[0].title.rstrip('.')})"
-    return (None, [f"{name} is not compared with a reference: {why}."]) if why else (nearest, [])
+    if why:
+        return None, [f"{name} is not compared with a reference: {why}."]
+    unasked = f"the reference has no channel {', '.join(missing)}; what stands out there may not be new"
+    return nearest, [f"{name}: {unasked}."] if missing else []
 
 
 # --------------------
@@ -443,13 +450,22 @@ def diagnose_gearless(
     """
     tell("analysing the references", 0.05)
     left_out: list[str] = []
-    healthy = readable(references, lambda item: (_with_bearings(item), []), "reference", left_out)
+
+    def healthy_reference(reference: PreparedRecording) -> tuple[PreparedRecording, list[str]]:
+        _with_bearings(named_alike(recordings[0].recording, reference))
+        return reference, []
+
+    usable = readable(references, healthy_reference, "reference", left_out)
     done, rig = iter(range(len(recordings))), recordings[0].rig
 
     def examine(recording: PreparedRecording) -> tuple[ExaminedRecording, list[str]]:
         name = recording.recording.name
         tell(f"analysing {name}", 0.2 + 0.7 * next(done) / len(recordings))
-        return _beyond_reference(recording, examined(name, _with_bearings(recording), healthy), references), []
+        healthy = [named_alike(recording.recording, reference) for reference in usable]
+        alone = examined(name, _with_bearings(recording), [_with_bearings(reference) for reference in healthy])
+        pairs = zip(usable, healthy, strict=True)
+        taken = [f.title for then, named in pairs for f in only_channel_taken(then.recording, named.recording)]
+        return _beyond_reference(recording, alone, healthy), taken
 
     every = readable(recordings, examine, "recording", left_out)
     hint = () if references else (NO_REFERENCE,)
@@ -604,7 +620,7 @@ def unexpected_findings(
     healthy: list[tuple[Analysis, ShaftAngle]] = []
     if nearest is not None:
         with suppress(RefusalError):
-            healthy = [analysed(nearest)]
+            healthy = [analysed(named_alike(recording.recording, nearest))]
     now_examined = examined(name, now, healthy)
     warnings = _fault_of_reference(healthy[0][0], now[0], name) if healthy else []
     weak = [part for part in now_examined.unexpected if part.finding.code == LINE or part.finding.kind is Kind.NOTICE]

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from gearsig.checks import closest_match_hint
-from gearsig.diagnosis import read_whole
-from gearsig.errors import InputError, RefusalError
+from gearsig.diagnosis import REFERENCE_OPTIONS, read_whole, rig_and_rate_of_reference
+from gearsig.errors import InputError, RefusalError, options_named
 from gearsig.formatting import counted
 from gearsig.gap._labelled import LabelledRecording
 from gearsig.gap._types import NONE, UNKNOWN
@@ -31,7 +31,7 @@ class GapRequest:
     torques_nm : tuple of float
         None, one for all, or one for each recording.
     sampling_rate_hz : float or None
-        Of files that do not state it.
+        Of files that do not state it; of references unless a rig file beside them does.
     names, reference_names : tuple of str
         Of recordings and references, for people; empty: those of the files.
     learn : Path or None
@@ -40,6 +40,8 @@ class GapRequest:
         Gear pair that is diagnosed, of several, see `diagnose_gap`.
     speed_rpm : float or None
         Constant speed of the reference shaft in all recordings and references, where nothing measures it.
+    reference_rate_hz : float or None
+        Sampling rate of the references, where it differs.
     """
 
     recordings: tuple[Path, ...]
@@ -52,6 +54,7 @@ class GapRequest:
     learn: Path | None = None
     stage: str = ""
     speed_rpm: float | None = None
+    reference_rate_hz: float | None = None
 
 
 @dataclass(frozen=True)
@@ -84,19 +87,26 @@ def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lamb
         *(request.names or _names(request.recordings)),
         *(request.reference_names or _names(request.references)),
     )
-    recordings = []
+    recordings: list[Recording] = []
+    n, labelled = len(request.recordings), tuple[LabelledRecording, ...]()
+    speed = None if request.speed_rpm is None else ConstantSpeed(request.speed_rpm)
     for path, name, rig in zip(files, names, _rigs(request, files), strict=True):
         on_file(path.name)
-        speed = None if request.speed_rpm is None else ConstantSpeed(request.speed_rpm)
-        recording = read_whole(path, rig, sampling_rate_hz=request.sampling_rate_hz, speed=speed)
+        is_reference = len(recordings) >= n
+        rate_hz = _rate_hz_of_reference(path, request) if is_reference else request.sampling_rate_hz
+        with options_named(REFERENCE_OPTIONS if is_reference else {}):
+            recording = read_whole(path, rig, sampling_rate_hz=rate_hz, speed=speed)
         recordings.append(recording.with_name(name))
-    n, labelled = len(request.recordings), tuple[LabelledRecording, ...]()
     if request.learn is not None:
         on_file(request.learn.name)
         labelled = read_labelled(
             request.learn, rig=recordings[0].rig, sampling_rate_hz=request.sampling_rate_hz, on_file=on_file
         )
     return GapInputs(tuple(recordings[:n]), tuple(recordings[n:]), labelled)
+
+
+def _rate_hz_of_reference(path: Path, request: GapRequest) -> float | None:
+    return rig_and_rate_of_reference(path, None, request.sampling_rate_hz, request.reference_rate_hz)[1]
 
 
 def _check_files(request: GapRequest) -> None:
@@ -143,7 +153,7 @@ def _rigs(request: GapRequest, files: Sequence[Path]) -> tuple[Rig, ...]:
 
 
 def _merged(common: Rig | None, of_recording: Rig | None) -> Rig:
-    """Return the common rig at the operating point and with the speed source of the recording's own."""
+    """Return the common rig at the operating point of the recording's own, and with its measurement."""
     if common is None or of_recording is None:
         rig = common or of_recording
         assert rig is not None  # noqa: S101 - the caller has made sure of one
@@ -156,7 +166,7 @@ def _merged(common: Rig | None, of_recording: Rig | None) -> Rig:
             speed_rpm=common_point.speed_rpm if point.speed_rpm is None else point.speed_rpm,
             torque_nm=common_point.torque_nm if point.torque_nm is None else point.torque_nm,
         )
-    return replace(common, operating_point=point, speed=of_recording.speed or common.speed)
+    return replace(common.with_measurement_of(of_recording), operating_point=point)
 
 
 def _with_torque(rig: Rig, request: GapRequest, place: int) -> Rig:

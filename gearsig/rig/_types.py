@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import cos, isclose, radians
 from os import PathLike
@@ -575,6 +575,21 @@ class Rig:
         if self.operating_point.shaft:
             return self.operating_point.shaft
         return self.shafts[0].name if self.shafts else ""
+
+    def with_measurement_of(self, other: Rig) -> Rig:
+        """Return this machine with what another rig file of it states of sensors, speed source and sampling rate.
+
+        Raises
+        ------
+        InputError
+            If its speed source is on a shaft that this rig does not describe.
+        """
+        return replace(
+            self,
+            sensors=other.sensors or self.sensors,
+            speed=other.speed or self.speed,
+            sampling_rate_hz=other.sampling_rate_hz or self.sampling_rate_hz,
+        )
 
     def ratio(self, shaft: str, to: str = "") -> float | None:
         """Revolutions of `shaft` per revolution of `to` (default: the reference shaft); None if not known."""

@@ -228,6 +228,30 @@ def test_the_file_without_a_tachometer_is_named_once(capsys: pytest.CaptureFixtu
     assert err.count("const.csv") == 1
 
 
+def test_a_reference_has_the_channels_and_the_speed_source_of_its_own_rig_file(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The eccentric wheel has ch1 and a tachometer on ch2, its healthy machine a1 and one on tacho."""
+    code, out, _ = run(capsys, "analyze", sample("eccentric_wheel"), "--reference", sample("healthy"))
+    assert code == 0
+    assert "Compared with healthy.h5." in out
+    assert "Suspicion: Perhaps an eccentric, loose or damaged gear on shaft output." in " ".join(out.split())
+
+
+def test_the_rate_of_a_reference_that_does_not_state_it_is_an_option(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    healthy = read_recording(sample("root_crack_0mm"))
+    bare = tmp_path / "bare.csv"
+    np.savetxt(bare, healthy.samples.T, delimiter=",", header=",".join(healthy.channel_names), comments="", fmt="%.9g")
+    given = ("crack", sample("root_crack_3mm"), "--reference", bare)
+    code, _, err = run(capsys, *given)
+    assert code == 2
+    assert "bare.csv: states no sampling rate (allowed: above 0 Hz); give --reference-fs or" in err
+    code, out, _ = run(capsys, *given, "--reference-fs", 12800)
+    assert (code, out) == (0, run(capsys, *given[:-1], sample("root_crack_0mm"))[1])
+
+
 def test_analyze_against_a_reference_names_the_crack_once(capsys: pytest.CaptureFixture[str]) -> None:
     reference = ("--reference", sample("root_crack_0mm"))
     code, out, _ = run(capsys, "analyze", sample("root_crack_4mm"), *reference, "--json")

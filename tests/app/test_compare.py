@@ -40,6 +40,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     export(folder / "model.csv", gear_record(gain=0.5, noise=0.01, duration_s=2.0, rate_hz=10000.0, seed=1))
     export(folder / "other.csv", gear_record(duration_s=1.0), name="b7")
     export(folder / "velocity.csv", gear_record(duration_s=1.0), unit="mm/s")
+    np.savetxt(folder / "bare.csv", gear_record(duration_s=1.0).samples[0], header="a1", comments="", fmt="%.6g")
     (folder / "gear.toml").write_text(RIG + "[speed]\nsource = 'constant'\nspeed_rpm = 1500.0\nshaft = 'in'\n")
     return folder
 
@@ -101,6 +102,9 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(
         (["velocity.csv", "measured.csv", "--rig", "gear.toml"], "measure different things: velocity and acceleration"),
         (["model.csv", "measured.csv"], "the speed of the simulation is not known"),
         (["model.csv", "missing.csv", "--rig", "gear.toml"], "missing.csv"),
+        (["bare.csv", "measured.csv", "--rig", "gear.toml", "--fs", "9e3"], "bare.csv: states no sampling rate"),
+        (["bare.csv", "measured.csv", "--rig", "gear.toml", "--fs", "9e3"], "give --sim-fs or"),
+        (["model.csv", "bare.csv", "--rig", "gear.toml"], "give --fs or"),
         (["model.csv", "measured.csv", "--rig", "gear.toml", "--channel", "a1"], ""),
         (["model.csv", "measured.csv", "--rig", "gear.toml", "--channel", "x"], "'x' is not SIM=RECORDED"),
         (["model.csv", "measured.csv", "--rig", "gear.toml", "--channel", "a1=a2"], "there is no channel 'a2'"),

@@ -11,7 +11,7 @@ import pytest
 
 from app.cli.main import main
 from gearsig.errors import RefusalError
-from gearsig.gap import GapOutcome, GapReport, PlaceKind, diagnose_gap
+from gearsig.gap import GapOutcome, GapReport, GapRequest, PlaceKind, diagnose_gap, read_gap_inputs
 from gearsig.recording import Channel, Recording, read_recording
 from gearsig.report import gap_page_html, gap_schema, gap_to_dict
 from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft, write_rig
@@ -111,6 +111,38 @@ def test_a_reference_that_is_damaged_itself_is_not_used() -> None:
 
 
 @pytest.mark.slow
+def named(record: Recording, number: int, *more: str) -> Recording:
+    """Return the recording with the names that a data logger gives by the record's number, and as many channels."""
+    places = ("DE", *more)
+    noise = np.random.default_rng(7).standard_normal((len(more), record.n_samples))
+    channels = tuple(replace(record.channels[0], name=f"X{number}_{place}_time") for place in places)
+    return replace(record, samples=np.concatenate([record.samples, noise]), channels=channels)
+
+
+def test_channels_that_differ_by_a_records_number_are_compared_and_one_that_is_not_there_is_told() -> None:
+    report = diagnosed(named(recording(ORDERS["BPFO"]), 130, "FE"), named(recording(seed=1), 118))
+    assert report.causes[0].name == "bearing_outer_race"
+    assert report.references
+    assert "now: the reference has no channel X130_FE_time; what stands out there may not be new." in report.notes
+
+
+def test_a_reference_at_another_rate_is_read_at_its_own(tmp_path: Path) -> None:
+    """Its rig file or the request tells it; what is stated for the recordings is not the reference's then."""
+    write_rig(RIG, tmp_path / "rig.toml")
+    for name in ("now", "then"):
+        np.savetxt(tmp_path / f"{name}.csv", np.random.default_rng(0).standard_normal(4000), header="a1", comments="")
+    asked = GapRequest((tmp_path / "now.csv",), (tmp_path / "then.csv",), tmp_path / "rig.toml", sampling_rate_hz=12e3)
+
+    def rates(request: GapRequest) -> list[float]:
+        inputs = read_gap_inputs(request)
+        return [r.sampling_rate_hz for r in (*inputs.recordings, *inputs.references)]
+
+    assert rates(asked) == [12e3, 12e3]
+    assert rates(replace(asked, reference_rate_hz=48e3)) == [12e3, 48e3]
+    write_rig(replace(RIG, sampling_rate_hz=24e3), tmp_path / "then.toml")
+    assert rates(asked) == [12e3, 24e3]
+
+
 def test_impacts_of_no_known_part_stay_unknown() -> None:
     strange = diagnosed(recording(5.9))
     assert strange.outcome is GapOutcome.UNKNOWN

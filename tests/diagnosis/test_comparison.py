@@ -16,12 +16,13 @@ from gearsig.diagnosis import (
     analyze,
     beside_reference,
     changes,
+    read_reference,
     rig_and_rate_of_reference,
 )
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
-from gearsig.report import marked_positions
-from gearsig.rig import write_rig
+from gearsig.report import marked_positions, reference_text
+from gearsig.rig import Sensor, TachometerChannel, write_rig
 from tests.diagnosis.machines import GOOD, RIG, codes, finding, good_analysis, motor, record, teeth
 from tests.kinematic.model import BearingFault
 
@@ -98,7 +99,37 @@ def test_the_rate_of_a_rig_file_beside_the_reference_holds_for_it(tmp_path: Path
     path = tmp_path / "healthy.csv"
     assert rig_and_rate_of_reference(path, None, 12000.0)[1] == 12000.0
     write_rig(replace(RIG, sampling_rate_hz=48000.0), tmp_path / "healthy.toml")
-    assert rig_and_rate_of_reference(path, None, 12000.0)[1] is None
+    rig, rate_hz = rig_and_rate_of_reference(path, None, 12000.0)
+    assert (rig.sampling_rate_hz, rate_hz) == (48000.0, None)
+    assert rig_and_rate_of_reference(path, None, 12000.0, 25600.0)[1] == 25600.0
+
+
+def test_the_rig_file_beside_the_reference_says_how_it_was_measured(tmp_path: Path) -> None:
+    """The machine is the recording's; sensors and speed source are those of the reference's own measurement."""
+    measured = replace(RIG, sensors=(Sensor("ch1", scale=62.5),), speed=TachometerChannel("ch2", shaft="in"))
+    then = replace(RIG, bearings=(), sensors=(Sensor("a1"),), speed=TachometerChannel("tacho", shaft="in"))
+    write_rig(then, tmp_path / "then.toml")
+    rig = rig_and_rate_of_reference(tmp_path / "then.csv", measured, None)[0]
+    assert (rig.sensors, rig.speed, rig.bearings) == (then.sensors, then.speed, RIG.bearings)
+    write_rig(replace(then, speed=TachometerChannel("tacho", shaft="out")), tmp_path / "then.toml")
+    with pytest.raises(InputError, match=r"then.csv: .* speed of shaft 'out', the recording's that of 'in'"):
+        rig_and_rate_of_reference(tmp_path / "then.csv", measured, None)
+    assert rig_and_rate_of_reference(tmp_path / "then.csv", RIG, None)[0].speed is None
+
+
+def test_a_reference_without_a_rate_asks_for_its_own_option(tmp_path: Path) -> None:
+    path = tmp_path / "then.csv"
+    np.savetxt(path, record().samples[:1].T, header="a1", comments="", fmt="%.6g")
+    with pytest.raises(InputError, match=r"then.csv: states no sampling rate .*; give --reference-fs or"):
+        read_reference(path, RIG)
+    assert read_reference(path, RIG, reference_rate_hz=5120.0).recording.sampling_rate_hz == 5120.0
+
+
+def test_a_reference_that_is_suspected_is_not_called_faulty() -> None:
+    good = good_analysis()
+    for kind, said in ((Kind.FAULT, "is not healthy itself"), (Kind.SUSPICION, "gives a suspicion itself")):
+        then = replace(good, findings=(Finding("bearing-outer-race", kind, "Damage."),), verdict="Damage.")
+        assert reference_text(then).endswith(f", which {said}: Damage.")
 
 
 def test_without_a_reference_nothing_is_compared() -> None:

@@ -34,8 +34,10 @@ FORM_LABELS = {
 _PLACES = {
     "--fs or sampling_rate_hz in the rig file": "the sampling rate, below or under Machine",
     "--fs": "the sampling rate, below or under Machine",
+    "--sim-speed-rpm": "the simulation's speed",
     "--speed-rpm": "the constant speed, below or under Machine",
     "given with --reference": "chosen on the left as healthy machine",
+    "with --reference-fs": "on the command line",
     "--reference": "the healthy machine on the left",
     "low_cut_hz": "the lowest frequency",
     "high_cut_hz": "the highest frequency",
