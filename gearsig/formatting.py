@@ -94,6 +94,42 @@ def signed(value: float, n_decimals: int = 1) -> str:
     return f"{rounded:+.{n_decimals}f}".replace("-", "−") if rounded else f"{0.0:.{n_decimals}f}"
 
 
+def decimals_for(scatter: float, n_decimals: int = 1) -> int:
+    """Return the decimals of a figure and its scatter: one more where the scatter would be written as zero.
+
+    Examples
+    --------
+    >>> decimals_for(0.2), decimals_for(0.04), decimals_for(0.0004, 3)
+    (1, 2, 4)
+    """
+    return n_decimals if scatter >= 0.5 * 10.0**-n_decimals else n_decimals + 1
+
+
+def scatter_text(scatter: float, n_decimals: int = 1) -> str:
+    """Return a scatter for people: never written as zero.
+
+    Examples
+    --------
+    >>> scatter_text(0.23), scatter_text(0.04), scatter_text(0.001)
+    ('0.2', '0.04', '<0.01')
+    """
+    n = decimals_for(scatter, n_decimals)
+    return f"{scatter:.{n}f}" if scatter >= 0.5 * 10.0**-n else f"<{10.0**-n:.{n}f}"
+
+
+def plus_minus(value: float, scatter: float, n_decimals: int = 1, *, with_sign: bool = False) -> str:
+    """Return a figure with its scatter, in as many decimals.
+
+    Examples
+    --------
+    >>> plus_minus(0.99479, 0.0014, 3), plus_minus(98.83, 0.03), plus_minus(-0.04, 0.02, with_sign=True)
+    ('0.995 ± 0.001', '98.83 ± 0.03', '−0.04 ± 0.02')
+    """
+    n = decimals_for(scatter, n_decimals)
+    text = signed(value, n) if with_sign else with_minus(f"{round(value, n) + 0.0:.{n}f}")
+    return f"{text} ± {scatter_text(scatter, n_decimals)}"
+
+
 def percent(share: float) -> str:
     """Write a share in percent: nothing below one is told from another.
 

@@ -175,7 +175,7 @@ def compare(
         alignments=alignments,
         channels=compared,
         notes=(*machine.notes, *notes_of(*sides, alignments, compared, ratios)),
-        verdict=verdict_of(compared),
+        verdict=verdict_of(compared, alignments),
         findings=findings_of(compared),
     )
 

@@ -315,7 +315,7 @@ class Comparison(Result, rows="channels"):
     notes : tuple of str
         What the reader should know before believing a figure.
     verdict : str
-        How far the mesh harmonics are apart, one sentence per channel.
+        What differs most beyond the records' scatter, per channel.
     findings : tuple of str
         Lines that only one side has, shapes of the averages, energy that turns with the shafts.
     """

@@ -6,16 +6,25 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from gearsig.comparison._differences import (
+    BETTER_TURNED,
+    MIN_REPEATED,
+    WITHIN_DB,
+    common_gain_db,
+    comparable_averages,
+    differing_average,
+    differing_lines,
+    differing_tooth,
+    further_lines,
+    is_hidden,
+    mesh_lines,
+    power_difference,
+)
 from gearsig.comparison._sides import MIN_REVOLUTIONS, ComparedSide
-from gearsig.comparison._types import Alignment, ChannelComparison, LineLevel
-from gearsig.formatting import percent, signed, with_minus
+from gearsig.comparison._types import BEYOND, Alignment, ChannelComparison, LineLevel
+from gearsig.formatting import counted, enumerated, percent, plus_minus, signed, with_minus
 
-WITHIN_DB = 3.0
-"""Levels this close are called agreement: a factor of √2."""
-
-
-MIN_REPEATED = 0.3
-"""Correlation that two averages could reach, below which they say nothing of each other: their halves differ."""
+_WHERE = {"mesh": "mesh harmonics", "shaft": "shaft orders"}
 
 
 def missing_words(line: LineLevel) -> str:
@@ -26,19 +35,17 @@ def missing_words(line: LineLevel) -> str:
     if line.simulated_is_seen and line.recorded_is_seen:
         return ""
     record = "recording" if line.simulated_is_seen else "simulation"
-    return f"hidden by the {record}'s scatter" if _is_hidden(line) else f"not in the {record}"
+    return f"hidden by the {record}'s scatter" if is_hidden(line) else f"not in the {record}"
 
 
-def _is_hidden(line: LineLevel) -> bool:
-    """Whether the record that does not show a line would not show it either if it were there."""
-    difference_db = line.level.difference_db
-    # 6 dB: a line half as large would be seen above the other record's noise.
-    return (difference_db if line.simulated_is_seen else -difference_db) <= 6.0
+def verdict_of(channels: Sequence[ChannelComparison], alignments: Sequence[Alignment]) -> str:
+    """Return per channel what differs most beyond scatter, the largest first.
 
-
-def verdict_of(channels: Sequence[ChannelComparison]) -> str:
-    """Return one sentence per channel on how far the mesh harmonics, or else the shaft orders, are apart."""
-    return " ".join(_headline(channel, channels) + _levels_text(channel) for channel in channels)
+    One sentence is on the mesh harmonics, or else the shaft orders; one on the line or the tooth beside them that
+    differs most, or on the averages' correlation, where one does. Of both the first is on the larger difference of
+    power, unless what the mesh harmonics differ by is called agreement.
+    """
+    return " ".join(_headline(channel, channels) + _verdict_text(channel, alignments) for channel in channels)
 
 
 def findings_of(channels: Sequence[ChannelComparison]) -> tuple[str, ...]:
@@ -56,29 +63,81 @@ def _headline(channel: ChannelComparison, channels: Sequence[ChannelComparison])
     return f"{channel.name}: " if len(channels) > 1 else ""
 
 
-def mesh_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
-    """Return the mesh harmonics that the recording shows; the shaft orders where it shows none."""
-    for kind in ("mesh", "shaft"):
-        lines = tuple(line for line in channel.lines if line.kind == kind and line.recorded_is_seen)
-        if lines:
-            return lines
-    return ()
+def _verdict_text(channel: ChannelComparison, alignments: Sequence[Alignment]) -> str:
+    elsewhere, power = _elsewhere_text(channel, alignments)
+    if not elsewhere:
+        return _levels_text(channel, alignments)
+    texts = elsewhere, _levels_text(channel)
+    gain_db = 0.0 if channel.levels_compare else common_gain_db(channel)
+    apart = (
+        line.level
+        for line in mesh_lines(channel)
+        if line.level.is_beyond and abs(line.level.difference_db - gain_db) > WITHIN_DB
+    )
+    mesh_first = max((power_difference(level, gain_db) for level in apart), default=0.0) > power
+    return " ".join(reversed(texts) if mesh_first else texts)
 
 
-def _levels_text(channel: ChannelComparison) -> str:
+def _elsewhere_text(channel: ChannelComparison, alignments: Sequence[Alignment]) -> tuple[str, float]:
+    """Return a sentence on what differs most beside the mesh harmonics, and its power; empty where nothing does."""
+    tooth = differing_tooth(channel, alignments)
+    lines, gain_db = differing_lines(channel), common_gain_db(channel)
+    line_powers = [power_difference(line.level, gain_db) for line in lines]
+    if tooth is not None and tooth.power >= max(line_powers, default=0.0):
+        off = plus_minus(abs(tooth.off_db), BEYOND * tooth.level.repeatability_db)
+        others = " against the other teeth" if tooth.is_beside_others else ""
+        where = f"at {tooth.place}, where the simulation is too {_word(tooth.off_db)} by {off} dB{others}"
+        return f"The averages over angle differ most {where}.", tooth.power
+    if lines:
+        return f"{_most_text(channel, lines[0], gain_db)}.", line_powers[0]
+    average = differing_average(channel)
+    if average is None:
+        return "", 0.0
+    of = f" of {average.shaft}" if average.shaft else ""
+    figure = plus_minus(average.correlation.value, BEYOND * average.correlation.repeatability, 3)
+    possible = f"{average.best_correlation:.3f} is possible"
+    return f"The synchronous averages{of} differ: their correlation is {figure} where {possible}.", 0.0
+
+
+def _most_text(channel: ChannelComparison, line: LineLevel, gain_db: float) -> str:
+    beside = next((f"Beside the {_WHERE[main.kind]}, " for main in mesh_lines(channel)), "")
+    off_db, scatter = line.level.difference_db - gain_db, BEYOND * line.level.repeatability_db
+    after = f" after a common gain of {signed(-gain_db)} dB" if gain_db else ""
+    if words := missing_words(line):
+        text = f"{line.label} differs most{after}: it is {words}, by {abs(off_db):.1f} dB or more"
+    else:
+        by = plus_minus(abs(off_db), scatter)
+        text = f"{line.label} differs most{after}: there the simulation is too {_word(off_db)} by {by} dB"
+    return f"{beside}{text}" if beside else f"{text[:1].upper()}{text[1:]}"
+
+
+def _word(off_db: float) -> str:
+    return "weak" if off_db < 0 else "strong"
+
+
+def _levels_text(channel: ChannelComparison, alignments: Sequence[Alignment] | None = None) -> str:
+    """Say how far the mesh harmonics are apart; with alignments also that nothing else is, where nothing is at all."""
     lines = mesh_lines(channel)
     if not lines:
         return "No line of the recording stands above its own noise: only the floors can be compared."
-    where = "mesh harmonics" if lines[0].kind == "mesh" else "shaft orders"
-    comparable = [line for line in lines if line.simulated_is_seen or not _is_hidden(line)]
+    where = _WHERE[lines[0].kind]
+    comparable = [line for line in lines if line.simulated_is_seen or not is_hidden(line)]
     hidden = len(lines) - len(comparable)
     if not comparable:
         return f"The simulation's own scatter hides all {where} of the recording: they cannot be compared."
-    text = _lines_text(comparable, where, levels_compare=channel.levels_compare)
+    further = () if alignments is None else _further_places(channel, alignments)
+    text = _lines_text(comparable, where, further, levels_compare=channel.levels_compare)
     return f"{text} {hidden} more are hidden by the simulation's own scatter." if hidden else text
 
 
-def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool) -> str:
+def _further_places(channel: ChannelComparison, alignments: Sequence[Alignment]) -> tuple[str, ...]:
+    """Name what was compared besides the mesh harmonics."""
+    n = len(further_lines(channel))
+    by_tooth = any(shaft.tooth_levels for shaft in comparable_averages(channel, alignments))
+    return (*((f"{counted(n, 'other line')}",) if n else ()), *(("tooth by tooth",) if by_tooth else ()))
+
+
+def _lines_text(lines: Sequence[LineLevel], where: str, further: Sequence[str] = (), *, levels_compare: bool) -> str:
     differences = np.array([line.level.difference_db for line in lines])
     gain = float(np.median(differences))
     n = f"{len(lines)} {where}" if len(lines) > 1 else f"one {where[:-1]}"
@@ -92,7 +151,8 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
         )
     largest = float(np.max(np.abs(differences)))
     if not any(line.level.is_beyond for line in lines):
-        return f"At {n}, simulation and recording do not differ by more than the records' own scatter."
+        where = enumerated([n, *further])
+        return f"At {where}, simulation and recording do not differ by more than the records' own scatter."
     if largest <= WITHIN_DB:
         return f"Simulation and recording agree within {largest:.1f} dB at {n}."
     spread = float(np.max(np.abs(differences - gain)))
@@ -105,7 +165,7 @@ def _lines_text(lines: Sequence[LineLevel], where: str, *, levels_compare: bool)
 
 def _line_text(line: LineLevel, gain: float) -> str:
     off = line.level.difference_db - gain
-    return f", most at {line.label}, where the simulation is too {'weak' if off < 0 else 'strong'}"
+    return f", most at {line.label}, where the simulation is too {_word(off)}"
 
 
 def _missing_texts(channel: ChannelComparison) -> list[str]:
@@ -118,7 +178,7 @@ def _missing_texts(channel: ChannelComparison) -> list[str]:
         missing = [
             line
             for line in (*channel.lines, *channel.other_lines)
-            if getattr(line, seen_field) and not getattr(line, lacking_field) and not _is_hidden(line)
+            if getattr(line, seen_field) and not getattr(line, lacking_field) and not is_hidden(line)
         ]
         side = "recorded_db" if seen_field.startswith("recorded") else "simulated_db"
         strongest = max(getattr(line.level, side) for line in (*channel.lines, *channel.other_lines))
@@ -141,10 +201,9 @@ def _shape_texts(channel: ChannelComparison) -> list[str]:
         if shaft.best_correlation < MIN_REPEATED:
             loose.append(name)
         else:
-            parts.append(
-                f"{with_minus(f'{shaft.correlation.value:.2f}')}{name} ({shaft.best_correlation:.2f} is possible)"
-            )
-    texts = [f"The synchronous averages correlate by {', '.join(parts)}."] if parts else []
+            figure = plus_minus(shaft.correlation.value, BEYOND * shaft.correlation.repeatability, 3)
+            parts.append(f"{figure}{name and f' for {shaft.shaft}'} ({shaft.best_correlation:.3f} is possible)")
+    texts = [f"The correlation of the synchronous averages is {enumerated(parts)}."] if parts else []
     if loose:
         texts.append(
             f"How alike the synchronous averages{' and'.join(loose)} are cannot be told: in one of the records "
@@ -235,7 +294,7 @@ def _speed_words(side: ComparedSide, name: str) -> str:
 def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:
     texts = []
     for alignment in alignments:
-        if alignment.method == "marks" and alignment.gain > 0.1:
+        if alignment.method == "marks" and alignment.gain > BETTER_TURNED:
             turned = with_minus(f"{alignment.best_shift_deg:+.4g}°")
             texts.append(
                 f"The averages{_of([alignment])} are aligned by their marks; with the simulation turned by {turned} "

@@ -11,6 +11,7 @@ from textwrap import fill
 
 from gearsig import __version__
 from gearsig.comparison import (
+    BEYOND,
     MIN_REPEATED,
     STEADY,
     BandLevel,
@@ -21,10 +22,22 @@ from gearsig.comparison import (
     RecordFacts,
     Repeated,
     ShaftComparison,
+    differing_lines,
+    differing_tooth,
     mesh_lines,
     missing_words,
 )
-from gearsig.formatting import readable, rounded, signed, spreadsheet_cell, unit_text, with_minus
+from gearsig.formatting import (
+    decimals_for,
+    plus_minus,
+    readable,
+    rounded,
+    scatter_text,
+    signed,
+    spreadsheet_cell,
+    unit_text,
+    with_minus,
+)
 from gearsig.plot import Captioned, Cursor, Picture, embed
 from gearsig.report._files import render
 from gearsig.report._json import Layout, document, plain
@@ -151,6 +164,7 @@ def shown_orders(comparison: Comparison) -> float:
 
 
 WIDTH = 100
+SCATTER = "± is twice the standard error"
 ORDER_COLUMNS = (
     "channel",
     "kind",
@@ -174,7 +188,7 @@ def comparison_text(comparison: Comparison) -> str:
         *(f"aligned    {text}" for text in alignment_texts(comparison)),
     ]
     for channel in comparison.channels:
-        lines += ["", *_channel_table(channel)]
+        lines += ["", *_channel_table(comparison, channel)]
     lines += ["", fill(comparison.verdict, WIDTH)]
     lines += [fill(text, WIDTH) for text in comparison.findings]
     for note in comparison.notes:
@@ -192,7 +206,7 @@ def alignment_texts(comparison: Comparison) -> list[str]:
             continue
         certain = alignment.tooth_is_certain
         sure = {None: "", True: ", the same tooth in both", False: ", to a whole number of teeth only"}[certain]
-        within = "" if certain is False else f" ± {alignment.repeatability_deg:.2g}°"
+        within = "" if certain is False else f" ± {BEYOND * alignment.repeatability_deg:.2g}°"
         turned = with_minus(f"{alignment.shift_deg:+.4g}°")
         texts.append(f"{name}by correlation, simulation turned by {turned}{within}{sure}")
     return texts
@@ -231,31 +245,38 @@ def _record(facts: RecordFacts) -> str:
     )
 
 
-def _channel_table(channel: ChannelComparison) -> list[str]:
+def _channel_table(comparison: Comparison, channel: ChannelComparison) -> list[str]:
     unit = f" re 1 {unit_text(channel.unit)}" if channel.unit else ""
-    rows = [f"{channel.name:<30} {'recorded':>10} {'simulated':>10} {'difference':>11}   (dB{unit}, rms)"]
+    rows = [f"{channel.name:<30} {'recorded':>10} {'simulated':>10} {'difference':>11}   (dB{unit}, rms; {SCATTER})"]
     rows.append(_level_row("overall", channel.overall))
-    rows += [_level_row(line.label, line.level, line) for line in mesh_lines(channel)[:12]]
+    lines = (*mesh_lines(channel)[:12], *differing_lines(channel)[:6])
+    rows += [_level_row(line.label, line.level, missing_words(line)) for line in lines]
+    tooth = differing_tooth(channel, comparison.alignments)
+    if tooth is not None:
+        others = f"the other teeth {signed(tooth.level.difference_db - tooth.off_db)}" if tooth.is_beside_others else ""
+        rows.append(_level_row(tooth.place, tooth.level, others))
     for shaft in channel.shafts:
-        best = shaft.best_correlation
-        possible = f"at most {best:.3f}" if best >= MIN_REPEATED else "its halves do not repeat"
         frac = shaft.agreement
         rows.append(
-            f"average of {shaft.shaft or 'the shaft'}: correlation {shaft.correlation.value:.3f} "
-            f"± {shaft.correlation.repeatability:.2g} ({possible}); FRAC {frac.complex_frac.value:.3f} complex "
-            f"({frac.complex_by_chance:.3f} by chance), {frac.magnitude_frac.value:.3f} of magnitudes"
+            f"average of {shaft.shaft or 'the shaft'}: correlation {_repeated(shaft.correlation)}; {_possible(shaft)}; "
+            f"FRAC {frac.complex_frac.value:.3f} complex ({frac.complex_by_chance:.3f} by chance), "
+            f"{frac.magnitude_frac.value:.3f} of magnitudes"
         )
     return rows
 
 
-def _level_row(label: str, level: LevelPair, line: LineLevel | None = None) -> str:
-    words = "" if line is None else missing_words(line)
-    missing = f"  {words}" if words else ""
-    return (
-        f"{label[:30]:<30} {with_minus(f'{level.recorded_db:.1f}'):>10} {with_minus(f'{level.simulated_db:.1f}'):>10} "
-        f"{signed(level.difference_db):>11} "
-        f"± {2 * level.repeatability_db:.1f}{missing}"
-    )
+def _level_row(label: str, level: LevelPair, remark: str = "") -> str:
+    recorded, simulated, difference, scatter = _level_texts(level)
+    row = f"{label[:30]:<30} {recorded:>10} {simulated:>10} {difference:>11} ± {scatter}"
+    return f"{row}  {remark}" if remark else row
+
+
+def _level_texts(level: LevelPair) -> tuple[str, str, str, str]:
+    """Return recorded, simulated, difference and scatter, all in as many decimals."""
+    scatter = BEYOND * level.repeatability_db
+    n = decimals_for(scatter)
+    recorded, simulated = (with_minus(f"{round(x, n) + 0.0:.{n}f}") for x in (level.recorded_db, level.simulated_db))
+    return recorded, simulated, signed(level.difference_db, n), scatter_text(scatter)
 
 
 Rows = tuple[tuple[str, str], ...]
@@ -364,16 +385,12 @@ def _possible(shaft: ShaftComparison) -> str:
 
 
 def _line_row(line: LineLevel) -> LevelRow:
-    level = line.level
     return LevelRow(
         line.label,
         readable(line.order, 6),
-        with_minus(f"{level.recorded_db:.1f}"),
-        with_minus(f"{level.simulated_db:.1f}"),
-        signed(level.difference_db),
-        f"{2 * level.repeatability_db:.1f}",
+        *_level_texts(line.level),
         missing_words(line),
-        level.is_beyond,
+        line.level.is_beyond,
     )
 
 
@@ -400,15 +417,15 @@ def _provenance(comparison: Comparison, command: str, date: datetime) -> Rows:
 
 
 def _difference(level: LevelPair) -> str:
-    return f"{signed(level.difference_db)} ± {2 * level.repeatability_db:.1f} dB"
+    return f"{plus_minus(level.difference_db, BEYOND * level.repeatability_db, with_sign=True)} dB"
 
 
 def _repeated(figure: Repeated) -> str:
-    return f"{with_minus(f'{figure.value:.3f}')} ± {2 * figure.repeatability:.2g}"
+    return plus_minus(figure.value, BEYOND * figure.repeatability, 3)
 
 
 def _percent(figure: Repeated) -> str:
-    return f"{100 * figure.value:.1f} ± {200 * figure.repeatability:.1f} %"
+    return f"{plus_minus(100 * figure.value, 100 * BEYOND * figure.repeatability)} %"
 
 
 # A comparison as JSON, in a schema that stays.
@@ -419,7 +436,8 @@ def _percent(figure: Repeated) -> str:
 # of the records.
 #
 # - ``schema``: "gearsig.comparison", ``schema_version``: 1, ``gearsig_version``
-# - ``verdict``: one sentence per channel; ``findings``: more of them; ``notes``: what to know before believing a figure
+# - ``verdict``: what differs most, per channel; ``findings``: more of them; ``notes``: what to know before believing
+#   a figure
 # - ``simulated``, ``recorded``: ``source``, ``sha256``, ``duration_s``, ``sampling_rate_hz``, ``mean_speed_rpm``,
 #   ``speed_range_rpm``, ``n_revolutions``, ``speed_method``, ``notes``
 # - ``machine``, ``reference_shaft``, ``mesh_orders``, ``highest_order``

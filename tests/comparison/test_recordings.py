@@ -1,5 +1,6 @@
 """Comparisons whose outcome is known: equal signals, gains, shifts, noise alone."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,9 @@ from hypothesis import strategies as st
 
 from gearsig.comparison import Comparison, LineLevel, compare, missing_words
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import plus_minus
 from gearsig.recording import Channel, Recording
+from gearsig.report import comparison_page, comparison_text
 from gearsig.rig import GearPair, PulseTimes, Rig, Shaft
 from tests.comparison.machines import LINES, RIG, TEETH, gear_record
 
@@ -169,6 +172,64 @@ def test_one_stronger_tooth_is_found_tooth_by_tooth() -> None:
     assert len(teeth) == 23
     assert int(np.argmin(differences)) == 6
     assert differences[6] == pytest.approx(-6.0, abs=0.7)  # the band limit rounds the edges of the doubled tooth
+
+
+def test_the_verdict_opens_with_the_tooth_that_differs_where_no_mesh_harmonic_does() -> None:
+    record = gear_record(noise=0.01, seed=1)
+    strike = np.exp(-(((25.0 * record.time_s() % 1.0 - 6.5 / 23) * 23 / 0.3) ** 2))  # in the middle of tooth 7
+    marked = replace(record, samples=record.samples + 3.0 * strike * np.sin(2 * np.pi * 37 * 25.0 * record.time_s()))
+    found = compare(gear_record(noise=0.01, seed=2), marked)
+    assert found.verdict.startswith("The averages over angle differ most at tooth 7 of in (102°), where the simulation")
+    assert "is too weak by" in found.verdict
+    assert "do not differ" not in found.verdict.partition(". ")[0]
+    table = comparison_text(found)
+    assert "tooth 7 of in (102°)" in table.partition("The averages over angle")[0]
+
+
+def test_the_verdict_names_a_line_that_one_record_lacks_and_the_table_shows_it() -> None:
+    lines = {n: amplitude for n, amplitude in LINES.items() if n != 24}
+    found = compare(gear_record(lines=lines, seed=1), gear_record())
+    assert found.verdict.startswith("Beside the mesh harmonics, 1× mesh p + 1× in differs most: it is not in the sim")
+    row = next(text for text in comparison_text(found).splitlines() if text.startswith("1× mesh p + 1× in"))
+    assert row.endswith("not in the simulation")
+
+
+def test_a_larger_difference_of_the_mesh_comes_first() -> None:
+    lines = {n: amplitude * {23: 0.5, 24: 0.4}.get(n, 1.0) for n, amplitude in LINES.items()}
+    verdict = compare(gear_record(lines=lines, seed=1), gear_record()).verdict
+    first, _, second = verdict.partition(". ")
+    assert first.startswith("Simulation and recording differ by up to 6.")
+    assert "1× mesh p + 1× in differs most: there the simulation is too weak by 8." in second
+
+
+def test_averages_of_equal_levels_that_do_not_correlate_are_told() -> None:
+    turned = {n: amplitude * (-1.0 if n in (23, 46) else 1.0) for n, amplitude in LINES.items()}
+    found = compare(gear_record(lines=turned, seed=1), gear_record(), align_by="marks")
+    figure = found.channels[0].shafts[0].correlation
+    assert figure.value < 0.0
+    teeth_or_average = found.verdict.partition(". ")[0]
+    assert "differ" in teeth_or_average
+    assert "do not" not in teeth_or_average
+
+
+def test_records_of_one_state_do_not_differ_whatever_their_noise() -> None:
+    for seed in range(1, 31):
+        verdict = compare(gear_record(seed=seed, noise=0.5), gear_record(seed=100 + seed, noise=0.5)).verdict
+        assert "differ most" not in verdict, seed
+        assert "differs most" not in verdict, seed
+
+
+def test_every_scatter_is_twice_the_standard_error_and_never_zero() -> None:
+    """The terminal, the page and the sentences write one figure alike."""
+    found = compare(gear_record(seed=1, noise=0.005), gear_record(noise=0.005))
+    shaft = found.channels[0].shafts[0]
+    figure = plus_minus(shaft.correlation.value, 2 * shaft.correlation.repeatability, 3)
+    text, page = comparison_text(found), comparison_page(found)
+    assert f"correlation {figure}" in text
+    assert figure.replace("<", "&lt;") in page
+    assert figure in " ".join(found.findings)
+    assert "± is twice the standard error" in text
+    assert not re.search(r"± 0\.0+(?![0-9])", text + page)
 
 
 def test_units_are_converted_and_unknown_ones_told() -> None:
