@@ -321,6 +321,14 @@ def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> 
     assert headline_of(same)[0] in shown_text(page)
 
 
+def test_a_reference_with_a_rig_file_of_its_own_is_read_with_its_channels() -> None:
+    """The eccentric wheel's tachometer is on ch2, that of the healthy gearbox on tacho."""
+    page = opened("eccentric_wheel")
+    assert not page.exception
+    assert not page.error, shown_text(page)
+    assert "**Changed since the reference** :gray[healthy.h5]" in shown_text(page)
+
+
 def test_an_uploaded_reference_that_does_not_fit_is_one_message() -> None:
     page = opened()
     next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("Own file").run()

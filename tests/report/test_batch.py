@@ -103,6 +103,20 @@ def test_each_machine_is_compared_with_its_own_reference(recordings, tmp_path, m
     assert jobs == {"one.csv": (None, True), "two.csv": (one, False), "three.csv": (one, False)}
 
 
+def test_the_reference_has_its_own_rate_on_its_page_and_beside_the_others(recordings, tmp_path, monkeypatch):
+    rates = {}
+
+    def page(job):
+        rates[job.name] = job.sampling_rate_hz, job.reference_rate_hz
+        return _page_for(job)
+
+    monkeypatch.setattr(batch, "_report_one", page)
+    one, _ = recordings
+    stated = {"sampling_rate_hz": 12e3, "n_processes": 1}
+    report_many(recordings, tmp_path / "a", reference=one, reference_rate_hz=48e3, **stated)
+    assert rates == {"one.csv": (48e3, None), "two.csv": (12e3, 48e3)}
+
+
 def test_unexpected_errors_ask_for_a_report(recordings, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise ZeroDivisionError("by\nnothing")
