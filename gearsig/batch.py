@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gearsig.errors import GearsigError, InputError
+from gearsig.errors import GearsigError
 from gearsig.formatting import file_label
 from gearsig.processes import killed_text, n_processors, run_jobs
 
@@ -88,9 +88,10 @@ def report_many(
 ) -> BatchResult:
     """Analyse recordings and write a page for each, and an index that compares them.
 
-    A file that fails does not stop the others: the index lists it with its reason. A page that was made of the same
-    recording, rig and options by the same gearsig is kept. While the pages are made, and after an interruption, the
-    index says what is missing; the same call goes on from there.
+    A file that cannot be analysed does not stop the others: the index lists it with its reason; one that does not exist
+    is refused before anything is written. A page that was made of the same recording, rig and options by the same
+    gearsig is kept. While the pages are made, and after an interruption, the index says what is missing; the same call
+    goes on from there.
 
     Parameters
     ----------
@@ -137,11 +138,12 @@ def report_many(
     Raises
     ------
     InputError
-        If there are no paths, `n_processes` is below 1, or the folder cannot be made.
+        If a file that is named does not exist, there are no recordings, `n_processes` is below 1, or the folder cannot
+        be made.
     """
     from gearsig.cache import remove_parts
     from gearsig.checks import count
-    from gearsig.fleet import find_recordings
+    from gearsig.fleet import find_recordings, no_recordings
     from gearsig.report import (
         Entry,
         Failure,
@@ -154,8 +156,7 @@ def report_many(
 
     files = [path for path, _ in find_recordings(paths)]
     if not files:
-        where = ", ".join(str(path) for path in paths)
-        raise InputError("there are no recordings to report on", where=where, remedy="name at least one file")
+        raise no_recordings(paths)
     if pdf:
         check_pdf()
     workers = min(len(files), n_processors()) if n_processes is None else count(n_processes, "n_processes")

@@ -45,8 +45,8 @@ def report(
 ) -> None:
     """Write one self-contained HTML page per recording, and an index page that compares them.
 
-    A file that cannot be read does not stop the others: the index lists it with its reason, and the exit code is 1
-    (2 if no file could be read). With --reference, all recordings are compared with that one. It can be stopped at any
+    A file that cannot be analysed does not stop the others: the index lists it with its reason, and the exit code is 1
+    (2 if none could be). With --reference, all recordings are compared with that one. It can be stopped at any
     time: the same command goes on from the pages that are there.
 
     Example: gearsig report monday.csv tuesday.csv --rig gearbox.toml -o report

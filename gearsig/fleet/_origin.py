@@ -9,8 +9,9 @@ from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 
+from gearsig.checks import closest_match_hint
 from gearsig.errors import InputError
-from gearsig.formatting import counted
+from gearsig.formatting import counted, file_label
 from gearsig.rig import Rig, read_rig, rig_file_beside
 
 FIELDS = ("machine", "point", "date")
@@ -218,8 +219,34 @@ def find_recordings(places: Iterable[str | Path]) -> list[tuple[Path, Path]]:
                 raise InputError("no file matches", where=str(root), remedy="check the folder and the pattern")
             root_of |= {path: path.parent for path in matches if path.is_file()}
         else:
+            _check_is_there(root)
             root_of.setdefault(root, root.parent)
     return list(root_of.items())
+
+
+def _check_is_there(path: Path) -> None:
+    """Raise unless a named file is there; "runs.mat#2" names a run in a file."""
+    from gearsig.recording import without_condition
+
+    try:
+        without_condition(path)[0].stat()
+    except (OSError, ValueError) as error:
+        problem = getattr(error, "strerror", None) or "no such name is possible"
+        names = [sibling.name for sibling in path.parent.iterdir()] if path.parent.is_dir() else []
+        remedy = closest_match_hint(path.name, names) or "check the name"
+        raise InputError(f"cannot be read ({problem})", where=file_label(path, whole=True), remedy=remedy) from None
+
+
+def no_recordings(places: Iterable[str | Path], *, complaint: str = "") -> InputError:
+    """Return the error that places hold no recordings; the complaint says what else is to be known of them."""
+    from gearsig.recording import FORMAT_OF_EXTENSION
+
+    return InputError(
+        f"there are no recordings{complaint}",
+        where=", ".join(file_label(place, whole=True) for place in places),
+        allowed=" ".join(FORMAT_OF_EXTENSION),
+        remedy="check the folder and the pattern",
+    )
 
 
 def _walk(root: Path) -> Iterable[Path]:
@@ -287,16 +314,9 @@ def origins(
 
     result = matching_origins(searched, pass_over, pattern=pattern, machine=machine, point=point, date=date, rig=rig)
     if not result:
-        from gearsig.recording import FORMAT_OF_EXTENSION
-
-        raise InputError(
-            "there are no recordings"
-            + (f" that match {pattern!r}" if pattern else "")
-            + (f"; {passed_over_text(passed_over)}" if passed_over else ""),
-            where=", ".join(str(place) for place in searched),
-            allowed=" ".join(FORMAT_OF_EXTENSION),
-            remedy="check the folder and the pattern",
-        )
+        complaint = f" that match {pattern!r}" if pattern else ""
+        complaint += f"; {passed_over_text(passed_over)}" if passed_over else ""
+        raise no_recordings(searched, complaint=complaint)
     return result
 
 

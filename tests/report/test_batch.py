@@ -48,23 +48,43 @@ def _page_for(job):
 
 def test_one_broken_file_does_not_stop_the_rest(recordings, broken, tmp_path):
     steps = []
+    empty = tmp_path / "empty.csv"
+    empty.touch()
     result = report_many(
-        [recordings[0], broken, recordings[1], tmp_path / "absent.csv"],
+        [recordings[0], broken, recordings[1], empty],
         tmp_path / "out",
         n_processes=1,
         on_progress=lambda *step: steps.append(step),
         command="gearsig report",
     )
     assert [entry.name for entry in result.entries] == ["one.csv", "two.csv"]
-    assert [failure.name for failure in result.failures] == ["broken.csv", "absent.csv"]
+    assert [failure.name for failure in result.failures] == ["broken.csv", "empty.csv"]
     assert "abc" in result.failures[0].reason
     assert "\n" not in result.failures[0].reason
     assert [(done, total) for done, total, _ in steps] == [(1, 4), (2, 4), (3, 4), (4, 4)]
     html = result.index_path.read_text(encoding="utf-8")
-    assert "absent.csv" in html
+    assert "empty.csv" in html
     assert "<b>abc" not in html
     made = {"one.html", "two.html", "index.html", "batch.csv", "batch.json", ".results"}
     assert {path.name for path in (tmp_path / "out").iterdir()} == made
+
+
+@pytest.mark.parametrize("wrong", ["absent", "absent.csv", "absent.mat#2", "no_recordings"])
+def test_a_mistyped_path_is_refused_before_anything_is_written(recordings, tmp_path, wrong):
+    (tmp_path / "no_recordings").mkdir()
+    files = [tmp_path / wrong] if wrong == "no_recordings" else [recordings[0], tmp_path / wrong]
+    message = (
+        r"there are no recordings \(allowed: .*\.csv.*\.wav" if wrong == "no_recordings" else "cannot be read .*check"
+    )
+    with pytest.raises(InputError, match=message):
+        report_many(files, tmp_path / "out", n_processes=1)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_condition_of_a_file_that_is_there_is_no_mistyped_path(recordings, tmp_path, monkeypatch):
+    monkeypatch.setattr(batch, "_report_one", _page_for)
+    result = report_many([f"{recordings[0]}#2"], tmp_path / "out", n_processes=1)
+    assert [entry.name for entry in result.entries] == ["one.csv#2"]
 
 
 @pytest.mark.slow
@@ -128,6 +148,10 @@ def test_unexpected_errors_ask_for_a_report(recordings, tmp_path, monkeypatch):
 
 def test_files_of_one_name_are_told_apart(tmp_path, monkeypatch):
     monkeypatch.setattr(batch, "_report_one", _page_for)
+    monkeypatch.chdir(tmp_path)
+    for folder in (Path("a"), Path("b")):
+        folder.mkdir()
+        (folder / "run.csv").touch()
     result = report_many(["a/run.csv", "b/run.csv"], tmp_path / "out", n_processes=1)
     assert [entry.name for entry in result.entries] == [str(Path("a/run.csv")), str(Path("b/run.csv"))]
     assert [entry.page for entry in result.entries] == ["run.html", "run-2.html"]
@@ -206,12 +230,14 @@ def script(tmp_path) -> Path:
     path = tmp_path / "script.py"
     path.write_text(SCRIPT)
     (tmp_path / "work_of_a_test.py").write_text(WORK)  # processes know modules, not scripts
+    for name in ("a", "b", "killer", "slow"):
+        (tmp_path / f"{name}.csv").touch()
     return path
 
 
 @pytest.mark.slow
 def test_a_killed_worker_costs_only_its_own_file(script, tmp_path):
-    command = [sys.executable, script, tmp_path / "out", "a.csv", "killer.csv", "b.csv"]
+    command = [sys.executable, script, tmp_path / "out", *(tmp_path / f"{name}.csv" for name in ("a", "killer", "b"))]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
     assert done.stdout.startswith("['a.csv', 'b.csv'] [('killer.csv', 'the process that analysed it was killed")
 
@@ -219,7 +245,7 @@ def test_a_killed_worker_costs_only_its_own_file(script, tmp_path):
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of process groups are POSIX")
 def test_ctrl_c_ends_the_workers_and_tidies_up(script, tmp_path):
     out = tmp_path / "out"
-    command = [sys.executable, script, out, "a.csv", "slow.csv"]
+    command = [sys.executable, script, out, tmp_path / "a.csv", tmp_path / "slow.csv"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as running:
         limit = time.monotonic() + 30
         while not (list(out.glob(".slow.html.*.part")) and (tmp_path / "out.counted").exists()):
