@@ -179,7 +179,14 @@ def test_jitter_below_one_percent_is_fine(tmp_path):
         (["a,b"], "no line of numbers"),
         (["<html><body>1,2"], "HTML"),
         (["time", "1", "2", "3"], "only column"),
-        (["when,a", "2024-01-01 00:00:01,2", "2024-01-01 00:00:02,2"], "date and time are not read"),
+        (["when,a", "1.2.2024 00:00:01,2", "1.2.2024 00:00:02,2"], "line 2 begins .*date and time are read as 2026-01"),
+        (["when,a", "2024-02-30T00:00:01,2", "2024-02-30T00:00:02,2"], "line 2 begins .*date and time are read as"),
+        (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02Z,2", "2024-01-01T00:00:03,2"], "line 3, .*no date"),
+        (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02,2", "2024-01-01T00:00:02,2"], "does not increase at"),
+        (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02,x"], "line 3, column 'a': 'x' is not a number"),
+        (["when,a", "1678-01-01T00:00:01,2", "2261-01-01T00:00:02,2", "1679-01-01T00:00:02,2"], "does not increase"),
+        (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02,2", "2024-02-30T00:00:02,2"], "line 4, .*no date"),
+        (["text,a", "b,2", "c,3"], "line 1 begins 'text,a'"),
         (["a b", "1 2", "3 4", "5 1_0"], "line 4, column 'b': '1_0'"),
     ],
 )
@@ -204,6 +211,30 @@ def test_axes_before_names_and_units(tmp_path):
     r = read_recording(write(tmp_path / "x.csv", lines))
     assert (r.channel_names, r.channels[0].unit) == (("column 2",), "g")
     assert r.sampling_rate_hz == pytest.approx(FS_HZ)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("zone", ["", "Z", "+01:00"])
+@pytest.mark.parametrize("between", ["T", " "])
+@pytest.mark.parametrize("quote", ["", '"'])
+@pytest.mark.parametrize("name", ["timestamp", "when", None])
+def test_dates_and_times_are_the_time(tmp_path, separator, zone, between, quote, name):
+    start = np.datetime64("2026-01-01T23:59:59.9", "us")  # over midnight
+    stamps = [str(start + np.timedelta64(round(1e6 * t), "us")).replace("T", between) for t, _, _ in rows(5000)]
+    lines = [] if name is None else [separator.join([name, "acc (g)"])]
+    values = [a for _, a, _ in rows(5000)]
+    lines += [f"{quote}{stamp}{zone}{quote}{separator}{a!r}" for stamp, a in zip(stamps, values, strict=True)]
+    r = read_recording(write(tmp_path / "x.csv", lines))
+    assert r.sampling_rate_hz == pytest.approx(FS_HZ, rel=1e-5)  # stamps are rounded to a microsecond
+    np.testing.assert_array_equal(r.samples, [values])
+    if name is not None:
+        assert [(c.name, c.unit) for c in r.channels] == [("acc", "g")]
+
+
+def test_the_first_bad_line_is_named_not_the_last_of_a_sample(tmp_path):
+    lines = ["timestamp,acc", *(f"01.01.2026 00:00:00.{i:06},{i}" for i in range(20_000))]
+    with pytest.raises(InputError, match="line 2 begins"):
+        read_recording(write(tmp_path / "x.csv", lines))
 
 
 @pytest.mark.parametrize("decimal", [".", ","])

@@ -6,9 +6,10 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +39,11 @@ COMMENT_SIGNS = ("#", "%", "//")
 
 # Possessive: digits that no number ends are looked at once.
 _NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:e[+-]?\d++)?\Z|[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
+_DATE_TIME = re.compile(
+    r"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ][0-9]{2}:[0-9]{2}:[0-9]{2}(?:\.[0-9]{1,9})?(Z|[+-][0-9]{2}(?::?[0-9]{2})?)?\Z"
+)
+DATE_TIME_EXAMPLES = "2026-01-31T12:00:00.0001 or 2026-01-31 12:00:00.0001Z"
+"""Of what is read as date and time, ISO 8601."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,9 @@ class CsvLayout:
         Bytes before that line.
     bytes_per_line : float
         Mean over the lines that were looked at.
+    date_times : str
+        Of the first column: "local" or "zoned" where it holds dates and times (ISO 8601) without or with an offset from
+        UTC, empty where it holds numbers.
     """
 
     separator: str
@@ -73,6 +82,7 @@ class CsvLayout:
     first_line: int
     offset: int
     bytes_per_line: float
+    date_times: str = ""
 
 
 def is_number(text: str, decimal: str) -> bool:
@@ -83,6 +93,47 @@ def is_number(text: str, decimal: str) -> bool:
             return False
         field = field.replace(",", ".")
     return _NUMBER.match(field) is not None
+
+
+def date_time_kind(text: str) -> str:
+    """Return "zoned" for date and time with an offset from UTC, "local" for those without, and nothing for other text.
+
+    Examples
+    --------
+    >>> [date_time_kind(text) for text in ("2026-01-31T12:00:00.5Z", "2026-01-31 12:00:00", "2026-02-30 12:00:00")]
+    ['zoned', 'local', '']
+    """
+    from pyarrow import ArrowInvalid
+
+    kind = _date_time_form(text)
+    try:
+        _seconds_from_first([text.strip(" \t\r")] if kind else [], kind)
+    except ArrowInvalid:  # a 30th of February
+        return ""
+    return kind
+
+
+def _date_time_form(text: str) -> str:
+    """Return what `date_time_kind` does, whether or not there is such a day and time."""
+    match = _DATE_TIME.match(text.strip(" \t\r"))
+    return "" if match is None else "zoned" if match[1] else "local"
+
+
+def _seconds_from_first(date_times: Any, kind: str) -> FloatArray:
+    """Return dates and times, as texts or as Arrow's, in seconds from the first: exact to a nanosecond over days."""
+    import pyarrow as pa
+
+    if isinstance(date_times, list):
+        date_times = pa.array(date_times, pa.string()).cast(_arrow_type(kind))
+    whole, rest_ns = np.divmod(date_times.cast(pa.int64()).to_numpy(zero_copy_only=False), 10**9)
+    seconds: FloatArray = (whole - whole[:1]) + (rest_ns - rest_ns[:1]) / 1e9
+    return seconds
+
+
+def _arrow_type(kind: str) -> Any:
+    import pyarrow as pa
+
+    return pa.timestamp("ns", "UTC" if kind == "zoned" else None)
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -122,6 +173,7 @@ def find_layout(data: bytes, where: str) -> CsvLayout:
         first_line=start + 1,
         offset=sum(len(line) for line in lines[:start]),
         bytes_per_line=sum(len(line) for line in table) / len(table),
+        date_times=date_time_kind(fields[0]),
     )
 
 
@@ -166,9 +218,11 @@ def _n_columns(proof: list[str], separator: str, decimal: str) -> int:
     rows = [split(line, separator) for line in proof]
     if rows[0][-1].strip() == "" and len(rows[0]) > 1:
         rows = [row[:-1] if row and row[-1].strip() == "" else row for row in rows]
-    if not all(is_number(field, decimal) for field in rows[0]):
+    first, *others = rows[0]
+    kind = date_time_kind(first) if others else ""
+    if not all(is_number(field, decimal) for field in (others if kind else rows[0])):
         return 0
-    same = sum(len(row) == len(rows[0]) for row in rows)
+    same = sum(len(row) == len(rows[0]) and (not kind or date_time_kind(row[0]) == kind) for row in rows)
     return len(rows[0]) if 2 * same > len(rows) else 0
 
 
@@ -225,14 +279,18 @@ def _all_units(fields: Iterable[str]) -> bool:
     return bool(words) and all(b or is_unit(word) for b, word in zip(bracketed, words, strict=True))
 
 
+_BEGINS_LIKE_NUMBER = re.compile(r"[\s\"']*+[+-]?[.,]?[0-9]")
+
+
 def _raise_no_table(texts: list[str], where: str) -> None:
-    last = next((i for i in range(len(texts) - 1, -1, -1) if texts[i].strip()), 0)
-    shown = texts[last][:60] if texts else ""
+    filled = [i for i, text in enumerate(texts) if text.strip()] or [0]
+    bad = next((i for i in filled if _BEGINS_LIKE_NUMBER.match(texts[i])), filled[0])
+    shown = texts[bad][:60] if texts else ""
     remedy = "the file was cut off after its header, or it holds something else"
     if re.search(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d:\d\d", shown):
-        remedy = "date and time are not read: replace that column by seconds, or remove it and give --fs"
+        remedy = f"date and time are read as {DATE_TIME_EXAMPLES}: write them so, or replace that column by seconds"
     raise InputError(
-        f"no line of numbers was found; line {last + 1} begins {shown!r}",
+        f"no line of numbers was found; line {bad + 1} begins {shown!r}",
         where=where,
         allowed="columns of numbers separated by comma, semicolon, tab or blanks",
         remedy=remedy,
@@ -274,18 +332,26 @@ def _parse_fast(data: bytes, layout: CsvLayout) -> list[FloatArray]:
     if separator == " ":
         table_bytes = memoryview(_with_single_blanks(bytes(table_bytes)))
     columns = [f"column {i}" for i in range(layout.n_columns)]
+    types = dict.fromkeys(columns, pa.float64())
+    if layout.date_times:
+        types[columns[0]] = _arrow_type(layout.date_times)
     table = csv.read_csv(
         pa.BufferReader(pa.py_buffer(table_bytes)),
         read_options=csv.ReadOptions(column_names=columns + ["nothing"] * layout.trailing_separator),
         parse_options=csv.ParseOptions(delimiter=separator, quote_char=False),
         convert_options=csv.ConvertOptions(
-            column_types=dict.fromkeys(columns, pa.float64()),
+            column_types=types,
             null_values=[],
             decimal_point=layout.decimal,
             include_columns=columns,
         ),
     )
-    return [table.column(name).to_numpy() for name in columns]
+    return [
+        _seconds_from_first(table.column(name), layout.date_times)
+        if layout.date_times and name == columns[0]
+        else table.column(name).to_numpy()
+        for name in columns
+    ]
 
 
 def _with_single_blanks(text: bytes) -> bytes:
@@ -298,18 +364,32 @@ def _with_single_blanks(text: bytes) -> bytes:
 
 def _parse_carefully(data: bytes, layout: CsvLayout, names: tuple[str, ...], where: str) -> list[FloatArray]:
     """Parse line by line: slow, and precise about the first thing that is wrong."""
+    from pyarrow import ArrowInvalid
+
     rows = []
+    date_times: dict[int, str] = {}
     for number, line in _filled_lines(data, layout):
         fields = split(line, layout.separator)
         if layout.trailing_separator and len(fields) == layout.n_columns + 1 and not fields[-1].strip():
             fields.pop()
         if len(fields) != layout.n_columns:
             _raise_field_count(len(fields), number, line, layout, where)
+        if layout.date_times:
+            if _date_time_form(fields[0]) != layout.date_times:
+                _raise_no_date_time(fields[0], number, names[0], layout, where)
+            date_times[number], fields[0] = fields[0].strip(" \t\r"), "0"
         for field, name in zip(fields, names, strict=True):
             if not is_number(field, layout.decimal):
                 _raise_no_number(field, number, name, layout, where)
         rows.append([float(field.replace(",", ".")) for field in fields])
-    return list(np.array(rows, dtype=np.float64).T)
+    columns = list(np.array(rows, dtype=np.float64).T)
+    if layout.date_times:
+        try:
+            columns[0] = _seconds_from_first(list(date_times.values()), layout.date_times)
+        except ArrowInvalid:
+            number = next(number for number, text in date_times.items() if not date_time_kind(text))
+            _raise_no_date_time(date_times[number], number, names[0], layout, where)
+    return columns
 
 
 def _filled_lines(data: bytes, layout: CsvLayout) -> Iterator[tuple[int, str]]:
@@ -336,6 +416,15 @@ def _raise_field_count(n_fields: int, number: int, line: str, layout: CsvLayout,
     )
 
 
+def _raise_no_date_time(field: str, number: int, name: str, layout: CsvLayout, where: str) -> None:
+    raise InputError(
+        f"line {number}, column {name!r}: {field.strip()[:60]!r} is no date and time as those above it",
+        where=where,
+        allowed=f"e.g. {DATE_TIME_EXAMPLES}, each {'with' if layout.date_times == 'zoned' else 'without'} a time zone",
+        remedy="correct the field, or replace the column by seconds",
+    )
+
+
 def _raise_no_number(field: str, number: int, name: str, layout: CsvLayout, where: str) -> None:
     text = field.strip()[:60]
     raise InputError(
@@ -356,7 +445,8 @@ def read_csv(path: Path) -> RawTable:
 
     The layout is found from the first lines: separator (comma, semicolon, tab, blanks), decimal point or comma, a
     header, units in brackets or in a row of their own, lines above the header ("# …" or free text). A line
-    "sampling rate: 25600" among those states the rate.
+    "sampling rate: 25600" among those states the rate. A first column of dates and times (ISO 8601) is the time, in
+    seconds from its first row.
 
     Raises
     ------
@@ -380,7 +470,11 @@ def read_csv(path: Path) -> RawTable:
     warnings = list(_doubtful_comma(layout, values))
     columns = [RawColumn(name, v, unit) for name, unit, v in zip(names, units, values, strict=True)]
     time = None
-    if not layout.header or plain_name(layout.header[0]) in INDEX_NAMES:
+    if layout.date_times:
+        time, *columns = columns
+        time = replace(time, unit="s")
+        warnings += [] if layout.header else ask_whether_runs(columns, where)
+    elif not layout.header or plain_name(layout.header[0]) in INDEX_NAMES:
         columns, time, notes = without_clock(columns)
         warnings += notes if time is None else [*notes, *ask_whether_runs(columns, where)]
     return RawTable(
