@@ -156,6 +156,9 @@ def _frame_of_items(items: Sequence[Any]) -> DataFrame:
 
     tables = [_table_of(item) if isinstance(item, Result) else None for item in items]
     rows = [_row_of(item) for item in items]
+    # Where one item has a dataclass, whose numbers are columns, and another has none, None is no column of its own.
+    parents = {name[:at] for row in rows for name in row for at, c in enumerate(name) if c == "."}
+    rows = [{name: value for name, value in row.items() if name not in parents} for row in rows]
     parts = [table for table in tables if table is not None]
     if not parts or len(parts) < len(items):
         return DataFrame(rows)

@@ -99,6 +99,22 @@ def test_findings_and_parameters_are_rows() -> None:
     assert table.to_dict("list") == {"name": ["a", "b"], "value": [1.0, 2.0]}
 
 
+def test_a_part_that_some_items_lack_is_no_column_of_its_own() -> None:
+    @dataclass(frozen=True)
+    class Strength:
+        value: float
+
+    @dataclass(frozen=True)
+    class Item:
+        name: str
+        strength: Strength | None
+        note: str | None = None
+
+    table = to_frame((Item("a", None), Item("b", Strength(2.0))))
+    assert list(table.columns) == ["name", "note", "strength.value"]
+    assert table["strength.value"].isna().to_list() == [True, False]
+
+
 def test_signals_by_name_are_columns_of_a_subclass_too() -> None:
     @dataclass(frozen=True)
     class Run(Result, columns=("time_s", "signals")):

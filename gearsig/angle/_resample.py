@@ -14,6 +14,7 @@ from numba import config, njit
 from gearsig.angle._types import AngleSignal, ShaftAngle, check_shaft_angle
 from gearsig.checks import FloatArray, count, listed, positive, read_only
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted
 from gearsig.recording import Recording, check_recording
 
 # Bandlimited interpolation at arbitrary times, and with a lower cut-off where the result is sampled more coarsely.
@@ -471,6 +472,12 @@ def _covered_times(recording: Recording, angle: ShaftAngle, n_per_rev: int | Non
         margin = np.where(scale < 1.0, 1.02 * (REACH + HALF_BAND) / scale, REACH) / rate
         complete = t[(t >= margin) & (t <= last_s - margin)]
         begin, end = (complete[0], complete[-1]) if len(complete) else (begin, begin)
+    if end <= begin and min(angle.end_s, last_s) > max(angle.start_s, 0.0):
+        raise RefusalError(
+            f"the signal is too short: {counted(recording.n_samples, 'sample')}, {recording.duration_s:.4g} s, and a "
+            f"value between samples takes {REACH} of them to either side, more where the shaft turns slowly",
+            remedy="record longer",
+        )
     if end <= begin:
         raise RefusalError(
             f"the shaft angle is known from {angle.start_s:.4g} to {angle.end_s:.4g} s, the recording lasts from 0 to "

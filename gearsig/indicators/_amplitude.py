@@ -19,6 +19,7 @@ from gearsig.checks import FloatArray, frozen_array, read_only
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from gearsig.results import Result
+from gearsig.spectra import array_rate_hz
 
 
 def checked_values(values: FloatArray, name: str = "values") -> FloatArray:
@@ -100,7 +101,7 @@ class Amplitudes:
     def __init__(self, values: FloatArray) -> None:
         self.x = checked_values(values)
         self.mean, low, high = (float(f()) for f in (self.x.mean, self.x.min, self.x.max))
-        self.peak, self.peak_to_peak = max(-low, high), high - low
+        self.peak, self.peak_to_peak = max(-low, high) + 0.0, high - low  # no -0
         self.largest_deviation = max(high - self.mean, self.mean - low)
 
     @cached_property
@@ -196,15 +197,23 @@ def _standardised(a: Amplitudes, order: int) -> float:
 
 
 def time_indicators(
-    signal: FloatArray | Recording, channel: str = "", unit: str = "", *, computed_on: str = "raw", shaft: str = ""
+    signal: FloatArray | Recording,
+    channel: str | float = "",
+    unit: str = "",
+    *,
+    computed_on: str = "raw",
+    shaft: str = "",
 ) -> tuple[Indicator, ...]:
     """Return rms, peaks, moments and factors of a signal's amplitudes.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
-    channel, unit : str
-        Of a recording: which to read, and in what unit. Of an array: what the indicators are labelled with.
+    channel : str or float
+        Of a recording: which to read. Of an array: its sampling rate in Hz, as other methods take it, though no
+        indicator depends on it; or what the indicators are labelled with.
+    unit : str
+        In which a recording's channel is read; else what the indicators are labelled with.
     computed_on : str
         "raw", "synchronous average", …
     shaft : str
@@ -218,12 +227,17 @@ def time_indicators(
     Raises
     ------
     InputError
-        On an empty array or one with NaN.
+        On an empty array or one with NaN, or a sampling rate that is not above zero.
 
     References
     ----------
     M. Lebold et al., "Review of vibration analysis methods for gearbox diagnostics and prognostics", 2000.
     """
+    if not isinstance(channel, str):
+        if isinstance(signal, Recording):
+            raise InputError(f"channel of a recording is {channel!r}", allowed=", ".join(signal.channel_names))
+        array_rate_hz(channel, "channel")
+        channel = ""
     if isinstance(signal, Recording):
         unit = unit or signal.channels[signal.index(channel)].unit
         signal = signal.values(channel)

@@ -10,7 +10,7 @@ import numpy as np
 from gearsig import plot
 from gearsig.diagnosis import RecordBlocks
 from gearsig.errors import GearsigError
-from gearsig.formatting import readable, unit_text
+from gearsig.formatting import counted, readable, unit_text
 from gearsig.methods._spectra import cursors_of, highest_order
 from gearsig.methods._table import (
     HIGHEST,
@@ -125,25 +125,20 @@ def _tracking(prepared: PreparedRecording, channel: str, orders: Sequence[float]
         signal, channel, chosen, revolutions_per_block=max(1.0, min(10.0, signal.n_revolutions / 8.0))
     )
     unit, time_s, speed = tracked[0].unit, tracked[0].time_s, tracked[0].speed_rpm
-    sweeps = float(np.ptp(speed)) > 0.05 * float(np.mean(speed))
-    x, label = (speed, "speed (rpm)") if sweeps else (time_s, "time (s)")
-    rising = np.argsort(x, kind="stable")
-    curves = {f"order {t.order:.6g}": t.amplitude[rising] for t in tracked}
-    caption = f"levels of {len(tracked)} orders over {'speed' if sweeps else 'time'}"
-    amplitude = with_unit("amplitude peak", unit)
-    panel = plot.CurvePanel(x[rising], curves, label, amplitude)
+    panel = plot.tracked_panel(tracked)
+    caption = f"levels of {counted(len(tracked), 'order')} over {panel.x_label.split()[0]}"
     table: dict[str, Any] = {"time (s)": time_s, "speed (rpm)": speed}
     for t in tracked:
         table[with_unit(f"order {t.order:.6g}, amplitude peak", unit)] = t.amplitude
         table[f"order {t.order:.6g}, phase (rad)"] = t.phase_rad
-    lines = [ChartLine(x[rising], values, name, k) for k, (name, values) in enumerate(curves.items())]
+    lines = [ChartLine(panel.x, values, name, k) for k, (name, values) in enumerate(panel.curves.items())]
     return MethodAnswer(
         channel,
         caption,
         lambda: plot.curves_figure([panel], title=f"{channel}: {caption}"),
         table,
         numbers={"bandwidth_orders": tracked[0].bandwidth_orders, "shaft": tracked[0].shaft},
-        panels=(LinePanel(lines, label, amplitude),),
+        panels=(LinePanel(lines, panel.x_label, panel.y_label),),
     )
 
 

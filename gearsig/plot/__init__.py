@@ -65,6 +65,7 @@ from gearsig.plot._methods import (
     squeezed_stft,
     stft,
     synchronous_average,
+    track_orders,
     vmd,
 )
 from gearsig.plot._panels import (
@@ -77,6 +78,7 @@ from gearsig.plot._panels import (
     panels_figure,
     panels_of,
     pooled_levels,
+    tracked_panel,
 )
 from gearsig.plot._phase import (
     bifurcation_figure,
@@ -242,6 +244,8 @@ __all__ = [
     "time_figure",
     "time_frequency_figure",
     "tooth_figure",
+    "track_orders",
+    "tracked_panel",
     "trend_figure",
     "value_limits",
     "vmd",

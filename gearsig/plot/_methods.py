@@ -12,6 +12,7 @@ from gearsig import angle, decompose, orders, phase, recording, spectra, timefre
 from gearsig.errors import InputError
 from gearsig.plot._average import average_figure
 from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_figure, time_frequency_figure
+from gearsig.plot._panels import curves_figure, tracked_panel
 from gearsig.plot._phase import bifurcation_figure, divergence_figure, phase_portrait_figure, recurrence_figure
 from gearsig.plot._spectrum import modes_figure, spectrum_figure, speed_figure, time_figure
 
@@ -24,20 +25,28 @@ def figure_of(result: object) -> Figure:
 
     Parameters
     ----------
-    result : Recording, ShaftAngle, Spectrum, OrderMap, TimeFrequencyMap, SynchronousAverage, …
+    result : Recording, ShaftAngle, Spectrum, OrderMap, TimeFrequencyMap, SynchronousAverage, tuple of TrackedOrder, …
 
     Raises
     ------
     InputError
         If there is no figure of such a result.
     """
-    drawn = sorted(cls.__name__ for cls in figure_of.registry if cls is not object)
+    drawn = sorted("TrackedOrder" if cls is tuple else cls.__name__ for cls in figure_of.registry if cls is not object)
     raise InputError(f"there is no figure of a {type(result).__name__}", allowed=", ".join(drawn))
 
 
 @figure_of.register
 def _(result: orders.SynchronousAverage) -> Figure:
     return average_figure([result])
+
+
+@figure_of.register
+def _(result: tuple) -> Figure:  # type: ignore[type-arg]  # the registry knows no items
+    if not result or not all(isinstance(item, orders.TrackedOrder) for item in result):
+        kinds = sorted({type(item).__name__ for item in result})
+        raise InputError(f"there is no figure of a tuple of {', '.join(kinds) or 'nothing'}", allowed="TrackedOrder")
+    return curves_figure([tracked_panel(result)], title=result[0].source)
 
 
 figure_of.register(recording.Recording, time_figure)
@@ -73,6 +82,7 @@ kurtogram = _drawn(spectra.kurtogram)
 spectral_coherence = _drawn(spectra.spectral_coherence)
 order_spectrum = _drawn(orders.order_spectrum)
 order_map = _drawn(orders.order_map)
+track_orders = _drawn(orders.track_orders)
 synchronous_average = _drawn(orders.synchronous_average)
 stft = _drawn(timefreq.stft_map)
 cwt = _drawn(timefreq.cwt_map)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
     from pandas import DataFrame
 
+    from gearsig.orders import TrackedOrder
+
 
 @dataclass(frozen=True)
 class ChartLine:
@@ -471,6 +473,22 @@ class CurvePanel:
     marks: Sequence[float] = ()
     looks: Literal["line", "dots", "both"] = "line"
     log_y: bool = False
+
+
+def tracked_panel(tracked: Sequence[TrackedOrder]) -> CurvePanel:
+    """Return the panel of tracked orders: peak amplitudes over speed where it changes by more than 5 %, else over time.
+
+    Parameters
+    ----------
+    tracked : sequence of TrackedOrder
+        At least one, of one channel and the same blocks.
+    """
+    first = tracked[0]
+    sweeps = float(np.ptp(first.speed_rpm)) > 0.05 * float(np.mean(first.speed_rpm))
+    x, label = (first.speed_rpm, "speed (rpm)") if sweeps else (first.time_s, "time (s)")
+    rising = np.argsort(x, kind="stable")
+    curves = {f"order {t.order:.6g}": t.amplitude[rising] for t in tracked}
+    return CurvePanel(x[rising], curves, label, style.with_unit("amplitude peak", first.unit))
 
 
 def curves_figure(

@@ -147,6 +147,8 @@ def test_axes_and_refusals() -> None:
         resample_to_angle(
             recording, ShaftAngle("s", angle.time_s + 100, angle.revolutions, angle.speed_rev_per_s, "pulses")
         )
+    with pytest.raises(RefusalError, match="too short: 5 samples"):
+        resample_to_angle(recording_of(np.ones(5)), constant_speed_angle(1500.0, 5 / recording.sampling_rate_hz))
     with pytest.raises(RefusalError, match="revolutions within"):
         resample_to_angle(recording, constant_speed_angle(5.0, recording.duration_s))
     with pytest.raises(RefusalError, match="at rest"):

@@ -22,6 +22,7 @@ from gearsig.indicators import (
     skewness,
     time_indicators,
 )
+from gearsig.recording import Channel, Recording
 
 SINE = 2.5 * np.sin(2 * np.pi * (np.arange(4096) + 0.5) / 4096)
 DIMENSIONLESS = (crest_factor, skewness, kurtosis, shape_factor, impulse_factor, clearance_factor)
@@ -90,6 +91,20 @@ def test_constant_is_undefined_with_a_note():
     zeros = {i.name: i for i in time_indicators(np.zeros(50))}
     assert all(math.isnan(zeros[n].value) for n in ("crest factor", "shape factor", "impulse factor"))
     assert zeros["rms"].value == 0.0
+
+
+def test_zeros_have_no_negative_zeros():
+    assert not any(math.copysign(1.0, i.value) < 0 for i in time_indicators(np.zeros(50)))
+
+
+def test_a_number_beside_an_array_is_its_sampling_rate_as_elsewhere():
+    assert time_indicators(SINE, 10_000.0) == time_indicators(SINE)
+    assert [i.channel for i in time_indicators(SINE, 10_000.0)] == [""] * 9
+    with pytest.raises(InputError, match="sampling rate"):
+        time_indicators(SINE, -1.0)
+    recording = Recording(SINE[None], 1000.0, (Channel("a1"),))
+    with pytest.raises(InputError, match=r"10000\.0 \(allowed: a1\)"):
+        time_indicators(recording, 10_000.0)
 
 
 def test_indicators_carry_channel_unit_and_offset():

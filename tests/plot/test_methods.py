@@ -37,6 +37,17 @@ def test_the_line_stands_where_the_method_puts_it() -> None:
     assert x[np.argmax(y)] == pytest.approx(spectrum.positions[np.argmax(spectrum.values)])
 
 
+def test_tracked_orders_are_drawn_over_time_at_steady_speed_else_over_speed() -> None:
+    for speed_rpm, label in ((600.0, "time (s)"), (np.linspace(600.0, 900.0, len(T)), "speed (rpm)")):
+        (axes, *_) = plot.track_orders(RECORDING, "a1", [10.0, 3.0], speed_rpm=speed_rpm).axes
+        (tracked, _) = gearsig.track_orders(RECORDING, "a1", [10.0, 3.0], speed_rpm=speed_rpm)
+        assert axes.get_xlabel() == label
+        assert "m/s²" in axes.get_ylabel()
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), tracked.amplitude)
+
+
 def test_results_that_nothing_draws_are_refused() -> None:
     with pytest.raises(InputError):
         plot.figure_of(3.0)
+    with pytest.raises(InputError, match="tuple of Indicator"):
+        plot.figure_of(gearsig.time_indicators(RECORDING, "a1"))
