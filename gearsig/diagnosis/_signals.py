@@ -400,7 +400,8 @@ def witness_text(
     if band is None:
         return ()
     low, high = (f"{edge / 1000:.3g}" for edge in band.band.band_hz)
-    text = f"The kurtogram's own band, {low} to {high} kHz (kurtosis {band.band.kurtosis:.2g}), "
+    what = "The kurtogram's own band" if band.band.level > 0 else "The kurtogram's best, the whole spectrum"
+    text = f"{what}, {low} to {high} kHz (kurtosis {band.band.kurtosis:.2g} with steady tones removed), "
     comb = witness(band, order)
     if comb is None:
         return (f"{text}does not show it.",)

@@ -227,7 +227,8 @@ def _envelope(
     top = min(float(banded.spectrum.positions[-1]), (high - low) / 2, usual_hz) if highest is None else highest
     answer = _marked_spectrum(channel, banded.spectrum, text, rhythms_of(prepared, banded.spectrum), lowest, top)
     numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}
-    return replace(answer, numbers={**answer.numbers, **numbers}, warnings=banded.warnings)
+    facts = (*answer.facts, *([f"Band: {banded.reason}"] if banded.reason else []))
+    return replace(answer, numbers={**answer.numbers, **numbers}, facts=facts, warnings=banded.warnings)
 
 
 def _envelope_in_blocks(
@@ -287,6 +288,7 @@ def _kurtogram(
         "standard error": grid.standard_error,
         "noise's limit": grid.noise_limit,
     }
+    prepared_text = {"none": "as recorded", "tones removed": "with steady tones removed"}.get(preparation, preparation)
     warnings = list(chosen.warnings)
     angle = angle_or_none(prepared)
     if angle is not None and not angle.is_steady():
@@ -310,7 +312,8 @@ def _kurtogram(
         facts=(
             (
                 f"{'The kurtogram’s' if band_hz is None else 'Your'} band: **{band.low_hz:.5g} to {band.high_hz:.5g} "
-                f"Hz**, spectral kurtosis **{band.kurtosis:.3g}** (of noise alone: 0 ± {band.standard_error:.2g})"
+                f"Hz**, spectral kurtosis **{band.kurtosis:.3g}** of the signal {prepared_text} (of noise alone: 0 ± "
+                f"{band.standard_error:.2g})"
             ),
             *([chosen.reason] if chosen.reason else []),
         ),

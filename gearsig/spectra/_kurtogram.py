@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -109,7 +110,12 @@ class Kurtogram(Result):
         return np.unique(self.level)
 
     def best_band(
-        self, *, narrowest_hz: float = 0.0, lowest_hz: float = 0.0, highest_hz: float | None = None
+        self,
+        *,
+        narrowest_hz: float = 0.0,
+        lowest_hz: float = 0.0,
+        highest_hz: float | None = None,
+        with_whole: bool = True,
     ) -> BandCandidate:
         """Return the band of the largest kurtosis among those allowed; of equals, the widest.
 
@@ -119,6 +125,8 @@ class Kurtogram(Result):
             Bands are at least that wide: three times the highest modulation frequency sought, or more.
         lowest_hz, highest_hz : float
             Bands lie between these; None is half the sampling rate.
+        with_whole : bool
+            Whether the whole spectrum (level 0) is a band among them.
 
         Raises
         ------
@@ -131,6 +139,7 @@ class Kurtogram(Result):
             (self.bandwidth_hz >= not_negative(narrowest_hz, "narrowest_hz", "Hz") - rounding)
             & (self.low_hz >= not_negative(lowest_hz, "lowest_hz", "Hz") - rounding)
             & (self.high_hz <= top + rounding)
+            & (with_whole | (self.level > 0))
         )
         if not allowed.any():
             raise RefusalError(
@@ -396,7 +405,8 @@ def kurtogram_envelope(
     kind : str
         Of the envelope, "squared" or "magnitude".
     band_hz : (float, float) or None
-        Overrides the choice; `narrowest_hz`, `lowest_hz` and `highest_hz` then mean nothing.
+        Overrides the choice, which is the whole spectrum only where no part of it fits; `narrowest_hz`, `lowest_hz` and
+        `highest_hz` then mean nothing.
 
     Returns
     -------
@@ -422,7 +432,11 @@ def kurtogram_envelope(
         narrowest_hz = max(narrowest_hz, 3.0 * highest)
     reason = ""
     if band_hz is None:
-        band = grid.best_band(narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+        limits = {"narrowest_hz": narrowest_hz, "lowest_hz": lowest_hz, "highest_hz": highest_hz}
+        band = grid.best_band(**limits)
+        if band.level == 0:  # the envelope of everything mixes in low lines: the best part, if one fits
+            with suppress(RefusalError):
+                band = grid.best_band(**limits, with_whole=False)
         reason = _reason(grid, band, narrowest_hz, of_modulation=highest_modulation_hz is not None)
     else:
         band = _given_band(x, fs, band_hz)
@@ -434,6 +448,8 @@ def kurtogram_envelope(
 
 def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_modulation: bool) -> str:
     """Return why a band was chosen, above all where others have more kurtosis."""
+    if band.level == 0:
+        return "It is the whole spectrum: no part of it is wide enough."
     text = "It has the largest kurtosis"
     if narrowest_hz > 0.0:
         text += f" of the bands at least {narrowest_hz:.4g} Hz wide"
@@ -441,6 +457,9 @@ def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_mod
     narrower = grid.kurtosis[grid.bandwidth_hz < narrowest_hz * (1.0 - 1e-9)]
     if narrower.size and float(narrower.max()) > band.kurtosis:
         text += f". Narrower ones reach {narrower.max():.3g}, but their envelopes are too slow to show so fast a rhythm"
+    whole = float(grid.kurtosis[grid.level == 0].max(initial=-np.inf))
+    if whole > band.kurtosis:
+        text += f". The whole spectrum reaches {whole:.3g}, but is no band: impacts may ring all over it"
     return text + "."
 
 

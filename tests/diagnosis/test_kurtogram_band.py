@@ -35,6 +35,7 @@ def test_the_finding_says_what_the_own_band_shows(found: Analysis) -> None:
     assert race.kind is Kind.FAULT
     assert sum("kurtogram's own band" in text for text in race.evidence) == 1
     assert any("over its floor" in text for text in race.evidence)
+    assert any("with steady tones removed" in text for text in race.evidence)
     assert "spectral kurtosis of bands" in page_html(found)
 
 

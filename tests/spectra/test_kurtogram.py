@@ -265,3 +265,16 @@ def test_a_slow_change_of_level_hardly_stands_out():
     x = rng.normal(size=n) * (1.0 + 0.2 * np.cos(2 * np.pi * 3.0 * np.arange(n) / FS))
     k = kurtogram(x, FS, n_levels=3)
     assert any("hardly stands out" in remark for remark in k.warnings(k.best_band()))
+
+
+def test_the_whole_spectrum_is_no_band_where_a_part_of_it_is_wide_enough():
+    x = np.zeros(40_000)
+    x[::400] = 1.0  # impacts that ring nowhere: the whole spectrum is as impulsive as can be
+    x += 0.01 * np.random.default_rng(0).normal(size=len(x))
+    assert kurtogram(x, FS).best_band(narrowest_hz=FS / 8).level == 0
+    chosen = kurtogram_envelope(recording_of(x), "a", narrowest_hz=FS / 8)
+    assert chosen.band.level > 0
+    assert "The whole spectrum reaches" in chosen.reason
+    whole = kurtogram_envelope(recording_of(x), "a", narrowest_hz=FS / 2)
+    assert whole.band.level == 0
+    assert "no part of it is wide enough" in whole.reason
