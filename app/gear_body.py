@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearsig.checks import FloatArray, count, within
-from gearsig.formatting import counted
+from gearsig.formatting import counted, signed
 from gearsig.plot import gear_mesh_figure, gear_modes_figure, gear_stress_figure
 from gearsig.report import made_folder
 from sims import fe_gear
@@ -194,7 +194,7 @@ def lines(study: GearBodyStudy) -> list[str]:
     q = study.quality
     text = [
         f"{study.mesh.n_dof} degrees of freedom; {_cells(study)}",
-        f"mass {q.mass_kg:.4g} kg ({1e6 * (q.volume_m3 / q.true_volume_m3 - 1.0):+.0f} ppm of the outline's)",
+        f"mass {q.mass_kg:.4g} kg ({signed(1e6 * (q.volume_m3 / q.true_volume_m3 - 1.0), 0)} ppm of the outline's)",
         f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², lowest scaled Jacobian {q.scaled_jacobian.min():.2f}",
         f"tooth compliance in mid-flank {study.load.push_m / study.load.force_n:.3g} m/N, bore held",
         f"modes, {HELD[study.held]}:",
@@ -202,10 +202,11 @@ def lines(study: GearBodyStudy) -> list[str]:
     ]
     if study.discretisation is not None:
         d, size = study.discretisation, study.mesh.size
+        worst = d.frequency[np.argmax(np.abs(d.frequency))]
         text.append(
-            f"coarse: against {d.finer_dof} degrees of freedom the first frequency is {100.0 * d.frequency[0]:+.1f} %, "
-            f"the worst of {len(d.frequency)} {100.0 * d.frequency[np.argmax(np.abs(d.frequency))]:+.1f} %, a tooth's "
-            f"compliance {100.0 * d.compliance:+.0f} %"
+            f"coarse: against {d.finer_dof} degrees of freedom the first frequency is {signed(100.0 * d.frequency[0])} "
+            f"%, the worst of {len(d.frequency)} {signed(100.0 * worst)} %, a tooth's "
+            f"compliance {signed(100.0 * d.compliance, 0)} %"
         )
         if size.order == 1:
             text.append(f"edges straight, up to {q.outline_error_mm:.2g} mm off the outline: no stress is shown")

@@ -177,6 +177,18 @@ def counted(n: int, noun: str) -> str:
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
+def sentence(text: str) -> str:
+    """Return a note as a sentence: with a capital letter, unless it begins with a name, and a full stop.
+
+    Examples
+    --------
+    >>> sentence("the file states 1796 rpm"), sentence("fs = 5 may be a speed"), sentence("Are these runs?")
+    ('The file states 1796 rpm.', 'fs = 5 may be a speed.', 'Are these runs?')
+    """
+    begun = text[:1].upper() + text[1:] if re.match(r"[a-z]+ (?!=)", text) else text
+    return begun if begun.endswith((".", "?", "!")) else f"{begun}."
+
+
 def with_minus(text: str) -> str:
     """Return a text whose negative numbers have a minus sign, which a hyphen is not.
 

@@ -121,7 +121,10 @@ CASES = {
     "delay_embedding": (lambda: gearsig.delay_embedding("a.csv", "a1"), f"signal {READ}"),
     "order_map": (lambda: gearsig.order_map("a.csv", "a1"), f"signal {READ}"),
     "order_spectrum, no channel": (lambda: gearsig.order_spectrum(BARE, "b1"), r"no channel 'b1' \(allowed: a1, a2\)"),
-    "order_spectrum, no speed": (lambda: gearsig.order_spectrum(BARE, "a1"), r"speed is not known; give one of both"),
+    "order_spectrum, no speed": (
+        lambda: gearsig.order_spectrum(BARE, "a1"),
+        r"speed is not known; give either shaft_angle or speed_rpm",
+    ),
     "order_spectrum, prepared": (lambda: gearsig.order_spectrum(PREPARED, "a1"), r"give signal\.recording"),
     "order_spectrum, angle": (lambda: gearsig.order_spectrum(BARE, "a1", shaft_angle=5.0), r"as speed_rpm"),
     "order_spectrum, speed": (lambda: gearsig.order_spectrum(BARE, "a1", speed_rpm="9"), r"speed_rpm is '9'"),

@@ -186,6 +186,8 @@ def trend(
     Limits are the zones of ISO 20816-3 for the overall velocity, where the rig file says what the machine is, and
     statistical ones from the baseline otherwise; docs/fleet.md says how often they are wrong.
     """
+    from gearsig.formatting import unit_text
+
     fleet = _open(store)
     if not indicator:
         table = fleet.series(machine, point)
@@ -212,7 +214,7 @@ def trend(
             )
             for row in series.table.to_dict("records")
         ]
-        unit = f" ({series.unit})" if series.unit else ""
+        unit = f" ({unit_text(series.unit)})" if series.unit else ""
         _table(("", "date", f"{series.name}{unit}", "expected", "limit", "alarm", "rpm", "N m"), rows, styles=_STYLES)
 
 
@@ -434,8 +436,9 @@ def _series_row(row: dict[Any, Any]) -> tuple[str, ...]:
     from pandas import isna
 
     from gearsig.fleet import change_text, series_level
+    from gearsig.formatting import unit_text
 
-    unit = f" {row['unit']}" if row["unit"] else ""
+    unit = f" {unit_text(row['unit'])}" if row["unit"] else ""
     of = " ".join(part for part in (row["point"], row["place"], row["channel"], row["computed_on"]) if part)
     return (
         series_level(row),

@@ -23,7 +23,7 @@ from app.samples import EXAMPLE_PATTERN, write_example_fleet
 from gearsig.diagnosis import Outcome
 from gearsig.errors import InputError
 from gearsig.fleet import Fleet, Trend, TrendSettings, change_text, level_counts, open_fleet, series_level, trends_text
-from gearsig.formatting import with_minus
+from gearsig.formatting import unit_text, with_minus
 from gearsig.plot import ChartLine, LinePanel, with_unit
 from gearsig.recording import sha256_of
 from gearsig.rig import rig_file_beside
@@ -239,7 +239,7 @@ def _series_table(series: DataFrame) -> dict[str, list[Any]]:
         "last": [row["value"] for row in rows],
         "expected": [row["expected"] for row in rows],
         "limit": [row["upper_limit"] for row in rows],
-        "unit": [row["unit"] for row in rows],
+        "unit": [unit_text(row["unit"]) for row in rows],
         "since": [row["since"] for row in rows],
         "limits by": [row["basis"] for row in rows],
     }

@@ -271,8 +271,9 @@ def _speed_texts(simulated_side: ComparedSide, recorded_side: ComparedSide) -> l
     off = simulated / recorded - 1.0
     if abs(off) > OTHER_SPEED:
         text = (
-            f"The simulation turns at {simulated:.5g} rpm, the recording at {recorded:.5g} rpm ({100 * off:+.0f} %): "
-            "orders are compared all the same, but each meets other resonances, and forces change with the speed."
+            f"The simulation turns at {simulated:.5g} rpm, the recording at {recorded:.5g} rpm "
+            f"({signed(100 * off, 0)} %): orders are compared all the same, but each meets other resonances, "
+            "and forces change with the speed."
         )
         return [text]
     if abs(off) > SAME_SPEED:

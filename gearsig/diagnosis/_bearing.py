@@ -37,7 +37,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.formatting import named, percent, signed
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
-from gearsig.rig import hunting_tooth_order
+from gearsig.rig import Rig, hunting_tooth_order
 
 CLEAR_MODULATION = 0.05
 """Depth of the strongest line of the envelope from which a race is called damaged, not only worth watching."""
@@ -195,8 +195,8 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     return Finding(
         "non-synchronous-impacts",
         Kind.SUSPICION if strong else Kind.NOTICE,
-        f"Impacts at order {order:.4f} of {where.order_shaft or 'the shaft'} ({where.frequency_hz:.5g} Hz), which no "
-        "shaft, gear or bearing of the rig explains.",
+        f"Impacts at order {order:.4f} of {where.order_shaft or 'the shaft'} ({where.frequency_hz:.5g} Hz), which "
+        f"{_unexplained_by(signals.rig)}.",
         where,
         _strength(candidate),
         confidence,
@@ -204,6 +204,14 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         (f"{_family_text(candidate)}.", _modulation_text(candidate), *near, *causes),
         "" if signals.rig.bearings else surer,
     )
+
+
+def _unexplained_by(rig: Rig) -> str:
+    """Say what explains no impacts: nothing that a rig file describes, or only the shaft whose speed is known."""
+    if not any(shaft.name for shaft in rig.shafts):
+        return "the shaft does not explain"
+    kinds = ["shaft", *(["gear"] if rig.pairs else []), *(["bearing"] if rig.bearings else [])]
+    return f"no {' or '.join(filter(None, [', '.join(kinds[:-1]), kinds[-1]]))} of the rig explains"
 
 
 def _over_frequency(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Iterator[Finding]:
@@ -330,9 +338,10 @@ def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float])
 def _not_examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float], where: Where) -> Iterator[Finding]:
     hidden = [(bearing, name) for (bearing, name), depth in depths.items() if depth > CLEAR_MODULATION]
     if hidden:
+        orders_fall = "Its order falls" if len(hidden) == 1 else "Their orders fall"
         finding = cannot_tell(
             "bearing-part-hidden",
-            f"Not examined: {', '.join(part_text(name, bearing) for bearing, name in hidden)}. Their orders fall on "
+            f"Not examined: {', '.join(part_text(name, bearing) for bearing, name in hidden)}. {orders_fall} on "
             "multiples of a shaft within the resolution, or the floor there is too high for a modulation of "
             f"{percent(CLEAR_MODULATION)} to show.",
             where,

@@ -543,7 +543,7 @@ def _changed(changes: Sequence[LevelChange], off: float) -> Finding:
     if abs(off) > OTHER_SPEED:
         evidence.insert(
             0,
-            f"The speed differs by {100 * off:+.0f} %: an unbalance alone would change 1× by "
+            f"The speed differs by {signed(100 * off, 0)} %: an unbalance alone would change 1× by "
             f"{signed(40 * np.log10(1 + off))} dB, and resonances meet other orders.",
         )
     return Finding(

@@ -18,6 +18,7 @@ from gearsig.checks import FloatArray
 from gearsig.diagnosis._lines import mains_lines, speed_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
 from gearsig.diagnosis._types import CannotTell, Finding, Kind
+from gearsig.formatting import unit_text
 from gearsig.prepared import STATED_SPEED_TOLERANCE, LinesOverFloor
 from gearsig.rig import ConstantSpeed, EncoderChannel, TachometerChannel
 
@@ -118,8 +119,8 @@ def _finding(
     stated_hz = signals.recording.sampling_rate_hz
     factors = (factor, *others)
     hertz, rpm = [f"{x * stated_hz:.6g} Hz" for x in factors], [f"{stated_rpm / x:.5g} rpm" for x in factors]
-    rate = f"{hertz[0]}, {_times(factor)} the stated {stated_hz:.6g} Hz"
-    speed = f"{rpm[0]}, {_times(1 / factor)} the stated {stated_rpm:.5g} rpm"
+    rate = f"{hertz[0]} instead of the stated {stated_hz:.6g} Hz"
+    speed = f"{rpm[0]} instead of the stated {stated_rpm:.5g} rpm"
     # The mains show which of the two is right; where a shaft turns at their frequency as well, they show nothing.
     scales = (1.0, factor)
     right, wrong = (mains_lines(signals, scale, scales) if signals.angle else None for scale in scales)
@@ -132,14 +133,14 @@ def _finding(
         clock = f"Lines of the mains stand at {right[1]:.0f} Hz and multiples: the sampling rate is right."
         surer = f"Check the {what}."
     else:
-        what, fits = ", ".join(["sampling rate", *also]) + " or stated speed", f"{rate}, or {speed}"
+        what, fits = ", ".join(["sampling rate", *also]) + " or stated speed", f"{rate}, or {speed},"
         nearly = [f"{a} or {b}" for a, b in zip(hertz[1:], rpm[1:], strict=True)]
         clock = "Orders are the same with either, and no lines of the mains tell which."
         surer = f"Check the stated speed first, which is quickly measured, then the {' and '.join(['rate', *also])}."
     return Finding(
         SAMPLING_RATE,
         Kind.DATA_PROBLEM,
-        f"The {what} is probably wrong: {fits}, would fit best{'; ' if nearly else ''}"
+        f"The {what} is probably wrong: {fits} would fit best{'; ' if nearly else ''}"
         f"{', or '.join(nearly)}{' nearly as well' if nearly else ''}.",
         confidence=0.9,
         confidence_basis="what the factor explains that the stated figures do not",
@@ -148,8 +149,10 @@ def _finding(
     )
 
 
-def _times(factor: float) -> str:
-    return f"{factor:.4g} times" if factor > 1 else f"1/{1 / factor:.4g} of"
+def _power_text(log10_p: float) -> str:
+    """Write a probability by its power of ten."""
+    power = round(log10_p)
+    return unit_text(f"10^{power}") if power < 0 else "1"
 
 
 def _usual(factor: float, tolerance: float) -> float | None:
@@ -424,8 +427,9 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         signals,
         factor,
         60.0 * signals.frequency_per_order_hz,
-        f"The strongest lines of {len(spectra)} spectra then lie at orders of shafts and races (lg p "
-        f"{explained:.0f} in sum); with what is stated they do not ({stated:.0f}).",
+        f"The strongest lines of {len(spectra)} spectra then lie at orders of shafts and races: by chance as many with "
+        f"a probability of {_power_text(explained)}, were the spectra independent; with what is stated, of "
+        f"{_power_text(stated)}.",
         others=others[:2],
     )
 

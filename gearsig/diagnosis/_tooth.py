@@ -585,7 +585,8 @@ def _withheld(examined: _Examined) -> Finding:
 def _undecided(examined: list[_Examined], reason: str) -> list[Finding]:
     if not examined:
         return []
-    more = "ore revolutions, a sensor nearer to the gears, a higher load; machine data that are not assumed."
+    more = "ore revolutions, a sensor nearer to the gears, a higher load"
+    more += "; machine data that are not assumed." if examined[0].signals.rig.assumed else "."
     healthy = "A recording of the same gears when they were healthy, given with --reference: what teeth are made with"
     surer = f"M{more}" if examined[0].signals.has_reference else f"{healthy} cancels. Or m{more}"
     title = f"Nothing shows at the teeth of {_shafts_text(_names(examined))}, but {reason}."

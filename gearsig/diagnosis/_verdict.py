@@ -20,7 +20,7 @@ from gearsig.diagnosis._types import (
     Where,
     outcome_of,
 )
-from gearsig.formatting import percent
+from gearsig.formatting import percent, sentence
 from gearsig.recording import Recording
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
@@ -130,7 +130,7 @@ def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset
         for p in problems
     ]
     findings += [
-        Finding("reader-note", Kind.NOTICE, text, confidence_basis="stated by the reader of the file")
+        Finding("reader-note", Kind.NOTICE, sentence(text), confidence_basis="stated by the reader of the file")
         for text in recording.warnings
     ]
     return findings, frozenset(p.channel for p in problems if p.kind == "dead")

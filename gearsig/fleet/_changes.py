@@ -183,7 +183,8 @@ def trends_text(row: Mapping[Any, Any]) -> str:
         return "" if isna(n) or n else "baseline not complete"
     since = "" if isna(row["since"]) else f" since {row['since']:%Y-%m-%d}"
     change = change_text(row["change"], in_db=bool(row["change_in_db"]))
-    return f"{', '.join(counts)}{since}; worst: {row['worst']}{f' {change}' if change else ''}"
+    of = f" of {row['worst_place']}" if row["worst_place"] else ""
+    return f"{', '.join(counts)}{since}; worst: {row['worst']}{of}{f' {change}' if change else ''}"
 
 
 def change_text(change: float, *, in_db: bool) -> str:

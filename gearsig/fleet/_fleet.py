@@ -275,8 +275,8 @@ class Fleet:
 
         Columns: machine, point, n_recordings, n_failed, first, last, outcome and verdict of the last recording, level
         (of `STATUS_LEVELS`: the worse of diagnosis and trends, "unknown" where neither says anything), n_alarms,
-        n_warnings, since, worst (indicator), change (of that one against what is expected, in dB where change_in_db),
-        changed (since when the level of some indicator is another one).
+        n_warnings, since, worst (indicator), worst_place (its gear, bearing or shaft), change (of that one against what
+        is expected, in dB where change_in_db), changed (since when the level of some indicator is another one).
         """
         self._refreshed()
         sql = f"""
@@ -290,6 +290,7 @@ class Fleet:
                 SELECT machine, point, max(level) AS level, count(*) FILTER (level = {ALARM}) AS n_alarms,
                     count(*) FILTER (level = {WARNING}) AS n_warnings, min(since) AS since,
                     arg_max(name, (level, coalesce(abs(change), 0))) FILTER (level > 0) AS worst,
+                    arg_max(place, (level, coalesce(abs(change), 0))) FILTER (level > 0) AS worst_place,
                     arg_max(change, (level, coalesce(abs(change), 0))) FILTER (level > 0) AS change,
                     arg_max(in_db, (level, coalesce(abs(change), 0))) FILTER (level > 0) AS change_in_db,
                     min(changed) AS changed, max(n_baseline) AS n_baseline

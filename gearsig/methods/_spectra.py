@@ -289,6 +289,7 @@ def _kurtogram(
         "noise's limit": grid.noise_limit,
     }
     prepared_text = {"none": "as recorded", "tones removed": "with steady tones removed"}.get(preparation, preparation)
+    whose = "The kurtogram's" if band_hz is None else "Your"
     warnings = list(chosen.warnings)
     angle = angle_or_none(prepared)
     if angle is not None and not angle.is_steady():
@@ -311,7 +312,7 @@ def _kurtogram(
         ),
         facts=(
             (
-                f"{'The kurtogram’s' if band_hz is None else 'Your'} band: **{band.low_hz:.5g} to {band.high_hz:.5g} "
+                f"{whose} band: **{band.low_hz:.5g} to {band.high_hz:.5g} "
                 f"Hz**, spectral kurtosis **{band.kurtosis:.3g}** of the signal {prepared_text} (of noise alone: 0 ± "
                 f"{band.standard_error:.2g})"
             ),

@@ -305,7 +305,8 @@ def svg_ring(
     radius = zero + swing * values / full
     d = _path(radius * np.sin(at), -radius * np.cos(at))
     parts.append(f'<path d="{d}" fill="none" stroke="{line}" stroke-width="1.3" stroke-linejoin="round"/>')
-    note = f"{average.kind} of {average.shaft}, {average.channel}, {average.n_revolutions} revolutions"
+    of = average.shaft or "the shaft"
+    note = f"{average.kind} of {of}, {average.channel}, {average.n_revolutions} revolutions"
     scale = f"rings: ± {round_value:g} {unit_text(average.unit)}".rstrip()
     parts += [
         f'<text x="-198" y="-185" font-size="14" opacity="0.8">{escape(style.plain(note, 50))}</text>',

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.angle import ShaftAngle, estimate_shaft_angle, find_shaft_angle, refine_by_phase
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import signed
 from gearsig.prepared._lines import (
     CLEAR_LINE_DB,
     FOOT_LINES,
@@ -111,7 +112,7 @@ def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
             stated, quality=0.5, notes=(*stated.notes, "The stated speed could not be confirmed from the signal.")
         )
     difference = 100 * (by_lines.mean_speed_rpm / stated.mean_speed_rpm - 1)
-    lines_say = f"the signal's own lines say {by_lines.mean_speed_rpm:.6g} rpm ({difference:+.2f} %)"
+    lines_say = f"the signal's own lines say {by_lines.mean_speed_rpm:.6g} rpm ({signed(difference, 2)} %)"
     note = f"Stated {stated.mean_speed_rpm:.6g} rpm; {lines_say}."
     return replace(by_lines, shaft=stated.shaft, notes=(*by_lines.notes, note))
 
@@ -129,7 +130,7 @@ def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngl
     difference = by_lines.mean_speed_rpm / measured.mean_speed_rpm - 1
     if abs(difference) * measured.n_revolutions < LARGEST_DRIFT_REV:
         return measured
-    lines_say = f"the signal's own lines say {by_lines.mean_speed_rpm:.6g} rpm ({100 * difference:+.2f} %)"
+    lines_say = f"the signal's own lines say {by_lines.mean_speed_rpm:.6g} rpm ({signed(100 * difference, 2)} %)"
     note = f"The speed channel says {measured.mean_speed_rpm:.6g} rpm; {lines_say}."
     return replace(by_lines, shaft=measured.shaft, notes=(*by_lines.notes, note))
 

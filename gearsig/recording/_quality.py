@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.formatting import counted, percent
+from gearsig.formatting import counted, percent, signed
 from gearsig.recording._types import Channel, Recording
 
 
@@ -393,7 +393,7 @@ def _stepped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     if abs(step) < max(STEP_DB, 4.0 * scatter) or abs(near) < 0.8 * abs(step):
         return None
     place = 100 * cuts[best] / N_BLOCKS
-    evidence = f"the level changes by {step:+.1f} dB at {place:.0f} % of the record, and is steady"
+    evidence = f"the level changes by {signed(step)} dB at {place:.0f} % of the record, and is steady"
     remedy = "check gain, mounting and load, and analyse the parts before and after by themselves"
     return ChannelProblem(channel.name, "stepped", 1.0, f"{evidence} before and after ({scatter:.1f} dB)", remedy)
 

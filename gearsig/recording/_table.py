@@ -140,7 +140,7 @@ def without_clock(columns: list[RawColumn]) -> tuple[list[RawColumn], RawColumn 
     if first.values[0] in (0, 1) and bool(np.all(steps == 1)):
         return columns[1:], None, [f"column 1 ({first.name!r}) only counts the rows and was left out"]
     if steps.min() > 0 and np.ptp(steps) <= 0.02 * steps.mean():
-        note = f"column 1 ({first.name!r}) has no name, increases uniformly and was taken for the time in seconds"
+        note = "column 1 has no name of its own, increases uniformly and was taken for the time in seconds"
         return columns[1:], RawColumn("time", first.values, "s"), [note]
     return columns, None, []
 

@@ -135,12 +135,13 @@ def _order_text(where: Where) -> str:
 
 
 def strength_text(strength: Strength | None) -> str:
-    """Return the size of a finding against its floor, in words."""
+    """Return the size of a finding against its floor, in words; only a channel's unit may not be known."""
     if strength is None:
         return ""
     unit = f" {unit_text(strength.unit)}" if strength.unit else ""
+    unknown = "" if strength.unit else " (unit unknown)"
     floor = f"{strength.against} {readable(strength.floor)}{unit}".strip()
-    text = f"{readable(strength.value)}{unit} against {floor} ({strength.floor_is})"
+    text = f"{readable(strength.value)}{unit}{unknown} against {floor} ({strength.floor_is})"
     return text if strength.ratio_db is None else f"{text}: {readable(strength.ratio_db, 3)}\u00a0dB"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numba import njit
@@ -432,11 +432,11 @@ def kurtogram_envelope(
         narrowest_hz = max(narrowest_hz, 3.0 * highest)
     reason = ""
     if band_hz is None:
-        limits = {"narrowest_hz": narrowest_hz, "lowest_hz": lowest_hz, "highest_hz": highest_hz}
-        band = grid.best_band(**limits)
+        best = partial(grid.best_band, narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+        band = best()
         if band.level == 0:  # the envelope of everything mixes in low lines: the best part, if one fits
             with suppress(RefusalError):
-                band = grid.best_band(**limits, with_whole=False)
+                band = best(with_whole=False)
         reason = _reason(grid, band, narrowest_hz, of_modulation=highest_modulation_hz is not None)
     else:
         band = _given_band(x, fs, band_hz)

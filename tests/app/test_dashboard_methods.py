@@ -354,7 +354,7 @@ def measured_line(page: AppTest) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("preparation", ["As recorded", "Tones removed", "Whitened"])
 def test_the_kurtogram_shows_the_bearing_in_its_own_band(preparation: str) -> None:
     page = choose(opened_at("Kurtogram", "outer_race"), "Signal", preparation)
-    assert "The kurtogram’s band: " in shown_text(page)
+    assert "The kurtogram's band: " in shown_text(page)
     at, values = measured_line(page)
     fault = float(at[at > 5][np.argmax(values[at > 5])])
     assert min(fault % OUTER_RACE_HZ, -fault % OUTER_RACE_HZ) < 1.0  # the race or a harmonic of it

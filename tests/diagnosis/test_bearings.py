@@ -43,12 +43,19 @@ def steady(**changes: object) -> Recording:
     return record(replace(GOOD, speed=ConstantProfile(1320.0), **changes), seconds=SECONDS)  # type: ignore[arg-type]
 
 
+def _title_without_rig(recording: Recording) -> str:
+    bare = replace(recording.select(["a1"]), rig=None, speed=ConstantSpeed(1320.0))
+    return finding(analyze(bare), "non-synchronous-impacts").title
+
+
 @pytest.mark.parametrize("order", [0.151, 0.41, 0.7])
 def test_slow_impacts_are_no_bearings(order: float) -> None:
     analysis = analyze(with_impacts(steady(), 22.0 * order))
     assert not NAMED & set(codes(analysis))
     found = finding(analysis, "non-synchronous-impacts")
     assert found.where.order == pytest.approx(order, rel=2e-3)  # their rate, not a multiple of it
+    assert found.title.endswith("which no shaft, gear or bearing of the rig explains.")
+    assert "which the shaft does not explain" in _title_without_rig(with_impacts(steady(), 22.0 * order))
 
 
 def test_a_damaged_race_beside_slow_impacts_is_named() -> None:
@@ -67,6 +74,12 @@ def test_more_than_two_parts_at_once_are_a_suspicion() -> None:
     assert {(f.where.bearing, f.code) for f in named} >= {(b, f"bearing-{race}-race") for b, race, _ in faults}
     assert {f.kind for f in named} == {Kind.SUSPICION}
     assert all(any("parts show at once" in text for text in f.evidence) for f in named)
+
+
+def test_one_hidden_part_has_one_order() -> None:
+    rig = replace(RIG, bearings=(Bearing("b", RIG.shafts[0].name, bpfo_order=4.7, ftf_order=0.4),))
+    hidden = finding(analyze(replace(steady(), rig=rig).between(0.0, 1.5)), "bearing-part-hidden")
+    assert hidden.title.startswith("Not examined: cage of b. Its order falls on")
 
 
 def test_impacts_at_the_cages_order_are_at_most_a_suspicion() -> None:
@@ -174,7 +187,8 @@ def test_a_speed_channel_of_wrong_scale_is_set_right_by_the_mesh(scale: float) -
     )
     angle = refined_angle(measured, RIG)
     assert angle.mean_speed_rpm == pytest.approx(1320.0, rel=5e-5)
-    assert any("speed channel says" in note for note in angle.notes)
+    (note,) = (note for note in angle.notes if "speed channel says" in note)
+    assert ("(−" if scale > 1 else "(+") in note
 
 
 def test_a_speed_beyond_the_sampling_rate_is_refused() -> None:

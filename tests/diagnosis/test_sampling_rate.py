@@ -1,5 +1,6 @@
 """A sampling rate that is stated wrongly is told, with the factor that fits; one that is right is never doubted."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,10 @@ CODE = "sampling-rate-doubtful"
 @pytest.mark.parametrize(("race", "times"), [("BPFO", 0.1), ("BPFI", 0.25), ("BPFI", 4.0), ("BPFI", 12.8 / 12)])
 def test_of_a_motor(race: str, times: float) -> None:
     analysis = analyze(replace(motor(race, 1), sampling_rate_hz=MOTOR_RATE_HZ * times))
-    assert f"{MOTOR_RATE_HZ:g} Hz" in finding(analysis, CODE).title
+    doubt = finding(analysis, CODE)
+    assert f"{MOTOR_RATE_HZ:g} Hz" in doubt.title
+    assert f" Hz instead of the stated {times * MOTOR_RATE_HZ:.6g} Hz" in doubt.title
+    assert re.search(r"a probability of 10⁻[⁰¹²³⁴⁵⁶⁷⁸⁹]+, were the spectra independent", doubt.evidence[0])
     assert analysis.verdict.startswith(finding(analysis, CODE).title)
     assert not any(code.startswith("bearing") for code in codes(analysis))
 

@@ -42,6 +42,7 @@ def test_status_has_the_worst_first(fleet, make_recordings, tmp_path):
     assert list(status["level"]) == ["alarm", "ok", "ok"]
     assert list(status["n_recordings"]) == [9, 12, 14]
     worst = fleet.series("broken").iloc[0]
+    assert (status["worst"][0], status["worst_place"][0]) == (worst["name"], worst["place"])
     assert worst["change"] == pytest.approx(20 * np.log10(30), abs=1.0)
     again = open_fleet(tmp_path / "store").status()
     assert again.equals(status)

@@ -8,8 +8,9 @@ from importlib.resources import files
 
 import pytest
 
-from gearsig.diagnosis import SURER_WITH, Finding, Kind, LevelChange, Outcome, Where
+from gearsig.diagnosis import SURER_WITH, Finding, Kind, LevelChange, Outcome, Strength, Where
 from gearsig.indicators import Indicator
+from gearsig.plot import svg_ring
 from gearsig.report import (
     analysis_text,
     bearing_cursors,
@@ -155,6 +156,18 @@ def test_how_sure_is_said_once():
     finding = Finding("x", Kind.FAULT, "X.", confidence=0.95, confidence_basis=basis)
     assert finding_card(finding).confidence_basis == basis
     assert finding_card(replace(finding, confidence_basis="height")).confidence_basis == "at most 95 %: height"
+
+
+def test_a_strength_without_unit_says_that_it_is_unknown():
+    finding = Finding("x", Kind.NOTICE, "X.", strength=Strength(0.34, "", 0.0006, "noise floor", 55.1))
+    assert finding_card(finding).strength == "0.34 (unit unknown) against a floor of 0.0006 (noise floor): 55.1\u00a0dB"
+    known = replace(finding, strength=Strength(0.34, "m/s^2", 0.0006, "noise floor"))
+    assert finding_card(known).strength == "0.34 m/s² against a floor of 0.0006 m/s² (noise floor)"
+
+
+def test_the_average_of_a_shaft_without_a_name_is_of_the_shaft(gearbox):
+    average = next(iter(gearbox.channels[0].averages.values()))
+    assert "average of the shaft, a1" in svg_ring(replace(average, shaft="", kind="average", channel="a1"))
 
 
 def test_most_important_finding_comes_first(html):

@@ -19,6 +19,7 @@ from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, packed, padded_
 from app.dashboard.widgets.spectrum import show_spectrum
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
+from gearsig.formatting import with_minus
 from gearsig.indicators import crest_factor, kurtosis, rms
 from gearsig.plot import ChartLine, Cursor, LinePanel
 from gearsig.recording import Recording
@@ -490,4 +491,4 @@ def change(old: float, new: float) -> str:
     percent = 100.0 * (new / old - 1.0)
     if abs(percent) < 0.05:
         return " (±0 %)"
-    return f" ({percent:+.2g} %)" if abs(percent) < 100 else f" ({new / old:.3g} ×)"
+    return with_minus(f" ({percent:+.2g} %)") if abs(percent) < 100 else f" ({new / old:.3g} ×)"

@@ -19,7 +19,7 @@ from gearsig.angle import find_shaft_angle, resample_to_angle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.formatting import percent
+from gearsig.formatting import percent, signed
 from gearsig.orders import separate, synchronous_average
 from gearsig.plot import crack_comparison_figure
 from gearsig.recording import Recording
@@ -120,7 +120,7 @@ def _show_answer(estimate: CrackEstimate | NoCrackSeen) -> None:
         tooth = f"tooth {estimate.tooth}" if estimate.tooth is not None else "not known"
         gear = f"{estimate.gear}{'' if estimate.gear_is_certain else ' or its mate'}"
         kinds = ", ".join(f"{kind} {percent(share)}" for kind, share in estimate.kind_probabilities.items())
-        reach = f"{estimate.reach_cycles:.1f} mesh cycles; {estimate.squeezed_rise_db:+.1f} dB"
+        reach = f"{estimate.reach_cycles:.1f} mesh cycles; {signed(estimate.squeezed_rise_db)} dB"
         numbers = {
             "Depth of a crack": f"{estimate.depth_mm:.2f} mm, {estimate.depth_percent:.0f} % of the root",
             "90 % interval": f"{low:.2f} to {high:.2f} mm",

@@ -327,7 +327,7 @@ def bandwidths_of(
 ) -> FloatArray:
     """Return the bandwidths in the unit of the tracks, (n_orders, 1) if constant, else (n_orders, n)."""
     if (hz is None) == (in_orders is None):
-        raise InputError("give either bandwidth_hz or bandwidth_orders", where="bandwidth", allowed="one of both")
+        raise InputError("give either bandwidth_hz or bandwidth_orders, not both", where="bandwidth")
     n_orders, over_angle = len(tracks.names), tracks.unit == "orders"
     name, unit = ("bandwidth_orders", "orders") if hz is None else ("bandwidth_hz", "Hz")
     bandwidths = np.atleast_1d(np.asarray(in_orders if hz is None else hz, dtype=object))
