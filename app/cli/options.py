@@ -31,8 +31,21 @@ RigOption = Annotated[
         help="Rig file (TOML): shafts, teeth, bearings, sensors, speed source. Default: NAME.toml beside it.",
     ),
 ]
+
+
+def _rate_hz(text: str | float) -> float:
+    """Return a sampling rate in Hz; as an error of the parser, which takes an `InputError` for one of its own."""
+    try:
+        return quantity(str(text), "Hz", "--fs")
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
 SamplingRateOption = Annotated[
-    float | None, typer.Option("--fs", metavar="HZ", help="Sampling rate in Hz, where the file does not state it.")
+    float | None,
+    typer.Option(
+        "--fs", metavar="RATE", parser=_rate_hz, help="Sampling rate, in Hz or kHz, where the file does not state it."
+    ),
 ]
 SpeedOption = Annotated[
     float | None,

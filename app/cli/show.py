@@ -66,6 +66,14 @@ class MethodGroup(TyperGroup):
 
         return _command(cmd_name, METHODS[cmd_name]) if cmd_name in METHODS else None
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the method that the first argument names."""
+        from gearsig.checks import known_name
+        from gearsig.methods import METHODS
+
+        known_name(args[0], METHODS, f"there is no method {args[0]!r}")
+        return super().resolve_command(ctx, args)
+
 
 show = typer.Typer(
     name="show",

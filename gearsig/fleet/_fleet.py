@@ -558,7 +558,7 @@ class Fleet:
             raise InputError(
                 f"there is no machine {machine!r}",
                 where=str(self.folder),
-                allowed=", ".join(machines[:20]) + (" …" if len(machines) > 20 else ""),
+                allowed=", ".join(repr(m) for m in machines[:20]) + (" …" if len(machines) > 20 else ""),
                 remedy=closest_match_hint(machine, machines),
             )
         points = [p for (p,) in self._rows(_POINTS, [machine])]

@@ -38,11 +38,10 @@ RESIDUAL = "residual without all chosen orders"
 def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, highest: float | None) -> MethodAnswer:
     over = "order" if levels.axis == "order" else "frequency"
     caption = f"{over} map: spectra of consecutive blocks"
-    unit = "Hz" if over == "frequency" else "order"
     kept = levels.positions <= (np.inf if highest is None else highest)
     values, positions = levels.values[:, kept], levels.positions[kept]
     table = {"time (s)": levels.time_s, "speed (rpm)": levels.speed_rpm}
-    lines = {f"{p:.7g} {unit}": values[:, i] for i, p in enumerate(positions)}
+    lines = {f"order {p:.7g}" if over == "order" else f"{p:.7g} Hz": values[:, i] for i, p in enumerate(positions)}
     panel = LevelPanel(
         decibels(values, levels.scaling),
         positions,

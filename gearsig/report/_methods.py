@@ -66,6 +66,10 @@ def _write_arrays(answer: MethodAnswer, file: IO[bytes]) -> None:
     file.write(content.getbuffer())
 
 
+N_NAMED_COLUMNS = 40
+"""Of a method's table, which JSON names: maps have one for each line."""
+
+
 def answer_json(answer: MethodAnswer) -> str:
     """Return what a method found as JSON, without its arrays; short tables are in it."""
     about: dict[str, Any] = {"method": answer.method, "channel": answer.channel, "shows": answer.caption}
@@ -73,7 +77,7 @@ def answer_json(answer: MethodAnswer) -> str:
     if answer.warnings:
         about["warnings"] = list(answer.warnings)
     columns = list(answer.table)
-    about["columns"] = columns if len(columns) <= 40 else [*columns[:3], "…", columns[-1]]
+    about |= {"n_columns": len(columns), "columns": columns[:N_NAMED_COLUMNS]}
     for what, table in {"table": answer.table, **answer.tables}.items():
         n_rows = max((len(column) for column in table.values()), default=0)
         if n_rows * len(table) <= 2000:

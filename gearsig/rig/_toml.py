@@ -136,7 +136,7 @@ def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
     if "machine" in data:
         parts["machine"] = from_table(MachineSize, data["machine"], f"{where}: [machine]")
     if "speed" in data:
-        parts["speed"] = _speed(data["speed"], f"{where}: [speed]")
+        parts["speed"] = _speed(data["speed"], f"{where}: [speed]", parts.get("operating_point"))
     plain = {key: data[key] for key in _PLAIN if key in data}
     return from_table(Rig, plain, where, **parts)  # type: ignore[no-any-return]
 
@@ -168,7 +168,7 @@ def write_rig(rig: Rig, path: str | Path) -> None:
     write_whole(Path(path), lambda file: file.write(text.encode()))
 
 
-def _speed(table: Any, where: str) -> SpeedSource | None:
+def _speed(table: Any, where: str, nominal: OperatingPoint | None) -> SpeedSource | None:
     if not isinstance(table, dict) or not isinstance(table.get("source"), str):
         raise InputError("has no source", where=where, allowed=", ".join((*_SPEED_SOURCES, "none")))
     source, values = table["source"], {k: v for k, v in table.items() if k != "source"}
@@ -186,6 +186,14 @@ def _speed(table: Any, where: str) -> SpeedSource | None:
             where=where,
             allowed=", ".join((*_SPEED_SOURCES, "none")),
             remedy=closest_match_hint(source, _SPEED_SOURCES),
+        )
+    if _SPEED_SOURCES[source] is ConstantSpeed and "speed_rpm" not in values and nominal and nominal.speed_rpm:
+        shaft = f' and shaft = "{nominal.shaft}"' if nominal.shaft else ""
+        raise InputError(
+            "speed_rpm must be given",
+            where=where,
+            remedy=f"write speed_rpm = {nominal.speed_rpm:g}{shaft} if the machine turned at its nominal speed, "
+            "which [operating_point] states",
         )
     return from_table(_SPEED_SOURCES[source], values, where)  # type: ignore[no-any-return]
 

@@ -418,3 +418,19 @@ def test_name_that_is_no_utf8_does_not_end_a_report(capsys: pytest.CaptureFixtur
     page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert "bad?.csv" in page
     assert good.name in page
+
+
+def test_a_sampling_rate_may_be_in_kilohertz(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = csv(tmp_path, "a\n" + "\n".join(str(i % 7) for i in range(4096)) + "\n")
+    code, out, _ = run(capsys, "show", "spectrum", path, "--fs", "2.56kHz", "--json")
+    assert code == 0
+    assert json.loads(out)["resolution"] == pytest.approx(2560 / 4096)
+    code, _, err = run(capsys, "show", "spectrum", path, "--fs", "25.6k")
+    assert code == 2
+    assert "give it in Hz (or kHz, MHz)" in err
+
+
+def test_a_misspelt_method_has_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, "show", "spectrm", "x.csv")
+    assert code == 2
+    assert err.strip().endswith("did you mean spectrum?")

@@ -121,3 +121,8 @@ def test_limits_are_closer_where_speed_is_accounted_for():
     without = prediction_limits(y, np.ones((21, 1)), baseline, 1e-3)
     assert with_speed.high[-1] - with_speed.low[-1] < 0.3 * (without.high[-1] - without.low[-1])
     assert with_speed.low[-1] < y[-1] < with_speed.high[-1]
+
+
+def test_machines_are_named_in_quotes_as_names_may_hold_commas(fleet):
+    with pytest.raises(InputError, match=r"allowed: 'calm', 'loud'"):
+        fleet.point_trends("absent")

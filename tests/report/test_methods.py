@@ -14,7 +14,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.methods import METHODS, apply_method, suggested_rate_hz
 from gearsig.prepared import prepare
 from gearsig.recording import Channel, Recording, write_recording
-from gearsig.report import fitting_methods, named_method, write_answer
+from gearsig.report import answer_json, fitting_methods, named_method, write_answer
 from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft
 
 RATE_HZ, N = 8192.0, 16384
@@ -175,6 +175,10 @@ def test_the_spectrum_reads_the_tone_and_the_map_its_order() -> None:
     top = spectrum.loc[spectrum.iloc[:, 1].idxmax()]
     assert tuple(top) == pytest.approx((500.0, 3.0), rel=0.01)
     levels = apply_method("order-map", recording())
+    titles = list(levels.table)
+    assert titles[2] == "order 0"
+    about = json.loads(answer_json(levels))
+    assert (about["n_columns"], about["columns"]) == (len(titles), titles[:40])
     orders, mean = levels.axes["order"], levels.matrices["levels"].mean(axis=0)
     assert orders[np.argmax(mean)] == pytest.approx(20.0, abs=0.1)  # 20 teeth
     tracked = apply_method("tracking", recording(), orders=(20.0,)).table

@@ -151,3 +151,12 @@ def test_rig_is_not_written_where_nothing_can_be(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written"):
         write_rig(Rig(), tmp_path / "file" / "x.toml")
+
+
+def test_a_constant_speed_without_its_value_points_at_the_nominal_one(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        '[[shaft]]\nname = "s"\n[operating_point]\nshaft = "s"\nspeed_rpm = 3600\n[speed]\nsource = "constant"\n'
+    )
+    with pytest.raises(InputError, match=r'must be given; write speed_rpm = 3600 and shaft = "s" if .*operating_point'):
+        read_rig(path)
