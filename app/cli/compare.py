@@ -54,7 +54,7 @@ def compare(
     pulses_per_revolution: options.PulsesOption = 1,
     simulation_rig: SimulationRigOption = None,
     simulation_fs: Annotated[
-        float | None, typer.Option("--sim-fs", metavar="HZ", help="Sampling rate of the simulation, like --fs.")
+        float | None, options.rate_option("--sim-fs", "Sampling rate of the simulation, like --fs.")
     ] = None,
     simulation_speed_rpm: Annotated[
         float | None, typer.Option("--sim-speed-rpm", metavar="RPM", help="Speed of the simulation, like --speed-rpm.")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -33,19 +33,20 @@ RigOption = Annotated[
 ]
 
 
-def _rate_hz(text: str | float) -> float:
-    """Return a sampling rate in Hz; as an error of the parser, which takes an `InputError` for one of its own."""
-    try:
-        return quantity(str(text), "Hz", "--fs")
-    except InputError as error:
-        raise typer.BadParameter(str(error)) from None
+def rate_option(name: str, about: str) -> Any:
+    """Return an option for a sampling rate, in Hz or with its unit."""
+
+    def hertz(text: str | float) -> float:
+        try:
+            return quantity(str(text), "Hz", name)
+        except InputError as error:  # the parser takes it for one of its own
+            raise typer.BadParameter(str(error)) from None
+
+    return typer.Option(name, metavar="RATE", parser=hertz, help=about)
 
 
 SamplingRateOption = Annotated[
-    float | None,
-    typer.Option(
-        "--fs", metavar="RATE", parser=_rate_hz, help="Sampling rate, in Hz or kHz, where the file does not state it."
-    ),
+    float | None, rate_option("--fs", "Sampling rate, in Hz or kHz, where the file does not state it.")
 ]
 SpeedOption = Annotated[
     float | None,
@@ -66,8 +67,7 @@ ReferenceOption = Annotated[
     ),
 ]
 ReferenceRateOption = Annotated[
-    float | None,
-    typer.Option("--reference-fs", metavar="HZ", help="Sampling rate of the reference, like --fs."),
+    float | None, rate_option("--reference-fs", "Sampling rate of the reference, like --fs.")
 ]
 TorqueOption = Annotated[
     str | None,
