@@ -12,7 +12,7 @@ from gearsig.checks import FloatArray, listed, short
 from gearsig.errors import InputError, RefusalError, options_named
 from gearsig.orders import first_whole_sample
 from gearsig.prepared import PreparedRecording
-from gearsig.recording import SI_FACTORS, Channel, Recording, find_problems
+from gearsig.recording import SI_FACTORS, Channel, Recording, find_problems, si_factor
 from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource
 
 MIN_REVOLUTIONS = 8
@@ -246,9 +246,9 @@ def _factor(unit: str, target_unit: str, quantity: str) -> float | None:
     if unit == target_unit:
         return 1.0
     for name in (quantity,) if quantity != "unknown" else tuple(SI_FACTORS):
-        units = SI_FACTORS.get(name, {})
-        if unit in units and target_unit in units:
-            return units[unit] / units[target_unit]
+        own, target = si_factor(name, unit), si_factor(name, target_unit)
+        if own is not None and target is not None:
+            return own / target
     return None
 
 

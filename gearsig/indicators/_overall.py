@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.indicators._amplitude import Amplitudes, Indicator, checked_values, crest_factor, kurtosis, rms
-from gearsig.recording import SI_FACTORS, Channel
+from gearsig.recording import SI_FACTORS, Channel, si_factor
 from gearsig.spectra import Spectrum, amplitude_spectrum
 
 VELOCITY_BAND_HZ = (10.0, 1000.0)
@@ -69,7 +69,7 @@ def overall_velocity_mm_per_s(
         If the channel is neither, its unit is not known, or the recording is too short or sampled too slowly.
     """
     quantity = "velocity" if channel.quantity == "velocity" else "acceleration"
-    factor = SI_FACTORS[quantity].get(channel.unit) if channel.quantity in ("velocity", "acceleration") else None
+    factor = si_factor(quantity, channel.unit) if channel.quantity in ("velocity", "acceleration") else None
     where = f"channel {channel.name!r}"
     if factor is None:
         raise InputError(

@@ -11,7 +11,7 @@ from gearsig.checks import FloatArray, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
 from gearsig.phase._types import PhasePortrait, checked_series
-from gearsig.recording import Recording
+from gearsig.recording import Recording, si_factor
 from gearsig.spectra import named_signal
 
 SETTLING_PERIODS, MIN_PERIODS = 5.0, 4.0
@@ -109,9 +109,6 @@ MotionQuantity = Literal["acceleration", "velocity", "displacement"]
 # Integrations from the measured quantity to displacement; velocity takes one less.
 _INTEGRATIONS = {"acceleration": 2, "velocity": 1, "displacement": 0, "transmission_error": 0}
 
-# Metres (per second, per second squared) in the units that files use.
-_SI = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "g": 9.80665}
-
 
 def phase_plane(
     signal: FloatArray | Recording,
@@ -191,7 +188,7 @@ def phase_plane(
             f"{len(x) / rate:.4g} s are too short for a low cut of {low:g} Hz, which needs {need:.4g} s",
             remedy=f"raise low_cut_hz above {low * need * rate / len(x):.4g} Hz or record longer",
         )
-    factor, length_unit = _length_unit(unit, n_times)
+    factor, length_unit = _length_unit(unit, measured)
     kept = slice(n_lost, len(x) - n_lost)
     axes = [integrate_band(x, rate, n, (low, high))[kept] * factor for n in (n_times, n_times - 1)]
     return PhasePortrait(
@@ -220,13 +217,12 @@ def _band(low_cut_hz: float | None, high_cut_hz: float | None, rate: float, n_ti
     return low, high
 
 
-def _length_unit(unit: str, n_times: int) -> tuple[float, str]:
+def _length_unit(unit: str, measured: str) -> tuple[float, str]:
     """Return the factor to metres and "m", or 1 and the unit as it follows from the channel's own."""
-    known = unit.replace("²", "^2").replace(" ", "")
-    length = known.split("/")[0]
-    expected = {2: (f"{length}/s^2", "g"), 1: (f"{length}/s",), 0: (length,)}[n_times]
-    if length in _SI and known in expected and (length != "g" or n_times == 2):
-        return _SI[length], "m"
+    factor = si_factor(measured, unit)
+    if factor is not None:
+        return factor, "m"
     if not unit:
         return 1.0, ""
+    n_times = _INTEGRATIONS[measured]
     return 1.0, unit if n_times == 0 else f"{unit} s" if n_times == 1 else f"{unit} s^2"

@@ -23,6 +23,7 @@ from gearsig.recording._types import (
     check_recording,
     metres_per_second_squared,
     names_without_number,
+    si_factor,
 )
 from gearsig.recording.formats._mat import variables
 from gearsig.recording.formats._wav import parse_lea
@@ -51,6 +52,7 @@ __all__ = [
     "read_recording",
     "recording_target",
     "sha256_of",
+    "si_factor",
     "variables",
     "without_condition",
     "write_recording",

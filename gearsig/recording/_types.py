@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from math import pi
 from os import PathLike
 from types import MappingProxyType, UnionType
 from typing import TYPE_CHECKING, Any
@@ -39,21 +40,36 @@ INTERVAL_NAMES = frozenset(
 SPEED_NAMES = frozenset(("rpm", "rate", "speed", "shaftspeed", "rotspeed", "speedrpm", "drehzahl", "shaftrate", "hz"))
 """Names of scalars that may be a shaft speed; told to the user, never used."""
 
-UNITS_OF_QUANTITY = {
-    "acceleration": ("m/s^2", "m/s2", "m/s²", "m/s**2", "ms-2", "mm/s^2", "mm/s²", "g", "gn", "g_n", "mg"),
-    "velocity": ("m/s", "mm/s", "in/s", "ips"),
-    "displacement": ("mm", "µm", "μm", "um", "mil"),
-    "sound_pressure": ("pa",),
-    "force": ("n", "kn"),
-    "torque": ("nm", "n*m", "n·m"),
-    "rotational_speed": ("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1", "rad/s"),
-    "angle": ("rad",),
-    "angular_acceleration": ("rad/s^2", "rad/s2", "rad/s²"),
-    "temperature": ("°c", "degc"),
-    "voltage": ("v", "mv"),
-}
-_QUANTITY_OF_UNIT = {unit: quantity for quantity, units in UNITS_OF_QUANTITY.items() for unit in units}
 RPM_UNITS = frozenset(("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1"))
+_G, _INCH = 9.80665, 0.0254
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "mil": 1e-3 * _INCH}
+
+SI_FACTORS: dict[str, dict[str, float]] = {
+    "acceleration": {
+        "m/s²": 1.0,
+        "ms-2": 1.0,
+        "mm/s²": 1e-3,
+        "µm/s²": 1e-6,
+        "g": _G,
+        "gn": _G,
+        "g_n": _G,
+        "mg": 1e-3 * _G,
+    },
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "µm/s": 1e-6, "in/s": _INCH, "ips": _INCH},
+    "displacement": _LENGTHS,
+    "transmission_error": _LENGTHS,
+    "sound_pressure": {"Pa": 1.0},
+    "force": {"N": 1.0, "kN": 1e3},
+    "torque": {"N·m": 1.0, "kN·m": 1e3},
+    "rotational_speed": {**dict.fromkeys(sorted(RPM_UNITS), 2 * pi / 60), "rad/s": 1.0},
+    "angle": {"rad": 1.0},
+    "angular_acceleration": {"rad/s²": 1.0},
+    "temperature": {"°C": 1.0, "degC": 1.0},  # of differences: the zero is not the kelvin's
+    "voltage": {"V": 1.0, "mV": 1e-3},
+}
+"""Quantity → unit → what a value is multiplied by to be in the SI unit, of every unit that is known here.
+
+In one spelling each; `si_factor` finds the others ("m/s^2", "m/s**2", "Nm")."""
 
 # Texts of files may be made to be slow to match: quantifiers are possessive, and what stands about is stripped.
 _RATE_SIGN = re.compile(r"[=:;,\t]")
@@ -117,7 +133,7 @@ def is_unit(text: str) -> bool:
     from gearsig.recording._table import SECONDS_PER_UNIT
 
     word = text.strip().casefold()
-    return word in _QUANTITY_OF_UNIT or (word != "" and word in SECONDS_PER_UNIT)
+    return _plain_unit(text) in _QUANTITY_OF_UNIT or (word != "" and word in SECONDS_PER_UNIT)
 
 
 def same_unit(first: str, second: str) -> bool:
@@ -136,6 +152,35 @@ def _plain_unit(unit: str) -> str:
     return re.sub(r"[\s·*]+", "", squares).replace("/s/s", "/s2").replace("μ", "µ").replace("um", "µm")
 
 
+_FACTORS = {
+    quantity: {_plain_unit(unit): factor for unit, factor in units.items()} for quantity, units in SI_FACTORS.items()
+}
+# A length is a displacement, unless a channel is said to be a transmission error.
+_QUANTITY_OF_UNIT = {
+    unit: quantity for quantity, units in _FACTORS.items() if quantity != "transmission_error" for unit in units
+}
+
+
+def si_factor(quantity: str, unit: str) -> float | None:
+    """Return what values of a quantity are multiplied by to be in its SI unit; None where that is not known.
+
+    Parameters
+    ----------
+    quantity : str
+        One of `QUANTITIES`.
+    unit : str
+        In any spelling.
+
+    Examples
+    --------
+    >>> si_factor("velocity", "in/s"), si_factor("acceleration", "m/s**2"), si_factor("torque", "kN m")
+    (0.0254, 1.0, 1000.0)
+    >>> si_factor("velocity", "g") is None
+    True
+    """
+    return _FACTORS.get(quantity, {}).get(_plain_unit(unit))
+
+
 def quantity_of(name: str, unit: str) -> str:
     """Return the quantity that a unit, or a telling name, stands for; "unknown" where neither tells.
 
@@ -146,7 +191,7 @@ def quantity_of(name: str, unit: str) -> str:
     >>> quantity_of("a1", "m/s^2"), quantity_of("Tacho", "V"), quantity_of("a1", "")
     ('acceleration', 'tachometer', 'unknown')
     """
-    quantity = _QUANTITY_OF_UNIT.get(unit.strip().casefold(), "unknown")
+    quantity = _QUANTITY_OF_UNIT.get(_plain_unit(unit), "unknown")
     if quantity in ("unknown", "voltage") and re.match(r"tach|keyphas", name.strip().casefold()):
         return "tachometer"
     if quantity == "unknown" and plain_name(name) in ("rpm", "speedrpm"):
@@ -484,18 +529,6 @@ def check_recording(value: object, name: str = "recording", kinds: type | UnionT
     instance_of(value, kinds, name, remedy=remedy)
 
 
-SI_FACTORS = {
-    "acceleration": {"m/s^2": 1.0, "m/s²": 1.0, "m/s2": 1.0, "mm/s^2": 1e-3, "mm/s²": 1e-3, "g": 9.80665},
-    "velocity": {"m/s": 1.0, "mm/s": 1e-3},
-    "displacement": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
-    "transmission_error": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
-    "sound_pressure": {"Pa": 1.0},
-    "force": {"N": 1.0, "kN": 1e3},
-    "torque": {"N m": 1.0, "Nm": 1.0, "N·m": 1.0, "kN m": 1e3},
-}
-"""Quantity → unit → SI unit."""
-
-
 def metres_per_second_squared(channel: Channel) -> float | None:
     """Return what a channel's values are multiplied by to be m/s²; None where it is no acceleration in a known unit."""
-    return SI_FACTORS["acceleration"].get(channel.unit) if channel.quantity in ("acceleration", "unknown") else None
+    return si_factor("acceleration", channel.unit) if channel.quantity in ("acceleration", "unknown") else None

@@ -21,7 +21,7 @@ from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed, order_cursors
 from gearsig.prepared import circular_correlation
-from gearsig.recording import SI_FACTORS
+from gearsig.recording import si_factor
 from gearsig.report._files import render
 from gearsig.report._methods import fitting_methods, method_pictures
 from gearsig.report._sections import (
@@ -227,7 +227,7 @@ def crack_picture(analysis: Analysis) -> Picture | None:
     averages: list[tuple[float, str, FloatArray, FloatArray | None]] = []
     for channel in analysis.channels:
         average = channel.averages.get((crack.shaft, "average"))
-        factor = SI_FACTORS["acceleration"].get(average.unit) if average is not None else None
+        factor = si_factor("acceleration", average.unit) if average is not None else None
         if average is None or factor is None:
             continue
         now, then = average.values * factor, None

@@ -232,12 +232,12 @@ def test_every_scatter_is_twice_the_standard_error_and_never_zero() -> None:
     assert not re.search(r"± 0\.0+(?![0-9])", text + page)
 
 
-def test_units_are_converted_and_unknown_ones_told() -> None:
-    in_g = Channel("a1", "acceleration", "g")
+@pytest.mark.parametrize(("unit", "per_si"), [("g", 1 / 9.80665), ("mg", 1e3 / 9.80665), ("m/s**2", 1.0)])
+def test_units_are_converted_and_unknown_ones_told(unit: str, per_si: float) -> None:
     simulated = gear_record(seed=1)
-    recorded = gear_record(gain=1 / 9.80665, noise=0.05 / 9.80665, channel=in_g)
+    recorded = gear_record(gain=per_si, noise=0.05 * per_si, channel=Channel("a1", "acceleration", unit))
     found = compare(simulated, recorded)
-    assert found.channels[0].unit == "g"
+    assert found.channels[0].unit == unit
     assert line(found, 23).level.difference_db == pytest.approx(0.0, abs=0.1)
     bare = gear_record(gain=20.0, noise=1.0, channel=Channel("a1"))
     found = compare(simulated, bare)

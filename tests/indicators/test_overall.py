@@ -18,7 +18,9 @@ def tone(hertz: float, velocity_mm_per_s: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("hertz", [12.0, 25.3, 160.0, 990.0])
-@pytest.mark.parametrize(("unit", "factor"), [("m/s^2", 1.0), ("g", 1 / 9.80665), ("mm/s^2", 1e3)])
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("m/s**2", 1.0), ("g", 1 / 9.80665), ("mg", 1e3 / 9.80665), ("mm/s^2", 1e3)]
+)
 def test_of_a_tone(hertz: float, unit: str, factor: float) -> None:
     velocity = overall_velocity_mm_per_s(factor * tone(hertz, 3.0), FS_HZ, Channel("a1", "acceleration", unit))
     assert velocity == pytest.approx(3.0, rel=2e-3)
@@ -28,6 +30,8 @@ def test_of_a_velocity_and_of_what_lies_outside_the_band() -> None:
     velocity = 2.0 * np.sqrt(2) * np.sin(2 * np.pi * 50.0 * T)
     channel = Channel("v1", "velocity", "mm/s")
     assert overall_velocity_mm_per_s(velocity, FS_HZ, channel) == pytest.approx(2.0, rel=2e-3)
+    inches = Channel("v1", "velocity", "in/s")
+    assert overall_velocity_mm_per_s(velocity / 25.4, FS_HZ, inches) == pytest.approx(2.0, rel=2e-3)
     outside = tone(3.0, 50.0) + tone(2000.0, 50.0) + 7.0  # slow sway, a mesh, the sensor's offset
     assert overall_velocity_mm_per_s(outside, FS_HZ, ACCELERATION) < 0.05
 

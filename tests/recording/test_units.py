@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.recording import Channel, Recording
-from gearsig.rig import PulseTimes, Rig, Sensor
+from gearsig.recording import SI_FACTORS, Channel, Recording, read_recording, si_factor
+from gearsig.rig import QUANTITIES, PulseTimes, Rig, Sensor
 
 
 def recording(unit: str) -> Recording:
@@ -61,3 +63,48 @@ def test_sensors_are_applied_once_whatever_else_of_the_rig_changes() -> None:
         assert (found.rig.name, found.rig.sensors) == ("other", rig(scale=9.81).sensors)
     with pytest.raises(InputError, match="other sensors"):
         scaled.with_rig(rig(scale=2.0))
+
+
+# Every spelling that a reader knows, with the unit in full.
+SPELLINGS = {
+    "acceleration": ("m/s^2", "m/s2", "m/s²", "m/s**2", "ms-2", "mm/s^2", "mm/s²", "g", "gn", "g_n", "mg", "G"),
+    "velocity": ("m/s", "mm/s", "in/s", "ips", "IPS"),
+    "displacement": ("mm", "µm", "μm", "um", "mil"),
+    "sound_pressure": ("Pa",),
+    "force": ("N", "kN"),
+    "torque": ("Nm", "N*m", "N·m", "N m"),
+    "rotational_speed": ("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1", "rad/s"),
+    "angle": ("rad",),
+    "angular_acceleration": ("rad/s^2", "rad/s2", "rad/s²"),
+    "temperature": ("°C", "degC"),
+    "voltage": ("V", "mV"),
+}
+
+
+@pytest.mark.parametrize(("quantity", "unit"), [(q, unit) for q, units in SPELLINGS.items() for unit in units])
+def test_every_unit_that_a_reader_knows_has_its_factor(quantity: str, unit: str, tmp_path: Path) -> None:
+    rows = "".join(f"{i / 100},{i % 7}\n" for i in range(100))
+    (tmp_path / "x.csv").write_text(f"time (s),x ({unit})\n{rows}", encoding="utf-8")
+    (channel,) = read_recording(tmp_path / "x.csv").channels
+    assert (channel.quantity, channel.unit) == (quantity, unit)
+    assert si_factor(quantity, unit) is not None
+
+
+def test_every_quantity_with_a_unit_has_its_units() -> None:
+    assert set(SI_FACTORS) == set(QUANTITIES) - {"tachometer", "encoder", "unknown"}
+    assert set(SPELLINGS) == set(SI_FACTORS) - {"transmission_error"}
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "factor"),
+    [
+        ("acceleration", "mg", 9.80665e-3),
+        ("acceleration", "gn", 9.80665),
+        ("velocity", "ips", 0.0254),
+        ("displacement", "mil", 25.4e-6),
+        ("transmission_error", "um", 1e-6),
+        ("rotational_speed", "1/min", 2 * pi / 60),
+    ],
+)
+def test_factors_are_those_of_the_units(quantity: str, unit: str, factor: float) -> None:
+    assert si_factor(quantity, unit) == pytest.approx(factor)

@@ -22,14 +22,13 @@ from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import percent, signed
 from gearsig.orders import separate, synchronous_average
 from gearsig.plot import crack_comparison_figure
-from gearsig.recording import Recording
+from gearsig.recording import Recording, metres_per_second_squared
 from gearsig.severity import CrackEstimate, NoCrackSeen, estimate_crack
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NONE, FILE, SAMPLE, SIDEBAR = "None", "Own file", "Sample", "As in the sidebar"
-TO_MPS2 = {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": 9.80665}
 severity = cached(8, "Looking at every tooth …")(estimate_crack)
 
 
@@ -187,7 +186,7 @@ def _mean_residual(
     recording: Recording, estimate: CrackEstimate, channel: str, *, n_angles: int | None = None
 ) -> FloatArray:
     """Return one mean revolution of the gear's shaft without mesh harmonics, in m/s²."""
-    scale = TO_MPS2.get(recording.channels[recording.index(channel)].unit)
+    scale = metres_per_second_squared(recording.channels[recording.index(channel)])
     rig = recording.rig
     ratio = rig.ratio(estimate.shaft) if rig is not None else None
     if scale is None or ratio is None:
