@@ -122,6 +122,13 @@ def test_car_run_up_reads_its_own_speed_channel() -> None:
         assert abs(np.median(difference)) < 0.5
 
 
+@pytest.mark.parametrize("file", ["OR007@6_0.mat", "IR021_0.mat"])
+def test_impacts_of_an_unknown_bearing_are_placed_at_the_drive_end(file: str) -> None:
+    recording = read_recording(DATA / "bearing_cwru" / file, sampling_rate_hz=CWRU_RATES_HZ[file])
+    (channel,) = found(analyze(recording), "non-synchronous-impacts").where.channels
+    assert channel.endswith("DE_time")
+
+
 @pytest.mark.parametrize(
     ("file", "code"),
     [

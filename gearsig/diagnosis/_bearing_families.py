@@ -236,6 +236,9 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
 SAME_FAMILY = 5e-3
 """Relative distance of two fundamentals that are one: a bearing's slip differs from day to day."""
 
+SEEN_THERE = 0.01
+"""Chance of a family in one envelope up to which that of another envelope is seen there as well."""
+
 SECOND_DB = 12.0
 """A family so much weaker than another, in its own envelope or in the clearest one, is a by-product of it: sums and
 differences with the shaft and the cage, and the other bearing's sensor."""
@@ -312,14 +315,19 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
 def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:
     """Return the surest family with a fundamental between `low` and `high`, its p-value over all envelopes.
 
-    Of families that are no chance at all, the strongest.
+    Of families that are no chance at all, the strongest. It is placed where it stands out most, and that is not where
+    chance explains it least: a family that fills its own channel with lines makes lines more likely there.
     """
     combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
     families = [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
     best = min(families, key=lambda family: (max(family.p_value, 1e-9), -family.strength_db), default=None)
     if best is None:
         return None
-    return replace(best, p_value=min(1.0, best.p_value * len(envelopes)), loudest=_loudest(envelopes, best))
+    fundamental = best.comb.fundamental
+    near = (family for family in families if abs(family.comb.fundamental / fundamental - 1) <= SAME_FAMILY)
+    same = [family for family in near if family.p_value <= SEEN_THERE]
+    placed = max((best, *same), key=lambda family: family.strength_db)
+    return replace(placed, p_value=min(1.0, best.p_value * len(envelopes)), loudest=_loudest(envelopes, best))
 
 
 def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:

@@ -58,6 +58,23 @@ def test_slow_impacts_are_no_bearings(order: float) -> None:
     assert "which the shaft does not explain" in _title_without_rig(with_impacts(steady(), 22.0 * order))
 
 
+@pytest.mark.parametrize(("gain", "noise"), [(0.02, 0.15), (0.1, 0.2)])
+def test_impacts_are_placed_where_they_stand_out_most(gain: float, noise: float) -> None:
+    # Modulated at several slow rates, they fill the spectrum of the near sensor with lines that noise hides far away.
+    rng, n = np.random.default_rng(0), round(SECONDS * SAMPLING_RATE_HZ)
+    t = np.arange(n) / SAMPLING_RATE_HZ
+    turning = Recording(np.cos(2 * np.pi * 22.0 * t)[None], SAMPLING_RATE_HZ, (Channel("near"),), rig=ONE_SHAFT)
+    struck = with_impacts(turning, 107.6).samples[0] - turning.samples[0]
+    struck *= 1 + 0.25 * np.sum(np.cos(2 * np.pi * np.array([5.1, 7.7, 9.3, 11.9])[:, None] * t), axis=0)
+    near, far = (a * struck + turning.samples[0] + b * rng.normal(size=n) for a, b in ((1.0, gain), (0.1, noise)))
+    both = (Channel("near"), Channel("far"))
+    speed = ConstantSpeed(1320.0, "in")
+    recording = Recording(np.stack([near, far]), SAMPLING_RATE_HZ, both, speed, rig=replace(ONE_SHAFT, bearings=()))
+    found = finding(analyze(recording), "non-synchronous-impacts")
+    assert found.where.channels == ("near",)
+    assert found.where.order == pytest.approx(107.6 / 22, rel=1e-3)
+
+
 def test_a_damaged_race_beside_slow_impacts_is_named() -> None:
     faulty = steady(bearing_faults=(BearingFault("front", "outer", 8.0, resonance_hz=3200.0),))
     analysis = analyze(with_impacts(faulty, 22.0 * 0.41, 6.0))
