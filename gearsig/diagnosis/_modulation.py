@@ -13,7 +13,16 @@ from gearsig.diagnosis._signals import AnalysisSignals, line_at
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, from_p_value, p_text
 from gearsig.formatting import signed
 from gearsig.indicators import lobe_lines
-from gearsig.prepared import INNER_LINES, RUN_UP_FOOT_ORDERS, Comb, LinesOverFloor, best_comb, neighbour_level
+from gearsig.prepared import (
+    INNER_LINES,
+    RUN_UP_FOOT_ORDERS,
+    Comb,
+    LinesOverFloor,
+    best_comb,
+    lines_over_floor,
+    neighbour_level,
+    neighbour_levels,
+)
 from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
 
@@ -284,9 +293,9 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
     hunting = hunting_tooth_order(signals.rig, pair)
     known = (*trains, hunting) if hunting is not None else trains
     is_known |= _is_part_of(comb.fundamental, known, excess.spectrum.resolution)
-    if p_value > signals.settings.false_alarm_probability or is_known or not _is_family(excess, comb, mesh):
+    if p_value > signals.settings.false_alarm_probability or is_known or not _is_family(comb, mesh):
         return
-    evidence = [f"{len(comb.positions)} of the sidebands stand 6 dB or more over the floor."]
+    evidence = [f"{len(comb.positions)} of the sidebands stand 6 dB or more over what lies beside them."]
     surer = "Give the teeth of all gears: a shaft of that order would explain it."
     teeth = mesh / comb.fundamental
     if None in (pair.driver_teeth, pair.driven_teeth) and abs(teeth - round(teeth)) <= 0.1:
@@ -306,7 +315,7 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
         f"The mesh of {pair.name} has sidebands spaced by order {comb.fundamental:.4f} of {where.order_shaft} "
         f"({where.frequency_hz:.4g} Hz), which no known shaft explains.",
         replace(where, frequency_hz=None),
-        Strength(comb.amplitude, excess.spectrum.unit, comb.floor, "noise floor of the order spectrum", ratio),
+        Strength(comb.amplitude, excess.spectrum.unit, comb.floor, "what lies beside it in the order spectrum", ratio),
         confidence=from_p_value(p_value, prior=0.3, limit=0.99),
         confidence_basis=f"chance that noise makes such a family: {p_text(p_value)}, over all spacings "
         "and channels tried",
@@ -328,10 +337,24 @@ def _is_part_of(spacing: float, orders: Sequence[float], resolution: float) -> b
     return any(1 <= n <= MOST_PARTS and abs(order - n * spacing) <= n * resolution / 6 for order, n in whole)
 
 
+CLOSEST_LINES = 8.0
+"""Spacing, in lines, below which the lines of a family leave none beside them to stand out of."""
+
+COMBINATIONS = ((1, 1), (1, 2), (2, 1))
+"""j and k of the sidebands at j·a ± k·b of a mesh that both its shafts, of orders a and b, modulate."""
+
+
 def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, trains: Sequence[float]) -> Comb | None:
+    """Return the best family of sidebands of a pair's mesh that neither its shafts nor anything else known makes.
+
+    Its lines are those that stand out of what lies beside them: the skirt of a mesh line is far above the noise floor,
+    and any spacing fits lines of a skirt.
+    """
     mesh, hunting = signals.rig.mesh_order(pair), hunting_tooth_order(signals.rig, pair)
     if mesh is None:
         return None
+    beside = neighbour_levels(excess.spectrum, of_both_sides=True)
+    excess = lines_over_floor(excess.spectrum, np.maximum(excess.floor, beside))
     foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
     for other in {mesh, *signals.known_mesh_orders.values()}:
         excess = excess.without_multiples(other, half_width=foot)
@@ -339,6 +362,11 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
         wide = foot if order >= 4 * foot else 0.0
         excess = excess.without_multiples(order, half_width=wide)
         excess = excess.without_multiples(order, start=mesh, half_width=wide)
+    driver, driven = (signals.known_shaft_orders.get(shaft) for shaft in (pair.driver, pair.driven))
+    if driver is not None and driven is not None:
+        for j, k in COMBINATIONS:
+            for start in (j * driver + k * driven, j * driver - k * driven):
+                excess = excess.without_multiples(mesh, start=start).without_multiples(mesh, start=-start)
     if hunting is not None:
         excess = excess.without_multiples(hunting)  # of both gears together, and the mesh is one of them
     for train in trains:  # with each shaft's sidebands
@@ -348,21 +376,19 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
     centres = centres[centres + 2 < excess.spectrum.positions[-1]]
     if len(centres) == 0:
         return None
-    lowest = max(0.05, sideband_distance(excess.spectrum), 3 * foot)
+    lowest = max(0.05, CLOSEST_LINES * excess.spectrum.resolution, 3 * foot)
     return best_comb(excess, lowest, 1.9, offsets=np.array([-3, -2, -1, 1, 2, 3]), centres=centres)
 
 
-def _is_family(excess: LinesOverFloor, comb: Comb, mesh: float) -> bool:
-    """Whether three of the lines stand out of what lies beside them by 6 dB, two of them on both sides of one carrier.
+def _is_family(comb: Comb, mesh: float) -> bool:
+    """Whether three of the lines are there, two of them on both sides of one carrier, and one is clear by itself.
 
-    The foot of a mesh line is above the floor and no family.
+    An amplitude that wanders at random puts the same noise about all harmonics of the mesh, on both sides: its lines
+    are as one line, and together no less likely than that.
     """
-    own_reach = comb.fundamental / excess.spectrum.resolution - 3
     places = []
     for position in comb.positions:
-        level = neighbour_level(excess.spectrum, position, own_reach)
-        amplitude = excess.spectrum.largest_near(position, excess.spectrum.resolution)[1]
-        if level is None or amplitude >= level * 10 ** (6.0 / 20):
-            h = max(1, round(position / mesh))
-            places.append((h, round((position - h * mesh) / comb.fundamental)))
-    return len(places) >= 3 and any((h, -k) in places for h, k in places)
+        h = max(1, round(position / mesh))
+        places.append((h, round((position - h * mesh) / comb.fundamental)))
+    is_clear = max(comb.ratios_db, default=0.0) >= CLEAR_DB
+    return is_clear and len(places) >= 3 and any((h, -k) in places for h, k in places)

@@ -500,16 +500,32 @@ def neighbour_level(spectrum: Spectrum, position: float, outer_lines: float = OU
     return float(np.sqrt(np.sort(neighbours**2)[len(neighbours) // 2] / log(2)))
 
 
-def neighbour_levels(spectrum: Spectrum) -> FloatArray:
-    """Return `neighbour_level` at every line; the ends are mirrored."""
+def neighbour_levels(spectrum: Spectrum, *, of_both_sides: bool = False) -> FloatArray:
+    """Return `neighbour_level` at every line; the ends are mirrored.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Amplitudes.
+    of_both_sides : bool
+        Take the higher of the levels of either side, where the skirt of a line may fall steeply.
+
+    Returns
+    -------
+    array, (n_lines,)
+        In the spectrum's unit.
+    """
     from scipy.ndimage import median_filter
 
-    footprint = np.ones(2 * OUTER_LINES + 1, dtype=np.bool_)
-    footprint[OUTER_LINES - INNER_LINES + 1 : OUTER_LINES + INNER_LINES] = False
     power = np.asarray(spectrum.values, dtype=np.float64) ** 2
+    offsets = np.arange(-OUTER_LINES, OUTER_LINES + 1)
+    below, above = offsets <= -INNER_LINES, offsets >= INNER_LINES
     # As a single row: in one dimension SciPy's filter takes the whole width, holes of the footprint included.
-    medians = median_filter(power[None, :], footprint=footprint[None, :], mode="reflect")[0]
-    return np.asarray(np.sqrt(medians / log(2)))
+    medians = [
+        median_filter(power[None, :], footprint=footprint[None, :], mode="reflect")[0]
+        for footprint in ((below, above) if of_both_sides else (below | above,))
+    ]
+    return np.asarray(np.sqrt(np.max(medians, axis=0) / log(2)))
 
 
 # --------------------

@@ -1,5 +1,6 @@
 """Modulation of the mesh: what is one, what is not, and whose; teeth that the lines contradict."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from math import log10, pi
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, Finding, Kind, Outcome, analyze, modulation_of
 from gearsig.diagnosis import Modulation as Found
 from gearsig.orders import order_spectrum
@@ -232,6 +234,46 @@ def test_the_foot_of_a_mesh_line_in_a_run_up_is_no_family() -> None:
         analysis = analyze(record(model, rig(27, 143), seed=seed))
         assert not found(analysis, "sidebands-of-unknown-shaft") + found(analysis, "unexplained-line")
         assert not found(analysis, "mesh-modulated")
+
+
+def with_mesh(seconds: float, teeth: int, modulation: Callable[[FloatArray], FloatArray], seed: int = 0) -> Recording:
+    """Return a mesh at 22 Hz of the input shaft, modulated in amplitude as a function of time, in little noise."""
+    t = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    x = 0.02 * np.random.default_rng(seed).normal(size=len(t))
+    x += 30.0 * (1 + modulation(t)) * sum(np.cos(2 * pi * h * teeth * 22.0 * t) / h for h in (1, 2, 3))
+    speed = ConstantSpeed(1320.0, "in")
+    channel = Channel("a1", "acceleration", "m/s^2")
+    return Recording(x[None], RATE_HZ, (channel,), speed, rig=rig(teeth, 47))
+
+
+def wander(t: FloatArray, seed: int = 0) -> FloatArray:
+    """Return a load that wanders, of rms 1: it makes a skirt about the lines of the mesh, and no lines."""
+    lines = np.fft.rfft(np.random.default_rng(seed).normal(size=len(t)))
+    slow: FloatArray = np.fft.irfft(lines / (1 + (np.fft.rfftfreq(len(t), 1 / RATE_HZ) / 3.0) ** 2), len(t))
+    return slow / np.std(slow)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_skirt_of_a_mesh_line_is_no_family(seed: int) -> None:
+    analysis = analyze(with_mesh(2.0, 27, lambda t: 0.05 * wander(t, seed), seed))
+    assert not found(analysis, "sidebands-of-unknown-shaft")
+
+
+def test_a_family_of_an_unknown_shaft_stands_out_of_the_skirt() -> None:
+    def modulation(t: FloatArray) -> FloatArray:
+        turns = 2 * pi * 0.3 * 22.0 * t
+        return 0.02 * wander(t) + 0.1 * np.cos(turns) + 0.05 * np.cos(2 * turns)
+
+    (finding,) = found(analyze(with_mesh(6.0, 27, modulation)), "sidebands-of-unknown-shaft")
+    assert finding.where.order == pytest.approx(0.3, abs=0.002)
+
+
+def test_sidebands_of_both_shafts_together_are_no_unknown_shafts() -> None:
+    def modulation(t: FloatArray) -> FloatArray:
+        driver, driven = 2 * pi * 22.0 * t, 2 * pi * 22.0 * 29 / 47 * t
+        return (1 + 0.4 * np.cos(driver)) * (1 + 0.4 * np.cos(driven) + 0.1 * np.cos(2 * driven)) - 1
+
+    assert not found(analyze(with_mesh(8.0, 29, modulation)), "sidebands-of-unknown-shaft")
 
 
 def test_pulses_of_which_there_are_twice_as_many_are_doubted() -> None:
