@@ -11,8 +11,14 @@ import numpy as np
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
-from gearsig.prepared import RUN_UP_FOOT_ORDERS, LinesOverFloor, lines_over_noise_floor, neighbour_levels
-from gearsig.recording import MAINS_HZ
+from gearsig.prepared import (
+    RUN_UP_FOOT_ORDERS,
+    LinesOverFloor,
+    lines_over_noise_floor,
+    neighbour_levels,
+    peak_position,
+)
+from gearsig.recording import MAINS_HZ, MAINS_WANDER
 from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
 
@@ -244,20 +250,31 @@ def detect_lines(signals: AnalysisSignals, trains: Sequence[float] = ()) -> list
 
 
 def _mains(signals: AnalysisSignals) -> Finding | None:
-    """Look for lines at the mains frequency and its first multiples that no shaft explains."""
+    """Look for lines at the mains frequency and its first multiples that no shaft explains.
+
+    Where no speed is known, a shaft may: of two poles, or one that is not driven by the mains at all.
+    """
     found = mains_lines(signals)
     if found is None:
         return None
     name, mains, line = found
+    times = max(1, round(line.position / mains))
+    title = f"Lines of the {mains:.0f} Hz mains stand in channel {name}."
+    confidence, surer = 0.8, "Switch the machine off and record again: hum stays."
+    if signals.angle is None:
+        hertz = line.position / times
+        title = f"Lines at {hertz:.4g} Hz and multiples stand in channel {name}: the {mains:.0f} Hz mains, or a shaft "
+        title += f"at {60 * hertz:.4g} rpm."
+        confidence, surer = 0.5, f"Give the speed; or {surer[:1].lower()}{surer[1:]}"
     return Finding(
         "mains-hum",
         Kind.NOTICE,
-        f"Lines of the {mains:.0f} Hz mains stand in channel {name}.",
+        title,
         Where((name,), frequency_hz=mains),
         line.strength("noise floor of the spectrum"),
-        confidence=0.8,
-        confidence_basis="two of the first three multiples within 0.1 Hz",
-        surer="Switch the machine off and record again: hum stays.",
+        confidence=confidence,
+        confidence_basis=f"two of the first three multiples within {100 * MAINS_WANDER:g} %, as far as supplies wander",
+        surer=surer,
     )
 
 
@@ -279,13 +296,24 @@ def mains_lines(
             continue  # a mains line is then not told from a shaft's
         excess = lines_over_noise_floor(spectrum, 4.0 * max(MAINS_HZ) / scale)
         for mains in MAINS_HZ:
-            places = [k * mains / scale for k in (1, 2, 3)]
-            lines = [line_at(excess, place, 0.1 / scale) for place in places]
-            near = [x for x, place in zip(lines, places, strict=True) if x and abs(x.position - place) <= 0.1 / scale]
-            clear = [line for line in near if line.ratio_db > UNEXPLAINED_DB]
-            if len(clear) >= 2 and not any(_is_synchronous(signals, places[0], times) for times in slower):
-                return name, mains, lines[0] or clear[0]
+            lines = [_peak_at(excess, k * mains / scale, MAINS_WANDER) for k in (1, 2, 3)]
+            clear = [line for line in lines if line is not None and line.ratio_db > UNEXPLAINED_DB]
+            if len(clear) >= 2 and not any(_is_synchronous(signals, mains / scale, times) for times in slower):
+                return name, mains, clear[0]
     return None
+
+
+def _peak_at(excess: LinesOverFloor, place: float, within: float) -> PlacedLine | None:
+    """Return the peak within a relative distance of a place, or a sixth of a line, between its lines; None without."""
+    spectrum = excess.spectrum
+    reach = max(within * place, spectrum.resolution / 6)
+    line = line_at(excess, place, reach + spectrum.resolution / 2)
+    if line is None:
+        return None
+    i = spectrum.index_of(line.position)
+    position = peak_position(spectrum, i)
+    is_peak = bool(spectrum.values[i] >= spectrum.values[max(i - 1, 0) : i + 2].max())
+    return replace(line, position=position) if is_peak and abs(position - place) <= reach else None
 
 
 def _is_synchronous(signals: AnalysisSignals, hertz: float, slower: float = 1.0) -> bool:

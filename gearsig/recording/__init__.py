@@ -1,7 +1,7 @@
 """Recordings: channels over time, readers, quality of the data."""
 
 from gearsig.recording._limits import check_memory, container_free_bytes, free_memory_bytes
-from gearsig.recording._quality import MAINS_HZ, ChannelProblem, find_problems
+from gearsig.recording._quality import MAINS_HZ, MAINS_WANDER, ChannelProblem, find_problems
 from gearsig.recording._read import (
     FORMAT_NAMES,
     FORMAT_OF_EXTENSION,
@@ -33,6 +33,7 @@ __all__ = [
     "FORMAT_NAMES",
     "FORMAT_OF_EXTENSION",
     "MAINS_HZ",
+    "MAINS_WANDER",
     "SI_FACTORS",
     "WRITERS",
     "Channel",

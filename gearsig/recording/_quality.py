@@ -334,8 +334,8 @@ MAINS_HZ = (50.0, 60.0)
 MAINS_WANDER = 1e-3
 """How far a line that is called hum may be from a supply's multiple: half of `gearsig.prepared.MAINS_TOLERANCE`.
 
-This one accuses a channel, and a motor of little slip turns close by; that one only leaves lines out of a search, where
-one that is missed does harm."""
+This one accuses a channel or names a line, and a motor of little slip turns close by; that one only leaves lines out of
+a search, where one that is missed does harm."""
 LONGEST_TURNED = 1 << 18
 """Samples in which the direction of time is looked for."""
 
