@@ -195,7 +195,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     return Finding(
         "non-synchronous-impacts",
         Kind.SUSPICION if strong else Kind.NOTICE,
-        f"Impacts at order {order:.4f} of {where.order_shaft or 'the shaft'} ({where.frequency_hz:.5g} Hz), which "
+        f"Impacts at order {order:.4f} of {where.order_shaft or 'the shaft'} ({signals.hertz_text(order)}), which "
         f"{_unexplained_by(signals.rig)}.",
         where,
         _strength(candidate),

@@ -56,8 +56,11 @@ def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
     plus_minus = f" ± {uncertainty * angle.mean_speed_rpm:.2g}" if isfinite(uncertainty) else ""
     named = f"Shaft {angle.shaft}" if angle.shaft else "The shaft"
     text = f"{named} turns at {angle.mean_speed_rpm:.6g}{plus_minus} rpm"
-    if not angle.is_steady(0.001):
-        text += ", between {:.5g} and {:.5g} rpm".format(*angle.speed_range_rpm)
+    low, high = angle.speed_range_rpm
+    if not angle.is_steady():  # then an uncertainty of the mean would be taken for that of the speed
+        text = f"{named} turns at {low:.5g} to {high:.5g} rpm, {angle.mean_speed_rpm:.5g} rpm on average"
+    elif not angle.is_steady(0.001):
+        text += f", between {low:.5g} and {high:.5g} rpm"
     return Finding(
         "speed",
         Kind.INFORMATION,
@@ -151,7 +154,7 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
     strength = line.strength("noise floor of the order spectrum")
     if _is_clear(line):
         where = signals.where(line.position, channel, gear=pair.name)
-        title = f"The mesh of {pair.name} shows at order {line.position:.6g} ({where.frequency_hz:.6g} Hz, "
+        title = f"The mesh of {pair.name} shows at order {line.position:.6g} ({signals.hertz_text(line.position, 6)}, "
         title += f"harmonic {harmonic})."
         return Finding("mesh-found", Kind.INFORMATION, title, where, strength, 0.99, _OVER_FLOOR)
     near = f"The best of {N_HARMONICS} harmonics is {line.ratio_db:.1f} dB over the floor."
@@ -159,7 +162,9 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
         near = f"Near harmonic {harmonic} a line stands beside its place: the speed may be off by little, and small "
         near += "errors smear all averages."
     elsewhere = signals.comb_elsewhere  # at which multiple of the stated speed the mesh lines do lie, if anywhere
-    title = f"No mesh line of {pair.name} where speed and teeth put it (order {mesh:.6g}, {hertz:.6g} Hz)"
+    title = (
+        f"No mesh line of {pair.name} where speed and teeth put it (order {mesh:.6g}, {signals.hertz_text(mesh, 6)})"
+    )
     if elsewhere is not None:
         title += f", but at {elsewhere.factor:.4g} times: sampling rate, speed or teeth are wrong"
     return Finding(
@@ -326,7 +331,7 @@ def _is_synchronous(signals: AnalysisSignals, hertz: float, slower: float = 1.0)
 
 
 def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding | None:
-    """Return the strongest order line that is no multiple of a known shaft's order, and no bearing's."""
+    """Return the strongest order line that is no multiple of a known shaft's order, and no low one of a bearing's."""
     best: tuple[float, str, int, LinesOverFloor] | None = None
     foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
     for name, excess in signals.order_excess.items():
@@ -337,7 +342,7 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
         for bearing in signals.rig.bearings:
             ratio = signals.rig.ratio(bearing.shaft)
             for order in bearing.orders().values() if ratio is not None else ():
-                excess = excess.without_multiples(order * (ratio or 1.0), half_width=0.02 * order)  # noqa: PLW2901
+                excess = _without_bearing(excess, order * (ratio or 1.0))  # noqa: PLW2901
         spectrum = excess.spectrum
         with np.errstate(divide="ignore", invalid="ignore"):
             clear = 20 * np.log10(spectrum.values / excess.floor) > UNEXPLAINED_DB
@@ -359,7 +364,10 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
     title = (
         "The strongest line of no single shaft or mesh" if origin else "The strongest line of no known shaft or mesh"
     )
-    title += f" is at order {line.position:.4f} ({where.frequency_hz:.5g} Hz)"
+    evidence = [] if origin or hunting is None else [f"It is near {hunting[1]}, as chance may have it."]
+    if signals.rig.bearings:
+        evidence.append(f"The first {BEARING_MULTIPLES} multiples of the bearings' orders are left aside.")
+    title += f" is at order {line.position:.4f} ({signals.hertz_text(line.position)})"
     return Finding(
         "unexplained-line",
         Kind.NOTICE,
@@ -368,9 +376,21 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
         line.strength("noise floor"),
         0.95,
         _UNKNOWN_CAUSE,
-        evidence=() if origin or hunting is None else (f"It is near {hunting[1]}, as chance may have it.",),
+        evidence=tuple(evidence),
         surer="A run-up: a line of fixed frequency is a resonance or electrical, one of fixed order a shaft's.",
     )
+
+
+BEARING_MULTIPLES = 6
+"""Multiples of a bearing's order that are left aside: those that its families are sought by. Of two bearings, all
+multiples with their slip would cover a large part of any spectrum, and hide what is stronger."""
+
+
+def _without_bearing(excess: LinesOverFloor, order: float) -> LinesOverFloor:
+    """Mask the first multiples of an order of a bearing, with 2 % of the order to either side for its slip."""
+    every = excess.without_multiples(order, half_width=0.02 * order).masked
+    is_low = excess.spectrum.positions <= (BEARING_MULTIPLES + 0.5) * order
+    return replace(excess, masked=excess.masked | (every & is_low))
 
 
 BY_CHANCE = 0.1

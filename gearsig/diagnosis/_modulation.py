@@ -313,7 +313,7 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
         "sidebands-of-unknown-shaft",
         Kind.NOTICE,
         f"The mesh of {pair.name} has sidebands spaced by order {comb.fundamental:.4f} of {where.order_shaft} "
-        f"({where.frequency_hz:.4g} Hz), which no known shaft explains.",
+        f"({signals.hertz_text(comb.fundamental, 4)}), which no known shaft explains.",
         replace(where, frequency_hz=None),
         Strength(comb.amplitude, excess.spectrum.unit, comb.floor, "what lies beside it in the order spectrum", ratio),
         confidence=from_p_value(p_value, prior=0.3, limit=0.99),

@@ -131,9 +131,16 @@ class AnalysisSignals:
         """Whether the speed changes by more than 1 %: a spectrum over frequency smears, a map along speed is made."""
         return self.angle is not None and not self.angle.is_steady()
 
+    def hertz_text(self, order: float, digits: int = 5) -> str:
+        """Return the frequency of an order in words, the range of it where the speed varies."""
+        if self.angle is None or not self.speed_varies:
+            return f"{order * self.frequency_per_order_hz:.{digits}g} Hz"
+        low, high = (order * rpm / 60 for rpm in self.angle.speed_range_rpm)
+        return f"{low:.4g} to {high:.4g} Hz"
+
     def where(self, order: float, channel: str = "", *, shaft: str = "", gear: str = "", bearing: str = "") -> Where:
-        """Return the place of what is at an order of the reference shaft, with its mean frequency."""
-        hertz = order * self.frequency_per_order_hz if self.angle is not None else None
+        """Return the place of what is at an order of the reference shaft, at a steady speed with its frequency."""
+        hertz = order * self.frequency_per_order_hz if self.angle is not None and not self.speed_varies else None
         channels = (channel,) if channel else ()
         return Where(channels, shaft, gear, bearing, order, self.rig.reference_shaft, hertz)
 
