@@ -151,7 +151,8 @@ def read_and_analyze(request: AnalysisRequest, content: Content, reference: Cont
     then = None
     if reference is not None:
         with _as_file(reference, request.reference_name) as path:
-            its_rig, rate_hz = rig_and_rate_of_reference(path, rig, request.sampling_rate_hz)
+            # A sample's machine may have been mended in the form.
+            its_rig, rate_hz = rig_and_rate_of_reference(path, rig, request.sampling_rate_hz, is_same_machine=True)
             read = read_usual_part(path, its_rig, **{**given, "sampling_rate_hz": rate_hz})
             then = _named(read, request.reference_name)
     with _as_file(content, request.name) as path:

@@ -307,7 +307,7 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
         return _as_cage(signals, replace(best, comb=train, in_train=True))
     known = _known_multiple(signals, best)
     if known is None:
-        return best
+        return _where_it_is_strongest(envelopes, best)
     # Smeared lines do not stand out from families beside them; of all orders theirs is the clearest all the same.
     return known if _stands_out(signals, known) else replace(known, share=0.5 * known.share)
 
@@ -315,19 +315,30 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
 def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:
     """Return the surest family with a fundamental between `low` and `high`, its p-value over all envelopes.
 
-    Of families that are no chance at all, the strongest. It is placed where it stands out most, and that is not where
-    chance explains it least: a family that fills its own channel with lines makes lines more likely there.
+    Of families that are no chance at all, the strongest.
     """
     combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
     families = [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
     best = min(families, key=lambda family: (max(family.p_value, 1e-9), -family.strength_db), default=None)
     if best is None:
         return None
-    fundamental = best.comb.fundamental
-    near = (family for family in families if abs(family.comb.fundamental / fundamental - 1) <= SAME_FAMILY)
-    same = [family for family in near if family.p_value <= SEEN_THERE]
-    placed = max((best, *same), key=lambda family: family.strength_db)
-    return replace(placed, p_value=min(1.0, best.p_value * len(envelopes)), loudest=_loudest(envelopes, best))
+    return replace(best, p_value=min(1.0, best.p_value * len(envelopes)), loudest=_loudest(envelopes, best))
+
+
+def _where_it_is_strongest(envelopes: list[BandEnvelope], family: Candidate) -> Candidate:
+    """Return a family in the envelope in which it stands out most.
+
+    That is not where chance explains it least: a family that fills its own channel with lines makes lines more likely
+    there.
+    """
+    low, high = (family.comb.fundamental * (1 + off) for off in (-SAME_FAMILY, SAME_FAMILY))
+    combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
+    seen = [
+        replace(family, comb=comb, envelope=envelope)
+        for comb, envelope in combs
+        if comb is not None and len(comb.positions) >= MINIMUM_LINES and comb.p_value <= SEEN_THERE
+    ]
+    return max((family, *seen), key=lambda candidate: candidate.strength_db)
 
 
 def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:

@@ -52,7 +52,12 @@ REFERENCE_OPTIONS = {"--fs": "--reference-fs"}
 
 
 def rig_and_rate_of_reference(
-    path: str | Path, rig: Rig | None, stated_hz: float | None, reference_rate_hz: float | None = None
+    path: str | Path,
+    rig: Rig | None,
+    stated_hz: float | None,
+    reference_rate_hz: float | None = None,
+    *,
+    is_same_machine: bool = False,
 ) -> tuple[Rig | None, float | None]:
     """Return (rig, sampling rate) of the healthy reference of a recording, by the rig file beside the reference.
 
@@ -67,26 +72,32 @@ def rig_and_rate_of_reference(
         Sampling rate that was stated for the recording: it holds for the reference, unless that file states one.
     reference_rate_hz : float or None
         Sampling rate that was stated for the reference.
+    is_same_machine : bool
+        Whether that was said: other teeth in the file beside the reference are a mistake there then.
 
     Raises
     ------
     InputError
-        If that rig file has gears with other teeth, or tells the speed of another shaft.
+        If that rig file has gears with other teeth, unless `is_same_machine`, or tells the speed of another shaft.
     """
     from gearsig.rig import read_rig, rig_file_beside
 
     beside = rig_file_beside(path)
     rig_beside = read_rig(beside) if beside is not None else None
-    its_rig = rig if rig_beside is None else _rig_at_reference(path, rig or Rig(), rig_beside)
+    its_rig = (
+        rig
+        if rig_beside is None
+        else _rig_at_reference(path, rig or Rig(), rig_beside, is_same_machine=is_same_machine)
+    )
     if reference_rate_hz is not None:
         return its_rig, reference_rate_hz
     return its_rig, stated_hz if rig_beside is None or rig_beside.sampling_rate_hz is None else None
 
 
-def _rig_at_reference(path: str | Path, rig: Rig, rig_beside: Rig) -> Rig:
+def _rig_at_reference(path: str | Path, rig: Rig, rig_beside: Rig, *, is_same_machine: bool) -> Rig:
     """Return the recording's machine with what the file beside the reference states of the measurement."""
     teeth, others = (", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in r.pairs) for r in (rig, rig_beside))
-    if rig.pairs and rig_beside.pairs and teeth != others:
+    if not is_same_machine and rig.pairs and rig_beside.pairs and teeth != others:
         raise InputError(
             f"the reference is of another machine: its rig file says teeth {others}, the recording's {teeth}",
             where=Path(path).name,
