@@ -154,16 +154,16 @@ def odds_text(probability: float) -> str:
     return "> 99 %" if probability > 0.99 else percent(probability)
 
 
-def enumerated(names: Sequence[str]) -> str:
+def enumerated(names: Sequence[str], conjunction: str = "and") -> str:
     """Return names as a sentence lists them.
 
     Examples
     --------
-    >>> enumerated(["input"]), enumerated(["input", "middle", "output"])
-    ('input', 'input, middle and output')
+    >>> enumerated(["input"]), enumerated(["input", "middle", "output"]), enumerated(["gear", "shaft"], "or")
+    ('input', 'input, middle and output', 'gear or shaft')
     """
     *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
+    return f"{', '.join(first)} {conjunction} {last}" if first else last
 
 
 def counted(n: int, noun: str) -> str:

@@ -35,7 +35,7 @@ from gearsig.diagnosis._types import (
     from_p_value,
     p_text,
 )
-from gearsig.formatting import named, percent, signed
+from gearsig.formatting import enumerated, named, percent, signed
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
 from gearsig.rig import Rig, hunting_tooth_order
 
@@ -211,7 +211,7 @@ def _unexplained_by(rig: Rig) -> str:
     if not any(shaft.name for shaft in rig.shafts):
         return "the shaft does not explain"
     kinds = ["shaft", *(["gear"] if rig.pairs else []), *(["bearing"] if rig.bearings else [])]
-    return f"no {' or '.join(filter(None, [', '.join(kinds[:-1]), kinds[-1]]))} of the rig explains"
+    return f"no {enumerated(kinds, 'or')} of the rig explains"
 
 
 def _over_frequency(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Iterator[Finding]:

@@ -317,8 +317,7 @@ def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> C
 
     Of families that are no chance at all, the strongest.
     """
-    combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
-    families = [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
+    families = _families(envelopes, low, high)
     best = min(families, key=lambda family: (max(family.p_value, 1e-9), -family.strength_db), default=None)
     if best is None:
         return None
@@ -332,13 +331,18 @@ def _where_it_is_strongest(envelopes: list[BandEnvelope], family: Candidate) -> 
     there.
     """
     low, high = (family.comb.fundamental * (1 + off) for off in (-SAME_FAMILY, SAME_FAMILY))
-    combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
     seen = [
-        replace(family, comb=comb, envelope=envelope)
-        for comb, envelope in combs
-        if comb is not None and len(comb.positions) >= MINIMUM_LINES and comb.p_value <= SEEN_THERE
+        replace(family, comb=there.comb, envelope=there.envelope)
+        for there in _families(envelopes, low, high)
+        if there.p_value <= SEEN_THERE
     ]
     return max((family, *seen), key=lambda candidate: candidate.strength_db)
+
+
+def _families(envelopes: list[BandEnvelope], low: float, high: float) -> list[Candidate]:
+    """Return each envelope's best family with a fundamental between `low` and `high`, where it has one."""
+    combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
+    return [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
 
 
 def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:

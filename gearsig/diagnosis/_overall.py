@@ -104,23 +104,23 @@ def _source(signals: AnalysisSignals, velocity: Indicator) -> tuple[str, str]:
     if signals.angle is None:
         return "", ""
     per_order_hz = signals.frequency_per_order_hz
-    places = {
-        (f"{k}×", f"{k} × shaft {name or 'speed'}"): [k * order * per_order_hz]
-        for name, order in signals.known_shaft_orders.items()
-        for k in (1, 2)
-    }
+    places_hz: dict[str, list[float]] = {}
+    causes: dict[str, str] = {}
+    for name, order in signals.known_shaft_orders.items():
+        for k in (1, 2):
+            place = f"{k} × shaft {name or 'speed'}"
+            places_hz[place], causes[place] = [k * order * per_order_hz], CAUSES[f"{k}×"]
     for name, order in signals.known_mesh_orders.items():
-        places["mesh", f"the mesh harmonics of gear pair {name}"] = [
-            k * order * per_order_hz for k in range(1, N_MESH_HARMONICS + 1)
-        ]
-    channel = next(channel for channel in signals.recording.channels if channel.name == velocity.channel)
-    words = {text: hertz for (_, text), hertz in places.items()}
+        place = f"the mesh harmonics of gear pair {name}"
+        places_hz[place] = [k * order * per_order_hz for k in range(1, N_MESH_HARMONICS + 1)]
+        causes[place] = CAUSES["mesh"]
+    channel = signals.recording.channels[signals.recording.index(velocity.channel)]
     band_hz = velocity_band_hz(signals.angle.mean_speed_rpm)
-    shares = velocity_shares(signals.spectra[channel.name], channel, words, band_hz)
-    kind, text = max(places, key=lambda place: shares[place[1]], default=("", ""))
-    if shares.get(text, 0.0) < DOMINANT:
+    shares = velocity_shares(signals.spectra[channel.name], channel, places_hz, band_hz)
+    place = max(shares, key=shares.__getitem__, default="")
+    if shares.get(place, 0.0) < DOMINANT:
         return "", ""
-    return f"{percent(shares[text])} of its power is at {text}", CAUSES[kind]
+    return f"{percent(shares[place])} of its power is at {place}", causes[place]
 
 
 def _why_not(machine: MachineSize, signals: AnalysisSignals, velocities: list[Indicator]) -> str:
