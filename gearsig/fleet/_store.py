@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Value = TypeVar("Value")
 
 SCHEMA, SCHEMA_VERSION = "gearsig-fleet", 1
-MANIFEST, NEW, SEGMENTS, DAMAGED, CLAIMS = "store.json", "new", "segments", "damaged", "claims"
+MANIFEST, NEW, SEGMENTS, DAMAGED, CLAIMS, LOCK = "store.json", "new", "segments", "damaged", "claims", ".lock"
 MERGED = "merged.json"
 
 RECORDING = {
@@ -110,23 +110,32 @@ class Store:
         self.folder, self.on_message = folder, on_message
         self._loose_known: frozenset[str] = frozenset()
         self._segments_known: tuple[str, ...] | None = None
-        if not (folder / MANIFEST).exists() and not (folder / SEGMENTS).is_dir():
-            if not create:
-                raise InputError(
-                    "there is no fleet", where=str(folder), remedy="make one with: gearsig fleet add RECORDINGS"
-                )
-            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-                raise InputError("holds other things", where=str(folder), remedy="choose another with --store")
+        if not (folder / MANIFEST).exists() and not (folder / SEGMENTS).is_dir() and not create:
+            raise InputError(
+                "there is no fleet", where=str(folder), remedy="make one with: gearsig fleet add RECORDINGS"
+            )
         if create:
-            try:
-                for name in (NEW, SEGMENTS, CLAIMS):
-                    (folder / name).mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise InputError(
-                    f"cannot be made ({error.strerror})", where=str(folder), remedy="choose another with --store"
-                ) from None
-            if not (folder / MANIFEST).exists():
-                self._write_manifest([], [])
+            self._make()
+
+    def _make(self) -> None:
+        """Make what is not there; two processes may make the same store at once, and neither undoes the other's."""
+        from filelock import FileLock
+
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            present = {path.name for path in self.folder.iterdir()}
+            if present and not present & {MANIFEST, SEGMENTS}:
+                raise InputError("holds other things", where=str(self.folder), remedy="choose another with --store")
+            for name in (SEGMENTS, NEW, CLAIMS):  # the first tells the others that this is a store
+                (self.folder / name).mkdir(exist_ok=True)
+            if MANIFEST not in present:
+                with FileLock(self.folder / LOCK):
+                    if not (self.folder / MANIFEST).exists():
+                        self._write_manifest(self._present_segments(), [])
+        except OSError as error:
+            raise InputError(
+                f"cannot be made ({error.strerror})", where=str(self.folder), remedy="choose another with --store"
+            ) from None
 
     # ---------------- what there is
 
@@ -343,7 +352,7 @@ class Store:
         """
         from filelock import FileLock, Timeout
 
-        lock = FileLock(self.folder / ".lock")
+        lock = FileLock(self.folder / LOCK)
         try:
             lock.acquire(timeout=0)
         except Timeout:

@@ -6,7 +6,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 from pathlib import Path
 
@@ -184,6 +186,37 @@ def test_a_merge_that_is_killed_before_it_deletes_doubles_nothing(make_recording
         path.write_bytes(content)
     assert len(fleet.recordings()) == 2
     assert len(fleet.indicators(name="rms")) == 2
+
+
+def test_a_store_that_many_make_at_once_is_made_for_each(tmp_path):
+    for attempt in range(20):
+        start = threading.Barrier(8)
+
+        def make(store=tmp_path / str(attempt), start=start):
+            start.wait()
+            return open_fleet(store, create=True)
+
+        with ThreadPoolExecutor(8) as pool:
+            for made in [pool.submit(make) for _ in range(8)]:
+                assert made.result().recordings().empty
+
+
+def test_who_makes_a_store_forgets_nothing_that_another_added_meanwhile(make_recordings, tmp_path, monkeypatch):
+    """The list of segments is written by another process between the look at the folder and the making of it."""
+    data, store = make_recordings("pump 1", [1.0, 1.1]), tmp_path / "store"
+    looked = Path.iterdir
+
+    def look(folder):
+        names = list(looked(folder))
+        if folder == store and not names:
+            monkeypatch.setattr(Path, "iterdir", looked)
+            first = open_fleet(store, create=True)
+            first.add(data, pattern=PATTERN, n_processes=1)
+            first.compact()
+        return names
+
+    monkeypatch.setattr(Path, "iterdir", look)
+    assert len(open_fleet(store, create=True).recordings()) == 2
 
 
 def test_other_folders_are_not_taken_for_a_store(tmp_path):
