@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.angle._comb import (
+    CLEAR,
     MIN_QUALITY,
     NARROW,
     TOP,
@@ -255,7 +256,7 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
             candidate = _refined(search, angle.of_shaft(angle.shaft, candidate.decision.speed))
         if candidate is not None and abs(candidate.decision.speed - 1.0) <= 0.02:
             candidates.append(candidate)
-            if candidate.decision.quality > _CLEAR:
+            if candidate.decision.quality > CLEAR:
                 break
     best = max(candidates, key=_rank, default=None)
     if best is None or best.decision.quality < MIN_QUALITY or search.high < NARROW * search.low:
@@ -267,15 +268,11 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
     return max([best, *(o for o in others if o is not None and abs(o.decision.speed - 1.0) <= 0.02)], key=_rank)
 
 
-_CLEAR = 0.9
-"""Quality beyond which no other block length is tried."""
-
-
 def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[ShaftAngle]:
     """Yield the constant speed where there is one; unless that is beyond doubt, the courses followed as well."""
     if start is not None:
         yield start.angle
-        if start.decision.quality >= _CLEAR:
+        if start.decision.quality >= CLEAR:
             return
     from scipy.integrate import cumulative_trapezoid
 

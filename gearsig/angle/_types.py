@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, frozen_array, instance_of, known_name, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
 
 AngleMethod = Literal["constant", "pulses", "encoder", "speed channel", "tachless"]
 
@@ -128,13 +132,16 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
             speed_rev_per_s=np.maximum(self._evaluate(time, 1), 0.0),
         )
 
-    def _evaluate(self, time_s: FloatArray, derivative: int) -> FloatArray:
+    @cached_property
+    def _spline(self) -> CubicHermiteSpline:
         from scipy.interpolate import CubicHermiteSpline
 
+        return CubicHermiteSpline(self.time_s, self.revolutions, self.speed_rev_per_s)
+
+    def _evaluate(self, time_s: FloatArray, derivative: int) -> FloatArray:
         t = np.asarray(time_s, dtype=np.float64)
         inside = np.clip(t, self.time_s[0], self.time_s[-1])
-        spline = CubicHermiteSpline(self.time_s, self.revolutions, self.speed_rev_per_s)
-        result: FloatArray = spline(inside, derivative)
+        result: FloatArray = self._spline(inside, derivative)
         if derivative == 0:
             ends = np.where(t < inside, self.speed_rev_per_s[0], self.speed_rev_per_s[-1])
             result = result + (t - inside) * ends

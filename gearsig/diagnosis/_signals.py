@@ -417,11 +417,14 @@ def witness_text(
 
 
 def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float) -> KurtogramBand | None:
-    from gearsig.spectra import kurtogram, prepared_signal
+    from scipy.fft import irfft
+
+    from gearsig.spectra import kurtogram, prepared_lines
 
     fs = signals.recording.sampling_rate_hz
     recorded = signals.recording.values(channel)
-    x = prepared_signal(recorded, fs, "tones removed", transform=signals.prepared.transform(channel))
+    lines = prepared_lines(signals.prepared.transform(channel), "tones removed")
+    x = np.asarray(irfft(lines, len(recorded)))
     if np.std(x) < 1e-9 * np.std(recorded):
         return None  # a model's tones are all there is: what is left of them are the rounding errors of their removal
     try:
@@ -430,7 +433,7 @@ def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float)
     except RefusalError:  # the record is too short, or the races too fast for the sampling rate
         return None
     without_tones = replace(signals.recording.select([channel]), samples=x[None, :])
-    envelope = next(envelopes_in(signals, without_tones, band.band_hz), None)
+    envelope = next(envelopes_in(signals, without_tones, band.band_hz, {channel: lines}), None)
     return None if envelope is None else KurtogramBand(grid, band, envelope)
 
 

@@ -190,7 +190,7 @@ def overall_indicators(
     if channel.quantity in ("acceleration", "unknown") and high_hz > 2 * low_hz:
         n, known = len(values), rfft(checked_values(values)) if transform is None else transform
         inside = slice(ceil(low_hz * n / sampling_rate_hz), floor(high_hz * n / sampling_rate_hz) + 1)
-        lines = np.zeros(len(known), dtype=np.complex128)
+        lines = np.zeros_like(known)
         lines[inside] = known[inside]
         high = Amplitudes(irfft(lines, n, overwrite_x=True))
         for name, value, unit in (

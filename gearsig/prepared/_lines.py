@@ -518,14 +518,15 @@ def neighbour_levels(spectrum: Spectrum, *, of_both_sides: bool = False) -> Floa
     from scipy.ndimage import median_filter
 
     power = np.asarray(spectrum.values, dtype=np.float64) ** 2
-    offsets = np.arange(-OUTER_LINES, OUTER_LINES + 1)
-    below, above = offsets <= -INNER_LINES, offsets >= INNER_LINES
-    # As a single row: in one dimension SciPy's filter takes the whole width, holes of the footprint included.
-    medians = [
-        median_filter(power[None, :], footprint=footprint[None, :], mode="reflect")[0]
-        for footprint in ((below, above) if of_both_sides else (below | above,))
-    ]
-    return np.asarray(np.sqrt(np.max(medians, axis=0) / log(2)))
+    if of_both_sides:
+        width, n = OUTER_LINES - INNER_LINES + 1, len(power)
+        running = median_filter(np.pad(power, OUTER_LINES, mode="symmetric"), width)[width // 2 :]
+        medians = np.maximum(running[:n], running[OUTER_LINES + INNER_LINES :][:n])
+    else:
+        beside = np.abs(np.arange(-OUTER_LINES, OUTER_LINES + 1)) >= INNER_LINES
+        # As a single row: in one dimension SciPy's filter takes the whole width, the hole in its middle included.
+        medians = median_filter(power[None, :], footprint=beside[None, :], mode="reflect")[0]
+    return np.asarray(np.sqrt(medians / log(2)))
 
 
 # --------------------

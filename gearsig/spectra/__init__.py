@@ -31,6 +31,7 @@ from gearsig.spectra._envelope import (
     band_envelope,
     envelope_recording,
     envelope_spectrum,
+    prepared_lines,
     prepared_signal,
 )
 from gearsig.spectra._kurtogram import (
@@ -108,6 +109,7 @@ __all__ = [
     "order_coherence",
     "plan_blocks",
     "power_density",
+    "prepared_lines",
     "prepared_signal",
     "scaled",
     "scaled_unit",

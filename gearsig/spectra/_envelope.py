@@ -262,8 +262,9 @@ def _complex_envelope(
 
     n, n_band = len(x), last - first + 1
     m = next_fast_len(oversampling * n_band + 1)
-    lines = np.zeros(m, dtype=np.complex128)
-    lines[:n_band] = (rfft(x.astype(np.float64)) if transform is None else transform)[first : last + 1]
+    known = rfft(x.astype(np.float64)) if transform is None else transform
+    lines = np.zeros(m, dtype=known.dtype)
+    lines[:n_band] = known[first : last + 1]
     lines[:n_band] *= band_taper(n_band, edge_fraction)
     z: ComplexArray = ifft(lines, overwrite_x=True)
     z *= 2.0 * m / n
@@ -432,7 +433,15 @@ def prepared_signal(
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     if one_of(preparation, "preparation", PREPARATIONS) == "none":
         return x
-    lines: ComplexArray = rfft(x.astype(np.float64)) if transform is None else transform.copy()
+    lines = prepared_lines(rfft(x.astype(np.float64)) if transform is None else transform, preparation)
+    return np.asarray(irfft(lines, len(x), overwrite_x=True))
+
+
+def prepared_lines(transform: ComplexArray, preparation: Preparation) -> ComplexArray:
+    """Return the `rfft` of a signal's `prepared_signal`, of its own."""
+    lines = transform.copy()
+    if preparation == "none":
+        return lines
     lines[0] = 0.0
     power = lines.real**2 + lines.imag**2
     if preparation == "tones removed":
@@ -443,5 +452,4 @@ def prepared_signal(
         level = np.sqrt(2.0 * (len(lines) - 1.0))  # gives a mean square of about 1
         magnitude = np.abs(lines)
         lines *= np.divide(level, magnitude, out=np.zeros_like(magnitude), where=magnitude > 0)
-    result: FloatArray = irfft(lines, len(x), overwrite_x=True)
-    return result
+    return lines
