@@ -492,19 +492,20 @@ def pair_force(
 
     Linear: δ = N (c + c_h).  Load-dependent: δ = c N + B N^0.9. Both times the engagement weight.
 
-    With N = u¹⁰ the second is convex and rising in u; from above the root Newton's method comes down without a miss.
+    With N = u¹⁰ the second is convex and rising in u: Newton's method comes down to the root from above, and from below
+    after one step. It starts from N^-0.1 = 1/2, that of a kilonewton. A step of 1e-8 u leaves an error of some 1e-15.
     """
     if penetration <= 0.0 or weight <= 0.0:
         return 0.0, 0.0
     if not load_dependent:
         slope = weight / (compliance + contact)
         return slope * penetration, slope
-    u = min((penetration / compliance) ** 0.1, (penetration / contact) ** (1.0 / 9.0))
+    u = (penetration / (compliance + 0.5 * contact)) ** 0.1
     for _ in range(50):
         u8 = u**8
         change = (u8 * u * (compliance * u + contact) - penetration) / (u8 * (10.0 * compliance * u + 9.0 * contact))
         u -= change
-        if change <= 1e-14 * u:
+        if abs(change) <= 1e-8 * u:
             break
     return weight * u**10, weight / (compliance + 0.9 * contact / u)
 
