@@ -402,8 +402,9 @@ def _figures(x: FloatArray, interval: int, *, last: bool) -> Iterator[FloatArray
         power = square.mean(axis=1, dtype=np.float64)
         fourth = np.einsum("ij,ij->i", square, square, dtype=np.float64) / part.shape[1]
         rms, peak = np.sqrt(power), np.sqrt(square.max(axis=1).astype(np.float64))
-        safe = np.maximum(power, 1e-300)
-        yield np.stack([rms, peak, peak / np.sqrt(safe), fourth / safe**2])
+        # Of a channel that is dead for an interval both are 0, not 0/0.
+        crest_factor, kurtosis = peak / np.maximum(rms, 1e-150), fourth / np.maximum(power**2, 1e-300)
+        yield np.stack([rms, peak, crest_factor, kurtosis])
 
 
 USUAL = "the usual level"

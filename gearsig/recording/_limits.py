@@ -133,10 +133,18 @@ def check_memory(
         )
 
 
-def check_decoded(decoded_bytes: int, path: Path) -> None:
+def check_decoded(decoded_bytes: int, path: Path, *, at_once_bytes: int | None = None) -> None:
     """Raise if what a file unpacks to is a decompression bomb, or does not fit into memory twice.
 
     Formats that state their sizes are checked before anything is decoded, streams as they grow.
+
+    Parameters
+    ----------
+    decoded_bytes : int
+        Of the whole file.
+    path : Path
+    at_once_bytes : int or None
+        What is unpacked at once where the file is read in parts; None: all of it.
 
     Raises
     ------
@@ -150,7 +158,7 @@ def check_decoded(decoded_bytes: int, path: Path) -> None:
             allowed=f"a ratio up to {MAX_RATIO}",
             remedy="this is no recording; if it is, unpack it first",
         )
-    check_memory(2 * decoded_bytes, path.name)
+    check_memory(2 * (decoded_bytes if at_once_bytes is None else at_once_bytes), path.name)
 
 
 def read_gzip(path: Path) -> bytes:

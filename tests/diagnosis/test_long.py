@@ -92,6 +92,16 @@ def test_overview_is_that_of_the_whole_record(monkeypatch, block):
     assert len(found.time_s) == 49  # 48.8 s
 
 
+def test_overview_of_a_record_that_is_dead_for_a_while():
+    x = np.where(np.arange(X.shape[1]) < 100_000, 0, X).astype(np.float32)
+    x[1] = 0.5
+    found = long_overview(LONG, x.shape[1], lambda part: Recording(x[:, part], RATE, LONG.channels))
+    for figures in (found.rms, found.peak, found.crest_factor, found.kurtosis):
+        assert not figures[0, :24].any()
+        assert np.all(figures[0, 26:] > 0)
+        assert not figures[1].any()
+
+
 def test_parts_are_the_usual_the_loudest_and_the_most_impulsive(tmp_path, monkeypatch):
     monkeypatch.setattr("gearsig.diagnosis._long.PART_SAMPLES", 8192)
     monkeypatch.setattr("gearsig.diagnosis._long.BYTES_PER_SAMPLE", 24_000.0)

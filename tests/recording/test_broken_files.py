@@ -31,9 +31,9 @@ class Trap:
         return os.mkdir, (self.mark,)
 
 
-def refused(path, match=None):
+def refused(path, match=None, **more):
     with pytest.raises(InputError, match=match) as caught:
-        read_recording(path, sampling_rate_hz=100)
+        read_recording(path, sampling_rate_hz=100, **more)
     error = caught.value
     assert path.name in str(error)
     assert "\n" not in str(error)
@@ -248,8 +248,9 @@ def test_text_beside_numbers_is_not_unpacked(tmp_path):
     assert pa.default_memory_pool().max_memory() < most + 50e6  # the texts are 2 GB
 
 
+@pytest.mark.parametrize("part", [None, slice(0, 9)])
 @pytest.mark.parametrize("ending", [".h5", ".parquet"])
-def test_numbers_that_are_packed_to_almost_nothing(tmp_path, ending):
+def test_numbers_that_are_packed_to_almost_nothing(tmp_path, ending, part):
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -260,13 +261,33 @@ def test_numbers_that_are_packed_to_almost_nothing(tmp_path, ending):
             file["again"] = file["a"]
     else:
         parquet.write_table(pa.table({"a": np.zeros(1 << 25, np.float32)}), path)
-    refused(path, "200 times")
+    refused(path, "200 times", part=part)
 
 
-def test_small_dataset_in_a_huge_chunk(tmp_path):
+@pytest.mark.parametrize("part", [None, slice(0, 9)])
+def test_small_dataset_in_a_huge_chunk(tmp_path, part):
     with h5py.File(tmp_path / "x.h5", "w") as file:
         file.create_dataset("a", (300,), "f8", chunks=(1 << 28,), maxshape=(None,), compression="gzip")
-    refused(tmp_path / "x.h5", "200 times")
+    refused(tmp_path / "x.h5", "200 times", part=part)
+
+
+@pytest.mark.parametrize("ending", [".h5", ".parquet"])
+def test_a_part_takes_the_memory_of_what_is_unpacked_with_it(tmp_path, ending, monkeypatch):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    path, x = tmp_path / f"x{ending}", np.random.default_rng(0).standard_normal(1 << 17)
+    monkeypatch.setattr("gearsig.recording._limits.free_memory_bytes", lambda: 1e6)  # whole, it takes 4 MB
+    for n, fits in ((1 << 17, False), (1 << 10, True)):
+        if ending == ".h5":
+            with h5py.File(path, "w") as file:
+                file.create_dataset("a", data=x, chunks=(n,), compression="gzip")
+        else:
+            parquet.write_table(pa.table({"a": x}), path, row_group_size=n)
+        if fits:
+            assert read_recording(path, sampling_rate_hz=1.0, part=slice(5, 9)).n_samples == 4
+        else:
+            refused(path, "of memory", part=slice(5, 9))
 
 
 def test_name_that_is_no_utf8_and_one_as_long_as_names_can_be(tmp_path):

@@ -53,8 +53,9 @@ def read_hdf5(path: Path, part: slice | None = None) -> RawTable:
         by_path = dict(datasets)
         is_own = OWN_NAME in by_path and OWN_SAMPLES in by_path and by_path[OWN_NAME].shape == ()
         datasets = [(p, d) for p, d in datasets if d.dtype.kind in "fiubc" and d.ndim <= 2 and d.size]
-        if part is None:
-            check_decoded(sum(decoded_bytes(d) for p, d in datasets if not is_own or p == OWN_SAMPLES), path)
+        read = [d for p, d in datasets if not is_own or p == OWN_SAMPLES]
+        chunk_bytes = max((prod(d.chunks or (0,)) * d.dtype.itemsize for d in read), default=0)
+        check_decoded(sum(map(decoded_bytes, read)), path, at_once_bytes=None if part is None else chunk_bytes)
         if is_own:
             samples = load_dataset(by_path[OWN_SAMPLES], where, part)
             return table_from_metadata(_own_text(by_path[OWN_NAME], path), list(np.atleast_2d(samples)), READER, where)

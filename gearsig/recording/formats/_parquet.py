@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from pathlib import Path
 from typing import Any
 
@@ -40,8 +40,8 @@ def read_parquet(path: Path, part: slice | None = None) -> RawTable:
         numeric = [f for f in schema if any(test(f.type) for test in is_number)]
         kept = [f for f in numeric if not f.name.startswith("__index_level_")]
         row_bytes = sum(max(1, int(f.type.bit_width) // 8) for f in kept)
-        if part is None:
-            check_decoded(max(parts.metadata.num_rows * row_bytes, _stated_bytes(parts, kept)), path)
+        sizes = _group_bytes(parts, kept, row_bytes)
+        check_decoded(sum(sizes), path, at_once_bytes=None if part is None else max(sizes, default=0))
         # Other columns are not even decoded: texts unpack to any size.
         single = [f.name for f in kept if schema.names.count(f.name) == 1]
         values = {name: _column_values(parts, name, part) for name in single}
@@ -93,12 +93,19 @@ def _column_values(parts: Any, name: str, part: slice | None) -> NumberArray:
     return np.concatenate(pieces) if pieces else np.empty(0, np.float32)
 
 
-def _stated_bytes(parts: Any, fields: Sequence[Any]) -> int:
-    """Return the unpacked size that the file states of some columns, pages and dictionaries included."""
+def _group_bytes(parts: Any, fields: Sequence[Any], row_bytes: int) -> list[int]:
+    """Return what some columns unpack to in each group of rows, pages and dictionaries as the file states them."""
     names = {field.name for field in fields}
-    groups = (parts.metadata.row_group(i) for i in range(parts.metadata.num_row_groups))
-    chunks = (group.column(i) for group in groups for i in range(group.num_columns))
-    return sum(int(chunk.total_uncompressed_size) for chunk in chunks if chunk.path_in_schema in names)
+    groups = [parts.metadata.row_group(i) for i in range(parts.metadata.num_row_groups)]
+    return [
+        max(group.num_rows * row_bytes, sum(int(c.total_uncompressed_size) for c in _chunks(group, names)))
+        for group in groups
+    ]
+
+
+def _chunks(group: Any, names: Set[str]) -> list[Any]:
+    chunks = (group.column(i) for i in range(group.num_columns))
+    return [chunk for chunk in chunks if chunk.path_in_schema in names]
 
 
 def _stated_rate(metadata: Mapping[bytes, bytes]) -> float | None:
