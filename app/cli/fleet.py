@@ -255,6 +255,7 @@ def report(
     """
     from datetime import UTC
 
+    from gearsig.errors import InputError
     from gearsig.fleet import last_report, mark_reported
     from gearsig.report import check_pdf, write_fleet_page
 
@@ -264,7 +265,10 @@ def report(
     now = datetime.now(UTC).replace(tzinfo=None)
     write_fleet_page(fleet, output, None if everything else since or last_report(fleet), pdf=pdf)
     if since is None and not everything:
-        mark_reported(fleet, now)
+        try:
+            mark_reported(fleet, now)
+        except InputError as error:  # of others' stores, which may be read only
+            _say(f"the next report begins where this one did: {error}")
     typer.echo(f"Open {output} in a browser.")
 
 

@@ -181,15 +181,24 @@ def add_recordings(
                 results.append(AddedRecording(origin, str(row["outcome"]), str(row["verdict"] or row["reason"])))
                 if on_progress is not None:
                     on_progress(len(results), len(missing), results[-1])
-                if len(results) % 64 == 0 and store.n_new() >= COMPACT_FROM:
-                    store.compact()
+                if len(results) % 64 == 0:
+                    _merge_many(store)
     finally:
         for claim in claims.values():
             claim.close()
-    if store.n_new() >= COMPACT_FROM:
-        store.compact()
+    _merge_many(store)
     n_known = len(recordings) - len(missing) + len(unseen)
     return AddResult(tuple(results), n_known, len(elsewhere))
+
+
+def _merge_many(store: Store) -> None:
+    """Merge small files where there are many; no addition fails because the disk has no room for the merged ones."""
+    if store.n_new() < COMPACT_FROM:
+        return
+    try:
+        store.compact()
+    except InputError as error:
+        store.on_message(f"small files are not merged yet: {error}")
 
 
 COMPACT_FROM = 128

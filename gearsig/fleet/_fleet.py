@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearsig.cache import part_beside
 from gearsig.checks import closest_match_hint, count, known_name, one_of
 from gearsig.errors import InputError
 from gearsig.fleet._add import FAILED, AddResult, AnalysisOptions, Progress, add_recordings
 from gearsig.fleet._origin import Origin, PassedOver, origins
 from gearsig.fleet._statistics import ALARM, OK, WARNING
-from gearsig.fleet._store import SERIES, Store
+from gearsig.fleet._store import SERIES, Store, write_query
 from gearsig.fleet._trends import (
     NONE,
     Baseline,
@@ -125,6 +124,7 @@ class Fleet:
 
     def __init__(self, store: Store) -> None:
         self._store = store
+        self._trends: DataFrame | None = None
 
     def __repr__(self) -> str:
         n, machines, points = self._rows(
@@ -380,8 +380,10 @@ class Fleet:
         # Dictionaries of texts that hardly repeat, and filters over them, cost time and save no room; small groups of
         # rows stay in the processor's cache.
         parquet = "parquet, COMPRESSION snappy, DICTIONARY_SIZE_LIMIT 1000, WRITE_BLOOM_FILTER false, "
-        forms = {".csv": "csv, HEADER", ".parquet": f"{parquet} ROW_GROUP_SIZE 61440", ".jsonl": "json"}
+        forms = {".csv": "csv, HEADER", ".parquet": f"{parquet} ROW_GROUP_SIZE 20480", ".jsonl": "json"}
         form = forms[one_of(target.suffix.lower(), f"ending of {target.name}", forms)]
+        if not target.parent.is_dir():
+            raise InputError("there is no such folder", where=str(target.parent), remedy="make it, or choose another")
         self._check_place(machine, point)
         dated = table in ("indicators", "recordings")
         if table == "status":
@@ -392,30 +394,15 @@ class Fleet:
             frame = self.series(machine, point)
             frame = frame[(frame["name"] == name) | (not name)]
         where, values = _where(machine, point, {"name": name if table == "indicators" else ""}, start, end)
-        part = part_beside(target)
 
         def write(connection: DuckDBPyConnection) -> int:
-            if dated:
-                source = f"(SELECT * FROM {table} {where})"
-            else:
-                connection.register("chosen", frame)
-                source, values[:] = "(FROM chosen)", []
-            text = str(part).replace("'", "''")
             connection.execute("SET preserve_insertion_order = false")  # rows know their date; in half the time
-            return int(connection.execute(f"COPY {source} TO '{text}' (FORMAT {form})", values).fetchall()[0][0])
+            if dated:
+                return write_query(connection, f"SELECT * FROM {table} {where}", target, form, values)
+            connection.register("chosen", frame)
+            return write_query(connection, "FROM chosen", target, form)
 
-        try:
-            if not target.parent.is_dir():
-                raise InputError(
-                    "there is no such folder", where=str(target.parent), remedy="make it, or choose another"
-                )
-            n = self._store.read(write)
-            part.replace(target)
-        except OSError as error:
-            raise InputError(f"cannot be written ({error.strerror})", where=str(target)) from None
-        finally:
-            part.unlink(missing_ok=True)
-        return n
+        return self._store.read(write)
 
     def news(self, since: datetime) -> tuple[int, int, tuple[tuple[str, str], ...], tuple[DiagnosisChange, ...]]:
         """Return what came into the store since: how many results, failures, the last of these, other diagnoses."""
@@ -491,22 +478,26 @@ class Fleet:
         new = pd.DataFrame(rows, columns=list(_STATE))
         connection.register("judged_anew", new)
         connection.register("stale", pd.DataFrame([place[:2] for place in stale], columns=["machine", "point"]))
-        part = part_beside(self.folder / TRENDS)
         columns = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
-        text = str(part).replace("'", "''")
+        query = (
+            f"SELECT {columns} FROM trends ANTI JOIN stale USING (machine, point) UNION ALL "
+            f"SELECT {columns} FROM judged_anew"
+        )
         try:
-            connection.execute(
-                f"COPY (SELECT {columns} FROM trends ANTI JOIN stale USING (machine, point) UNION ALL "
-                f"SELECT {columns} FROM judged_anew) TO '{text}' (FORMAT parquet, COMPRESSION zstd)"
-            )
-            part.replace(self.folder / TRENDS)
-        finally:
-            part.unlink(missing_ok=True)
+            write_query(connection, query, self.folder / TRENDS, "parquet, COMPRESSION zstd")
+            self._trends = None
+        except InputError:  # others' stores may be read only, and disks full
+            self._trends = connection.execute(query).df()
 
     def _view_of_trends(self, connection: DuckDBPyConnection) -> None:
-        """Make the view `trends`; a damaged file is as if there were none."""
+        """Make the view `trends`, of the file or of what could not be written; a damaged file is as none."""
         import pyarrow.parquet as pq
 
+        if self._trends is not None:
+            connection.register("unwritten", self._trends)
+            columns = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
+            connection.execute(f"CREATE OR REPLACE TEMP VIEW trends AS SELECT {columns} FROM unwritten")
+            return
         path = self.folder / TRENDS
         try:
             whole = path.exists() and list(pq.read_schema(path).names) == list(_STATE)

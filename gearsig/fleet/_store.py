@@ -22,13 +22,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from math import log
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 from gearsig.cache import remove_parts, write_whole
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
+    from filelock import FileLock
 
 Value = TypeVar("Value")
 
@@ -109,6 +110,7 @@ class Store:
     def __init__(self, folder: Path, on_message: Callable[[str], object], *, create: bool = False) -> None:
         self.folder, self.on_message = folder, on_message
         self._loose_known: frozenset[str] = frozenset()
+        self._doubled: set[str] = set()
         self._segments_known: tuple[str, ...] | None = None
         if not (folder / MANIFEST).exists() and not (folder / SEGMENTS).is_dir() and not create:
             raise InputError(
@@ -219,7 +221,7 @@ class Store:
             recordings = [str(self._segment(name) / "recordings.parquet") for name in segments]
             indicators = [str(self._segment(name) / "indicators.parquet") for name in segments]
             self._drop_doubled(connection, loose, recordings)
-            loose = [path for path in loose if path.exists()]
+            loose = [path for path in loose if path.stem not in self._doubled and path.exists()]
             replaced += self._replaced_by(connection, [*recordings, *map(str, loose)])
             connection.execute("CREATE TEMP TABLE replaced (key VARCHAR)")
             if replaced:
@@ -248,7 +250,10 @@ class Store:
             connection.close()
 
     def _drop_doubled(self, connection: DuckDBPyConnection, loose: Sequence[Path], segments: Sequence[str]) -> None:
-        """Delete small files whose result is in a segment: two processes added it, or a merge was cut short."""
+        """Delete small files whose result is in a segment: two processes added it, or a merge was cut short.
+
+        Where a store may be read only, they stay, and do not count.
+        """
         names = frozenset(path.stem for path in loose)
         state = tuple(segments)
         unseen = names if state != self._segments_known else names - self._loose_known
@@ -257,7 +262,9 @@ class Store:
                 f"SELECT key FROM read_parquet({_list(segments)}) WHERE key IN (SELECT unnest(?))", [sorted(unseen)]
             ).fetchall()
             for (key,) in doubled:
-                (self.folder / NEW / f"{key}.parquet").unlink(missing_ok=True)
+                self._doubled.add(key)
+                with suppress(OSError):
+                    (self.folder / NEW / f"{key}.parquet").unlink(missing_ok=True)
         self._loose_known, self._segments_known = names, state
 
     def _replaced_by(self, connection: DuckDBPyConnection, files: Sequence[str]) -> list[str]:
@@ -324,13 +331,15 @@ class Store:
 
     @contextmanager
     def claim(self, name: str) -> Iterator[bool]:
-        """Hold the right to analyse a file while the process lives; yields False where another one has it."""
-        from filelock import FileLock, Timeout
+        """Hold the right to analyse a file while the process lives; yields False where another one has it.
 
-        lock = FileLock(self.folder / CLAIMS / name)
-        try:
-            lock.acquire(timeout=0)
-        except Timeout:
+        Raises
+        ------
+        InputError
+            If the store cannot be written.
+        """
+        lock = self._locked(Path(CLAIMS) / name)
+        if lock is None:
             yield False
             return
         try:
@@ -339,6 +348,21 @@ class Store:
             with suppress(OSError):
                 Path(lock.lock_file).unlink()
             lock.release()
+
+    def _locked(self, name: Path) -> FileLock | None:
+        """Return a lock that is held; None where another process holds it."""
+        from filelock import FileLock, Timeout
+
+        lock = FileLock(self.folder / name)
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            return None
+        except OSError as error:
+            raise InputError(
+                f"cannot be written ({error.strerror})", where=str(self.folder), remedy="choose another with --store"
+            ) from None
+        return lock
 
     def n_new(self) -> int:
         """Return how many small files there are."""
@@ -349,17 +373,20 @@ class Store:
 
         Nothing is lost whenever it is killed: a segment counts from when the list names it, and a small file is
         deleted after that.
-        """
-        from filelock import FileLock, Timeout
 
-        lock = FileLock(self.folder / LOCK)
-        try:
-            lock.acquire(timeout=0)
-        except Timeout:
+        Raises
+        ------
+        InputError
+            If the store cannot be written.
+        """
+        lock = self._locked(Path(LOCK))
+        if lock is None:
             return False
         try:
             self._remove_stale()
             self.read(lambda connection: self._merge(connection, everything=everything))
+        except OSError as error:
+            raise InputError(f"cannot be written ({error.strerror})", where=str(self.folder)) from None
         finally:
             lock.release()
         return True
@@ -390,11 +417,9 @@ class Store:
             union = " UNION ALL ".join(
                 f"SELECT {columns} FROM read_parquet({_list(paths)}){kept}" for paths in (old, files) if paths
             )
-            options = "(FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE 60000)"
-            connection.execute(
-                f"COPY (SELECT * FROM ({union}){once} ORDER BY machine, point, date) "
-                f"TO {_text(str(part / 'recordings.parquet'))} {options}"
-            )
+            form = "parquet, COMPRESSION zstd, ROW_GROUP_SIZE 60000"
+            query = f"SELECT * FROM ({union}){once} ORDER BY machine, point, date"
+            write_query(connection, query, part / "recordings.parquet", form)
             names = ", ".join(INDICATOR)
             of_loose = (
                 f"SELECT key, machine, point, date, {', '.join(f'i.{n} AS {n}' for n in INDICATOR)} FROM (SELECT key, "
@@ -403,9 +428,8 @@ class Store:
             of_old = f"SELECT key, machine, point, date, {names} FROM read_parquet({_list(of)}){kept}"
             rows = " UNION ALL ".join(sql for sql, exists in ((of_old, of), (of_loose, files)) if exists)
             order = ", ".join(("machine", "point", *SERIES, "date"))
-            connection.execute(
-                f"COPY (SELECT * FROM ({rows}) ORDER BY {order}) TO {_text(str(part / 'indicators.parquet'))} {options}"
-            )
+            query = f"SELECT * FROM ({rows}) ORDER BY {order}"
+            write_query(connection, query, part / "indicators.parquet", form)
             (part / MERGED).write_text(json.dumps(merged), encoding="utf-8")
             part.rename(self._segment(name))
         except BaseException:
@@ -424,6 +448,45 @@ class Store:
                 shutil.rmtree(path, ignore_errors=True)
         for folder in (self.folder, self.folder / NEW):
             remove_parts(folder)
+
+
+def write_query(
+    connection: DuckDBPyConnection, query: str, path: Path, form: str, values: Sequence[object] = ()
+) -> int:
+    """Write the result of a query to a file, whole or not at all; return how many rows it has.
+
+    Parameters
+    ----------
+    connection : DuckDBPyConnection
+    query : str
+    path : Path
+    form : str
+        Format and its options, as COPY takes them.
+    values : sequence
+        Parameters of the query.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    import duckdb
+
+    n = 0
+
+    def write(file: IO[bytes]) -> None:
+        nonlocal n
+        try:
+            sql = f"COPY ({query}) TO {_text(file.name)} (FORMAT {form}, USE_TMP_FILE false)"
+            n = connection.execute(sql, list(values)).fetchall()[0][0]
+        except duckdb.IOException as error:
+            _, is_of_this, reason = str(error).partition(Path(file.name).name)
+            if not is_of_this:  # but of one that is read
+                raise
+            raise OSError(reason.lstrip(':\\" ').split('"')[0]) from None
+
+    write_whole(path, write)
+    return n
 
 
 def _segments_to_merge(sizes: dict[str, int]) -> list[str]:

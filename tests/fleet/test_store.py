@@ -3,6 +3,7 @@
 import json
 import multiprocessing
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -372,3 +373,74 @@ def test_a_query_that_is_interrupted_is_an_interruption(tmp_path):
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+def test_a_store_that_cannot_be_written_is_read_all_the_same(make_recordings, tmp_path):
+    data, store = make_recordings("pump 1", [1.0, 1.1]), tmp_path / "store"
+    open_fleet(store, create=True).add(data, pattern=PATTERN, n_processes=1)
+    expected = open_fleet(store).status(), open_fleet(store).series()
+    (store / "trends.parquet").unlink()
+    (store / "trends.parquet").mkdir()  # no file can take its place
+    fleet = open_fleet(store)
+    for _ in range(2):
+        assert fleet.status().equals(expected[0])
+        assert fleet.series().equals(expected[1])
+    assert fleet.export(tmp_path / "x.csv", "trends") == len(expected[1])
+    assert not list(store.glob(".*.part"))
+    shutil.rmtree(store / "claims")
+    (store / "claims").write_text("")
+    make_recordings("pump 3", [1.0])
+    with pytest.raises(InputError, match="cannot be written"):
+        fleet.add(data, pattern=PATTERN, n_processes=1)
+
+
+def test_small_files_that_cannot_be_merged_fail_no_addition(make_recordings, tmp_path, monkeypatch):
+    messages: list[str] = []
+    store = tmp_path / "store"
+    fleet = open_fleet(store, create=True, on_message=messages.append)
+    monkeypatch.setattr("gearsig.fleet._add.COMPACT_FROM", 1)
+    (store / "segments").rmdir()
+    (store / "segments").write_text("")
+    assert len(fleet.add(make_recordings("pump 1", [1.0]), pattern=PATTERN, n_processes=1).added) == 1
+    assert "not merged yet" in messages[0]
+    assert len(fleet.recordings()) == 1
+
+
+def test_a_doubled_small_file_that_cannot_be_deleted_counts_once(make_recordings, tmp_path, monkeypatch):
+    store = tmp_path / "store"
+    fleet = open_fleet(store, create=True)
+    fleet.add(make_recordings("pump 1", [1.0, 1.1]), pattern=PATTERN, n_processes=1)
+    shutil.copytree(store / "new", tmp_path / "new")
+    fleet.compact()
+    shutil.copytree(tmp_path / "new", store / "new", dirs_exist_ok=True)
+
+    def refuse(path, **_):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    for _ in range(2):
+        assert len(fleet.recordings()) == 2
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder is known in which nobody can write")
+@pytest.mark.parametrize("table", ["recordings", "indicators", "trends", "status"])
+def test_a_table_is_not_exported_where_nothing_can_be_written(make_recordings, tmp_path, table):
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(make_recordings("pump 1", [1.0]), pattern=PATTERN, n_processes=1)
+    with pytest.raises(InputError, match=r"x\.csv: cannot be written"):
+        fleet.export("/proc/self/x.csv", table)
+
+
+def test_a_full_disk_is_said_and_leaves_no_table(make_recordings, tmp_path):
+    resource = pytest.importorskip("resource")
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.add(make_recordings("pump 1", [1.0]), pattern=PATTERN, n_processes=1)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (60, before[1]))  # as if no more room were left
+    try:
+        with pytest.raises(InputError, match=r"x\.parquet: cannot be written \(\w[^\":]*\)"):
+            fleet.export(tmp_path / "x.parquet", "recordings")
+        assert len(fleet.status()) == 1
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.glob("*x.parquet*"))
