@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import date, datetime, time
@@ -31,6 +30,7 @@ from gearsig.fleet._statistics import (
     standardised_innovations,
 )
 from gearsig.fleet._store import SERIES
+from gearsig.rig import read_toml
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -127,12 +127,9 @@ def read_settings(folder: Path) -> TrendSettings:
         If the file is damaged or a value is not allowed.
     """
     path = folder / SETTINGS
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         return TrendSettings()
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"is no settings file ({' '.join(str(error).split())})", where=str(path)) from None
+    data = read_toml(path, remedy="delete it for the usual settings, or mend it")
     known = [name for name in TrendSettings.__dataclass_fields__ if name != "baselines"]
     unknown = sorted(set(data) - {*known, "baseline"})
     if unknown:

@@ -14,6 +14,7 @@ from gearsig.rig._contact import (
 from gearsig.rig._orders import OrderLine, describe_rig, hunting_tooth_order, order_lines
 from gearsig.rig._toml import (
     from_table,
+    parse_toml,
     read_rig,
     read_toml,
     recording_stem,
@@ -78,6 +79,7 @@ __all__ = [
     "hunting_tooth_order",
     "known_ratio",
     "order_lines",
+    "parse_toml",
     "path_of_contact",
     "read_rig",
     "read_toml",

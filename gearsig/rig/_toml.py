@@ -77,19 +77,31 @@ def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
         with path.open("rb") as file:
             data = file.read(MAX_TOML_BYTES + 1)
         text = data.decode("utf-8-sig") if len(data) <= MAX_TOML_BYTES else ""
-        deep = _DEEP_KEY.search(text)
-        tables: dict[str, Any] = {} if deep else tomllib.loads(text)
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
     except UnicodeDecodeError:
         raise InputError("is not text in UTF-8", where=path.name, remedy="save it as UTF-8") from None
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError, numbers of thousands of digits, nesting
-        raise InputError(f"is not valid TOML: {error}", where=path.name, remedy=remedy) from None
     if len(data) > MAX_TOML_BYTES:
         raise InputError("is too long", where=path.name, allowed="up to 1 MB of TOML")
+    return parse_toml(text, path.name, remedy=remedy)
+
+
+def parse_toml(text: str, where: str, *, remedy: str = "") -> dict[str, Any]:
+    """Return the tables of a text in TOML that may come from anybody.
+
+    Raises
+    ------
+    InputError
+        If it is nested too deep, or not valid TOML.
+    """
+    deep = _DEEP_KEY.search(text)
     if deep is not None:
-        raise InputError(f"{deep[0][:40]!r} is too deep", where=path.name, allowed="keys of up to 16 names")
-    return tables
+        raise InputError(f"{deep[0][:40]!r} is too deep", where=where, allowed="keys of up to 16 names")
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError, numbers of thousands of digits, nesting
+        problem = "it is nested too deep" if isinstance(error, RecursionError) else str(error).partition("; use sys")[0]
+        raise InputError(f"is not valid TOML: {problem}", where=where, remedy=remedy) from None
 
 
 def rig_file_beside(recording: str | Path) -> Path | None:

@@ -225,6 +225,21 @@ def test_an_impossible_sampling_rate_is_one_message(rate: float) -> None:
     assert len(page.error) == 1
 
 
+HOSTILE_RIGS = (
+    "a=" + "[" * 5000 + "]" * 5000,
+    "sampling_rate_hz=" + "9" * 5000,
+    "shaft=5",
+    "shaft=[1, 2]",
+    '[shaft]\nname="a"\n',
+    "speed=3",
+    '[speed]\nsource="constant"\nspeed_rpm="fast"\n',
+    "name=[1]",
+    '[[pair]]\nname="a"\ndriver="b"\ndriven=[]\n',
+    '[[pair]]\nname="a"\ndriver="b"\ndriven="c"\ndriver_teeth="x"\ndriven_teeth=1' + "0" * 400,
+    "".join(f'[[shaft]]\nname="{i}"\n' for i in range(2000)),
+)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "rig"),
     [
@@ -235,6 +250,7 @@ def test_an_impossible_sampling_rate_is_one_message(rate: float) -> None:
         ("short.csv", b"a1\n1\n2\n", ""),
         ("good.csv", b"a1\n1\n2\n", "[[shaft]\n"),
         ("good.csv", b"a1\n1\n2\n", "[[pear]]\n"),
+        *(("good.csv", b"a1\n1\n2\n", rig) for rig in HOSTILE_RIGS),
     ],
 )
 def test_broken_files_show_one_message(name: str, content: bytes, rig: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,7 @@ from app.dashboard.widgets.charts import download
 from app.dashboard.widgets.messages import FORM_LABELS, FORM_TABLES, show_error
 from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import unit_text
-from gearsig.rig import QUANTITIES, Rig, bearing_catalogue, order_lines, rig_from_dict
+from gearsig.rig import QUANTITIES, Rig, bearing_catalogue, order_lines, parse_toml, rig_from_dict
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -38,6 +37,7 @@ SPEED_SOURCES: dict[str, tuple[str, ...]] = {
     "speed channel": ("channel", "rpm_per_unit"),
 }
 FIRST: Table = {"pulses_per_revolution": 1, "units_per_revolution": 360.0, "rpm_per_unit": 1.0, "speed_rpm": 1500.0}
+LARGEST, MOST_ROWS = 2.0**53, 1000
 _CHANGED = "machine changed"
 
 
@@ -58,8 +58,8 @@ def text_as_stated(file: ChosenFile) -> str:
     if rate_hz is None and speed_rpm is None:
         return machine_text(file)
     try:
-        table: Table = tomllib.loads(machine_text(file))
-    except tomllib.TOMLDecodeError:
+        table: Table = parse_toml(machine_text(file), file.rig_name)
+    except GearsigError:
         return machine_text(file)
     if rate_hz is not None:
         table["sampling_rate_hz"] = rate_hz
@@ -83,9 +83,13 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
         st.rerun()
     text = machine_text(file)
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
+        table = parse_toml(text, file.rig_name)
+    except GearsigError:
         st.info("The rig file is no TOML yet: mend it as text.", icon=":material/edit:")
+        _show_text(file, text, is_open=True)
+        return
+    if not _fits_form(table):
+        st.info("The form cannot show this rig file: mend it as text.", icon=":material/edit:")
         _show_text(file, text, is_open=True)
         return
     is_unknown = not table.get("shaft")
@@ -155,6 +159,24 @@ def describe(file: ChosenFile, text: str) -> None:
 def _take(file: ChosenFile, text: str) -> None:
     describe(file, text)
     st.session_state[_CHANGED] = True
+
+
+def _fits_form(table: Table) -> bool:
+    """Whether what the form shows are tables of texts and numbers as its fields take them; a file may hold anything."""
+    groups = {kind: table.get(kind, []) for kind in COLUMNS} | {"speed": [table.get("speed", {})]}
+    numbers = {*FIRST, *(name for kind in COLUMNS for name in _numbers(kind))}
+    shown = {name for names in (*COLUMNS.values(), *SPEED_SOURCES.values()) for name in names} | {"source"}
+
+    def fits(name: str, value: object) -> bool:
+        is_number = isinstance(value, int | float) and abs(value) <= LARGEST
+        return name not in shown or (is_number if name in numbers else isinstance(value, str))
+
+    return isinstance(table.get("name", ""), str) and all(
+        isinstance(rows, list)
+        and len(rows) <= MOST_ROWS
+        and all(isinstance(row, dict) and all(fits(*item) for item in row.items()) for row in rows)
+        for rows in groups.values()
+    )
 
 
 def _form(file: ChosenFile, table: Table, text: str, channels: Sequence[str], first: DeltaGenerator) -> Table:
