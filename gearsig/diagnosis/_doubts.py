@@ -9,7 +9,6 @@ from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._lines import MESH_ELSEWHERE
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Strength, Where
-from gearsig.recording import MAINS_HZ
 from gearsig.rig import Rig
 
 OFF_NOMINAL, NEAR_ZERO = "speed-off-nominal", "speed-near-zero"
@@ -70,14 +69,24 @@ def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
 
 
 def without_synchronous_hum(findings: Iterable[Finding], angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
-    """Leave out that hum rules a channel where a shaft turns at the supply's own frequency: it may be the shaft."""
+    """Call hum a notice where one to four times a shaft's speed is the same frequency: it may be the shaft."""
     turns_hz = []
     if isinstance(angle, ShaftAngle):
-        ratios = [rig.ratio(name) for name in rig.shaft_names] or [1.0]
-        turns_hz = [angle.mean_speed_rpm / 60 * ratio for ratio in ratios if ratio is not None]
-    multiples = [h * hz / mains for hz in turns_hz for h in (1, 2, 3, 4) for mains in MAINS_HZ]
-    synchronous = any(round(m) >= 1 and abs(m / round(m) - 1) < 1e-3 for m in multiples)
-    return [f for f in findings if not (synchronous and f.code == "channel-hum")]
+        ratios = {name: rig.ratio(name) for name in rig.shaft_names} or {angle.shaft: 1.0}
+        turns_hz = [(name, angle.mean_speed_rpm / 60 * ratio) for name, ratio in ratios.items() if ratio is not None]
+    return [_perhaps_the_shafts(f, turns_hz) if f.code == "channel-hum" else f for f in findings]
+
+
+def _perhaps_the_shafts(hum: Finding, turns_hz: Sequence[tuple[str, float]]) -> Finding:
+    line_hz = hum.where.frequency_hz or 0.0
+    for name, turn_hz in turns_hz:
+        for multiple in (1, 2, 3, 4):
+            # The line is within a thousandth of the supply's multiple, and the speed is known as well at best.
+            if abs(multiple * turn_hz / line_hz - 1) < 2e-3:
+                of = f"{multiple} × {name or 'the shaft'}"
+                title = f"One line, {line_hz:.5g} Hz, rules channel {hum.where.channels[0]}: {of}, or mains hum."
+                return replace(hum, code="line-of-mains-or-shaft", kind=Kind.NOTICE, title=title)
+    return hum
 
 
 def lowered(findings: Iterable[Finding], channels: Sequence[str]) -> list[Finding]:

@@ -121,7 +121,7 @@ def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset
             f"channel-{p.kind}",
             Kind.DATA_PROBLEM,
             _TITLES.get(p.kind, "Channel {} is {}.").format(p.channel, p.kind),
-            Where((p.channel,)),
+            Where((p.channel,), frequency_hz=p.frequency_hz),
             confidence=0.95,
             confidence_basis="direct inspection of the samples",
             evidence=(p.evidence,),

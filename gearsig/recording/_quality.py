@@ -171,6 +171,8 @@ class ChannelProblem:
     evidence : str
         What was seen, with numbers.
     remedy : str
+    frequency_hz : float or None
+        Of hum: the line.
     """
 
     channel: str
@@ -178,6 +180,7 @@ class ChannelProblem:
     share: float
     evidence: str
     remedy: str
+    frequency_hz: float | None = None
 
 
 def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
@@ -366,7 +369,11 @@ def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     # Values that wrap around fill the range up to both ends; those of a natural signal thin out towards them.
     place = (x - low) / span
     outer, next_to = (np.count_nonzero(np.abs(place - 0.5) > 0.5 - edge) for edge in (0.01, 0.05))
-    if np.mean(goes_on) < 0.6 or not 0.02 < np.median(neighbour_steps) < 0.6 or outer < max(20, 0.08 * next_to):
+    if not 0.08 * next_to <= outer <= 0.5 * next_to or outer < 20:  # more of them at the ends were cut
+        return None
+    # Uniform noise fills it evenly, and goes from end to end as well.
+    is_even = np.median(neighbour_steps) > 0.6 and np.count_nonzero(np.abs(place - 0.5) < 0.05) < 3 * next_to
+    if np.mean(goes_on) < 0.6 or np.median(neighbour_steps) < 0.02 or is_even:
         return None
     evidence = f"{n} steps from one end of the range, {low:.4g} to {high:.4g}, to the other, and the slope goes on"
     remedy = "export again in a wider number format; nothing can be read from this channel"
@@ -448,5 +455,5 @@ def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | No
         if 1 <= multiple <= 6 and deviation < MAINS_WANDER and share > 0.5 and step_hz < 2.0:
             evidence = f"{percent(share)} of the power stands at {line_hz:.5g} Hz, a multiple of {mains_hz:.0f} Hz"
             remedy = "check shield and earthing, if no shaft or mesh turns there; what is weaker drowns in it"
-            return ChannelProblem(channel.name, "hum", share, evidence, remedy)
+            return ChannelProblem(channel.name, "hum", share, evidence, remedy, line_hz)
     return None

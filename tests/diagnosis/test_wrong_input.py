@@ -1,5 +1,6 @@
 """A sample machine with a damaged tooth whose recording was spoiled on its way: noticed, said, and never as sure."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ from app.samples import sample_folder
 from gearsig import analyze
 from gearsig.diagnosis import Kind
 from gearsig.recording import Recording, find_problems, read_recording
-from gearsig.rig import ConstantSpeed, read_rig
+from gearsig.rig import ConstantSpeed, Rig, Shaft, read_rig
+from tests.measured import DATA, MOTOR, needs_data
 
 FOLDER = Path(sample_folder())
 RIG = read_rig(FOLDER / "damaged_tooth.toml")
@@ -102,8 +104,49 @@ def test_noise_tones_and_pulse_trains_have_no_such_problem():
         rng.standard_normal(n),
         np.sin(2 * np.pi * 6300 * time_s) + 0.01 * rng.standard_normal(n),
         np.sign(np.sin(2 * np.pi * 110 * time_s)) + 0.01 * rng.standard_normal(n),
+        rng.uniform(-1, 1, n),
+        np.clip(rng.standard_normal(n), -2, 2) + 1e-3 * rng.standard_normal(n),
         rng.standard_normal(n) * (1 + time_s),
         rng.standard_normal(n) * np.exp(-0.5 * np.sin(2 * np.pi * 3 * time_s)),
     ):
         kinds = {p.kind for p in find_problems(Recording(x[None], 12800.0, (channel,)))}
         assert not kinds & {"wrapped", "stepped", "reversed", "hum"}
+
+
+@pytest.mark.parametrize("share", [0.01, 0.03, 0.1])
+def test_noise_of_a_wide_band_that_wraps_is_told_from_noise(share):
+    x = np.random.default_rng(0).standard_normal(1 << 15)
+    counts = np.round(x / np.quantile(np.abs(x), 1 - share) * 32768).astype(np.int64)
+    recording = Recording(((counts + 32768) % 65536 - 32768.0)[None], 12800.0, (TRUE.channels[0],))
+    assert {p.kind for p in find_problems(recording)} == {"wrapped"}
+
+
+@pytest.mark.parametrize(("speed_rpm", "is_hum"), [(1500.0, False), (2001.0, True)])
+def test_a_shaft_excuses_hum_at_its_own_frequency_only(speed_rpm, is_hum):
+    rig = Rig(shafts=(Shaft("motor"),), speed=ConstantSpeed(speed_rpm, "motor"))  # 3 × 2001 rpm are 100.05 Hz
+    time_s = np.arange(1 << 16) / 12800
+    x = np.random.default_rng(0).standard_normal(1 << 16) + 20 * np.sin(2 * np.pi * 50 * time_s)
+    codes = {f.code for f in analyze(Recording(x[None], 12800.0, (TRUE.channels[0],), rig=rig)).findings}
+    assert ("channel-hum" in codes) == is_hum
+    assert ("line-of-mains-or-shaft" in codes) == (not is_hum)
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("spoil", "code"),
+    [
+        (lambda x, _: np.clip(x, *(np.quantile(np.abs(x), 0.7) * np.array([-1, 1]))), "channel-clipped"),
+        (lambda x, _: (np.round(x / np.quantile(np.abs(x), 0.97) * 32768) + 32768) % 65536 - 32768, "channel-wrapped"),
+        (lambda x, _: np.where(np.arange(len(x)) < len(x) // 2, 1, 3) * x, "channel-stepped"),
+        (lambda x, t: x + 20 * np.sqrt(2) * x.std() * np.sin(2 * np.pi * 50 * t), "channel-hum"),
+    ],
+    ids=["clipped", "wrapped", "gain step", "hum"],
+)
+def test_a_measured_recording_that_is_spoiled(spoil, code):
+    rig = replace(MOTOR, speed=ConstantSpeed(1797.0, "motor"))
+    true = read_recording(DATA / "bearing_cwru" / "OR007@6_0.mat", rig=rig, sampling_rate_hz=12e3)
+    x = true.values("X130_DE_time").astype(float)
+    sent = spoil(x, np.arange(len(x)) / 12e3).astype(np.float32)
+    found = analyze(Recording(sent[None], 12e3, true.channels[:1], speed=true.speed, rig=rig))
+    assert code in {f.code for f in found.findings}
+    assert not [f for f in found.findings if f.kind is Kind.FAULT]
