@@ -64,7 +64,7 @@ LONGEST_RUN_S, MAX_REVOLUTIONS = 5.0, 24.0
 """Of a simulation: longer ones say no more; but so many revolutions of the slower shaft at least."""
 LEAD = 2.0
 """Revolutions that a record loses before its first and after its last pulse."""
-TRIAL_S, TRIAL_REVOLUTIONS = 1.0, 12.0
+TRIAL_S, TRIAL_REVOLUTIONS = 1.0, 10.0
 """The same of a run that tries an effect: it differs from the healthy run by that effect only, not by noise."""
 
 

@@ -700,11 +700,12 @@ def observed_changes(conditions: Sequence[Condition]) -> list[ObservedChange]:
 def _run(twin: Twin, condition: Condition) -> TwinRun:
     """Return where an effect is simulated: without noise, if the twin can, in which what it adds would drown.
 
-    The machine's own baseline is put under it, see `_distances`.
+    It starts as the healthy run does, so that all that differs is the effect. The machine's own baseline is put under
+    it, see `_distances`.
     """
     still = twin.quiet() if isinstance(twin, CanBeQuiet) else twin
     return TwinRun(
-        still, condition.facts.point, float(f"{condition.trial_s:.3g}"), condition.facts.sampling_rate_hz, noise=1
+        still, condition.facts.point, float(f"{condition.trial_s:.3g}"), condition.facts.sampling_rate_hz, noise=0
     )
 
 
@@ -738,9 +739,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
         compared, baseline = names, condition.learned.credibility * base[0] + usual
     real = dict(zip(base_names, baseline.tolist(), strict=True))
     repeated = dict(zip(floor.names, usual.tolist(), strict=True))
-    again = np.zeros(len(bank.change_names))  # a mere second run changes something, too
-    again[: len(names)] = bank.healthy_changes.mean(axis=0)[: len(names)]
-    mean_changes = [(bank.changes[bank.added.index(a)].mean(axis=0) - again)[: len(compared)] for a in kept]
+    mean_changes = [bank.changes[bank.added.index(a)].mean(axis=0)[: len(compared)] for a in kept]
     rows = [
         [transplanted(compared, change, simulated, real, repeated, *way) for change in mean_changes] for way in WAYS_DB
     ]

@@ -1,16 +1,31 @@
 """Bank of the gap diagnosis: what is in it; it is kept whole or not at all; damaged and foreign files do no harm."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap import Added, Bank, OperatingCondition, TwinRun, banks_of, change_once, once, reduce_recording, rounded
+from gearsig.gap import (
+    Added,
+    Bank,
+    OperatingCondition,
+    TwinRun,
+    banks_of,
+    change_once,
+    conditions_of,
+    once,
+    reduce_recording,
+    rounded,
+    try_effects,
+)
+from gearsig.prepared import PreparedRecording
 from gearsig.recording import Channel, Recording
 from gearsig.rig import GearPair, Rig, Shaft, TachometerChannel
+from sims.registry import gap_simulator
 
 FS, DURATION_S, TEETH = 4096.0, 2.0, (20, 31)
 POINT = OperatingCondition(1800.0, 40.0)
@@ -196,3 +211,30 @@ def test_a_folder_that_cannot_be_made_is_named_before_the_work(tmp_path: Path) -
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(InputError, match="--cache"):
         bank(tmp_path / "file" / "folder", on_progress=_never)
+
+
+def test_a_trial_differs_from_the_healthy_run_by_its_effect_only() -> None:
+    """Another start or noise would be taken for what the effect changes."""
+    runs: list[tuple[tuple[Added, ...], int, int, float]] = []
+
+    class Noted(Sines):  # local: it cannot be sent to another process
+        point = POINT
+
+        def run(self, point: OperatingCondition, added: Sequence[Added] = (), **how: Any) -> Recording:
+            runs.append((tuple(added), how["seed"], how.get("noise", 0), how["duration_s"]))
+            return super().run(point, added, **how)
+
+    today, healthy = (
+        PreparedRecording(
+            Sines().run(POINT, added, seed=5, duration_s=4.0, sampling_rate_hz=FS, noise=noise).with_name(name)
+        )
+        for added, noise, name in (((STRONG,), 1, "today"), ((), 2, "healthy"))
+    )
+    twin = Noted()
+    conditions, _ = conditions_of([today], [healthy], twin)
+    louder = replace(gap_simulator("cracked").gap_effects()["unbalance"], name="louder")
+    assert "louder" in try_effects([louder], twin, conditions, None, lambda _what, _done: None)
+    with_effect = [run for run in runs if run[0]]
+    assert [added for added, *_ in with_effect] == [(WEAK,), (STRONG,), (IMPOSSIBLE,)]
+    compared_with = [run[1:] for run in runs if not run[0] and run[2] == 0]
+    assert all(run[1:] in compared_with for run in with_effect)
