@@ -58,7 +58,7 @@ from gearsig.rig import SIDES
 # --------------------
 
 
-_ARRAYS = ("healthy", "healthy_changes", "changes", "sidebands")
+_ARRAYS = ("healthy", "changes", "sidebands")
 SIDEBAND_AXES = 5
 MAX_BYTES = 100_000_000
 """Of a bank's arrays; a real one has less than one."""
@@ -94,16 +94,16 @@ def _checked(about: dict[str, Any], arrays: dict[str, Any]) -> Bank | None:
 
     names, changes = tuple(about["feature_names"]), tuple(about["change_names"])
     added = tuple(_added(row) for row in about["added"])
-    healthy, again, changed, sidebands = (arrays[name] for name in _ARRAYS)
+    healthy, changed, sidebands = (arrays[name] for name in _ARRAYS)
     n, m = len(names), len(changes)
-    shapes = healthy.ndim == again.ndim == 2 and changed.ndim == 3 and sidebands.ndim == SIDEBAND_AXES
+    shapes = healthy.ndim == 2 and changed.ndim == 3 and sidebands.ndim == SIDEBAND_AXES
     if not shapes or len(sidebands) != len(added):
         return None
     if sidebands.shape[2:] != (len(SIDES), N_HARMONICS, len(OFFSETS)) or sidebands.dtype != np.complex128:
         return None
-    if not shapes or healthy.shape[1] != n or again.shape != (len(healthy), m) or changed.shape[::2] != (len(added), m):
+    if healthy.shape[1] != n or changed.shape[::2] != (len(added), m):
         return None
-    if any(a.dtype != np.float64 for a in (healthy, again, changed)):
+    if any(a.dtype != np.float64 for a in (healthy, changed)):
         return None
     left_out = tuple((_added(row), str(why)) for row, why in about["left_out"])
     return Bank(
@@ -111,7 +111,6 @@ def _checked(about: dict[str, Any], arrays: dict[str, Any]) -> Bank | None:
         names,
         changes,
         healthy,
-        again,
         added,
         changed,
         sidebands,
@@ -239,8 +238,7 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
         if key not in known:
             known[key] = _reduced_run(run, task.seed, None, 0)
         healthy = known[key]
-        # A healthy specimen is measured again with other noise: against itself everything would be zero.
-        now = _reduced_run(run, task.seed, task.added, run.noise if task.added is not None else max(run.noise, 1))
+        now = healthy if task.added is None else _reduced_run(run, task.seed, task.added, run.noise)
         alone = {}
         if task.further:
             alone = {
@@ -317,8 +315,6 @@ class Bank:
         Of the changes, the features' names first; see `gearsig.gap`.
     healthy : array, (n_seeds, n_features)
         One row per specimen.
-    healthy_changes : array, (n_seeds, n_changes)
-        Another run of the healthy specimen against its first: what a change is when nothing has changed.
     added : tuple of Added
         The candidates that could be simulated.
     changes : array, (n_added, n_change_seeds, n_changes)
@@ -333,7 +329,6 @@ class Bank:
     feature_names: tuple[str, ...]
     change_names: tuple[str, ...]
     healthy: FloatArray
-    healthy_changes: FloatArray
     added: tuple[Added, ...]
     changes: FloatArray
     sidebands: ComplexArray
@@ -478,7 +473,6 @@ def _assembled(
         first.names,
         first.change_names,
         np.stack([row.values for row in healthy]),
-        np.stack([row.change for row in healthy]),
         tuple(kept),
         np.array(changes).reshape(len(kept), n_seeds, len(first.change_names)),
         np.array(sidebands, dtype=np.complex128).reshape(len(kept), *first.sidebands.shape),
