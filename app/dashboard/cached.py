@@ -17,6 +17,7 @@ import streamlit as st
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
 from app.dashboard.theme import one_line
 from app.dashboard.work import kept
+from gearsig.errors import options_named
 
 if TYPE_CHECKING:
     from gearsig.diagnosis import Analysis
@@ -144,15 +145,23 @@ def _size(content: Content) -> int:
 
 def read_and_analyze(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
     """Read rig, recording and reference, and analyse; of recordings longer than memory their most telling parts."""
-    from gearsig.diagnosis import LongAnalysis, analyze_file, read_usual_part, rig_and_rate_of_reference
+    from gearsig.diagnosis import (
+        REFERENCE_OPTIONS,
+        LongAnalysis,
+        analyze_file,
+        read_usual_part,
+        rig_and_rate_of_reference,
+    )
 
     rig = read_rig_text(request.rig_text, request.rig_name)
     given: dict[str, Any] = {"sampling_rate_hz": request.sampling_rate_hz, "speed": _constant(request.speed_rpm)}
     then = None
     if reference is not None:
-        with _as_file(reference, request.reference_name) as path:
+        with _as_file(reference, request.reference_name) as path, options_named(REFERENCE_OPTIONS):
             # A sample's machine may have been mended in the form.
-            its_rig, rate_hz = rig_and_rate_of_reference(path, rig, request.sampling_rate_hz, is_same_machine=True)
+            its_rig, rate_hz = rig_and_rate_of_reference(
+                path, rig, request.sampling_rate_hz, request.reference_rate_hz, is_same_machine=True
+            )
             read = read_usual_part(path, its_rig, **{**given, "sampling_rate_hz": rate_hz})
             then = _named(read, request.reference_name)
     with _as_file(content, request.name) as path:
@@ -217,6 +226,8 @@ def command_of(request: AnalysisRequest) -> str:
     """Return the command that gives the same diagnosis outside the dashboard."""
     words = ["gearsig", "analyze", request.name, *stated_options(request)]
     words += ["--reference", request.reference_name] if request.reference_name else []
+    rate_hz = request.reference_rate_hz
+    words += ["--reference-fs", f"{rate_hz:.15g}"] if rate_hz is not None else []
     words += ["--torque", f"{request.torque_nm:.15g}Nm"] if request.torque_nm is not None else []
     return shlex.join(words)
 

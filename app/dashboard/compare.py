@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from dataclasses import dataclass
 
@@ -12,7 +13,7 @@ from app.dashboard import address, state
 from app.dashboard.cached import recorded, stated_options
 from app.dashboard.laboratory.setup import MODEL, Setup, shown_name
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
-from app.dashboard.theme import as_typed
+from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import (
     download,
     looked_at,
@@ -307,7 +308,10 @@ NAMES = ("recorded", "simulated")
 
 def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
     """Show what was set alike, verdict, findings, then one channel in figures that zoom together, and in numbers."""
-    st.markdown(f"#### {as_typed(comparison.verdict)}")
+    headline, *more = re.split(r"(?<=[;.]) ", comparison.verdict, maxsplit=1)
+    st.markdown(f"#### {as_typed(headline.rstrip(';.'))}.")
+    if more:
+        st.markdown(as_typed(capitalised(more[0])))
     with st.container(gap=None):
         show_alike(comparison, rig)
     if comparison.findings:

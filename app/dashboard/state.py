@@ -40,6 +40,8 @@ class AnalysisRequest:
         Of the recording that is compared with; empty for none.
     torque_nm : float or None
         What the user states where the rig does not.
+    reference_rate_hz : float or None
+        Sampling rate that the user states of the reference, where it is another one than the recording's.
     """
 
     name: str
@@ -51,6 +53,7 @@ class AnalysisRequest:
     reference_name: str = ""
     reference_sha256: str = ""
     torque_nm: float | None = None
+    reference_rate_hz: float | None = None
 
 
 @dataclass(frozen=True)

@@ -97,8 +97,9 @@ def speed_sweep_figure(
     for (name, mesh_hz, up, down), colour in zip(sweeps, series.series_colours(len(sweeps)), strict=True):
         x = series.checked_axis(mesh_hz, f"mesh_hz of {name}")
         rows = [series.checked_values(v, len(x), f"rms of {name}") * 1e6 for v in (up, down)]
-        lines.append(axes.plot(x, rows[0], color=colour, linewidth=1.5, label=name)[0])
-        axes.plot(x, rows[1], color=colour, linewidth=1.3, linestyle=(0, (4, 2)))
+        lines += axes.plot(x, rows[0], color=colour, linewidth=1.5, label=name if len(sweeps) > 1 else "sweep up")
+        falling = axes.plot(x, rows[1], color=colour, linewidth=1.3, linestyle=(0, (4, 2)), label="sweep down")
+        lines += falling if len(sweeps) == 1 else []
     axes.set_xlim(min(float(s[1][0]) for s in sweeps), max(float(s[1][-1]) for s in sweeps))
     axes.set_ylim(bottom=0.0)
     natural = {} if natural_hz is None else {"ωₙ": natural_hz, "ωₙ/2": natural_hz / 2, "ωₙ/3": natural_hz / 3}
@@ -106,7 +107,7 @@ def speed_sweep_figure(
         axes.axvline(hertz, color=style.FLOOR, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1)
         series.write(axes, hertz, 1.01, word)
     style.label_axes(axes, "mesh frequency (Hz)", "rms of the DTE (µm)")
-    series.head(figure, title, lines, "full: up, dashed: down")
+    series.head(figure, title, lines, "full: up, dashed: down" if len(sweeps) > 1 else "")
     return figure
 
 

@@ -358,6 +358,20 @@ def test_an_uploaded_reference_that_does_not_fit_is_one_message() -> None:
     assert "the reference has no channel" in shown_text(page)
 
 
+def test_the_sampling_rate_of_an_uploaded_reference_is_asked_for() -> None:
+    page = opened()
+    next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("Own file").run()
+    assert all(w.label != "Its sampling rate (Hz)" for w in page.sidebar.number_input)
+    rows = "\n".join(f"{i * 37 % 101};{i * 41 % 101}" for i in range(3000))
+    page.sidebar.file_uploader[0].upload("bare.csv", f"b;c\n{rows}".encode())
+    page.run()
+    assert "its sampling rate on the left" in page.error[0].value
+    assert "--" not in page.error[0].value
+    labelled(page, "number_input", "Its sampling rate (Hz)").set_value(12800.0).run()
+    assert "the reference has no channel" in page.error[0].value
+    assert not page.exception
+
+
 def test_a_zoomed_ring_of_teeth_is_kept_in_the_address_and_reads_off_its_values() -> None:
     page = opened(tab="Average")
     (ring,) = pictures(page)

@@ -2,6 +2,7 @@
 
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -97,6 +98,8 @@ def test_the_command_survives_a_shell() -> None:
     assert words[5:] == ["--fs", "25600", "--speed-rpm", "1500"]
     compared = AnalysisRequest("a.h5", "", reference_name="healthy; 1.h5", reference_sha256="1", torque_nm=40.0)
     assert shlex.split(command_of(compared))[3:] == ["--reference", "healthy; 1.h5", "--torque", "40Nm"]
+    at_another = replace(compared, reference_rate_hz=12800.0, torque_nm=None)
+    assert shlex.split(command_of(at_another))[5:] == ["--reference-fs", "12800"]
 
 
 def test_dark_pictures_turn_paper_and_ink_over_and_keep_the_hue() -> None:

@@ -85,6 +85,7 @@ def test_uploads_become_files_with_their_own_rigs(tmp_path) -> None:
         (upload("b.h5", HEALTHY.read_bytes()),),
         (upload("gearbox.toml", text=RIG), upload("b.toml", text=own)),
         torque_nm=None,
+        reference_rate_hz=51200.0,
     )
     asked = files_of(choice, tmp_path)
     assert all(tmp_path in path.parents for path in (*asked.recordings, *asked.references))
@@ -92,6 +93,8 @@ def test_uploads_become_files_with_their_own_rigs(tmp_path) -> None:
     inputs = read_gap_inputs(asked)
     torques = [r.rig.operating_point.torque_nm for r in (*inputs.recordings, *inputs.references)]
     assert torques == [110.0, 55.0, 55.0]
+    assert asked.reference_rate_hz == 51200.0
+    assert "--reference-fs 51200" in choice.command
     assert "--rig gearbox.toml" in choice.command
     assert "'../a run.h5'" in choice.command
 

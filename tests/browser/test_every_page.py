@@ -40,6 +40,18 @@ def test_a_page_fits_a_narrow_window_in_light_and_dark(page: playwright.Page, ad
         assert (lightness > 0.8) == (scheme == "light")
 
 
+@pytest.mark.parametrize("sample", ["damaged_tooth", "outer_race", "run_up"])
+def test_verdict_picture_and_the_strip_of_views_are_on_a_narrow_first_screen(
+    page: playwright.Page, address: str, sample: str
+) -> None:
+    page.set_viewport_size({"width": 800, "height": 900})
+    opened(page, f"{address}analysis?sample={sample}")
+    places = [".st-key-verdict h3", ".st-key-verdict :is(.picture, .figure)", ".strip button"]
+    boxes = [page.locator(place).first.bounding_box() for place in places]
+    assert [box["y"] for box in boxes] == sorted(box["y"] for box in boxes)
+    assert boxes[-1]["y"] + boxes[-1]["height"] <= 900
+
+
 @pytest.mark.parametrize("path", ["compare", "gap"])
 def test_a_broken_file_is_one_message_on_the_other_pages(page: playwright.Page, address: str, path: str) -> None:
     opened(page, address + path)

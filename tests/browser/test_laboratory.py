@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser.conftest import CHROMIUM, settle
+from tests.browser.conftest import CHROMIUM, settle, soon
 
 pytestmark = [
     pytest.mark.browser,
@@ -50,6 +50,19 @@ def test_from_the_slider_to_the_analysis_and_back(laboratory: playwright.Page) -
     laboratory.get_by_role("link", name="Fault laboratory").click()
     laboratory.get_by_role("tab", name="Phase portrait").first.wait_for()
     laboratory.get_by_role("heading", name="Crack in a tooth root, 2 mm", exact=True).first.wait_for()
+
+
+def test_results_fade_as_soon_as_a_slider_stands_elsewhere(laboratory: playwright.Page) -> None:
+    """The server need not hear of it: here it never does."""
+    slider = laboratory.get_by_role("slider", name="Crack in a tooth root")
+    number = laboratory.locator(
+        ".st-key-results [data-testid=stElementContainer]:has([data-testid=stMetricValue])"
+    ).first
+    opacity = "element => Number(getComputedStyle(element).opacity)"
+    assert number.evaluate(opacity) == 1.0
+    for depth, is_faded in (("0.02", True), ("0", False)):
+        slider.evaluate("(slider, depth) => slider.setAttribute('aria-valuetext', depth)", depth)
+        assert soon(laboratory, lambda is_faded=is_faded: (number.evaluate(opacity) < 0.5) == is_faded)
 
 
 def test_the_finite_element_pair_follows_its_slider_to_the_end(laboratory: playwright.Page) -> None:

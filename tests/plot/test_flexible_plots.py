@@ -7,7 +7,7 @@ import pytest
 from matplotlib.text import Text
 
 from gearsig.errors import InputError
-from gearsig.plot import frequency_curves_figure, mesh_maps_figure, speed_spectra_figure, speed_sweep_figure
+from gearsig.plot import frequency_curves_figure, mesh_maps_figure, panels_of, speed_spectra_figure, speed_sweep_figure
 
 CYCLES = np.linspace(0.0, 2.0, 81)
 TORQUE = np.linspace(10.0, 500.0, 20)
@@ -45,6 +45,12 @@ def test_sweeps_show_both_ways_and_mark_the_mode():
     assert {"ωₙ", "ωₙ/2", "ωₙ/3", "jump up", "rms of the DTE (µm)"} <= set(texts(figure))
     with pytest.raises(InputError):
         speed_sweep_figure([])
+
+
+def test_sweeps_of_one_case_are_named_where_they_are_zoomed():
+    up, down = np.linspace(1e-6, 2e-6, 60), np.linspace(2e-6, 3e-6, 60)
+    (((panel,),),) = panels_of(speed_sweep_figure([("170 N·m", HZ, up, down)]))
+    assert [(line.name, line.dotted) for line in panel.lines] == [("sweep up", False), ("sweep down", True)]
 
 
 def test_spectra_share_one_scale():

@@ -395,7 +395,7 @@ class Figure {
     const level = map.low + (this.levels[row * map.columns + column] / 255) * (map.high - map.low);
     const y = this.ofShare(share);
     const also = map.also ? `, ${figure(map.also[row])} ${map.also_unit}` : "";
-    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}: ${level.toFixed(1)} ${map.unit}`;
+    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}: ${level.toFixed(1).replace("-", "−")} ${map.unit}`;
   }
 
   showTip(lines, event) {
@@ -489,7 +489,7 @@ class Figure {
       for (let i = 0; i < this.levels.length; i++) {
         const x = low + ((i % map.columns) + 0.5) / map.columns * (high - low);
         const y = this.ofShare((Math.floor(i / map.columns) + 0.5) / map.rows);
-        rows.push([figure(x), figure(y), (map.low + this.levels[i] / 255 * (map.high - map.low)).toFixed(2)]);
+        rows.push([exact(x), exact(y), (map.low + this.levels[i] / 255 * (map.high - map.low)).toFixed(2)]);
       }
       return rows.map((row) => row.join(",")).join("\n");
     }
@@ -508,7 +508,9 @@ const html = (name, kind = "") => Object.assign(document.createElement(name), { 
 const range = (low, high) => Array.from({ length: high - low + 1 }, (_, i) => low + i);
 // Of one range, or of a plane's two.
 const same = (a, b) => a.length === b.length && a.every((value, i) => Math.abs(value - b[i]) <= 1e-9 * Math.abs(a[i | 1] - a[i & ~1]) + 1e-15);
-const figure = (value) => String(Number(value.toPrecision(6)));
+// A number as files have it, and as it is read: with the sign of minus that axes have.
+const exact = (value) => String(Number(value.toPrecision(6)));
+const figure = (value) => exact(value).replaceAll("-", "−");
 // A number beside a logarithmic axis; as a power of ten where some of them are far from one, then all of them.
 function short(value, powers) {
   const exponent = Math.round(Math.log10(value));

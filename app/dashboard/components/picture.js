@@ -136,7 +136,7 @@ class Picture {
     const turn = Math.atan2(x - (left + right) / 2, (top + bottom) / 2 - y) / (2 * Math.PI), share = turn < 0 ? turn + 1 : turn;
     const value = this.values[Math.floor(share * this.values.length)];
     const tooth = ring.teeth ? `, tooth ${Math.floor(share * ring.teeth) + 1}` : "";
-    this.tip.textContent = `${(360 * share).toFixed(1)}°${tooth}: ${Number(value.toPrecision(4))} ${ring.unit}`.trimEnd();
+    this.tip.textContent = `${(360 * share).toFixed(1)}°${tooth}: ${String(Number(value.toPrecision(4))).replace("-", "−")} ${ring.unit}`.trimEnd();
     this.tip.hidden = event.buttons > 0;
     const isRight = event.offsetX > this.frame.clientWidth / 2;
     Object.assign(this.tip.style, { left: isRight ? "" : `${event.offsetX + 14}px`, right: isRight ? `${this.frame.clientWidth - event.offsetX + 14}px` : "", top: `${event.offsetY + 10}px` });

@@ -12,7 +12,14 @@ import streamlit as st
 from app.dashboard import address
 from app.dashboard.cached import read_rig_text, safe_file_name
 from app.dashboard.state import ChosenFile
-from app.dashboard.widgets.chooser import SIMULATED, choose_files, choose_number, sample_file, sample_name
+from app.dashboard.widgets.chooser import (
+    SIMULATED,
+    choose_files,
+    choose_number,
+    choose_reference_rate,
+    sample_file,
+    sample_name,
+)
 from app.samples import samples
 from gearsig.errors import InputError
 from gearsig.gap import GapRequest
@@ -31,6 +38,8 @@ class Choice:
     model : str
     torque_nm, sampling_rate_hz : float or None
         What the files do not state.
+    reference_rate_hz : float or None
+        Sampling rate of the references, where it is another one.
     """
 
     recordings: tuple[ChosenFile, ...]
@@ -39,13 +48,14 @@ class Choice:
     model: str = "cracked"
     torque_nm: float | None = None
     sampling_rate_hz: float | None = None
+    reference_rate_hz: float | None = None
 
     @property
     def key(self) -> str:
         """Equal for choices with equal answers."""
         groups = self.recordings, self.references, self.rigs
         files = [[(file.name, file.sha256) for file in group] for group in groups]
-        return repr((files, self.model, self.torque_nm, self.sampling_rate_hz))
+        return repr((files, self.model, self.torque_nm, self.sampling_rate_hz, self.reference_rate_hz))
 
     @property
     def command(self) -> str:
@@ -55,7 +65,8 @@ class Choice:
         words += ["--rig", common.name] if common is not None else []
         words += [word for file in self.references for word in ("--reference", file.name)]
         words += ["--torque", f"{self.torque_nm:.15g}Nm"] if self.torque_nm is not None else []
-        words += ["--fs", f"{self.sampling_rate_hz:.15g}"] if self.sampling_rate_hz is not None else []
+        rates = {"--fs": self.sampling_rate_hz, "--reference-fs": self.reference_rate_hz}
+        words += [word for name, hz in rates.items() if hz is not None for word in (name, f"{hz:.15g}")]
         return shlex.join([*words, "--model", self.model, "-o", "gap"])
 
 
@@ -144,6 +155,7 @@ def files_of(choice: Choice, folder: Path) -> GapRequest:
         choice.sampling_rate_hz,
         tuple(file.name for file in choice.recordings),
         tuple(file.name for file in choice.references),
+        reference_rate_hz=choice.reference_rate_hz,
     )
 
 
@@ -189,7 +201,9 @@ def choose() -> Choice:
             rate = choose_number(
                 "Sampling rate (Hz)", "gap rate", "from the files or the rig", minimum=0.0, name="rate"
             )
-    return Choice(recordings, references, rigs, model, torque or None, rate or None)
+            of_files = bool(references) and origin == FILES
+            reference_rate = choose_reference_rate("gap reference rate", of_several=True) if of_files else None
+    return Choice(recordings, references, rigs, model, torque or None, rate or None, reference_rate)
 
 
 def _choose_samples() -> ChosenFiles:

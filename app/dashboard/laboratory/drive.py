@@ -18,7 +18,7 @@ from app.dashboard.laboratory.setup import (
     shown_name,
     shown_unit,
 )
-from app.dashboard.laboratory.views import show_metrics, show_title
+from app.dashboard.laboratory.views import say_sliders, show_metrics, show_title
 from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import show_figure
 from app.dashboard.work import kept
@@ -302,7 +302,13 @@ def _show_impacts(run: DriveRun) -> None:
 def show_drive(preset: Preset) -> None:
     """Choose, simulate, show."""
     setup = choose_drive(preset)
+    with st.container(key="results"):
+        _show_drives(setup)
+
+
+def _show_drives(setup: Setup) -> None:
     healthy, faulty = run_drive(setup.healthy), faulty_of(setup, run_drive)
+    say_sliders()
     head, buttons = st.columns((3, 2), vertical_alignment="top")
     with head:
         show_title(setup, is_shown=faulty is not None)

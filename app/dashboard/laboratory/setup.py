@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -162,6 +163,15 @@ def choose_number(label: str, name: str, default: float, high: float, *, low: fl
         number = float(st.slider(label, *ends, persist_state="session", **looks))
     address.keep(in_address, number, float(default))
     return number
+
+
+def slider_values() -> dict[str, float]:
+    """Return what the sliders of `choose_number` stand at in this run, by the class that Streamlit gives each."""
+    return {
+        "st-key-" + re.sub(r"[^a-zA-Z0-9_-]", "-", str(key)): value
+        for key, value in st.session_state.items()
+        if str(key).startswith(PREFIX) and isinstance(value, float)
+    }
 
 
 def choose_parameter(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
+from html import escape
 from math import isfinite
 
 import numpy as np
@@ -13,7 +15,7 @@ from app.dashboard.components import component_of
 from app.dashboard.laboratory import run as runs
 from app.dashboard.laboratory.bifurcation import show_bifurcation
 from app.dashboard.laboratory.run import LaboratoryRun
-from app.dashboard.laboratory.setup import Setup, effect_text
+from app.dashboard.laboratory.setup import Setup, effect_text, slider_values
 from app.dashboard.theme import as_typed, capitalised, palette
 from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, packed, padded_limits, show_lines
 from app.dashboard.widgets.spectrum import show_spectrum
@@ -407,6 +409,11 @@ NUMBERS: dict[str, tuple[str, Number]] = {
     "Mesh force, mean": ("N", lambda run, _: float(run.response["mesh_force_n"].mean())),
     "Transmission error, range": ("µm", lambda run, _: 1e6 * float(np.ptp(run.response["transmission_error_m"]))),
 }
+
+
+def say_sliders() -> None:
+    """Say which numbers the results are of: the page's script fades them while a slider beside stands elsewhere."""
+    st.html(f'<i class="of-page of-sliders" data-values="{escape(json.dumps(slider_values()))}"></i>')
 
 
 def show_title(setup: Setup, *, is_shown: bool) -> None:

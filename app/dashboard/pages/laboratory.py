@@ -76,6 +76,7 @@ def wait_for_compiled_code() -> None:
 def show_machines(setup: Setup, *, whole_s: float | None = None) -> None:
     """Simulate and show both machines; `whole_s` is the length that follows a preview."""
     healthy, faulty = simulated(setup.healthy), faulty_of(setup, simulated)
+    views.say_sliders()
     shown = faulty or healthy
     head, buttons = st.columns((3, 2), vertical_alignment="top")
     with head:

@@ -208,6 +208,14 @@ def choose_number(
     return number
 
 
+def choose_reference_rate(key: str, *, of_several: bool = False) -> float | None:
+    """Return the sampling rate in Hz that the user states of healthy references, None where the field is empty."""
+    label = "Sampling rate of the references (Hz)" if of_several else "Its sampling rate (Hz)"
+    about = "Of files that do not state it, where it is another one than the recording's."
+    rate_hz = choose_number(label, key, "as the recording's", minimum=0.0, name="reference_rate", about=about)
+    return rate_hz or None
+
+
 # --------------------
 # The recording of the analysis page, with its machine, its reference, and what its file does not state.
 # --------------------
@@ -322,15 +330,27 @@ def _described(file: ChosenFile, with_reference: bool) -> Chosen:
     )
     if not with_reference:
         return Chosen(request, file.content)
-    reference, torque_nm = _choose_comparison(file)
+    reference, rate_hz = _choose_reference(file)
+    torque_nm = choose_number(
+        "Torque (N·m)",
+        state.source_key("torque", file.sha256),
+        "from the machine",
+        about="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else "
+        "of the reference shaft.",
+        minimum=0.0,
+        name="torque",
+    )
+    request = replace(request, torque_nm=torque_nm or None)
     if reference is None:
-        return Chosen(replace(request, torque_nm=torque_nm), file.content)
-    request = replace(request, reference_name=reference.name, reference_sha256=reference.sha256, torque_nm=torque_nm)
+        return Chosen(request, file.content)
+    request = replace(
+        request, reference_name=reference.name, reference_sha256=reference.sha256, reference_rate_hz=rate_hz
+    )
     return Chosen(request, file.content, reference.content)
 
 
-def _choose_comparison(file: ChosenFile) -> tuple[ChosenFile | None, float | None]:
-    """Return the same machine when it was healthy, and the torque in N·m that depths rest on."""
+def _choose_reference(file: ChosenFile) -> tuple[ChosenFile | None, float | None]:
+    """Return the same machine when it was healthy, and the sampling rate in Hz that is stated of an own file of it."""
     source = file.sha256
     offered = {sample_name(s): s for s in samples() if s.recording.name != file.name}
     own = next((s.reference for s in samples() if s.recording == file.content), None)
@@ -350,13 +370,6 @@ def _choose_comparison(file: ChosenFile) -> tuple[ChosenFile | None, float | Non
     if name == FILE:
         key = state.source_key("reference file", source)
         reference = choose_file("Recording of the healthy machine", key, name="reference_file")
-    torque = choose_number(
-        "Torque (N·m)",
-        state.source_key("torque", source),
-        "from the machine",
-        about="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else "
-        "of the reference shaft.",
-        minimum=0.0,
-        name="torque",
-    )
-    return reference, torque or None
+    if reference is None or name != FILE:
+        return reference, None
+    return reference, choose_reference_rate(state.source_key("reference rate", reference.sha256))

@@ -85,12 +85,19 @@ def _show_words(analysis: Analysis) -> None:
         f"{counted(n, 'channel')}",
         f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz",
     ]
-    with st.container(horizontal=True, vertical_alignment="center"):
-        show_kind(analysis.outcome)
-        st.caption(" · ".join(facts), width="content")
-    st.subheader(as_typed(in_page_words(headline)), anchor=False)
-    if rest:
-        st.caption(as_typed(in_page_words(rest)))
+    with st.container(key="verdict-head"):
+        with st.container(horizontal=True, vertical_alignment="center"):
+            show_kind(analysis.outcome)
+            st.caption(" · ".join(facts), width="content")
+        st.subheader(as_typed(in_page_words(headline)), anchor=False)
+        if rest:
+            st.caption(as_typed(in_page_words(rest)))
+    with st.container(key="verdict-grounds"):
+        _show_grounds(analysis)
+
+
+def _show_grounds(analysis: Analysis) -> None:
+    """Show what changed since the reference, and how strong and how sure the first finding is."""
     if analysis.reference is not None:
         _show_changes(analysis, analysis.reference)
     claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION) and f.code != CHANGED]
@@ -100,7 +107,8 @@ def _show_words(analysis: Analysis) -> None:
             st.markdown(f"**{as_typed(card.title)}**")
         if card.where:
             st.caption(" · ".join(as_typed(text) for text in card.where))
-        _show_measures(card)
+        with st.container(key="verdict-measures"):
+            _show_measures(card)
 
 
 def _show_changes(analysis: Analysis, reference: Analysis) -> None:
