@@ -13,12 +13,14 @@ from app import flexible as pair_study
 from app import gear_body
 from app.dashboard.components import component_of
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import download, packed, show_figure
+from app.dashboard.widgets.charts import download, packed, show_figure, show_map
 from app.dashboard.work import kept
 from app.gear_body import GearBodyStudy
 from app.papers import PAPERS, Paper, paper
 from gearsig.checks import FloatArray
-from gearsig.plot import level_colours
+from gearsig.formatting import unit_text
+from gearsig.orders import OrderMap
+from gearsig.plot import LevelPanel, decibels, level_colours
 from sims import fe_gear
 from sims.fe_gear import GearBlank
 from sims.mesh import GearGeometry
@@ -157,16 +159,24 @@ def show_pair() -> None:
         "Show", list(WORDS), default="sweeps", format_func=WORDS.__getitem__, key="pair shown", persist_state="session"
     )
     name = shown or "sweeps"
-    show_figure(drawn[name], WORDS[name], f"pair {name}")
+    if name == "run_up":
+        show_run_up(study.run_up)
+    else:
+        show_figure(drawn[name], WORDS[name], f"pair {name}")
     for row in pair_study.summary(study)["sweeps"]:  # type: ignore[attr-defined]  # a list of mappings
         said = {way: row[f"jump_{way}_hz"] for way in ("up", "down")}
         jumps = ", ".join(f"{way}: {'no jump' if hz is None else f'jump at {hz:.0f} Hz'}" for way, hz in said.items())
         st.caption(f"Torsional mode {row['torsional_mode_hz']:.0f} Hz. Sweep {jumps}. {row['n_steps']:,} steps.")
-    st.caption(
-        "Full: sweep up; dotted: sweep down. Short sweeps load the teeth by the rotors' inertia, more on the way up "
-        "than on the way down."
-    )
+    st.caption("Short sweeps load the teeth by the rotors' inertia, more on the way up than on the way down.")
     download("Sweeps as CSV", pair_study.sweeps_csv(study).encode(), "sweeps.csv", "text/csv")
+
+
+def show_run_up(run_up: OrderMap) -> None:
+    """Show levels over order and time, with the speed under the pointer."""
+    unit = f"dB re 1 {unit_text(run_up.unit)}"
+    levels = decibels(run_up.values, run_up.scaling)
+    panel = LevelPanel(levels, run_up.positions, run_up.time_s, run_up.axis_label, "time (s)", unit)
+    show_map(panel, "pair run_up", also=(run_up.speed_rpm, "rpm"))
 
 
 # --------------------

@@ -11,6 +11,7 @@ from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
+from gearsig.plot._panels import UNDER_A_LINE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -143,7 +144,7 @@ def speed_spectra_figure(
     floor = 1e-5 * largest_um  # five decades below the greatest amplitude
     for i, (axes, (name, values)) in enumerate(zip(panels, curves.items(), strict=True)):
         level = np.maximum(values * 1e6, floor)
-        axes.fill_between(x, floor, level, color=style.SIMULATED, alpha=0.25, linewidth=0)
+        axes.fill_between(x, floor, level, color=style.SIMULATED, alpha=0.25, linewidth=0, label=UNDER_A_LINE)
         axes.plot(x, level, color=style.SIMULATED, linewidth=style.LINE_PT)
         axes.set_yscale("log")
         axes.set_ylim(floor, largest_um * 2.0)

@@ -18,6 +18,7 @@ from gearsig.plot._maps import draw_level_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import Collection, QuadMesh
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from pandas import DataFrame
@@ -227,13 +228,18 @@ def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> None:
 # --------------------
 
 
+UNDER_A_LINE = "_under a line"
+"""Label of what is filled below a line that is drawn as well."""
+
+
 def panels_of(figure: Figure) -> list[list[list[LinePanel | LevelPanel]]]:
     """Return what a figure of lines, bars and points shows: rows of columns of panels, to be zoomed.
 
-    Axes that share a place, for two quantities over one axis, are panels of one column. Empty where a figure shows
-    what no panel can: polar axes, places with names instead of numbers, surfaces, filled areas.
+    Axes that share a place, for two quantities over one axis, are panels of one column. A map of equal steps is a
+    panel without its lines of equal values, as hovering tells them. Empty where a figure shows what no panel can: polar
+    axes, places with names instead of numbers, surfaces, filled areas but those below a line (`UNDER_A_LINE`).
     """
-    from matplotlib.collections import LineCollection
+    from matplotlib.collections import QuadMesh
     from matplotlib.ticker import FixedFormatter
 
     places: dict[tuple[float, float], list[LinePanel | LevelPanel]] = {}
@@ -241,13 +247,40 @@ def panels_of(figure: Figure) -> list[list[list[LinePanel | LevelPanel]]]:
         if not axes.axison or axes.get_label() == "<colorbar>":
             continue
         is_named = any(isinstance(a.get_major_formatter(), FixedFormatter) for a in (axes.xaxis, axes.yaxis))
-        if axes.name != "rectilinear" or is_named or not all(isinstance(c, LineCollection) for c in axes.collections):
+        drawn: list[Collection] = list(axes.collections)
+        if axes.name != "rectilinear" or is_named or not all(map(_fits_a_panel, drawn)):
             return []
         box = axes.get_position()
-        panel = _level_panel(axes) if axes.images else _line_panel(axes, _names_of_looks(figure, axes))
+        panel = (
+            _level_panel(axes)
+            if axes.images or any(isinstance(c, QuadMesh) for c in drawn)
+            else _line_panel(axes, _names_of_looks(figure, axes))
+        )
         places.setdefault((-round(box.y1, 2), round(box.x0, 2)), []).append(panel)
     rows = [[places[place] for place in sorted(places) if place[0] == y] for y in sorted({y for y, _ in places})]
     return [row for row in rows if any(panel for panels in row for panel in panels)]
+
+
+def _fits_a_panel(drawn: Collection) -> bool:
+    """Whether it is upright lines, a map of equal steps, lines of equal values in one, or what fills below a line."""
+    from matplotlib.collections import LineCollection, QuadMesh
+    from matplotlib.contour import ContourSet
+
+    if isinstance(drawn, QuadMesh):
+        steps = np.diff(_axes_of_mesh(drawn)[0])
+        return bool(len(steps) and np.all(steps > 0.0) and np.ptp(steps) < 1e-3 * steps.mean())
+    if isinstance(drawn, ContourSet):
+        return not drawn.filled
+    return isinstance(drawn, LineCollection) or drawn.get_label() == UNDER_A_LINE
+
+
+def _axes_of_mesh(mesh: QuadMesh) -> tuple[FloatArray, FloatArray]:
+    """Return where the columns and the rows of a map's values lie: the middles of cells, or their corners."""
+    corners = np.asarray(mesh.get_coordinates(), dtype=np.float64)
+    x, y = corners[0, :, 0], corners[:, 0, 1]
+    if np.asarray(mesh.get_array()).shape == corners.shape[:2]:  # shaded from corner to corner
+        return x, y
+    return (x[:-1] + x[1:]) / 2.0, (y[:-1] + y[1:]) / 2.0
 
 
 def _names_of_looks(figure: Figure, axes: Axes) -> dict[tuple[str, bool], str]:
@@ -298,6 +331,16 @@ def _x_label(axes: Axes) -> str:
 
 
 def _level_panel(axes: Axes) -> LevelPanel:
+    from matplotlib.collections import QuadMesh
+
+    mesh = next((drawn for drawn in axes.collections if isinstance(drawn, QuadMesh)), None)
+    if mesh is not None:
+        levels = np.asarray(mesh.get_array(), dtype=np.float64)
+        unit = mesh.colorbar.ax.get_ylabel() if mesh.colorbar is not None else ""
+        low, high = (float(np.max(limit)) for limit in mesh.get_clim())
+        is_logarithmic, words = axes.get_yscale() == "log", _words_of(axes)
+        names = (_x_label(axes), axes.get_ylabel(), unit)
+        return LevelPanel(levels, *_axes_of_mesh(mesh), *names, is_logarithmic, span=high - low or 1.0, title=words)
     image = axes.images[0]
     left, right, low, high = image.get_extent()
     values = np.asarray(image.get_array(), dtype=np.float64)
@@ -328,7 +371,7 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
             take(limits, np.ravel(y)[[0, 0]], line.get_color(), dotted=True)
         elif len(np.ravel(x)):
             take(x, y, line.get_color(), dotted=_is_broken(line), dots=not joined)
-    collections: list[Any] = list(axes.collections)
+    collections: list[Any] = [drawn for drawn in axes.collections if drawn.get_label() != UNDER_A_LINE]
     for collection in collections:  # upright lines
         ends = np.array(collection.get_segments()).reshape(-1, 2, 2)
         gaps = np.concatenate([ends, np.full((len(ends), 1, 2), np.nan)], axis=1)
@@ -396,7 +439,7 @@ _Series = tuple[str, FloatArray, FloatArray, FloatArray]
 
 def _drawn_series(axes: Axes) -> Iterator[_Series]:
     """Yield name, places and levels of everything that is drawn in data's coordinates."""
-    from matplotlib.collections import Collection, PathCollection, QuadMesh
+    from matplotlib.collections import PathCollection, QuadMesh
 
     def named(artist: Any, kind: str) -> str:
         label = str(artist.get_label() or "")

@@ -218,7 +218,8 @@ def colour_bar(axes: Axes, drawn: ScalarMappable, label: str = "", *, gap_in: fl
     figure = axes.get_figure(root=True)
     assert figure is not None  # noqa: S101 - every panel belongs to one
     width, place = figure.get_size_inches()[0], axes.get_position()
-    bar_axes = figure.add_axes((place.x1 + gap_in / width, place.y0, 0.12 / width, place.height))
+    right_of_it = (place.x1 + gap_in / width, place.y0, 0.12 / width, place.height)
+    bar_axes = figure.add_axes(right_of_it, label="<colorbar>")  # as matplotlib calls those that it makes itself
     figure.colorbar(drawn, cax=bar_axes, **looks).outline.set_visible(False)
     bar_axes.tick_params(colors=QUIET, labelcolor=INK, labelsize=SMALL_PT)
     bar_axes.set_ylabel(plain(label), color=INK, fontsize=TEXT_PT, parse_math=False)

@@ -11,6 +11,9 @@ from app.dashboard import state
 from app.dashboard.state import ChosenFile
 from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.views import VIEWS
+from gearsig.recording import write_recording
+from gearsig.rig import write_rig
+from sims import simulate
 from tests.app.pages import (
     SAMPLES,
     at,
@@ -370,6 +373,15 @@ def test_the_sampling_rate_of_an_uploaded_reference_is_asked_for() -> None:
     labelled(page, "number_input", "Its sampling rate (Hz)").set_value(12800.0).run()
     assert "the reference has no channel" in page.error[0].value
     assert not page.exception
+
+
+def test_a_machine_that_starts_and_stops_opens_on_its_motion(tmp_path) -> None:
+    drive = simulate("forging", duration_s=6.0, sampling_rate_hz=1000.0)
+    file, rig = write_recording(drive, tmp_path / "drive.h5"), tmp_path / "drive.toml"
+    write_rig(drive.rig, rig)
+    page = opened_file(file.name, file.read_bytes(), rig.read_text())
+    assert not page.exception
+    assert page.session_state[state.TAB] == "Starts and stops"
 
 
 def test_a_zoomed_ring_of_teeth_is_kept_in_the_address_and_reads_off_its_values() -> None:

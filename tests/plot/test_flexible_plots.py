@@ -47,6 +47,27 @@ def test_sweeps_show_both_ways_and_mark_the_mode():
         speed_sweep_figure([])
 
 
+def test_maps_of_equal_steps_are_zoomed() -> None:
+    cycles = np.linspace(0.0, 1.0, 41)
+    values = np.sin(6.0 * cycles)[:, None] * TORQUE
+    ((columns),) = panels_of(mesh_maps_figure(cycles, TORQUE, {"stiffness (N/m)": values, "error (µm)": -values}))
+    ((first,), (second,)) = columns
+    np.testing.assert_array_equal(first.levels, values.T)
+    np.testing.assert_allclose(first.at, cycles)
+    np.testing.assert_allclose(first.positions, TORQUE)
+    assert (first.title, second.title) == ("stiffness (N/m)", "error (µm)")
+    assert first.span == pytest.approx(np.ptp(values))
+    uneven = np.sort(np.random.default_rng(1).uniform(0.0, 1.0, 41))
+    assert panels_of(mesh_maps_figure(uneven, TORQUE, {"stiffness (N/m)": values})) == []
+
+
+def test_spectra_at_several_speeds_are_zoomed() -> None:
+    spectra = {f"{rpm} rpm": np.linspace(1e-6, 2e-6, len(HZ)) for rpm in (500, 1000)}
+    rows = panels_of(speed_spectra_figure(HZ, spectra))
+    assert [panel.title for ((panel,),) in rows] == list(spectra)
+    assert all(len(panel.lines) == 1 for ((panel,),) in rows)
+
+
 def test_sweeps_of_one_case_are_named_where_they_are_zoomed():
     up, down = np.linspace(1e-6, 2e-6, 60), np.linspace(2e-6, 3e-6, 60)
     (((panel,),),) = panels_of(speed_sweep_figure([("170 N·m", HZ, up, down)]))

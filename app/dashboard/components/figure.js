@@ -395,7 +395,7 @@ class Figure {
     const level = map.low + (this.levels[row * map.columns + column] / 255) * (map.high - map.low);
     const y = this.ofShare(share);
     const also = map.also ? `, ${figure(map.also[row])} ${map.also_unit}` : "";
-    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}: ${level.toFixed(1).replace("-", "−")} ${map.unit}`;
+    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}: ${level.toFixed(digits(map)).replace("-", "−")} ${map.unit}`;
   }
 
   showTip(lines, event) {
@@ -447,8 +447,9 @@ class Figure {
       return made;
     };
     const left = html("span"), right = html("span");
+    const named = this.lines.filter(({ name, dotted }, i, all) => name && all.findIndex((line) => line.name === name && line.dotted === dotted) === i);
     if (this.lines.length > 1 && this.data.legend)
-      for (const line of this.lines) {
+      for (const line of named) {
         const key = html("i");
         key.style.background = line.dotted ? `repeating-linear-gradient(90deg, ${line.colour} 0 3px, transparent 3px 5px)` : line.colour;
         const entry = html("span", "key");
@@ -489,7 +490,7 @@ class Figure {
       for (let i = 0; i < this.levels.length; i++) {
         const x = low + ((i % map.columns) + 0.5) / map.columns * (high - low);
         const y = this.ofShare((Math.floor(i / map.columns) + 0.5) / map.rows);
-        rows.push([exact(x), exact(y), (map.low + this.levels[i] / 255 * (map.high - map.low)).toFixed(2)]);
+        rows.push([exact(x), exact(y), (map.low + this.levels[i] / 255 * (map.high - map.low)).toFixed(digits(map) + 1)]);
       }
       return rows.map((row) => row.join(",")).join("\n");
     }
@@ -511,6 +512,8 @@ const same = (a, b) => a.length === b.length && a.every((value, i) => Math.abs(v
 // A number as files have it, and as it is read: with the sign of minus that axes have.
 const exact = (value) => String(Number(value.toPrecision(6)));
 const figure = (value) => exact(value).replaceAll("-", "−");
+// Decimals that tell a map's colours apart.
+const digits = ({ low, high }) => Math.min(Math.max(Math.ceil(2 - Math.log10(high - low)), 1), 9);
 // A number beside a logarithmic axis; as a power of ten where some of them are far from one, then all of them.
 function short(value, powers) {
   const exponent = Math.round(Math.log10(value));

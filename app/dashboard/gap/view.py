@@ -322,7 +322,8 @@ def _show_panels(report: GapReport) -> None:
         "How far": "Left of the whole gap, in structural floors. One is how far healthy machines differ from their "
         "simulation or from their own reference.",
     }
-    for column, title, rows in zip(st.columns(3), TABS, (places, causes, steps), strict=False):
+    columns = st.container(key="gap-panels").columns(3)
+    for column, title, rows in zip(columns, TABS, (places, causes, steps), strict=False):
         with column.container(border=True, height="stretch"):
             st.button(
                 title, key=f"gap panel {title}", type="tertiary", icon=":material/zoom_in:",
