@@ -315,8 +315,17 @@ def _number_of(colour: str) -> int | str:
 
 
 def _words_of(axes: Axes) -> str:
+    named = _names_of_upright_lines(axes).values()
     words = [axes.get_title(loc="left"), *(text.get_text() for text in axes.texts)]
-    return " · ".join(word for word in words if word)
+    return " · ".join(word for word in words if word and word not in named)
+
+
+def _names_of_upright_lines(axes: Axes) -> dict[float, str]:
+    """Return the texts that stand at upright lines, by their places."""
+    upright = axes.get_xaxis_transform()
+    at = {float(np.ravel(line.get_xdata())[0]) for line in axes.lines if line.get_transform() == upright}
+    texts = {float(text.get_position()[0]): text.get_text() for text in axes.texts if text.get_transform() == upright}
+    return {x: text for x, text in texts.items() if x in at}
 
 
 def _x_label(axes: Axes) -> str:
@@ -355,6 +364,7 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
     lines: list[ChartLine] = []
     cursors: list[Cursor] = []
     limits = axes.get_xlim()
+    named = _names_of_upright_lines(axes)
 
     def take(x: Any, y: Any, colour: Any, **looks: Any) -> None:
         is_quiet = isinstance(number := _number_of(name := _colour(colour)), int) and number < 0
@@ -366,7 +376,8 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
         joined = line.get_linestyle() != "None"
         if line.get_transform() == axes.get_xaxis_transform():
             is_fault = _number_of(_colour(line.get_color())) == 1
-            cursors.append(Cursor(float(np.ravel(x)[0]), "finding" if is_fault else "", ""))
+            at = float(np.ravel(x)[0])
+            cursors.append(Cursor(at, "finding" if is_fault else "", named.get(at, "")))
         elif line.get_transform() == axes.get_yaxis_transform():
             take(limits, np.ravel(y)[[0, 0]], line.get_color(), dotted=True)
         elif len(np.ravel(x)):

@@ -11,6 +11,7 @@ from datetime import datetime
 from io import StringIO
 from math import inf, isfinite
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 from urllib.parse import quote
 
@@ -312,6 +313,10 @@ def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ())
     write_text(folder / "batch.csv", text.getvalue())
 
 
+LONGEST_IN_PRINT = 170
+"""Letters of a verdict in the printed table: about the two lines that the index shows. Its page says all of it."""
+
+
 def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
     rows = [
         {
@@ -320,7 +325,7 @@ def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
             "date": row.date,
             "outcome": row.entry.outcome.value,
             "css_class": row.css_class,
-            "conclusion": row.entry.conclusion,
+            "conclusion": shorten(row.entry.conclusion, LONGEST_IN_PRINT, placeholder=" …"),
             "confidence": row.confidence,
             "ratio": row.ratio,
             "cells": [cell.text for cell in row.cells],

@@ -70,7 +70,9 @@ def test_spectra_at_several_speeds_are_zoomed() -> None:
 
 def test_sweeps_of_one_case_are_named_where_they_are_zoomed():
     up, down = np.linspace(1e-6, 2e-6, 60), np.linspace(2e-6, 3e-6, 60)
-    (((panel,),),) = panels_of(speed_sweep_figure([("170 N·m", HZ, up, down)]))
+    (((panel,),),) = panels_of(speed_sweep_figure([("170 N·m", HZ, up, down)], natural_hz=2650.0))
+    assert [(c.position, c.label) for c in panel.cursors] == [(2650.0, "ωₙ"), (1325.0, "ωₙ/2"), (2650.0 / 3, "ωₙ/3")]
+    assert not panel.title
     assert [(line.name, line.dotted) for line in panel.lines] == [("sweep up", False), ("sweep down", True)]
 
 

@@ -100,6 +100,13 @@ def test_the_index_as_pdf(write, tmp_path):
     assert (tmp_path / "index.pdf").read_bytes().startswith(b"%PDF-")
 
 
+def test_a_dozen_long_verdicts_fit_a_printed_page(write, tmp_path):
+    pytest.importorskip("typst")
+    long = replace(_entry("a", Outcome.CANNOT_TELL), conclusion="Nothing shows, but noise would hide it. " * 20)
+    write([long] * 12, pdf=True)
+    assert re.findall(rb"/Count (\d+)", (tmp_path / "index.pdf").read_bytes()) == [b"1"]
+
+
 def test_dates_of_names_are_a_column_and_an_order(write, tmp_path):
     """The names state them; where none does, there is no column."""
     names = ("fan_2026-03-02", "fan_2026-03-01T0605", "fan")
