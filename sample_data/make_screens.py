@@ -88,6 +88,7 @@ def take(page: Page, clock: Clock) -> None:
     page.get_by_role("link", name="Comparison").click()
     page.get_by_role("tab", name="Orders").wait_for()
     clock.tell("comparison, with a simulation of five seconds")
+    flexible_and_fleet(page, clock)
     page.get_by_role("link", name="Gap").click()
     settle(page)
     clock.start()
@@ -96,6 +97,29 @@ def take(page: Page, clock: Clock) -> None:
     clock.tell("gap of two samples, nothing kept of the rig")
     with TemporaryDirectory() as folder:
         long_recording(page, clock, Path(folder))
+
+
+def flexible_and_fleet(page: Page, clock: Clock) -> None:
+    """Look at one gear, at a pair, and at the fleet's example."""
+    clock.start()
+    page.get_by_role("link", name="Flexible gears").click()
+    page.locator(".solid").first.wait_for()
+    clock.tell("flexible gear: mesh, modes and stress")
+    clock.start()
+    page.get_by_text("Pair", exact=True).click()
+    page.locator(".figure svg").first.wait_for()
+    clock.tell("flexible pair: both sweeps and all maps")
+    clock.start()
+    page.get_by_text("Mesh stiffness over angle and torque").click()
+    clock.tell("its view *Mesh stiffness*")
+    clock.start()
+    page.get_by_role("link", name="Fleet").click()
+    page.get_by_role("button", name="See an example").wait_for()
+    clock.tell("fleet, empty")
+    clock.start()
+    page.get_by_role("button", name="See an example").click()
+    page.locator(".figure svg").first.wait_for()
+    clock.tell("its example, analysed at first")
 
 
 N_LONG, RATE_HZ = 2**20, 25600.0
@@ -173,7 +197,16 @@ def main() -> None:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     command = [sys.executable, "-m", "app.cli.main", "dashboard", "--port", str(port), "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server:
+    # An empty cache: what runs before have kept would be taken for speed.
+    with (
+        TemporaryDirectory(ignore_cleanup_errors=True) as cache,
+        subprocess.Popen(
+            command,
+            env={**os.environ, "GEARSIG_CACHE": cache},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        ) as server,
+    ):
         try:
             for _ in range(600):
                 try:
