@@ -66,7 +66,7 @@ def next_recordings(
             p,
             OF_A_TRIAL * conditions[0].trial_s * max(1.0, base.point.speed_rpm / p.speed_rpm),
             base.sampling_rate_hz,
-            1,
+            noise=0,
         )
         for p in points
     ]

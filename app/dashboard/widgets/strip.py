@@ -37,9 +37,8 @@ def choose_view(analysis: Analysis, names: Sequence[str]) -> str:
     first = FIRST_OF.get(picture.about if picture is not None else "", "Order spectrum")
     if analysis.motion is not None:
         first = FIRST_OF["motion"]
-    elif isinstance(
-        analysis.shaft_angle, CannotTell
-    ):  # the form asks for the speed, of a machine that is described too
+    elif isinstance(analysis.shaft_angle, CannotTell):
+        # The form asks for the speed, of a machine that is described too.
         first = "Machine" if analysis.rig is None or not analysis.rig.shafts else "Spectrum"
     chosen = address.chosen(state.TAB, "view", names, first if first in names else names[0])
     items = _tiles(state.view_key(f"tiles {is_dark()}", analysis), tuple(names), analysis)
