@@ -431,7 +431,7 @@ MIN_QUALITY = 0.5
 """Below it no speed is claimed: on simulated and measured recordings, hardly a wrong speed lies above."""
 
 CLEAR = 0.9
-"""Quality beyond which no other length of blocks is tried."""
+"""Quality of the best so far beyond which no other length of blocks is tried."""
 
 TOP = 0.45
 """Share of the sampling rate that is looked at; above it lie the anti-aliasing filters of recorders."""
@@ -527,11 +527,12 @@ def best_decision(samples: FloatArray, rate: float, comb: CombLines, low: float,
 
     `rate` is in samples per second, or per revolution; `low` and `high` accordingly.
     """
-    decisions: list[CombDecision] = []
+    best: CombDecision | None = None
     for n in (samples.shape[1] // d for d in _DIVISIONS):
         # Sidebands need four bins between them and the mesh line.
         if n >= 256 and high * n / rate > 4.0:
-            decisions.append(decide(line_evidence(samples, rate, n, TOP * rate), comb, low, high))
-            if decisions[-1].quality >= CLEAR:
-                return decisions[-1]
-    return max(decisions, key=lambda d: (d.quality >= MIN_QUALITY, d.score), default=None)
+            decision = decide(line_evidence(samples, rate, n, TOP * rate), comb, low, high)
+            best = max([best, decision] if best else [decision], key=lambda d: (d.quality >= MIN_QUALITY, d.score))
+            if best.quality >= CLEAR:
+                break
+    return best
