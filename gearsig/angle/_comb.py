@@ -335,6 +335,11 @@ class CombDecision:
         parts.append(self.coverage**12)
         return float(np.prod(parts))
 
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """What the better of two has more of: any trustworthy one comes before all others."""
+        return self.quality >= MIN_QUALITY, self.score
+
     def evidence(self, unit: str = "rev/s") -> str:
         """State the numbers in one sentence."""
         return (
@@ -532,7 +537,8 @@ def best_decision(samples: FloatArray, rate: float, comb: CombLines, low: float,
         # Sidebands need four bins between them and the mesh line.
         if n >= 256 and high * n / rate > 4.0:
             decision = decide(line_evidence(samples, rate, n, TOP * rate), comb, low, high)
-            best = max([best, decision] if best else [decision], key=lambda d: (d.quality >= MIN_QUALITY, d.score))
+            if best is None or decision.rank > best.rank:
+                best = decision
             if best.quality >= CLEAR:
                 break
     return best

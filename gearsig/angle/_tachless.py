@@ -297,7 +297,7 @@ def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[Shaft
 
 
 def _rank(candidate: SpeedCandidate) -> tuple[bool, float]:
-    return candidate.decision.quality >= MIN_QUALITY, candidate.decision.score
+    return candidate.decision.rank
 
 
 def _refined(search: SpeedSearch, angle: ShaftAngle) -> SpeedCandidate | None:

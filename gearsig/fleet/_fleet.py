@@ -73,6 +73,7 @@ _STATE = {
     "events": "VARCHAR",
     "fingerprint": "VARCHAR",
 }
+_TYPED = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
 """Columns of a series' state: see `state_rows`."""
 
 
@@ -478,10 +479,9 @@ class Fleet:
         new = pd.DataFrame(rows, columns=list(_STATE))
         connection.register("judged_anew", new)
         connection.register("stale", pd.DataFrame([place[:2] for place in stale], columns=["machine", "point"]))
-        columns = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
         query = (
-            f"SELECT {columns} FROM trends ANTI JOIN stale USING (machine, point) UNION ALL "
-            f"SELECT {columns} FROM judged_anew"
+            f"SELECT {_TYPED} FROM trends ANTI JOIN stale USING (machine, point) UNION ALL "
+            f"SELECT {_TYPED} FROM judged_anew"
         )
         try:
             write_query(connection, query, self.folder / TRENDS, "parquet, COMPRESSION zstd")
@@ -495,8 +495,7 @@ class Fleet:
 
         if self._trends is not None:
             connection.register("unwritten", self._trends)
-            columns = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
-            connection.execute(f"CREATE OR REPLACE TEMP VIEW trends AS SELECT {columns} FROM unwritten")
+            connection.execute(f"CREATE OR REPLACE TEMP VIEW trends AS SELECT {_TYPED} FROM unwritten")
             return
         path = self.folder / TRENDS
         try:

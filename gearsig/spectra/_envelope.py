@@ -396,9 +396,7 @@ Preparation = Literal["none", "tones removed", "whitened"]
 PREPARATIONS = ("none", "tones removed", "whitened")
 
 
-def prepared_signal(
-    values: FloatArray, sampling_rate_hz: float, preparation: Preparation, *, transform: ComplexArray | None = None
-) -> FloatArray:
+def prepared_signal(values: FloatArray, sampling_rate_hz: float, preparation: Preparation) -> FloatArray:
     """Return a signal without its steady tones, or with all lines equally strong.
 
     Parameters
@@ -409,8 +407,6 @@ def prepared_signal(
         "none"; "tones removed": lines of the whole signal's spectrum more than 13 dB above the floor are cut down to
         the floor, phases kept, which takes out mesh and shaft harmonics of a steady speed; "whitened": every line is
         divided by its magnitude (cepstral prewhitening), which takes out tones and resonances alike.
-    transform : array, (n_samples // 2 + 1,), or None
-        The values' `rfft`, where it is known.
 
     Returns
     -------
@@ -433,12 +429,23 @@ def prepared_signal(
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     if one_of(preparation, "preparation", PREPARATIONS) == "none":
         return x
-    lines = prepared_lines(rfft(x.astype(np.float64)) if transform is None else transform, preparation)
-    return np.asarray(irfft(lines, len(x), overwrite_x=True))
+    return np.asarray(irfft(prepared_lines(rfft(x.astype(np.float64)), preparation), len(x), overwrite_x=True))
 
 
 def prepared_lines(transform: ComplexArray, preparation: Preparation) -> ComplexArray:
-    """Return the `rfft` of a signal's `prepared_signal`, of its own."""
+    """Return the `rfft` of what `prepared_signal` makes of a signal, from the signal's own.
+
+    Parameters
+    ----------
+    transform : array, (n_samples // 2 + 1,)
+    preparation : str
+        As of `prepared_signal`.
+
+    Returns
+    -------
+    array, (n_samples // 2 + 1,)
+        Another array, in the transform's precision.
+    """
     lines = transform.copy()
     if preparation == "none":
         return lines

@@ -84,12 +84,11 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
     text = machine_text(file)
     try:
         table = parse_toml(text, file.rig_name)
+        problem = "" if _fits_form(table) else "The form cannot show this rig file"
     except GearsigError:
-        st.info("The rig file is no TOML yet: mend it as text.", icon=":material/edit:")
-        _show_text(file, text, is_open=True)
-        return
-    if not _fits_form(table):
-        st.info("The form cannot show this rig file: mend it as text.", icon=":material/edit:")
+        problem = "The rig file is no TOML yet"
+    if problem:
+        st.info(f"{problem}: mend it as text.", icon=":material/edit:")
         _show_text(file, text, is_open=True)
         return
     is_unknown = not table.get("shaft")
