@@ -143,6 +143,7 @@ from gearsig.gap._reduction import (
     reduce_recording,
     speed_figures,
 )
+from gearsig.gap._report import GapReport, is_settled, unbounded_fits, within_the_floor
 from gearsig.gap._simulator import (
     Added,
     DriveFacts,
@@ -189,7 +190,6 @@ from gearsig.gap._types import (
     GapKind,
     GapOutcome,
     GapPlace,
-    GapReport,
     GapStep,
     Interval,
     LabelledFacts,
@@ -201,7 +201,6 @@ from gearsig.gap._types import (
     group_probabilities,
     rivals,
 )
-from gearsig.gap._verdict import is_settled, unbounded_fits, within_the_floor
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
 from gearsig.gap._waveform import (
     SimulatedWaveform,

@@ -29,6 +29,15 @@ from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._places import counted_against, gap_places, ranked_places
 from gearsig.gap._population import load_learned
+from gearsig.gap._report import (
+    GapReport,
+    in_order,
+    is_settled,
+    most_probable_two,
+    named_cause,
+    unbounded_fits,
+    within_the_floor,
+)
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
 from gearsig.gap._tooth_error import ToothErrorEvidence, mean_log_likelihoods, tooth_error_evidence
 from gearsig.gap._trials import (
@@ -44,18 +53,9 @@ from gearsig.gap._types import (
     NAMING,
     GapCause,
     GapPlace,
-    GapReport,
     Interval,
     LabelledFacts,
     NextRecording,
-)
-from gearsig.gap._verdict import (
-    in_order,
-    is_settled,
-    most_probable_two,
-    named_cause,
-    unbounded_fits,
-    within_the_floor,
 )
 from gearsig.gap._waveform import gain_scatter
 from gearsig.gap._words import fitted_words

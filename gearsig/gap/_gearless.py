@@ -26,6 +26,7 @@ from gearsig.diagnosis import (
 from gearsig.errors import RefusalError
 from gearsig.formatting import enumerated, named, percent, signed
 from gearsig.gap._conditions import Stage, readable
+from gearsig.gap._report import GapReport, named_cause
 from gearsig.gap._simulator import GapEffect, OperatingCondition
 from gearsig.gap._types import (
     NONE,
@@ -34,11 +35,9 @@ from gearsig.gap._types import (
     GapCause,
     GapOutcome,
     GapPlace,
-    GapReport,
     PlaceKind,
     SpectrumCurves,
 )
-from gearsig.gap._verdict import named_cause
 from gearsig.gap._words import band_words, hertz
 from gearsig.prepared import PreparedRecording
 from gearsig.rig import Rig

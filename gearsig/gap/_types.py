@@ -12,7 +12,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.formatting import odds_text
 from gearsig.gap._simulator import Added, OperatingCondition
-from gearsig.results import Result, verdict_html
+from gearsig.results import Result
 
 # --------------------
 # The curves that a gap report draws: order spectra, energy over the angle, synchronous averages.
@@ -521,110 +521,3 @@ class LabelledFacts:
             f"Without {'them' if n > 1 else 'it'} the likeliest would be {first.replace('_', ' ')}, "
             f"{odds_text(self.without.get(first, 0.0))} (outcome: {self.outcome_without.value})."
         )
-
-
-@dataclass(frozen=True)
-class GapReport(Result, rows="causes"):
-    """The answer.
-
-    Parameters
-    ----------
-    rig, simulator : str
-        Names; no simulator where none can be set to the rig.
-    conditions : tuple of ConditionFacts
-    references : tuple of str
-        Names of the healthy recordings that were compared with; empty: the simulation itself is compared with.
-    outcome : GapOutcome
-    size : Interval
-        Of the whole gap in structural floors (the largest that healthy machines reach once in twenty is 1); nan where
-        nothing was simulated.
-    repeatability : float
-        The same in repeatability floors.
-    places : tuple of GapPlace
-        See `gearsig.gap`.
-    causes : tuple of GapCause
-        What the outcome names first, the others by probability; these add up to 1.
-    groups : mapping
-        Group → probability; default: of the causes.
-    inseparable : tuple of str or None
-        Causes that these recordings cannot tell apart, likeliest first; default: `rivals`, where the outcome says so.
-    steps : tuple of GapStep
-        Before, with each effect, what is left.
-    next_recordings : tuple of NextRecording
-        Best first.
-    spectra : tuple of SpectrumCurves
-    angles : tuple of AngleCurves
-    averages : tuple of AverageCurves
-        Empty where there is no reference.
-    notes : tuple of str
-        What the reader should know.
-    warnings : tuple of str
-        What must be checked first, where there is strong evidence of it: a wrong rig file, or recording and reference
-        exchanged. The rest of the report is as if it were not so.
-    twin_toml : str
-        The simulator with the effect fitted, as a preset; empty where none is named.
-    labelled : LabelledFacts or None
-        What labelled recordings of the rig changed; None: none were given.
-    next_steps : tuple of NextStep
-        What would help most besides, best first.
-    """
-
-    rig: str
-    simulator: str
-    conditions: tuple[ConditionFacts, ...]
-    references: tuple[str, ...]
-    outcome: GapOutcome
-    causes: tuple[GapCause, ...]
-    size: Interval = NOT_KNOWN
-    repeatability: float = nan
-    places: tuple[GapPlace, ...] = ()
-    groups: Mapping[str, float] = field(default_factory=dict)
-    inseparable: tuple[str, ...] | None = None
-    steps: tuple[GapStep, ...] = ()
-    next_recordings: tuple[NextRecording, ...] = ()
-    spectra: tuple[SpectrumCurves, ...] = ()
-    angles: tuple[AngleCurves, ...] = ()
-    averages: tuple[AverageCurves, ...] = ()
-    notes: tuple[str, ...] = ()
-    twin_toml: str = field(default="", repr=False)
-    warnings: tuple[str, ...] = ()
-    labelled: LabelledFacts | None = None
-    next_steps: tuple[NextStep, ...] = ()
-
-    def __post_init__(self) -> None:
-        if not self.groups:
-            object.__setattr__(self, "groups", group_probabilities(self.causes))
-        if self.inseparable is None and self.outcome is GapOutcome.CANNOT_SEPARATE:
-            object.__setattr__(self, "inseparable", rivals(self.causes))
-
-    @property
-    def kind(self) -> GapKind | None:
-        """The kind of fault that is named; None where nothing is, or no kind is likelier than all else together."""
-        return kind_of(self.causes, self.groups) if self.outcome in NAMING else None
-
-    def _repr_html_(self) -> str:
-        """Return the four lines of the verdict and the likeliest causes, for notebooks."""
-        probable = [cause for cause in self.causes if cause.probability >= 0.01][:5]
-        rows = [(cause.title, odds_text(cause.probability), cause.place) for cause in probable]
-        return verdict_html(self.verdict, ("cause", "probability", "place"), rows)
-
-    @property
-    def is_simulated(self) -> bool:
-        """Whether a simulator could be set to the rig; without one there are no sizes in floors, no steps, no twin."""
-        return bool(self.simulator)
-
-    @property
-    def is_beyond(self) -> bool:
-        """Whether an effect is named, or the whole gap exceeds what healthy machines show.
-
-        Single places and lines may exceed their own floors all the same, by chance. True where nothing was simulated:
-        there is no whole then.
-        """
-        return self.outcome in NAMING or not self.size.value <= 1.0
-
-    @property
-    def verdict(self) -> tuple[str, str, str, str]:
-        """Where, which, how far, and what to record next: one line each."""
-        from gearsig.gap._verdict import verdict_lines
-
-        return verdict_lines(self)

@@ -20,8 +20,8 @@ from gearsig.errors import InputError
 from gearsig.formatting import file_label
 from gearsig.recording._assemble import assemble
 from gearsig.recording._limits import CHUNK_BYTES, foreign_errors, read_text_bytes
-from gearsig.recording._table import SECONDS_PER_UNIT, RawTable, condition_numbers, one_condition, one_measurement
-from gearsig.recording._types import Recording, check_recording, split_unit
+from gearsig.recording._table import RawTable, condition_numbers, one_condition, one_measurement
+from gearsig.recording._types import SECONDS_PER_UNIT, Recording, check_recording, split_unit
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
 from gearsig.rig import PulseTimes, Rig, SpeedSource, check_rig, check_speed_source

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.formatting import counted
-from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, SPEED_NAMES, plain_name
+from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, SECONDS_PER_UNIT, SPEED_NAMES, plain_name
 from gearsig.rig import ConstantSpeed, SpeedSource
 
 NumberArray = NDArray[Any]
@@ -89,22 +89,6 @@ TIME_NAMES = frozenset(
         *("time_s", "t_s", "zeit_s", "temps_s", "time_ms", "t_ms"),
     )
 )
-SECONDS_PER_UNIT = {
-    "": 1.0,
-    "s": 1.0,
-    "sec": 1.0,
-    "second": 1.0,
-    "seconds": 1.0,
-    "sek": 1.0,
-    "ms": 1e-3,
-    "msec": 1e-3,
-    "us": 1e-6,
-    "µs": 1e-6,
-    "μs": 1e-6,
-    "ns": 1e-9,
-    "min": 60.0,
-    "h": 3600.0,
-}
 
 
 def seconds_per_unit(name: str, unit: str) -> float | None:

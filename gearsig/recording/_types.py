@@ -40,6 +40,22 @@ INTERVAL_NAMES = frozenset(
 SPEED_NAMES = frozenset(("rpm", "rate", "speed", "shaftspeed", "rotspeed", "speedrpm", "drehzahl", "shaftrate", "hz"))
 """Names of scalars that may be a shaft speed; told to the user, never used."""
 
+SECONDS_PER_UNIT = {
+    "": 1.0,
+    "s": 1.0,
+    "sec": 1.0,
+    "second": 1.0,
+    "seconds": 1.0,
+    "sek": 1.0,
+    "ms": 1e-3,
+    "msec": 1e-3,
+    "us": 1e-6,
+    "µs": 1e-6,
+    "μs": 1e-6,
+    "ns": 1e-9,
+    "min": 60.0,
+    "h": 3600.0,
+}
 RPM_UNITS = frozenset(("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1"))
 _G, _INCH = 9.80665, 0.0254
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "mil": 1e-3 * _INCH}
@@ -130,8 +146,6 @@ def rate_in_line(line: str) -> float | None:
 
 def is_unit(text: str) -> bool:
     """Whether the text is a unit of a quantity or of time that is known here."""
-    from gearsig.recording._table import SECONDS_PER_UNIT
-
     word = text.strip().casefold()
     return _plain_unit(text) in _QUANTITY_OF_UNIT or (word != "" and word in SECONDS_PER_UNIT)
 

@@ -5,10 +5,8 @@ from gearsig.rig._contact import (
     DAMPING_LAWS,
     PathOfContact,
     ToothContact,
-    contact_pair,
     damping_ratio_s_per_m,
     hertz_stiffness_n_per_m1p5,
-    path_of_contact,
     standard_path,
 )
 from gearsig.rig._orders import OrderLine, describe_rig, hunting_tooth_order, order_lines
@@ -42,7 +40,9 @@ from gearsig.rig._types import (
     TachometerChannel,
     check_rig,
     check_speed_source,
+    contact_pair,
     known_ratio,
+    path_of_contact,
     shaft_ratios,
 )
 

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, isfinite, pi, radians, sin, sqrt
-from typing import TYPE_CHECKING
+from math import cos, isfinite, pi, sin, sqrt
 
 import numpy as np
 
 from gearsig.checks import FloatArray, not_negative, one_of, positive, within
-from gearsig.errors import InputError, RefusalError
-
-if TYPE_CHECKING:
-    from gearsig.rig._types import GearPair, Rig
-
+from gearsig.errors import InputError
 
 DAMPING_LAWS = ("flores", "lankarani", "hunt-crossley")
 """Damping of an impact from its restitution; see `damping_ratio_s_per_m`."""
@@ -275,36 +270,6 @@ def _smooth_step(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     return t**3 * (10.0 + t * (6.0 * t - 15.0)), 30.0 * (t * (1.0 - t)) ** 2
 
 
-def path_of_contact(rig: Rig) -> PathOfContact:
-    """Return the path of contact of the pair that the rig's contact names.
-
-    Raises
-    ------
-    RefusalError
-        If the rig has no contact, or teeth, module or pressure angle are missing.
-    """
-    pair = contact_pair(rig)
-    contact = rig.contact
-    if contact is None:
-        raise RefusalError("the rig has no [contact] table", remedy="give the contact's stiffness and backlash there")
-    known = (pair.driver_teeth, pair.driven_teeth, pair.module_mm, pair.pressure_angle_deg)
-    if None in known:
-        raise RefusalError(
-            f"pair {pair.name!r} lacks teeth, module or pressure angle, which the path of contact follows from",
-            remedy="add them to its [[pair]] table",
-        )
-    z1, z2, module_mm, angle_deg = known
-    assert z1 is not None and z2 is not None and module_mm is not None and angle_deg is not None  # noqa: S101, PT018
-    return standard_path(
-        (z1, z2),
-        module_mm * 1e-3,
-        radians(angle_deg),
-        phase=contact.mesh_phase,
-        contact_ratio=contact.contact_ratio,
-        ramp=contact.mesh_ramp,
-    )
-
-
 def standard_path(
     teeth: tuple[int, int],
     module_m: float,
@@ -345,17 +310,3 @@ def standard_path(
     within(ratio, "contact_ratio", 1.0, 2.0, remedy="the model holds for one to two pairs in contact")
     start = length - out_2 - 0.5 * (ratio - standard_ratio) * base_pitch
     return PathOfContact(teeth, (rb1, rb2), ratio, base_pitch, max(start, 0.0), length, phase, ramp)
-
-
-def contact_pair(rig: Rig) -> GearPair:
-    """Return the pair that the rig's contact belongs to."""
-    name = rig.contact.pair if rig.contact is not None else ""
-    if name:
-        return rig.pair(name)
-    if len(rig.pairs) != 1:
-        raise InputError(
-            f"the rig has {len(rig.pairs)} gear pairs and the contact names none",
-            where="rig: [contact]",
-            remedy="name the pair there",
-        )
-    return rig.pairs[0]

@@ -7,8 +7,7 @@ from math import gcd, lcm
 from typing import Literal
 
 from gearsig.errors import RefusalError
-from gearsig.rig._contact import path_of_contact
-from gearsig.rig._types import GearPair, Rig
+from gearsig.rig._types import GearPair, Rig, path_of_contact
 
 OrderKind = Literal["shaft", "mesh", "sideband", "hunting", "bearing"]
 

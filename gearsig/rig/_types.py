@@ -24,7 +24,7 @@ from gearsig.checks import (
 )
 from gearsig.errors import InputError, RefusalError
 from gearsig.rig._catalogue import catalogue_bearing
-from gearsig.rig._contact import ToothContact
+from gearsig.rig._contact import PathOfContact, ToothContact, standard_path
 
 # --------------------
 # Speed ratios of all shafts, from the teeth along the gear train.
@@ -648,3 +648,47 @@ def check_rig(value: object, name: str = "rig", *, needed: bool = False) -> None
     if isinstance(value, str | PathLike):
         remedy = f"read the rig file first: gearsig.read_rig({str(value)!r})"
     instance_of(value, Rig if needed else Rig | None, name, remedy=remedy)
+
+
+def contact_pair(rig: Rig) -> GearPair:
+    """Return the pair that the rig's contact belongs to."""
+    name = rig.contact.pair if rig.contact is not None else ""
+    if name:
+        return rig.pair(name)
+    if len(rig.pairs) != 1:
+        raise InputError(
+            f"the rig has {len(rig.pairs)} gear pairs and the contact names none",
+            where="rig: [contact]",
+            remedy="name the pair there",
+        )
+    return rig.pairs[0]
+
+
+def path_of_contact(rig: Rig) -> PathOfContact:
+    """Return the path of contact of the pair that the rig's contact names.
+
+    Raises
+    ------
+    RefusalError
+        If the rig has no contact, or teeth, module or pressure angle are missing.
+    """
+    pair = contact_pair(rig)
+    contact = rig.contact
+    if contact is None:
+        raise RefusalError("the rig has no [contact] table", remedy="give the contact's stiffness and backlash there")
+    known = (pair.driver_teeth, pair.driven_teeth, pair.module_mm, pair.pressure_angle_deg)
+    if None in known:
+        raise RefusalError(
+            f"pair {pair.name!r} lacks teeth, module or pressure angle, which the path of contact follows from",
+            remedy="add them to its [[pair]] table",
+        )
+    z1, z2, module_mm, angle_deg = known
+    assert z1 is not None and z2 is not None and module_mm is not None and angle_deg is not None  # noqa: S101, PT018
+    return standard_path(
+        (z1, z2),
+        module_mm * 1e-3,
+        radians(angle_deg),
+        phase=contact.mesh_phase,
+        contact_ratio=contact.contact_ratio,
+        ramp=contact.mesh_ramp,
+    )

@@ -1,10 +1,13 @@
 """Spectra over frequency: amplitude, power, envelope, cepstrum."""
 
 from gearsig.spectra._amplitude import (
+    Preparation,
     amplitude_spectrum,
     find_lines,
     noise_floor,
     power_density,
+    prepared_lines,
+    prepared_signal,
     spectrum_of_blocks,
 )
 from gearsig.spectra._bands import LARGEST_SLIP, BandChoice, coherence_band, compare_bands
@@ -24,23 +27,15 @@ from gearsig.spectra._deconvolution import (
     multipoint_norms,
 )
 from gearsig.spectra._envelope import (
-    BandCandidate,
+    ChosenBand,
     Envelope,
     EnvelopeKind,
-    Preparation,
     band_envelope,
     envelope_recording,
     envelope_spectrum,
-    prepared_lines,
-    prepared_signal,
-)
-from gearsig.spectra._kurtogram import (
-    ChosenBand,
-    Kurtogram,
-    kurtogram,
     kurtogram_envelope,
-    splitter,
 )
+from gearsig.spectra._kurtogram import BandCandidate, Kurtogram, kurtogram, splitter
 from gearsig.spectra._types import (
     BATCH_SAMPLES,
     WINDOW_NAMES,

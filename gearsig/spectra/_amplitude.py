@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from gearsig.spectra._types import (
     ComplexArray,
     Scaling,
     Spectrum,
+    checked_signal,
     mean_power,
     named_signal,
     plan_blocks,
@@ -498,3 +500,77 @@ def _half_lobe(window: str) -> float:
     """Return half the main lobe's width in lines: where the response first falls below 1 %."""
     fine = window_response(window, np.arange(0, 128) / 8.0)
     return float(np.argmax(fine < 0.01)) / 8.0
+
+
+# --------------------
+# A signal without its steady tones, or with all lines equally strong.
+# --------------------
+
+Preparation = Literal["none", "tones removed", "whitened"]
+PREPARATIONS = ("none", "tones removed", "whitened")
+
+
+def prepared_signal(values: FloatArray, sampling_rate_hz: float, preparation: Preparation) -> FloatArray:
+    """Return a signal without its steady tones, or with all lines equally strong.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    sampling_rate_hz : float
+    preparation : str
+        "none"; "tones removed": lines of the whole signal's spectrum more than 13 dB above the floor are cut down to
+        the floor, phases kept, which takes out mesh and shaft harmonics of a steady speed; "whitened": every line is
+        divided by its magnitude (cepstral prewhitening), which takes out tones and resonances alike.
+
+    Returns
+    -------
+    array, (n_samples,)
+        In the signal's unit; dimensionless with a mean square of 1 where whitened. Without mean.
+
+    Notes
+    -----
+    Impulses that repeat exactly are lines themselves and go with the tones; a bearing's slip keeps them. Where the
+    speed drifts by more than a line, harmonics are no lines: average over the shaft angle, and take the residual.
+
+    References
+    ----------
+    P. Borghesani, P. Pennacchi, R. B. Randall, N. Sawalhi and R. Ricci, "Application of cepstrum pre-whitening for
+    the diagnosis of bearing faults under variable speed conditions", 2013.
+    """
+    from scipy.fft import irfft, rfft
+
+    x = checked_signal(values, minimum=64)
+    positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+    if one_of(preparation, "preparation", PREPARATIONS) == "none":
+        return x
+    return np.asarray(irfft(prepared_lines(rfft(x.astype(np.float64)), preparation), len(x), overwrite_x=True))
+
+
+def prepared_lines(transform: ComplexArray, preparation: Preparation) -> ComplexArray:
+    """Return the `rfft` of what `prepared_signal` makes of a signal, from the signal's own.
+
+    Parameters
+    ----------
+    transform : array, (n_samples // 2 + 1,)
+    preparation : str
+        As of `prepared_signal`.
+
+    Returns
+    -------
+    array, (n_samples // 2 + 1,)
+        Another array, in the transform's precision.
+    """
+    lines = transform.copy()
+    if preparation == "none":
+        return lines
+    lines[0] = 0.0
+    power = lines.real**2 + lines.imag**2
+    if preparation == "tones removed":
+        floor = floor_of_powers(power)
+        tones = power > 20.0 * floor  # of noise, one line in e²⁰, half a billion, gets there
+        lines[tones] *= np.sqrt(floor[tones] / power[tones])
+    else:
+        level = np.sqrt(2.0 * (len(lines) - 1.0))  # gives a mean square of about 1
+        magnitude = np.abs(lines)
+        lines *= np.divide(level, magnitude, out=np.zeros_like(magnitude), where=magnitude > 0)
+    return lines

@@ -9,9 +9,9 @@ import numpy as np
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import RefusalError
 from gearsig.recording import Recording
-from gearsig.spectra._amplitude import noise_floor
+from gearsig.spectra._amplitude import Preparation, noise_floor, prepared_signal
 from gearsig.spectra._coherence import SpectralCoherence, enhanced_envelope, spectral_coherence
-from gearsig.spectra._envelope import Preparation, envelope_spectrum, prepared_signal
+from gearsig.spectra._envelope import envelope_spectrum
 from gearsig.spectra._kurtogram import kurtogram
 from gearsig.spectra._types import Spectrum, named_signal
 

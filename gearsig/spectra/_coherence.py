@@ -13,7 +13,7 @@ from gearsig.checks import FloatArray, count, freeze, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.results import Result
-from gearsig.spectra._envelope import Preparation, prepared_signal
+from gearsig.spectra._amplitude import Preparation, prepared_signal
 from gearsig.spectra._types import (
     ComplexArray,
     Spectrum,

@@ -1,24 +1,26 @@
-"""Envelope of a frequency band, decimated, and its spectrum."""
+"""Envelope of a frequency band, decimated, and its spectrum; in a given band or in the one that a kurtogram chooses."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from gearsig.checks import FloatArray, freeze, one_of, positive, within
-from gearsig.errors import InputError
+from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
-from gearsig.spectra._amplitude import amplitude_spectrum, floor_of_powers
+from gearsig.spectra._amplitude import Preparation, amplitude_spectrum, prepared_signal
+from gearsig.spectra._kurtogram import BandCandidate, Kurtogram, kurtogram, kurtosis_error
 from gearsig.spectra._types import (
     BATCH_SAMPLES,
     ComplexArray,
     Scaling,
     Spectrum,
-    checked_signal,
     named_signal,
     squared_unit,
 )
@@ -171,8 +173,6 @@ def envelope_spectrum(
     else:
         x, fs, unit, source = named_signal(signal, channel_or_rate_hz, "", "")
         if band_hz is None:
-            from gearsig.spectra._kurtogram import kurtogram  # it takes this module's envelopes
-
             band_hz = kurtogram(x, fs).best_band(narrowest_hz=3.0 * (highest_hz or 0.0)).band_hz
         envelope = band_envelope(x, fs, band_hz, kind=kind, unit=unit, source=source)
     spectrum = amplitude_spectrum(
@@ -365,98 +365,137 @@ def band_taper(n_lines: int, edge_fraction: float) -> FloatArray:
     return taper
 
 
+# --------------------
+# The envelope in the band that the kurtogram chooses.
+# --------------------
+
+
 @dataclass(frozen=True)
-class BandCandidate:
-    """A frequency band and how impulsive it is.
+class ChosenBand:
+    """A band with the kurtogram that chose it, and the envelope and its spectrum there.
 
     Parameters
     ----------
-    low_hz, high_hz : float
-    level : float
-        The spectrum is cut into 2^level bands; thirds stand at log2(3), 1 + log2(3), …
-    kurtosis : float
-        Of the complex envelope, E|z|⁴/(E|z|²)² - 2: 0 for Gaussian noise, -1 for a tone.
-    standard_error : float
-        Of the kurtosis under Gaussian noise.
+    band : BandCandidate
+    kurtogram : Kurtogram
+    envelope : Envelope
+    spectrum : Spectrum
+        Of the envelope, over modulation frequency.
+    warnings : tuple of str
+        What speaks against the choice; empty if nothing does.
+    reason : str
+        Why the band was chosen; empty if it was given.
     """
 
-    low_hz: float
-    high_hz: float
-    level: float
-    kurtosis: float
-    standard_error: float
-
-    @property
-    def band_hz(self) -> tuple[float, float]:
-        """Lower and upper limit."""
-        return self.low_hz, self.high_hz
+    band: BandCandidate
+    kurtogram: Kurtogram
+    envelope: Envelope
+    spectrum: Spectrum
+    warnings: tuple[str, ...]
+    reason: str = ""
 
 
-Preparation = Literal["none", "tones removed", "whitened"]
-PREPARATIONS = ("none", "tones removed", "whitened")
-
-
-def prepared_signal(values: FloatArray, sampling_rate_hz: float, preparation: Preparation) -> FloatArray:
-    """Return a signal without its steady tones, or with all lines equally strong.
+def kurtogram_envelope(
+    recording: Recording,
+    channel: str,
+    *,
+    n_levels: int | None = None,
+    preparation: Preparation = "none",
+    narrowest_hz: float = 0.0,
+    lowest_hz: float = 0.0,
+    highest_hz: float | None = None,
+    highest_modulation_hz: float | None = None,
+    kind: EnvelopeKind = "squared",
+    band_hz: tuple[float, float] | None = None,
+) -> ChosenBand:
+    """Return the envelope spectrum in the band that the channel's own kurtogram chooses, or in a given one.
 
     Parameters
     ----------
-    values : array, (n_samples,)
-    sampling_rate_hz : float
-    preparation : str
-        "none"; "tones removed": lines of the whole signal's spectrum more than 13 dB above the floor are cut down to
-        the floor, phases kept, which takes out mesh and shaft harmonics of a steady speed; "whitened": every line is
-        divided by its magnitude (cepstral prewhitening), which takes out tones and resonances alike.
+    recording : Recording
+    channel : str
+    n_levels, preparation
+        As in `kurtogram`. The envelope is that of the prepared signal.
+    narrowest_hz, lowest_hz, highest_hz : float
+        As in `Kurtogram.best_band`.
+    highest_modulation_hz : float or None
+        Lines of the envelope spectrum above it are left out; the band is at least three times as wide.
+    kind : str
+        Of the envelope, "squared" or "magnitude".
+    band_hz : (float, float) or None
+        Overrides the choice, which is the whole spectrum only where no part of it fits; `narrowest_hz`, `lowest_hz` and
+        `highest_hz` then mean nothing.
 
     Returns
     -------
-    array, (n_samples,)
-        In the signal's unit; dimensionless with a mean square of 1 where whitened. Without mean.
+    ChosenBand
 
-    Notes
-    -----
-    Impulses that repeat exactly are lines themselves and go with the tones; a bearing's slip keeps them. Where the
-    speed drifts by more than a line, harmonics are no lines: average over the shaft angle, and take the residual.
-
-    References
-    ----------
-    P. Borghesani, P. Pennacchi, R. B. Randall, N. Sawalhi and R. Ricci, "Application of cepstrum pre-whitening for
-    the diagnosis of bearing faults under variable speed conditions", 2013.
+    Raises
+    ------
+    InputError
+        As `kurtogram`; also if `band_hz` lies outside of the spectrum.
+    RefusalError
+        As `kurtogram`; also if no band is allowed.
     """
-    from scipy.fft import irfft, rfft
-
-    x = checked_signal(values, minimum=64)
-    positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    if one_of(preparation, "preparation", PREPARATIONS) == "none":
-        return x
-    return np.asarray(irfft(prepared_lines(rfft(x.astype(np.float64)), preparation), len(x), overwrite_x=True))
-
-
-def prepared_lines(transform: ComplexArray, preparation: Preparation) -> ComplexArray:
-    """Return the `rfft` of what `prepared_signal` makes of a signal, from the signal's own.
-
-    Parameters
-    ----------
-    transform : array, (n_samples // 2 + 1,)
-    preparation : str
-        As of `prepared_signal`.
-
-    Returns
-    -------
-    array, (n_samples // 2 + 1,)
-        Another array, in the transform's precision.
-    """
-    lines = transform.copy()
-    if preparation == "none":
-        return lines
-    lines[0] = 0.0
-    power = lines.real**2 + lines.imag**2
-    if preparation == "tones removed":
-        floor = floor_of_powers(power)
-        tones = power > 20.0 * floor  # of noise, one line in e²⁰, half a billion, gets there
-        lines[tones] *= np.sqrt(floor[tones] / power[tones])
+    fs, unit = recording.sampling_rate_hz, recording.channels[recording.index(channel)].unit
+    x = prepared_signal(recording.values(channel), fs, preparation)
+    grid = kurtogram(x, fs, n_levels=n_levels, source=f"{channel}, {preparation}" if preparation != "none" else channel)
+    if highest_modulation_hz is not None:
+        highest = positive(highest_modulation_hz, "highest_modulation_hz", "Hz")
+        if not 8 * fs / len(x) <= highest <= fs / 6.0:
+            raise InputError(
+                f"highest_modulation_hz is {highest:g} Hz",
+                allowed=f"{8 * fs / len(x):.4g} Hz, 8 over the length, to {fs / 6.0:.4g} Hz, a third of the spectrum",
+            )
+        narrowest_hz = max(narrowest_hz, 3.0 * highest)
+    reason = ""
+    if band_hz is None:
+        best = partial(grid.best_band, narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+        band = best()
+        if band.level == 0:  # the envelope of everything mixes in low lines: the best part, if one fits
+            with suppress(RefusalError):
+                band = best(with_whole=False)
+        reason = _reason(grid, band, narrowest_hz, of_modulation=highest_modulation_hz is not None)
     else:
-        level = np.sqrt(2.0 * (len(lines) - 1.0))  # gives a mean square of about 1
-        magnitude = np.abs(lines)
-        lines *= np.divide(level, magnitude, out=np.zeros_like(magnitude), where=magnitude > 0)
-    return lines
+        band = _given_band(x, fs, band_hz)
+    unit = "" if preparation == "whitened" else unit
+    envelope = band_envelope(x, fs, band.band_hz, kind=kind, unit=unit, source=channel)
+    spectrum = envelope_spectrum(envelope, highest_hz=highest_modulation_hz)
+    return ChosenBand(band, grid, envelope, spectrum, grid.warnings(band), reason)
+
+
+def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_modulation: bool) -> str:
+    """Return why a band was chosen, above all where others have more kurtosis."""
+    if band.level == 0:
+        return "It is the whole spectrum: no part of it is wide enough."
+    text = "It has the largest kurtosis"
+    if narrowest_hz > 0.0:
+        text += f" of the bands at least {narrowest_hz:.4g} Hz wide"
+        text += ", three times the highest modulation" if of_modulation else ""
+    narrower = grid.kurtosis[grid.bandwidth_hz < narrowest_hz * (1.0 - 1e-9)]
+    if narrower.size and float(narrower.max()) > band.kurtosis:
+        text += f". Narrower ones reach {narrower.max():.3g}, but their envelopes are too slow to show so fast a rhythm"
+    whole = float(grid.kurtosis[grid.level == 0].max(initial=-np.inf))
+    if whole > band.kurtosis:
+        text += f". The whole spectrum reaches {whole:.3g}, but is no band: impacts may ring all over it"
+    return text + "."
+
+
+def _given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[float, float]) -> BandCandidate:
+    """Return the kurtosis of a band that was not chosen from the tree, see `Kurtogram` for its definition.
+
+    Raises
+    ------
+    InputError
+        If the band lies outside of the spectrum or holds fewer than three lines.
+    RefusalError
+        If there is nothing in the band.
+    """
+    square = band_envelope(values, sampling_rate_hz, band_hz, kind="squared").values
+    mean = float(np.mean(square))
+    if mean <= 0.0:
+        raise RefusalError("there is no signal in the band", remedy="choose another band")
+    n_bands = sampling_rate_hz / 2.0 / (band_hz[1] - band_hz[0])
+    kurtosis = float(np.mean(np.square(square / mean))) - 2.0
+    error = kurtosis_error(2, max(1, round(len(values) / n_bands)))
+    return BandCandidate(float(band_hz[0]), float(band_hz[1]), float(np.log2(n_bands)), kurtosis, error)

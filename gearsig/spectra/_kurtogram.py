@@ -1,29 +1,20 @@
-"""Fast kurtogram, the band it chooses, and the envelope spectrum in that band."""
+"""Fast kurtogram, and the band it chooses."""
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
 
-from gearsig.checks import FloatArray, count, freeze, not_negative, positive
+from gearsig.checks import FloatArray, count, freeze, not_negative
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.recording import Recording
 from gearsig.results import Result
-from gearsig.spectra._envelope import (
-    BandCandidate,
-    Envelope,
-    EnvelopeKind,
-    Preparation,
-    band_envelope,
-    envelope_spectrum,
-    prepared_signal,
-)
-from gearsig.spectra._types import Spectrum, named_signal
+from gearsig.spectra._amplitude import Preparation, prepared_signal
+from gearsig.spectra._types import named_signal
 
 OVERLAP = 1.66
 """Σ|ρ(m)|⁴ over the envelope's lags for the tree's filters (1.60 to 1.75 by path): samples per independent one."""
@@ -36,6 +27,33 @@ def kurtosis_error(n_bands: int, n_samples: int) -> float:
     Var K = (4/n) Σ|ρ(m)|⁴. The whole real band has Hermite's H₄ instead: Var K = 24/n.
     """
     return float(np.sqrt((24.0 if n_bands == 1 else 4.0 * OVERLAP) / n_samples))
+
+
+@dataclass(frozen=True)
+class BandCandidate:
+    """A frequency band and how impulsive it is.
+
+    Parameters
+    ----------
+    low_hz, high_hz : float
+    level : float
+        The spectrum is cut into 2^level bands; thirds stand at log2(3), 1 + log2(3), …
+    kurtosis : float
+        Of the complex envelope, E|z|⁴/(E|z|²)² - 2: 0 for Gaussian noise, -1 for a tone.
+    standard_error : float
+        Of the kurtosis under Gaussian noise.
+    """
+
+    low_hz: float
+    high_hz: float
+    level: float
+    kurtosis: float
+    standard_error: float
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """Lower and upper limit."""
+        return self.low_hz, self.high_hz
 
 
 @dataclass(frozen=True)
@@ -277,31 +295,6 @@ MIN_SAMPLES = 512
 """Of a finest band's envelope: below it the kurtosis of noise alone scatters by more than 0.1."""
 
 
-@dataclass(frozen=True)
-class ChosenBand:
-    """A band with the kurtogram that chose it, and the envelope and its spectrum there.
-
-    Parameters
-    ----------
-    band : BandCandidate
-    kurtogram : Kurtogram
-    envelope : Envelope
-    spectrum : Spectrum
-        Of the envelope, over modulation frequency.
-    warnings : tuple of str
-        What speaks against the choice; empty if nothing does.
-    reason : str
-        Why the band was chosen; empty if it was given.
-    """
-
-    band: BandCandidate
-    kurtogram: Kurtogram
-    envelope: Envelope
-    spectrum: Spectrum
-    warnings: tuple[str, ...]
-    reason: str = ""
-
-
 def kurtogram(
     signal: FloatArray | Recording,
     channel_or_rate_hz: str | float,
@@ -375,112 +368,6 @@ def kurtogram(
     rows = [_row_of_bands(fs, *row) for row in tree_moments(x, levels, mean, spread)]
     lows, highs, level, kurtosis, error, share, n = (np.concatenate(column) for column in zip(*rows, strict=True))
     return Kurtogram(lows, highs, level, kurtosis, error, share, n, preparation, source or "signal")
-
-
-def kurtogram_envelope(
-    recording: Recording,
-    channel: str,
-    *,
-    n_levels: int | None = None,
-    preparation: Preparation = "none",
-    narrowest_hz: float = 0.0,
-    lowest_hz: float = 0.0,
-    highest_hz: float | None = None,
-    highest_modulation_hz: float | None = None,
-    kind: EnvelopeKind = "squared",
-    band_hz: tuple[float, float] | None = None,
-) -> ChosenBand:
-    """Return the envelope spectrum in the band that the channel's own kurtogram chooses, or in a given one.
-
-    Parameters
-    ----------
-    recording : Recording
-    channel : str
-    n_levels, preparation
-        As in `kurtogram`. The envelope is that of the prepared signal.
-    narrowest_hz, lowest_hz, highest_hz : float
-        As in `Kurtogram.best_band`.
-    highest_modulation_hz : float or None
-        Lines of the envelope spectrum above it are left out; the band is at least three times as wide.
-    kind : str
-        Of the envelope, "squared" or "magnitude".
-    band_hz : (float, float) or None
-        Overrides the choice, which is the whole spectrum only where no part of it fits; `narrowest_hz`, `lowest_hz` and
-        `highest_hz` then mean nothing.
-
-    Returns
-    -------
-    ChosenBand
-
-    Raises
-    ------
-    InputError
-        As `kurtogram`; also if `band_hz` lies outside of the spectrum.
-    RefusalError
-        As `kurtogram`; also if no band is allowed.
-    """
-    fs, unit = recording.sampling_rate_hz, recording.channels[recording.index(channel)].unit
-    x = prepared_signal(recording.values(channel), fs, preparation)
-    grid = kurtogram(x, fs, n_levels=n_levels, source=f"{channel}, {preparation}" if preparation != "none" else channel)
-    if highest_modulation_hz is not None:
-        highest = positive(highest_modulation_hz, "highest_modulation_hz", "Hz")
-        if not 8 * fs / len(x) <= highest <= fs / 6.0:
-            raise InputError(
-                f"highest_modulation_hz is {highest:g} Hz",
-                allowed=f"{8 * fs / len(x):.4g} Hz, 8 over the length, to {fs / 6.0:.4g} Hz, a third of the spectrum",
-            )
-        narrowest_hz = max(narrowest_hz, 3.0 * highest)
-    reason = ""
-    if band_hz is None:
-        best = partial(grid.best_band, narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
-        band = best()
-        if band.level == 0:  # the envelope of everything mixes in low lines: the best part, if one fits
-            with suppress(RefusalError):
-                band = best(with_whole=False)
-        reason = _reason(grid, band, narrowest_hz, of_modulation=highest_modulation_hz is not None)
-    else:
-        band = _given_band(x, fs, band_hz)
-    unit = "" if preparation == "whitened" else unit
-    envelope = band_envelope(x, fs, band.band_hz, kind=kind, unit=unit, source=channel)
-    spectrum = envelope_spectrum(envelope, highest_hz=highest_modulation_hz)
-    return ChosenBand(band, grid, envelope, spectrum, grid.warnings(band), reason)
-
-
-def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_modulation: bool) -> str:
-    """Return why a band was chosen, above all where others have more kurtosis."""
-    if band.level == 0:
-        return "It is the whole spectrum: no part of it is wide enough."
-    text = "It has the largest kurtosis"
-    if narrowest_hz > 0.0:
-        text += f" of the bands at least {narrowest_hz:.4g} Hz wide"
-        text += ", three times the highest modulation" if of_modulation else ""
-    narrower = grid.kurtosis[grid.bandwidth_hz < narrowest_hz * (1.0 - 1e-9)]
-    if narrower.size and float(narrower.max()) > band.kurtosis:
-        text += f". Narrower ones reach {narrower.max():.3g}, but their envelopes are too slow to show so fast a rhythm"
-    whole = float(grid.kurtosis[grid.level == 0].max(initial=-np.inf))
-    if whole > band.kurtosis:
-        text += f". The whole spectrum reaches {whole:.3g}, but is no band: impacts may ring all over it"
-    return text + "."
-
-
-def _given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[float, float]) -> BandCandidate:
-    """Return the kurtosis of a band that was not chosen from the tree, see `Kurtogram` for its definition.
-
-    Raises
-    ------
-    InputError
-        If the band lies outside of the spectrum or holds fewer than three lines.
-    RefusalError
-        If there is nothing in the band.
-    """
-    square = band_envelope(values, sampling_rate_hz, band_hz, kind="squared").values
-    mean = float(np.mean(square))
-    if mean <= 0.0:
-        raise RefusalError("there is no signal in the band", remedy="choose another band")
-    n_bands = sampling_rate_hz / 2.0 / (band_hz[1] - band_hz[0])
-    kurtosis = float(np.mean(np.square(square / mean))) - 2.0
-    error = kurtosis_error(2, max(1, round(len(values) / n_bands)))
-    return BandCandidate(float(band_hz[0]), float(band_hz[1]), float(np.log2(n_bands)), kurtosis, error)
 
 
 def _checked_levels(n_samples: int, n_levels: int | None) -> int:

@@ -27,9 +27,9 @@ from gearsig.gap import _types as types
 from gearsig.gap._attribution import Attribution, is_calibrated
 from gearsig.gap._evidence import evidence_of_feature
 from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
+from gearsig.gap._report import GapReport, in_order, most_probable_two, named_cause
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
-from gearsig.gap._types import NAMING, GapCause, GapOutcome, GapPlace, GapReport, Interval
-from gearsig.gap._verdict import in_order, most_probable_two, named_cause
+from gearsig.gap._types import NAMING, GapCause, GapOutcome, GapPlace, Interval
 from gearsig.gap._words import fitted_words, severity_unit
 from gearsig.gap.start_stop._attribution import (
     CRACK,

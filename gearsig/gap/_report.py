@@ -1,9 +1,10 @@
-"""A gap report in four sentences: where, which, how far, and what to record next."""
+"""A gap report, and what it says in four sentences: where, which, how far, and what to record next."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from dataclasses import dataclass, field
+from math import isfinite, nan
 
 from gearsig.formatting import odds_text, percent
 from gearsig.gap._next_recording import HEALTHY_MACHINE, STEPS
@@ -12,24 +13,135 @@ from gearsig.gap._types import (
     LIKELIER_THAN_NOT,
     NAMING,
     NONE,
+    NOT_KNOWN,
     OWN_LABELS,
     UNKNOWN,
+    AngleCurves,
+    AverageCurves,
+    ConditionFacts,
     GapCause,
     GapKind,
     GapOutcome,
     GapPlace,
-    GapReport,
+    GapStep,
     Interval,
+    LabelledFacts,
+    NextRecording,
+    NextStep,
+    SpectrumCurves,
+    group_probabilities,
+    kind_of,
     rivals,
 )
 from gearsig.gap._words import hardly_predicted, same_load, same_speed, severity_unit
+from gearsig.results import Result, verdict_html
 
 
-def verdict_lines(report: GapReport) -> tuple[str, str, str, str]:
-    """Return one line for each question."""
-    if report.is_simulated:
-        return _where(report), _which(report), _shrinkage_text(report), _next(report)
-    return _where_seen(report), _which_seen(report), NO_SIMULATION, _next_seen(report)
+@dataclass(frozen=True)
+class GapReport(Result, rows="causes"):
+    """The answer.
+
+    Parameters
+    ----------
+    rig, simulator : str
+        Names; no simulator where none can be set to the rig.
+    conditions : tuple of ConditionFacts
+    references : tuple of str
+        Names of the healthy recordings that were compared with; empty: the simulation itself is compared with.
+    outcome : GapOutcome
+    size : Interval
+        Of the whole gap in structural floors (the largest that healthy machines reach once in twenty is 1); nan where
+        nothing was simulated.
+    repeatability : float
+        The same in repeatability floors.
+    places : tuple of GapPlace
+        See `gearsig.gap`.
+    causes : tuple of GapCause
+        What the outcome names first, the others by probability; these add up to 1.
+    groups : mapping
+        Group → probability; default: of the causes.
+    inseparable : tuple of str or None
+        Causes that these recordings cannot tell apart, likeliest first; default: `rivals`, where the outcome says so.
+    steps : tuple of GapStep
+        Before, with each effect, what is left.
+    next_recordings : tuple of NextRecording
+        Best first.
+    spectra : tuple of SpectrumCurves
+    angles : tuple of AngleCurves
+    averages : tuple of AverageCurves
+        Empty where there is no reference.
+    notes : tuple of str
+        What the reader should know.
+    warnings : tuple of str
+        What must be checked first, where there is strong evidence of it: a wrong rig file, or recording and reference
+        exchanged. The rest of the report is as if it were not so.
+    twin_toml : str
+        The simulator with the effect fitted, as a preset; empty where none is named.
+    labelled : LabelledFacts or None
+        What labelled recordings of the rig changed; None: none were given.
+    next_steps : tuple of NextStep
+        What would help most besides, best first.
+    """
+
+    rig: str
+    simulator: str
+    conditions: tuple[ConditionFacts, ...]
+    references: tuple[str, ...]
+    outcome: GapOutcome
+    causes: tuple[GapCause, ...]
+    size: Interval = NOT_KNOWN
+    repeatability: float = nan
+    places: tuple[GapPlace, ...] = ()
+    groups: Mapping[str, float] = field(default_factory=dict)
+    inseparable: tuple[str, ...] | None = None
+    steps: tuple[GapStep, ...] = ()
+    next_recordings: tuple[NextRecording, ...] = ()
+    spectra: tuple[SpectrumCurves, ...] = ()
+    angles: tuple[AngleCurves, ...] = ()
+    averages: tuple[AverageCurves, ...] = ()
+    notes: tuple[str, ...] = ()
+    twin_toml: str = field(default="", repr=False)
+    warnings: tuple[str, ...] = ()
+    labelled: LabelledFacts | None = None
+    next_steps: tuple[NextStep, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.groups:
+            object.__setattr__(self, "groups", group_probabilities(self.causes))
+        if self.inseparable is None and self.outcome is GapOutcome.CANNOT_SEPARATE:
+            object.__setattr__(self, "inseparable", rivals(self.causes))
+
+    @property
+    def kind(self) -> GapKind | None:
+        """The kind of fault that is named; None where nothing is, or no kind is likelier than all else together."""
+        return kind_of(self.causes, self.groups) if self.outcome in NAMING else None
+
+    def _repr_html_(self) -> str:
+        """Return the four lines of the verdict and the likeliest causes, for notebooks."""
+        probable = [cause for cause in self.causes if cause.probability >= 0.01][:5]
+        rows = [(cause.title, odds_text(cause.probability), cause.place) for cause in probable]
+        return verdict_html(self.verdict, ("cause", "probability", "place"), rows)
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether a simulator could be set to the rig; without one there are no sizes in floors, no steps, no twin."""
+        return bool(self.simulator)
+
+    @property
+    def is_beyond(self) -> bool:
+        """Whether an effect is named, or the whole gap exceeds what healthy machines show.
+
+        Single places and lines may exceed their own floors all the same, by chance. True where nothing was simulated:
+        there is no whole then.
+        """
+        return self.outcome in NAMING or not self.size.value <= 1.0
+
+    @property
+    def verdict(self) -> tuple[str, str, str, str]:
+        """Where, which, how far, and what to record next: one line each."""
+        if self.is_simulated:
+            return _where(self), _which(self), _shrinkage_text(self), _next(self)
+        return _where_seen(self), _which_seen(self), NO_SIMULATION, _next_seen(self)
 
 
 NO_SIMULATION = (
