@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, frozen_array, instance_of, known_name, positive
+from gearsig.checks import FloatArray, freeze, frozen_array, instance_of, known_name, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
 
@@ -52,8 +52,7 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("time_s", "revolutions", "speed_rev_per_s"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "time_s", "revolutions", "speed_rev_per_s")
         if not len(self.time_s) == len(self.revolutions) == len(self.speed_rev_per_s) >= 2:
             raise InputError("time_s, revolutions and speed_rev_per_s differ in length or have fewer than two knots")
         if np.any(np.diff(self.time_s) <= 0):

@@ -137,9 +137,13 @@ def _examined(
     angle = _angle_of(prepared)
     findings = without_synchronous_hum(findings, angle, known)
     findings += [speed_finding(angle), *speed_doubts(angle, known)]
-    if not (names := [name for name in recording.vibration_names() if name not in dead]):
-        order = ranked([*findings, cannot_tell("all-channels-dead", "Every vibration channel is dead.")])
+
+    def ended(findings: Sequence[Finding]) -> tuple[Analysis, None]:
+        order = ranked(findings)
         return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
+
+    if not (names := [name for name in recording.vibration_names() if name not in dead]):
+        return ended([*findings, cannot_tell("all-channels-dead", "Every vibration channel is dead.")])
 
     # Signals are computed once, then looked at by all detectors; without an angle only those over frequency are there.
     announce("averages and spectra")
@@ -157,8 +161,7 @@ def _examined(
     if doubt is not None:
         findings.append(doubt)
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
-        order = ranked(findings)  # all orders are wrong, and what they would say
-        return Analysis(recording, recording.rig, angle, (), (), order, verdict_of(order), asdict(settings)), None
+        return ended(findings)  # all orders are wrong, and what they would say
     # The reference is analysed by itself, without one of its own: an unfit one is said to be so, and left out.
     if healthy is not None:
         announce("the reference")

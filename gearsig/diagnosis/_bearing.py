@@ -86,7 +86,7 @@ def detect_bearings(
     findings += [
         _unnamed_finding(signals, c) if c.bearing is None else _named_finding(signals, c, 1) for c in families.trains
     ]
-    claimed = any(f.kind in (Kind.FAULT, Kind.SUSPICION) for f in findings)
+    claimed = any(f.is_claim for f in findings)
     if not claimed and signals.rig.bearings and cleaned:
         fixed = cleaned[: len(envelopes)]  # where a damage rings is not known beforehand; an own band follows it
         findings += _none_shows(signals, fixed, families)

@@ -20,13 +20,20 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.recording import Recording, n_samples_of, read_recording
 from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource, TachometerChannel
-from gearsig.spectra import Scaling, Spectrum, plan_blocks, power_density, spectrum_of_blocks, squared_unit
+from gearsig.spectra import (
+    PERIODS_OF_EDGE,
+    Scaling,
+    Spectrum,
+    edged_band,
+    plan_blocks,
+    power_density,
+    spectrum_of_blocks,
+    squared_unit,
+)
 
 BLOCK_SAMPLES = 1 << 20
 """Of a block, per channel: some 100 MB of work at a time."""
 EDGE_FRACTION = 0.1
-PERIODS_OF_EDGE = 50
-"""So many periods of the width of a filter's edge its response reaches: 1/n³ is 1e-5 then."""
 KERNEL_SAMPLES = 64
 """More than the resampling reaches to either side."""
 
@@ -228,9 +235,8 @@ class RecordBlocks:
         side = ceil(PERIODS_OF_EDGE * rate / edge_hz / thinned) * thinned
         n = thinned * next_fast_len(ceil(max(BLOCK_SAMPLES, 4 * side) / thinned))
         frequency = np.arange(n // 2 + 1) * rate / n
-        inside = np.clip(np.minimum(frequency - low_hz, high_hz - frequency) / edge_hz, 0.0, 1.0)
-        lines = np.flatnonzero(inside)
-        response = 2.0 / thinned * np.sin(np.pi / 2 * inside[lines]) ** 2
+        lines, response = edged_band(frequency, (low_hz, high_hz), edge_hz)
+        response *= 2.0 / thinned
         step = n - 2 * side
         for first in range(0, self.n_samples, step):
             begin, end = max(0, first - side), min(self.n_samples, first + step + side)

@@ -170,7 +170,7 @@ def _clearest_text(finding: Finding, signals: AnalysisSignals, reference: Analys
     from gearsig.spectra import compare_bands
 
     order, channel = finding.where.order, next(iter(finding.where.channels), "")
-    is_claim = finding.where.bearing and finding.kind in (Kind.FAULT, Kind.SUSPICION)
+    is_claim = finding.where.bearing and finding.is_claim
     if not is_claim or order is None or signals.speed_varies or reference.speed_varies:
         return ""
     try:
@@ -450,7 +450,7 @@ def change_findings(
     headline = _changed(_largest(changed), off)
     if abs(off) > OTHER_SPEED or signals.speed_varies or reference.speed_varies:
         return [*findings, replace(headline, kind=Kind.NOTICE)]
-    claimed = {f.where.bearing for f in named if f.kind in (Kind.FAULT, Kind.SUSPICION)}
+    claimed = {f.where.bearing for f in named if f.is_claim}
     meanings = _meanings(risen, rest, signals, claimed)
     if not meanings and risen:
         more = "It has no pattern of a known fault: load, temperature or a sensor moved would do it as well."

@@ -96,7 +96,7 @@ def lowered(findings: Iterable[Finding], channels: Sequence[str]) -> list[Findin
     """
     findings = list(findings)
     problems = [f for f in findings if f.code in TRUST]
-    return [_lowered(f, problems, channels) if f.kind in (Kind.FAULT, Kind.SUSPICION) else f for f in findings]
+    return [_lowered(f, problems, channels) if f.is_claim else f for f in findings]
 
 
 def _lowered(finding: Finding, problems: Sequence[Finding], channels: Sequence[str]) -> Finding:

@@ -167,7 +167,7 @@ def beside_reference(
     measured : callable
         Finding → the level of its family of lines here and in the reference, in the same band; None: not measured.
     """
-    return [_beside(f, reference, measured(f)) if f.kind in (Kind.FAULT, Kind.SUSPICION) else f for f in findings]
+    return [_beside(f, reference, measured(f)) if f.is_claim else f for f in findings]
 
 
 def _beside(finding: Finding, reference: Analysis, measured: LevelChange | None) -> Finding:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gearsig.angle import AngleSignal, CombElsewhere, ShaftAngle, comb_elsewhere
 from gearsig.checks import FloatArray
-from gearsig.diagnosis._types import AnalysisSettings, ChannelAnalysis, Finding, Kind, OrderLevel, Strength, Where
+from gearsig.diagnosis._types import AnalysisSettings, ChannelAnalysis, Finding, OrderLevel, Strength, Where
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import OrderMap, SeparatedAverage, SynchronousAverage, separate, whole_revolutions
 from gearsig.prepared import (
@@ -455,11 +455,7 @@ def channel_analysis(
     named = (e for f in findings for e in candidates if f.where.band_hz == e.band_hz and name in f.where.channels)
     clearest = max(candidates, key=lambda e: float(e.excess.scores().sum()), default=None)
     envelope = next(named, clearest)
-    orders = [
-        f.where.order
-        for f in findings
-        if f.where.bearing and f.kind in (Kind.FAULT, Kind.SUSPICION) and name in f.where.channels
-    ]
+    orders = [f.where.order for f in findings if f.where.bearing and f.is_claim and name in f.where.channels]
     if own is not None and not any(witness(own, order) for order in orders if order is not None):
         own = None
     averages = {}

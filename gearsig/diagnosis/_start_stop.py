@@ -111,7 +111,7 @@ def _check_standing(angle_rad: FloatArray, recording: Recording, rig: Rig) -> No
 
 def _motion_finding(segments: MotionSegments) -> Finding:
     """Say how often the machine starts and stops, and when it moves."""
-    top_rpm = max((s.top_speed_rad_s for s in segments.moving), default=0.0) * 30.0 / np.pi
+    top_rpm = segments.top_speed_rpm
     return Finding(
         "start-stop",
         Kind.INFORMATION,

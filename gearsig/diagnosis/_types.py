@@ -126,6 +126,11 @@ class Finding(Result):
     evidence: tuple[str, ...] = ()
     surer: str = ""
 
+    @property
+    def is_claim(self) -> bool:
+        """Whether it claims damage of the machine: a fault or a suspicion."""
+        return self.kind in (Kind.FAULT, Kind.SUSPICION)
+
 
 def cannot_tell(
     code: str, title: str, where: Where | None = None, *, evidence: tuple[str, ...] = (), surer: str = ""

@@ -56,7 +56,7 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     zone = next((f.title for f in findings if f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE), "")
     changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
     others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED))
-    claims = [f for f in others if f.kind in (Kind.FAULT, Kind.SUSPICION)]
+    claims = [f for f in others if f.is_claim]
     # A change that no pattern explains is a suspicion by itself, and said already.
     if not claims and outcome_of(findings) is Outcome.SUSPICION:
         return " ".join(filter(None, (doubt, changed, zone)))  # with a change, the reference was compared

@@ -242,7 +242,7 @@ def _facts(analysis: Analysis, options: AnalysisOptions) -> Row:
     from gearsig.severity import CrackEstimate
 
     recording, rig, angle = analysis.recording, analysis.rig, analysis.shaft_angle
-    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION)]
+    claims = [f for f in analysis.findings if f.is_claim]
     top = min(claims, key=lambda finding: finding.kind is not Kind.FAULT, default=None)
     judged = rig is not None and any(f.code == "vibration-zone" for f in analysis.findings)
     machine = rig.machine if rig is not None and judged else None

@@ -22,7 +22,7 @@ from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._labelled import LabelledChange, LabelledEvidence, labelled_evidence, with_labelled
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
-from gearsig.gap._types import LIKELIER_THAN_NOT, NONE, UNKNOWN, GapOutcome, Shrinkage
+from gearsig.gap._types import LIKELIER_THAN_NOT, NONE, UNKNOWN, GapOutcome, Shrinkage, shares_of
 from gearsig.rig import GearPair
 
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
@@ -111,10 +111,7 @@ class GapCalibration:
         }
         levels[NONE] += self.none_bias + self.none_slope * float(np.log(counted))
         levels[UNKNOWN] += self.unknown_bias
-        top = max(levels.values())
-        weights = {name: float(np.exp(level - top)) for name, level in levels.items()}
-        total = sum(weights.values())
-        return dict(sorted(((name, w / total) for name, w in weights.items()), key=lambda item: -item[1]))
+        return shares_of(levels)
 
     def outcome(
         self, probabilities: Mapping[str, float], groups: Mapping[str, str] = MappingProxyType({})

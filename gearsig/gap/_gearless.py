@@ -500,8 +500,7 @@ def _beyond_reference(
 
     What is barely suspected in one recording is often just missed in another of the same machine.
     """
-    claims = (Kind.FAULT, Kind.SUSPICION)
-    if alone.reference is None or not any(part.finding.kind in claims for part in alone.unexpected):
+    if alone.reference is None or not any(part.finding.is_claim for part in alone.unexpected):
         return alone
     # The prepared one: what its own analysis has resampled and averaged is there.
     reference = next(prepared for prepared in references if prepared.recording is alone.reference.recording)
@@ -510,7 +509,7 @@ def _beyond_reference(
     kept, notes = [], list(alone.notes)
     for part in alone.unexpected:
         finding = now.get((part.finding.code, part.finding.where), part.finding)
-        if part.finding.kind in claims and finding.kind is not part.finding.kind:
+        if part.finding.is_claim and finding.kind is not part.finding.kind:
             notes.append(f"{alone.name}: {finding.title.rstrip('.')}. {finding.evidence[-1]}")
         else:
             kept.append(part)

@@ -27,6 +27,7 @@ from gearsig.gap._recognition import Learned, within_reach
 from gearsig.gap._reduction import ReducedRecording, reduce_recording
 from gearsig.gap._simulator import OperatingCondition, Twin
 from gearsig.gap._trials import features_digest
+from gearsig.gap._types import shares_of
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
 
@@ -218,8 +219,7 @@ def labelled_support(log_ratios: FloatArray) -> float:
     They are kept apart, for one effect at two places, or of two severities, looks like neither in the middle.
     """
     weighted_logs = WEIGHT * log_ratios
-    top = float(weighted_logs.max())
-    return top + float(np.log(np.mean(np.exp(weighted_logs - top))))
+    return float(np.logaddexp.reduce(weighted_logs)) - log(len(weighted_logs))
 
 
 SAME_SPEED = 1.25
@@ -296,8 +296,4 @@ def with_labelled(
     """
     top = max(probabilities.values())
     prior = dict(probabilities) | {name: top * share for name, share in alike.items()}
-    levels = {name: np.log(max(p, 1e-9)) + ratios.get(name, 0.0) for name, p in prior.items()}
-    highest = max(levels.values())
-    weights = {name: float(np.exp(level - highest)) for name, level in levels.items()}
-    total = sum(weights.values())
-    return {name: weight / total for name, weight in sorted(weights.items(), key=lambda item: -item[1])}
+    return shares_of({name: log(max(p, 1e-9)) + ratios.get(name, 0.0) for name, p in prior.items()})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from math import inf, isinf, nan
+from math import exp, inf, isinf, nan
 
 import numpy as np
 
@@ -357,6 +357,14 @@ def group_probabilities(causes: Sequence[GapCause]) -> dict[str, float]:
 TOGETHER, MAX_RIVALS = 0.9, 4
 """What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
 more of them than anybody would look at."""
+
+
+def shares_of(levels: Mapping[str, float]) -> dict[str, float]:
+    """Return probabilities p_c ∝ exp(level_c), likeliest first."""
+    top = max(levels.values())
+    weights = {name: exp(level - top) for name, level in levels.items()}
+    total = sum(weights.values())
+    return {name: weight / total for name, weight in sorted(weights.items(), key=lambda item: -item[1])}
 
 
 def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:

@@ -344,9 +344,7 @@ def _over_severity(
     group: Sequence[SimulatedWaveform], fullest: Sequence[SimulatedWaveform], log_severity: FloatArray
 ) -> FloatArray:
     """Return ln p(u | s) of one set of options."""
-    at, sizes = (
-        np.array(values) for values in zip(*((np.log(c.added.severity), c.log_size) for c in group), strict=True)
-    )
+    at, sizes = _log_sizes(group)
     shape = group if len(group) > 1 else fullest
     size = _straight(log_severity, shape)
     if len(group) == 1:
@@ -364,9 +362,14 @@ def _over_severity(
     return log_likelihood
 
 
+def _log_sizes(group: Sequence[SimulatedWaveform]) -> tuple[FloatArray, FloatArray]:
+    """Return ln of the severities that were simulated, and ln of the sidebands' sizes there."""
+    return np.log([c.added.severity for c in group]), np.array([c.log_size for c in group])
+
+
 def _straight(log_severity: FloatArray, shape: Sequence[SimulatedWaveform]) -> FloatArray:
     """Return ln of the sidebands' size over ln s, straight between simulations and beyond them."""
-    at, size = (np.array(v) for v in zip(*((np.log(c.added.severity), c.log_size) for c in shape), strict=True))
+    at, size = _log_sizes(shape)
     if len(at) == 1:
         return np.asarray(size[0] + (log_severity - at[0]))
     log_size: FloatArray = np.interp(log_severity, at, size)

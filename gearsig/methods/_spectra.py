@@ -10,7 +10,7 @@ import numpy as np
 
 from gearsig import plot, spectra
 from gearsig.angle import ShaftAngle, resample_to_angle
-from gearsig.diagnosis import Analysis, Kind, RecordBlocks, analyze
+from gearsig.diagnosis import Analysis, RecordBlocks, analyze
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import readable
 from gearsig.methods._table import (
@@ -26,7 +26,7 @@ from gearsig.methods._table import (
     waveforms_of,
 )
 from gearsig.orders import OrderMap, SynchronousAverage, order_spectrum
-from gearsig.plot import ChartLine, Cursor, LevelPanel, LinePanel, order_cursors, rhythm_cursors, with_unit
+from gearsig.plot import ChartLine, Cursor, LevelPanel, LinePanel, order_cursors, rhythm_cursors, rig_cursors, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Channel, Recording
 from gearsig.rig import order_lines
@@ -41,12 +41,7 @@ def cursors_of(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> tuple
     angle = angle_or_none(prepared)
     if angle is None or (shown.axis == "frequency" and not angle.is_steady()):
         return ()
-    scale = angle.mean_speed_rpm / 60.0 if shown.axis == "frequency" else 1.0
-    rig = prepared.rig
-    if not rig.shafts:
-        return tuple(Cursor(k * scale, "shaft", f"{k}× shaft", k) for k in (1, 2, 3))
-    base = shown.shaft if shown.shaft in rig.shaft_names else angle.shaft
-    return order_cursors(order_lines(rig, base, n_sidebands=1), scale)
+    return rig_cursors(prepared.rig, angle, shown, n_sidebands=1)
 
 
 def rhythms_of(prepared: PreparedRecording, shown: Spectrum) -> tuple[Cursor, ...]:
@@ -551,7 +546,7 @@ def suggested_rate_hz(analysis: Analysis) -> float | None:
     for finding in analysis.findings:
         shaft = finding.where.gear.rpartition("/")[2] or finding.where.shaft
         is_tooth = finding.where.tooth is not None or finding.where.angle_deg is not None
-        if finding.kind in (Kind.FAULT, Kind.SUSPICION) and is_tooth and shaft in rig.shaft_names:
+        if finding.is_claim and is_tooth and shaft in rig.shaft_names:
             return turns_hz * (rig.ratio(shaft) or 1.0)
     races = (
         ratio * bearing.orders()["BPFO"]

@@ -107,6 +107,11 @@ class MotionSegments(Result, rows="segments"):
         return sum(s.duration_s for s in self.segments if not s.direction) / total
 
     @property
+    def top_speed_rpm(self) -> float:
+        """Highest speed of all segments; 0 where nothing turns."""
+        return max((s.top_speed_rad_s for s in self.moving), default=0.0) * 30.0 / np.pi
+
+    @property
     def backwards_rad(self) -> float:
         """Angle turned against the direction in which most is turned."""
         turned = [sum(abs(s.turned_rad) for s in self.segments if s.direction == d) for d in (1, -1)]

@@ -126,7 +126,7 @@ def start_stop_indicators(
     loss and work per cycle, lost motion.
     """
     n_cycles = max(1, len(segments.moving))
-    top_rpm = max((s.top_speed_rad_s for s in segments.moving), default=0.0) * 30.0 / np.pi
+    top_rpm = segments.top_speed_rpm
     rows: list[tuple[str, float, str, str]] = [
         ("starts", float(len(segments.starts_s)), "", "motion"),
         ("stops", float(len(segments.stops_s)), "", "motion"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array, instance_of
+from gearsig.checks import FloatArray, freeze, instance_of
 from gearsig.errors import RefusalError
 from gearsig.results import Result
 from gearsig.rig import PathOfContact, ToothContact
@@ -175,8 +175,7 @@ class ForceEstimate(Result):
     descriptions: Mapping[str, str]
 
     def __post_init__(self) -> None:
-        for name in ("depth_m", "n_pairs"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), name, ndim=1))
+        freeze(self, "depth_m", "n_pairs")
 
     def to_frame(self) -> DataFrame:
         """Return time, references, models, depth and pairs in contact as a pandas table, one row a sample."""

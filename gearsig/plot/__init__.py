@@ -13,6 +13,7 @@ from gearsig.plot._cursors import (
     order_cursors,
     place,
     rhythm_cursors,
+    rig_cursors,
 )
 from gearsig.plot._fe_gear import (
     draw_shaded,
@@ -224,6 +225,7 @@ __all__ = [
     "recurrence_figure",
     "response_figure",
     "rhythm_cursors",
+    "rig_cursors",
     "series_colours",
     "spectral_coherence",
     "spectrum_figure",

@@ -6,14 +6,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from gearsig.diagnosis import Finding, Kind
+from gearsig.angle import ShaftAngle
+from gearsig.diagnosis import Finding
+from gearsig.orders import OrderMap
 from gearsig.plot import _style as style
 from gearsig.plot._style import plain
+from gearsig.rig import OrderLine, Rig, order_lines
+from gearsig.spectra import Spectrum
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from gearsig.rig import OrderLine
 
 
 PRIORITY = ("mesh", "bearing", "shaft", "hunting", "sideband")
@@ -93,6 +95,32 @@ def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) ->
         kind: len({line.element for line in lines if line.kind == kind}) == 1 for kind in ("mesh", "bearing", "hunting")
     }
     return tuple(_cursor(line, revolutions_per_s, is_only=only.get(line.kind, False)) for line in lines)
+
+
+def rig_cursors(
+    rig: Rig | None, angle: ShaftAngle, shown: Spectrum | OrderMap, *, n_sidebands: int
+) -> tuple[Cursor, ...]:
+    """Return the lines that a rig implies on a spectrum's axis; where it knows no shafts, the shaft's first three.
+
+    Parameters
+    ----------
+    rig : Rig or None
+    angle : ShaftAngle
+        Of the reference shaft; its mean speed places the lines on an axis in Hz.
+    shown : Spectrum or OrderMap
+        Over frequency or order.
+    n_sidebands : int
+        On either side of each mesh line.
+
+    Returns
+    -------
+    tuple of Cursor
+    """
+    scale = angle.mean_speed_rpm / 60.0 if shown.axis == "frequency" else 1.0
+    if rig is None or not rig.shafts:
+        return tuple(Cursor(k * scale, "shaft", f"{k}× shaft", k) for k in (1, 2, 3))
+    base = shown.shaft if shown.shaft in rig.shaft_names else angle.shaft
+    return order_cursors(order_lines(rig, base, n_sidebands=n_sidebands), scale)
 
 
 def rhythm_cursors(cursors: Iterable[Cursor]) -> tuple[Cursor, ...]:
@@ -254,7 +282,7 @@ def marks_of(findings: Iterable[Finding], shaft: str, n_teeth: int | None = None
     for finding in findings:
         where = finding.where
         is_of_shaft = where.shaft == shaft or where.gear.rpartition("/")[2] == shaft
-        if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or not is_of_shaft:
+        if not finding.is_claim or not is_of_shaft:
             continue
         angle = where.angle_deg
         if angle is None and where.tooth is not None and n_teeth:

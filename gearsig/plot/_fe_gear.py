@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+Window = tuple[float, float, float, float]
+"""Low and high x, low and high y, in mm."""
 
 
 def draw_shaded(
@@ -103,9 +106,7 @@ COLUMNS = 3
 TALL_IN = 3.95
 
 
-def gear_mesh_figure(
-    outlines_mm: FloatArray, quality: FloatArray, *, near_mm: tuple[float, float, float, float], title: str = ""
-) -> Figure:
+def gear_mesh_figure(outlines_mm: FloatArray, quality: FloatArray, *, near_mm: Window, title: str = "") -> Figure:
     """Draw the cells of a gear seen along its shaft, coloured by quality, and a tooth close by.
 
     Parameters
@@ -201,7 +202,7 @@ def gear_stress_figure(
     triangles: IntArray,
     stress_pa: FloatArray,
     *,
-    near_mm: tuple[float, float, float, float],
+    near_mm: Window,
     top_pa: float | None = None,
     force: tuple[FloatArray, FloatArray, str] | None = None,
     note: str = "",
@@ -236,14 +237,9 @@ def gear_stress_figure(
     figure, (axes,) = style.panels(
         (TALL_IN,), left_in=0.75, right_in=width_in - 0.75 - wide_in, top_in=0.4, width_in=width_in
     )
-    _frame(axes)
-    inside = (points[:, 0] > near_mm[0]) & (points[:, 0] < near_mm[1])
-    inside &= (points[:, 1] > near_mm[2]) & (points[:, 1] < near_mm[3])
-    top = float(stress[inside].max()) if top_pa is None else top_pa * 1e-6
-    drawn = draw_shaded(axes, points, triangles, stress, window=near_mm, limits=(0.0, top), cmap="viridis")
-    _draw_border(axes, points, points, triangles)
-    axes.set_xlim(*near_mm[:2])
-    axes.set_ylim(*near_mm[2:])
+    shown = stress[_inside(points, near_mm)]
+    top = float(shown.max()) if top_pa is None else top_pa * 1e-6
+    drawn = _draw_stress(axes, points, triangles, stress, near_mm, (0.0, top), "viridis")
     if force is not None:
         place, direction, text = np.asarray(force[0]), np.asarray(force[1]), force[2]
         span = 0.16 * (near_mm[3] - near_mm[2])
@@ -254,7 +250,7 @@ def gear_stress_figure(
     style.label_axes(axes, "x (mm)", "y (mm)")
     if note:
         style.put_text(axes, 0.0, 1.0 + 0.09 / TALL_IN, note, transform=axes.transAxes, va="center")
-    beyond = top < float(stress[inside].max())
+    beyond = top < float(shown.max())
     style.colour_bar(axes, drawn, "von Mises stress (MPa)", extend="max" if beyond else "neither")
     series.headline(figure, title)
     return figure
@@ -265,7 +261,7 @@ def stress_maps_figure(
     triangles: IntArray,
     stress_pa: Mapping[str, FloatArray],
     *,
-    near_mm: tuple[float, float, float, float],
+    near_mm: Window,
     part: float = 0.995,
     title: str = "",
 ) -> Figure:
@@ -299,18 +295,14 @@ def stress_maps_figure(
     figure, panels = style.panels(
         (3.4,) * n_rows, (1.0, 1.0), right_in=0.9, top_in=0.62, column_gap_in=1.5, row_gap_in=0.85
     )
-    inside = (points[:, 0] > near_mm[0]) & (points[:, 0] < near_mm[1])
-    inside &= (points[:, 1] > near_mm[2]) & (points[:, 1] < near_mm[3])
+    inside = _inside(points, near_mm)
     for axes, (name, values) in zip(panels, stress_pa.items(), strict=False):
         stress = series.checked_values(values, len(points), name) * 1e-6
-        _frame(axes)
-        signed = bool(stress[inside].min() < -0.05 * stress[inside].max())
-        top = max(float(np.quantile(np.abs(stress[inside]), part)), 1e-12)
+        shown = stress[inside]
+        signed = bool(shown.min() < -0.05 * shown.max())
+        top = max(float(np.quantile(np.abs(shown), part)), 1e-12)
         low, colours = (-top, "RdBu_r") if signed else (0.0, "viridis")
-        drawn = draw_shaded(axes, points, triangles, stress, window=near_mm, limits=(low, top), cmap=colours)
-        _draw_border(axes, points, points, triangles)
-        axes.set_xlim(*near_mm[:2])
-        axes.set_ylim(*near_mm[2:])
+        drawn = _draw_stress(axes, points, triangles, stress, near_mm, (low, top), colours)
         style.label_axes(axes, "x (mm)", "y (mm)", name)
         style.colour_bar(axes, drawn, "MPa", extend="both" if signed else "max")
     for axes in panels[len(stress_pa) :]:
@@ -329,6 +321,31 @@ def _draw_shape(axes: Axes, points: FloatArray, triangles: IntArray, motion: Flo
     _draw_border(axes, moved, points, triangles)
     axes.set(xlim=(-end, end), ylim=(-end, end), aspect="equal")
     axes.set_axis_off()
+    return drawn
+
+
+def _inside(points: FloatArray, near_mm: Window) -> NDArray[np.bool_]:
+    """Return which points lie in a window: low and high x, low and high y."""
+    (x, y), (left, right, bottom, top) = points.T[:2], near_mm
+    inside: NDArray[np.bool_] = (x > left) & (x < right) & (y > bottom) & (y < top)
+    return inside
+
+
+def _draw_stress(
+    axes: Axes,
+    points: FloatArray,
+    triangles: IntArray,
+    stress: FloatArray,
+    near_mm: Window,
+    limits: tuple[float, float],
+    colours: str,
+) -> Any:
+    """Draw a stress with the body's border in a frame around the window; return what a bar of colours is made of."""
+    _frame(axes)
+    drawn = draw_shaded(axes, points, triangles, stress, window=near_mm, limits=limits, cmap=colours)
+    _draw_border(axes, points, points, triangles)
+    axes.set_xlim(*near_mm[:2])
+    axes.set_ylim(*near_mm[2:])
     return drawn
 
 

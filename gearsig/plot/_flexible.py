@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 
-CYCLES = "mesh cycles (tooth passages)"
 N_LEVELS = 7  # lines of equal values in a map
 
 
@@ -64,7 +63,7 @@ def mesh_maps_figure(
             bar.hlines(levels, 0.0, 1.0, colors=inks, linewidths=0.7, transform=bar.get_yaxis_transform())
             bar.set_yticks([float(f"{level:.3g}") for level in levels])
         style.put_text(axes, 0.0, 1.03, name, colour=style.INK, fontsize=style.TEXT_PT, transform=axes.transAxes)
-        style.label_axes(axes, CYCLES if n < 3 else "mesh cycles", "torque (N·m)" if axes is panels[0] else "")
+        style.label_axes(axes, series.CYCLES if n < 3 else "mesh cycles", "torque (N·m)" if axes is panels[0] else "")
     series.headline(figure, title)
     return figure
 
@@ -194,7 +193,7 @@ def frequency_curves_figure(
         named.setdefault("without contact", line[0])
     axes.set_xlim(float(x[0]), float(x[-1]))
     axes.set_ylim(bottom=0.0)
-    style.label_axes(axes, CYCLES, "natural frequency (kHz)")
+    style.label_axes(axes, series.CYCLES, "natural frequency (kHz)")
     series.head(figure, title, () if uncoupled_hz is None else list(named.values()))
     return figure
 
@@ -215,6 +214,6 @@ def contact_spreading_figure(
     curves = series.checked_curves(frequency_hz, len(x), "frequency_hz")
     figure, (axes,) = style.panels((2.2,), top_in=0.85)
     lines = series.plot_curves(axes, x, curves)
-    style.label_axes(axes, CYCLES, "torsional mode (Hz)")
+    style.label_axes(axes, series.CYCLES, "torsional mode (Hz)")
     series.head(figure, title, lines)
     return figure

@@ -81,13 +81,20 @@ def _draw_levels(
     style.colour_bar(axes, mesh, f"dB re 1 {unit_text(unit)}".strip())
 
 
-def draw_level_map(axes: Axes, at: FloatArray, positions: FloatArray, level: FloatArray, unit: str) -> None:
+def draw_level_map(
+    axes: Axes,
+    at: FloatArray,
+    positions: FloatArray,
+    level: FloatArray,
+    unit: str,
+    span_db: float = DYNAMIC_RANGE_DB,
+) -> None:
     """Draw levels in dB, (n_positions, n_at), the largest of the cells in a pixel, with their bar of colours."""
     at, level = _fewer_cells(at, level, axis=1, n_max=N_COLUMNS)
     positions, level = _fewer_cells(positions, level, axis=0, n_max=N_ROWS)
     logarithmic = axes.get_yscale() == "log"
     y = np.exp(_cell_borders(np.log(positions))) if logarithmic else np.maximum(_cell_borders(positions), 0.0)
-    _draw_levels(axes, _cell_borders(at), y, level, unit)
+    _draw_levels(axes, _cell_borders(at), y, level, unit, span_db)
     if logarithmic:
         style.number_decades(axes.yaxis)
 
@@ -153,13 +160,11 @@ def time_frequency_figure(
     logarithmic = levels.spacing == "logarithmic"
     if logarithmic:
         axes.set_yscale("log")
-    at, values = _fewer_cells(levels.at, levels.values, axis=0, n_max=N_COLUMNS)
-    positions, values = _fewer_cells(levels.positions, values, axis=1, n_max=N_ROWS)
-    x = _cell_borders(at)
-    y = np.exp(_cell_borders(np.log(positions))) if logarithmic else np.maximum(_cell_borders(positions), 0.0)
-    _draw_levels(axes, x, y, decibels(values.T, levels.scaling), levels.unit, dynamic_range_db)
-    inside = levels.edge < (x[-1] - x[0]) / 2
-    for side in (x[0] + levels.edge, x[-1] - levels.edge):
+    level = decibels(levels.values.T, levels.scaling)
+    draw_level_map(axes, levels.at, levels.positions, level, levels.unit, dynamic_range_db)
+    start, end = axes.get_xlim()
+    inside = levels.edge < (end - start) / 2
+    for side in (start + levels.edge, end - levels.edge):
         axes.plot(side[inside], levels.positions[inside], color="white", linewidth=2.2)
         axes.plot(side[inside], levels.positions[inside], color=style.QUIET, linewidth=0.8, linestyle=(0, (4, 3)))
     for number, ridge in enumerate(ridges, start=1):
@@ -173,9 +178,7 @@ def time_frequency_figure(
             style.put_text(axes, *where, str(number), colour=style.FAULT, ha="center", va="center", bbox=disc)
     style.label_axes(axes, levels.at_label, levels.axis_label, levels.source)
     style.note(axes, f"{levels.method}; {'mean power' if levels.reduction == 'mean' else 'largest'} per column")
-    if logarithmic:
-        style.number_decades(axes.yaxis)
-    else:
+    if not logarithmic:
         style.no_offset(axes)
     return figure
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 
 STIFFNESS_UNIT = 1e8
-CYCLES = "mesh cycles (tooth passages)"
 MICRO = 1e6
 
 
@@ -62,7 +61,7 @@ def mesh_stiffness_figure(
     label = "mesh stiffness (10⁸ N/m)"
     figure, (axes, *close) = style.panels((2.1,), (1.0,) if single_pair is None else (1.7, 1.0), top_in=0.65)
     lines = series.plot_curves(axes, x, shown, 1.4)
-    style.label_axes(axes, CYCLES, label)
+    style.label_axes(axes, series.CYCLES, label)
     if single_pair is not None:
         low, high = series.checked_limits(single_pair, "single_pair")
         inside = (x >= low) & (x <= high)
@@ -121,7 +120,7 @@ def load_sharing_figure(
     upper.set_ylim(0.0, 1.06 * highest or 1.0)
     cases = series.plot_curves(lower, x, {label: error * 1e6 for label, error in errors.items()}, 1.4)
     style.label_axes(upper, "", "force of a pair (N)")
-    style.label_axes(lower, CYCLES, "transmission error (µm)")
+    style.label_axes(lower, series.CYCLES, "transmission error (µm)")
     series.legend_row(figure, cases, top_in=2.46)
     series.headline(figure, title)
     return figure

@@ -22,6 +22,7 @@ from gearsig.checks import FloatArray
 from gearsig.fleet import Trend
 from gearsig.formatting import readable, unit_text
 from gearsig.orders import SynchronousAverage
+from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import AngleMark, Cursor
 from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, line_colour, pooled_levels
@@ -455,9 +456,7 @@ def _padded_range(curves: Sequence[FloatArray], *, logarithmic: bool) -> tuple[f
     if logarithmic and (values > 0).any():
         high = float(values.max())
         return max(float(np.percentile(values[values > 0], 5)), high * 1e-6) / 2, 2 * high
-    low, high = float(values.min()), float(values.max())
-    margin = 0.06 * (high - low) or 1.0
-    return low - margin, high + margin
+    return series.padded(values)
 
 
 def _ticks(low: float, high: float, n: int) -> list[float]:

@@ -162,14 +162,14 @@ def _give_columns_one_scale(
     richest = max(float(np.median(amplitude)) for amplitude in lines)
     bottom = min(max(richest / 30.0, top * 1e-6), top / 10.0)
     for time, spectrum, phase, section in rows:
-        time.set_ylim(*_padded(y * MICRO))
+        time.set_ylim(*series.padded(y * MICRO))
         time.locator_params(axis="x", nbins=4)
         spectrum.set_ylim(bottom, 2.0 * top)
-        phase.set_xlim(*_padded(y * MICRO))
-        phase.set_ylim(*_padded(v * MILLI))
+        phase.set_xlim(*series.padded(y * MICRO))
+        phase.set_ylim(*series.padded(v * MILLI))
         if dots_y.size:
-            section.set_xlim(*_padded(dots_y))
-            section.set_ylim(*_padded(dots_v))
+            section.set_xlim(*series.padded(dots_y))
+            section.set_ylim(*series.padded(dots_v))
         for axes in (phase, section):
             axes.locator_params(nbins=4)
         for axes in (time, spectrum, phase, section):
@@ -182,12 +182,6 @@ def _inside(case: ResponseCase, limits: tuple[float, float]) -> np.ndarray[tuple
     if not inside.any():
         raise InputError(f"no line of {case.name!r} lies within {limits[0]:g} to {limits[1]:g} Hz", where="limits_hz")
     return np.asarray(inside)
-
-
-def _padded(values: FloatArray) -> tuple[float, float]:
-    low, high = float(values.min()), float(values.max())
-    margin = 0.06 * (high - low) or 1.0
-    return low - margin, high + margin
 
 
 def crack_comparison_figure(

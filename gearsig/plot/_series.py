@@ -26,6 +26,17 @@ N_POINTS = 4000
 """Points of a thinned line: more than twice the pixel columns of a figure."""
 
 
+CYCLES = "mesh cycles (tooth passages)"
+"""Label of an axis over the mesh."""
+
+
+def padded(values: FloatArray) -> tuple[float, float]:
+    """Return limits of an axis that leave a little room around values."""
+    low, high = float(values.min()), float(values.max())
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
 def series_colours(n: int) -> tuple[str, ...]:
     """Return `n` colours from dark blue to orange: lightness grows with the order, so that all readers see it.
 

@@ -39,7 +39,7 @@ from gearsig.formatting import (
     with_minus,
 )
 from gearsig.plot import Captioned, Cursor, Picture, embed
-from gearsig.report._files import render
+from gearsig.report._files import date_text, render
 from gearsig.report._json import Layout, document, plain
 
 # --------------------
@@ -332,7 +332,7 @@ def comparison_page(comparison: Comparison, *, command: str = "", date: datetime
         recorded=_record_rows(comparison.recorded),
         alignment=tuple(alignment_texts(comparison)),
         channels=[_section(comparison, channel, i) for i, channel in enumerate(comparison.channels)],
-        provenance=_provenance(comparison, command, date or datetime.now().astimezone()),
+        provenance=_provenance(comparison, command, date),
     )
 
 
@@ -405,12 +405,12 @@ def _record_rows(facts: RecordFacts) -> Rows:
     )
 
 
-def _provenance(comparison: Comparison, command: str, date: datetime) -> Rows:
+def _provenance(comparison: Comparison, command: str, date: datetime | None) -> Rows:
     rows = (
         ("SHA-256, simulation", comparison.simulated.sha256),
         ("SHA-256, recording", comparison.recorded.sha256),
         ("version", f"gearsig {__version__}"),
-        ("date", date.strftime("%Y-%m-%d %H:%M %Z").strip()),
+        ("date", date_text(date)),
         ("command", command),
     )
     return tuple((name, text) for name, text in rows if text)

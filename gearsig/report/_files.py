@@ -149,6 +149,11 @@ def _environment() -> Environment:
     return environment
 
 
+def date_text(date: datetime | None = None) -> str:
+    """Return when a page was made, as pages say it; None: now."""
+    return (date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip()
+
+
 # --------------------
 # The page of a benchmark: tables and figures, one section each.
 # --------------------
@@ -187,6 +192,6 @@ def benchmark_html(
         summary=summary,
         sections=sections,
         provenance=provenance,
-        date=f"{date:%Y-%m-%d %H:%M %Z}".strip(),
+        date=date_text(date),
         version=__version__,
     )

@@ -14,7 +14,7 @@ from gearsig.errors import InputError
 from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, counts_text, fleet_changes, trends_text
 from gearsig.formatting import readable, unit_text
 from gearsig.plot import Picture, fleet_trend_picture
-from gearsig.report._files import render
+from gearsig.report._files import date_text, render
 from gearsig.report._pdf import compiled, put_picture, write_pdf
 
 LEVEL_CLASSES = {"alarm": "fault", "warning": "suspicion", "unknown": "cannot-tell", "ok": "no-fault"}
@@ -71,7 +71,7 @@ def _page_values(fleet: Fleet, since: datetime | None, date: datetime | None) ->
     n_points = len(changes.status)
     return {
         "since": f"since {since:%Y-%m-%d %H:%M} UTC" if since is not None else "since the beginning",
-        "date": (date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip(),
+        "date": date_text(date),
         "version": __version__,
         "summary": _summary(changes),
         "counts": f"{counts_text(changes.status)}." if n_points else "",

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from datetime import datetime
-from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from gearsig import __version__, plot
+from gearsig import plot
 from gearsig.cache import write_text
 from gearsig.formatting import enumerated, named, odds_text, percent, readable, signed
 from gearsig.gap import (
@@ -40,7 +38,7 @@ from gearsig.gap import (
     stance_words,
 )
 from gearsig.report._files import render
-from gearsig.report._sections import Rows
+from gearsig.report._sections import Rows, made_rows
 
 N_DETAILED = 3
 """Causes whose evidence is shown."""
@@ -311,17 +309,14 @@ def condition_rows(report: GapReport) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def fact_rows(report: GapReport, command: str, date: datetime) -> Rows:
+def fact_rows(report: GapReport, command: str, date: datetime | None = None) -> Rows:
     """Return what the diagnosis rests on, and how to repeat it."""
-    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
     rows = (
         ("rig", report.rig),
         ("simulator", report.simulator or "none: nothing was simulated"),
         ("healthy references", references_text(report)),
         ("size of the gap", size_text(report)),
-        ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
-        ("date", date.strftime("%Y-%m-%d %H:%M %Z").strip()),
-        ("command", command),
+        *made_rows(command, date),
     )
     return tuple((name, text) for name, text in rows if text)
 
@@ -649,6 +644,6 @@ def gap_page_html(report: GapReport, *, command: str = "", date: datetime | None
         steps=step_rows(report),
         next_recordings=next_rows(report),
         conditions=condition_rows(report),
-        facts_rows=fact_rows(report, command, date or datetime.now().astimezone()),
+        facts_rows=fact_rows(report, command, date),
         galleries=gap_galleries(report),
     )

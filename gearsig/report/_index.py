@@ -22,7 +22,7 @@ from gearsig.fleet import date_in_name
 from gearsig.formatting import percent, readable, spreadsheet_cell, unit_text
 from gearsig.indicators import Indicator
 from gearsig.plot import with_unit
-from gearsig.report._files import render
+from gearsig.report._files import date_text, render
 from gearsig.report._pdf import compiled, write_pdf
 from gearsig.report._sections import css_class, headline_of
 from gearsig.severity import CrackEstimate
@@ -83,7 +83,7 @@ class Failure:
 
 def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
     """Sum up an analysis for the index page."""
-    claims = (f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION))
+    claims = (f for f in analysis.findings if f.is_claim)
     top = min(claims, key=lambda finding: finding.kind is not Kind.FAULT, default=None)
     crack_mm, crack = None, analysis.crack
     if isinstance(crack, CrackEstimate) and not crack.likelier_other and top is not None:
@@ -261,7 +261,7 @@ def write_index(
     """
     path = Path(path)
     index = index_of(entries, failures)
-    made = (date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip()
+    made = date_text(date)
     html = render(
         "index.html.j2",
         index=index,

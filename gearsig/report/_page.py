@@ -19,7 +19,7 @@ from gearsig.errors import RefusalError
 from gearsig.formatting import readable, unit_text
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
-from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed, order_cursors
+from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed
 from gearsig.prepared import circular_correlation
 from gearsig.recording import si_factor
 from gearsig.report._files import render
@@ -52,15 +52,9 @@ def speed_is_constant(analysis: Analysis) -> bool:
 
 def line_cursors(analysis: Analysis, spectrum: Spectrum | OrderMap, *, n_sidebands: int = 2) -> tuple[Cursor, ...]:
     """Return the lines that the rig implies on a spectrum's axis; without a rig the shaft's first three."""
-    scale = _per_order(analysis, spectrum)
-    if scale is None:
+    if not isinstance(analysis.shaft_angle, ShaftAngle) or spectrum.axis == "quefrency":
         return ()
-    if analysis.rig is None or not analysis.rig.shafts:
-        return tuple(Cursor(k * scale, "shaft", f"{k}× shaft", k) for k in (1, 2, 3))
-    from gearsig.rig import order_lines
-
-    shaft = spectrum.shaft if spectrum.shaft in analysis.rig.shaft_names else _reference(analysis)
-    return order_cursors(order_lines(analysis.rig, shaft, n_sidebands=n_sidebands), scale)
+    return plot.rig_cursors(analysis.rig, analysis.shaft_angle, spectrum, n_sidebands=n_sidebands)
 
 
 def bearing_cursors(analysis: Analysis, spectrum: Spectrum) -> tuple[Cursor, ...]:
@@ -116,7 +110,7 @@ def marked_positions(
     """
     positions: list[float] = []
     for finding in sorted(analysis.findings, key=_faults_first):
-        if finding.kind not in (Kind.FAULT, Kind.SUSPICION) or is_of_envelope(finding.where) != of_bearings:
+        if not finding.is_claim or is_of_envelope(finding.where) != of_bearings:
             continue
         if finding.where.channels and channel not in finding.where.channels:
             continue
@@ -194,7 +188,7 @@ def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
         return None
     if analysis.motion is not None:
         return VerdictPicture("motion", next(iter(channels.values())))
-    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION) or f.code == "resonance"]
+    claims = [f for f in analysis.findings if f.is_claim or f.code == "resonance"]
     for finding in sorted(claims, key=_faults_first):
         where = finding.where
         channel = next((channels[name] for name in where.channels if name in channels), next(iter(channels.values())))
@@ -367,7 +361,7 @@ def gallery(analysis: Analysis, methods: Sequence[str] | None = None) -> Gallery
         groups.append(PictureGroup("Starts and stops", tuple(drawn)))
     if (crack := crack_picture(analysis)) is not None:
         groups.append(PictureGroup("The damaged tooth", (crack,)))
-    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION)]
+    claims = [f for f in analysis.findings if f.is_claim]
     channels = {channel.channel: channel for channel in analysis.channels}
     named = dict.fromkeys(name for f in claims for name in f.where.channels if name in channels)
     detailed = list(named)[:N_DETAILED] or list(channels)[:1]  # the first one where no finding names any
@@ -693,7 +687,7 @@ def page_html(
     mark: str = "",
 ) -> str:
     """Return the page that `write_page` writes."""
-    parts = page_parts(analysis, command=command, date=date or datetime.now().astimezone(), methods=methods)
+    parts = page_parts(analysis, command=command, date=date, methods=methods)
     return render(
         "page.html.j2",
         **parts,
@@ -706,7 +700,7 @@ def page_html(
 
 
 def page_parts(
-    analysis: Analysis, *, command: str, date: datetime, methods: Sequence[str] | None = None
+    analysis: Analysis, *, command: str, date: datetime | None, methods: Sequence[str] | None = None
 ) -> dict[str, Any]:
     """Return what the page says, in HTML as in PDF."""
     recording = analysis.recording

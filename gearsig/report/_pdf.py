@@ -46,7 +46,7 @@ def page_pdf(
     InputError
         If typst is not installed.
     """
-    parts = page_parts(analysis, command=command, date=date or datetime.now().astimezone(), methods=methods)
+    parts = page_parts(analysis, command=command, date=date, methods=methods)
     pictures: dict[str, bytes] = {}
     verdict = parts["verdict_picture"]
     data = {

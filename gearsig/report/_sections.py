@@ -33,10 +33,10 @@ from gearsig.diagnosis import (
 )
 from gearsig.formatting import counted, named, percent, readable, signed, unit_text, with_minus
 from gearsig.indicators import Indicator
+from gearsig.report._files import date_text
 from gearsig.rig import Bearing, GearPair, Rig
 
 Rows = tuple[tuple[str, str], ...]
-_CLAIMS = (Kind.FAULT, Kind.SUSPICION)
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def finding_cards(findings: Sequence[Finding]) -> tuple[FindingCard, ...]:
 
 def is_confidence_stated(finding: Finding) -> bool:
     """Whether a finding's confidence is more than that of a plain statement."""
-    return finding.kind in _CLAIMS or finding.confidence < 1.0
+    return finding.is_claim or finding.confidence < 1.0
 
 
 def sureness_text(finding: Finding) -> str:
@@ -276,11 +276,10 @@ def speed_rows(angle: ShaftAngle | CannotTell) -> Rows:
     )
 
 
-def provenance_rows(analysis: Analysis, command: str, date: datetime) -> Rows:
+def provenance_rows(analysis: Analysis, command: str, date: datetime | None) -> Rows:
     """Return everything needed to make the page again."""
     recording = analysis.recording
     origin = recording.provenance
-    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
     rows = [
         ("file", origin.source),
         ("SHA-256", origin.sha256),
@@ -288,11 +287,19 @@ def provenance_rows(analysis: Analysis, command: str, date: datetime) -> Rows:
         ("history", "; ".join(origin.history)),
         ("sampling rate", f"{recording.sampling_rate_hz:.10g} Hz"),
         ("parameters", "; ".join(setting_text(name, value) for name, value in analysis.settings.items())),
-        ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
-        ("date", date.strftime("%Y-%m-%d %H:%M %Z").strip()),
-        ("command", command),
+        *made_rows(command, date),
     ]
     return tuple((name, text) for name, text in rows if text)
+
+
+def made_rows(command: str, date: datetime | None) -> Rows:
+    """Return what a page was made with and when; the date None: now."""
+    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
+    return (
+        ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
+        ("date", date_text(date)),
+        ("command", command),
+    )
 
 
 _SETTINGS = {

@@ -27,10 +27,12 @@ from gearsig.spectra._deconvolution import (
     multipoint_norms,
 )
 from gearsig.spectra._envelope import (
+    PERIODS_OF_EDGE,
     ChosenBand,
     Envelope,
     EnvelopeKind,
     band_envelope,
+    edged_band,
     envelope_recording,
     envelope_spectrum,
     kurtogram_envelope,
@@ -61,6 +63,7 @@ from gearsig.spectra._types import (
 __all__ = [
     "BATCH_SAMPLES",
     "LARGEST_SLIP",
+    "PERIODS_OF_EDGE",
     "WINDOW_NAMES",
     "BandCandidate",
     "BandChoice",
@@ -86,6 +89,7 @@ __all__ = [
     "checked_signal",
     "coherence_band",
     "compare_bands",
+    "edged_band",
     "enhanced_envelope",
     "envelope_recording",
     "envelope_spectrum",

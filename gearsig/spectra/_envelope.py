@@ -9,6 +9,7 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, freeze, one_of, positive, within
 from gearsig.errors import InputError, RefusalError
@@ -272,7 +273,24 @@ def _complex_envelope(
 
 
 PERIODS_OF_EDGE = 50
-"""Of the width of a raised-cosine edge, beyond which the filter's response is 1e-5."""
+"""Of the width of a raised-cosine edge, to where the filter's response reaches: it falls as 1/n³, which is 1e-5 then."""
+
+
+def edged_band(
+    frequency_hz: FloatArray, band_hz: tuple[float, float], edge_hz: float
+) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return the numbers of a band's lines, and its response there: 1 between raised-cosine edges that lie inside it.
+
+    Parameters
+    ----------
+    frequency_hz : array, (n_lines,)
+    band_hz : (float, float)
+    edge_hz : float
+        Width of either edge.
+    """
+    inside = np.clip(np.minimum(frequency_hz - band_hz[0], band_hz[1] - frequency_hz) / edge_hz, 0.0, 1.0)
+    lines = np.flatnonzero(inside)
+    return lines, np.sin(np.pi / 2 * inside[lines]) ** 2
 
 
 @dataclass(frozen=True)
@@ -302,17 +320,14 @@ class _Blocks:
 
     @classmethod
     def of(cls, band_hz: tuple[float, float], fs: float, edge_fraction: float, highest_hz: float) -> _Blocks:
-        low_hz, high_hz = band_hz
-        edge_hz = edge_fraction * (high_hz - low_hz)
+        edge_hz = edge_fraction * (band_hz[1] - band_hz[0])
         ringing = PERIODS_OF_EDGE * fs * (1.0 / edge_hz + 1.0 / highest_hz)
         n = 1 << max(13, int(np.ceil(np.log2(8 * ringing))))
         hertz = np.arange(n // 2) * fs / n
-        inside = np.clip(np.minimum(hertz - low_hz, high_hz - hertz) / edge_hz, 0.0, 1.0)
-        lines = np.flatnonzero(inside)
+        lines, response = edged_band(hertz, band_hz, edge_hz)
         n_band, n_out = (_multiple_of_eight(k) for k in (4 * len(lines) + 1, 3 * highest_hz * n / fs))
         # Full up to the highest modulation, nothing from twice that on, which would be mirrored to it.
         slow = np.clip(2.0 - hertz[: n_out // 2 + 1] / highest_hz, 0.0, 1.0)
-        response = np.sin(np.pi / 2 * inside[lines]) ** 2
         return cls(n, n_band, n_out, int(lines[0]), response, np.sin(np.pi / 2 * slow) ** 2)
 
     def pay(self, n_samples: int, has_transform: bool) -> bool:

@@ -100,7 +100,7 @@ def _show_grounds(analysis: Analysis) -> None:
     """Show what changed since the reference, and how strong and how sure the first finding is."""
     if analysis.reference is not None:
         _show_changes(analysis, analysis.reference)
-    claims = [f for f in analysis.findings if f.kind in (Kind.FAULT, Kind.SUSPICION) and f.code != CHANGED]
+    claims = [f for f in analysis.findings if f.is_claim and f.code != CHANGED]
     for finding in claims[:1] or [f for f in analysis.findings if f.kind is not Kind.INFORMATION][:1]:
         card = finding_card(finding)
         if card.title.rstrip(".") not in analysis.verdict:

@@ -12,7 +12,6 @@ from gearsig.gap.start_stop._attribution import (
     fit,
     load_floors,
     own_features,
-    shares,
     shrink,
 )
 from gearsig.gap.start_stop._comparison import (
@@ -68,7 +67,6 @@ __all__ = [
     "prediction_errors",
     "read_cycles",
     "robust_least_squares",
-    "shares",
     "shrink",
     "spot_of",
     "thin",

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.gap._attribution import Attribution, GapCalibration, calibration_values
 from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
-from gearsig.gap._types import NONE, UNKNOWN, Interval, Shrinkage
+from gearsig.gap._types import NONE, UNKNOWN, Interval, Shrinkage, shares_of
 from gearsig.gap.start_stop._cycles import FEATURES, NAMES
 
 FLOORS_FILE = Path(__file__).with_name("floors.json")
@@ -237,7 +237,7 @@ def fit(cause: PredictedCause, change: FloatArray, floor: DriveFloor) -> FittedD
         return np.array([float(np.sum(floor.log_density(change, p, error * np.abs(p) + free))) for p in predicted])
 
     logs = likelihoods(model_error)
-    evidence = float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))))
+    evidence = float(np.logaddexp.reduce(logs) - np.log(len(logs)))
     if cause.direct is not None and np.any(cause.direct & np.isfinite(change)):
         logs = likelihoods(np.where(cause.direct, direct_error, model_error))
     best = int(np.argmax(logs))
@@ -264,13 +264,6 @@ def evidences(change: FloatArray, floor: DriveFloor, fits: Sequence[FittedDriveC
     every = float(np.sum(floor.log_density(change, nothing, 4.0 * floor.scale)))
     unknown = float(np.logaddexp.reduce([alone, pairs, every]) - np.log(3.0))
     return {fitted.name: fitted.log_evidence for fitted in fits} | {NONE: total, UNKNOWN: unknown}
-
-
-def shares(logs: Mapping[str, float]) -> dict[str, float]:
-    """Return probabilities in proportion to the evidence."""
-    top = max(logs.values())
-    weights = {name: float(np.exp(value - top)) for name, value in logs.items()}
-    return {name: w / sum(weights.values()) for name, w in weights.items()}
 
 
 def own_features(predicted: FloatArray, change: FloatArray, floor: DriveFloor) -> NDArray[np.intp]:
@@ -381,7 +374,7 @@ def attribute_drive(
         for name, *cause_fits in zip(names, *fits, strict=True)
     }
     return Attribution(
-        shares({name: float(np.mean([log[name] for log in logs])) for name in logs[0]}),
+        shares_of({name: float(np.mean([log[name] for log in logs])) for name in logs[0]}),
         {name: replace(fitted, shrinkage=_shrinkage(name, folds)) for name, fitted in best.items()},
         calibration,
     )
