@@ -60,7 +60,6 @@ def encoder_angle(
     units_per_revolution: float = 360.0,
     *,
     wraps: bool = True,
-    shaft: str = "",
 ) -> ShaftAngle:
     """Turn an angle channel, wrapping or running on, into shaft angle.
 
@@ -76,7 +75,6 @@ def encoder_angle(
         360 for degrees, 2π for radians, the line count for counts.
     wraps : bool
         Whether the angle starts again after each revolution.
-    shaft : str
 
     Returns
     -------
@@ -107,7 +105,7 @@ def encoder_angle(
     angle = np.maximum.accumulate(angle)
     duration = (len(x) - 1) / sampling_rate_hz
     return ShaftAngle(
-        shaft,
+        "",
         positions / sampling_rate_hz,
         angle,
         np.maximum(slopes, 0.0) * sampling_rate_hz,
@@ -154,9 +152,7 @@ def _half_width(revolutions: FloatArray, noise: float) -> tuple[int, tuple[str, 
 # From a speed channel to shaft angle.
 
 
-def speed_channel_angle(
-    values: FloatArray, sampling_rate_hz: float, rpm_per_unit: float = 1.0, *, shaft: str = ""
-) -> ShaftAngle:
+def speed_channel_angle(values: FloatArray, sampling_rate_hz: float, rpm_per_unit: float = 1.0) -> ShaftAngle:
     """Integrate a speed channel to shaft angle, zero at the first sample.
 
     revolutions(t) = ∫ rpm/60 dt, by trapezoids over all samples, knots every 0.05 s; the speed at a knot is a
@@ -168,7 +164,6 @@ def speed_channel_angle(
         rpm after multiplying by `rpm_per_unit`; negative throughout for a shaft that turns backwards.
     sampling_rate_hz : float
     rpm_per_unit : float
-    shaft : str
 
     Returns
     -------
@@ -200,7 +195,7 @@ def speed_channel_angle(
             f"the speed scatters by {60 * noise:.2g} rpm and is smoothed over ±{half_width / sampling_rate_hz:.2g} s",
         )
     return ShaftAngle(
-        shaft,
+        "",
         positions / sampling_rate_hz,
         angle,
         limited_slopes(positions / sampling_rate_hz, angle, smooth),

@@ -464,7 +464,7 @@ def _penalised(rows: FloatArray, penalty: FloatArray, weights: FloatArray, targe
 
 
 def pulse_train_angle(
-    times_s: FloatArray, pulses_per_revolution: int = 1, *, shaft: str = "", tick_s: float | None = None
+    times_s: FloatArray, pulses_per_revolution: int = 1, *, tick_s: float | None = None
 ) -> ShaftAngle:
     """Turn pulse times into shaft angle.
 
@@ -476,7 +476,6 @@ def pulse_train_angle(
     times_s : array, (n_pulses,)
         Increasing.
     pulses_per_revolution : int
-    shaft : str
     tick_s : float, optional
         Step of the clock; 0: exact times. Default: found from the times.
 
@@ -512,7 +511,7 @@ def pulse_train_angle(
         pulses = np.maximum.accumulate(fit_within_ticks(kept, pulses, tick, breaks))
     revolutions = pulses / n_per_rev
     return ShaftAngle(
-        shaft,
+        "",
         kept,
         revolutions,
         monotone_slopes(kept, revolutions),

@@ -133,7 +133,7 @@ def _to_reference_shaft(angle: ShaftAngle, shaft: str, rig: Rig | None) -> Shaft
 # Shaft angle at a stated, constant speed.
 
 
-def constant_speed_angle(speed_rpm: float, duration_s: float, *, shaft: str = "") -> ShaftAngle:
+def constant_speed_angle(speed_rpm: float, duration_s: float) -> ShaftAngle:
     """Return the angle of a shaft at constant speed, zero at time zero.
 
     revolutions = speed · time
@@ -159,7 +159,7 @@ def constant_speed_angle(speed_rpm: float, duration_s: float, *, shaft: str = ""
         )
     speed = speed_rpm / 60.0
     return ShaftAngle(
-        shaft,
+        "",
         np.array([0.0, duration_s]),
         np.array([0.0, speed * duration_s]),
         np.array([speed, speed]),

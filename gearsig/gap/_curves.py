@@ -46,9 +46,8 @@ def spectrum_curves(
     reference: ReducedRecording | None = None,
     reference_structural: StructuralFloor | None = None,
     unit: str = "m/s^2",
-    channel: str = "",
 ) -> tuple[SpectrumCurves, ...]:
-    """Return the order spectra of both shafts' averages and of what neither repeats.
+    """Return the order spectra of both shafts' averages and of what neither repeats, rms over all channels.
 
     Parameters
     ----------
@@ -64,11 +63,9 @@ def spectrum_curves(
         Of the comparison with it.
     unit : str
         Of the channels.
-    channel : str
-        Empty: root mean square over all channels.
     """
     runs = _Runs(now, before, after, reference)
-    names = (channel,) if channel else tuple(now.channels)
+    names = tuple(now.channels)
     averages = (_of_average(side, runs, names, unit) for side in (DRIVER, DRIVEN))
     spectra = (*averages, _of_residual(runs, names, unit))
     features = [average_features(side, now.frame.teeth[side], len(spectra[side].orders)) for side in (DRIVER, DRIVEN)]
@@ -232,7 +229,6 @@ def angle_curves(
     *,
     healthy: ReducedRecording | None = None,
     simulated_healthy: ReducedRecording | None = None,
-    unit: str = "",
 ) -> tuple[AngleCurves, ...]:
     """Return, for both shafts, the energy within one pitch over that of the measured median tooth.
 
@@ -264,7 +260,7 @@ def angle_curves(
         first, second, third = ([np.roll(values, -shift) for values in curves] + [NOTHING])[:3]
         frame = now.frame
         curves_of_shafts.append(
-            AngleCurves(frame.shafts[side], unit, frame.teeth[side], now.marks[side], angle, first, second, third)
+            AngleCurves(frame.shafts[side], "", frame.teeth[side], now.marks[side], angle, first, second, third)
         )
     return tuple(curves_of_shafts)
 

@@ -198,12 +198,11 @@ def _over_orders(prepared: PreparedRecording, over: str) -> bool:
     return over == "order" or (over == "automatic" and angle is not None and not angle.is_steady())
 
 
-def _rhythm_over(default: str = "automatic") -> MethodOption:
-    return MethodOption(
-        "over", "Rhythm over", "choice", default,
-        "Over orders, a change of speed does not smear the lines that follow it.",
-        choices={"automatic": "Automatic", "frequency": "Frequency", "order": "Order"},
-    )  # fmt: skip
+_RHYTHM_OVER = MethodOption(
+    "over", "Rhythm over", "choice", "automatic",
+    "Over orders, a change of speed does not smear the lines that follow it.",
+    choices={"automatic": "Automatic", "frequency": "Frequency", "order": "Order"},
+)  # fmt: skip
 
 
 def _envelope(
@@ -671,7 +670,7 @@ RHYTHMS = {
                 "The spectrum is cut into up to 2 to the power of it bands, and into thirds of these.", "up to 7",
                 more=True,
             ),
-            _rhythm_over(),
+            _RHYTHM_OVER,
         ),
         "Envelope",
         1_000_000,
@@ -682,7 +681,7 @@ RHYTHMS = {
         "Finds rhythms in noise and in which band they are, also where no band stands out: for bearings and wear.",
         _coherence,
         (
-            _rhythm_over(),
+            _RHYTHM_OVER,
             replace(
                 PREPARATION,
                 default="tones removed",

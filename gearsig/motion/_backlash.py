@@ -111,7 +111,7 @@ def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -
     )
 
 
-def dependence(values: FloatArray, longest: int = 200) -> float:
+def dependence(values: FloatArray) -> float:
     """Factor by which the variance of a mean grows because neighbours are alike: 1 + 2 Σ ρ_k up to the first ρ_k ≤ 0.
 
     Source: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), initial positive sequence.
@@ -121,7 +121,7 @@ def dependence(values: FloatArray, longest: int = 200) -> float:
     if power == 0.0:
         return 1.0
     total = 1.0
-    for lag in range(1, min(longest, len(values) - 1)):
+    for lag in range(1, min(200, len(values) - 1)):
         rho = float(np.mean(centred[:-lag] * centred[lag:])) / power
         if rho <= 0.0:
             break

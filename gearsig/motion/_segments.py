@@ -163,13 +163,14 @@ def motion_segments(
     return MotionSegments(final, threshold, _starts_at_once(final[0], angle_rad, sampling_rate_hz))
 
 
-def is_start_stop(segments: MotionSegments, *, min_standing: float = 0.05, min_back_rad: float = 0.1) -> bool:
+def is_start_stop(segments: MotionSegments) -> bool:
     """Say whether a motion starts and stops, or reverses: no speed to count orders by.
 
-    A run-up from rest does not: what follows can be counted in revolutions.
+    A run-up from rest does not: what follows can be counted in revolutions. Nor does less than 5 % of the time at rest,
+    or a tenth of a radian turned back.
     """
-    rests = bool(segments.starts_s) and bool(segments.stops_s) and segments.standing_part >= min_standing
-    return rests or segments.backwards_rad >= min_back_rad
+    rests = bool(segments.starts_s) and bool(segments.stops_s) and segments.standing_part >= 0.05
+    return rests or segments.backwards_rad >= 0.1
 
 
 def _starts_at_once(first: MotionSegment, angle_rad: FloatArray, rate_hz: float) -> bool:

@@ -213,17 +213,17 @@ def largest_lyapunov_exponent(
     )
 
 
-def fit_limits(curve: Divergence, memory: int, n_min: int, room: float = ROOM) -> tuple[int, int]:
+def fit_limits(curve: Divergence, memory: int, n_min: int) -> tuple[int, int]:
     """Return the first step of the fit and the one after its last.
 
-    A curve that starts within `room` of saturation but stays there is noise on a motion that does not diverge: it is
+    A curve that starts within `ROOM` of saturation but stays there is noise on a motion that does not diverge: it is
     fitted as a whole.
     """
     s = curve.log_distance
     missing = curve.saturation - float(s[memory])
     if missing > MIN_MISSING and float(s[memory:].max()) < s[memory] + FLAT * missing:
         return memory, len(s)
-    near = np.flatnonzero(s[memory:] >= curve.saturation - room)
+    near = np.flatnonzero(s[memory:] >= curve.saturation - ROOM)
     stop = memory + int(near[0]) if len(near) else len(s)
     if stop - memory >= n_min:
         return memory, stop

@@ -100,7 +100,6 @@ def polar_figure(
     n_teeth: int | None = None,
     marks: Sequence[AngleMark] = (),
     largest: float | None = None,
-    size_in: float = 5.4,
 ) -> Figure:
     """Draw one mean revolution around the circle with its band of ± 2 standard errors.
 
@@ -124,6 +123,7 @@ def polar_figure(
     check_average(average)
     if n_teeth is not None:
         count(n_teeth, "n_teeth", minimum=3)
+    size_in = 5.4
     figure = style.new_figure(size_in, size_in)
     axes = style.polar_panel(figure)
     full = largest or float(np.max(np.abs(average.values) + 2 * average.standard_error, initial=0.0)) or 1.0

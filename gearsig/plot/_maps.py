@@ -132,7 +132,6 @@ def time_frequency_figure(
     ridges: Sequence[Ridge] = (),
     *,
     dynamic_range_db: float = DYNAMIC_RANGE_DB,
-    height_in: float = 4.6,
     numbered: bool = False,
 ) -> Figure:
     """Draw levels over time (or angle) and frequency (or order), with ridges as lines.
@@ -144,7 +143,6 @@ def time_frequency_figure(
         Dashed where two of them share their place.
     dynamic_range_db : float
         Span of the colours below the largest level.
-    height_in : float
     numbered : bool
         Number the ridges from 1, at their right ends.
 
@@ -156,7 +154,7 @@ def time_frequency_figure(
         outside of the signal.
     """
     positive(dynamic_range_db, "dynamic_range_db", "dB")
-    figure, (axes,) = style.panels((height_in - 1.1,), right_in=1.0, top_in=0.55)
+    figure, (axes,) = style.panels((3.5,), right_in=1.0, top_in=0.55)
     logarithmic = levels.spacing == "logarithmic"
     if logarithmic:
         axes.set_yscale("log")
@@ -183,7 +181,7 @@ def time_frequency_figure(
     return figure
 
 
-def kurtogram_figure(kurtogram: Kurtogram, band: BandCandidate | None = None, *, height_in: float = 4.2) -> Figure:
+def kurtogram_figure(kurtogram: Kurtogram, band: BandCandidate | None = None) -> Figure:
     """Draw the kurtosis of each band over frequency, one row per bandwidth, the widest on top.
 
     Parameters
@@ -198,7 +196,7 @@ def kurtogram_figure(kurtogram: Kurtogram, band: BandCandidate | None = None, *,
         Colours start at 0: bands below are no more impulsive than noise. Remarks on the band stand below the title.
     """
     band = kurtogram.best_band() if band is None else band
-    figure, (axes,) = style.panels((height_in - 1.1,), right_in=1.0, top_in=0.55)
+    figure, (axes,) = style.panels((3.1,), right_in=1.0, top_in=0.55)
     axes.grid(visible=False)
     top = max(float(kurtogram.kurtosis.max()), 1e-3)
     for row, level in enumerate(kurtogram.levels):
@@ -232,7 +230,6 @@ def coherence_figure(
     *,
     cursors: Sequence[Cursor] = (),
     limits: tuple[float, float] | None = None,
-    height_in: float = 5.2,
 ) -> Figure:
     """Draw the squared coherence as a map, and above it its mean over the carriers.
 
@@ -245,7 +242,6 @@ def coherence_figure(
         Lines of shafts and bearings, in cyclic frequencies or orders; see `rhythm_cursors`.
     limits : (float, float) or None
         Cyclic frequencies or orders that are drawn; None: all.
-    height_in : float
 
     Returns
     -------
@@ -273,7 +269,7 @@ def coherence_figure(
     right_in = 1.0
     placed = place(cursors, (float(x[0]), float(x[-1])), style.WIDTH_IN - 0.85 - right_in)
     figure, (above, below) = style.panels(
-        (1.3, height_in - 2.52),
+        (1.3, 2.68),
         right_in=right_in,
         top_in=0.4 + ROW_IN * n_rows(placed),
         row_gap_in=0.12,

@@ -174,9 +174,9 @@ def embedding_figure(information: MutualInformation, dimension: EmbeddingDimensi
     return figure
 
 
-def divergence_figure(exponent: LyapunovExponent, *, title: str = "", height_in: float = 3.4) -> Figure:
+def divergence_figure(exponent: LyapunovExponent, *, title: str = "") -> Figure:
     """Draw the divergence curve with its fitted segment, line and saturation."""
-    figure, (axes,) = style.panels((height_in - 0.97,), top_in=0.42)
+    figure, (axes,) = style.panels((2.43,), top_in=0.42)
     axes.plot(exponent.times_s, exponent.log_distance, color=style.MEASURED, linewidth=1.2)
     axes.axhline(exponent.saturation_log_distance, color=style.FLOOR, linewidth=0.8, linestyle="--")
     series.shade(axes, exponent.fit_s)

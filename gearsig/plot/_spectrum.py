@@ -40,7 +40,6 @@ def spectrum_figure(
     limits: tuple[float, float] | None = None,
     marked: Sequence[float] = (),
     title: str = "",
-    panel_height_in: float = 2.1,
 ) -> Figure:
     """Draw a spectrum with the lines that the machine's kinematics explain.
 
@@ -80,7 +79,7 @@ def spectrum_figure(
     if not low < high:
         raise InputError(f"limits are {low:g} to {high:g}", allowed="ascending")
     placed = place(cursors, (low, high), style.WIDTH_IN - 0.85 - 0.2)
-    figure, (axes,) = style.panels((panel_height_in,), top_in=0.36 + ROW_IN * n_rows(placed))
+    figure, (axes,) = style.panels((2.1,), top_in=0.36 + ROW_IN * n_rows(placed))
     _draw_lines(axes, spectrum, floor, (low, high), scale, marked)
     draw(axes, placed)
     style.label_axes(axes, spectrum.axis_label, _value_label(spectrum, scale))
@@ -167,7 +166,6 @@ def time_figure(
     channels: Sequence[str] = (),
     *,
     limits_s: tuple[float, float] | None = None,
-    n_points: int = N_POINTS,
 ) -> Figure:
     """Draw channels one below the other over a common time axis, extremes kept.
 
@@ -178,8 +176,6 @@ def time_figure(
         Names; empty: all.
     limits_s : pair of float or None
         First and last time; None: the whole recording.
-    n_points : int
-        Points per line, see `thin`.
 
     Returns
     -------
@@ -194,7 +190,7 @@ def time_figure(
     figure, panels = style.panels((1.02,) * len(names), top_in=0.33, row_gap_in=0.33, share_x=True)
     for axes, name in zip(panels, names, strict=True):
         channel = recording.channels[recording.index(name)]
-        axes.plot(*thin(time, recording.values(name)[start:stop], n_points), color=style.MEASURED, linewidth=0.6)
+        axes.plot(*thin(time, recording.values(name)[start:stop]), color=style.MEASURED, linewidth=0.6)
         quantity = "" if channel.quantity == "unknown" else ": " + channel.quantity.replace("_", " ")
         x = "time (s)" if axes is panels[-1] else ""
         style.label_axes(axes, x, unit_text(channel.unit), f"{plain(name)}{quantity}")
@@ -254,7 +250,7 @@ def speed_figure(shaft_angle: ShaftAngle) -> Figure:
 
 
 def order_levels_figure(
-    levels: Sequence[OrderLevel], *, resonances_hz: Sequence[float] = (), title: str = "", height_in: float = 4.0
+    levels: Sequence[OrderLevel], *, resonances_hz: Sequence[float] = (), title: str = ""
 ) -> Figure:
     """Draw amplitudes of orders over speed, the largest of each marked.
 
@@ -263,10 +259,8 @@ def order_levels_figure(
     levels : sequence of OrderLevel
         1 to 8, of one channel.
     resonances_hz : sequence of float
-        Each order is marked where it crosses them.
-        By letters, which the title names.
+        Each order is marked where it crosses them, by letters, which the title names.
     title : str
-    height_in : float
 
     Returns
     -------
@@ -279,7 +273,7 @@ def order_levels_figure(
     """
     series.check_number(len(levels), f"{len(levels)} levels")
     top_in = 0.85 if resonances_hz else 0.65
-    figure, (axes,) = style.panels((height_in - 0.55 - top_in,), top_in=top_in)
+    figure, (axes,) = style.panels((3.45 - top_in,), top_in=top_in)
     lines: list[Line2D] = []
     for level, colour in zip(levels, series.series_colours(len(levels)), strict=True):
         lines += axes.plot(level.speed_rpm, level.amplitude, color=colour, linewidth=1.2, label=level.name)

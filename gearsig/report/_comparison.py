@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import datetime
 from io import StringIO
 from textwrap import fill
 
@@ -308,7 +307,7 @@ class ChannelSection:
     sidebands: tuple[LevelRow, ...]
 
 
-def comparison_page(comparison: Comparison, *, command: str = "", date: datetime | None = None) -> str:
+def comparison_page(comparison: Comparison, *, command: str = "") -> str:
     """Return the page of a comparison: verdict, what was compared, and each channel with figures and tables.
 
     It is one file without scripts that loads nothing.
@@ -318,8 +317,6 @@ def comparison_page(comparison: Comparison, *, command: str = "", date: datetime
     comparison : Comparison
     command : str
         The command that makes it again.
-    date : datetime or None
-        Of the page; None: now.
     """
     return render(
         "compare.html.j2",
@@ -332,7 +329,7 @@ def comparison_page(comparison: Comparison, *, command: str = "", date: datetime
         recorded=_record_rows(comparison.recorded),
         alignment=tuple(alignment_texts(comparison)),
         channels=[_section(comparison, channel, i) for i, channel in enumerate(comparison.channels)],
-        provenance=_provenance(comparison, command, date),
+        provenance=_provenance(comparison, command),
     )
 
 
@@ -405,12 +402,12 @@ def _record_rows(facts: RecordFacts) -> Rows:
     )
 
 
-def _provenance(comparison: Comparison, command: str, date: datetime | None) -> Rows:
+def _provenance(comparison: Comparison, command: str) -> Rows:
     rows = (
         ("SHA-256, simulation", comparison.simulated.sha256),
         ("SHA-256, recording", comparison.recorded.sha256),
         ("version", f"gearsig {__version__}"),
-        ("date", date_text(date)),
+        ("date", date_text()),
         ("command", command),
     )
     return tuple((name, text) for name, text in rows if text)
@@ -463,4 +460,4 @@ LAYOUTS = {
 
 def comparison_to_json(comparison: Comparison) -> str:
     """Return a comparison as JSON text; waveforms and spectra are left out."""
-    return document("gearsig.comparison", 1, plain(comparison, layouts=LAYOUTS))
+    return document("gearsig.comparison", plain(comparison, layouts=LAYOUTS))

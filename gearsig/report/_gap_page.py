@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from datetime import datetime
 from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -309,14 +308,14 @@ def condition_rows(report: GapReport) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def fact_rows(report: GapReport, command: str, date: datetime | None = None) -> Rows:
+def fact_rows(report: GapReport, command: str) -> Rows:
     """Return what the diagnosis rests on, and how to repeat it."""
     rows = (
         ("rig", report.rig),
         ("simulator", report.simulator or "none: nothing was simulated"),
         ("healthy references", references_text(report)),
         ("size of the gap", size_text(report)),
-        *made_rows(command, date),
+        *made_rows(command),
     )
     return tuple((name, text) for name, text in rows if text)
 
@@ -600,7 +599,7 @@ def n_conditions(report: GapReport) -> int:
     return len(distinct)
 
 
-def write_gap_page(report: GapReport, path: str | Path, *, command: str = "", date: datetime | None = None) -> Path:
+def write_gap_page(report: GapReport, path: str | Path, *, command: str = "") -> Path:
     """Write the page of a gap diagnosis.
 
     The page is one file without scripts; it loads nothing, from nowhere. It appears only when it is complete.
@@ -612,18 +611,16 @@ def write_gap_page(report: GapReport, path: str | Path, *, command: str = "", da
         Folders on the way are made.
     command : str
         The command that makes the page again.
-    date : datetime or None
-        Of the page; None: now.
 
     Returns
     -------
     Path
         Of the page.
     """
-    return write_text(Path(path), gap_page_html(report, command=command, date=date))
+    return write_text(Path(path), gap_page_html(report, command=command))
 
 
-def gap_page_html(report: GapReport, *, command: str = "", date: datetime | None = None) -> str:
+def gap_page_html(report: GapReport, *, command: str = "") -> str:
     """Return the page that `write_gap_page` writes."""
     return render(
         "gap.html.j2",
@@ -644,6 +641,6 @@ def gap_page_html(report: GapReport, *, command: str = "", date: datetime | None
         steps=step_rows(report),
         next_recordings=next_rows(report),
         conditions=condition_rows(report),
-        facts_rows=fact_rows(report, command, date),
+        facts_rows=fact_rows(report, command),
         galleries=gap_galleries(report),
     )

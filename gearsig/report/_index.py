@@ -229,7 +229,6 @@ def write_index(
     *,
     failures: Sequence[Failure] = (),
     command: str = "",
-    date: datetime | None = None,
     n_missing: int = 0,
     pdf: bool = False,
 ) -> Path:
@@ -247,8 +246,6 @@ def write_index(
         Listed with their reasons.
     command : str
         The command that makes the report again.
-    date : datetime or None
-        Of the report; None: now.
     n_missing : int
         Recordings that are still to be analysed: the page says so, and stands alone.
     pdf : bool
@@ -261,7 +258,7 @@ def write_index(
     """
     path = Path(path)
     index = index_of(entries, failures)
-    made = date_text(date)
+    made = date_text()
     html = render(
         "index.html.j2",
         index=index,

@@ -53,10 +53,10 @@ Layouts = Mapping[type, Layout]
 _AS_FIELDS = Layout()
 
 
-def document(schema: str, version: int, content: Json, *, indent: int | None = 2) -> str:
+def document(schema: str, content: Json) -> str:
     """Return a file's text: what it is, in which version, made by which gearsig, and its content."""
-    head = {"schema": schema, "schema_version": version, "gearsig_version": __version__}
-    return json.dumps(head | plain(content), indent=indent, ensure_ascii=False, allow_nan=False) + "\n"
+    head = {"schema": schema, "schema_version": 1, "gearsig_version": __version__}
+    return json.dumps(head | plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def members(value: object, *names: str) -> Json:

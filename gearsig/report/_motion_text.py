@@ -104,7 +104,7 @@ def force_json(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
         "errors": estimate.errors,
         "noise": noise and members(noise, "reference", "levels_um", "rms_n", "crossover_um", "text"),
     }
-    return document("gearsig.force", 1, content)
+    return document("gearsig.force", content)
 
 
 def force_csv(estimate: ForceEstimate) -> str:
@@ -153,7 +153,7 @@ def identify_json(identification: Identification) -> str:
         for name, text in identification.equations.items()
     ]
     content = {"source": identification.source, "parameters": parameters, "equations": equations}
-    return document("gearsig.identify", 1, content)
+    return document("gearsig.identify", content)
 
 
 def _row(p: FittedParameter) -> str:
@@ -247,4 +247,4 @@ def start_stop_json(
         "refusals": examined.refusals,
         "notes": examined.notes,
     }
-    return document("gearsig.start_stop", 1, content)
+    return document("gearsig.start_stop", content)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -644,7 +643,6 @@ def write_page(
     *,
     command: str = "",
     index: str = "",
-    date: datetime | None = None,
     methods: Sequence[str] | None = None,
     mark: str = "",
 ) -> Path:
@@ -661,8 +659,6 @@ def write_page(
         The command that makes the page again.
     index : str
         Address of the index page, relative to this one; empty: no link.
-    date : datetime or None
-        Of the report; None: now.
     methods : sequence of str or None
         Further methods that the page shows; None: those that the recording calls for.
     mark : str
@@ -673,7 +669,7 @@ def write_page(
     Path
         Of the page.
     """
-    html = page_html(analysis, command=command, index=index, date=date, methods=methods, mark=mark)
+    html = page_html(analysis, command=command, index=index, methods=methods, mark=mark)
     return write_text(Path(path), html)
 
 
@@ -682,12 +678,11 @@ def page_html(
     *,
     command: str = "",
     index: str = "",
-    date: datetime | None = None,
     methods: Sequence[str] | None = None,
     mark: str = "",
 ) -> str:
     """Return the page that `write_page` writes."""
-    parts = page_parts(analysis, command=command, date=date, methods=methods)
+    parts = page_parts(analysis, command=command, methods=methods)
     return render(
         "page.html.j2",
         **parts,
@@ -699,9 +694,7 @@ def page_html(
     )
 
 
-def page_parts(
-    analysis: Analysis, *, command: str, date: datetime | None, methods: Sequence[str] | None = None
-) -> dict[str, Any]:
+def page_parts(analysis: Analysis, *, command: str, methods: Sequence[str] | None = None) -> dict[str, Any]:
     """Return what the page says, in HTML as in PDF."""
     recording = analysis.recording
     ordered = sorted(analysis.findings, key=lambda finding: finding.kind not in CLAIMED)
@@ -723,5 +716,5 @@ def page_parts(
         "speed": speed_rows(analysis.shaft_angle),
         "gallery": gallery(analysis, methods),
         "reference": reference_text(analysis.reference),
-        "provenance": provenance_rows(analysis, command, date),
+        "provenance": provenance_rows(analysis, command),
     }

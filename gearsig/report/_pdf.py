@@ -6,7 +6,6 @@ import json
 from base64 import b64decode
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from datetime import datetime
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,7 +25,6 @@ def page_pdf(
     analysis: Analysis,
     *,
     command: str = "",
-    date: datetime | None = None,
     methods: Sequence[str] | None = None,
 ) -> bytes:
     """Return the page of one recording as PDF, with the same content as `page_html` but the table of indicators.
@@ -36,8 +34,6 @@ def page_pdf(
     analysis : Analysis
     command : str
         The command that makes the page again.
-    date : datetime or None
-        Of the report; None: now.
     methods : sequence of str or None
         Further methods that the page shows; None: those that the recording calls for.
 
@@ -46,7 +42,7 @@ def page_pdf(
     InputError
         If typst is not installed.
     """
-    parts = page_parts(analysis, command=command, date=date, methods=methods)
+    parts = page_parts(analysis, command=command, methods=methods)
     pictures: dict[str, bytes] = {}
     verdict = parts["verdict_picture"]
     data = {

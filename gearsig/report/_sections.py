@@ -6,7 +6,6 @@ import platform
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
 from importlib.metadata import version
 from textwrap import fill
 
@@ -167,9 +166,9 @@ class ChangeRow:
         return f"{signed(self.change_db)} dB"
 
 
-def change_rows(analysis: Analysis, most: int = 8) -> tuple[ChangeRow, ...]:
+def change_rows(analysis: Analysis) -> tuple[ChangeRow, ...]:
     """Return the levels that changed most since the reference, largest first; bars are relative to the first."""
-    changed = sorted((c for c in analysis.level_changes if c.is_change), key=lambda c: -abs(c.change_db))[:most]
+    changed = sorted((c for c in analysis.level_changes if c.is_change), key=lambda c: -abs(c.change_db))[:8]
     return tuple(
         ChangeRow(
             _label_of(c, changed), c.change_db, c.repeatability_db, 100 * abs(c.change_db) / abs(changed[0].change_db)
@@ -276,7 +275,7 @@ def speed_rows(angle: ShaftAngle | CannotTell) -> Rows:
     )
 
 
-def provenance_rows(analysis: Analysis, command: str, date: datetime | None) -> Rows:
+def provenance_rows(analysis: Analysis, command: str) -> Rows:
     """Return everything needed to make the page again."""
     recording = analysis.recording
     origin = recording.provenance
@@ -287,17 +286,17 @@ def provenance_rows(analysis: Analysis, command: str, date: datetime | None) -> 
         ("history", "; ".join(origin.history)),
         ("sampling rate", f"{recording.sampling_rate_hz:.10g} Hz"),
         ("parameters", "; ".join(setting_text(name, value) for name, value in analysis.settings.items())),
-        *made_rows(command, date),
+        *made_rows(command),
     ]
     return tuple((name, text) for name, text in rows if text)
 
 
-def made_rows(command: str, date: datetime | None) -> Rows:
-    """Return what a page was made with and when; the date None: now."""
+def made_rows(command: str) -> Rows:
+    """Return what a page was made with, and that it was made now."""
     versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
     return (
         ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
-        ("date", date_text(date)),
+        ("date", date_text()),
         ("command", command),
     )
 

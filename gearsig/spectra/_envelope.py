@@ -273,7 +273,7 @@ def _complex_envelope(
 
 
 PERIODS_OF_EDGE = 50
-"""Of the width of a raised-cosine edge, to where the filter's response reaches: it falls as 1/n³, which is 1e-5 then."""
+"""Of the width of a raised-cosine edge, which the filter's response reaches: it falls as 1/n³, to 1e-5 then."""
 
 
 def edged_band(

@@ -130,7 +130,7 @@ def test_same_result_from_several_threads() -> None:
 
 def test_axes_and_refusals() -> None:
     recording = recording_of(np.ones(N), np.zeros(N))
-    angle = constant_speed_angle(1500.0, recording.duration_s, shaft="in")
+    angle = constant_speed_angle(1500.0, recording.duration_s)
     signal = resample_to_angle(recording, angle, channels=["a1"], highest_order=100.0)
     assert signal.samples_per_revolution >= 250
     assert signal.channel_names == ("a1",)

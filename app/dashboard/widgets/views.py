@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import datetime
 from functools import partial
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
@@ -363,7 +362,7 @@ def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
 
 
 def _show_provenance(analysis: Analysis) -> None:
-    rows = provenance_rows(analysis, "", datetime.now().astimezone())
+    rows = provenance_rows(analysis, "")
     st.markdown("Where it came from:")
     # a table of words, whose cells wrap
     st.table({name: as_typed(text) for name, text in rows}, border="horizontal")

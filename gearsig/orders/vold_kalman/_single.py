@@ -526,7 +526,10 @@ def envelope_alone(
 
 
 def waveform_alone(
-    y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidth: FloatArray, *, gain_bytes: int = GAIN_BYTES
+    y: FloatArray,
+    cycles: FloatArray,
+    active: BoolArray | None,
+    bandwidth: FloatArray,
 ) -> FloatArray:
     """Return the waveform of one order, as `solve_waveforms` does for several; bandwidth (n - 2,) or (1,)."""
     n = len(y)
@@ -542,7 +545,7 @@ def waveform_alone(
             oscillator(around[row], widths[row], kappa[row], q[row])
         return level[None], q, kappa
 
-    return _smoothed_halves(n, 2, prepare, middle_q=0.0, dtype=np.float64, pair=False, gain_bytes=gain_bytes)
+    return _smoothed_halves(n, 2, prepare, middle_q=0.0, dtype=np.float64, pair=False, gain_bytes=GAIN_BYTES)
 
 
 def _levels(active: BoolArray | None, n: int, i: int, j: int) -> FloatArray:
