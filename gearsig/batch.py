@@ -154,6 +154,7 @@ def report_many(
         write_index,
     )
 
+    # What can be refused is refused before anything is written: no recordings, no typst, a wrong method or folder.
     files = [path for path, _ in find_recordings(paths)]
     if not files:
         raise no_recordings(paths)
@@ -161,6 +162,7 @@ def report_many(
         check_pdf()
     workers = min(len(files), n_processors()) if n_processes is None else count(n_processes, "n_processes")
     folder = made_folder(Path(output_folder))
+    # A recording is not compared with itself: the reference's own page says that it is one.
     given = reference if isinstance(reference, Mapping) else dict.fromkeys(files, Path(reference)) if reference else {}
     healthy = {file.resolve(): path for file, path in given.items()}
     healthy_files = {path.resolve() for path in healthy.values()}
@@ -183,6 +185,7 @@ def report_many(
                 is_reference=is_healthy, pdf=pdf, methods=chosen, memory_bytes=memory_bytes,
             )
         )  # fmt: skip
+    # Pages that were made of the same files and options by the same gearsig stay as they are.
     made_of = _made_of()
     jobs = [replace(job, made_of=made_of(job)) for job in jobs]
     results: dict[int, Entry | Failure] = {n: kept for n, job in enumerate(jobs) if (kept := _kept(job)) is not None}
@@ -206,6 +209,7 @@ def report_many(
         executor=executor,
         if_killed=_killed,
     )
+    # Also after an interruption the index says what is there and what is missing.
     try:
         with closing(running):
             for place, result in running:

@@ -2,7 +2,6 @@
 
 from gearsig.comparison._averages import HalvedLines, frac, tooth_powers, waveform
 from gearsig.comparison._compare import ALIGN, compare
-from gearsig.comparison._differences import MIN_REPEATED, differing_lines, differing_tooth, mesh_lines
 from gearsig.comparison._lines import band_powers, order_band_limits, third_octave_limits, third_octaves
 from gearsig.comparison._sides import SIMULATION_OPTIONS, for_simulation
 from gearsig.comparison._types import (
@@ -18,7 +17,14 @@ from gearsig.comparison._types import (
     ShaftComparison,
     power_levels,
 )
-from gearsig.comparison._verdict import STEADY, missing_words
+from gearsig.comparison._verdict import (
+    MIN_REPEATED,
+    STEADY,
+    differing_lines,
+    differing_tooth,
+    mesh_lines,
+    missing_words,
+)
 
 __all__ = [
     "ALIGN",

@@ -343,8 +343,7 @@ def usable_speed(rig: Rig, recording: Recording) -> SpeedSource | None:
 
 def teeth_on(rig: Rig, shaft: str) -> int | None:
     """Return the teeth of the first gear on a shaft whose teeth are known."""
-    gears = (pair.teeth(shaft) for pair in rig.pairs if shaft in (pair.driver, pair.driven))
-    return next((teeth for teeth in gears if teeth is not None), None)
+    return next((teeth for pair in rig.pairs_on(shaft) if (teeth := pair.teeth(shaft)) is not None), None)
 
 
 def _shaft_names(simulated: Rig, recorded: Rig) -> dict[str, str]:
@@ -376,4 +375,4 @@ def _shaft_names(simulated: Rig, recorded: Rig) -> dict[str, str]:
 def _gears(rig: Rig) -> str:
     if not rig.pairs:
         return f"no gears, shafts {', '.join(rig.shaft_names) or 'none'}"
-    return ", ".join(f"{p.driver_teeth or '?'}/{p.driven_teeth or '?'}" for p in rig.pairs) + " teeth"
+    return f"{rig.teeth_text} teeth"

@@ -14,7 +14,6 @@ from gearsig.checks import instance_of, positive
 from gearsig.diagnosis._bearing import detect_bearings
 from gearsig.diagnosis._change import change_findings, family_change, level_changes, with_clearest_band
 from gearsig.diagnosis._crack import Answer, crack_depth, with_crack
-from gearsig.diagnosis._doubts import lowered, speed_doubts, spoiled, withheld_crack, without_synchronous_hum
 from gearsig.diagnosis._lines import detect_lines, detect_mesh, speed_finding
 from gearsig.diagnosis._modulation import detect_sidebands
 from gearsig.diagnosis._overall import detect_vibration_zone
@@ -43,7 +42,16 @@ from gearsig.diagnosis._types import (
     Where,
     cannot_tell,
 )
-from gearsig.diagnosis._verdict import detect_data_problems, ranked, verdict_of
+from gearsig.diagnosis._verdict import (
+    detect_data_problems,
+    lowered,
+    ranked,
+    speed_doubts,
+    spoiled,
+    verdict_of,
+    withheld_crack,
+    without_synchronous_hum,
+)
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders import SeparatedAverage, SynchronousAverage, band_passed_mesh
 from gearsig.prepared import MEMORY_LIMIT_MB, PreparedRecording, prepare
@@ -307,8 +315,8 @@ def _of_gears(
 ) -> Iterator[indicators.Indicator]:
     if parts is not None and before is not None and before.average.unit != parts.average.unit:
         before = None
-    for pair in rig.pairs:
-        teeth = pair.teeth(shaft) if shaft in (pair.driver, pair.driven) else None
+    for pair in rig.pairs_on(shaft):
+        teeth = pair.teeth(shaft)
         if parts is None or teeth is None:
             continue
         band, band_before = _mesh_band(parts, teeth), None if before is None else _mesh_band(before, teeth)

@@ -238,8 +238,7 @@ def compute_signals(
 def _one_shaft(prepared: PreparedRecording, shaft: str, names: Sequence[str]) -> ShaftSignals:
     signal = prepared.over_angle(shaft, names)
     averages = {name: prepared.average(shaft, name) for name in names}
-    gears = [pair.teeth(shaft) for pair in prepared.rig.pairs if shaft in (pair.driver, pair.driven)]
-    teeth = tuple(z for z in gears if z is not None)
+    teeth = tuple(z for pair in prepared.rig.pairs_on(shaft) if (z := pair.teeth(shaft)) is not None)
     separated, halves = {}, {}
     for name, average in averages.items():
         visible = tuple(z for z in teeth if z <= average.highest_line)

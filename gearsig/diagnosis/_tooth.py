@@ -483,7 +483,7 @@ def _damage(examined: _Examined) -> Finding:
     equal = [n for n, order in signals.known_shaft_orders.items() if abs(order / own - 1) < 1e-9 and n != shaft.shaft]
     what = "Local tooth damage" if clear else "A local event, perhaps tooth damage,"
     shares = zip(shaft.separated, place.channel_shares, strict=True)
-    pairs = [p.name for p in signals.rig.pairs if shaft.shaft in (p.driver, p.driven)]
+    pairs = [pair.name for pair in signals.rig.pairs_on(shaft.shaft)]
     return Finding(
         "tooth-local-damage",
         Kind.FAULT if clear else Kind.SUSPICION,
@@ -616,7 +616,7 @@ def _visible_text(examined: _Examined) -> str:
 
 def _why_blind(signals: AnalysisSignals, shaft: ShaftSignals) -> str:
     """Return why the teeth of a shaft cannot be looked at although there is an average; empty if they can."""
-    pairs = [p for p in signals.rig.pairs if shaft.shaft in (p.driver, p.driven)]
+    pairs = signals.rig.pairs_on(shaft.shaft)
     for pair in pairs:
         real = teeth_are_contradicted(signals, pair)
         if real is not None:

@@ -1,11 +1,12 @@
-"""Order the findings and put the most important into one sentence."""
+"""Lower what rests on doubtful input, order the findings, and put the most important into one sentence."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
-from gearsig.diagnosis._doubts import said_first
-from gearsig.diagnosis._lines import SPEED_UNKNOWN
+from gearsig.angle import ShaftAngle
+from gearsig.diagnosis._lines import MESH_ELSEWHERE, SPEED_UNKNOWN
 from gearsig.diagnosis._overall import VIBRATION_ZONE
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import (
@@ -14,14 +15,17 @@ from gearsig.diagnosis._types import (
     HINDERING,
     REFERENCE_UNFIT,
     UNCHANGED,
+    CannotTell,
     Finding,
     Kind,
     Outcome,
+    Strength,
     Where,
     outcome_of,
 )
 from gearsig.formatting import percent, sentence
 from gearsig.recording import Recording
+from gearsig.rig import Rig
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
 """Code of the finding that a given reference did not tell the depth of a crack."""
@@ -134,3 +138,142 @@ def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset
         for text in recording.warnings
     ]
     return findings, frozenset(p.channel for p in problems if p.kind == "dead")
+
+
+# --------------------
+# What is wrong with the input lowers what rests on it: one place, for every problem and every finding.
+# --------------------
+
+
+OFF_NOMINAL, NEAR_ZERO = "speed-off-nominal", "speed-near-zero"
+
+TRUST = {
+    SAMPLING_RATE: 0.5,
+    OFF_NOMINAL: 0.75,
+    NEAR_ZERO: 0.5,
+    "mesh-above-sampling": 0.5,
+    "mesh-absent": 0.75,
+    MESH_ELSEWHERE: 0.5,
+    "channel-clipped": 0.7,
+    "channel-wrapped": 0.0,
+    "channel-stepped": 0.75,
+    "channel-reversed": 0.5,
+    "channel-hum": 0.75,
+}
+"""Problem → what a confidence is multiplied by: a judgement, and no probability. 0.5 where places or frequencies are
+probably wrong, 0.7 and 0.75 where they stand but sizes are not to be trusted, 0 where nothing is left."""
+
+SURE = 0.7
+"""Below it, what was a fault is a suspicion."""
+
+NEAR_ZERO_SHARE = 0.1
+"""Of the highest speed: a tachometer does not tell whether a shaft that slows down so far turns on or back."""
+
+
+def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
+    """Compare the speed with the rig's nominal speed and tolerance, and see whether it comes near standstill."""
+    if not isinstance(angle, ShaftAngle):
+        return []
+    found = []
+    low, high = angle.speed_range_rpm
+    nominal = rig.nominal_speed_rpm(angle.shaft if angle.shaft in rig.shaft_names else "")
+    tolerance = rig.operating_point.speed_tolerance_percent / 100
+    if nominal and not low * (1 - tolerance) <= nominal <= high * (1 + tolerance):
+        ratio = angle.mean_speed_rpm / nominal
+        near = min((f for n in range(2, 11) for f in (n, 1 / n)), key=lambda f: abs(ratio / f - 1))
+        pulses = f" {near:.3g} pulses per revolution would explain it." if abs(ratio / near - 1) < 0.03 else ""
+        title = f"The speed, {angle.mean_speed_rpm:.5g} rpm, is {ratio:.3g} times the rig's {nominal:.5g} rpm"
+        found.append(
+            Finding(
+                OFF_NOMINAL,
+                Kind.DATA_PROBLEM,
+                f"{title} ± {100 * tolerance:.3g} %.",
+                Where(shaft=angle.shaft),
+                Strength(angle.mean_speed_rpm, "rpm", nominal, "nominal speed", against="a nominal speed of"),
+                confidence_basis="comparison with the rig file",
+                evidence=(f"How it was found: {angle.method}.{pulses}",),
+                surer="Check sampling rate, pulses per revolution and the speed in the rig file.",
+            )
+        )
+    if low < NEAR_ZERO_SHARE * high:
+        title = f"The speed falls to {low:.3g} rpm, near standstill: whether the shaft turns on or back is not told."
+        surer = "An encoder, which tells the direction; or analyse the parts before and after by themselves."
+        found.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, Where(shaft=angle.shaft), surer=surer))
+    return found
+
+
+def without_synchronous_hum(findings: Iterable[Finding], angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
+    """Call hum a notice where one to four times a shaft's speed is the same frequency: it may be the shaft."""
+    turns_hz = []
+    if isinstance(angle, ShaftAngle):
+        ratios = {name: rig.ratio(name) for name in rig.shaft_names} or {angle.shaft: 1.0}
+        turns_hz = [(name, angle.mean_speed_rpm / 60 * ratio) for name, ratio in ratios.items() if ratio is not None]
+    return [_perhaps_the_shafts(f, turns_hz) if f.code == "channel-hum" else f for f in findings]
+
+
+def _perhaps_the_shafts(hum: Finding, turns_hz: Sequence[tuple[str, float]]) -> Finding:
+    line_hz = hum.where.frequency_hz or 0.0
+    for name, turn_hz in turns_hz:
+        for multiple in (1, 2, 3, 4):
+            # The line is within a thousandth of the supply's multiple, and the speed is known as well at best.
+            if abs(multiple * turn_hz / line_hz - 1) < 2e-3:
+                of = f"{multiple} × {name or 'the shaft'}"
+                title = f"One line, {line_hz:.5g} Hz, rules channel {hum.where.channels[0]}: {of}, or mains hum."
+                return replace(hum, code="line-of-mains-or-shaft", kind=Kind.NOTICE, title=title)
+    return hum
+
+
+def lowered(findings: Iterable[Finding], channels: Sequence[str]) -> list[Finding]:
+    """Return the findings with faults and suspicions lowered, or withheld, by the problems among them.
+
+    A problem of a channel touches what was seen in it; one of speed or sampling rate touches everything.
+    """
+    findings = list(findings)
+    problems = [f for f in findings if f.code in TRUST]
+    return [_lowered(f, problems, channels) if f.is_claim else f for f in findings]
+
+
+def _lowered(finding: Finding, problems: Sequence[Finding], channels: Sequence[str]) -> Finding:
+    seen_in = set(finding.where.channels or channels)
+    touching = [p for p in problems if p.code != finding.code and (not _of_channels(p) or seen_in & _of_channels(p))]
+    confidence, kind = finding.confidence, finding.kind
+    for problem in touching:
+        confidence *= TRUST[problem.code]
+    if not touching:
+        return finding
+    because = " ".join(p.title for p in touching)
+    if confidence == 0.0:
+        kind, confidence = Kind.CANNOT_TELL, 1.0
+        finding = replace(finding, code=f"withheld-{finding.code}", title=f"Withheld: {finding.title} {because}")
+    elif confidence < SURE:
+        kind = Kind.SUSPICION
+    evidence = (*finding.evidence, f"Its confidence is lowered: {because}")
+    return replace(finding, kind=kind, confidence=confidence, evidence=evidence)
+
+
+def _of_channels(problem: Finding) -> set[str]:
+    return set(problem.where.channels) if problem.code.startswith("channel-") else set()
+
+
+def spoiled(findings: Iterable[Finding], channels: Sequence[str]) -> frozenset[str]:
+    """Return the channels from which no depth of a crack is to be read."""
+    found: set[str] = set()
+    for finding in findings:
+        if finding.code in TRUST:
+            found |= _of_channels(finding) or set(channels)
+    return frozenset(found)
+
+
+def withheld_crack(findings: Iterable[Finding], *, asked: bool) -> CannotTell | None:
+    """Return why the depth of a crack is withheld where every channel is spoiled; None where nobody asked."""
+    reason = " ".join(f.title for f in findings if f.code in TRUST)
+    return CannotTell("How deep is a crack?", reason, "Correct what is doubtful, or measure again.") if asked else None
+
+
+def said_first(findings: Sequence[Finding], *, claims: bool) -> str:
+    """Return the problems that open the verdict: rate or speed always, those of channels where something is claimed."""
+    titles = {f.code: f.title for f in findings if f.code in TRUST and f.kind is Kind.DATA_PROBLEM}
+    if SAMPLING_RATE in titles:
+        titles.pop(OFF_NOMINAL, None)  # the same, seen from the other side
+    first = [title for code, title in titles.items() if not code.startswith("channel-") and code != NEAR_ZERO]
+    return " ".join([*first, *(t for t in titles.values() if claims and t not in first)])

@@ -15,7 +15,6 @@ from gearsig.gap._attribution import (
     with_likelihoods,
     with_unknown_shared,
 )
-from gearsig.gap._burst import burst_features
 from gearsig.gap._change import (
     alike_features,
     apart_features,
@@ -65,7 +64,7 @@ from gearsig.gap._evidence import (
     over_floors,
     shaft_signs,
 )
-from gearsig.gap._features import Feature, Features, features_of, once
+from gearsig.gap._features import Feature, Features, burst_features, features_of, once
 from gearsig.gap._floors import (
     StructuralFloor,
     credibility_of,

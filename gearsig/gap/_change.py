@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.gap._burst import burst_features, clearness
 from gearsig.gap._features import (
     Feature,
     Features,
     NamedValue,
+    burst_features,
+    clearness,
     once,
     pattern_features,
     whole_and_parts,

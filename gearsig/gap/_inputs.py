@@ -420,7 +420,7 @@ def with_stage(rig: Rig, stage: str = "") -> Rig:
     """
     names = [pair.name for pair in rig.pairs]
     chosen = [pair for pair in rig.pairs if pair.name == stage]
-    chosen = chosen or [pair for pair in rig.pairs if stage in (pair.driver, pair.driven)]
+    chosen = chosen or list(rig.pairs_on(stage))
     if not stage and len(names) > 1:
         raise RefusalError(
             f"the rig has {len(names)} gear pairs ({', '.join(names)}), and one is diagnosed at a time",

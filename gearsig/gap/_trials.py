@@ -278,7 +278,7 @@ def _reduced_run(run: TwinRun, seed: int, added: Added | None, noise: int) -> Re
 
 
 _MODULES = (
-    *(f"gearsig.gap.{name}" for name in ("_reduction", "_features", "_burst", "_change", "_waveform")),
+    *(f"gearsig.gap.{name}" for name in ("_reduction", "_features", "_change", "_waveform")),
     *(f"gearsig.{name}" for name in ("severity._features", "orders._average", "prepared._angle")),
     *(f"gearsig.angle.{name}" for name in ("_source", "_resample", "_tachless")),
 )

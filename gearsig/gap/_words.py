@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isclose
 
-from gearsig.gap._burst import ECHO_LAGS_PITCHES, N_QUARTERS
+from gearsig.gap._features import ECHO_LAGS_PITCHES, N_QUARTERS
 from gearsig.gap._reduction import GearFrame, ReducedRecording
 from gearsig.gap._simulator import OperatingCondition
 from gearsig.gap._types import Evidence, GapCause, PlaceKind, Shrinkage

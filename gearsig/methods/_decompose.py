@@ -64,6 +64,7 @@ def _modes(
     engine: Any,
 ) -> MethodAnswer:
     signal, offset = _decomposed(prepared, channel, envelope_hz, over_angle=over_angle, shaft=shaft)
+    # How many modes and which penalty: asked for, or tried out on the signal, with the trials as a table.
     reasons: tuple[str, ...] = ()
     settings, trials = VmdSettings(n_modes or 4, penalty or 2000.0), dict[str, Any]()
     place = ("methods", "modes", channel, envelope_hz, over_angle, shaft)
@@ -82,6 +83,7 @@ def _modes(
     )
     modes = prepared.keep((*place, settings), lambda: by_centre(vmd(signal, None, settings)))
     modes = replace(modes, offset=offset)
+    # The mode to look at is the one with the most impulsive waveform: damage knocks, meshing hums.
     impulses = [kurtosis(waveform) for waveform in modes.waveforms]
     chosen = int(np.argmax(impulses)) if mode is None else mode - 1
     if not 0 <= chosen < modes.n_modes:
@@ -139,8 +141,8 @@ def _modes(
     )
     if not then:
         return answer
+    # The chosen mode alone, transformed two octaves to either side of its centre; the modes' panels stay below it.
     centre, top = float(modes.centres[chosen]), 0.45 * modes.sampling_rate
-    # two octaves to either side of the mode's centre
     low = centre / 4.0 if lowest is None else lowest
     levels = levels_of(
         modes.signal(chosen, start=signal.start), then, lowest=low,

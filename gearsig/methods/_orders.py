@@ -155,6 +155,7 @@ def _vold_kalman(
     coupling: str,
     over: str,
 ) -> MethodAnswer:
+    # Without orders the machine's first two are taken; coupled or not decides whether they share what they overlap.
     recording, angle = prepared.recording, prepared.shaft_angle
     known = known_orders(prepared)
     values = tuple(orders) or tuple(known)[:2]
@@ -165,6 +166,7 @@ def _vold_kalman(
         ("methods", "vold-kalman", channel, values, coupled, *filters.items()),
         lambda: track_vold_kalman(recording, channel, values, shaft_angle=angle, coupled=coupled, **filters),
     )
+    # A resampling-based track of about the same width beside it: where both agree, neither filter made the level.
     unit, time_s = unit_of(prepared, channel), separation.time_s()
     over_speed = over == "speed" or (over == "automatic" and not angle.is_steady())
     width = bandwidth if bandwidth_in == "orders" else 60.0 * bandwidth / max(angle.mean_speed_rpm, 1e-9)
@@ -185,6 +187,7 @@ def _vold_kalman(
     label = "speed of the reference shaft (rpm)" if over_speed else "time (s)"
     limits = (0.0, 1.15 * max(tops, default=0.0) or 1.0)
     panel = LinePanel(lines, label, with_unit("amplitude peak", unit), limits)
+    # What remains without all orders tells how much of the signal they explain.
     columns = {"signal": recording.values(channel)}
     columns |= {name: order.waveform for name, order in zip(names, separation.orders, strict=True)}
     columns[RESIDUAL] = separation.residual

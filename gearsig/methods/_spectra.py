@@ -255,6 +255,7 @@ def _kurtogram(
     band_hz: tuple[float, float] | None,
     over: str,
 ) -> MethodAnswer:
+    # The band must be wide enough for the fastest rhythm looked for, and its envelope long enough for a kurtosis.
     recording = prepared.recording
     usual = highest_modulation_hz or _usual_modulation_hz(prepared)
     max_levels = max(1, int(np.log2(max(recording.n_samples / 512.0, 2.0))))
@@ -272,8 +273,10 @@ def _kurtogram(
         ),
     )
     grid, band, envelope, spectrum = chosen.kurtogram, chosen.band, chosen.envelope, chosen.spectrum
+    # Where the speed changes, a rhythm's lines stay sharp over orders only.
     if _over_orders(prepared, over):
         spectrum = _envelope_orders(prepared, chosen, usual)
+    # All bands as a table, with the limit that the kurtosis of noise reaches: without it a large number says little.
     bands = {
         "from (Hz)": grid.low_hz,
         "to (Hz)": grid.high_hz,
@@ -291,6 +294,7 @@ def _kurtogram(
             "the speed changes: mesh harmonics that pass resonances raise the kurtosis too, without any impact. Trust "
             "a rhythm of the envelope over order, or choose a part of even speed"
         )
+    # The envelope itself, at its own lower rate, for other methods.
     signal = replace(signal_of(prepared, channel), values=envelope.values, rate=envelope.sampling_rate_hz)
     columns = {envelope.source: envelope.values}
     return MethodAnswer(
@@ -377,6 +381,7 @@ def _coherence(
     band_hz: tuple[float, float] | None,
     odds: int,
 ) -> MethodAnswer:
+    # How large the result is follows from the highest rhythm: refused before it is computed.
     recording = prepared.recording
     over_orders = _over_orders(prepared, over)
     usual_hz = _usual_modulation_hz(prepared)
@@ -397,6 +402,7 @@ def _coherence(
         )
 
     coherence = prepared.keep(("methods", "coherence", channel, over_orders, preparation, top, n_bands), compute)
+    # Only lines above what noise reaches are marked on the map; its colours begin at the level of one cell in 1000.
     mean = spectra.enhanced_envelope(coherence, band_hz, probability=1.0 / odds)
     spectrum = mean.spectrum
     cursors = rhythms_of(prepared, spectrum)

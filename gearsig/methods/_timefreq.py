@@ -178,6 +178,7 @@ def _ridges(
     signal = _signal(prepared, channel, options)
     levels = prepared.keep(key, lambda: levels_of(signal, transform, **options))
     ridges = timefreq.ridges(levels, n_ridges, stiffness=bends, steepest=steepest)
+    # Each component is taken out of the signal, not of what earlier ones left: their order must not matter.
     first, wavelet = ridges[0], wavelet_of(options["periods"])
     columns: dict[str, FloatArray] = {"signal": signal.values}
     residual = signal.values.astype(np.float64)
@@ -189,6 +190,7 @@ def _ridges(
         columns[f"component {number}"] = part.values
         residual -= part.values
     columns[RESIDUAL] = residual
+    # The map shows where the ridges run; two profiles below it show place and level of each.
     step = f"components along {len(ridges)} ridges, {wavelet.name}"
     answer = levels_answer(channel, levels, {"n_ridges": len(ridges)}, ridges)
     at, peak = timefreq.at_label(first.axis, first.shaft), with_unit("amplitude peak", first.unit)

@@ -629,7 +629,7 @@ def teeth_of_shaft(analysis: Analysis, shaft: str) -> int | None:
     """Return the teeth of the gear on a shaft; of the gear that a finding names, where there are several."""
     if analysis.rig is None:
         return None
-    gears = {pair.name: pair.teeth(shaft) for pair in analysis.rig.pairs if shaft in (pair.driver, pair.driven)}
+    gears = {pair.name: pair.teeth(shaft) for pair in analysis.rig.pairs_on(shaft)}
     for finding in analysis.findings:
         pair, _, on = finding.where.gear.rpartition("/")
         if on == shaft and gears.get(pair):

@@ -624,6 +624,15 @@ class Rig:
         pairs = {pair.name: pair for pair in self.pairs}
         return pairs[known_name(name, pairs, f"there is no pair {name!r}")]
 
+    def pairs_on(self, shaft: str) -> tuple[GearPair, ...]:
+        """Return the pairs that have a gear on a shaft."""
+        return tuple(pair for pair in self.pairs if shaft in (pair.driver, pair.driven))
+
+    @property
+    def teeth_text(self) -> str:
+        """Teeth of all pairs, driver's first, e.g. "29/71, ?/40"; empty without pairs."""
+        return ", ".join(f"{pair.driver_teeth or '?'}/{pair.driven_teeth or '?'}" for pair in self.pairs)
+
     def mesh_order(self, pair: GearPair, shaft: str = "") -> float | None:
         """Mesh cycles of `pair` per revolution of `shaft` (default: the reference shaft); None if it cannot be known.
 

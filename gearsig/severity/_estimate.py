@@ -299,12 +299,10 @@ def check_same_rig(now: Rig, healthy: Rig) -> None:
     ------
     RefusalError
     """
-    teeth, reference_teeth = (
-        ", ".join(f"{p.driver_teeth or '?'}/{p.driven_teeth or '?'}" for p in rig.pairs) for rig in (now, healthy)
-    )
-    if reference_teeth and teeth != reference_teeth:
+    if healthy.pairs and now.teeth_text != healthy.teeth_text:
         raise RefusalError(
-            f"the reference is of another machine: its teeth are {reference_teeth}, the recording's {teeth}",
+            f"the reference is of another machine: its teeth are {healthy.teeth_text}, the recording's "
+            f"{now.teeth_text}",
             remedy=_REMEDY,
         )
     torque, reference_torque = now.operating_point.torque_nm, healthy.operating_point.torque_nm

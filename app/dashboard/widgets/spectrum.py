@@ -200,12 +200,8 @@ def show_average(analysis: Analysis, channel: ChannelAnalysis) -> None:
 
 def teeth_choice(analysis: Analysis, shaft: str) -> int | None:
     """Return the teeth of the gear on a shaft; the user chooses where there are several."""
-    pairs = analysis.rig.pairs if analysis.rig is not None else ()
-    gears = {
-        pair.name: teeth
-        for pair in pairs
-        if shaft in (pair.driver, pair.driven) and (teeth := pair.teeth(shaft)) is not None
-    }
+    pairs = analysis.rig.pairs_on(shaft) if analysis.rig is not None else ()
+    gears = {pair.name: teeth for pair in pairs if (teeth := pair.teeth(shaft)) is not None}
     if len(gears) < 2:
         return next(iter(gears.values()), None)
     named = [f.where.gear.rpartition("/")[0] for f in analysis.findings if f.where.gear.rpartition("/")[2] == shaft]
