@@ -34,17 +34,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from gearsig import __version__
 from gearsig.angle import ShaftAngle
 from gearsig.cache import write_text
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, LongAnalysis, changes
 from gearsig.formatting import rounded
 from gearsig.recording import Recording
-from gearsig.report._json import Json, plain
+from gearsig.report._json import Json, head, plain
 from gearsig.rig import SpeedSource
 from gearsig.severity import CrackEstimate, NoCrackSeen
-
-SCHEMA, SCHEMA_VERSION = "gearsig.analysis", 1
 
 
 def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
@@ -61,10 +58,7 @@ def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
     dict
         `json.dumps(..., allow_nan=False)` takes it.
     """
-    return {
-        "schema": SCHEMA,
-        "schema_version": SCHEMA_VERSION,
-        "gearsig_version": __version__,
+    return head("gearsig.analysis") | {
         "outcome": analysis.outcome.value,
         "verdict": analysis.verdict,
         "findings": [plain(finding, arrays=False) for finding in analysis.findings],

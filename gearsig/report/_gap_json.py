@@ -11,7 +11,6 @@ from dataclasses import replace
 from math import inf, isnan
 from pathlib import Path
 
-from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.errors import InputError
 from gearsig.gap import (
@@ -26,7 +25,7 @@ from gearsig.gap import (
     Shrinkage,
     SpectrumCurves,
 )
-from gearsig.report._json import Json, Layout, from_plain, plain
+from gearsig.report._json import Json, Layout, from_plain, head, plain
 
 SCHEMA, SCHEMA_VERSION = "gearsig.gap", 3
 FLOORS = "structural floors"
@@ -67,10 +66,7 @@ def gap_to_dict(report: GapReport) -> Json:
     dict
         `json.dumps(..., allow_nan=False)` takes it, and `gap.schema.json` holds for it.
     """
-    result: Json = {
-        "schema": SCHEMA,
-        "schema_version": SCHEMA_VERSION,
-        "gearsig_version": __version__,
+    result = head(SCHEMA, SCHEMA_VERSION) | {
         "outcome": report.outcome.value,
         "verdict": dict(zip(("where", "which", "how_far", "next"), report.verdict, strict=True)),
         "kind": None if report.kind is None else plain(report.kind, layouts=LAYOUTS),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
+from datetime import datetime
 from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -308,14 +309,14 @@ def condition_rows(report: GapReport) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def fact_rows(report: GapReport, command: str) -> Rows:
+def fact_rows(report: GapReport, command: str, date: datetime | None = None) -> Rows:
     """Return what the diagnosis rests on, and how to repeat it."""
     rows = (
         ("rig", report.rig),
         ("simulator", report.simulator or "none: nothing was simulated"),
         ("healthy references", references_text(report)),
         ("size of the gap", size_text(report)),
-        *made_rows(command),
+        *made_rows(command, date),
     )
     return tuple((name, text) for name, text in rows if text)
 
@@ -620,7 +621,7 @@ def write_gap_page(report: GapReport, path: str | Path, *, command: str = "") ->
     return write_text(Path(path), gap_page_html(report, command=command))
 
 
-def gap_page_html(report: GapReport, *, command: str = "") -> str:
+def gap_page_html(report: GapReport, *, command: str = "", date: datetime | None = None) -> str:
     """Return the page that `write_gap_page` writes."""
     return render(
         "gap.html.j2",
@@ -641,6 +642,6 @@ def gap_page_html(report: GapReport, *, command: str = "") -> str:
         steps=step_rows(report),
         next_recordings=next_rows(report),
         conditions=condition_rows(report),
-        facts_rows=fact_rows(report, command),
+        facts_rows=fact_rows(report, command, date),
         galleries=gap_galleries(report),
     )

@@ -53,10 +53,14 @@ Layouts = Mapping[type, Layout]
 _AS_FIELDS = Layout()
 
 
+def head(schema: str, version: int = 1) -> Json:
+    """Return the members that a file begins with: what it is, in which version, made by which gearsig."""
+    return {"schema": schema, "schema_version": version, "gearsig_version": __version__}
+
+
 def document(schema: str, content: Json) -> str:
-    """Return a file's text: what it is, in which version, made by which gearsig, and its content."""
-    head = {"schema": schema, "schema_version": 1, "gearsig_version": __version__}
-    return json.dumps(head | plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    """Return a file's text: its head, and its content."""
+    return json.dumps(head(schema) | plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def members(value: object, *names: str) -> Json:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -678,11 +679,12 @@ def page_html(
     *,
     command: str = "",
     index: str = "",
+    date: datetime | None = None,
     methods: Sequence[str] | None = None,
     mark: str = "",
 ) -> str:
     """Return the page that `write_page` writes."""
-    parts = page_parts(analysis, command=command, methods=methods)
+    parts = page_parts(analysis, command=command, date=date, methods=methods)
     return render(
         "page.html.j2",
         **parts,
@@ -694,7 +696,9 @@ def page_html(
     )
 
 
-def page_parts(analysis: Analysis, *, command: str, methods: Sequence[str] | None = None) -> dict[str, Any]:
+def page_parts(
+    analysis: Analysis, *, command: str, date: datetime | None = None, methods: Sequence[str] | None = None
+) -> dict[str, Any]:
     """Return what the page says, in HTML as in PDF."""
     recording = analysis.recording
     ordered = sorted(analysis.findings, key=lambda finding: finding.kind not in CLAIMED)
@@ -716,5 +720,5 @@ def page_parts(analysis: Analysis, *, command: str, methods: Sequence[str] | Non
         "speed": speed_rows(analysis.shaft_angle),
         "gallery": gallery(analysis, methods),
         "reference": reference_text(analysis.reference),
-        "provenance": provenance_rows(analysis, command),
+        "provenance": provenance_rows(analysis, command, date),
     }

@@ -6,6 +6,7 @@ import platform
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from importlib.metadata import version
 from textwrap import fill
 
@@ -275,7 +276,7 @@ def speed_rows(angle: ShaftAngle | CannotTell) -> Rows:
     )
 
 
-def provenance_rows(analysis: Analysis, command: str) -> Rows:
+def provenance_rows(analysis: Analysis, command: str, date: datetime | None = None) -> Rows:
     """Return everything needed to make the page again."""
     recording = analysis.recording
     origin = recording.provenance
@@ -286,17 +287,17 @@ def provenance_rows(analysis: Analysis, command: str) -> Rows:
         ("history", "; ".join(origin.history)),
         ("sampling rate", f"{recording.sampling_rate_hz:.10g} Hz"),
         ("parameters", "; ".join(setting_text(name, value) for name, value in analysis.settings.items())),
-        *made_rows(command),
+        *made_rows(command, date),
     ]
     return tuple((name, text) for name, text in rows if text)
 
 
-def made_rows(command: str) -> Rows:
-    """Return what a page was made with, and that it was made now."""
+def made_rows(command: str, date: datetime | None = None) -> Rows:
+    """Return what a page was made with, and when; None: now."""
     versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
     return (
         ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
-        ("date", date_text()),
+        ("date", date_text(date)),
         ("command", command),
     )
 
