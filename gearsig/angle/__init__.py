@@ -3,7 +3,6 @@
 from gearsig.angle._encoder import encoder_angle, speed_channel_angle
 from gearsig.angle._pulses import clock_tick, count_pulses, find_pulse_edges, pulse_train_angle
 from gearsig.angle._resample import (
-    PASSBAND,
     REACH,
     delay_table,
     doubling_filter,
@@ -16,7 +15,6 @@ from gearsig.angle._tachless import CombElsewhere, comb_elsewhere, estimate_shaf
 from gearsig.angle._types import AngleSignal, ShaftAngle, check_shaft_angle
 
 __all__ = [
-    "PASSBAND",
     "REACH",
     "AngleSignal",
     "CombElsewhere",

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from gearsig.methods._apply import METHODS, apply_method, apply_method_to_file
 from gearsig.methods._decompose import by_centre
-from gearsig.methods._phase import N_IN_SPACE
 from gearsig.methods._spectra import suggested_rate_hz
 from gearsig.methods._table import (
     Kind,
@@ -21,13 +20,11 @@ from gearsig.methods._table import (
     Waveforms,
     angle_or_none,
     part_of,
-    usual_channel,
 )
 from gearsig.methods._timefreq import TRANSFORMS
 
 __all__ = [
     "METHODS",
-    "N_IN_SPACE",
     "TRANSFORMS",
     "Kind",
     "Method",
@@ -40,5 +37,4 @@ __all__ = [
     "by_centre",
     "part_of",
     "suggested_rate_hz",
-    "usual_channel",
 ]

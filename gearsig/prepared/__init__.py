@@ -10,7 +10,6 @@ from gearsig.prepared._angle import (
     MAINS_TOLERANCE,
     STATED_SPEED_TOLERANCE,
     envelope_bands,
-    phase_followed_angle,
     refined_angle,
 )
 from gearsig.prepared._lines import (
@@ -60,7 +59,6 @@ __all__ = [
     "neighbour_levels",
     "over_floor_db",
     "peak_position",
-    "phase_followed_angle",
     "prepare",
     "refined_angle",
     "score_needed",

@@ -43,7 +43,6 @@ from gearsig.report._json import from_plain, plain
 from gearsig.report._methods import (
     answer_json,
     fitting_methods,
-    method_pictures,
     named_method,
     write_answer,
 )
@@ -57,7 +56,6 @@ from gearsig.report._motion_text import (
     start_stop_text,
 )
 from gearsig.report._page import (
-    VerdictPicture,
     bearing_cursors,
     highest_order_of_interest,
     line_cursors,
@@ -92,7 +90,6 @@ __all__ = [
     "GapFigure",
     "Question",
     "Section",
-    "VerdictPicture",
     "alignment_texts",
     "analysis_text",
     "analysis_to_dict",
@@ -140,7 +137,6 @@ __all__ = [
     "made_folder",
     "marked_positions",
     "mesh_cursors",
-    "method_pictures",
     "n_conditions",
     "named_method",
     "next_rows",

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap import NONE, UNKNOWN
+from gearsig.gap import NONE, UNKNOWN, shares_of
 from gearsig.gap.start_stop import (
     NAMES,
     DriveFloor,
@@ -16,7 +16,6 @@ from gearsig.gap.start_stop import (
     fit,
     load_floors,
     own_features,
-    shares,
     shrink,
 )
 
@@ -68,9 +67,9 @@ def test_no_change_is_none():
 
 def test_a_change_of_its_own_is_named_and_a_strange_one_is_not():
     fits = [fit(cause(str(i), i), direction(2, 15.0), FLOOR_OF_ONE) for i in range(4)]
-    found = shares(evidences(direction(2, 15.0), FLOOR_OF_ONE, fits))
+    found = shares_of(evidences(direction(2, 15.0), FLOOR_OF_ONE, fits))
     assert found["2"] > 0.5
-    strange = shares(
+    strange = shares_of(
         evidences(direction(9, 15.0), FLOOR_OF_ONE, [fit(cause("0", 0), direction(9, 15.0), FLOOR_OF_ONE)])
     )
     assert strange[UNKNOWN] > 0.9
