@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gearsig.cache import made_folder
 from gearsig.checks import FloatArray, count, within
 from gearsig.formatting import counted, signed
 from gearsig.plot import gear_mesh_figure, gear_modes_figure, gear_stress_figure
-from gearsig.report import made_folder
 from sims import fe_gear
 from sims.fe_gear import (
     CraigBamptonGear,

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.cache import write_text
+from gearsig.cache import made_folder, write_text
 from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.plot import CurvePanel, curves_figure
-from gearsig.report import made_folder
 from sims.fe_gear import (
     READY,
     GearBlank,

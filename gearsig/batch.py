@@ -141,14 +141,13 @@ def report_many(
         If a file that is named does not exist, there are no recordings, `n_processes` is below 1, or the folder cannot
         be made.
     """
-    from gearsig.cache import remove_parts
+    from gearsig.cache import made_folder, remove_parts
     from gearsig.checks import count
     from gearsig.fleet import find_recordings, no_recordings
     from gearsig.report import (
         Entry,
         Failure,
         check_pdf,
-        made_folder,
         named_method,
         page_names,
         write_index,

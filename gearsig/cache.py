@@ -108,6 +108,23 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object], *, remedy: str
     return path
 
 
+def made_folder(folder: Path, remedy: str = "choose another with -o") -> Path:
+    """Make a folder where there is none, and return it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made: a file of that name, a place that may not be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"the folder cannot be made ({error.strerror or error})", where=str(folder), remedy=remedy
+        ) from None
+    return folder
+
+
 def write_text(path: Path, text: str) -> Path:
     """Write a result as a text, whole or not at all; a failure leaves what was there before.
 

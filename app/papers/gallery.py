@@ -143,8 +143,8 @@ def paper(name: str, on_progress: Progress = lambda _stage, _done: None) -> Pape
 
 def write_paper(found: Paper, folder: Path, *, command: str = "") -> tuple[Path, ...]:
     """Write each figure as PNG and SVG, the claims as JSON, and the page that shows them beside each other."""
-    from gearsig.cache import write_text
-    from gearsig.report import Section, benchmark_html, made_folder
+    from gearsig.cache import made_folder, write_text
+    from gearsig.report import Section, benchmark_html
 
     made_folder(folder)
     paths = []

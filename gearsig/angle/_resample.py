@@ -269,11 +269,10 @@ _STEEPEST = 1e3
 def times_at(knots, angle, speed, k, first, step, out):  # type: ignore[no-untyped-def]
     """Solve θ(t) = first + i·step for each i, θ the Hermite cubic through knots, values `angle` and slopes `speed`.
 
-    The search starts at interval k, which must not lie beyond the first angle; all angles lie within the knots'
-    range. In
-    u = (t - t₀)/h of an interval, θ - θ₀ = ((c u + b) u + a) u. The ends of each block are solved one by one, the
-    points between by two
-    Newton steps from the cubic through the ends of the inverse function; these steps do not wait for each other.
+    The search starts at interval k, which must not lie beyond the first angle; all angles lie within the knots' range.
+    In u = (t - t₀)/h of an interval, θ - θ₀ = ((c u + b) u + a) u. The ends of each block are solved one by one, the
+    points between by two Newton steps from the cubic through the ends of the inverse function; these steps do not wait
+    for each other.
     """
     n, n_knots = out.shape[0], knots.shape[0]
     i = 0
@@ -413,12 +412,10 @@ def resample_to_angle(
     Returns
     -------
     AngleSignal
-        Same unit as the channels. Sample i lies at start_revolution + i / samples_per_revolution; the start is a
-        whole step,
-        so that revolution 0 of the shaft angle falls on the grid. The first and last 24 samples of the recording
-        (more where
-        the grid is coarse) have no complete kernel and are left out. Error below 5e-6 of full scale up to 0.4 of the
-        lower of both sampling rates.
+        Same unit as the channels. Sample i lies at start_revolution + i / samples_per_revolution; the start is a whole
+        step, so that revolution 0 of the shaft angle falls on the grid. The first and last 24 samples of the recording
+        (more where the grid is coarse) have no complete kernel and are left out. Error below 5e-6 of full scale up to
+        0.4 of the lower of both sampling rates.
 
     Raises
     ------

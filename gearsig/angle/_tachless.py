@@ -105,9 +105,8 @@ def refine_by_phase(
     """Return the angle with which the strongest mesh harmonics run at constant phase.
 
     Over the estimated angle a harmonic of order o has the phase 2πo(θ_true - θ), so θ_true = θ + phase/(2πo). The
-    phase is summed
-    from sample to sample over all channels, weighted over harmonics by o² times their height over the neighbourhood.
-    Repeated, each time over a better angle and with a narrower band.
+    phase is summed from sample to sample over all channels, weighted over harmonics by o² times their height over the
+    neighbourhood. Repeated, each time over a better angle and with a narrower band.
 
     Parameters
     ----------
@@ -121,9 +120,9 @@ def refine_by_phase(
     Notes
     -----
     Source: F. Bonnardot, M. El Badaoui, R. B. Randall, J. Danière, F. Guillet, *Use of the acceleration signal of a
-    gearbox in
-    order to perform angular resampling*, Mech. Syst. Signal Process. 19 (2005); J. Urbanek, T. Barszcz, J. Antoni, *A
-    two-step procedure for estimation of instantaneous rotational speed with large fluctuations*, ibid. 38 (2013).
+    gearbox in order to perform angular resampling*, Mech. Syst. Signal Process. 19 (2005); J. Urbanek, T. Barszcz, J.
+    Antoni, *A two-step procedure for estimation of instantaneous rotational speed with large fluctuations*, ibid. 38
+    (2013).
     """
     if orders:
         recording = _thinned(recording, channels, (max(orders) + 2.0) * angle.speed_range_rpm[1] / 60.0)

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.cache import keep, modules_digest, read_arrays
+from gearsig.cache import keep, made_folder, modules_digest, read_arrays
 from gearsig.checks import FloatArray, count, positive
-from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.errors import GearsigError, RefusalError
 from gearsig.gap._conditions import SEED, Condition, halves, observed
 from gearsig.gap._evidence import SIGNS, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS, determined_options
 from gearsig.gap._features import whole_and_parts
@@ -419,7 +419,12 @@ class _BankRequest:
         positive(run.duration_s, "duration_s", "s")
         at = replace(run, point=rounded(run.point))
         key = bank_key(at, candidates, seeds, within)
-        path = None if folder is None else _made(folder) / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
+        path = (
+            None
+            if folder is None
+            else made_folder(folder, "choose another with --cache")
+            / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
+        )
         return cls(at, candidates, key, path)
 
 
@@ -434,16 +439,6 @@ def bank_key(run: TwinRun, candidates: Sequence[Added], seeds: Sequence[int], ch
     runs = [list(seeds), list(change_seeds), run.duration_s, run.sampling_rate_hz, run.noise]
     known = [run.twin.key, features_digest(), [run.point.speed_rpm, run.point.torque_nm], settings, runs]
     return json.dumps(known, sort_keys=True)
-
-
-def _made(folder: Path) -> Path:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"cannot be made ({error.strerror})", where=str(folder), remedy="choose another folder with --cache"
-        ) from None
-    return folder
 
 
 def _assembled(

@@ -11,7 +11,7 @@ from gearsig.report._comparison import (
     orders_csv,
     shown_orders,
 )
-from gearsig.report._files import Section, benchmark_html, check_writable, made_folder, page_names, recording_mark
+from gearsig.report._files import Section, benchmark_html, check_writable, page_names, recording_mark
 from gearsig.report._fleet import fleet_page_html, fleet_page_pdf, write_fleet_page
 from gearsig.report._gap_json import gap_from_dict, gap_schema, gap_to_dict, gap_to_json, read_gap_json, write_gap_json
 from gearsig.report._gap_page import (
@@ -134,7 +134,6 @@ __all__ = [
     "line_cursors",
     "long_analysis_text",
     "long_analysis_to_json",
-    "made_folder",
     "marked_positions",
     "mesh_cursors",
     "n_conditions",

@@ -74,23 +74,6 @@ def check_writable(folder: Path) -> None:
         raise _unwritable(folder, error) from None
 
 
-def made_folder(folder: Path) -> Path:
-    """Make a folder where there is none, and return it.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made: a file of that name, a place that may not be written.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"the folder cannot be made ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
-        ) from error
-    return folder
-
-
 def _unwritable(path: Path, error: OSError) -> InputError:
     return InputError(
         f"cannot be written ({error.strerror or error})", where=str(path), remedy="choose another folder with -o"

@@ -11,14 +11,13 @@ from typing import IO, Any
 import numpy as np
 
 from gearsig.angle import ShaftAngle
-from gearsig.cache import write_text, write_whole
+from gearsig.cache import made_folder, write_text, write_whole
 from gearsig.checks import closest_match_hint, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.methods import METHODS, TRANSFORMS, MethodAnswer, apply_method
 from gearsig.plot import Picture, embed, svg_panel
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
-from gearsig.report._files import made_folder
 from gearsig.report._json import plain
 
 
