@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
+from gearsig.diagnosis._signals import MINIMUM_LINES, SEEN_THERE, AnalysisSignals, BandEnvelope
 from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at
 from gearsig.recording import MAINS_HZ
 from gearsig.rig import Bearing
@@ -136,9 +136,6 @@ SAME_BEARING_ORDER = 1e-3
 N_MULTIPLES = 6
 """Of a family's fundamental that are looked at."""
 
-MINIMUM_LINES = 3
-"""Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -235,9 +232,6 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
 
 SAME_FAMILY = 5e-3
 """Relative distance of two fundamentals that are one: a bearing's slip differs from day to day."""
-
-SEEN_THERE = 0.01
-"""Chance of a family in one envelope up to which that of another envelope is seen there as well."""
 
 SECOND_DB = 12.0
 """A family so much weaker than another, in its own envelope or in the clearest one, is a by-product of it: sums and

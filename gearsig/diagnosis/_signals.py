@@ -392,10 +392,18 @@ def kurtogram_bands(signals: AnalysisSignals) -> tuple[KurtogramBand, ...]:
     return tuple(band for band in bands if band is not None)
 
 
+MINIMUM_LINES = 3
+"""Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
+
+SEEN_THERE = 0.01
+"""Chance of a family in one envelope up to which that of another envelope is seen there as well."""
+
+
 def witness(band: KurtogramBand, order: float) -> Comb | None:
     """Return the family at an order found elsewhere, if the own band shows it too."""
     comb = best_comb(band.envelope.excess, order * (1 - 3e-3), order * (1 + 3e-3))  # a bearing slips alike in all bands
-    return comb if comb is not None and comb.p_value <= 0.01 and len(comb.positions) >= 3 else None
+    is_seen = comb is not None and comb.p_value <= SEEN_THERE and len(comb.positions) >= MINIMUM_LINES
+    return comb if is_seen else None
 
 
 def witness_text(
