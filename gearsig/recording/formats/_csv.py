@@ -16,10 +16,9 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory, read_text_bytes
-from gearsig.recording._metadata import OWN_TEXT_MARK, metadata_json, table_from_metadata
 from gearsig.recording._table import RawColumn, RawTable, ask_whether_runs, without_clock
 from gearsig.recording._types import Recording, is_unit, plain_name, rate_in_line, split_unit
-from gearsig.recording.formats._format import FileFormat
+from gearsig.recording.formats._format import OWN_TEXT_MARK, FileFormat, metadata_json, table_from_metadata
 
 # --------------------
 # How a text file of numbers is laid out: separator, decimal sign, header, first line of numbers.

@@ -11,10 +11,9 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_decoded
-from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
 from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, Recording, plain_name
-from gearsig.recording.formats._format import OWN_NAME, FileFormat
+from gearsig.recording.formats._format import OWN_NAME, FileFormat, metadata_json, table_from_metadata
 
 READER = "gearsig HDF5 reader"
 OWN_SAMPLES = "samples"

@@ -13,10 +13,9 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording._limits import CHUNK_BYTES, check_decoded
-from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
 from gearsig.recording._types import Recording
-from gearsig.recording.formats._format import OWN_NAME, FileFormat
+from gearsig.recording.formats._format import OWN_NAME, FileFormat, metadata_json, table_from_metadata
 from gearsig.recording.formats._hdf5 import decoded_bytes, load_dataset, own_datasets
 
 # --------------------

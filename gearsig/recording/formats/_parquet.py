@@ -10,10 +10,9 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_decoded
-from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NumberArray, RawColumn, RawTable
 from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, Recording, plain_name, split_unit
-from gearsig.recording.formats._format import OWN_NAME, FileFormat
+from gearsig.recording.formats._format import OWN_NAME, FileFormat, metadata_json, table_from_metadata
 
 READER = "gearsig Parquet reader"
 

@@ -13,10 +13,9 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory
-from gearsig.recording._metadata import metadata_json, table_from_metadata
 from gearsig.recording._table import NumberArray, RawColumn, RawTable
 from gearsig.recording._types import Recording
-from gearsig.recording.formats._format import FileFormat
+from gearsig.recording.formats._format import FileFormat, metadata_json, table_from_metadata
 
 # --------------------
 # The chunks of a RIFF/WAVE file beside its samples.
