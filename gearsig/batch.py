@@ -144,14 +144,7 @@ def report_many(
     from gearsig.cache import made_folder, remove_parts
     from gearsig.checks import count
     from gearsig.fleet import find_recordings, no_recordings
-    from gearsig.report import (
-        Entry,
-        Failure,
-        check_pdf,
-        named_method,
-        page_names,
-        write_index,
-    )
+    from gearsig.report import Entry, Failure, check_pdf, named_method, page_names, write_index
 
     # What can be refused is refused before anything is written: no recordings, no typst, a wrong method or folder.
     files = [path for path, _ in find_recordings(paths)]

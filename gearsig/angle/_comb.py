@@ -460,10 +460,7 @@ class SpeedSearch:
 
 
 def search_of(
-    recording: Recording,
-    rig: Rig,
-    channels: Sequence[str] | None,
-    speed_range_rpm: tuple[float, float] | None,
+    recording: Recording, rig: Rig, channels: Sequence[str] | None, speed_range_rpm: tuple[float, float] | None
 ) -> SpeedSearch:
     """Check what the search rests on: teeth, living channels, a range of speeds with enough revolutions."""
     check_recording(recording)

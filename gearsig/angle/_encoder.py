@@ -55,11 +55,7 @@ def local_parabolas(x: FloatArray, half_width: int) -> tuple[FloatArray, FloatAr
 
 
 def encoder_angle(
-    values: FloatArray,
-    sampling_rate_hz: float,
-    units_per_revolution: float = 360.0,
-    *,
-    wraps: bool = True,
+    values: FloatArray, sampling_rate_hz: float, units_per_revolution: float = 360.0, *, wraps: bool = True
 ) -> ShaftAngle:
     """Turn an angle channel, wrapping or running on, into shaft angle.
 

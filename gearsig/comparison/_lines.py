@@ -57,13 +57,7 @@ def expected_lines(rig: Rig, reference: str) -> tuple[OrderLine, ...]:
     if not rig.shafts:
         name = reference or "shaft"
         return tuple(OrderLine(float(k), "shaft", f"{k}× {name}", name, k) for k in range(1, 13))
-    lines = order_lines(
-        rig,
-        reference,
-        n_mesh_harmonics=10,
-        n_shaft_harmonics=4 if rig.pairs else 12,
-        n_sidebands=3,
-    )
+    lines = order_lines(rig, reference, n_mesh_harmonics=10, n_shaft_harmonics=4 if rig.pairs else 12, n_sidebands=3)
     return tuple(line for line in lines if line.kind in _PRIORITY and line.order > 0)
 
 
@@ -251,10 +245,7 @@ def order_band_limits(mesh_order: float | None, name: str, highest: float) -> tu
     if mesh_order is not None and 1.5 * mesh_order <= highest:
         n = min(int(highest / mesh_order - 0.5), 10)
         around = [(f"around {k}× mesh {name}".rstrip(), (k - 0.5) * mesh_order) for k in range(1, n + 1)]
-        return (
-            ("below the mesh", 0.5, 0.5 * mesh_order),
-            *((label, low, low + mesh_order) for label, low in around),
-        )
+        return (("below the mesh", 0.5, 0.5 * mesh_order), *((label, low, low + mesh_order) for label, low in around))
     edges = np.linspace(0.5, highest, 11)
     return tuple((f"orders {a:.4g} to {b:.4g}", float(a), float(b)) for a, b in pairwise(edges))
 

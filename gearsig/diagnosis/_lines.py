@@ -11,13 +11,7 @@ import numpy as np
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
-from gearsig.prepared import (
-    RUN_UP_FOOT_ORDERS,
-    LinesOverFloor,
-    lines_over_noise_floor,
-    neighbour_levels,
-    peak_position,
-)
+from gearsig.prepared import RUN_UP_FOOT_ORDERS, LinesOverFloor, lines_over_noise_floor, neighbour_levels, peak_position
 from gearsig.recording import MAINS_HZ, MAINS_WANDER
 from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum

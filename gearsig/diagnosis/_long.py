@@ -287,11 +287,7 @@ def read_usual_part(
 
 
 def read_whole(
-    path: str | Path,
-    rig: Rig | None = None,
-    *,
-    sampling_rate_hz: float | None = None,
-    speed: SpeedSource | None = None,
+    path: str | Path, rig: Rig | None = None, *, sampling_rate_hz: float | None = None, speed: SpeedSource | None = None
 ) -> Recording:
     """Read a recording for what looks at all of it at once; refuse before one that half of the free memory is less for.
 

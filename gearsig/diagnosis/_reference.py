@@ -151,9 +151,7 @@ def reference_unfit(reference: Analysis) -> Finding:
 
 
 def beside_reference(
-    findings: Iterable[Finding],
-    reference: Analysis,
-    measured: Callable[[Finding], LevelChange | None] = lambda _: None,
+    findings: Iterable[Finding], reference: Analysis, measured: Callable[[Finding], LevelChange | None] = lambda _: None
 ) -> list[Finding]:
     """Return the findings, each fault or suspicion with a sentence on what the reference shows of it.
 

@@ -22,11 +22,7 @@ Settings = Mapping[str, str | float | int | None]
 
 
 def start_stop_analysis(
-    recording: Recording,
-    rig: Rig,
-    problems: list[Finding],
-    settings: Settings,
-    reference: Recording | None = None,
+    recording: Recording, rig: Rig, problems: list[Finding], settings: Settings, reference: Recording | None = None
 ) -> Analysis | None:
     """Return the analysis of a start–stop recording, or None where the motion is not one or is not known.
 

@@ -49,10 +49,7 @@ from gearsig.gap._curves import (
     lines_beyond,
     spectrum_curves,
 )
-from gearsig.gap._diagnose import (
-    diagnose_gap,
-    effects_without_place,
-)
+from gearsig.gap._diagnose import diagnose_gap, effects_without_place
 from gearsig.gap._evidence import (
     SIGNS,
     TOOTH_FAULTS,
@@ -79,14 +76,7 @@ from gearsig.gap._gearless import UnexpectedFinding, place_of_unexpected, unexpe
 from gearsig.gap._inputs import GapRequest, read_gap_inputs, read_labelled, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes, labelled_support, with_labelled
 from gearsig.gap._next_recording import next_recordings, next_steps
-from gearsig.gap._places import (
-    counted_against,
-    gap_places,
-    locate_all_round,
-    locate_mesh,
-    locate_tail,
-    ranked_places,
-)
+from gearsig.gap._places import counted_against, gap_places, locate_all_round, locate_mesh, locate_tail, ranked_places
 from gearsig.gap._population import (
     BY_HAND,
     INDEPENDENT,
@@ -199,12 +189,7 @@ from gearsig.gap._types import (
     shares_of,
 )
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
-from gearsig.gap._waveform import (
-    SimulatedWaveform,
-    WaveformMatch,
-    compare_waveform,
-    waveform_match,
-)
+from gearsig.gap._waveform import SimulatedWaveform, WaveformMatch, compare_waveform, waveform_match
 from gearsig.gap._words import (
     ComparedPair,
     feature_words,

@@ -17,24 +17,11 @@ from gearsig.formatting import percent
 from gearsig.gap._change import change_features, difference_features, lines_of_shaft, turned_difference
 from gearsig.gap._evidence import over_floors
 from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_energy
-from gearsig.gap._floors import (
-    REPEATABLE,
-    GapSize,
-    StructuralFloor,
-    gap_size,
-    pooled_scatter,
-)
+from gearsig.gap._floors import REPEATABLE, GapSize, StructuralFloor, gap_size, pooled_scatter
 from gearsig.gap._population import load_learned
 from gearsig.gap._prediction import ObservedChange
 from gearsig.gap._recognition import Learned
-from gearsig.gap._reduction import (
-    DRIVEN,
-    DRIVER,
-    NOMINAL_REVOLUTIONS,
-    GearFrame,
-    ReducedRecording,
-    reduce_recording,
-)
+from gearsig.gap._reduction import DRIVEN, DRIVER, NOMINAL_REVOLUTIONS, GearFrame, ReducedRecording, reduce_recording
 from gearsig.gap._simulator import Added, OperatingCondition, Twin
 from gearsig.gap._types import ConditionFacts
 from gearsig.gap._words import shaft_words

@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap._change import turned_difference
-from gearsig.gap._features import (
-    MAX_SHAFT_ORDERS,
-    SIDEBANDS,
-    STEPS_PER_TOOTH,
-    floor_ratio,
-)
+from gearsig.gap._features import MAX_SHAFT_ORDERS, SIDEBANDS, STEPS_PER_TOOTH, floor_ratio
 from gearsig.gap._floors import StructuralFloor
 from gearsig.gap._places import changed_pattern, pattern_of_recording
 from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ReducedRecording

@@ -14,13 +14,7 @@ from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.formatting import odds_text
 from gearsig.gap._attribution import Attribution, attribute, is_calibrated
-from gearsig.gap._conditions import (
-    Condition,
-    Stage,
-    conditions_of,
-    simulated,
-    warnings_of,
-)
+from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import evidence_of
 from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpected_findings, with_unexpected
@@ -49,14 +43,7 @@ from gearsig.gap._trials import (
     run_for_a_moment,
     steps_of,
 )
-from gearsig.gap._types import (
-    NAMING,
-    GapCause,
-    GapPlace,
-    Interval,
-    LabelledFacts,
-    NextRecording,
-)
+from gearsig.gap._types import NAMING, GapCause, GapPlace, Interval, LabelledFacts, NextRecording
 from gearsig.gap._waveform import gain_scatter
 from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
@@ -473,10 +460,7 @@ def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect]) -> l
 
 
 def _posterior(
-    attribution: Attribution[TriedEffect],
-    clearest: Condition,
-    known: Mapping[str, GapEffect],
-    gap: Sequence[GapPlace],
+    attribution: Attribution[TriedEffect], clearest: Condition, known: Mapping[str, GapEffect], gap: Sequence[GapPlace]
 ) -> dict[str, float]:
     """Return cause → probability, with what the whole gap and its places say."""
     posterior = within_the_floor(attribution.probabilities(), clearest.size.structural)

@@ -83,10 +83,7 @@ def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lamb
     """
     _check_files(request)
     files = (*request.recordings, *request.references)
-    names = (
-        *(request.names or _names(request.recordings)),
-        *(request.reference_names or _names(request.references)),
-    )
+    names = (*(request.names or _names(request.recordings)), *(request.reference_names or _names(request.references)))
     recordings: list[Recording] = []
     n, labelled = len(request.recordings), tuple[LabelledRecording, ...]()
     speed = None if request.speed_rpm is None else ConstantSpeed(request.speed_rpm)

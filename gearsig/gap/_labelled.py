@@ -14,14 +14,7 @@ from gearsig.cache import keep, read_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap._change import change_features, difference_features
-from gearsig.gap._conditions import (
-    Condition,
-    HealthyReference,
-    facts_of,
-    matching_reference,
-    read_healthy,
-    simulated,
-)
+from gearsig.gap._conditions import Condition, HealthyReference, facts_of, matching_reference, read_healthy, simulated
 from gearsig.gap._features import Features
 from gearsig.gap._recognition import Learned, within_reach
 from gearsig.gap._reduction import ReducedRecording, reduce_recording

@@ -40,13 +40,7 @@ from gearsig.gap._floors import (
     kinds_of,
     pooled_scatter,
 )
-from gearsig.gap._reduction import (
-    DRIVER,
-    N_HARMONICS,
-    N_MESH_HARMONICS,
-    GearFrame,
-    ReducedRecording,
-)
+from gearsig.gap._reduction import DRIVER, N_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording
 from gearsig.gap._simulator import GapEffect
 from gearsig.gap._types import UNKNOWN, GapPlace, PlaceKind
 from gearsig.gap._words import ComparedPair, LocatedChange, band_words, by_decibels, feature_words, hertz, shaft_words

@@ -173,11 +173,7 @@ def _read(path: Path, left_out: str) -> Population:
         return whole.of_rows(whole.simulators != left_out)
     arrays = read_arrays(path, MAX_BYTES)
     if arrays is None:
-        raise InputError(
-            "the population is not there, or damaged",
-            where=path.name,
-            remedy=MAKE_POPULATION,
-        )
+        raise InputError("the population is not there, or damaged", where=path.name, remedy=MAKE_POPULATION)
     of_rigs = np.searchsorted(arrays["simulated_rigs"], arrays["rigs"])
     tables = {
         name: np.asarray(arrays[name], dtype=np.float64)

@@ -107,14 +107,7 @@ def _checked(about: dict[str, Any], arrays: dict[str, Any]) -> Bank | None:
         return None
     left_out = tuple((_added(row), str(why)) for row, why in about["left_out"])
     return Bank(
-        OperatingCondition(*map(float, about["point"])),
-        names,
-        changes,
-        healthy,
-        added,
-        changed,
-        sidebands,
-        left_out,
+        OperatingCondition(*map(float, about["point"])), names, changes, healthy, added, changed, sidebands, left_out
     )
 
 

@@ -12,15 +12,7 @@ from __future__ import annotations
 from gearsig.methods._apply import METHODS, apply_method, apply_method_to_file
 from gearsig.methods._decompose import by_centre
 from gearsig.methods._spectra import suggested_rate_hz
-from gearsig.methods._table import (
-    Kind,
-    Method,
-    MethodAnswer,
-    MethodOption,
-    Waveforms,
-    angle_or_none,
-    part_of,
-)
+from gearsig.methods._table import Kind, Method, MethodAnswer, MethodOption, Waveforms, angle_or_none, part_of
 from gearsig.methods._timefreq import TRANSFORMS
 
 __all__ = [

@@ -10,16 +10,7 @@ import numpy as np
 
 from gearsig import plot
 from gearsig.checks import FloatArray
-from gearsig.decompose import (
-    DenoiseSettings,
-    Modes,
-    VmdEngine,
-    VmdSettings,
-    denoise,
-    mode_spectra,
-    suggest_modes,
-    vmd,
-)
+from gearsig.decompose import DenoiseSettings, Modes, VmdEngine, VmdSettings, denoise, mode_spectra, suggest_modes, vmd
 from gearsig.errors import InputError
 from gearsig.formatting import readable, unit_text
 from gearsig.indicators import kurtosis
@@ -132,10 +123,7 @@ def _modes(
                 f"{impulses[chosen]:.3g}, centre {modes.centres[chosen]:.5g} {unit}."
             ),
         ),
-        notes=(
-            *reasons,
-            f"{end} after {modes.n_iterations} iterations. Upright lines: the modes' centres.",
-        ),
+        notes=(*reasons, f"{end} after {modes.n_iterations} iterations. Upright lines: the modes' centres."),
         warnings=modes.notes,
         waveforms=waveforms,
     )
@@ -162,12 +150,7 @@ def _modes(
 
 
 def _decomposed(
-    prepared: PreparedRecording,
-    channel: str,
-    envelope_hz: tuple[float, float] | None,
-    *,
-    over_angle: bool,
-    shaft: str,
+    prepared: PreparedRecording, channel: str, envelope_hz: tuple[float, float] | None, *, over_angle: bool, shaft: str
 ) -> tuple[UniformSignal, float]:
     """Return what is taken apart, and the constant that was subtracted from it."""
     if envelope_hz is None:

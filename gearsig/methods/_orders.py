@@ -12,16 +12,7 @@ from gearsig.diagnosis import RecordBlocks
 from gearsig.errors import GearsigError
 from gearsig.formatting import counted, readable, unit_text
 from gearsig.methods._spectra import cursors_of, highest_order
-from gearsig.methods._table import (
-    HIGHEST,
-    SHAFT,
-    Method,
-    MethodAnswer,
-    MethodOption,
-    signal_of,
-    unit_of,
-    waveforms_of,
-)
+from gearsig.methods._table import HIGHEST, SHAFT, Method, MethodAnswer, MethodOption, signal_of, unit_of, waveforms_of
 from gearsig.orders import OrderMap, TrackedOrder, frequency_map, order_map, track_orders, track_vold_kalman
 from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibels, with_unit
 from gearsig.prepared import PreparedRecording

@@ -72,11 +72,7 @@ def _speed_messages(prepared: PreparedRecording) -> tuple[str, ...]:
 
 
 def _plane(
-    prepared: PreparedRecording,
-    channel: str,
-    lowest_hz: float | None,
-    highest_hz: float | None,
-    quantity: str,
+    prepared: PreparedRecording, channel: str, lowest_hz: float | None, highest_hz: float | None, quantity: str
 ) -> phase.PhasePortrait:
     recording = prepared.recording
     known = recording.channels[recording.index(channel)].quantity
@@ -199,12 +195,7 @@ def _in_band(
             )
         return np.asarray(values, dtype=np.float64), rate_hz, 0.0, channel
     plane = phase.phase_plane(
-        values,
-        rate_hz,
-        quantity="displacement",
-        low_cut_hz=low_hz or None,
-        high_cut_hz=high_hz or None,
-        source=channel,
+        values, rate_hz, quantity="displacement", low_cut_hz=low_hz or None, high_cut_hz=high_hz or None, source=channel
     )
     return np.ascontiguousarray(plane.points[:, 0]), plane.sampling_rate_hz, plane.start_s, plane.source
 

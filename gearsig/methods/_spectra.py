@@ -118,11 +118,7 @@ def _marked_spectrum(
         channel,
         caption,
         lambda: plot.spectrum_figure(
-            spectrum,
-            cursors,
-            scale="linear" if is_quefrency else "log",
-            limits=limits,
-            title=f"{channel}: {caption}",
+            spectrum, cursors, scale="linear" if is_quefrency else "log", limits=limits, title=f"{channel}: {caption}"
         ),
         part,
         numbers=numbers,
@@ -264,12 +260,7 @@ def _kurtogram(
     chosen = prepared.keep(
         ("methods", "kurtogram", channel, settings),
         lambda: spectra.kurtogram_envelope(
-            recording,
-            channel,
-            preparation=preparation,
-            n_levels=n_levels,
-            highest_modulation_hz=usual,
-            band_hz=band_hz,
+            recording, channel, preparation=preparation, n_levels=n_levels, highest_modulation_hz=usual, band_hz=band_hz
         ),
     )
     grid, band, envelope, spectrum = chosen.kurtogram, chosen.band, chosen.envelope, chosen.spectrum

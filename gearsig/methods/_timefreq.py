@@ -12,16 +12,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.formatting import axis_label, unit_text
 from gearsig.methods._spectra import cursors_of
-from gearsig.methods._table import (
-    LINES,
-    OVER_ANGLE,
-    SHAFT,
-    Method,
-    MethodAnswer,
-    MethodOption,
-    signal_of,
-    waveforms_of,
-)
+from gearsig.methods._table import LINES, OVER_ANGLE, SHAFT, Method, MethodAnswer, MethodOption, signal_of, waveforms_of
 from gearsig.orders import order_spectrum
 from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibels, with_unit
 from gearsig.prepared import PreparedRecording
@@ -29,12 +20,7 @@ from gearsig.timefreq import Morse, Ridge, TimeFrequencyMap, UniformSignal, Wave
 
 TRANSFORMS = ("cwt", "squeezed-cwt", "stft", "squeezed-stft")
 """Transforms of the method time-frequency, and of a chosen mode."""
-NAMES = {
-    "stft": "Fourier",
-    "cwt": "Wavelet",
-    "squeezed-stft": "Squeezed Fourier",
-    "squeezed-cwt": "Squeezed wavelet",
-}
+NAMES = {"stft": "Fourier", "cwt": "Wavelet", "squeezed-stft": "Squeezed Fourier", "squeezed-cwt": "Squeezed wavelet"}
 OCTAVES = 8.0
 """Of wavelet maps; lower lines are mostly the ends' doing."""
 TRANSFORM = MethodOption(

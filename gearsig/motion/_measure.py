@@ -15,11 +15,7 @@ from gearsig.motion._types import PairMotion, stands
 from gearsig.recording import Channel, Recording, check_recording
 from gearsig.rig import SIDES, EncoderChannel, GearPair, PathOfContact, Rig, check_rig, contact_pair, path_of_contact
 
-QUANTITY_OF = {
-    "angle": ("angle", "encoder"),
-    "speed": ("rotational_speed",),
-    "acceleration": ("angular_acceleration",),
-}
+QUANTITY_OF = {"angle": ("angle", "encoder"), "speed": ("rotational_speed",), "acceleration": ("angular_acceleration",)}
 ROLES = (*(f"{side} {what}" for what in QUANTITY_OF for side in SIDES), "torque", "force")
 """What a channel can be: angle, speed and acceleration of either gear, torque of the driver's shaft, tooth force."""
 

@@ -88,10 +88,7 @@ class MotionSegments(Result, rows="segments"):
     def summary(self) -> str:
         """Starts and stops in words; a record that begins or ends in motion holds one less of them."""
         counts = f"{counted(len(self.starts_s), 'start')} and {counted(len(self.stops_s), 'stop')}"
-        moves = {
-            "begins": self.segments[0].direction and not self.starts_at_once,
-            "ends": self.segments[-1].direction,
-        }
+        moves = {"begins": self.segments[0].direction and not self.starts_at_once, "ends": self.segments[-1].direction}
         ends = [name for name, is_moving in moves.items() if is_moving]
         return f"{counts} in a record that {' and '.join(ends)} in motion" if ends else counts
 

@@ -1,18 +1,7 @@
 """Motion in its phase space: portraits, Poincaré sections, embedding, Lyapunov exponents."""
 
-from gearsig.phase._bifurcation import (
-    TwoMotions,
-    bifurcation_diagram,
-    coexistence_ranges,
-    step_of,
-    values_apart,
-)
-from gearsig.phase._embedding import (
-    average_mutual_information,
-    delay_embedding,
-    delay_vectors,
-    embedding_dimension,
-)
+from gearsig.phase._bifurcation import TwoMotions, bifurcation_diagram, coexistence_ranges, step_of, values_apart
+from gearsig.phase._embedding import average_mutual_information, delay_embedding, delay_vectors, embedding_dimension
 from gearsig.phase._kind import (
     MotionKind,
     kind_of_motion,

@@ -344,13 +344,7 @@ def embedding_dimension(
 
 
 def _step(
-    x: FloatArray,
-    tau: int,
-    d: int,
-    library: np.ndarray,
-    references: np.ndarray,
-    window: int,
-    finest: float,
+    x: FloatArray, tau: int, d: int, library: np.ndarray, references: np.ndarray, window: int, finest: float
 ) -> tuple[float, float, float]:
     """Return the share of false neighbours, Cao's E and E* at dimension d; x has a standard deviation of one.
 

@@ -82,12 +82,7 @@ def _draw_levels(
 
 
 def draw_level_map(
-    axes: Axes,
-    at: FloatArray,
-    positions: FloatArray,
-    level: FloatArray,
-    unit: str,
-    span_db: float = DYNAMIC_RANGE_DB,
+    axes: Axes, at: FloatArray, positions: FloatArray, level: FloatArray, unit: str, span_db: float = DYNAMIC_RANGE_DB
 ) -> None:
     """Draw levels in dB, (n_positions, n_at), the largest of the cells in a pixel, with their bar of colours."""
     at, level = _fewer_cells(at, level, axis=1, n_max=N_COLUMNS)
@@ -269,11 +264,7 @@ def coherence_figure(
     right_in = 1.0
     placed = place(cursors, (float(x[0]), float(x[-1])), style.WIDTH_IN - 0.85 - right_in)
     figure, (above, below) = style.panels(
-        (1.3, 2.68),
-        right_in=right_in,
-        top_in=0.4 + ROW_IN * n_rows(placed),
-        row_gap_in=0.12,
-        share_x=True,
+        (1.3, 2.68), right_in=right_in, top_in=0.4 + ROW_IN * n_rows(placed), row_gap_in=0.12, share_x=True
     )
     mesh = below.pcolormesh(x, y, np.maximum(values.T, low), cmap=style.colours(), norm=norm, rasterized=True)
     below.grid(visible=False)

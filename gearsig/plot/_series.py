@@ -109,12 +109,7 @@ def head(figure: Figure, title: str, lines: Sequence[Line2D] = (), heading: str 
 
 
 def legend_row(
-    figure: Figure,
-    lines: Sequence[Line2D],
-    *,
-    left_in: float = 0.85,
-    top_in: float = NAMES_AT_IN,
-    heading: str = "",
+    figure: Figure, lines: Sequence[Line2D], *, left_in: float = 0.85, top_in: float = NAMES_AT_IN, heading: str = ""
 ) -> None:
     """Name curves in one row whose middle is `top_in` below the figure's top: it never covers data.
 

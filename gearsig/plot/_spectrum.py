@@ -162,10 +162,7 @@ def _value_label(spectrum: Spectrum, scale: Scale) -> str:
 
 
 def time_figure(
-    recording: Recording,
-    channels: Sequence[str] = (),
-    *,
-    limits_s: tuple[float, float] | None = None,
+    recording: Recording, channels: Sequence[str] = (), *, limits_s: tuple[float, float] | None = None
 ) -> Figure:
     """Draw channels one below the other over a common time axis, extremes kept.
 

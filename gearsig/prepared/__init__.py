@@ -6,12 +6,7 @@
 >>> analyze(now, reference=healthy), estimate_crack(now, reference=healthy)  # doctest: +SKIP
 """
 
-from gearsig.prepared._angle import (
-    MAINS_TOLERANCE,
-    STATED_SPEED_TOLERANCE,
-    envelope_bands,
-    refined_angle,
-)
+from gearsig.prepared._angle import MAINS_TOLERANCE, STATED_SPEED_TOLERANCE, envelope_bands, refined_angle
 from gearsig.prepared._lines import (
     INNER_LINES,
     LOG_RATIO_LIMIT,

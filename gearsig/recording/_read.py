@@ -560,10 +560,7 @@ def _checked(table: RawTable, source: str) -> RawTable:
         )
     if not len(columns[0].values):
         raise InputError(
-            "there are no samples",
-            where=source,
-            allowed="at least one",
-            remedy="check that it was written completely",
+            "there are no samples", where=source, allowed="at least one", remedy="check that it was written completely"
         )
     return table
 

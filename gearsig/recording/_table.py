@@ -488,9 +488,7 @@ def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: Mapping[str, float]
     return values[0] if values else None
 
 
-def _stated_speed(
-    scalars: Mapping[str, NumberArray],
-) -> tuple[dict[str, float], ConstantSpeed | None, list[str]]:
+def _stated_speed(scalars: Mapping[str, NumberArray]) -> tuple[dict[str, float], ConstantSpeed | None, list[str]]:
     """Return all scalars in rpm, the speed where they state one; mention others that may be, which were not used."""
     values = {path: float(a.reshape(-1)[0]) for path, a in scalars.items() if a.dtype.kind in "fiu"}
     in_rpm = {path: value for path, value in values.items() if plain_name(path).endswith("rpm")}

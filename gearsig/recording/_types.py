@@ -486,10 +486,7 @@ class Recording:
                     f"the values are taken as {sensor.unit}"
                 )
             channels[i] = Channel(
-                old.name,
-                sensor.quantity or old.quantity,
-                sensor.unit or old.unit,
-                sensor.position or old.position,
+                old.name, sensor.quantity or old.quantity, sensor.unit or old.unit, sensor.position or old.position
             )
         return replace(self, samples=samples, channels=tuple(channels), rig=rig, warnings=tuple(warnings))
 

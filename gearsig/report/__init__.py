@@ -40,12 +40,7 @@ from gearsig.report._gap_page import (
 )
 from gearsig.report._index import Entry, Failure, entry_of, write_index
 from gearsig.report._json import from_plain, plain
-from gearsig.report._methods import (
-    answer_json,
-    fitting_methods,
-    named_method,
-    write_answer,
-)
+from gearsig.report._methods import answer_json, fitting_methods, named_method, write_answer
 from gearsig.report._motion_text import (
     force_csv,
     force_json,

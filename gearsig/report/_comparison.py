@@ -358,10 +358,7 @@ def channel_rows(channel: ChannelComparison) -> Rows:
             f"magnitudes {_repeated(shaft.agreement.magnitude_frac)}; {shaft.agreement.n_lines} orders"
         )
         rows += [
-            (
-                f"correlation, average{name}",
-                f"{_repeated(shaft.correlation)}; {_possible(shaft)}",
-            ),
+            (f"correlation, average{name}", f"{_repeated(shaft.correlation)}; {_possible(shaft)}"),
             (f"FRAC, average{name}", frac),
         ]
     locked = channel.locked
@@ -383,11 +380,7 @@ def _possible(shaft: ShaftComparison) -> str:
 
 def _line_row(line: LineLevel) -> LevelRow:
     return LevelRow(
-        line.label,
-        readable(line.order, 6),
-        *_level_texts(line.level),
-        missing_words(line),
-        line.level.is_beyond,
+        line.label, readable(line.order, 6), *_level_texts(line.level), missing_words(line), line.level.is_beyond
     )
 
 

@@ -38,10 +38,7 @@ LAYOUTS = {
     Added: Layout({"name": "effect"}),
     Shrinkage: Layout({"placebo": "placebo_shrink", "elsewhere": "shrink_elsewhere"}),
     NextRecording: Layout(
-        {
-            "standard_deviations": "distance_in_structural_floors",
-            "now": "distance_now_in_structural_floors",
-        },
+        {"standard_deviations": "distance_in_structural_floors", "now": "distance_now_in_structural_floors"},
         inline=("point",),
     ),
     SpectrumCurves: Layout(
@@ -107,13 +104,7 @@ def gap_schema() -> Json:
     return schema
 
 
-OLD_NAMES = {
-    "doubts": "warnings",
-    "foretold": "predicted",
-    "notices": "notes",
-    "remarks": "notes",
-    "left": "remaining",
-}
+OLD_NAMES = {"doubts": "warnings", "foretold": "predicted", "notices": "notes", "remarks": "notes", "left": "remaining"}
 """Member of version 1 or 2 → what it is called now."""
 
 

@@ -102,11 +102,7 @@ def named_method(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def fitting_methods(
-    recording: Recording,
-    angle: ShaftAngle | None,
-    *,
-    suspects_crack: bool = False,
-    suspects_bearing: bool = False,
+    recording: Recording, angle: ShaftAngle | None, *, suspects_crack: bool = False, suspects_bearing: bool = False
 ) -> tuple[str, ...]:
     """Return the methods that a recording calls for, besides those that every page has.
 

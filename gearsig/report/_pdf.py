@@ -21,12 +21,7 @@ from gearsig.report._page import page_parts
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
 
 
-def page_pdf(
-    analysis: Analysis,
-    *,
-    command: str = "",
-    methods: Sequence[str] | None = None,
-) -> bytes:
+def page_pdf(analysis: Analysis, *, command: str = "", methods: Sequence[str] | None = None) -> bytes:
     """Return the page of one recording as PDF, with the same content as `page_html` but the table of indicators.
 
     Parameters

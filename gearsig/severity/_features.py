@@ -13,14 +13,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.formatting import percent
-from gearsig.prepared import (
-    PreparedRecording,
-    best_shift,
-    shift_scores,
-    sliding_mean,
-    strongest_window,
-    turned_lines,
-)
+from gearsig.prepared import PreparedRecording, best_shift, shift_scores, sliding_mean, strongest_window, turned_lines
 from gearsig.rig import GearPair
 
 MIN_REVOLUTIONS = 13

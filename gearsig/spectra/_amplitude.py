@@ -345,11 +345,7 @@ class Line:
 
 
 def find_lines(
-    spectrum: Spectrum,
-    floor: Spectrum | None = None,
-    *,
-    false_alarm: float = 0.01,
-    threshold_db: float | None = None,
+    spectrum: Spectrum, floor: Spectrum | None = None, *, false_alarm: float = 0.01, threshold_db: float | None = None
 ) -> tuple[Line, ...]:
     """Return the lines above the noise floor, in order of position.
 

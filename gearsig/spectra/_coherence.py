@@ -14,14 +14,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.results import Result
 from gearsig.spectra._amplitude import Preparation, prepared_signal
-from gearsig.spectra._types import (
-    ComplexArray,
-    Spectrum,
-    checked_signal,
-    make_window,
-    named_signal,
-    scaled_unit,
-)
+from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal, make_window, named_signal, scaled_unit
 
 MAX_CELLS = 1 << 26
 """1.6 GB of results; beyond it a typing error is likelier than a wish."""
@@ -404,12 +397,7 @@ class TurnSums:
 
 
 def order_coherence(
-    recording: Recording,
-    channel: str,
-    shaft_angle: ShaftAngle,
-    *,
-    highest_order: float,
-    n_bands: int = 64,
+    recording: Recording, channel: str, shaft_angle: ShaftAngle, *, highest_order: float, n_bands: int = 64
 ) -> SpectralCoherence:
     """Return the order–frequency spectral correlation and coherence of a channel.
 

@@ -17,14 +17,7 @@ from gearsig.recording import Channel, Recording
 from gearsig.results import Result
 from gearsig.spectra._amplitude import Preparation, amplitude_spectrum, prepared_signal
 from gearsig.spectra._kurtogram import BandCandidate, Kurtogram, kurtogram, kurtosis_error
-from gearsig.spectra._types import (
-    BATCH_SAMPLES,
-    ComplexArray,
-    Scaling,
-    Spectrum,
-    named_signal,
-    squared_unit,
-)
+from gearsig.spectra._types import BATCH_SAMPLES, ComplexArray, Scaling, Spectrum, named_signal, squared_unit
 
 EnvelopeKind = Literal["magnitude", "squared"]
 

@@ -105,11 +105,7 @@ def meetings(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
 
 
 def untangled(
-    paths: list[FloatArray],
-    levels: list[FloatArray],
-    gap: float,
-    level_weight: float,
-    power: FloatArray | None = None,
+    paths: list[FloatArray], levels: list[FloatArray], gap: float, level_weight: float, power: FloatArray | None = None
 ) -> list[FloatArray]:
     """Return the paths with their tails exchanged wherever both then go on more smoothly.
 

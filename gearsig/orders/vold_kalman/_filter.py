@@ -185,10 +185,7 @@ def _separated(
         )
         for k in range(len(valid))
     )
-    notes = (
-        *_time_notes(tracks, widths, valid, settled, skirt_poles),
-        *_coupling_notes(groups, neighbours, tracks),
-    )
+    notes = (*_time_notes(tracks, widths, valid, settled, skirt_poles), *_coupling_notes(groups, neighbours, tracks))
     if error > 1e-5:
         narrow = f"rounding may reach {error:.1g} of the largest component: the band is too narrow for this rate"
         notes = (*notes, f"{narrow}, or the bandwidths differ too much for one solution")

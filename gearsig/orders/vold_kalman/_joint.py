@@ -145,13 +145,7 @@ def _envelopes(solutions: Array, problem: Problem) -> ComplexArray:
 
 
 def solve_envelopes(
-    y: FloatArray,
-    cycles: FloatArray,
-    active: BoolArray | None,
-    bandwidths: FloatArray,
-    p: int,
-    *,
-    mirror: bool = True,
+    y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray, p: int, *, mirror: bool = True
 ) -> ComplexArray:
     """Return the complex envelopes of the second generation, jointly for all orders.
 

@@ -43,11 +43,7 @@ State = tuple[Any, ...]
 F = TypeVar("F", bound=Callable[..., Any])
 
 # With nothing infinite, a complex number times a real one costs two products, not four.
-_OPTIONS: dict[str, Any] = {
-    "nogil": True,
-    "fastmath": {"nnan", "ninf", "nsz", "contract"},
-    "error_model": "numpy",
-}
+_OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": {"nnan", "ninf", "nsz", "contract"}, "error_model": "numpy"}
 _kernel: Callable[[F], F] = njit(cache=True, **_OPTIONS)
 _copying: Callable[[F], F] = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -525,12 +521,7 @@ def envelope_alone(
     return x
 
 
-def waveform_alone(
-    y: FloatArray,
-    cycles: FloatArray,
-    active: BoolArray | None,
-    bandwidth: FloatArray,
-) -> FloatArray:
+def waveform_alone(y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidth: FloatArray) -> FloatArray:
     """Return the waveform of one order, as `solve_waveforms` does for several; bandwidth (n - 2,) or (1,)."""
     n = len(y)
 

@@ -10,16 +10,7 @@ from gearsig.recording.formats._tdms import TDMS
 from gearsig.recording.formats._uff58 import UFF58
 from gearsig.recording.formats._wav import WAV
 
-FORMATS: tuple[FileFormat, ...] = (
-    CSV,
-    MAT,
-    WAV,
-    HDF5,
-    PARQUET,
-    TDMS,
-    UFF58,
-    MF4,
-)
+FORMATS: tuple[FileFormat, ...] = (CSV, MAT, WAV, HDF5, PARQUET, TDMS, UFF58, MF4)
 """In the order in which users are told them; content is tried against them from the last: all text looks like CSV."""
 
 __all__ = ["CSV", "FORMATS", "FileFormat"]

@@ -339,10 +339,7 @@ def _parse_fast(data: bytes, layout: CsvLayout) -> list[FloatArray]:
         read_options=csv.ReadOptions(column_names=columns + ["nothing"] * layout.trailing_separator),
         parse_options=csv.ParseOptions(delimiter=separator, quote_char=False),
         convert_options=csv.ConvertOptions(
-            column_types=types,
-            null_values=[],
-            decimal_point=layout.decimal,
-            include_columns=columns,
+            column_types=types, null_values=[], decimal_point=layout.decimal, include_columns=columns
         ),
     )
     return [

@@ -94,11 +94,7 @@ def metadata_json(recording: Recording) -> str:
 
 
 def table_from_metadata(
-    text: str,
-    values: Sequence[NumberArray],
-    reader: str,
-    where: str,
-    row_place: Callable[[int], str] = sample_place,
+    text: str, values: Sequence[NumberArray], reader: str, where: str, row_place: Callable[[int], str] = sample_place
 ) -> RawTable:
     """Return the table of a file in gearsig's own layout from its JSON text and its columns in order."""
     try:

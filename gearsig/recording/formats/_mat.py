@@ -405,12 +405,7 @@ def write_mat(recording: Recording, path: Path) -> None:
     savemat(path, contents)
 
 
-_VERSIONS = {
-    b"\x00\x01IM": "MAT v5",
-    b"\x01\x00MI": "MAT v5",
-    b"\x00\x02IM": "MAT v7.3",
-    b"\x02\x00MI": "MAT v7.3",
-}
+_VERSIONS = {b"\x00\x01IM": "MAT v5", b"\x01\x00MI": "MAT v5", b"\x00\x02IM": "MAT v7.3", b"\x02\x00MI": "MAT v7.3"}
 
 
 def _sniff(head: bytes) -> str:

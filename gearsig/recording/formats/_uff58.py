@@ -21,14 +21,7 @@ TIME_RESPONSE = 1
 # Directions as numbered by data set 58.
 DIRECTIONS = {1: "+X", -1: "-X", 2: "+Y", -2: "-Y", 3: "+Z", -3: "-Z"}
 # Specific data types of data set 58 that are quantities here.
-QUANTITIES = {
-    8: "displacement",
-    9: "force",
-    11: "velocity",
-    12: "acceleration",
-    13: "force",
-    15: "sound_pressure",
-}
+QUANTITIES = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force", 15: "sound_pressure"}
 
 
 def read_uff58(path: Path) -> RawTable:
