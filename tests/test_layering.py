@@ -210,6 +210,25 @@ def test_tests_enter_rooms_by_their_faces() -> None:
     assert not {name_of(p) for p in files if any(inside(m) for m in starts_with(imported_modules(p), *LAYERS))}
 
 
+def test_modules_of_the_library_import_each_other_one_way() -> None:
+    """Also what is imported in a function or for a type alone: in a circle something stands in the wrong file."""
+    files = {name.removesuffix(".py").replace("/", "."): name for name in imports() if name.startswith("gearsig/")}
+    uses = {module: {m for m in imports()[name] if m in files and m != module} for module, name in files.items()}
+
+    def reached(module: str) -> set[str]:
+        seen, ahead = set(), [*uses[module]]
+        while ahead:
+            if (now := ahead.pop()) not in seen:
+                seen.add(now)
+                ahead += uses[now]
+        return seen
+
+    assert {module for module in files if module in reached(module)} <= {
+        "gearsig.fleet._changes",
+        "gearsig.fleet._fleet",
+    }
+
+
 def test_faces_list_what_they_offer() -> None:
     bare = []
     for path in FILES:

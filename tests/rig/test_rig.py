@@ -53,6 +53,13 @@ def test_unknown_teeth_leave_out_what_rests_on_them() -> None:
     assert {line.element for line in order_lines(rig)} == {"in", "p"}
 
 
+def test_pairs_are_found_by_their_shafts_and_told_by_their_teeth() -> None:
+    first, second = GearPair("a", "in", "mid", 20, 31), GearPair("b", "mid", "out", None, 47)
+    rig = Rig(shafts=(Shaft("in"), Shaft("mid"), Shaft("out")), pairs=(first, second))
+    assert [rig.pairs_on(shaft) for shaft in ("in", "mid", "none")] == [(first,), (first, second), ()]
+    assert (rig.teeth_text, Rig().teeth_text) == ("20/31, ?/47", "")
+
+
 def test_a_ratio_that_must_be_known_is_refused_without_the_teeth_or_the_rig() -> None:
     rig = Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("pair", "in", "out", 20, None),))
     for known in (rig, None):

@@ -6,7 +6,7 @@ from scipy import signal as scipy_signal
 
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Provenance, Recording
-from gearsig.spectra import band_envelope, envelope_recording, envelope_spectrum
+from gearsig.spectra import band_envelope, edged_band, envelope_recording, envelope_spectrum
 
 FS, N = 10_000.0, 20_000
 T = np.arange(N) / FS
@@ -92,3 +92,14 @@ def test_short_records_and_narrow_bands_keep_all_of_the_envelope():
         band_envelope(x, FS, (1000.0, 4000.0), kind="magnitude", highest_hz=highest) for highest in (None, 100.0)
     )
     assert np.array_equal(whole.values, asked.values)
+
+
+def test_edges_of_a_band_lie_inside_it_and_add_up_to_one_with_their_mirror_image():
+    frequency_hz = np.arange(1001.0)
+    lines, response = edged_band(frequency_hz, (200.0, 800.0), 100.0)
+    assert lines[0] == 201
+    assert lines[-1] == 799
+    assert np.all(response[(lines >= 300) & (lines <= 700)] == 1.0)
+    rise = response[lines < 300]
+    assert rise + rise[::-1] == pytest.approx(1.0)
+    assert response == pytest.approx(response[::-1])
