@@ -249,7 +249,7 @@ def _is_finite(array: FloatArray) -> bool:
 
 
 def _number(
-    value: Any, name: str, unit: str, *, minimum: float = -np.inf, exclusive: bool = False, remedy: str = ""
+    value: Any, name: str, unit: str, *, minimum: float = -np.inf, exclusive: bool = False, remedy: str
 ) -> float:
     number = None
     # What float() would take as well, a part of some of them lost.

@@ -306,7 +306,7 @@ def _further_places(channel: ChannelComparison, alignments: Sequence[Alignment])
     return (*((f"{counted(n, 'other line')}",) if n else ()), *(("tooth by tooth",) if by_tooth else ()))
 
 
-def _lines_text(lines: Sequence[LineLevel], where: str, further: Sequence[str] = (), *, levels_compare: bool) -> str:
+def _lines_text(lines: Sequence[LineLevel], where: str, further: Sequence[str], *, levels_compare: bool) -> str:
     differences = np.array([line.level.difference_db for line in lines])
     gain = float(np.median(differences))
     n = f"{len(lines)} {where}" if len(lines) > 1 else f"one {where[:-1]}"

@@ -315,7 +315,7 @@ def _peak_at(excess: LinesOverFloor, place: float, within: float) -> PlacedLine 
     return replace(line, position=position) if is_peak and abs(position - place) <= reach else None
 
 
-def _is_synchronous(signals: AnalysisSignals, hertz: float, slower: float = 1.0) -> bool:
+def _is_synchronous(signals: AnalysisSignals, hertz: float, slower: float) -> bool:
     if signals.angle is None:
         return False
     order = slower * hertz / signals.frequency_per_order_hz

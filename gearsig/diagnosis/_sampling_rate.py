@@ -246,7 +246,7 @@ def _log_p(
     factor: float,
     shafts: Sequence[float],
     parts: Sequence[tuple[float, float]],
-    tolerance: float = STATED_SPEED_TOLERANCE,
+    tolerance: float,
 ) -> float:
     r"""Return lg of the chance that so many strong lines lie on the places of shafts and races, in all spectra.
 

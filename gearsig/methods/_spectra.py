@@ -77,7 +77,7 @@ def columns_of(spectrum: Spectrum) -> dict[str, Any]:
     return {spectrum.axis_label: spectrum.positions, with_unit(spectrum.scaling, spectrum.unit): spectrum.values}
 
 
-def _panel(spectrum: Spectrum, cursors: Sequence[Cursor], *, linear: bool = False, name: str = "") -> LinePanel:
+def _panel(spectrum: Spectrum, cursors: Sequence[Cursor], *, linear: bool, name: str = "") -> LinePanel:
     values = spectrum.values if linear else plot.above_zero(spectrum.values)
     line = ChartLine(spectrum.positions, values, spectrum.source, peaks=True)
     inside = values[min(3, len(values) - 1) :]

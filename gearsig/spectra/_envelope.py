@@ -249,7 +249,7 @@ def _band_lines(band_hz: tuple[float, float], fs: float, n: int) -> tuple[int, i
 
 
 def _complex_envelope(
-    x: FloatArray, first: int, last: int, edge_fraction: float, oversampling: int, transform: ComplexArray | None = None
+    x: FloatArray, first: int, last: int, edge_fraction: float, oversampling: int, transform: ComplexArray | None
 ) -> ComplexArray:
     """Return the band's complex envelope with about `oversampling` samples per line of the band."""
     from scipy.fft import ifft, next_fast_len, rfft
