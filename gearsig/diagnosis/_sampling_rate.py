@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
-from math import log, log10
+from math import log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,9 @@ COMMON_RATES_HZ = (
     11025.0, 22050.0, 44100.0,
 )  # fmt: skip
 """Of acquisition systems; where one recording of a set was taken at another of them, the factor is their ratio."""
+
+SLIPS = np.linspace(0.985, 1.015, 61)
+"""Of a part's order over its kinematic one."""
 
 CLOSE_TOLERANCE = 0.005
 """Of the speed, by which rates are told apart that differ by less than a stated speed is to be trusted."""
@@ -231,79 +234,97 @@ def _strong_lines(excess: LinesOverFloor, highest: float) -> StrongLines | None:
     return StrongLines(spectrum.positions[places], 1.5 * spectrum.resolution, lowest, highest)
 
 
-def _strong_of_all(spectra: Sequence[LinesOverFloor], highest: float) -> list[StrongLines]:
-    return [lines for excess in spectra if (lines := _strong_lines(excess, highest)) is not None]
+class StrongSpectra:
+    """The strongest lines of several spectra: how likely it is by chance that so many lie where something puts them.
+
+    What many questions share is worked out once: the speed that shafts ask for, and which lines a part explains.
+
+    Parameters
+    ----------
+    spectra : sequence of StrongLines
+    shafts : sequence of float
+        Orders of the shafts.
+    """
+
+    def __init__(self, spectra: Sequence[StrongLines], shafts: Sequence[float]) -> None:
+        self.spectra, self.shafts = spectra, shafts
+        self.highest = max((x.highest for x in spectra), default=0.0)
+        self._speeds = cache(self._speed_of_shafts)
+        self._on_shafts = cache(self._at_shafts)
+        self._near_parts = cache(self._at_part)
+
+    def log_p(self, factor: float, parts: Sequence[tuple[float, float]], tolerance: float) -> float:
+        r"""Return lg of the chance that so many strong lines lie on the places of shafts and races, in all spectra.
+
+        .. math:: p = T \prod_s \sum_{k \ge m_s} \binom{n_s}{k} c_s^k (1 - c_s)^{n_s - k}
+
+        m of n lines lie on the places, which cover the share c of the range; T is the number of speeds and slips tried:
+        the true speed may be that tolerance beside the stated one, a part 1.5 % beside its kinematic order, each alike
+        in all spectra. Each multiple of a part has two sidebands to either side: of a race at its shaft's order, of a
+        rolling element at the cage's. Impacts that come unevenly smear a part's lines, the more the higher.
+        """
+        if not self.spectra:
+            return 0.0
+        best, n_speeds = self._speeds(factor, tolerance)
+        return min(self._log_p_at(speed, n_speeds, parts) for speed in (best, 1 / factor))
+
+    def _speed_of_shafts(self, factor: float, tolerance: float) -> tuple[float, int]:
+        """Return the speed that puts most lines on multiples of the first shaft's, and how many were tried."""
+        half_width = min(x.half_width for x in self.spectra)
+        n_speeds = min(4001, int(2 * tolerance * max(self.highest, 1.0) / (half_width / 1.5)) + 2)
+        speeds = np.linspace(1 - tolerance, 1 + tolerance, n_speeds) / factor
+        on_shaft = np.zeros(n_speeds)
+        for lines in self.spectra:
+            ratio = lines.orders[:, None] / speeds
+            beside = np.abs(ratio - np.maximum(np.rint(ratio), 1)) * speeds
+            on_shaft += (beside < lines.half_width).sum(axis=0)
+        return float(speeds[int(np.argmax(on_shaft))]), n_speeds
+
+    def _at_shafts(self, speed: float) -> tuple[FloatArray, list[NDArray[np.bool_]]]:
+        """Return the places of the shafts' multiples, and which lines of each spectrum lie there."""
+        places = np.concatenate([np.arange(1, int(self.highest / (s * speed)) + 2) * s * speed for s in self.shafts])
+        return places, [_near(lines, places) for lines in self.spectra]
+
+    def _at_part(self, part: float, sideband: float, speed: float) -> list[NDArray[np.bool_]]:
+        """Return which lines of each spectrum lie at a part's family, (slip, line)."""
+        return [_near_family(lines, part * SLIPS * speed, sideband * speed) for lines in self.spectra]
+
+    def _log_p_at(self, speed: float, n_speeds: int, parts: Sequence[tuple[float, float]]) -> float:
+        from scipy.special import betainc
+
+        places, seen = self._on_shafts(speed)
+        smeared = np.zeros(0)
+        found = log10(n_speeds)
+        for part, sideband in parts:
+            near = self._near_parts(part, sideband, speed)
+            new = sum((x & ~y).sum(axis=1) for x, y in zip(near, seen, strict=True))
+            best = int(np.argmax(new))
+            found += log10(3.0)
+            if new[best] >= 2:
+                family = _family(part * SLIPS[best], sideband, self.highest / speed) * speed
+                smeared = np.concatenate([smeared, family])
+                seen = [x | y[best] for x, y in zip(seen, near, strict=True)]
+                found += log10(len(SLIPS) / 3)
+        for lines, on_place in zip(self.spectra, seen, strict=True):
+            m, n = int(on_place.sum()), len(lines.orders)
+            if not m:
+                continue  # so many or more lie there for certain
+            widths = np.concatenate([np.full(len(places), lines.half_width), _smeared(lines, smeared)])
+            middles = np.concatenate([places, smeared])
+            covered = _covered(middles - widths, middles + widths, lines.lowest, lines.highest)
+            found += log10(max(float(betainc(m, n - m + 1, covered)), 1e-30))  # the binomial sum in closed form
+        return min(0.0, found)
+
+
+def _strong_of_all(spectra: Sequence[LinesOverFloor], shafts: Sequence[float], highest: float) -> StrongSpectra:
+    strong = (_strong_lines(excess, highest) for excess in spectra)
+    return StrongSpectra([lines for lines in strong if lines is not None], shafts)
 
 
 def _near(lines: StrongLines, places: FloatArray) -> NDArray[np.bool_]:
     """Which of the lines lie at one of the places."""
     beside: NDArray[np.bool_] = np.any(np.abs(lines.orders - places[:, None]) < lines.half_width, axis=0)
     return beside
-
-
-def _log_p(
-    spectra: Sequence[StrongLines],
-    factor: float,
-    shafts: Sequence[float],
-    parts: Sequence[tuple[float, float]],
-    tolerance: float,
-) -> float:
-    r"""Return lg of the chance that so many strong lines lie on the places of shafts and races, in all spectra.
-
-    .. math:: p = T \prod_s \sum_{k \ge m_s} \binom{n_s}{k} c_s^k (1 - c_s)^{n_s - k}
-
-    m of n lines lie on the places, which cover the share c of the range; T is the number of speeds and slips tried: the
-    true speed may be that tolerance beside the stated one, a part 1.5 % beside its kinematic order, each alike in all
-    spectra. Each multiple of a part has two sidebands to either side: of a race at its shaft's order, of a rolling
-    element at the cage's. Impacts that come unevenly smear a part's lines, the more the higher.
-    """
-    if not spectra:
-        return 0.0
-    highest, half_width = max(x.highest for x in spectra), min(x.half_width for x in spectra)
-    n_speeds = min(4001, int(2 * tolerance * max(highest, 1.0) / (half_width / 1.5)) + 2)
-    speeds = np.linspace(1 - tolerance, 1 + tolerance, n_speeds) / factor
-    on_shaft = np.zeros(n_speeds)
-    for lines in spectra:
-        ratio = lines.orders[:, None] / speeds
-        beside = np.abs(ratio - np.maximum(np.rint(ratio), 1)) * speeds
-        on_shaft += (beside < lines.half_width).sum(axis=0)
-    # The speed that puts most lines on the shaft's multiples, or the stated one where those are weak.
-    best = float(speeds[int(np.argmax(on_shaft))])
-    return min(_log_p_at(spectra, speed, n_speeds, shafts, parts) for speed in (best, 1 / factor))
-
-
-def _log_p_at(
-    spectra: Sequence[StrongLines],
-    speed: float,
-    n_speeds: int,
-    shafts: Sequence[float],
-    parts: Sequence[tuple[float, float]],
-) -> float:
-    from scipy.stats import binom
-
-    highest = max(x.highest for x in spectra)
-    places = np.concatenate([np.arange(1, int(highest / (s * speed)) + 2) * s * speed for s in shafts])
-    smeared = np.zeros(0)
-    seen = [_near(lines, places) for lines in spectra]
-    tries = log10(n_speeds)
-    for part, sideband in parts:
-        slips = part * np.linspace(0.985, 1.015, 61)
-        near = [_near_family(lines, slips * speed, sideband * speed) for lines in spectra]
-        new = sum((x & ~y).sum(axis=1) for x, y in zip(near, seen, strict=True))
-        best = int(np.argmax(new))
-        tries += log10(3.0)
-        if new[best] >= 2:
-            family = _family(slips[best], sideband, highest / speed) * speed
-            smeared = np.concatenate([smeared, family])
-            seen = [x | y[best] for x, y in zip(seen, near, strict=True)]
-            tries += log10(len(slips) / 3)
-    found = tries
-    for lines, on_place in zip(spectra, seen, strict=True):
-        widths = np.concatenate([np.full(len(places), lines.half_width), _smeared(lines, smeared)])
-        middles = np.concatenate([places, smeared])
-        covered = _covered(middles - widths, middles + widths, lines.lowest, lines.highest)
-        found += max(float(binom.logsf(int(on_place.sum()) - 1, len(lines.orders), covered)) / log(10), -30.0)
-    return min(0.0, found)
 
 
 def _smeared(lines: StrongLines, places: FloatArray) -> FloatArray:
@@ -340,7 +361,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     spectra = [*signals.order_excess.values(), *(e.excess for e in envelopes)]
     shafts = sorted(signals.known_shaft_orders.values())
     races, parts = (list(_parts(signals, with_elements=so)) for so in (False, True))
-    strong_to = cache(partial(_strong_of_all, spectra))
+    strong_to = cache(partial(_strong_of_all, spectra, shafts))
 
     def evidence(
         factor: float,
@@ -350,22 +371,22 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     ) -> float:
         """Return lg of the chance that lines up to an order lie as well."""
         at = at if at is not None else parts if factor == 1.0 else races
-        return _log_p(strong_to(highest), factor, shafts, at, tolerance)
+        return strong_to(highest).log_p(factor, at, tolerance)
 
     def of_one_part(factor: float) -> float:
         """Return the least of one race at a factor; without races, of a part of any order: what is near fractions."""
         if not races:
-            return _of_a_stranger(strong_to(ranges[factor]), shafts, factor)
+            return _of_a_stranger(strong_to(ranges[factor]), factor)
         return min(evidence(factor, ranges[factor], at=[race]) for race in races)
 
     def has_stranger(highest: float, enough: float) -> bool:
-        return _of_a_stranger(strong_to(highest), shafts) <= enough
+        return _of_a_stranger(strong_to(highest)) <= enough
 
     def has_plain_lines() -> bool:
         """Whether shafts, or one race beside them, explain the strongest lines at the stated rate."""
         strong = strong_to(HIGHEST_ORDER)
-        plain = min(_log_p(strong, 1.0, shafts, at, CLOSE_TOLERANCE) for at in ((), *([race] for race in races)))
-        return plain < EXPLAINED_EACH * len(strong)
+        plain = min(strong.log_p(1.0, at, CLOSE_TOLERANCE) for at in ((), *([race] for race in races)))
+        return plain < EXPLAINED_EACH * len(strong.spectra)
 
     usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
     candidates = [*usual, *common]
@@ -434,15 +455,15 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     )
 
 
-def _of_a_stranger(strong: Sequence[StrongLines], shafts: Sequence[float], factor: float = 1.0) -> float:
+def _of_a_stranger(strong: StrongSpectra, factor: float = 1.0) -> float:
     """Return lg p of shafts and one part of unknown order, that of a strong line, at a factor times the stated rate.
 
     Its impacts are as strong all along, or modulated by the shaft. Where something strange knocks and no more, that is
     likelier than a rate that puts it on a shaft or a race.
     """
-    orders = sorted({round(float(order), 2) for x in strong for order in x.orders if order > 0.3})
-    tried = [(factor * order, sideband) for order in orders for sideband in (0.0, *shafts)]
-    sums = (_log_p(strong, factor, shafts, [part], CLOSE_TOLERANCE) for part in tried)
+    orders = sorted({round(float(order), 2) for x in strong.spectra for order in x.orders if order > 0.3})
+    tried = [(factor * order, sideband) for order in orders for sideband in (0.0, *strong.shafts)]
+    sums = (strong.log_p(factor, [part], CLOSE_TOLERANCE) for part in tried)
     return min(sums, default=0.0) + log10(max(len(tried), 1))
 
 
