@@ -115,7 +115,6 @@ def friction_fields(machine: Machine, operation: Operation, force_n: float) -> d
     """Values of `FRICTION_FIELDS` at the set mesh force."""
     mesh, pair = machine.mesh, machine.mesh.pair
     log10_oil, oil_constant = oil_terms(machine.lubrication.viscosity_cp, machine.roughness.rms_um)
-    material_1, material_2 = mesh.material_1, mesh.material_2
     sliding = greatest_sliding_mps(machine, operation.speed_rpm.largest * pi / 30.0)
     lightest = min(w.mass_kg for w in machine.wheels)
     return {
@@ -127,12 +126,7 @@ def friction_fields(machine: Machine, operation: Operation, force_n: float) -> d
         "friction_factor": machine.lubrication.factor,
         "dry_friction": machine.lubrication.dry_coefficient,
         "width": mesh.face_width_m,
-        "reduced_modulus": reduced_modulus_pa(
-            material_1.youngs_modulus_pa,
-            material_1.poisson_ratio,
-            material_2.youngs_modulus_pa,
-            material_2.poisson_ratio,
-        ),
+        "reduced_modulus": reduced_modulus_pa(mesh.material_1, mesh.material_2),
         "log10_oil": log10_oil,
         "oil_constant": oil_constant,
         "sign_threshold": max(SIGN_THRESHOLD * sliding, STICKING * force_n * STICKING_S / lightest, 1e-6),

@@ -46,9 +46,7 @@ from sims.mesh._lead import (
     MAX_SLICES,
     STRAIGHT,
     Lead,
-    StandardStiffness,
     normal_section,
-    standard_stiffness,
     transverse_section,
 )
 from sims.mesh._mesh_stiffness import (
@@ -111,7 +109,6 @@ __all__ = [
     "Outline",
     "PairGeometry",
     "RootCrack",
-    "StandardStiffness",
     "TimeLockedRoughness",
     "ToothChip",
     "ToothFaults",
@@ -168,7 +165,6 @@ __all__ = [
     "separation_table",
     "share_torque",
     "spans_face",
-    "standard_stiffness",
     "tooth_compliance",
     "tooth_rows",
     "transverse_section",

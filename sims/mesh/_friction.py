@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError
 from gearsig.results import Result
+from sims.mesh._geometry import Material
 from sims.mesh._mesh_stiffness import MeshTable, share_torque
+from sims.mesh._pair import flexibility_per_pa
 from sims.mesh._stiffness import GearMesh
 
 MAX_FRICTION = 0.3
@@ -142,11 +144,9 @@ def line_contact_pressure_gpa(
     return pressure
 
 
-def reduced_modulus_pa(modulus_1_pa: float, poisson_1: float, modulus_2_pa: float, poisson_2: float) -> float:
+def reduced_modulus_pa(material_1: Material, material_2: Material) -> float:
     """Reduced modulus E* of two bodies: 1/E* = (1 - ν1²)/E1 + (1 - ν2²)/E2."""
-    positive(modulus_1_pa, "modulus_1_pa", "Pa")
-    positive(modulus_2_pa, "modulus_2_pa", "Pa")
-    return 1.0 / ((1 - poisson_1**2) / modulus_1_pa + (1 - poisson_2**2) / modulus_2_pa)
+    return 1.0 / flexibility_per_pa(material_1, material_2)
 
 
 def _regression(
@@ -337,7 +337,8 @@ def friction_over_mesh(
     u_1, u_2, radius_m = _speeds_and_radius(mesh, shared.mesh_cycles, positive(speed_rpm, "speed_rpm", "rpm"))
     normal = shared.pair_forces_n
     sliding, entrainment = u_2 - u_1, 0.5 * (u_1 + u_2)
-    pressure = line_contact_pressure_gpa(normal, mesh.face_width_m, radius_m, _reduced_modulus_pa(mesh))
+    modulus_pa = reduced_modulus_pa(mesh.material_1, mesh.material_2)
+    pressure = line_contact_pressure_gpa(normal, mesh.face_width_m, radius_m, modulus_pa)
 
     def found(where: NDArray[np.bool_]) -> FrictionResult:
         return friction_coefficient(
@@ -354,13 +355,6 @@ def friction_over_mesh(
     notes = found(normal >= MIN_PART * normal.sum(axis=1, keepdims=True)).notes
     friction = coefficient * normal * np.sign(sliding)
     return MeshFriction(shared.mesh_cycles, coefficient, friction, normal, sliding, notes)
-
-
-def _reduced_modulus_pa(mesh: GearMesh) -> float:
-    material_1, material_2 = mesh.material_1, mesh.material_2
-    return reduced_modulus_pa(
-        material_1.youngs_modulus_pa, material_1.poisson_ratio, material_2.youngs_modulus_pa, material_2.poisson_ratio
-    )
 
 
 def _speeds_and_radius(

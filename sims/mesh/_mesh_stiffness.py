@@ -347,7 +347,7 @@ def share_torque(
         Of this mesh, if it is at hand.
     """
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
-    force = positive(torque_nm, "torque_nm", "N m") / (mesh.pair.driver.base_radius_mm * 1e-3)
+    force = positive(torque_nm, "torque_nm", "N m") / mesh.pair.base_radii_m[0]
     table = mesh_table(mesh) if table is None else table
     delta, slope, forces = _equilibrium(table, force, *pair_states(table, cycles))
     slices = _by_pair(table, forces)

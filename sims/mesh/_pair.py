@@ -60,6 +60,11 @@ class PairGeometry:
         return self._tight_angle_rad
 
     @property
+    def base_radii_m(self) -> tuple[float, float]:
+        """r_b of driver and driven gear."""
+        return self.driver.base_radius_mm * 1e-3, self.driven.base_radius_mm * 1e-3
+
+    @property
     def centre_distance(self) -> float:
         """A in mm."""
         return (self.driver.base_radius_mm + self.driven.base_radius_mm) / cos(self.working_pressure_angle_rad)
@@ -236,8 +241,12 @@ def contact_half_width_mm(pair: PairGeometry, material_1: Material, material_2: 
     Source: K. L. Johnson, *Contact Mechanics*, 1985, ch. 4.
     """
     radius = float(curvature_radius_mm(pair, pair.pitch_point_radius_mm))
-    flexibility = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus_pa for m in (material_1, material_2))
-    return 2.0 * radius * WORKING_PRESSURE_PA * flexibility
+    return 2.0 * radius * WORKING_PRESSURE_PA * flexibility_per_pa(material_1, material_2)
+
+
+def flexibility_per_pa(material_1: Material, material_2: Material) -> float:
+    """1/E* = (1 − ν1²)/E1 + (1 − ν2²)/E2 of two bodies in contact."""
+    return sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus_pa for m in (material_1, material_2))
 
 
 def part_inside(place_mm: FloatArray, low_mm: float, high_mm: float, half_width_mm: float) -> FloatArray:

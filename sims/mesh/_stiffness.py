@@ -37,7 +37,7 @@ from sims.mesh._geometry import (
     root_point_mm,
 )
 from sims.mesh._lead import STRAIGHT, Lead, normal_roll_rad, normal_section
-from sims.mesh._pair import WORKING_PRESSURE_PA, PairGeometry, contact_half_width_mm, smooth_step
+from sims.mesh._pair import WORKING_PRESSURE_PA, PairGeometry, contact_half_width_mm, flexibility_per_pa, smooth_step
 from sims.mesh._roughness import FlankRoughness
 
 # Compliance of one tooth as a cantilever: bending, shear and axial compression along its true outline.
@@ -255,8 +255,7 @@ def linear_contact_compliance(material_1: Material, material_2: Material, face_w
     Source: D. C. H. Yang, J. Y. Lin, Hertzian damping, tooth friction and bending elasticity in gear impact dynamics,
     Journal of Mechanisms, Transmissions, and Automation in Design 109 (1987).
     """
-    flexibility = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus_pa for m in (material_1, material_2))
-    return 2.0 * flexibility / (pi * face_width_m)
+    return 2.0 * flexibility_per_pa(material_1, material_2) / (pi * face_width_m)
 
 
 def load_dependent_contact_coefficient(material_1: Material, material_2: Material, face_width_m: float) -> float:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from gearsig.errors import InputError
 from sims.mesh import (
     MAX_FRICTION,
+    Material,
     contact_friction_n,
     friction_coefficient,
     line_contact_pressure_gpa,
@@ -15,7 +16,7 @@ from sims.mesh import (
     reduced_modulus_pa,
 )
 
-STEEL_PA = reduced_modulus_pa(206e9, 0.3, 206e9, 0.3)
+STEEL_PA = reduced_modulus_pa(Material(), Material())
 OIL = {"viscosity_cp": 10.0, "roughness_um": 0.4}
 
 ratios = st.floats(1e-6, 2.0)

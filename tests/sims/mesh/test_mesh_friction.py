@@ -8,6 +8,7 @@ import pytest
 from gearsig.errors import InputError
 from sims.mesh import (
     FlankDeviation,
+    Material,
     RootCrack,
     ToothChip,
     ToothSpall,
@@ -40,7 +41,7 @@ def test_maxima_with_the_computed_load_sharing(roughness: float, maximum: float)
 def test_each_pair_as_the_compiled_friction_has_it() -> None:
     cycles = np.linspace(0.0, 3.0, 61)
     found = friction_over_mesh(MESH, 110.0, 500.0, *OIL, cycles)
-    modulus = reduced_modulus_pa(206e9, 0.3, 206e9, 0.3)
+    modulus = reduced_modulus_pa(Material(), Material())
     terms = oil_terms(*OIL)
     omega = 500.0 * np.pi / 30.0
     for row, c in enumerate(cycles):
