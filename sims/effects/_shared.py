@@ -11,7 +11,7 @@ import numpy as np
 
 from gearsig.checks import within
 from gearsig.errors import InputError
-from sims.effects._effect import MachineFacts, Option, Options, OptionValue, Scale
+from sims.effects._effect import MachineFacts, Option, Options, OptionValue, PlausibleRange, Scale, Severity
 from sims.machine import RACE_EDGE_MM, BearingSupport, Machine, RaceDefect, bearing_index
 from sims.measure import MeasuredChannel
 from sims.mesh import GearGeometry, RootCrack, ToothChip, ToothSpall
@@ -48,8 +48,18 @@ def with_bearing(machine: Machine, index: int, **changes: object) -> Machine:
     return replace(machine, bearings=bearings)
 
 
-def with_race_defect(machine: Machine, race: str, length_mm: float, options: Options) -> Machine:
-    """Return the machine with a defect on a race, which must be free of one and longer than the defect."""
+RACE_SEVERITY = Severity("length_mm", "mm", 0.0, 4.0, 0.3, "along the raceway; no longer than the elements' spacing")
+RACE_SHOWS_IN = ("envelope_orders", "resonances", "broadband")
+
+
+def with_race_defect(
+    race: str, machine: Machine, length_mm: float, options: Options, rng: np.random.Generator
+) -> Machine:
+    """Return the machine with a defect on a race, which must be free of one and longer than the defect.
+
+    Its angle counts from the middle of the load zone on the outer race, from tooth 1 at time 0 on the inner one.
+    """
+    del rng  # the places of the rolling elements are drawn by the simulator
     index = chosen_bearing(machine, options)
     support = machine.bearings[index]
     name = support.bearing.name
@@ -73,6 +83,11 @@ def with_race_defect(machine: Machine, race: str, length_mm: float, options: Opt
     return with_bearing(machine, index, defect=defect)
 
 
+def race_range(race: str, why: str) -> PlausibleRange:
+    """Plausible lengths of a defect on a race, over the rolling elements' diameter."""
+    return PlausibleRange(0.01, 0.15, why, _rolling_element_mm, each_bearing, _any_race, _longest_defect_mm(race))
+
+
 def each_bearing(machine: MachineFacts) -> Sequence[Options]:
     """Every bearing of the machine, for `PlausibleRange.choices`."""
     return [{"bearing": b.name} for b in machine.bearings]
@@ -83,17 +98,17 @@ def any_bearing(machine: MachineFacts, rng: np.random.Generator) -> Options:
     return {"bearing": str(rng.choice([b.name for b in machine.bearings]))}
 
 
-def any_race(machine: MachineFacts, rng: np.random.Generator) -> Options:
+def _any_race(machine: MachineFacts, rng: np.random.Generator) -> Options:
     """A random bearing, whose cage slips a little."""
     return {**any_bearing(machine, rng), "slip_percent": float(rng.uniform(0.0, 1.5))}
 
 
-def rolling_element_mm(machine: MachineFacts, options: Options) -> float:
+def _rolling_element_mm(machine: MachineFacts, options: Options) -> float:
     """Diameter of the chosen bearing's rolling elements."""
     return machine.bearing(options).rolling_element_diameter_mm or 1.0
 
 
-def longest_defect_mm(race: str) -> Scale:
+def _longest_defect_mm(race: str) -> Scale:
     """The longest defect that does not hold two elements at once, at 1 % jitter, less a fifth."""
 
     def longest(machine: MachineFacts, options: Options) -> float:

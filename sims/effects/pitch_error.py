@@ -27,6 +27,7 @@ from sims.effects.textbook import (
     balance,
     draw_side,
     late_tooth,
+    over_teeth,
     sign,
     swollen,
     tooth_window,
@@ -86,15 +87,11 @@ def _pitch_of_one_tooth(scene: SyntheticScene, size: float, rng: np.random.Gener
 def pitch_of_all_teeth(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
     """Each tooth comes early or late by its own amount: lines at all orders of its shaft."""
     side = draw_side(rng)
-    teeth, turn = scene.teeth[side], scene.revolutions * scene.shaft_orders[side]
-    errors, gains = (rng.standard_normal(teeth) for _ in range(2))
+    errors, gains = (rng.standard_normal(scene.teeth[side]) for _ in range(2))
     at, gain, slow = balance(rng, 3)
-    place = turn * teeth % teeth
-    nodes = np.arange(teeth + 1)
-    early = np.interp(place, nodes, np.append(errors, errors[0]))
-    louder = np.interp(place, nodes, np.append(gains, gains[0]))
     run = np.cumsum(errors - errors.mean())
-    low = np.interp(place, nodes, np.append(run, run[0])) / max(float(run.std()), 1e-12)
+    early, louder, low = (over_teeth(scene, side, of_teeth) for of_teeth in (errors, gains, run))
+    low = low / max(float(run.std()), 1e-12)
     return Signature(
         np.maximum(1.0 + 0.6 * gain * size * louder, 0.0),
         0.3 * MAX_ADVANCE * min(at * size, 1.0) / scene.teeth[0] * np.clip(early, -2.5, 2.5),

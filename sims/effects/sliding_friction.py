@@ -43,13 +43,7 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
         0.7 * min(size, 1.0) * rng.standard_normal(book.N_MESH_HARMONICS)
     )  # it may be against what was there
     noise = 0.8 * size * rng.uniform(0.2, 1.0) * book.at_the_mesh(scene, book.band_noise(scene, rng), rng)
-    return book.Signature(
-        added=(noise,),
-        mesh_gains=tuple(gains.tolist()),
-        paths_scatter=0.7 * min(size, 1.0) * book.partly(rng),
-        around=0.5 * book.partly(rng),
-        uneven=book.partly(rng) * book.uneven(scene, rng),
-    )
+    return book.mesh_louder(scene, gains, noise, 0.7 * min(size, 1.0), rng)
 
 
 EFFECT = Effect(

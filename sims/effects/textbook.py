@@ -390,14 +390,19 @@ def late_tooth(scene: SyntheticScene, share: float, window: FloatArray, rng: np.
     return np.asarray(sign(rng) * MAX_ADVANCE * min(share, 1.0) / scene.teeth[0] * window)
 
 
+def over_teeth(scene: SyntheticScene, side: int, of_teeth: FloatArray) -> FloatArray:
+    """Return what each tooth of a gear has, over the angle: at its mesh its own, in straight lines in between."""
+    teeth = scene.teeth[side]
+    place = scene.revolutions * scene.shaft_orders[side] * teeth % teeth
+    return np.asarray(np.interp(place, np.arange(teeth + 1), np.append(of_teeth, of_teeth[0])))
+
+
 def uneven(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
     """Return what differs from tooth to tooth of both gears, of unit size."""
     total = np.zeros(len(scene.time_s))
     for side, weight in zip((0, 1), rng.uniform(0.0, 1.0, 2), strict=True):
-        teeth = scene.teeth[side]
-        of_teeth = rng.standard_normal(teeth)
-        place = scene.revolutions * scene.shaft_orders[side] * teeth % teeth
-        total += weight * np.interp(place, np.arange(teeth + 1), np.append(of_teeth, of_teeth[0]))
+        of_teeth = rng.standard_normal(scene.teeth[side])
+        total += weight * over_teeth(scene, side, of_teeth)
     return np.clip(total, -2.5, 2.5)
 
 
@@ -410,6 +415,19 @@ def at_the_mesh(scene: SyntheticScene, noise: FloatArray, rng: np.random.Generat
 def swing(scene: SyntheticScene, order: float, size: float, rng: np.random.Generator) -> FloatArray:
     """Return a gain that swings at an order."""
     return np.asarray(np.maximum(1.0 + size * tone(order, scene, rng), 0.0))
+
+
+def mesh_louder(
+    scene: SyntheticScene, gains: FloatArray, noise: FloatArray, scatter: float, rng: np.random.Generator
+) -> Signature:
+    """Mesh harmonics grow, on some paths by up to e^`scatter` more, with what surrounds them; noise comes on top."""
+    return Signature(
+        added=(noise,),
+        mesh_gains=tuple(gains.tolist()),
+        paths_scatter=scatter * partly(rng),
+        around=0.5 * partly(rng),
+        uneven=partly(rng) * uneven(scene, rng),
+    )
 
 
 def modulated(

@@ -34,13 +34,7 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
     """
     gains = 1.0 + 8.0 * size * np.abs(rng.standard_normal(book.N_MESH_HARMONICS)) * book.steeply(rng)[::-1]
     noise = size * rng.uniform() ** 2 * book.at_the_mesh(scene, book.band_noise(scene, rng), rng)
-    return book.Signature(
-        added=(noise,),
-        mesh_gains=tuple(gains.tolist()),
-        paths_scatter=0.4 * min(size, 1.0) * book.partly(rng),
-        around=0.5 * book.partly(rng),
-        uneven=book.partly(rng) * book.uneven(scene, rng),
-    )
+    return book.mesh_louder(scene, gains, noise, 0.4 * min(size, 1.0), rng)
 
 
 EFFECT = Effect(
