@@ -20,7 +20,8 @@ from gearsig.cache import read_arrays, remove_parts, write_text, write_whole
 from gearsig.checks import FloatArray, count, one_of, within
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.processes import active_cluster, killed_text, n_processors, run_jobs
-from sims.cracked import DECAYS, SIGNALS, TRANSMISSION_ERROR, Branch, End, PairState, SteadyRun
+from sims.continuation import DECAYS, TRANSMISSION_ERROR, Branch, End, SteadyRun
+from sims.cracked import SIGNALS, PairState
 from sims.gear_pair import COORDINATES
 from sims.sweep import claimed
 

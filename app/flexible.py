@@ -16,7 +16,7 @@ from gearsig.cache import write_text
 from gearsig.checks import FloatArray, positive
 from gearsig.orders import OrderMap, order_map
 from sims import reduced_fe
-from sims.gear_pair import build_rig
+from sims.gear_pair import MeasuredRun, build_rig
 from sims.machine import Operation, Profile
 from sims.reduced_fe import (
     FlexiblePair,
@@ -158,14 +158,9 @@ def _run_up(
 ) -> OrderMap:
     """Measure a run-up and return its first channel's levels over order and time."""
     operation = Operation(Profile.of([0.0, duration_s], speeds_rpm), Profile.constant(torque_nm))
+    rig = build_rig(pair.machine, operation, name="run-up")
     recording, _ = reduced_fe.simulate_pair(
-        pair,
-        operation,
-        rng=np.random.default_rng(0),
-        sampling_rate_hz=RUN_UP_RATE_HZ,
-        duration_s=duration_s,
-        rig=build_rig(pair.machine, operation, name="run-up"),
-        step_s=step_s,
+        pair, operation, MeasuredRun(np.random.default_rng(0), RUN_UP_RATE_HZ, duration_s, rig, step_s=step_s)
     )
     signal = resample_to_angle(recording, find_shaft_angle(recording))
     return order_map(signal, recording.vibration_names()[0], highest_order=HIGHEST_ORDER)

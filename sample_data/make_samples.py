@@ -20,7 +20,7 @@ from gearsig.recording import Recording
 from gearsig.rig import OperatingPoint, Rig, Sensor, TachometerChannel, write_rig
 from sims.cracked import CrackedPair, simulate_with_motion
 from sims.effects import EffectSetting
-from sims.gear_pair import build_rig, draw_roughness
+from sims.gear_pair import MeasuredRun, build_rig, draw_roughness
 from sims.machine import Machine, Operation, Profile
 from sims.simulator import ParameterValue, SimulationSetup
 
@@ -133,9 +133,7 @@ def dynamic(
     rig = replace(rig, operating_point=OperatingPoint("input", nominal_rpm, torque_nm=operation.torque_nm.largest))
     rig = replace(rig, sensors=tuple(s for s in rig.sensors if s.channel in CHANNELS))
     machine = same_flanks(ready.machine)
-    recording, _ = simulate_with_motion(
-        machine, operation, rng=rng, sampling_rate_hz=RATE_HZ, duration_s=duration_s, rig=rig, truth=ready.truth()
-    )
+    recording, _ = simulate_with_motion(machine, operation, MeasuredRun(rng, RATE_HZ, duration_s, rig, ready.truth()))
     step_mps2 = machine.chain.channels[0].converter.step_mps2 if machine.chain.channels[0].converter else 0.0
     drawn = {"seed": seed, "specimen_seed": SPECIMEN_SEED, "converter_step_mps2": step_mps2}
     truth = {**dict(recording.truth or {}), **drawn}

@@ -10,9 +10,18 @@ import numpy as np
 from gearsig.checks import FloatArray, closest_match_hint, count, one_of, within
 from gearsig.errors import InputError
 from gearsig.recording import Recording
-from sims.cracked._respond import SIGNALS, PairState, Response, default_step_s, respond, slowest_decay_s
-from sims.cracked._simulator import NAME, CrackedPair, simulate_with_motion
-from sims.gear_pair import COORDINATES, MIN_MOTION_HZ, ReadyPair
+from sims.cracked import (
+    NAME,
+    SIGNALS,
+    CrackedPair,
+    PairState,
+    Response,
+    default_step_s,
+    respond,
+    simulate_with_motion,
+    slowest_decay_s,
+)
+from sims.gear_pair import COORDINATES, MIN_MOTION_HZ, MeasuredRun, ReadyPair
 from sims.machine import Machine, Operation, Profile
 from sims.simulator import SimulationSetup, operation_of
 from sims.sweep import Sweep
@@ -148,7 +157,10 @@ class Branch:
             response = self._settled(ready, rng, first, settle_s, duration_s, cycle_s)
         else:
             state = self._settled(ready, np.random.default_rng(self.sweep.seed), first, settle_s, cycle_s, cycle_s).last
-            recording, response = self._measured(ready, rng, state, duration_s)
+            measured = MeasuredRun(
+                rng, self.sweep.sampling_rate_hz, duration_s, also=self._signals_needed(), first=state
+            )
+            recording, response = simulate_with_motion(machine, operation, measured)
         assert response.last is not None  # noqa: S101 - said to the type checker: `respond` always leaves one
         end = End(response.last, speed, operation.torque_nm.largest)
         return SteadyRun(value, machine, _from_zero(response), recording, settle_s, end)
@@ -187,19 +199,6 @@ class Branch:
             start_s=-settle_s,
             step_s=step,
             stride=max(int(min(1.0 / MIN_MOTION_HZ, cycle_s / MIN_PER_CYCLE) / step), 1),
-            first=first,
-        )
-
-    def _measured(
-        self, ready: ReadyPair, rng: np.random.Generator, first: PairState | None, duration_s: float
-    ) -> tuple[Recording, Response]:
-        return simulate_with_motion(
-            ready.machine,
-            ready.operation,
-            rng=rng,
-            sampling_rate_hz=self.sweep.sampling_rate_hz,
-            duration_s=duration_s,
-            also=self._signals_needed(),
             first=first,
         )
 

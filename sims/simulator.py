@@ -5,6 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -12,7 +15,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint, one_of, within
 from gearsig.errors import InputError
 from gearsig.recording import Recording
-from sims.effects import EffectSetting, effect
+from sims.effects import EffectSetting, effect, user_files
 from sims.machine import Operation, Profile
 from sims.presets import Preset, preset, presets
 
@@ -305,3 +308,24 @@ def truth_of(
         ],
         "operation": {"speed_rpm": operation.speed_rpm.as_dict(), "torque_nm": operation.torque_nm.as_dict()},
     }
+
+
+# Which state of the simulators' code made a result.
+
+_ROOMS = ("cracked", "effects", "forging", "gear_pair", "machine", "measure", "mesh", "reduced_fe")
+
+
+def sources_digest() -> str:
+    """Return a short hash of the code that simulates: kept results of another state are not taken for this one's."""
+    of_users = sha256(b"".join(path.read_bytes() for path in user_files())).hexdigest()[:8] if user_files() else ""
+    return _listed_sources() + of_users
+
+
+@cache
+def _listed_sources() -> str:
+    sims_folder = Path(__file__).parent
+    digest = sha256()
+    for room in _ROOMS:
+        for path in sorted((sims_folder / room).rglob("*.py")):
+            digest.update(path.relative_to(sims_folder).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]

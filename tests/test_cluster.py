@@ -24,7 +24,7 @@ from gearsig.batch import report_many
 from gearsig.errors import InputError
 from gearsig.fleet import open_fleet
 from gearsig.processes import cluster, run_jobs
-from sims.cracked import Branch
+from sims.continuation import Branch
 from sims.sweep import Axis, Sweep, run_sweep
 from tests.fleet.recordings import PATTERN, write_recording_file
 

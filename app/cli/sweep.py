@@ -146,7 +146,7 @@ def bifurcation(
     Example: gearsig bifurcation cracked --preset symmetric_50_50 --torque 20Nm --vary speed=1600..2400rpm:41 -o jump
     """
     from app import bifurcation as study
-    from sims.cracked import Branch
+    from sims.continuation import Branch
 
     request = options.read_request(model, preset, settings, effects, speed, torque, "1s", fs, seed)
     n_points = points if points is not None else study.MIN_FOR_KIND if kind else 100

@@ -13,7 +13,7 @@ from gearsig.recording import Recording
 from sims.cracked import NAME as CRACKED
 from sims.cracked import CrackedPair, default_step_s, simulate_with_motion
 from sims.effects import EffectSetting, with_effects
-from sims.gear_pair import ReadyPair, build_rig, draw_roughness
+from sims.gear_pair import MeasuredRun, ReadyPair, build_rig, draw_roughness
 from sims.machine import Machine, Operation, log_uniform
 from sims.measure import MeasuredChannel, ModalPath, PathMode
 from sims.mesh import GearGeometry, deepest_crack_mm
@@ -290,18 +290,19 @@ def simulate_rig(
     machine = _with_fixed_flanks(machine, [drawn.seed, 77 + flanks])
     rng, lead_rev = _random_start(drawn, run)
     lead_s = lead_rev * 60.0 / drawn.speed_rpm
-    asked: dict[str, Any] = {
-        "rng": rng,
-        "sampling_rate_hz": SAMPLING_RATE_HZ,
-        "duration_s": drawn.duration_s + (lead_s if run else 0.0),
-        "rig": build_rig(machine, operation, name="drawn"),
-        "truth": {"depth_mm": size, "effect": effect if size else "", **chosen},
-    }
+    measured: MeasuredRun[Any] = MeasuredRun(
+        rng,
+        SAMPLING_RATE_HZ,
+        drawn.duration_s + (lead_s if run else 0.0),
+        build_rig(machine, operation, name="drawn"),
+        {"depth_mm": size, "effect": effect if size else "", **chosen},
+    )
     if isinstance(ready, PreparedPair):
-        recording, _ = simulate_pair(replace(ready.pair, machine=machine), operation, step_s=TWIN_STEP_S, **asked)
+        pair = replace(ready.pair, machine=machine)
+        recording, _ = simulate_pair(pair, operation, replace(measured, step_s=TWIN_STEP_S))
     else:
         step_s = None if step_angle_rad is None else default_step_s(machine, operation, step_angle_rad)
-        recording, _ = simulate_with_motion(machine, operation, step_s=step_s, **asked)
+        recording, _ = simulate_with_motion(machine, operation, replace(measured, step_s=step_s))
     return _cut(recording, round(lead_s * SAMPLING_RATE_HZ)) if run else recording
 
 

@@ -1,6 +1,5 @@
 """The cracked spur pair: 16 degrees of freedom, contact tooth pair by tooth pair, cracks, friction, backlash."""
 
-from sims.cracked._continuation import DECAYS, RAMP_S, SECTIONS, TRANSMISSION_ERROR, Branch, End, SteadyRun
 from sims.cracked._kernels import contact_forces, derivative, integrate, late_entry, place_of_entry, potential_energy
 from sims.cracked._respond import (
     SIGNALS,
@@ -27,21 +26,14 @@ from sims.cracked._simulator import (
 )
 
 __all__ = [
-    "DECAYS",
     "NAME",
-    "RAMP_S",
-    "SECTIONS",
     "SIGNALS",
     "STEP_ANGLE_RAD",
-    "TRANSMISSION_ERROR",
-    "Branch",
     "CrackedPair",
     "CrackedTwin",
-    "End",
     "PairConstants",
     "PairState",
     "Response",
-    "SteadyRun",
     "check_convergence",
     "contact_forces",
     "cracked_gap_simulator",

@@ -145,7 +145,7 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
     """Turn a machine into plain numbers; draws the places of rolling elements in bearings with a defect."""
     pair, mesh = machine.mesh.pair, machine.mesh
     table = mesh_table(mesh)
-    base_radius = np.array([pair.driver.base_radius_mm, pair.driven.base_radius_mm]) * 1e-3
+    base_radius = np.array(pair.base_radii_m)
     force = operation.torque_nm.largest / base_radius[0]
     mean_stiffness = mean_stiffness_n_per_m(machine, force)
     inertia = np.array([w.inertia_kg_m2 for w in machine.wheels])
@@ -201,8 +201,7 @@ def _filled(values: FloatArray) -> FloatArray:
 
 def mesh_mass_kg(machine: Machine) -> float:
     """Mass that the two gears put against each other along the line of action, 1/(r_b1²/J1 + r_b2²/J2)."""
-    pair = machine.mesh.pair
-    radii = (pair.driver.base_radius_mm * 1e-3, pair.driven.base_radius_mm * 1e-3)
+    radii = machine.mesh.pair.base_radii_m
     return 1.0 / sum(r**2 / w.inertia_kg_m2 for r, w in zip(radii, machine.wheels, strict=True))
 
 
@@ -222,10 +221,9 @@ def start_state(machine: Machine, operation: Operation, start_s: float) -> tuple
 
     Friction, roughness, run-out and unbalance are left out of the balance; what they change settles in a few cycles.
     """
-    pair = machine.mesh.pair
     torque = float(operation.torque_nm.at(start_s))
     omega = float(operation.speed_rpm.at(start_s)) * pi / 30.0
-    r1, r2 = pair.driver.base_radius_mm * 1e-3, pair.driven.base_radius_mm * 1e-3
+    r1, r2 = machine.mesh.pair.base_radii_m
     force = torque / r1
     delta = 0.0
     if torque > 0.0:
@@ -309,7 +307,8 @@ def _assembled(
 
     alpha, tilt = pair.working_pressure_angle_rad, tilting_shares(machine)
     tilted = [float(s * t * c) for t in tilt for s in (-1.0, 1.0) for c in (cos(alpha), sin(alpha))]
-    turned = [pair.driver.base_radius_mm * 1e-3, -pair.driven.base_radius_mm * 1e-3, 1.0, -1.0]
+    r1, r2 = pair.base_radii_m
+    turned = [r1, -r2, 1.0, -1.0]
     join([1, 2, 5, 7, *range(8, 16)], [*turned, *tilted], mesh)
     for side in range(2):
         join([3 * side, 1 + side], [1.0, -1.0], torsion[side])
@@ -349,10 +348,14 @@ def _eigenvalues_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> NDArray[n
     return np.linalg.eigvals(state).astype(np.complex128)
 
 
+def mesh_force_n(machine: Machine, operation: Operation) -> float:
+    """Static force of the mesh at the greatest torque."""
+    return operation.torque_nm.largest / machine.mesh.pair.base_radii_m[0]
+
+
 def slowest_decay_s(machine: Machine, operation: Operation) -> float:
     """Time in which the least damped motion falls to 1/e: of the vibrations, or of the speed that the drive holds."""
-    force = operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
-    eigenvalues = _eigenvalues_per_s(*matrices(machine, force))
+    eigenvalues = _eigenvalues_per_s(*matrices(machine, mesh_force_n(machine, operation)))
     ringing = eigenvalues[np.abs(eigenvalues.imag) > 1.0]
     recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
     return max(recovery, 1.0 / max(float(-ringing.real.max()), 1e-3) if len(ringing) else 0.0)
@@ -360,8 +363,7 @@ def slowest_decay_s(machine: Machine, operation: Operation) -> float:
 
 def default_step_s(machine: Machine, operation: Operation, step_angle_rad: float = STEP_ANGLE_RAD) -> float:
     """Step that stiffness, damping and tooth passage allow."""
-    force = operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
-    m, k, c = matrices(machine, force)
+    m, k, c = matrices(machine, mesh_force_n(machine, operation))
     fastest = 2.0 * pi * float(_frequencies_hz(m, k)[-1])
     step = min(step_angle_rad / fastest, STABLE / _fastest_rate_per_s(m, k, c))
     mesh_hz = operation.speed_rpm.largest / 60.0 * machine.mesh.pair.driver.teeth

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from gearsig.recording import Recording
-from gearsig.rig import Rig
-from sims.cracked._respond import PairState, Response, check_convergence, default_step_s, eigenfrequencies_hz, respond
+from sims.cracked._respond import (
+    PairState,
+    Response,
+    check_convergence,
+    default_step_s,
+    eigenfrequencies_hz,
+    mesh_force_n,
+    respond,
+)
 from sims.effects import effects, with_effects
 from sims.gear_pair import (
     PARAMETERS,
+    MeasuredRun,
     Measurement,
     PairGapSimulator,
     PairModel,
@@ -47,8 +53,8 @@ class CrackedPair(PairModel[ReadyPair]):
         check_load(healthy, request.operation)
         return ReadyPair(request, with_effects(healthy, request.effects, rng))
 
-    def _run(self, ready: ReadyPair, **how: Any) -> Recording:
-        return simulate_with_motion(ready.machine, ready.operation, **how)[0]
+    def _run(self, ready: ReadyPair, run: MeasuredRun[PairState]) -> Recording:
+        return simulate_with_motion(ready.machine, ready.operation, run)[0]
 
     def _converges(self, ready: ReadyPair, rng: np.random.Generator) -> StepConvergence:
         return check_convergence(ready.machine, ready.operation, rng)
@@ -58,19 +64,7 @@ class CrackedPair(PairModel[ReadyPair]):
 
 
 def simulate_with_motion(
-    machine: Machine,
-    operation: Operation,
-    *,
-    rng: np.random.Generator,
-    sampling_rate_hz: float,
-    duration_s: float,
-    rig: Rig | None = None,
-    truth: Mapping[str, Any] | None = None,
-    step_s: float | None = None,
-    also: Sequence[str] = (),
-    first: PairState | None = None,
-    noise_rng: np.random.Generator | None = None,
-    on_progress: Callable[[float], None] | None = None,
+    machine: Machine, operation: Operation, run: MeasuredRun[PairState]
 ) -> tuple[Recording, Response]:
     """Simulate the sixteen coordinates and measure them; return the recording and the motion behind it.
 
@@ -79,25 +73,9 @@ def simulate_with_motion(
     machine : Machine
     operation : Operation
         Its time 0 is the recording's start.
-    rng : numpy.random.Generator
-        Two streams are made of it, one for the machine and one for the chain: the same seed gives the same noise
-        whatever the machine draws.
-    sampling_rate_hz, duration_s : float
-    rig : Rig or None
-        Goes with the recording.
-    truth : mapping or None
-        What was asked for; "machine" and "solver" are added.
-    step_s : float or None
-        Longest step; None: `sims.cracked.default_step_s`. It is shortened to a whole part of the sampling
-        interval.
-    also : sequence of str
-        Signals of `sims.cracked.SIGNALS` wanted in the motion besides those that are measured.
-    first : PairState or None
-        Where the lead-in starts; None: at the static balance.
-    noise_rng : numpy.random.Generator or None
-        For the chain, instead of the stream made of `rng`: the same machine with other noise.
-    on_progress : callable or None
-        Called now and then with the part of the motion that is done, 0 to 1.
+    run : MeasuredRun
+        Without a step of its own it has `sims.cracked.default_step_s`. "machine" and "solver" are added to its truth;
+        its further signals are of `sims.cracked.SIGNALS`.
 
     Returns
     -------
@@ -106,37 +84,23 @@ def simulate_with_motion(
     motion : Response
         Lead-in included: it begins before time 0.
     """
-    longest = default_step_s(machine, operation) if step_s is None else step_s
-    measured = Measurement.of(machine, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s, longest_step_s=longest)
-    machine_rng, chain_rng = rng.spawn(2)
-    response = respond(
-        machine,
-        operation,
-        duration_s=measured.motion_s,
-        rng=machine_rng,
-        signals=measured.signals(also),
-        start_s=-measured.lead_in_s,
-        step_s=measured.step_s,
-        stride=measured.stride,
-        first=first,
-        on_progress=on_progress,
-    )
-    known = {
-        "machine": plain(replace(machine, chain=None)),  # type: ignore[arg-type]  # the chain stands under "measurement"
-        "solver": {
-            "step_s": response.step_s,
-            "eigenfrequencies_hz": [float(f) for f in eigenfrequencies_hz(machine, _force_n(machine, operation))],
-        },
-    }
+    longest = default_step_s(machine, operation) if run.step_s is None else run.step_s
+    measured = Measurement.of(machine, run, longest)
+    machine_rng, chain_rng = run.streams()
+    response = respond(machine, operation, rng=machine_rng, **measured.motion)
+    frequencies = eigenfrequencies_hz(machine, mesh_force_n(machine, operation))
     recording = measured.record(
         response,
-        rng=chain_rng if noise_rng is None else noise_rng,
-        rig=rig,
-        truth={**(truth or {}), **known},
+        chain_rng,
+        known={
+            "machine": plain(replace(machine, chain=None)),  # type: ignore[arg-type]  # it stands under "measurement"
+            "solver": {"step_s": response.step_s, "eigenfrequencies_hz": [float(f) for f in frequencies]},
+        },
+        notes=model_notes(machine, operation),
         source="simulation: cracked 16-DOF spur pair",
         reader="sims.cracked",
     )
-    return replace(recording, warnings=(*recording.warnings, *model_notes(machine, operation))), response
+    return recording, response
 
 
 def model_notes(machine: Machine, operation: Operation) -> tuple[str, ...]:
@@ -153,10 +117,6 @@ def model_notes(machine: Machine, operation: Operation) -> tuple[str, ...]:
             "modes of gear bodies and teeth, which it lacks, would take part"
         )
     return tuple(notes)
-
-
-def _force_n(machine: Machine, operation: Operation) -> float:
-    return operation.torque_nm.largest / (machine.mesh.pair.driver.base_radius_mm * 1e-3)
 
 
 # The cracked pair set to a rig, for the gap diagnosis: see `gearsig.gap`.

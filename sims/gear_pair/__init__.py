@@ -19,7 +19,7 @@ from sims.gear_pair._drive import (
     total_inertia_kg_m2,
 )
 from sims.gear_pair._installed import Installed, completed
-from sims.gear_pair._measurement import COORDINATES, MIN_MOTION_HZ, YIELDS, Measurement
+from sims.gear_pair._measurement import COORDINATES, MIN_MOTION_HZ, YIELDS, MeasuredRun, Measurement
 from sims.gear_pair._parameters import PARAMETERS
 from sims.gear_pair._rolling import (
     contact_n_per_m15,
@@ -49,6 +49,7 @@ __all__ = [
     "PARAMETERS",
     "YIELDS",
     "Installed",
+    "MeasuredRun",
     "Measurement",
     "PairGapSimulator",
     "PairModel",

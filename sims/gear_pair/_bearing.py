@@ -113,8 +113,7 @@ def tilting_shares(machine: Machine) -> FloatArray:
     of the mesh: its moment F_a r_w is taken by ±F_a r_w/L on the two bearings, L apart. The first bearing stands at −z.
     """
     pair = machine.mesh.pair
-    radii = np.array([gear.base_radius_mm for gear in (pair.driver, pair.driven)]) * 1e-3
-    radii /= cos(pair.working_pressure_angle_rad)
+    radii = np.array(pair.base_radii_m) / cos(pair.working_pressure_angle_rad)
     apart = np.array([shaft.bearing_distance_m for shaft in machine.shafts])
     result: FloatArray = machine.mesh.axial_share * radii / apart
     return result

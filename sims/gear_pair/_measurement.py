@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import ceil, floor
-from typing import Any, Protocol
+from typing import Any, Generic
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from gearsig.checks import FloatArray, positive
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from sims.gear_pair._drive import governor_nm_s_per_rad, total_inertia_kg_m2
+from sims.gear_pair._run import PairResponse, State
 from sims.machine import Machine
 from sims.measure import MeasurementChain, Motion
 
@@ -43,30 +44,63 @@ SETTLING = 6.0
 """Time constants of the slowest start-up motion that are left out ahead of the recording."""
 
 
-class PairSignals(Protocol):
-    """What a model's run gives."""
+@dataclass(frozen=True)
+class MeasuredRun(Generic[State]):
+    """What is asked of a run that is measured.
 
-    @property
-    def interval_s(self) -> float:
-        """Between its points."""
-        ...
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Two streams are made of it, one for the machine and one for the chain: the same seed gives the same noise
+        whatever the machine draws.
+    sampling_rate_hz, duration_s : float
+        Of the recording.
+    rig : Rig or None
+        Goes with the recording.
+    truth : mapping
+        What was asked for; the model adds what it knows of machine and solver.
+    step_s : float or None
+        Longest step of the integrator; None: the model's. It is shortened to what the model needs, and to a whole part
+        of the sampling interval.
+    also : sequence of str
+        Signals of the model wanted in the motion besides those that are measured.
+    first : state of the model or None
+        Where the lead-in starts; None: at the static balance.
+    noise_rng : numpy.random.Generator or None
+        For the chain, instead of the stream made of `rng`: the same machine with other noise.
+    on_progress : callable or None
+        Called now and then with the part of the motion that is done, 0 to 1.
+    """
 
-    def __getitem__(self, name: str) -> FloatArray:
-        """Return a signal by its name."""
-        ...
+    rng: np.random.Generator
+    sampling_rate_hz: float
+    duration_s: float
+    rig: Rig | None = None
+    truth: Mapping[str, Any] = field(default_factory=dict)
+    step_s: float | None = None
+    also: Sequence[str] = ()
+    first: State | None = None
+    noise_rng: np.random.Generator | None = None
+    on_progress: Callable[[float], None] | None = None
+
+    def streams(self) -> tuple[np.random.Generator, np.random.Generator]:
+        """Return the generators of the machine and of the chain; to be called once."""
+        machine_rng, chain_rng = self.rng.spawn(2)
+        return machine_rng, chain_rng if self.noise_rng is None else self.noise_rng
 
 
 @dataclass(frozen=True)
-class Measurement:
+class Measurement(Generic[State]):
     """How a machine is run to be measured, and the recording of it; time 0 of its profiles is a sample.
 
     Parameters
     ----------
     machine : Machine
+    run : MeasuredRun
     chain : MeasurementChain
         At the sampling rate of the recording.
-    duration_s, lead_in_s : float
-        Of the recording, and of what goes before it.
+    lead_in_s : float
+        Of what goes before the recording.
     step_s : float
         Of the integrator, a whole part of the sampling interval.
     stride : int
@@ -76,31 +110,31 @@ class Measurement:
     """
 
     machine: Machine
+    run: MeasuredRun[State]
     chain: MeasurementChain
-    duration_s: float
     lead_in_s: float
     step_s: float
     stride: int
     positions: tuple[str, ...]
 
     @classmethod
-    def of(cls, machine: Machine, *, sampling_rate_hz: float, duration_s: float, longest_step_s: float) -> Measurement:
-        """Plan a recording of `duration_s`; the step is `longest_step_s`, or less where the chain needs it.
+    def of(cls, machine: Machine, run: MeasuredRun[State], longest_step_s: float) -> Measurement[State]:
+        """Plan a recording; the step is `longest_step_s`, or less where the chain needs it.
 
         Raises
         ------
         InputError
             If rate, duration or step are not above 0.
         """
-        positive(duration_s, "duration_s", "s")
-        rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
+        positive(run.duration_s, "duration_s", "s")
+        rate = positive(run.sampling_rate_hz, "sampling_rate_hz", "Hz")
         chain = replace(machine.chain, sampling_rate_hz=rate)
         rate_hz = motion_rate_hz(chain)
         per_sample = ceil(max(1.0 / positive(longest_step_s, "step_s", "s"), rate_hz) / rate - 1e-9)
         return cls(
             machine,
+            run,
             chain,
-            duration_s,
             ceil(lead_in_s(machine, chain) * rate) / rate,
             1.0 / (rate * per_sample),
             max(floor(rate * per_sample / rate_hz + 1e-9), 1),
@@ -108,14 +142,19 @@ class Measurement:
         )
 
     @property
-    def motion_s(self) -> float:
-        """How long the model is to run."""
-        return self.chain.simulated_s(self.duration_s, self.lead_in_s) + 4.0 / self.chain.sampling_rate_hz
-
-    def signals(self, also: Sequence[str] = ()) -> tuple[str, ...]:
-        """Return the signals that the model is to give, with those that are wanted besides."""
+    def motion(self) -> dict[str, Any]:
+        """How the model is to respond, by the names of its parameters: times, steps, signals, first state."""
         needed = [name for position in self.positions for name in self._signals_at(position)]
-        return tuple(dict.fromkeys((*ANGLES, *needed, *also)))
+        return {
+            "duration_s": self.chain.simulated_s(self.run.duration_s, self.lead_in_s)
+            + 4.0 / self.chain.sampling_rate_hz,
+            "signals": tuple(dict.fromkeys((*ANGLES, *needed, *self.run.also))),
+            "start_s": -self.lead_in_s,
+            "step_s": self.step_s,
+            "stride": self.stride,
+            "first": self.run.first,
+            "on_progress": self.run.on_progress,
+        }
 
     def _signals_at(self, position: str) -> tuple[str, ...]:
         place = position.removesuffix(" yield")
@@ -125,7 +164,7 @@ class Measurement:
         """Whether a bearing's shaft moves by itself as its rolling elements pass, else as the spring yields."""
         return position in YIELDS and self.machine.bearings[YIELDS.index(position) // 2].elements_pass
 
-    def _acceleration(self, response: PairSignals, position: str) -> FloatArray:
+    def _acceleration(self, response: PairResponse[State], position: str) -> FloatArray:
         """Return a place's acceleration; of a yield by differences of what it is less than the shaft's motion."""
         place = position.removesuffix(" yield")
         acceleration = response[f"{place} acceleration"]
@@ -136,31 +175,45 @@ class Measurement:
 
     def record(
         self,
-        response: PairSignals,
-        *,
+        response: PairResponse[State],
         rng: np.random.Generator,
-        rig: Rig | None,
-        truth: Mapping[str, Any],
+        *,
+        known: Mapping[str, Any],
+        notes: Sequence[str],
         source: str,
         reader: str,
     ) -> Recording:
-        """Return the recording of a run that began at −`lead_in_s`; see `MeasurementChain.record`."""
+        """Return the recording of a run that began at −`lead_in_s`; see `MeasurementChain.record`.
+
+        Parameters
+        ----------
+        response : PairResponse
+        rng : numpy.random.Generator
+            Of the chain.
+        known : mapping
+            What the model adds to the truth.
+        notes : sequence of str
+            Where formulas are used outside their range: warnings of the recording.
+        source, reader : str
+            For its provenance.
+        """
         motion = Motion(
             response.interval_s,
             self.positions,
             np.column_stack([self._acceleration(response, name) for name in self.positions]),
             dict(zip(self.machine.shaft_names, (response[name] for name in ANGLES), strict=True)),
         )
-        return self.chain.record(
+        recording = self.chain.record(
             motion,
             rng=rng,
-            rig=rig,
-            duration_s=self.duration_s,
+            rig=self.run.rig,
+            duration_s=self.run.duration_s,
             lead_in_s=self.lead_in_s,
-            truth=truth,
+            truth={**self.run.truth, **known},
             source=source,
             reader=reader,
         )
+        return replace(recording, warnings=(*recording.warnings, *notes))
 
 
 def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from gearsig.checks import within
 from gearsig.recording import Recording
-from gearsig.rig import Rig
 from sims.effects import EffectSetting, completed
 from sims.gear_pair._installed import Installed, installed_of
+from sims.gear_pair._measurement import MeasuredRun
 from sims.machine import Machine, Operation
 from sims.simulator import HasText, Parameter, SimulationSetup, Simulator, Values, complete_values, truth_of
 
@@ -152,57 +152,23 @@ class PairModel(Simulator, Generic[Ready]):
             name=self.rig_name(ready.preset),
             sources=self.rig_sources(ready.preset),
         )
-        return self.record(ready, rng, rig=rig, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s)
+        return self.record(ready, MeasuredRun(rng, sampling_rate_hz, duration_s, rig))
 
     @abstractmethod
     def _built(self, request: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> Ready:
         """Build what is asked for."""
 
     @abstractmethod
-    def _run(self, ready: Ready, **how: Any) -> Recording:
-        """Run a prepared pair and measure it; `how` as of `record`, by name."""
+    def _run(self, ready: Ready, run: MeasuredRun[Any]) -> Recording:
+        """Run a prepared pair and measure it."""
 
     @abstractmethod
     def _converges(self, ready: Ready, rng: np.random.Generator) -> HasText:
         """Compare a prepared pair's motion with that of smaller steps."""
 
-    def record(
-        self,
-        ready: Ready,
-        rng: np.random.Generator,
-        *,
-        rig: Rig,
-        sampling_rate_hz: float,
-        duration_s: float,
-        step_s: float | None = None,
-        noise_rng: np.random.Generator | None = None,
-    ) -> Recording:
-        """Run a prepared pair and measure it.
-
-        Parameters
-        ----------
-        ready : ReadyPair
-        rng : numpy.random.Generator
-            For the machine and, unless `noise_rng` is given, for the chain.
-        rig : Rig
-            Goes with the recording.
-        sampling_rate_hz, duration_s : float
-        step_s : float or None
-            Longest step of the integrator; None: the model's.
-        noise_rng : numpy.random.Generator or None
-            For the chain: the same machine with other noise.
-        """
-        step: dict[str, Any] = {} if step_s is None else {"step_s": step_s}
-        return self._run(
-            ready,
-            rng=rng,
-            rig=rig,
-            sampling_rate_hz=sampling_rate_hz,
-            duration_s=duration_s,
-            truth=ready.truth(),
-            noise_rng=noise_rng,
-            **step,
-        )
+    def record(self, ready: Ready, run: MeasuredRun[Any]) -> Recording:
+        """Run a prepared pair and measure it; what was put in goes into the truth."""
+        return self._run(ready, replace(run, truth=ready.truth()))
 
     def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> HasText:
         """Tell how far a smaller step of the integrator changes the result of this very machine."""

@@ -19,12 +19,12 @@ from gearsig.recording import Recording
 from gearsig.rig import OperatingPoint, Rig, rig_to_dict
 from sims.effects import GEARS, EffectSetting, MachineFacts, Options, as_gap_effect, effect, effects
 from sims.gear_pair._installed import HousingMode, SensorSeat, completed, further_seats, installed_of_rig, table_of
+from sims.gear_pair._measurement import MeasuredRun
 from sims.gear_pair._simulator import PairModel, ReadyPair
 from sims.machine import Nominal, log_uniform, nominal_of, pitch_tolerance_um, runout_tolerance_um, usual_mass_kg
 from sims.mesh import PairGeometry
 from sims.presets import Preset, preset_text
-from sims.registry import sources_digest
-from sims.simulator import ParameterValue, SimulationSetup
+from sims.simulator import ParameterValue, SimulationSetup, sources_digest
 
 # Parameters of a pair of which only the rig's data are known: the rest is usual for its size.
 #
@@ -238,15 +238,16 @@ class PairTwin:
         if noise:
             skipped = round(run_rng.uniform(0.0, LONGEST_LEAD_REV) * 60.0 / point.speed_rpm * sampling_rate_hz)
         machine_rng = np.random.default_rng(seed)
-        recording = self.pair_model.record(
-            self._prepared(preset_at_point, machine_rng, sampling_rate_hz),
+        ready = self._prepared(preset_at_point, machine_rng, sampling_rate_hz)
+        run: MeasuredRun[Any] = MeasuredRun(
             machine_rng,
-            rig=self._rig_at(point),
-            sampling_rate_hz=sampling_rate_hz,
-            duration_s=duration_s + skipped / sampling_rate_hz,
+            sampling_rate_hz,
+            duration_s + skipped / sampling_rate_hz,
+            self._rig_at(point),
             step_s=self._step_s(preset_at_point),
             noise_rng=run_rng if noise else None,
         )
+        recording = self.pair_model.record(ready, run)
         recording = replace(recording, truth={**(recording.truth or {}), "seed": seed, "noise": noise})
         return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
 

@@ -775,7 +775,7 @@ def mesh_maps(
         raise InputError("torques that do not ascend from above 0", where="torque_nm", allowed="ascending, above 0 N m")
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
     table = static_table(gears, mesh, support=support) if table is None else table
-    loads = torques / (mesh.pair.driver.base_radius_mm * 1e-3)
+    loads = torques / mesh.pair.base_radii_m[0]
     delta, force, tangent = _solved(table, mesh, cycles, loads, by_force=True)
     return MeshMaps(cycles, torques, delta, force, tangent, _separations(table, mesh, cycles))
 

@@ -350,7 +350,7 @@ def build_side(
     InputError
         If the gear's total inertia or mass is below that of its finite elements.
     """
-    base_m = (machine.mesh.pair.driver, machine.mesh.pair.driven)[index].base_radius_mm * 1e-3
+    base_m = machine.mesh.pair.base_radii_m[index]
     twist = -SIGNS[index] * gear.hub_modes[kept.single, ABOUT_Z]
     coupled = np.flatnonzero(np.abs(twist) > 0.0)
     alone = np.setdiff1d(np.arange(len(kept.single)), coupled)
@@ -627,7 +627,7 @@ def constants(
     from sims.reduced_fe._eigenfrequencies import torsional_mode  # which takes these constants
 
     machine, mesh = pair.machine, pair.machine.mesh
-    base = np.array([mesh.pair.driver.base_radius_mm, mesh.pair.driven.base_radius_mm]) * 1e-3
+    base = np.array(mesh.pair.base_radii_m)
     force = max(operation.torque_nm.largest / base[0], MIN_FORCE_N)
     stiffness = mean_stiffness_n_per_m(pair, force)
     table, kept, groups = _contact(pair)
@@ -693,9 +693,8 @@ def _contact(pair: FlexiblePair) -> tuple[ContactTable, list[RetainedModes], Flo
 def back_rows(machine: Machine, sides: tuple[FlexibleSide, FlexibleSide]) -> FloatArray:
     """∂D/∂η of the flanks behind, (2, n_modes): along their own line of action, the bodies rigid."""
     alpha = machine.mesh.pair.working_pressure_angle_rad
-    base = (machine.mesh.pair.driver.base_radius_mm * 1e-3, machine.mesh.pair.driven.base_radius_mm * 1e-3)
     rows = []
-    for sign, radius, side in zip((1.0, -1.0), base, sides, strict=True):
+    for sign, radius, side in zip((1.0, -1.0), machine.mesh.pair.base_radii_m, sides, strict=True):
         gear, x, y = side.shapes[1:4]
         rows.append(sign * (-radius * gear - cos(2.0 * alpha) * y + sin(2.0 * alpha) * x))
     return np.array(rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.recording import Recording
-from gearsig.rig import SIDES, Rig
+from gearsig.rig import SIDES
 from sims.effects import effects, with_effects
 from sims.fe_gear import READY, GearBlank, ReducedGear, cached_gear, plan_for, ready_gear
 from sims.gear_pair import (
@@ -20,6 +20,7 @@ from sims.gear_pair import (
 )
 from sims.gear_pair import (
     Installed,
+    MeasuredRun,
     Measurement,
     PairGapSimulator,
     PairModel,
@@ -175,8 +176,9 @@ class ReducedPair(PairModel[PreparedPair]):
             )
         return PreparedPair(request, machine, flexible_pair(request.values, machine, gears))
 
-    def _run(self, ready: PreparedPair, **how: Any) -> Recording:
-        return simulate_pair(ready.pair, ready.operation, **({"step_s": ready.step_s} | how))[0]
+    def _run(self, ready: PreparedPair, run: MeasuredRun[FlexState]) -> Recording:
+        stepped = run if run.step_s is not None else replace(run, step_s=ready.step_s)
+        return simulate_pair(ready.pair, ready.operation, stepped)[0]
 
     def _converges(self, ready: PreparedPair, rng: np.random.Generator) -> StepConvergence:
         del rng
@@ -190,19 +192,7 @@ MAX_DEPTH_PART = 0.5
 
 
 def simulate_pair(
-    pair: FlexiblePair,
-    operation: Operation,
-    *,
-    rng: np.random.Generator,
-    sampling_rate_hz: float,
-    duration_s: float,
-    rig: Rig | None = None,
-    truth: Mapping[str, Any] | None = None,
-    step_s: float = STEP_S,
-    also: Sequence[str] = (),
-    first: FlexState | None = None,
-    noise_rng: np.random.Generator | None = None,
-    on_progress: Callable[[float], None] | None = None,
+    pair: FlexiblePair, operation: Operation, run: MeasuredRun[FlexState]
 ) -> tuple[Recording, FlexResponse]:
     """Simulate a flexible pair and measure it; return the recording and the motion behind it.
 
@@ -211,58 +201,33 @@ def simulate_pair(
     pair : FlexiblePair
     operation : Operation
         Its time 0 is the recording's start.
-    rng : numpy.random.Generator
-        One stream for the machine (roughness), one for the measurement chain.
-    sampling_rate_hz, duration_s : float
-    rig : Rig or None
-        Goes with the recording.
-    truth : mapping or None
-        What was asked for; "machine", "gears" and "solver" are added.
-    step_s : float
-        Longest step; it is shortened to what the contact can be followed with, and to a whole part of the sampling
-        interval.
-    also : sequence of str
-        Signals of `sims.reduced_fe.signal_names` wanted besides those that are measured.
-    first : FlexState or None
-        Where the lead-in starts; None: at the static balance.
-    noise_rng : numpy.random.Generator or None
-        For the chain, instead of the stream made of `rng`.
-    on_progress : callable or None
-        Called now and then with the part of the motion that is done, 0 to 1.
+    run : MeasuredRun
+        Without a step of its own it has `sims.reduced_fe.STEP_S`; either is shortened to what the contact can be
+        followed with. "machine", "gears" and "solver" are added to its truth; its further signals are of
+        `sims.reduced_fe.signal_names`. Its machine's stream draws the roughness.
 
     Raises
     ------
     InputError
         If the teeth yield further under the load than their corners are apart.
     """
-    machine_rng, chain_rng = rng.spawn(2)
+    machine_rng, chain_rng = run.streams()
     machine, _ = draw_roughness(pair.machine, machine_rng)
     pair = replace(pair, machine=machine)
     check_depth(pair, operation)
     pair_constants = constants(pair, operation, rng=machine_rng)
-    step = followed_step_s(pair, pair_constants, operation, positive(step_s, "step_s", "s"))
-    measured = Measurement.of(machine, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s, longest_step_s=step)
-    response = respond(
-        pair,
-        operation,
-        duration_s=measured.motion_s,
-        signals=measured.signals(also),
-        start_s=-measured.lead_in_s,
-        step_s=measured.step_s,
-        stride=measured.stride,
-        first=first,
-        ready=pair_constants,
-        on_progress=on_progress,
-    )
+    longest = positive(STEP_S if run.step_s is None else run.step_s, "step_s", "s")
+    measured = Measurement.of(machine, run, followed_step_s(pair, pair_constants, operation, longest))
+    response = respond(pair, operation, ready=pair_constants, **measured.motion)
     recording = measured.record(
         response,
-        rng=chain_rng if noise_rng is None else noise_rng,
-        rig=rig,
-        truth={**(truth or {}), **_known(pair, operation, pair_constants, response)},
+        chain_rng,
+        known=_known(pair, operation, pair_constants, response),
+        notes=model_notes(pair, operation, pair_constants),
         source="simulation: pair of reduced finite-element gears",
         reader="sims.reduced_fe",
     )
-    return replace(recording, warnings=(*recording.warnings, *model_notes(pair, operation, pair_constants))), response
+    return recording, response
 
 
 def model_notes(pair: FlexiblePair, operation: Operation, pair_constants: FlexiblePairConstants) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from app.bifurcation import (
 from app.cli.main import main
 from gearsig.errors import InputError
 from gearsig.phase import PoincareSection
-from sims.cracked import Branch
+from sims.continuation import Branch
 from sims.sweep import Axis, Sweep
 
 BASE = ("bifurcation", "cracked", "--preset", "small_30_25", "--set", "roughness_um=0", "--points", "20", "-j", "1")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from sims.cracked import DECAYS, Branch, CrackedPair, PairState, respond, slowest_decay_s
+from sims.continuation import DECAYS, Branch
+from sims.cracked import CrackedPair, PairState, respond, slowest_decay_s
 from sims.effects import EffectSetting
 from sims.gear_pair import total_inertia_kg_m2
 from sims.machine import Operation, Profile

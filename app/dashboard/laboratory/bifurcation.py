@@ -18,7 +18,8 @@ from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import show_figure
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError, InputError
-from sims.cracked import DECAYS, RAMP_S, SECTIONS, Branch, slowest_decay_s
+from sims.continuation import DECAYS, RAMP_S, SECTIONS, Branch
+from sims.cracked import slowest_decay_s
 from sims.effects import effect
 from sims.machine import Operation, Profile
 from sims.presets import preset

@@ -27,7 +27,7 @@ from gearsig.recording import Recording
 from gearsig.rig import SIDES, Rig, order_lines
 from sims.cracked import Response, simulate_with_motion
 from sims.effects import completed, effect
-from sims.gear_pair import build_rig
+from sims.gear_pair import MeasuredRun, build_rig
 from sims.machine import Machine, Operation
 from sims.presets import preset
 from sims.reduced_fe import FlexiblePair, FlexResponse
@@ -106,29 +106,16 @@ def run_setup(setup: Setup) -> LaboratoryRun:
     rig_name = f"simulated: {setup.preset}"
     if setup.model == MODEL:
         ready = CrackedPair().prepare(asked, rng, sampling_rate_hz=rate_hz)
+        rig = build_rig(ready.machine, operation, name=rig_name)
         recording, response = simulate_with_motion(
-            ready.machine,
-            operation,
-            rng=rng,
-            sampling_rate_hz=rate_hz,
-            duration_s=duration_s,
-            rig=build_rig(ready.machine, operation, name=rig_name),
-            truth=ready.truth(),
-            also=MOTION,
+            ready.machine, operation, MeasuredRun(rng, rate_hz, duration_s, rig, ready.truth(), also=MOTION)
         )
         return LaboratoryRun(setup, ready.machine, recording, _shown_part(response, duration_s))
     flexible = ReducedPair().prepare(asked, rng, sampling_rate_hz=rate_hz)
     pair, machine = flexible.pair, flexible.pair.machine
+    rig = build_rig(machine, operation, name=rig_name)
     recording, bent = simulate_pair(
-        pair,
-        operation,
-        rng=rng,
-        sampling_rate_hz=rate_hz,
-        duration_s=duration_s,
-        rig=build_rig(machine, operation, name=rig_name),
-        truth=flexible.truth(),
-        step_s=flexible.step_s,
-        also=MOTION,
+        pair, operation, MeasuredRun(rng, rate_hz, duration_s, rig, flexible.truth(), flexible.step_s, MOTION)
     )
     return LaboratoryRun(setup, machine, recording, _shown_part(bent, duration_s), pair)
 

@@ -16,6 +16,7 @@ from gearsig.checks import FloatArray
 from gearsig.recording import Recording
 from sims.cracked import simulate_with_motion
 from sims.effects import EffectSetting, with_effects
+from sims.gear_pair import MeasuredRun
 from sims.machine import Operation
 from tests.sims.cracked.order_lines import OUTPUT_ORDER, Run, healthy, run, run_machine
 from tests.sims.machines import TEETH, spur_pair_machine
@@ -272,14 +273,8 @@ def test_clearance_shows_at_the_elements_passing_and_beside_the_mesh() -> None:
 def recorded(*settings: EffectSetting, speed_rpm: float = 1200.0) -> Recording:
     """One second; at 1200 rpm the mesh harmonics stand at multiples of 1100 Hz."""
     machine = with_effects(spur_pair_machine(), settings, np.random.default_rng(0))
-    recording, _ = simulate_with_motion(
-        machine,
-        Operation.steady(speed_rpm, TORQUE_NM),
-        rng=np.random.default_rng(0),
-        sampling_rate_hz=20480.0,
-        duration_s=1.0,
-    )
-    return recording
+    run = MeasuredRun(np.random.default_rng(0), 20480.0, 1.0)
+    return simulate_with_motion(machine, Operation.steady(speed_rpm, TORQUE_NM), run)[0]
 
 
 def spectrum(recording: Recording) -> FloatArray:

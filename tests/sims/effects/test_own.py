@@ -13,7 +13,8 @@ import pytest
 from gearsig.errors import InputError
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 from sims.effects import VARIABLE, EffectSetting, add_effect, effect, effects, is_user_effect, with_effects
-from sims.registry import gap_simulator, sources_digest
+from sims.registry import gap_simulator
+from sims.simulator import sources_digest
 from tests.sims.machines import spur_pair_machine
 
 RIG = Rig(
