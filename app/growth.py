@@ -16,24 +16,9 @@ from gearsig.cache import made_folder, write_text
 from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.plot import CurvePanel, curves_figure
-from sims.fe_gear import (
-    READY,
-    GearBlank,
-    ReducedGear,
-    cached_gear,
-    crack_size,
-    deepest_followed_mm,
-    plan_for,
-    ready_gear,
-)
+from sims.fe_gear import GearBlank, ReducedGear, crack_size, deepest_followed_mm
 from sims.mesh import GearMesh
-from sims.reduced_fe import (
-    CrackGrowth,
-    GrowthLaw,
-    StressIntensity,
-    crack_growth,
-    stress_intensity,
-)
+from sims.reduced_fe import CrackGrowth, GrowthLaw, StressIntensity, crack_growth, reduced_gear, stress_intensity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -147,9 +132,7 @@ def growth_study(
 def gear_of(mesh: GearMesh, side: int) -> ReducedGear:
     """Finite elements of a gear: ready-made, kept, or made now."""
     own = mesh.side(side)
-    blank = GearBlank(own.gear, material=own.material)
-    name = next((name for name, ready in READY.items() if ready == blank), None)
-    return ready_gear(name) if name else cached_gear(blank, plan_for(blank, DOF_PER_TOOTH * own.gear.teeth))
+    return reduced_gear(GearBlank(own.gear, material=own.material), DOF_PER_TOOTH * own.gear.teeth)
 
 
 def growth_figure(study: GrowthStudy) -> Figure:

@@ -15,9 +15,8 @@ from app.cli.compare import compare
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED
 from app.cli.dashboard import dashboard
 from app.cli.fleet import fleet_app
-from app.cli.flexible import flexible, gear_body
+from app.cli.flexible import flexible, gear_body, growth
 from app.cli.gap import gap
-from app.cli.growth import growth
 from app.cli.motion import force, identify, start_stop
 from app.cli.report import report
 from app.cli.show import modes, show

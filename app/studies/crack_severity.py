@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 import typer
 
-from app.studies import drawn_rigs
+from app.studies import answers_of, drawn_rigs
 from app.studies.drawn_rigs import DrawnRig, draw_rig, simulate_rig
-from app.studies.pool import answers_of
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording

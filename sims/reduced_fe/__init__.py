@@ -56,6 +56,7 @@ from sims.reduced_fe._simulator import (
     ReducedTwin,
     check_depth,
     reduced_gap_simulator,
+    reduced_gear,
     simulate_pair,
     twin_parameters,
 )
@@ -97,6 +98,7 @@ __all__ = [
     "mirror_groups",
     "mirrors",
     "reduced_gap_simulator",
+    "reduced_gear",
     "residual_compliance",
     "respond",
     "rolls_rad",

@@ -298,7 +298,7 @@ def reduced_gears(values: Values) -> Gears:
     """
     parameters = ParameterValues(values)
     n_dof = parameters.whole("mesh_dof")
-    return _gear(_blank(parameters, 0), n_dof), _gear(_blank(parameters, 1), n_dof)
+    return reduced_gear(_blank(parameters, 0), n_dof), reduced_gear(_blank(parameters, 1), n_dof)
 
 
 def healthy_machine(
@@ -342,7 +342,8 @@ def _blank(values: ParameterValues, side: int) -> GearBlank:
 
 
 @lru_cache(maxsize=8)
-def _gear(blank: GearBlank, n_dof: int) -> ReducedGear:
+def reduced_gear(blank: GearBlank, n_dof: int) -> ReducedGear:
+    """Return a gear: ready-made where one fits, else from the cache, else reduced now with about `n_dof`."""
     for name, ready in READY.items():
         if ready == blank:
             return ready_gear(name)

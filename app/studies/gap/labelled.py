@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import typer
 
+from app.studies import answers_of
 from app.studies.gap.by_hand import with_foreign_vibration
 from app.studies.gap.machines import MOUNTED_ANEW_SHARE
 from app.studies.gap.quasi_static import EFFECTS, QUASI_STATIC, QuasiStaticDay, StaticMachine, record
@@ -32,7 +33,6 @@ from app.studies.gap.rows import (
     samples_of,
     write,
 )
-from app.studies.pool import answers_of
 from gearsig.checks import FloatArray
 from gearsig.gap import (
     INDEPENDENT,

@@ -13,7 +13,6 @@ from math import pi
 
 import numpy as np
 
-from app.studies.gap.by_hand import made_by_hand, with_foreign_vibration, with_signature
 from app.studies.gap.lumped_rig import (
     N_PATH,
     LumpedDay,
@@ -22,9 +21,9 @@ from app.studies.gap.lumped_rig import (
     LumpedRig,
     record,
 )
-from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, reduced_twin, samples_of
+from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, put_in_by_hand, reduced_twin, samples_of
 from gearsig.checks import FloatArray
-from gearsig.gap import BY_HAND, NONE, UNKNOWN
+from gearsig.gap import NONE, UNKNOWN
 from sims.effects import ONE_TOOTH_SHARE
 from sims.machine import log_uniform
 
@@ -365,10 +364,6 @@ def _at(rig: LumpedRig, point: int, levels: FloatArray, faults: list[tuple[str, 
             recording = record(rig, point, day, fault, rng, healthy_levels=levels)
             healthy = recording if cause == NONE else healthy
             yield cause, words, 0.0, recording, torque_nm
-        for _ in range(N_FOREIGN):
-            recording, foreign = with_foreign_vibration(healthy, rng)
-            yield UNKNOWN, foreign, 0.0, recording, torque_nm
-        for name in map(str, rng.choice(made_by_hand(healthy, torque_nm), N_BY_HAND, replace=False)):
-            yield name, BY_HAND, 0.0, with_signature(healthy, name, rng)[0], torque_nm
+        yield from put_in_by_hand([healthy], N_FOREIGN, N_BY_HAND, torque_nm, rng)
 
     return reference, reduced_twin(reference, number, torque_nm), compared()

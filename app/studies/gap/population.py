@@ -22,10 +22,10 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from app.studies import answers_of
 from app.studies.gap.lumped import LUMPED, lumped_samples
 from app.studies.gap.quasi_static import QUASI_STATIC, static_samples
 from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
-from app.studies.pool import answers_of
 from gearsig.gap import BY_HAND, INDEPENDENT, LEARNED_FILE, learn, load_population, population_file, write_learned
 
 MACHINES = {CRACKED.name: 36, REDUCED.name: 21, INDEPENDENT: 195, QUASI_STATIC: 122, LUMPED: 46}

@@ -15,16 +15,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import cos, pi, radians, sqrt, tan
 
 import numpy as np
 
 from app.studies.drawn_rigs import DrawnRig
-from app.studies.gap.by_hand import made_by_hand, with_foreign_vibration, with_signature
 from app.studies.gap.machines import draw_machine
-from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, reduced, samples_of
+from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, put_in_by_hand, reduced, samples_of
 from gearsig.checks import FloatArray
-from gearsig.gap import BY_HAND, NONE, UNKNOWN, OperatingCondition
+from gearsig.gap import NONE, OperatingCondition
 from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, Rig
 from sims.cracked import CrackedPair, CrackedTwin
@@ -442,9 +442,6 @@ def textures(teeth: int, size_m: float, rng: np.random.Generator) -> FloatArray:
 # --------------------
 
 
-Knock = Callable[[FloatArray, FloatArray, np.random.Generator], FloatArray]
-
-
 def _tooth(machine: StaticMachine, rng: np.random.Generator) -> tuple[int, int]:
     side = textbook.draw_side(rng)
     return side, int(rng.integers(machine.drawn.teeth[side]))
@@ -625,14 +622,6 @@ def _race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Genera
     state.impacts.append(knock)
 
 
-def _outer_race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    _race(machine, state, rng, "BPFO")
-
-
-def _inner_race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    _race(machine, state, rng, "BPFI")
-
-
 def _bearing_clearance(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
     """A bearing that is loose: forces reach the housing bent, its support is softer."""
     bearing, shaft = _bearing(machine, rng)
@@ -657,8 +646,8 @@ EFFECTS: dict[str, Callable[[StaticMachine, QuasiStaticState, np.random.Generato
     "misalignment": _misalignment,
     "torque_ripple": _torque_ripple,
     "speed_fluctuation": _speed_fluctuation,
-    "bearing_outer_race": _outer_race,
-    "bearing_inner_race": _inner_race,
+    "bearing_outer_race": partial(_race, name="BPFO"),
+    "bearing_inner_race": partial(_race, name="BPFI"),
     "bearing_clearance": _bearing_clearance,
 }
 
@@ -881,11 +870,7 @@ def _recordings(machine: StaticMachine, levels: FloatArray, rng: np.random.Gener
         state = machine.healthy()
         effect(machine, state, rng)
         yield name, "", 0.0, recorded(state, rng), torque_nm
-    for i in range(N_FOREIGN):
-        recording, foreign = with_foreign_vibration(healthy[i % N_HEALTHY], rng)
-        yield UNKNOWN, foreign, 0.0, recording, torque_nm
-    for i, name in enumerate(map(str, rng.choice(made_by_hand(healthy[0], torque_nm), N_BY_HAND, replace=False))):
-        yield name, BY_HAND, 0.0, with_signature(healthy[i % N_HEALTHY], name, rng)[0], torque_nm
+    yield from put_in_by_hand(healthy, N_FOREIGN, N_BY_HAND, torque_nm, rng)
     path_rng = np.random.default_rng([machine.seed, 5])
     for _ in range(N_PATHS):
         state = machine.healthy()

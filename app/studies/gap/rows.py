@@ -125,6 +125,18 @@ def reduced(recording: Recording, rig: int) -> ReducedRecording:
     return reduced_recording.with_channels({name: reduced_recording.channels[name]})
 
 
+def put_in_by_hand(
+    healthy: Sequence[Recording], n_foreign: int, n_by_hand: int, torque_nm: float, rng: np.random.Generator
+) -> Iterator[Recorded]:
+    """Yield healthy recordings, in turn, with foreign vibration, then with as many effects' signatures, each once."""
+    for i in range(n_foreign):
+        recording, foreign = with_foreign_vibration(healthy[i % len(healthy)], rng)
+        yield UNKNOWN, foreign, 0.0, recording, torque_nm
+    names = rng.choice(made_by_hand(healthy[0], torque_nm), n_by_hand, replace=False)
+    for i, name in enumerate(map(str, names)):
+        yield name, BY_HAND, 0.0, with_signature(healthy[i % len(healthy)], name, rng)[0], torque_nm
+
+
 def write(path: Path, samples: Sequence[PopulationSample]) -> None:
     """Write the table as arrays of numbers and text."""
     columns = ("simulator", "rig", "label", "detail", "severity", "torque_nm", "load_n_per_mm")
@@ -321,11 +333,8 @@ def _condition(
         yield NONE, "", 0.0, healthy, torque_nm
         if cause != NONE:
             yield cause, "", severity, now, torque_nm
-        recording, foreign = with_foreign_vibration(healthy, rng)
-        yield UNKNOWN, foreign, 0.0, recording, torque_nm
-        for name in map(str, rng.choice(made_by_hand(healthy, torque_nm), N_BY_HAND, replace=False)):
-            signed, _ = with_signature(healthy, name, rng)
-            yield name, BY_HAND, severity if name == cause else 0.0, signed, torque_nm
+        for name, detail, _, recording, torque in put_in_by_hand([healthy], 1, N_BY_HAND, torque_nm, rng):
+            yield name, detail, severity if name == cause else 0.0, recording, torque
 
     return reference, reduced_twin(now, rig, torque_nm), compared()
 

@@ -40,7 +40,9 @@ CRACK = Added("root_crack", 2.0, {"gear": "driver", "tooth": 4.0})
 def twin() -> Iterator[ReducedTwin]:
     """Of synthetic gears: how gears are reduced is tested elsewhere."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sims.reduced_fe._simulator._gear", cache(lambda blank, _n_dof: synthetic_gear(blank.geometry)))
+        patch.setattr(
+            "sims.reduced_fe._simulator.reduced_gear", cache(lambda blank, _n_dof: synthetic_gear(blank.geometry))
+        )
         made = gap_simulator("reduced-fe").twin_of(RIG)
         assert isinstance(made, ReducedTwin)
         yield made
