@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli import options
-from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED, EXIT_SOME_FAILED, progress_bar
+from app.cli.console import EXIT_INPUT_ERROR, EXIT_SOME_FAILED, progress_bar, stopped
 
 if TYPE_CHECKING:
     from gearsig.fleet import AddResult, Fleet, Origin, PassedOver
@@ -129,10 +129,7 @@ def add(
                 on_progress=advance,
             )
         except KeyboardInterrupt:
-            typer.echo(
-                f"gearsig: stopped; {n_done} results are in {store}; the same command goes on from there", err=True
-            )
-            raise typer.Exit(EXIT_INTERRUPTED) from None
+            raise stopped(f"{n_done} results are in {store}") from None
         _show_added(replace(result, passed_over=tuple(passed_over)), store, workers, json=json)
     if result.failures:
         raise typer.Exit(EXIT_INPUT_ERROR if len(result.failures) == len(listed) else EXIT_SOME_FAILED)

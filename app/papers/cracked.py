@@ -242,26 +242,22 @@ def stiffness_with_friction(roughness_um: float, cycles: FloatArray, *, squared:
 
 
 def _friction_inside() -> PaperFigure:
-    rig = machine()
-    ratio = rig.mesh.pair.contact_ratio
-    cycles = np.linspace(0.0, 2.0, 1201)
-    curves = {
-        rq(r): (stiffness_with_friction(r, cycles) if r else mesh_stiffness(rig.mesh, cycles).total_n_per_m)
+    mesh = machine().mesh
+    ratio, cycles = mesh.pair.contact_ratio, np.linspace(0.0, 2.0, 1201)
+    shown = {
+        rq(r): (stiffness_with_friction(r, cycles) if r else mesh_stiffness(mesh, cycles).total_n_per_m) / 1e8
         for r in ROUGHNESS_UM
     }
-    shown = {name: values / 1e8 for name, values in curves.items()}
-    squared = {
-        r: stiffness_with_friction(r, cycles, squared=True) / 1e8 / shown[rq(0.0)] - 1.0 for r in ROUGHNESS_UM[1:]
-    }
-    single = (cycles % 1.0 > ratio - 1.0 + 0.05) & (cycles % 1.0 < 0.95)
-    printed = squared[1.40]
+    smooth = shown.pop(rq(0.0))
+    changes = {name: values / smooth - 1.0 for name, values in shown.items()}
+    squared = {r: stiffness_with_friction(r, cycles, squared=True) / 1e8 / smooth - 1.0 for r in ROUGHNESS_UM[1:]}
+    printed, change = squared[1.40], changes[rq(1.40)]
     figure = curves_figure(
         [
-            CurvePanel(cycles, shown, "mesh cycles", "stiffness (10⁸ N/m)"),
+            CurvePanel(cycles, {rq(0.0): smooth} | shown, "mesh cycles", "stiffness (10⁸ N/m)"),
             CurvePanel(
                 cycles,
-                {name: 100.0 * (values / shown[rq(0.0)] - 1.0) for name, values in list(shown.items())[1:]}
-                | {"1.40 µm as printed": 100.0 * printed},
+                {name: 100.0 * values for name, values in (changes | {"1.40 µm as printed": printed}).items()},
                 "mesh cycles",
                 "change (%)",
             ),
@@ -269,14 +265,15 @@ def _friction_inside() -> PaperFigure:
         title="Friction inside the stiffness",
         heading="",
     )
-    change = shown[rq(1.40)] / shown[rq(0.0)] - 1.0
+    # Well inside single and double contact: where a pair takes up its load or lets go, its ramp hides the friction.
+    single = (cycles % 1.0 > ratio - 1.0 + 0.05) & (cycles % 1.0 < 0.95)
+    double = ~single & (cycles % 1.0 > 0.05) & (cycles % 1.0 < ratio - 1.0 - 0.05)
+    # Of one single contact its first and last place: sliding turns round in between.
     of_single = np.flatnonzero(single & (cycles < 1.0))
     first, last = float(change[of_single[0]]), float(change[of_single[-1]])
-    double = ~single & (cycles % 1.0 > 0.05) & (cycles % 1.0 < ratio - 1.0 - 0.05)
-    means = [
-        100.0 * float(np.mean(values[double] / shown[rq(0.0)][double] - 1.0)) for values in list(shown.values())[1:]
-    ]
-    pairs = pairs_with_friction(1.40, cycles[double]) / mesh_stiffness(rig.mesh, cycles[double]).pairs_n_per_m
+    means = [100.0 * float(np.mean(values[double])) for values in changes.values()]
+    # What either pair of a double contact does by itself: their changes nearly cancel in the sum.
+    pairs = pairs_with_friction(1.40, cycles[double]) / mesh_stiffness(mesh, cycles[double]).pairs_n_per_m
     entering, leaving = (100.0 * float(np.mean(pairs[:, slot]) - 1.0) for slot in (0, 1))
     claims = (
         judged(
@@ -430,24 +427,28 @@ def _at(case: ResponseCase, hz: float) -> float:
     return float(case.amplitude_m[near].max())
 
 
+def _scatter(case: ResponseCase) -> float:
+    """How far the Poincaré points scatter, over the whole motion, in both directions of the phase plane together."""
+    return float(
+        np.hypot(
+            np.std(case.poincare_displacement_m) / np.std(case.displacement_m),
+            np.std(case.poincare_velocity_mps) / np.std(case.velocity_mps),
+        )
+    )
+
+
 def _responses() -> PaperFigure:
     cases = [response_case(roughness) for roughness in ROUGHNESS_UM]
     mesh = mesh_frequency_hz()
+    # The same on softer shafts tells the resonance of a bending mode from what the mesh does.
     harmonics = [_at(cases[0], k * mesh) for k in (1, 2, 3, 4)]
     softer = [_at(response_case(0.0, **SOFTER), k * mesh) for k in (1, 2, 3, 4)]
     natural = eigenfrequencies_hz(machine(), TORQUE_NM / (1e-3 * machine().mesh.pair.driver.base_radius_mm))
     mode = float(natural[np.argmin(np.abs(natural - 3.0 * mesh))])
+    # The roughness's own lines, but for the one that the mesh frequency hides.
     lines = [[_at(case, hz) for hz in PUBLISHED_LINES_HZ if abs(hz - mesh) > 20.0] for case in cases]
     grown = [float(np.sqrt(np.sum(np.square(values)))) for values in lines]
-    scatter = [
-        float(
-            np.hypot(
-                np.std(case.poincare_displacement_m) / np.std(case.displacement_m),
-                np.std(case.poincare_velocity_mps) / np.std(case.velocity_mps),
-            )
-        )
-        for case in cases
-    ]
+    scatter = [_scatter(case) for case in cases]
     claims = (
         within_part("the mesh frequency is 458.3 Hz", 458.3, mesh, "Hz", part=0.001),
         judged(
@@ -611,6 +612,7 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
     spread = [float(np.std(x - levels[0])) / float(np.std(levels[0])) for x in levels[1:]]
     times = UniformSignal(levels[2], rate)
     high = maps[4].positions > 2000.0
+    # What the crack adds, without the mesh, which would repeat each tooth: its shocks come once a turn.
     shocks = np.abs(levels[2] - levels[0])
     lag = _repeats_after(shocks - shocks.mean(), 1.0 / rate, period_s)
     time_claims = (
@@ -622,11 +624,13 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
         ),
     )
     time_figure = PaperFigure("crack_times", "Figure 18", "time signals at 1000 rpm", figure, time_claims)
+    # The most impulsive mode of the signal holds the shocks, apart from the mesh harmonics.
     modes = vmd(times, None, VmdSettings(5, penalty=2000.0))
-    kurtosis = [float(np.mean((m - m.mean()) ** 4) / np.var(m) ** 2) for m in modes.waveforms]
+    kurtosis, whole = [_kurtosis(m) for m in modes.waveforms], _kurtosis(levels[2])
     chosen = int(np.argmax(kurtosis))
     squeezed = squeezed_cwt_map(modes.signal(chosen), lowest=float(modes.centres[chosen]) / 4.0)
     drawn = plot.time_frequency_figure(squeezed)
+    # Power of the map above 2 kHz at its greatest, and how much it swings below 1 kHz, over time.
     peaks = [float(np.sum(maps[d].values[:, high] ** 2, axis=1).max()) for d in (0, 1, 4)]
     share = [peak / peaks[0] for peak in peaks[1:]]
     low = maps[4].positions < 1000.0
@@ -647,12 +651,16 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
         judged(
             "modes of the signal (VMD, penalty 2000) express the fault clearly",
             f"of {modes.n_modes} modes the most impulsive has a kurtosis of {kurtosis[chosen]:.1f}, the signal "
-            f"{float(np.mean((levels[2] - levels[2].mean()) ** 4) / np.var(levels[2]) ** 2):.1f}",
-            agrees=kurtosis[chosen] > float(np.mean((levels[2] - levels[2].mean()) ** 4) / np.var(levels[2]) ** 2),
+            f"{whole:.1f}",
+            agrees=kurtosis[chosen] > whole,
         ),
     )
     title = f"squeezed wavelet transform of the mode at {modes.centres[chosen]:.0f} Hz, crack of 4 mm, 1000 rpm"
     return time_figure, PaperFigure("crack_maps", "Figures 16 and 20", title, drawn, map_claims)
+
+
+def _kurtosis(x: FloatArray) -> float:
+    return float(np.mean((x - x.mean()) ** 4) / np.var(x) ** 2)
 
 
 def _repeats_after(x: FloatArray, step_s: float, near_s: float) -> float:

@@ -6,11 +6,12 @@ Machine: preset "manipulator_formula", with the study's 95 N m, 290 kg, 1 ms; se
 from __future__ import annotations
 
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
 
-from app.papers.gallery import Paper, PaperFigure, Progress, judged, within_part
+from app.papers.gallery import Claim, Paper, PaperFigure, Progress, judged, within_part
 from gearsig import plot
 from gearsig.motion import (
     AS_PRINTED,
@@ -29,6 +30,9 @@ from gearsig.plot import CurvePanel, curves_figure
 from gearsig.recording import Recording
 from sims import simulate
 from sims.presets import preset
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PRESETS = ("manipulator_formula", "manipulator_table")
 EXACT = {
@@ -106,45 +110,49 @@ def _force(mode: str, answers: str) -> PaperFigure:
             because=_reason_not_as_printed(estimate),
         ),
     ]
-    time = estimate.motion.time_s
-    shown = (time < 1.4) if mode == "start-stop" else (time < 0.6)
-    forces = {
-        "torque / rb1": estimate.references_n[FROM_TORQUE][shown],
-        "piecewise": estimate.forces_n[PIECEWISE][shown],
-        "Hunt–Crossley": estimate.forces_n[HUNT_CROSSLEY][shown],
-    }
-    errors = {name: forces[name] - forces["torque / rb1"] for name in ("piecewise", "Hunt–Crossley")}
-    figure = curves_figure(
-        [
-            CurvePanel(
-                time[shown],
-                {k: 1e-3 * v for k, v in forces.items()},
-                "time (s)",
-                "force (kN)",
-                "total interaction force",
-            ),
-            CurvePanel(time[shown], {k: 1e-3 * v for k, v in errors.items()}, "time (s)", "error (kN)", "force errors"),
-        ],
-        title=f"Interaction force, {mode} rotation",
-    )
     if mode == "start-stop":
-        after = (time > 1.0) & (time < 3.0)
-        reverse = estimate.references_n[FROM_TORQUE][after]
-        lowest, delay_ms = float(reverse.min()), 1e3 * (float(time[after][np.argmin(reverse)]) - 1.0)
-        claims.append(
-            judged(
-                "a reverse back impact when the torque is removed: the driven gear strikes the pinion",
-                f"{lowest:.0f} N, {delay_ms:.0f} ms after the torque is removed",
-                agrees=lowest < -100.0,
-            )
-        )
+        claims.append(_back_impact(estimate))
     return PaperFigure(
         f"force_{mode.replace('-', '_')}",
         answers,
         f"interaction force and errors, {mode} rotation",
-        figure,
+        _force_figure(estimate, mode),
         tuple(claims),
     )
+
+
+def _back_impact(estimate: ForceEstimate) -> Claim:
+    """Judge the force after the torque has gone, which acts up to 1 s: the load, which still turns, strikes back."""
+    time = estimate.motion.time_s
+    after = (time > 1.0) & (time < 3.0)
+    reverse = estimate.references_n[FROM_TORQUE][after]
+    lowest, delay_ms = float(reverse.min()), 1e3 * (float(time[after][np.argmin(reverse)]) - 1.0)
+    return judged(
+        "a reverse back impact when the torque is removed: the driven gear strikes the pinion",
+        f"{lowest:.0f} N, {delay_ms:.0f} ms after the torque is removed",
+        agrees=lowest < -100.0,
+    )
+
+
+def _force_figure(estimate: ForceEstimate, mode: str) -> Figure:
+    """Draw forces and errors of the start and, where the drive stops, of the back impact after 1 s."""
+    time = estimate.motion.time_s
+    shown = (time < 1.4) if mode == "start-stop" else (time < 0.6)
+    measured = estimate.references_n[FROM_TORQUE][shown]
+    models = {
+        "piecewise": estimate.forces_n[PIECEWISE][shown],
+        "Hunt–Crossley": estimate.forces_n[HUNT_CROSSLEY][shown],
+    }
+    forces = {"torque / rb1": measured} | models
+    errors = {name: force - measured for name, force in models.items()}
+    panels = [
+        CurvePanel(time[shown], {k: 1e-3 * v for k, v in curves.items()}, "time (s)", f"{label} (kN)", title)
+        for curves, label, title in (
+            (forces, "force", "total interaction force"),
+            (errors, "error", "force errors"),
+        )
+    ]
+    return curves_figure(panels, title=f"Interaction force, {mode} rotation")
 
 
 PRESSURE_ANGLE_RAD, TEETH_OF_BOTH = np.radians(20.0), (20, 100)

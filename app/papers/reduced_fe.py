@@ -47,6 +47,7 @@ def _maps(study: Study, drawn: dict[str, Figure]) -> list[PaperFigure]:
     maps = study.maps
     stiffness, error = maps.secant_stiffness_n_per_m, maps.transmission_error_m
     at = len(maps.torque_nm) // 2
+    # Both are periodic in the mesh cycle: the shorter way round counts.
     lowest, highest = int(np.argmin(stiffness[:, at])), int(np.argmax(error[:, at]))
     apart = abs((lowest - highest + len(stiffness) // 2) % len(stiffness) - len(stiffness) // 2) / len(stiffness)
     peaks = error.max(axis=0)

@@ -315,11 +315,11 @@ def _pulses(starts: FloatArray, ends: FloatArray, rise_s: float, height: float =
     return Profile.of(times[keep], values[keep])
 
 
-def _blows(starts: FloatArray, cycle: Cycle, n_points: int = 9) -> Profile:
+def _blows(starts: FloatArray, cycle: Cycle) -> Profile:
     """Parabolas of the press's torque, as straight pieces."""
     if cycle.press_nm == 0.0:
         return Profile.constant(0.0)
-    x = np.linspace(0.0, 1.0, n_points)
+    x = np.linspace(0.0, 1.0, 9)
     times = (starts[:, None] + cycle.press_duration_s * x).ravel()
     return Profile.of(times, np.tile(4.0 * cycle.press_nm * x * (1.0 - x), len(starts)))
 

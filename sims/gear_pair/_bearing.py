@@ -29,6 +29,8 @@ from sims.machine import RACE_EDGE_MM, BearingSupport, Machine
 
 N_HARMONICS = 4
 """Of the motion at the rolling elements' passing."""
+N_ANGLES = 32
+"""Of the cage over one element spacing, at which the shaft's place is found."""
 N_PLACES = 1024
 """Rolling elements whose place in the cage is drawn; then they repeat (the cage's own ones, spread by skidding)."""
 
@@ -150,18 +152,18 @@ def _sway(support: BearingSupport, load_n: FloatArray) -> FloatArray:
     return np.stack([lines.real.T, -lines.imag.T], axis=-1)
 
 
-def _carried_place(support: BearingSupport, load_n: FloatArray, clearance_m: float, n_angles: int = 32) -> FloatArray:
-    """Where the shaft stands, x and y in m, at even places of the cage over one element spacing, (n_angles, 2)."""
+def _carried_place(support: BearingSupport, load_n: FloatArray, clearance_m: float) -> FloatArray:
+    """Where the shaft stands, x and y in m, at even places of the cage over one element spacing, (N_ANGLES, 2)."""
     n, load = support.bearing.n_rolling_elements or 1, float(np.hypot(*load_n))
     toward = np.array(load_n) / load
     deflection = load / support.stiffness_n_per_m
     # Mean over the cage of Σ cos^2.5 ψ for a load in the middle of its zone: K follows from the bearing's stiffness.
     psi = np.linspace(-pi / 2, pi / 2, 2001)
     contact = load / (deflection**1.5 * n * np.trapezoid(np.cos(psi) ** 2.5, psi) / (2 * pi))
-    places = np.empty((n_angles, 2))
+    places = np.empty((N_ANGLES, 2))
     guess = toward * (deflection + clearance_m)
-    for i in range(n_angles):
-        angles = 2 * pi * (np.arange(n) + i / n_angles) / n
+    for i in range(N_ANGLES):
+        angles = 2 * pi * (np.arange(n) + i / N_ANGLES) / n
         radial = np.column_stack((np.cos(angles), np.sin(angles)))
         places[i] = guess = balanced(radial, contact, clearance_m, load_n, guess)
     swing: FloatArray = places - places.mean(axis=0)

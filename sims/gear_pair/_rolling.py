@@ -80,13 +80,13 @@ def element_loads_n(support: BearingSupport, load_n: FloatArray, cage_rad: float
     return result
 
 
-def stiffness_under_load_n_per_m(support: BearingSupport, load_n: FloatArray, n_places: int = 16) -> float:
-    """Stiffness along its load, mean over the cage's places: ΣK 1.5 √δ cos²; that of the spring where there is one."""
+def stiffness_under_load_n_per_m(support: BearingSupport, load_n: FloatArray) -> float:
+    """Stiffness along its load, mean over 16 places of the cage, ΣK 1.5 √δ cos²; of a spring, its own."""
     if support.law == "linear" or float(np.hypot(*load_n)) == 0.0:
         return support.stiffness_n_per_m
     n, toward = support.bearing.n_rolling_elements or 1, float(np.arctan2(load_n[1], load_n[0]))
     contact, stiffnesses = contact_n_per_m15(support.bearing), []
-    for cage in 2.0 * pi / n * np.arange(n_places) / n_places:
+    for cage in 2.0 * pi / n * np.arange(16) / 16:
         loads = element_loads_n(support, load_n, float(cage))
         root_depth = (loads / contact) ** (1.0 / 3.0)
         along = np.cos(element_angles_rad(n, float(cage)) - toward) ** 2

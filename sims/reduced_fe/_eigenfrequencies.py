@@ -73,9 +73,9 @@ class TorsionalMode:
 
 
 def torsional_mode(
-    pair: FlexiblePair, operation: Operation, *, ready: FlexiblePairConstants | None = None, n_points: int = 20
+    pair: FlexiblePair, operation: Operation, *, ready: FlexiblePairConstants | None = None
 ) -> TorsionalMode:
-    """Return the torsional mode of the pair about its loaded state.
+    """Return the torsional mode of the pair about its loaded state, mean over 20 mesh angles of a cycle.
 
     Parameters
     ----------
@@ -84,14 +84,10 @@ def torsional_mode(
         Its greatest torque loads the contact.
     ready : FlexiblePairConstants or None
         Where they are at hand.
-    n_points : int
-        Mesh angles in a cycle.
     """
     pair_constants = constants(pair, operation) if ready is None else ready
-    frequency, contact, other_damping = _torsional(pair, pair_constants, operation, one_mesh_cycle(n_points)).mean(
-        axis=0
-    )
-    return TorsionalMode(float(frequency), float(contact), float(other_damping))
+    modes = _torsional(pair, pair_constants, operation, one_mesh_cycle(20))
+    return TorsionalMode(*(float(mean) for mean in modes.mean(axis=0)))
 
 
 def torsional_curve_hz(pair: FlexiblePair, operation: Operation, mesh_cycles: FloatArray) -> FloatArray:

@@ -324,6 +324,8 @@ def _place(pair_constants: FlexiblePairConstants, name: str, factors: FloatArray
 
 STRIDE = 10
 """Steps per kept point."""
+JUMP = 1.4
+"""Ratio of rms values from which on one is a jump."""
 
 
 @dataclass(frozen=True)
@@ -360,13 +362,13 @@ class SpeedSweep(Result):
             raise InputError(f"no part of the sweep lies in {low_hz:g} to {high_hz:g} Hz", where="peak_hz")
         return float(self.mesh_hz[inside][np.argmax(self.rms_m[inside])])
 
-    def jump_hz(self, low_hz: float, high_hz: float, ratio: float = 1.4) -> float | None:
-        """Mesh frequency of the greatest jump of rms, over the part it happens in; None where none exceeds `ratio`."""
+    def jump_hz(self, low_hz: float, high_hz: float) -> float | None:
+        """Mesh frequency of the greatest jump of rms, over the part it happens in; None where none exceeds `JUMP`."""
         inside = np.flatnonzero((self.mesh_hz >= low_hz) & (self.mesh_hz <= high_hz))
         level = np.log(self.rms_m[inside])
         change = np.abs(level[2:] - level[:-2])
         place = int(np.argmax(change))
-        return float(self.mesh_hz[inside[place + 1]]) if change[place] >= np.log(ratio) else None
+        return float(self.mesh_hz[inside[place + 1]]) if change[place] >= np.log(JUMP) else None
 
 
 def speed_sweep(

@@ -31,6 +31,7 @@ from app.benchmark.scoring.scores import (
     is_one_answer,
     judgement,
     share,
+    strong_only,
 )
 from gearsig import __version__
 from gearsig.cache import write_text
@@ -269,11 +270,10 @@ def _right(rows: Sequence[Row]) -> str:
 
 def confusions_table(result: BenchmarkResult) -> Table:
     """Return the commonest wrong answers, and in which kinds of features both effects show."""
-    rows = [r for r in result.rows[result.judged] if r.source == BLIND and r.kind != "pair"]
-    if result.strengths_known:
-        rows = [r for r in rows if r.kind == "none" or r.strength >= STRONG]
     confusions = Counter(
-        (r.truths[0] if r.kind != "unknown" else r.effects[0], r.first) for r in rows if r.first not in r.truths
+        (r.truths[0] if r.kind != "unknown" else r.effects[0], r.first)
+        for r in _with_one_answer(result)
+        if r.first not in r.truths
     )
     table = [
         (true, answer or "no answer", str(n), _common(true, answer)) for (true, answer), n in confusions.most_common()
@@ -284,6 +284,12 @@ def confusions_table(result: BenchmarkResult) -> Table:
         ("it was", "said", "cases", "in common"),
         tuple(table[:MAX_CONFUSIONS]),
     )
+
+
+def _with_one_answer(result: BenchmarkResult) -> list[Row]:
+    """Return the blind cases with one right answer, of strong faults only where strength is known."""
+    rows = [r for r in result.rows[result.judged] if r.source == BLIND and r.kind != "pair"]
+    return strong_only(rows, STRONG) if result.strengths_known else rows
 
 
 def _common(true: str, answer: str) -> str:
@@ -301,9 +307,7 @@ def _common(true: str, answer: str) -> str:
 
 def confusion_counts(result: BenchmarkResult) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray]:
     """Return what it was, what was said, and the counts, (n_true, n_said), of blind cases with one right answer."""
-    rows = [r for r in result.rows[result.judged] if r.source == BLIND and r.kind != "pair"]
-    if result.strengths_known:
-        rows = [r for r in rows if r.kind == "none" or r.strength >= STRONG]
+    rows = _with_one_answer(result)
     true = (*CATALOGUE, NONE, UNKNOWN)
     answers = (*true, "no answer") if any(not r.first for r in rows) else true
     counts = np.zeros((len(true), len(answers)), dtype=np.int64)
@@ -322,11 +326,9 @@ CHANGED = "; it changed while the benchmark ran, so that the answers are not all
 REPORT, TABLE, SCORES, CASES, LABELS = "report.html", "table.md", "scores.json", "cases.csv", "labels"
 
 
-def write_results(
-    result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str, date: datetime | None = None
-) -> Path:
+def write_results(result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str) -> Path:
     """Write everything; return the page's path. Nothing may be left to diagnose when this is called."""
-    now = date or datetime.now().astimezone()
+    now = datetime.now().astimezone()
     write_files(result, cases, folder, command, markdown(result, command, now), now)
     return write_text(folder / REPORT, page(result, command, now))
 
