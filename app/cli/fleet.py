@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import datetime
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,7 +17,7 @@ from app.cli import options
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_SOME_FAILED, progress_bar, stopped
 
 if TYPE_CHECKING:
-    from gearsig.fleet import AddResult, Fleet, Origin, PassedOver
+    from gearsig.fleet import AddResult, Fleet, OperatingTrend, Origin, PassedOver
     from gearsig.processes import Cluster
 
 fleet_app = typer.Typer(
@@ -176,17 +177,25 @@ def trend(
     store: StoreOption = DEFAULT_STORE,
     point: OnlyPointOption = "",
     channel: Annotated[str, typer.Option("--channel", help="Only this channel.")] = "",
+    over: Annotated[
+        str, typer.Option("--over", help="time, or load or speed: limits then follow the baseline's dependence on it.")
+    ] = "time",
     json: options.JsonOption = False,
 ) -> None:
-    """Show an indicator over time with its limits, or all indicators of a machine against theirs.
+    """Show an indicator over time, load or speed with its limits, or all indicators of a machine against theirs.
 
     Limits are the zones of ISO 20816-3 for the overall velocity, where the rig file says what the machine is, and
     statistical ones from the baseline otherwise; docs/fleet.md says how often they are wrong.
     """
+    from gearsig.checks import one_of
+    from gearsig.errors import InputError
     from gearsig.formatting import unit_text
 
+    one_of(over, "--over", ("time", "load", "speed"))
     fleet = _open(store)
     if not indicator:
+        if over != "time":
+            raise InputError(f"--over {over} is of one indicator", remedy="name it after the machine")
         table = fleet.series(machine, point)
         if json:
             typer.echo(table.to_json(orient="records", date_format="iso", indent=1, force_ascii=False))
@@ -196,6 +205,9 @@ def trend(
             [_series_row(row) for row in table.to_dict("records")],
             styles=_STYLES,
         )
+        return
+    if over != "time":
+        _show_over(fleet.trend_over(over, machine, indicator, point=point, channel=channel), json=json)
         return
     trends = fleet.trend(machine, indicator, point=point, channel=channel)
     if json:
@@ -458,6 +470,35 @@ def _number(value: float) -> str:
     from gearsig.formatting import readable
 
     return readable(value, 4)
+
+
+def _show_over(trends: Sequence[OperatingTrend], *, json: bool) -> None:
+    from gearsig.formatting import unit_text
+
+    if json:
+        typer.echo(json_text.dumps([_over_json(shown) for shown in trends], indent=1, ensure_ascii=False))
+        return
+    for shown in trends:
+        typer.echo(f"{shown!r}. {shown.text}")
+        columns = [str(name) for name in shown.table.columns if name not in ("date", "level", "low")]
+        unit = f" ({unit_text(shown.trend.unit)})" if shown.trend.unit else ""
+        headings = {"load_nm": "N m", "speed_rpm": "rpm", "value": f"{shown.trend.name}{unit}", "high": "limit"}
+        rows = [
+            (row["level"], *(_number(row[name]) for name in columns), f"{row['date']:%Y-%m-%d %H:%M}")
+            for row in shown.table.to_dict("records")
+        ]
+        _table(("", *(headings.get(name, str(name)) for name in columns), "date"), rows, styles=_STYLES)
+
+
+def _over_json(shown: OperatingTrend) -> dict[str, Any]:
+    tables = {
+        name: json_text.loads(getattr(shown, name).to_json(orient="records", date_format="iso")) for name in _OVER
+    }
+    held = shown.held if isfinite(shown.held) else None
+    return _trend_json(shown.trend) | {"over": shown.over, "held": held, "text": shown.text} | tables
+
+
+_OVER = ("table", "curve")
 
 
 def _trend_json(trend: Any) -> dict[str, Any]:

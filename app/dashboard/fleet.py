@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import os
+from functools import partial
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -204,7 +205,9 @@ def _show_point(fleet: Fleet, row: Row) -> None:
     if series.empty:
         st.info("None of its recordings could be analysed.", icon=":material/help:")
     else:
-        _show_trend(fleet, _choose_series(series, machine, point))
+        row = _choose_series(series, machine, point)
+        over = _choose_over(fleet.recordings(machine, point))
+        (_show_trend if over == "date" else partial(_show_over, over=over))(fleet, row)
         with st.expander(f"All {len(series)} indicators, the worst first", icon=":material/table:"):
             st.dataframe(_series_table(series), hide_index=True)
     _show_recordings(fleet.recordings(machine, point).iloc[::-1])
@@ -243,6 +246,51 @@ def _series_table(series: DataFrame) -> dict[str, list[Any]]:
         "since": [row["since"] for row in rows],
         "limits by": [row["basis"] for row in rows],
     }
+
+
+def _choose_over(recordings: DataFrame) -> str:
+    """Return what the indicator is shown over: the date, or what the recordings state of load and speed."""
+    columns = {"load": "load_nm", "speed": "speed_rpm"}
+    known = [name for name, column in columns.items() if recordings[column].max() > recordings[column].min()]
+    if not known:
+        return "date"
+    looks = {"key": "fleet over", "name": "over", "label_visibility": "collapsed", "required": True}
+    names = {"date": "Over time", "load": "Over load", "speed": "Over speed"}
+    return str(
+        address.ask_one(st.segmented_control, "Over", ["date", *known], format_func=lambda over: names[over], **looks)
+    )
+
+
+def _show_over(fleet: Fleet, row: Row, over: str) -> None:
+    """Show one indicator over load or speed, in the band that the baseline's dependence on it gives."""
+    only = {name: row[name] for name in ("point", "channel", "place", "computed_on")}
+    found = fleet.trend_over(over, row["machine"], row["name"], **only)
+    shown = next((one for one in found if one.trend.band == row["band"]), found[0])
+    table, curve, trend = shown.table, shown.curve, shown.trend
+    at, value = table.iloc[:, 0].to_numpy(float), table["adjusted"].to_numpy(float)
+    is_baseline = (table["level"] == "baseline").to_numpy()
+    lines = [
+        ChartLine(at[chosen], value[chosen], name, colour, dots=True)
+        for chosen, name, colour in ((is_baseline, "baseline", 2), (~is_baseline, trend.name, 0))
+        if chosen.any()
+    ]
+    steps = curve.iloc[:, 0].to_numpy(float)
+    expected, low, high, alarm = (curve[name].to_numpy(float) for name in ("expected", "low", "high", "alarm"))
+    if len(steps):
+        band = (np.where(np.isfinite(low), low, np.nanmin(value)), high)
+        lines.insert(0, ChartLine(steps, expected, "expected, within its limits", QUIET, band=band))
+    if np.isfinite(alarm).any():
+        lines.append(ChartLine(steps, alarm, "alarm", 1, dotted=True))
+    beyond = table["level"].isin(["warning", "alarm"]).to_numpy()
+    everywhere = np.concatenate([at, steps])
+    margin = max(0.02 * float(np.ptp(everywhere)), 1e-3 * float(everywhere.max()))
+    span = (float(everywhere.min()) - margin, float(everywhere.max()) + margin)
+    x = "load (N·m)" if over == "load" else "speed (rpm)"
+    limits = padded_limits([value, *([high] if len(high) else [])])
+    panel = LinePanel(lines, x, with_minus(with_unit(trend.name, trend.unit)), limits, x_limits=span)
+    key = f"over {over} of {row['machine']} {row['point']} {_series_words(row)}"
+    show_lines(panel, key, marked=list(zip(at[beyond], value[beyond], strict=True)), legend=True)
+    st.caption(as_typed(shown.text))
 
 
 def _show_trend(fleet: Fleet, row: Row) -> None:

@@ -14,7 +14,7 @@ from gearsig.fleet._changes import (
     series_level,
     trends_text,
 )
-from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, TABLES, Fleet, Trend, open_fleet
+from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, TABLES, Fleet, OperatingTrend, Trend, open_fleet
 from gearsig.fleet._origin import (
     FilePattern,
     Origin,
@@ -60,6 +60,7 @@ __all__ = [
     "Fleet",
     "FleetChanges",
     "Limits",
+    "OperatingTrend",
     "Origin",
     "PassedOver",
     "PointTrends",

@@ -17,16 +17,19 @@ from gearsig.fleet._origin import Origin, PassedOver, origins
 from gearsig.fleet._statistics import ALARM, OK, WARNING
 from gearsig.fleet._store import SERIES, Store, write_query
 from gearsig.fleet._trends import (
+    CONDITIONS,
     NONE,
+    STATISTICAL,
     Baseline,
     PointTrends,
     TrendSettings,
     judge,
+    over_condition,
     read_settings,
     state_rows,
     write_settings,
 )
-from gearsig.formatting import counted
+from gearsig.formatting import counted, readable
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -118,6 +121,67 @@ class Trend:
         since = f", changed since {self.changed:%Y-%m-%d}" if self.changed is not None else ""
         state = "no limits yet" if self.basis == NONE else f"{self.level} ({self.basis} limits)"
         return f"Trend {self.name!r} of {of}: {counted(len(self.table), 'recording')}, {state}{since}"
+
+
+@dataclass(frozen=True)
+class OperatingTrend:
+    """One indicator of a measuring point over load or speed, with the limits that the baseline's dependence gives.
+
+    Parameters
+    ----------
+    trend : Trend
+        The same over time.
+    over : str
+        "load" or "speed".
+    table : DataFrame
+        By load_nm or speed_rpm: date, value, adjusted, expected, low, high, alarm (limits), level.
+        `adjusted` is the value as it would be at the other quantity's `held` value. `level` is that of the value by
+        itself: "baseline", "ok", "warning", "alarm", or "not judged" beyond the baseline's range.
+    curve : DataFrame
+        load_nm or speed_rpm, expected, low, high, alarm along it; empty without a baseline.
+    held : float
+        Speed or load for which both are; nan where the indicator does not follow it.
+    """
+
+    trend: Trend
+    over: str
+    table: DataFrame
+    curve: DataFrame
+    held: float
+
+    @property
+    def follows(self) -> bool:
+        """Whether what is expected depends on it: the baseline covers enough of it to tell."""
+        return self.over in self.trend.normalised
+
+    @property
+    def text(self) -> str:
+        """What is shown, and how often its limits are wrong, in a few sentences."""
+        other = "speed" if self.over == "load" else "load"
+        unit = "rpm" if other == "speed" else "N m"
+        parts = []
+        if self.curve.empty:
+            parts.append("No limits yet: the baseline is not complete.")
+        elif self.trend.basis != STATISTICAL:
+            parts.append(f"Limits are the zones of {self.trend.basis}, the same at any {self.over}.")
+        elif self.follows:
+            parts.append(f"Limits follow the baseline's dependence on {self.over}.")
+        else:
+            parts.append(f"The {self.over} varies too little over the baseline: limits do not depend on it.")
+        if np.isfinite(self.held) and self.trend.basis == STATISTICAL:
+            parts.append(f"Values are moved to {readable(self.held, 4)} {unit} along its dependence on {other}.")
+        if not self.curve.empty and self.trend.basis == STATISTICAL:
+            one_of_so_many = readable(1 / self.trend.false_alarm_rate, 4)
+            parts.append(f"An unchanged machine leaves them in at most one of {one_of_so_many} recordings.")
+        n = int((self.table["level"] == "not judged").sum())
+        if n and not self.curve.empty:
+            parts.append(f"{counted(n, 'recording')} too far beyond the baseline's range: not judged.")
+        return " ".join(parts)
+
+    def __repr__(self) -> str:
+        n = int(self.table["level"].isin(["warning", "alarm"]).sum())
+        beyond = "no limits yet" if self.curve.empty else f"{n} beyond the limits"
+        return f"{self.trend!r}; over {self.over}: {counted(len(self.table), 'recording')}, {beyond}"
 
 
 class Fleet:
@@ -332,6 +396,51 @@ class Fleet:
         InputError
             If there is no such machine, point or indicator.
         """
+        chosen = self._chosen(machine, name, point, {"channel": channel, "place": place, "computed_on": computed_on})
+        return tuple(_trend(trends, column, machine, of_point) for of_point, trends, column in chosen)
+
+    def trend_over(
+        self,
+        over: str,
+        machine: str,
+        name: str,
+        *,
+        point: str = "",
+        channel: str = "",
+        place: str = "",
+        computed_on: str = "",
+    ) -> tuple[OperatingTrend, ...]:
+        """Return an indicator of a machine over load or speed, for each channel and place that has it, as `trend` does.
+
+        Parameters
+        ----------
+        over : str
+            "load" or "speed".
+        machine, name, point, channel, place, computed_on : str
+            See `trend`.
+
+        Raises
+        ------
+        InputError
+            If there is no such machine, point or indicator, or no recording states its load or speed.
+        """
+        one_of(over, "over", CONDITIONS)
+        only = {"channel": channel, "place": place, "computed_on": computed_on}
+        result, settings = [], self.settings
+        for of_point, trends, column in self._chosen(machine, name, point, only):
+            table, curve, held = over_condition(trends, column, over, settings)
+            if not table.empty:
+                result.append(OperatingTrend(_trend(trends, column, machine, of_point), over, table, curve, held))
+        if not result:
+            remedies = {
+                "load": "give --torque to add, a torque channel, or torque_nm in the rig file's operating point",
+                "speed": "give a speed source or gears in a rig file",
+            }
+            raise InputError(f"no recording states its {over}", where=machine, remedy=remedies[over])
+        return tuple(result)
+
+    def _chosen(self, machine: str, name: str, point: str, only: dict[str, str]) -> list[tuple[str, PointTrends, int]]:
+        """Return measuring point, its trends and the column of each series that is asked for, the worst first."""
         self._check_place(machine, point)
         points = [point] if point else [p for (p,) in self._rows(_POINTS, [machine])]
         of_points = {chosen: self.point_trends(machine, chosen) for chosen in points}
@@ -340,8 +449,7 @@ class Fleet:
             for chosen, trends in of_points.items()
             for column, row in enumerate(trends.series.to_dict("records"))
         ]
-        conditions = {"name": name, "channel": channel, "place": place, "computed_on": computed_on}
-        for key, value in conditions.items():
+        for key, value in {"name": name, **only}.items():
             if value:
                 column_text = (
                     "indicator" if key == "name" else f"{name} {'on' if key == 'computed_on' else f'of {key}'}"
@@ -349,8 +457,8 @@ class Fleet:
                 known = sorted({row[key] for *_, row in series})
                 known_name(value, known, f"there is no {column_text} {value!r}", where=machine)
                 series = [item for item in series if item[2][key] == value]
-        result = [_trend(of_points[chosen], column, machine, chosen) for chosen, column, _ in series]
-        return tuple(sorted(result, key=lambda t: STATUS_LEVELS.index(t.level)))
+        result = [(chosen, of_points[chosen], column) for chosen, column, _ in series]
+        return sorted(result, key=lambda item: STATUS_LEVELS.index(_last_level(item[1], item[2])))
 
     def export(
         self,
@@ -624,6 +732,10 @@ def _judged(connection: DuckDBPyConnection, machine: str, point: str, settings: 
     return judge(recordings, indicators, settings, settings.baseline_of(machine, point))
 
 
+def _last_level(trends: PointTrends, column: int) -> str:
+    return level_name(int(trends.levels[-1, column]), trends.basis[column])
+
+
 def _trend(trends: PointTrends, column: int, machine: str, point: str) -> Trend:
     import pandas as pd
 
@@ -651,7 +763,7 @@ def _trend(trends: PointTrends, column: int, machine: str, point: str) -> Trend:
         **row,
         table=table,
         basis=trends.basis[column],
-        level=level_name(int(trends.levels[-1, column]), trends.basis[column]),
+        level=_last_level(trends, column),
         changed=dates.iloc[began].to_pydatetime() if began >= 0 else None,
         normalised=trends.normalised,
         false_alarm_rate=trends.false_alarm_rate,

@@ -19,9 +19,11 @@ from gearsig.fleet._statistics import (
     ALARM,
     MIN_SCATTER,
     OK,
+    OUTSIDE,
     WARNING,
     BoolArray,
     IntArray,
+    Limits,
     alarm_levels,
     change_points,
     decibels,
@@ -276,20 +278,17 @@ def judge(
     values, series = _matrix(recordings, indicators)
     baseline = _baseline(recordings, settings, stated)
     y, in_db = decibels(values, baseline)
-    speed, load = (recordings[name].to_numpy(np.float64) for name in ("speed_rpm", "load_nm"))
-    x, inside, normalised = regressors(speed, load, baseline)
+    x, inside, normalised = regressors(*_conditions(recordings), baseline)
     rate = settings.false_alarm_rate / max(len(series), 1)
-    limits = prediction_limits(y, x, baseline, rate, min_scatter=np.where(in_db, MIN_SCATTER, 1e-9))
+    limits, reach = _limits(y, x, baseline, in_db, rate, settings)
     judged = (~baseline & inside)[:, None] & np.isfinite(y) & np.isfinite(limits.high)
-    min_rise = np.where(in_db, settings.minimum_change_db, 0.0)
-    reach, rise = np.maximum(limits.high - limits.expected, min_rise), y - limits.expected
+    rise = y - limits.expected
     with np.errstate(invalid="ignore"):
         sample = np.where(np.abs(rise) > reach, np.where(in_db & (rise >= SERIOUS_DB), ALARM, WARNING), OK)
         calm = np.abs(rise) <= RETURN * reach
     sample = np.where(judged, sample, -1)
     basis = [STATISTICAL if known else NONE for known in np.asarray(np.isfinite(reach).any(axis=0)).tolist()]
-    expected, low, high = (_natural(limits.expected + part, in_db) for part in (0.0 * reach, -reach, reach))
-    alarm = np.where(in_db, _natural(limits.expected + np.maximum(reach, SERIOUS_DB), in_db), np.nan)
+    expected, low, high, alarm = _natural_limits(limits.expected, reach, in_db)
     zones = _zone_limits(recordings)
     is_velocity = np.asarray(series["name"] == "overall velocity", dtype=np.bool_)
     for column in np.flatnonzero(is_velocity):
@@ -322,6 +321,108 @@ def judge(
         normalised,
         rate,
     )
+
+
+def _conditions(recordings: DataFrame) -> tuple[FloatArray, FloatArray]:
+    """Return speed and load of each recording, nan where they are not known."""
+    speed, load = (recordings[name].to_numpy(np.float64) for name in ("speed_rpm", "load_nm"))
+    return speed, load
+
+
+def _limits(
+    y: FloatArray, x: FloatArray, baseline: BoolArray, in_db: BoolArray, rate: float, settings: TrendSettings
+) -> tuple[Limits, FloatArray]:
+    """Return the limits of prediction, and how far a value may be from what is expected: never less than a change."""
+    limits = prediction_limits(y, x, baseline, rate, min_scatter=np.where(in_db, MIN_SCATTER, 1e-9))
+    min_rise = np.where(in_db, settings.minimum_change_db, 0.0)
+    return limits, np.maximum(limits.high - limits.expected, min_rise)
+
+
+def _natural_limits(
+    expected: FloatArray, reach: FloatArray, in_db: BoolArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return what is expected, low, high and alarm in the indicators' units."""
+    middle, low, high = (_natural(expected + part, in_db) for part in (0.0 * reach, -reach, reach))
+    return middle, low, high, np.where(in_db, _natural(expected + np.maximum(reach, SERIOUS_DB), in_db), np.nan)
+
+
+CONDITIONS = {"load": "load_nm", "speed": "speed_rpm"}
+"""What an indicator is shown over besides time, and its column."""
+
+N_STEPS = 41
+"""Points of a curve over load or speed."""
+
+
+def over_condition(
+    trends: PointTrends, column: int, over: str, settings: TrendSettings
+) -> tuple[DataFrame, DataFrame, float]:
+    """Return a series over load or speed: its values, the curve of its limits, and the other one's value there.
+
+    The regression of the baseline is evaluated along one of the two, the other one being held at its mean of the
+    baseline. A value that was taken at another is moved there along the regression, and its limits with it: it lies
+    beyond them there if, and only if, it does over time.
+
+    Parameters
+    ----------
+    trends : PointTrends
+    column : int
+        Of the series.
+    over : str
+        Of `CONDITIONS`.
+    settings : TrendSettings
+
+    Returns
+    -------
+    DataFrame
+        By load or speed: that, date, value, adjusted, expected, low, high, alarm, level.
+    DataFrame
+        Load or speed from a quarter below to a quarter above the baseline's, expected, low, high, alarm there; empty
+        where there are no limits.
+    float
+        What the other one is held at; nan where nothing depends on it.
+    """
+    import pandas as pd
+
+    n, baseline, is_iso = len(trends.recordings), trends.baseline, trends.basis[column] == ISO
+    value, names = trends.values[:, column], ["expected", "low", "high", "alarm"]
+    speed, load = (np.abs(values) for values in _conditions(trends.recordings))
+    along, across = (load, speed) if over == "load" else (speed, load)
+    usable = np.isfinite(along) & (along > 0)
+    ends = along[usable & baseline] if (usable & baseline).any() else along[usable]
+    steps = np.geomspace(ends.min() / OUTSIDE, ends.max() * OUTSIDE, N_STEPS) if len(ends) else np.ones(0)
+    follows_other = any(name != over for name in trends.normalised)
+    held = float(10.0 ** np.log10(across[baseline]).mean()) if follows_other else float("nan")
+    # One regression for three kinds of rows: the recordings, the same with the other quantity held, the curve.
+    n_added = n + len(steps)
+    rows_along, rows_across = np.concatenate([along, along, steps]), np.concatenate([across, np.full(n_added, held)])
+    rows = (rows_across, rows_along) if over == "load" else (rows_along, rows_across)
+    is_baseline = np.concatenate([baseline, np.zeros(n_added, dtype=np.bool_)])
+    x, inside, _ = regressors(*rows, is_baseline)
+    y, in_db = decibels(value[:, None], baseline)
+    y = np.concatenate([y, np.full((n_added, 1), np.nan)])
+    limits, reach = _limits(y, x, is_baseline, in_db, trends.false_alarm_rate, settings)
+    reach[n : 2 * n] = reach[:n]  # each value keeps the limits of its own place
+    natural = np.hstack(_natural_limits(limits.expected, reach, in_db))
+    moved = np.nan_to_num(limits.expected[n : 2 * n, 0] - limits.expected[:n, 0])
+    if is_iso:  # boundaries of zones are the same at any load
+        moved[:] = 0.0
+        natural[:, 1], natural[:, 2:] = np.nan, [trends.high[0, column], trends.alarm[0, column]]
+    adjusted = value * 10.0 ** (moved / 20.0) if in_db[0] else value + moved
+    _, low, high, alarm = natural[n : 2 * n].T
+    with np.errstate(invalid="ignore"):
+        level = np.select([adjusted > alarm, (adjusted < low) | (adjusted > high)], ["alarm", "warning"], "ok")
+    level = level.astype(object)
+    level[~np.isfinite(high) | (~inside[:n] & (not is_iso))] = "not judged"
+    level[baseline] = "baseline"
+    table = pd.DataFrame(
+        {CONDITIONS[over]: along, "date": trends.recordings["date"], "value": value, "adjusted": adjusted}
+    )
+    table[names] = natural[n : 2 * n]
+    table["level"] = level
+    table = table[np.isfinite(value) & np.isfinite(along)].sort_values([CONDITIONS[over], "date"], kind="stable")
+    curve = pd.DataFrame({CONDITIONS[over]: steps})
+    curve[names] = natural[2 * n :]
+    return table.reset_index(drop=True), curve[np.isfinite(curve["high"])].reset_index(drop=True), held
 
 
 def _matrix(recordings: DataFrame, indicators: DataFrame) -> tuple[FloatArray, DataFrame]:

@@ -45,6 +45,25 @@ def test_the_worst_is_first_its_trend_has_limits_and_its_recording_opens(make_re
     assert "DE_20260109.csv" in shown_text(page)
 
 
+def test_an_indicator_over_load_in_the_limits_that_follow_it(make_recordings, tmp_path):  # noqa: F811
+    loads = [20.0, 40.0, 60.0, 80.0, 100.0, 30.0, 50.0, 70.0, 90.0]
+    data = make_recordings("mill", [load / 50 for load in loads[:8]] + [20.0])
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.set(TrendSettings(n_baseline=8))
+    for path, load in zip(sorted((data / "mill").iterdir()), loads, strict=True):
+        fleet.add(path, pattern=PATTERN, torque_nm=load, n_processes=1)
+    page = at("fleet", {"over": "load", "indicator": "rms (a1, raw)"}, **{STORE: str(tmp_path / "store")})
+    assert not page.exception
+    sent = figures(page)[0]
+    curves = {line["name"]: line for line in sent["lines"]}
+    assert numbers(curves["rms"]["x"]) == [90.0]
+    assert [x for x, _ in sent["marked"]] == [90.0]
+    assert sorted(numbers(curves["baseline"]["x"])) == sorted(loads[:8])
+    high = numbers(curves["expected, within its limits"]["high"])
+    assert high[-1] / high[0] > 4.0
+    assert "dependence on load" in shown_text(page)
+
+
 def test_an_empty_store_says_how_to_fill_it(tmp_path):
     page = opened(tmp_path / "nothing")
     assert not page.exception

@@ -8,7 +8,7 @@ import pytest
 from gearsig.errors import InputError
 from gearsig.fleet import Fleet, TrendSettings, counts_text, fleet_changes, last_report, mark_reported, open_fleet
 from gearsig.report import fleet_page_html, fleet_page_pdf
-from gearsig.rig import MachineSize, OperatingPoint, Rig, Sensor, Shaft
+from gearsig.rig import ConstantSpeed, MachineSize, OperatingPoint, Rig, Sensor, Shaft
 from tests.fleet.recordings import PATTERN
 
 
@@ -126,3 +126,52 @@ def test_limits_are_closer_where_speed_is_accounted_for():
 def test_machines_are_named_in_quotes_as_names_may_hold_commas(fleet):
     with pytest.raises(InputError, match=r"allowed: 'calm', 'loud'"):
         fleet.point_trends("absent")
+
+
+def loaded(fleet: Fleet, data, machine: str, loads: list[float], **more) -> None:
+    for path, load in zip(sorted((data / machine).iterdir()), loads, strict=True):
+        fleet.add(path, pattern=PATTERN, torque_nm=load, n_processes=1, **more)
+
+
+def test_over_load_the_limits_follow_the_baselines_dependence(make_recordings, tmp_path):
+    """A level that grows with the load is no change; half as loud at full load as it was is none over time alone."""
+    loads = [20.0, 40.0, 60.0, 80.0, 100.0, 30.0, 50.0, 70.0, 90.0, 25.0, 95.0, 100.0, 200.0]
+    levels = [load / 50 for load in loads[:10]] + [0.5, 20.0, 4.0]
+    levels[11] *= 2.0
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.set(TrendSettings(n_baseline=10))
+    loaded(fleet, make_recordings("mill", levels), "mill", loads)
+    shown = fleet.trend_over("load", "mill", "rms")[0]
+    table, curve = shown.table, shown.curve
+    assert list(table["load_nm"]) == sorted(loads)
+    levels_by_date = list(table.sort_values("date")["level"])
+    assert levels_by_date == ["baseline"] * 10 + ["warning", "alarm", "not judged"]
+    assert shown.follows
+    at = np.geomspace(20, 100, 9)
+    rms = np.hypot(np.sqrt(0.5), 0.3) * at / 50  # of a sine with noise, as loud as the load
+    assert np.interp(at, curve["load_nm"], curve["expected"]) == pytest.approx(rms, rel=0.05)
+    assert (curve["load_nm"].iloc[0], curve["load_nm"].iloc[-1]) == pytest.approx((16.0, 125.0))
+    judged = table[table["level"].isin(["warning", "alarm"])]
+    over_time = fleet.trend("mill", "rms")[0].table.set_index("date").loc[judged["date"]]
+    assert judged["high"].to_numpy() == pytest.approx(over_time["high"].to_numpy())
+    assert f"one of {1 / shown.trend.false_alarm_rate:.0f} recordings" in shown.text
+    with pytest.raises(InputError, match="no recording states its speed"):
+        fleet.trend_over("speed", "mill", "rms")
+
+
+def test_over_speed_values_are_moved_along_their_dependence_on_load(make_recordings, tmp_path):
+    """Level = (speed/1500)² · load/50: at any load the same curve over speed."""
+    rng = np.random.default_rng(7)
+    speeds, loads = rng.uniform(900.0, 1800.0, 13), rng.uniform(30.0, 90.0, 13)
+    data = make_recordings("mill", [(n / 1500) ** 2 * load / 50 for n, load in zip(speeds, loads, strict=True)])
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.set(TrendSettings(n_baseline=12))
+    for path, speed, load in zip(sorted((data / "mill").iterdir()), speeds, loads, strict=True):
+        fleet.add(path, pattern=PATTERN, torque_nm=load, speed=ConstantSpeed(float(speed)), n_processes=1)
+    shown = fleet.trend_over("speed", "mill", "rms", computed_on="raw")[0]
+    assert shown.held == pytest.approx(np.exp(np.log(loads[:12]).mean()))
+    table = shown.table
+    ratio = table["adjusted"] / (np.hypot(np.sqrt(0.5), 0.3) * (table["speed_rpm"] / 1500) ** 2 * shown.held / 50)
+    assert ratio.to_numpy() == pytest.approx(1.0, rel=0.06)
+    assert np.ptp(np.log(table["value"] / table["adjusted"])) > 0.5
+    assert set(table["level"]) == {"baseline", "ok"}

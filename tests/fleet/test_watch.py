@@ -173,3 +173,10 @@ def test_commands_show_tables_and_json(make_recordings, tmp_path):
         "1",
     ]
     assert run.invoke(app, words).stdout == ""
+    run.invoke(app, ["fleet", "add", str(data), *store, "--pattern", PATTERN, "--jobs", "1", "--torque", "40"])
+    words = ["fleet", "trend", "pump 1", "rms", *store, "--over", "load"]
+    over = json.loads(run.invoke(app, [*words, "--json"]).stdout)
+    assert [(row["load_nm"], row["level"]) for row in over[0]["table"]] == [(40.0, "not judged")] * 2
+    assert (over[0]["over"], over[0]["held"], over[0]["curve"]) == ("load", None, [])
+    assert "No limits yet" in run.invoke(app, words).stdout
+    assert run.invoke(app, [*words[:-1], "loud"]).exit_code != 0
