@@ -146,6 +146,7 @@ def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset
 
 
 OFF_NOMINAL, NEAR_ZERO = "speed-off-nominal", "speed-near-zero"
+MAINS_OR_SHAFT = "line-of-mains-or-shaft"
 
 TRUST = {
     SAMPLING_RATE: 0.5,
@@ -162,6 +163,12 @@ TRUST = {
 }
 """Problem → what a confidence is multiplied by: a judgement, and no probability. 0.5 where places or frequencies are
 probably wrong, 0.7 and 0.75 where they stand but sizes are not to be trusted, 0 where nothing is left."""
+
+TRUST_OF_SHARED_LINE = 0.5
+"""The same of what rests on a line that the mains make as well: nothing tells which of the two does."""
+
+SAME_LINE = 2e-3
+"""Relative distance: the line is within a thousandth of the supply's multiple, the speed is known as well at best."""
 
 SURE = 0.7
 """Below it, what was a fault is a suspicion."""
@@ -215,11 +222,10 @@ def _perhaps_the_shafts(hum: Finding, turns_hz: Sequence[tuple[str, float]]) -> 
     line_hz = hum.where.frequency_hz or 0.0
     for name, turn_hz in turns_hz:
         for multiple in (1, 2, 3, 4):
-            # The line is within a thousandth of the supply's multiple, and the speed is known as well at best.
-            if abs(multiple * turn_hz / line_hz - 1) < 2e-3:
+            if abs(multiple * turn_hz / line_hz - 1) < SAME_LINE:
                 of = f"{multiple} × {name or 'the shaft'}"
                 title = f"One line, {line_hz:.5g} Hz, rules channel {hum.where.channels[0]}: {of}, or mains hum."
-                return replace(hum, code="line-of-mains-or-shaft", kind=Kind.NOTICE, title=title)
+                return replace(hum, code=MAINS_OR_SHAFT, kind=Kind.NOTICE, title=title)
     return hum
 
 
@@ -251,8 +257,15 @@ def _lowered(finding: Finding, problems: Sequence[Finding], channels: Sequence[s
     return replace(finding, kind=kind, confidence=confidence, evidence=evidence)
 
 
+def _rests_on(finding: Finding, line: Finding) -> bool:
+    """Whether a finding is one of a line, and no mere change of it."""
+    own_hz, line_hz = finding.where.frequency_hz, line.where.frequency_hz
+    return bool(finding.code != CHANGED and own_hz and line_hz and abs(own_hz / line_hz - 1) < SAME_LINE)
+
+
 def _of_channels(problem: Finding) -> set[str]:
-    return set(problem.where.channels) if problem.code.startswith("channel-") else set()
+    of_channel = problem.code.startswith("channel-") or problem.code == MAINS_OR_SHAFT
+    return set(problem.where.channels) if of_channel else set()
 
 
 def spoiled(findings: Iterable[Finding], channels: Sequence[str]) -> frozenset[str]:

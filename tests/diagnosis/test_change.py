@@ -54,6 +54,18 @@ def test_what_changed_is_the_first_finding_and_its_likeliest_cause_the_second(
     assert analysis.outcome is Outcome.SUSPICION
 
 
+def test_what_rests_on_a_line_that_the_mains_make_as_well_is_half_as_sure() -> None:
+    """2 × 1500 rpm are 50 Hz, 2 × 1560 rpm are not. That it has changed stays as sure."""
+    confidences = {}
+    for speed_rpm in (1500.0, 1560.0):
+        healthy = rotor(HEALTHY, seed=2, speed_rpm=speed_rpm)
+        analysis = analyze(rotor(HEALTHY | {2.0: 0.3}, seed=1, speed_rpm=speed_rpm), reference=healthy)
+        assert ("line-of-mains-or-shaft" in codes(analysis)) == (speed_rpm == 1500.0)
+        found = [finding(analysis, code) for code in ("changed-since-reference", "misalignment")]
+        confidences[speed_rpm] = [f.confidence for f in found]
+    assert confidences[1500.0] == pytest.approx(np.array([1.0, 0.5]) * confidences[1560.0], rel=0.05)
+
+
 def test_the_only_channels_of_both_are_compared_whatever_they_are_called() -> None:
     now, healthy = rotor(HEALTHY | {1.0: 0.5}, seed=1), rotor(HEALTHY, seed=2)
     as_named = analyze(now, reference=healthy)
