@@ -405,17 +405,63 @@ def _stepped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     return ChannelProblem(channel.name, "stepped", 1.0, f"{evidence} before and after ({scatter:.1f} dB)", remedy)
 
 
-def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
-    r"""Look for envelopes that fall faster than they rise.
+LASTS_S, CLEAR_LOG_RATIO, CLEAR_ERRORS, MIN_IMPACTS = 4e-3, 0.25, 8.0, 30
+"""Of impacts: time in which they ring down; ln of the energies after and before, and its standard errors, from which
+they show the direction of time; how many of them. Of 26 measured channels the lowest is -0.03 (1 standard error), of
+290 of drawn motors and gearboxes -0.17 (3); six measured beside damaged races lie above 0.3 (8 or more)."""
 
-    The skewness of the envelope's steps, :math:`E[d^3] / E[d^2]^{3/2}`, changes its sign with the direction of time. Of
-    resonances that are struck it is positive. It is taken in four bands above 300 Hz, and by what 32 parts scatter.
-    """
+
+def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
+    """Look for impacts that swell and end suddenly: by the energy beside their peaks, then by the envelope's steps."""
     top_hz = 0.45 * rate_hz
     if channel.quantity not in _OFFSET_QUANTITIES or top_hz < 1000.0:
         return None
     x = np.asarray(x[: 1 << int(np.log2(min(len(x), LONGEST_TURNED)))], dtype=np.float64)
     spectrum, frequency = np.fft.fft(x - x.mean()), np.fft.fftfreq(len(x), 1.0 / rate_hz)
+    ratio, errors = _energy_after_peaks(spectrum, frequency, top_hz, max(2, int(LASTS_S * rate_hz)))
+    evidence = ""
+    if ratio < -CLEAR_LOG_RATIO and errors < -CLEAR_ERRORS:
+        evidence = (
+            f"impacts swell and end suddenly: the {1e3 * LASTS_S:g} ms before their peaks hold {np.exp(-ratio):.3g} "
+            f"times the energy of those after, {abs(errors):.0f} standard errors from even"
+        )
+    elif not (ratio > CLEAR_LOG_RATIO and errors > CLEAR_ERRORS):
+        evidence = _sudden_ends(spectrum, frequency, rate_hz, top_hz)
+    if not evidence:
+        return None
+    remedy = "check the order of the samples: turned round, teeth are counted backwards, and speeds fall that rose"
+    return ChannelProblem(channel.name, "reversed", 1.0, evidence, remedy)
+
+
+def _energy_after_peaks(
+    spectrum: NDArray[np.complexfloating], frequency: FloatArray, top_hz: float, n_ring: int
+) -> tuple[float, float]:
+    """Return the mean of ln(energy after / energy before) the impacts' peaks, and over its standard error; 0 without.
+
+    Peaks are the highest within four times the time of ringing, and eight times the mean power. A mode that is struck
+    rises within a part of that time and falls through all of it; two that beat may rise more slowly at first.
+    """
+    from scipy.ndimage import maximum_filter1d
+
+    power = np.abs(np.fft.ifft(np.where((frequency > 300.0) & (frequency < top_hz), 2.0 * spectrum, 0.0))) ** 2
+    is_peak = (power > 8.0 * power.mean()) & (power == maximum_filter1d(power, 8 * n_ring + 1))
+    peaks = np.flatnonzero(is_peak)
+    peaks = peaks[(peaks > n_ring) & (peaks < len(power) - n_ring - 1)]
+    if len(peaks) < MIN_IMPACTS:
+        return 0.0, 0.0
+    energy = np.concatenate([[0.0], np.cumsum(power)])
+    after, before = energy[peaks + 1 + n_ring] - energy[peaks + 1], energy[peaks] - energy[peaks - n_ring]
+    ratios = np.log(np.maximum(after, 1e-300) / np.maximum(before, 1e-300))
+    mean = float(ratios.mean())
+    return mean, mean / max(float(ratios.std(ddof=1)) / len(peaks) ** 0.5, 1e-12)
+
+
+def _sudden_ends(spectrum: NDArray[np.complexfloating], frequency: FloatArray, rate_hz: float, top_hz: float) -> str:
+    r"""Return what speaks for envelopes that fall faster than they rise, empty where nothing does.
+
+    The skewness of the envelope's steps, :math:`E[d^3] / E[d^2]^{3/2}`, changes its sign with the direction of time. Of
+    resonances that are struck it is positive. It is taken in four bands above 300 Hz, and by what 32 parts scatter.
+    """
     edges = [300.0 * (top_hz / 300.0) ** (i / 4) for i in range(5)]
     skews, scores = [], []
     for low, high in pairwise(edges):
@@ -431,14 +477,12 @@ def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem
     # speaks against it.
     turned = [i for i in range(4) if skews[i] < -1.0 and scores[i] < -4.0]
     if not turned or any(skews[i] > 0.2 and scores[i] > 3.0 for i in range(4)):
-        return None
+        return ""
     i = min(turned, key=lambda i: scores[i])
-    evidence = (
+    return (
         f"impacts between {edges[i]:.0f} and {edges[i + 1]:.0f} Hz swell and end suddenly: skewness of the envelope's "
         f"steps {skews[i]:.2f}, {abs(scores[i]):.0f} standard errors below zero"
     )
-    remedy = "check the order of the samples: turned round, teeth are counted backwards, and speeds fall that rose"
-    return ChannelProblem(channel.name, "reversed", 1.0, evidence, remedy)
 
 
 def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
