@@ -5,7 +5,7 @@ Orders are the same with either, so that both are said. A clock decides: the mai
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from math import log10
@@ -71,7 +71,10 @@ EXPLAINED_EACH = -3.5
 measured recordings -5 or less at the right rate, -2 or more at one that is too high."""
 
 AS_GOOD = 0.6
-"""Share of the best factor's sum that makes a smaller one preferred."""
+"""Share of the best factor's sum that makes a smaller one preferred, where it is far apart."""
+
+FAR_APART = 2.5
+"""Ratio of factors from which the larger may stand for a slower shaft that explains a race as well."""
 
 NAMED_AS_WELL = 0.35
 """Share of the best factor's sum from which another factor is said beside the preferred one."""
@@ -409,17 +412,13 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     best = min(sums.values())
     if best > ENOUGH_EVIDENCE:
         return None
-    # The smallest factor that explains nearly as much as the best: its multiples do so, too, with more places. One of
-    # the usual factors goes before ratios to common rates, which are many. Of a rate that is too low one damaged race
-    # tells more than all, whose places cover much of the range.
-    as_good = [f for f in factors if sums[f] <= AS_GOOD * best]
-    factor = min([f for f in as_good if f in usual] or as_good)
+    factor = _preferred(sums, usual, of_one_part)
     # Beside a lower rate, with more of the spectrum and more places, the strongest lines decide: at that rate hardly
     # any is where the stated one puts a shaft's or a race's. Where no race is described, one or another part may
     # knock: it asks for no mistake at all, and its order may be near a fraction of the shaft's.
     if has_plain_lines() if factor < 1 else not races and has_stranger(ranges[factor], AS_GOOD * best):
         return None
-    for milder in sorted(f for f in factors if f in usual and 1 < f < factor):
+    for milder in sorted(f for f in factors if f in usual and 1 < f <= factor / FAR_APART):
         of_one = of_one_part(milder)
         if of_one <= AS_GOOD * best:
             factor, sums[milder] = milder, of_one
@@ -453,6 +452,22 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         f"{_power_text(stated)}.",
         others=others[:2],
     )
+
+
+def _preferred(sums: dict[float, float], usual: Sequence[float], of_one_part: Callable[[float], float]) -> float:
+    """Return the factor that explains most, and put into `sums` what one race tells at those near it.
+
+    A sum counts its places; but where q times a race's order is nearly a whole number, a shaft that turns q times
+    slower explains shaft and race together. So the smallest factor that explains nearly as much gives way only to one
+    that is less than `FAR_APART` times as large. One of the usual factors goes before ratios to common rates, which are
+    many. Of a rate that is too low one damaged race tells more than all, whose places cover much of the range.
+    """
+    as_good = [f for f in sums if sums[f] <= AS_GOOD * min(sums.values())]
+    as_good = [f for f in as_good if f in usual] or as_good
+    near = [f for f in as_good if f < FAR_APART * min(as_good)]
+    if len(near) > 1:
+        sums |= {f: min(sums[f], of_one_part(f)) for f in near if f > 1}
+    return min(near, key=lambda f: sums[f])
 
 
 def _of_a_stranger(strong: StrongSpectra, factor: float = 1.0) -> float:

@@ -232,19 +232,21 @@ def _perhaps_the_shafts(hum: Finding, turns_hz: Sequence[tuple[str, float]]) -> 
 def lowered(findings: Iterable[Finding], channels: Sequence[str]) -> list[Finding]:
     """Return the findings with faults and suspicions lowered, or withheld, by the problems among them.
 
-    A problem of a channel touches what was seen in it; one of speed or sampling rate touches everything.
+    A problem of a channel touches what was seen in it; one of speed or sampling rate touches everything; a line that
+    may be the mains' what is said of that line, but not that it has changed.
     """
     findings = list(findings)
-    problems = [f for f in findings if f.code in TRUST]
+    problems = [f for f in findings if f.code in TRUST or f.code == MAINS_OR_SHAFT]
     return [_lowered(f, problems, channels) if f.is_claim else f for f in findings]
 
 
 def _lowered(finding: Finding, problems: Sequence[Finding], channels: Sequence[str]) -> Finding:
     seen_in = set(finding.where.channels or channels)
     touching = [p for p in problems if p.code != finding.code and (not _of_channels(p) or seen_in & _of_channels(p))]
+    touching = [p for p in touching if p.code != MAINS_OR_SHAFT or _rests_on(finding, p)]
     confidence, kind = finding.confidence, finding.kind
     for problem in touching:
-        confidence *= TRUST[problem.code]
+        confidence *= TRUST.get(problem.code, TRUST_OF_SHARED_LINE)
     if not touching:
         return finding
     because = " ".join(p.title for p in touching)

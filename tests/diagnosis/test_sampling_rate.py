@@ -11,7 +11,7 @@ from gearsig.recording import read_recording
 from gearsig.rig import Bearing, ConstantSpeed, OperatingPoint, TachometerChannel
 from tests.diagnosis.machines import GOOD, MOTOR, MOTOR_HZ, MOTOR_RATE_HZ, codes, finding, motor, record
 from tests.kinematic.speed import ConstantProfile
-from tests.measured import BEARING, DATA, needs_data
+from tests.measured import BY_NAME, DATA, needs_data
 
 CODE = "sampling-rate-doubtful"
 
@@ -89,10 +89,21 @@ def test_of_a_measured_race_that_nobody_described(race: str) -> None:
 
 
 @needs_data
-def test_of_a_measured_race_ten_times_too_low() -> None:
-    """No common rate, of which there are many, is named before the usual factor."""
-    recording = read_recording(DATA / "bearing_races/OuterRaceFault_vload_4.mat", rig=BEARING)
-    stated = analyze(replace(recording, sampling_rate_hz=recording.sampling_rate_hz / 10))
+@pytest.mark.parametrize(
+    ("name", "times"),
+    [
+        ("bearing_races/OuterRaceFault_vload_4.mat", 0.1),
+        ("bearing_races/OuterRaceFault_vload_4.mat", 0.2),
+        ("bearing_races/InnerRaceFault_vload_3.mat", 0.25),
+        ("bearing_cwru/OR007@6_0.mat", 0.1),
+        ("bearing_cwru/OR007@6_0.mat", 0.2),
+        ("bearing_cwru/B007_0.mat", 0.1),
+    ],
+)
+def test_of_a_measured_race_at_a_rate_that_is_too_low(name: str, times: float) -> None:
+    """The factor that fits is named first: no common rate, of which there are many, and no half of it."""
+    recording = BY_NAME[name].read()
+    stated = analyze(replace(recording, sampling_rate_hz=recording.sampling_rate_hz * times))
     assert f"{recording.sampling_rate_hz:g} Hz" in finding(stated, CODE).title.split("would fit best")[0]
 
 
