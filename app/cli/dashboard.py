@@ -24,6 +24,7 @@ OPTIONS = (
     "browser.gatherUsageStats=false",
     "client.toolbarMode=minimal",
     "client.showErrorLinks=false",
+    "runner.postScriptGC=false",  # the pages ask for it themselves, when nobody waits: see `work.tidy_later`
 )
 """Flags win over the configuration files of the user and of the folder the command is started in."""
 

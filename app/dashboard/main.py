@@ -6,7 +6,7 @@ from pathlib import Path
 
 import streamlit as st
 
-from app.dashboard import address
+from app.dashboard import address, work
 
 PAGES = Path(__file__).parent / "pages"
 
@@ -27,5 +27,6 @@ page = st.navigation(
     ],
     position="top",
 )
+work.tidy_later()
 with address.of_page(page.url_path):
     page.run()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import sys
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
-from functools import update_wrapper
-from threading import Lock, Thread, Timer
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
+from functools import partial, update_wrapper
+from threading import Event, Lock, Thread, Timer
 from time import monotonic
 from types import FrameType
 from typing import Any, Generic, ParamSpec, TypeVar, cast
@@ -22,7 +24,8 @@ P = ParamSpec("P")
 R = TypeVar("R")
 LOOK_EVERY_S = 0.05
 """A page that waits hears of clicks and sliders as often."""
-CANCEL_AFTER_S = 2.0
+SPINNER_AFTER_S, CANCEL_AFTER_S = 0.4, 2.0
+"""What takes less has neither: to put them in and to take them away is the browser's work, too."""
 GRACE_S = 2.0
 """What no page waits for any more goes on for so long, in case that somebody comes back to it."""
 _CANCELLED = "cancelled work"
@@ -114,6 +117,27 @@ def _later(seconds: float, function: Callable[[], None]) -> None:
     timer.start()
 
 
+def let_user_act() -> None:
+    """End this run of the page if the user has done something meanwhile: Streamlit does so where its state is used."""
+    st.session_state.get(_CANCELLED)
+
+
+TIDY_AFTER_S = 3.0
+_is_tidied_soon = Event()
+
+
+def tidy_later() -> None:
+    """Collect garbage in a moment: Streamlit would after each run of a page, which makes the next one wait 0.1 s."""
+    if not _is_tidied_soon.is_set():
+        _is_tidied_soon.set()
+        _later(TIDY_AFTER_S, _tidy)
+
+
+def _tidy() -> None:
+    _is_tidied_soon.clear()
+    gc.collect()
+
+
 class Kept(Generic[P, R]):
     """A function whose last answers are kept and shared between sessions; each is computed beside the page.
 
@@ -170,6 +194,23 @@ class Kept(Generic[P, R]):
             if not work.is_cancelled:  # else by another page that did not know of this one
                 return work.result()
 
+    @contextmanager
+    def ahead(self, *requests: Any) -> Iterator[None]:
+        """Compute answers while something else is shown; where that is broken off, so are they.
+
+        Parameters
+        ----------
+        *requests
+            Of functions of one argument.
+        """
+        works = [self._begin(self._key(request), partial(cast("Any", self._function), request)) for request in requests]
+        try:
+            yield
+        except BaseException:
+            for work in works:
+                _cancel_unwatched(work, self._grace_s)
+            raise
+
     def is_answered(self, *arguments: P.args, **named: P.kwargs) -> bool:
         """Whether a request was computed already, or failed."""
         with self._lock:
@@ -178,16 +219,21 @@ class Kept(Generic[P, R]):
 
     def _wait(self, work: Work[R], name: str, *, is_page: bool) -> None:
         """Wait; whatever the user does meanwhile ends this run of the page, and in time the work."""
-        if work.wait(LOOK_EVERY_S):
-            return
         if not is_page:  # within other work
             while not work.wait(LOOK_EVERY_S):
                 pass
             return
+        shown_s = monotonic() + SPINNER_AFTER_S
+        while not work.wait(LOOK_EVERY_S):
+            let_user_act()
+            if monotonic() > shown_s:
+                break
+        else:
+            return
         with st.spinner(self._words, show_time=True):
-            beat, place, is_offered = st.empty(), st.empty(), False
+            place, is_offered = st.empty(), False
             while not work.wait(LOOK_EVERY_S):
-                beat.empty()  # Streamlit ends the run of a page when it has something to show
+                let_user_act()
                 if not is_offered and monotonic() - work.begun_s > CANCEL_AFTER_S:
                     address.write()
                     place.button(

@@ -1,10 +1,13 @@
 """The fault laboratory's page, run without a browser."""
 
+from time import monotonic
+
 import numpy as np
 import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
+from app.dashboard.laboratory import setup as controls
 from app.dashboard.laboratory.run import chosen_of
 from app.dashboard.laboratory.setup import MODELS, WIDEST, Setup, automatic_s, greatest_severity, nice_step, shown_name
 from app.dashboard.laboratory.views import NUMBERS, TAB, VIEWS, change
@@ -214,3 +217,17 @@ def test_a_steeper_crack_ends_the_slider_earlier_or_later() -> None:
     page = opened("flexible_50_50")
     assert slider(page, "Crack").max == pytest.approx(8.15)
     assert slider(page, "Crack").min == 0.0
+
+
+@pytest.mark.parametrize(("ago_s", "waits"), [(0.0, True), (1e6, False)])
+def test_a_slider_that_keeps_changing_comes_to_rest_before_anything_is_simulated(monkeypatch, ago_s, waits) -> None:
+    page = opened()
+    looks = []
+    monkeypatch.setattr(controls, "let_user_act", lambda: looks.append(None))
+    page.session_state["last change of a slider"] = {}, monotonic() + 1e3 * waits - ago_s
+    slider(page, "Crack").set_value(0.5).run()
+    assert not page.exception
+    assert bool(looks) == waits
+    looks.clear()
+    page.run()  # nothing changed
+    assert not looks

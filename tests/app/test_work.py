@@ -8,7 +8,8 @@ from time import sleep
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from app.dashboard.work import Cancelled, Work, kept
+from app.dashboard import work as beside
+from app.dashboard.work import Cancelled, Work, kept, tidy_later
 from gearsig.errors import InputError
 
 
@@ -103,3 +104,51 @@ def test_an_import_is_not_broken_off(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert reached == [True]
     with pytest.raises(Cancelled):
         work.result()
+
+
+def test_what_is_computed_ahead_is_kept_and_broken_off_with_what_is_shown_meanwhile() -> None:
+    doubled = kept(4, "…", grace_s=0.0)(lambda x: 2 * x)
+    with doubled.ahead(1, 2):
+        pass
+    assert [doubled.begin(x).wait(60.0) and doubled.is_answered(x) for x in (1, 2)] == [True, True]
+
+    forever = kept(2, "…", grace_s=0.0)(lambda s: [sleep(s) for _ in iter(int, 1)])
+    work = forever.begin(0.01)
+    with pytest.raises(KeyError), forever.ahead(0.01):
+        {}["as Streamlit ends the run of a page"]
+    assert work.wait(60.0)
+    assert work.is_cancelled
+
+
+def test_garbage_is_collected_once_for_many_runs_of_a_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    waiting = []
+    monkeypatch.setattr(beside, "_later", lambda _, function: waiting.append(function))
+    beside._is_tidied_soon.clear()
+    for _ in range(5):
+        tidy_later()
+    assert len(waiting) == 1
+    waiting[0]()
+    tidy_later()
+    assert len(waiting) == 2
+    beside._is_tidied_soon.clear()
+
+
+def _quick_page() -> None:
+    from time import sleep
+
+    import streamlit as st
+
+    from app.dashboard.work import kept
+
+    st.title(str(kept(2, "Tripling …")(lambda x: sleep(0.1) or 3 * x)(2)))
+
+
+def test_what_is_there_at_once_has_no_spinner(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put in and taken away, it moves all that stands below it, which the browser then builds anew."""
+    import streamlit as st
+
+    monkeypatch.setattr(beside, "SPINNER_AFTER_S", 60.0)
+    monkeypatch.setattr(st, "spinner", lambda *_, **__: pytest.fail("a spinner"))
+    page = AppTest.from_function(_quick_page).run()
+    assert page.title[0].value == "6"
+    assert not page.exception

@@ -7,6 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import floor, log10
+from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import streamlit as st
 import sims
 from app.dashboard import address
 from app.dashboard.theme import capitalised
+from app.dashboard.work import let_user_act
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from sims.effects import Effect, EffectSetting, Option, effect, effects
@@ -172,6 +174,23 @@ def slider_values() -> dict[str, float]:
         for key, value in st.session_state.items()
         if str(key).startswith(PREFIX) and isinstance(value, float)
     }
+
+
+_LAST_CHANGE = "last change of a slider"
+HELD_S, REST_S = 0.4, 0.15
+
+
+def wait_for_rest() -> None:
+    """Let a slider come to rest whose last change was a moment ago; a key that is held changes it 30 times a second."""
+    values, now_s = slider_values(), monotonic()
+    past, changed_s = st.session_state.get(_LAST_CHANGE, (values, 0.0))
+    if values == past:
+        st.session_state[_LAST_CHANGE] = values, changed_s
+        return
+    st.session_state[_LAST_CHANGE] = values, now_s
+    while now_s - changed_s < HELD_S and monotonic() - now_s < REST_S:
+        sleep(0.03)
+        let_user_act()
 
 
 def choose_parameter(

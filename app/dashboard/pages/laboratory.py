@@ -20,8 +20,9 @@ from app.dashboard.laboratory.run import (
     simulated,
     with_all_options,
 )
-from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup, choose_preset, choose_setup
+from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup, choose_preset, choose_setup, wait_for_rest
 from app.dashboard.widgets.messages import show_error
+from app.dashboard.work import let_user_act
 from gearsig.errors import GearsigError
 from sims.presets import Preset
 
@@ -40,6 +41,7 @@ def show() -> None:
 
 def show_pair(preset: Preset) -> None:
     """Choose, simulate, show a pair that runs at a steady speed."""
+    wait_for_rest()
     setup = choose_setup(preset)
     # Its results fade at once while another machine is simulated: none is taken for the new one's.
     with st.container(key="results"):
@@ -51,10 +53,13 @@ def show_results(setup: Setup) -> None:
     wait_for_compiled_code()
     preview = preview_of(setup)
     if preview is None or all_simulated(setup):
-        show_machines(setup)
+        show_machines(setup, *find_machines(setup))
         return
-    show_machines(preview, whole_s=setup.duration_s)
-    for whole in (with_all_options(setup), setup.healthy):
+    machines = find_machines(preview)
+    wholes = (with_all_options(setup), setup.healthy)
+    with simulated.ahead(*wholes):  # while the page draws
+        show_machines(preview, *machines, whole_s=setup.duration_s)
+    for whole in wholes:
         with suppress(GearsigError):  # the preview has said it
             simulated(whole)
     st.rerun()
@@ -66,16 +71,22 @@ def wait_for_compiled_code() -> None:
         return
     with st.spinner("Compiling the simulators, once after an installation …", show_time=True):
         st.caption("About a minute. The other pages can be used meanwhile.")
-        beat = st.empty()
         while is_being_made():
             sleep(0.1)
-            beat.empty()  # Streamlit ends the run of a page when it has something to show
+            let_user_act()
     st.rerun()
 
 
-def show_machines(setup: Setup, *, whole_s: float | None = None) -> None:
-    """Simulate and show both machines; `whole_s` is the length that follows a preview."""
-    healthy, faulty = simulated(setup.healthy), faulty_of(setup, simulated)
+def find_machines(setup: Setup) -> tuple[LaboratoryRun, LaboratoryRun | None]:
+    """Simulate both machines; what is said meanwhile has a place of its own, so that nothing below it moves."""
+    with st.container():
+        return simulated(setup.healthy), faulty_of(setup, simulated)
+
+
+def show_machines(
+    setup: Setup, healthy: LaboratoryRun, faulty: LaboratoryRun | None, *, whole_s: float | None = None
+) -> None:
+    """Show both machines; `whole_s` is the length that follows a preview."""
     views.say_sliders()
     shown = faulty or healthy
     head, buttons = st.columns((3, 2), vertical_alignment="top")
