@@ -17,6 +17,7 @@ from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._average import ROOT, draw_degrees, draw_gear, draw_mark, write_corner
 from gearsig.plot._cursors import AngleMark
+from gearsig.plot._panels import ChartRow, RowPanel, line_colour
 from gearsig.plot._series import thin
 from gearsig.plot._style import plain, with_unit
 
@@ -322,13 +323,44 @@ def _write_beyond(axes: Axes, row: int, text: str, below: str = "", colour: str 
         style.put_text(axes, 1.02, row + up, below, n_max=24, va="center", transform=place)
 
 
+def gap_evidence_panel(evidence: Sequence[Evidence]) -> RowPanel:
+    """Return predicted and observed changes, feature by feature, with the floor about zero.
+
+    Parameters
+    ----------
+    evidence : sequence of Evidence
+        Strongest first; those past the tenth are left out.
+
+    Raises
+    ------
+    InputError
+        Without evidence.
+    """
+    if not evidence:
+        raise InputError("no evidence to draw", allowed="one or more")
+    rows = []
+    for item in evidence[:10]:
+        stance, verdict = ("further", -1) if item.is_further else ("against", 1)
+        stance, verdict = ("for", 2) if item.speaks_for else (stance, verdict)
+        rows.append(
+            ChartRow(
+                item.feature, 0.0, item.observed_db, beside=stance, verdict=verdict, mark=item.predicted_db,
+                band=item.floor_db,
+            )
+        )  # fmt: skip
+    ends = np.array([(e.floor_db, e.observed_db, e.predicted_db, -e.floor_db) for e in evidence[:10]])
+    reach = float(np.max(np.abs(ends)))
+    limits = float(ends.min()) - 0.06 * reach, 1.08 * reach
+    return RowPanel(rows, "change (dB)", "observed", "predicted", "structural floor", limits)
+
+
 def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Figure:
     """Draw predicted and observed changes, feature by feature, with the floor about zero.
 
     Parameters
     ----------
     evidence : sequence of Evidence
-        Strongest first; those past the tenth are left out.
+        See `gap_evidence_panel`.
     title : str
 
     Returns
@@ -341,34 +373,72 @@ def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Fig
     InputError
         Without evidence.
     """
-    if not evidence:
-        raise InputError("no evidence to draw", allowed="one or more")
-    shown = evidence[:10]
-    names = [row_evidence.feature for row_evidence in shown]
-    figure, axes = _rows(names, left_in=3.6, right_in=1.15, row_in=0.44, top_in=0.66)
-    rows = np.arange(len(shown))
-    floors, observed, predicted = np.array([(e.floor_db, e.observed_db, e.predicted_db) for e in shown]).T
-    axes.barh(rows, 2.0 * floors, left=-floors, height=0.8, color=style.FLOOR, alpha=0.2, linewidth=0, zorder=1)
-    axes.barh(rows, observed, height=0.6 * BAR, color=style.MEASURED, alpha=0.85, linewidth=0, zorder=2)
-    keys = axes.plot([], [], color=style.MEASURED, linewidth=6, label="observed")
-    for row, row_evidence in enumerate(shown):
+    panel = gap_evidence_panel(evidence)
+    figure, axes = _rows([row.name for row in panel.rows], left_in=3.6, right_in=1.15, row_in=0.44, top_in=0.66)
+    at = np.arange(len(panel.rows))
+    floors, observed, predicted = np.array([(row.band, row.end, row.mark) for row in panel.rows], dtype=float).T
+    axes.barh(at, 2.0 * floors, left=-floors, height=0.8, color=style.FLOOR, alpha=0.2, linewidth=0, zorder=1)
+    axes.barh(at, observed, height=0.6 * BAR, color=style.MEASURED, alpha=0.85, linewidth=0, zorder=2)
+    keys = axes.plot([], [], color=style.MEASURED, linewidth=6, label=panel.bar)
+    for i, row in enumerate(panel.rows):
         key = axes.plot(
-            [row_evidence.predicted_db], [row], "D", markersize=7, markerfacecolor="white", markeredgecolor=style.MESH,
-            markeredgewidth=1.8, zorder=3, label="predicted",
+            [predicted[i]], [i], "D", markersize=7, markerfacecolor="white", markeredgecolor=style.MESH,
+            markeredgewidth=1.8, zorder=3, label=panel.mark,
         )  # fmt: skip
-        keys += key if not row else []
-        against = ("further", style.QUIET) if row_evidence.is_further else ("against", style.FAULT)
-        text, colour = ("for", style.MESH) if row_evidence.speaks_for else against
-        _write_beyond(axes, row, text, colour=colour)
-    keys += axes.plot([], [], color=style.FLOOR, alpha=0.35, linewidth=9, label="structural floor")
+        keys += key if not i else []
+        _write_beyond(axes, i, row.beside, colour=line_colour(row.verdict or 0))
+    keys += axes.plot([], [], color=style.FLOOR, alpha=0.35, linewidth=9, label=panel.band)
     axes.axvline(0.0, color=style.QUIET, linewidth=0.9, zorder=1)
-    reach = float(np.max(np.abs([floors, observed, predicted])))
-    axes.set_xlim(float(np.min([-floors, observed, predicted])) - 0.06 * reach, reach * 1.08)
-    style.label_axes(axes, "change (dB)")
+    axes.set_xlim(panel.limits)
+    style.label_axes(axes, panel.x)
     style.no_offset(axes)
     series.headline(figure, title)
     series.legend_row(figure, keys, left_in=3.6)
     return figure
+
+
+def gap_waterfall_panel(steps: Sequence[GapStep], *, held_out: str = "") -> RowPanel:
+    """Return the gap before, what each effect takes away, and what is left, with 90 % intervals.
+
+    Parameters
+    ----------
+    steps : sequence of GapStep
+        The first is the gap before anything is added.
+    held_out : str
+        What it was scored on; named with the axis.
+
+    Returns
+    -------
+    RowPanel
+        Its span is the structural floor: healthy machines are in it.
+
+    Raises
+    ------
+    InputError
+        Without steps.
+    """
+    if not steps:
+        raise InputError("no steps to draw", allowed="the gap before, and one for each effect")
+    rows = [_total(steps[0].label, steps[0].remaining, 1)]
+    for last, step in pairwise(steps):
+        before, after = last.remaining.value, step.remaining.value
+        sign, colour = ("−", 2) if after <= before else ("+", 1)  # a larger gap in the colour of faults
+        share = abs(100.0 * (1.0 - after / before)) if before > 0 else 0.0
+        size, part = f"{sign}{abs(after - before):.2g}", f"{sign}{share:.0f} % of the gap"
+        ends = (step.remaining.low, step.remaining.high)
+        rows.append(ChartRow(f"with {step.label}", before, after, colour, size, part, colour, ends))
+    if len(steps) > 1:
+        rows.append(_total("what is left", steps[-1].remaining, 0))
+    scored = f", on {held_out}" if held_out else ""
+    limits = 0.0, 1.06 * max(1.2, *(step.remaining.high for step in steps))
+    name = f"gap (structural floors{scored}; 90 % intervals)"
+    return RowPanel(rows, name, "gap", band="structural floor", limits=limits, span=(0.0, 1.0))
+
+
+def _total(name: str, residual: Interval, colour: int) -> ChartRow:
+    ends = (residual.low, residual.high)
+    words = f"{residual.value:.2g}", f"{residual.low:.2g} to {residual.high:.2g}"
+    return ChartRow(name, 0.0, residual.value, colour, *words, interval=ends, is_total=True)
 
 
 def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title: str = "") -> Figure:
@@ -377,9 +447,8 @@ def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title:
     Parameters
     ----------
     steps : sequence of GapStep
-        The first is the gap before anything is added.
     held_out : str
-        What it was scored on; written below the axis.
+        See `gap_waterfall_panel`.
     title : str
 
     Returns
@@ -392,46 +461,33 @@ def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title:
     InputError
         Without steps.
     """
-    if not steps:
-        raise InputError("no steps to draw", allowed="the gap before, and one for each effect")
-    n = len(steps)
-    names = [steps[0].label, *(f"with {step.label}" for step in steps[1:]), *(["what is left"] if n > 1 else [])]
-    figure, axes = _rows(names, left_in=3.0, right_in=1.6, row_in=0.46, top_in=0.4)
+    panel = gap_waterfall_panel(steps, held_out=held_out)
+    figure, axes = _rows([row.name for row in panel.rows], left_in=3.0, right_in=1.6, row_in=0.46, top_in=0.4)
     axes.axvspan(0.0, 1.0, facecolor=style.FLOOR, alpha=0.16, linewidth=0, zorder=0.5)
     axes.axvline(1.0, color=style.FLOOR, linewidth=0.9, zorder=1)
-    _draw_residual(axes, 0, steps[0].remaining, style.FAULT)
-    for row, (last, step) in enumerate(pairwise(steps), start=1):
-        before, after = last.remaining.value, step.remaining.value
-        sign, colour = ("−", style.MESH) if after <= before else ("+", style.FAULT)  # a larger gap in faults' colour
-        _draw_bar(axes, row, before, step.remaining, colour)
-        for x, y in ((before, row - 0.5), (after, row + 0.5)):
+    for i, row in enumerate(panel.rows):
+        colour = line_colour(row.colour)
+        _draw_bar(axes, i, row, colour)
+        _write_beyond(axes, i, row.beside, row.below, colour)
+        if row.is_total:
+            axes.get_yticklabels()[i].set_fontweight("bold")
+            continue
+        for x, y in ((row.start, i - 0.5), (row.end, i + 0.5)):
             ends = [y - 0.5 + BAR / 2, y + 0.5 - BAR / 2]
             axes.plot([x, x], ends, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1.5)
-        share = abs(100.0 * (1.0 - after / before)) if before > 0 else 0.0
-        _write_beyond(axes, row, f"{sign}{abs(after - before):.2g}", f"{sign}{share:.0f} % of the gap", colour)
-    if n > 1:
-        _draw_residual(axes, n, steps[-1].remaining, style.MEASURED)
-    axes.set_xlim(0.0, 1.06 * max(1.2, *(step.remaining.high for step in steps)))
-    scored = f", on {held_out}" if held_out else ""
-    style.label_axes(axes, f"gap (structural floors{scored}; 90 % intervals)", "", title)
+    axes.set_xlim(panel.limits)
+    style.label_axes(axes, panel.x, "", title)
     style.no_offset(axes)
     return figure
 
 
-def _draw_residual(axes: Axes, row: int, residual: Interval, colour: str) -> None:
-    _draw_bar(axes, row, 0.0, residual, colour)
-    _write_beyond(axes, row, f"{residual.value:.2g}", f"{residual.low:.2g} to {residual.high:.2g}")
-    axes.get_yticklabels()[row].set_fontweight("bold")
-
-
-def _draw_bar(axes: Axes, row: int, start: float, residual: Interval, colour: str) -> None:
+def _draw_bar(axes: Axes, at: int, row: ChartRow, colour: str) -> None:
     """Draw a bar up to what is left, and its interval."""
-    low, high = sorted((start, residual.value))
-    wide = [[max(residual.value - residual.low, 0.0)], [max(residual.high - residual.value, 0.0)]]
-    axes.barh(row, high - low, left=low, height=BAR, color=colour, alpha=0.8, linewidth=0, zorder=2)
-    axes.errorbar(
-        [residual.value], [row], xerr=wide, fmt="none", ecolor=style.INK, elinewidth=1.1, capsize=3.5, zorder=3
-    )
+    low, high = sorted((row.start, row.end))
+    bottom, top = row.interval or (row.end, row.end)
+    wide = [[max(row.end - bottom, 0.0)], [max(top - row.end, 0.0)]]
+    axes.barh(at, high - low, left=low, height=BAR, color=colour, alpha=0.8, linewidth=0, zorder=2)
+    axes.errorbar([row.end], [at], xerr=wide, fmt="none", ecolor=style.INK, elinewidth=1.1, capsize=3.5, zorder=3)
 
 
 # --------------------

@@ -128,6 +128,71 @@ class LevelPanel:
     title: str = ""
 
 
+@dataclass(frozen=True)
+class ChartRow:
+    """A bar with its name.
+
+    Parameters
+    ----------
+    name : str
+    start, end : float
+        Of the bar.
+    colour : int or str
+        As of a `ChartLine`.
+    beside, below : str
+        What stands right of the row, and quietly below that.
+    verdict : int or str or None
+        Colour of `beside`; None: that of text.
+    interval : (float, float) or None
+        In which the bar's end lies.
+    mark : float or None
+        What the bar's end is compared with.
+    band : float or None
+        What is nothing yet, to both sides of zero.
+    is_total : bool
+        Whether its bar is a level, not a change.
+    """
+
+    name: str
+    start: float
+    end: float
+    colour: int | str = 0
+    beside: str = ""
+    below: str = ""
+    verdict: int | str | None = None
+    interval: tuple[float, float] | None = None
+    mark: float | None = None
+    band: float | None = None
+    is_total: bool = False
+
+
+@dataclass(frozen=True)
+class RowPanel:
+    """Bars below each other over one axis.
+
+    Parameters
+    ----------
+    rows : sequence of ChartRow
+        At least one.
+    x : str
+        Name of the axis with its unit.
+    bar, mark, band : str
+        What these are.
+    limits : (float, float) or None
+        Of the axis; None: about what is shown.
+    span : (float, float) or None
+        Of the axis, shaded behind all rows: what is nothing yet.
+    """
+
+    rows: Sequence[ChartRow]
+    x: str
+    bar: str = ""
+    mark: str = ""
+    band: str = ""
+    limits: tuple[float, float] | None = None
+    span: tuple[float, float] | None = None
+
+
 def pooled_levels(
     levels: FloatArray, positions: FloatArray, n_columns: int, n_rows: int, *, logarithmic: bool = False
 ) -> tuple[FloatArray, NDArray[np.intp]]:

@@ -361,6 +361,8 @@ class GapFigure:
         Whether it stands beside others.
     vector : bool
         Whether it has few lines.
+    data : RowPanel or AngleCurves or None
+        The numbers of bars and rings, for who draws them to be read off.
     """
 
     question: Question
@@ -370,6 +372,7 @@ class GapFigure:
     of: str = ""
     is_small: bool = False
     vector: bool = False
+    data: plot.RowPanel | AngleCurves | None = None
 
 
 @dataclass(frozen=True)
@@ -512,6 +515,7 @@ def _teeth(report: GapReport) -> Iterator[GapFigure]:
             f"Shaft {curves.shaft}, tooth by tooth: healthy teeth draw a ring, a damaged one stands out.{numbers}",
             f"Energy around one revolution of shaft {curves.shaft}, measured and simulated.",
             is_small=True,
+            data=curves,
         )
 
 
@@ -540,18 +544,21 @@ def _evidence(report: GapReport) -> Iterator[GapFigure]:
                 f"Predicted and observed changes of the own features of {cause.title}.",
                 of=cause.name,
                 vector=True,
+                data=plot.gap_evidence_panel(evidence),
             )
 
 
 def _waterfall(report: GapReport) -> Iterator[GapFigure]:
     if len(report.steps) > 1 and all(is_finite(step) for step in report.steps):
         shrinkage = report.causes[0].shrinkage if report.causes else None
+        held_out = shrinkage.held_out if shrinkage is not None else ""
         yield GapFigure(
             "how far",
-            plot.gap_waterfall_figure(report.steps, held_out=shrinkage.held_out if shrinkage is not None else ""),
+            plot.gap_waterfall_figure(report.steps, held_out=held_out),
             "What each effect takes away. Within the shaded structural floor there is nothing left to explain.",
             "The gap before, what each added effect takes away, and what is left.",
             vector=True,
+            data=plot.gap_waterfall_panel(report.steps, held_out=held_out),
         )
 
 

@@ -60,8 +60,9 @@ def test_run_look_and_download(gap: playwright.Page, tmp_path: Path) -> None:
         settle(gap)
     gap.get_by_role("tab", name="Where").click()
     settle(gap)
-    # Two averages; two spectra against the reference and two against the simulation, each with its gap; two rings.
-    playwright.expect(gap.locator(".figure")).to_have_count(10, timeout=60_000)
+    # Three panels; two averages; two spectra against the reference and two against the simulation, each with its gap;
+    # two rings.
+    playwright.expect(gap.locator(".figure")).to_have_count(13, timeout=60_000)
     playwright.expect(gap.locator(".picture img")).to_have_count(2)
     with gap.expect_download() as waiting:
         button(gap, "Report (HTML)").click()
@@ -71,6 +72,55 @@ def test_run_look_and_download(gap: playwright.Page, tmp_path: Path) -> None:
         button(gap, "JSON").click()
     waiting.value.save_as(tmp_path / "gap.json")
     assert json.loads((tmp_path / "gap.json").read_text())["schema"] == "gearsig.gap"
+
+
+def test_bars_and_rings_are_read_off_and_zoomed(gap: playwright.Page, tmp_path: Path) -> None:
+    button(gap, "Diagnose").click()
+    gap.get_by_role("tab", name="Which").first.wait_for()
+    settle(gap)
+    report = effect_report()
+    which = gap.locator(".st-key-gap-panels .figure").nth(1)
+    assert tip_at(gap, which, 0.3, 0.1).startswith(report.causes[0].title)
+    with gap.expect_download() as waiting:
+        which.get_by_role("button", name="CSV").click()
+    waiting.value.save_as(tmp_path / "which.csv")
+    rows = (tmp_path / "which.csv").read_text().splitlines()
+    assert rows[1].startswith(f'"{report.causes[0].title}",0,{100 * report.causes[0].probability:g}')
+
+    gap.get_by_role("tab", name="Which").click()
+    settle(gap)
+    evidence = report.causes[0].evidence[0]
+    chart = gap.locator("[role=tabpanel] .figure").first
+    said = tip_at(gap, chart, 0.6, 0.1)
+    assert said.splitlines() == [
+        evidence.feature,
+        f"observed: {evidence.observed_db:g} dB",
+        f"predicted: {evidence.predicted_db:g} dB",
+        f"structural floor: ±{evidence.floor_db:g} dB",
+    ]
+    ticks = chart.locator("svg > text").all_inner_texts()
+    box = chart.locator("svg").bounding_box()
+    gap.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 40)
+    gap.mouse.down()
+    gap.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 40, steps=4)
+    gap.mouse.up()
+    settle(gap)
+    assert chart.locator("svg > text").all_inner_texts() != ticks
+
+    gap.get_by_role("tab", name="Where").click()
+    settle(gap)
+    said = tip_at(gap, gap.locator(".picture").first, 0.7, 0.4)
+    assert ": measured " in said
+    assert "dB, simulated " in said
+
+
+def tip_at(page: playwright.Page, figure: playwright.Locator, across: float, down: float) -> str:
+    """Return what is read off a figure, at shares of its width and height."""
+    figure.scroll_into_view_if_needed()
+    box = figure.locator("svg, img").first.bounding_box()
+    page.mouse.move(box["x"] + across * box["width"], box["y"] + down * box["height"])
+    figure.locator(".tip").wait_for()
+    return str(figure.locator(".tip").inner_text())
 
 
 def test_stop_and_start_again(gap: playwright.Page) -> None:

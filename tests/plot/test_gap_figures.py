@@ -15,10 +15,12 @@ from gearsig.plot import (
     AngleMark,
     gap_averages_figure,
     gap_evidence_figure,
+    gap_evidence_panel,
     gap_lines_figure,
     gap_orders_figure,
     gap_teeth_figure,
     gap_waterfall_figure,
+    gap_waterfall_panel,
 )
 from tests.gap.example_report import effect_report, gearless_report
 
@@ -85,6 +87,18 @@ def test_the_waterfall_goes_from_before_to_what_is_left() -> None:
     grown = gap_waterfall_figure((GapStep("a", Interval(1, 1, 1)), GapStep("b", Interval(1.5, 1, 2))))
     assert "+0.5" in texts(grown)
     assert "+50 % of the gap" in texts(grown)
+
+
+def test_panels_say_what_the_figures_draw() -> None:
+    rows = gap_evidence_panel(REPORT.causes[0].evidence).rows
+    assert [(row.end, row.mark, row.band) for row in rows] == [
+        (one.observed_db, one.predicted_db, one.floor_db) for one in REPORT.causes[0].evidence
+    ]
+    assert [row.beside for row in rows] == ["for", "for", "for", "further", "against"]
+    steps = gap_waterfall_panel(REPORT.steps).rows
+    assert [abs(row.end - row.start) for row in steps] == pytest.approx([7.9, 2.3, 4.0, 1.6])
+    assert [row.is_total for row in steps] == [True, False, False, True]
+    assert [row.interval[0] for row in steps[:-1]] == [step.remaining.low for step in REPORT.steps]
 
 
 def test_evidence_stands_beside_its_prediction() -> None:

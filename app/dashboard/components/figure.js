@@ -1,9 +1,10 @@
 // A figure of lines or of a map over one axis. Dragging zooms, and the server is told the range that is looked at, so
 // that it sends the detail of it. Cursors, peak table and export need no server. A plane, of paths and points, is sent
-// whole and zoomed along both axes.
+// whole and zoomed along both axes. Bars with names stand in rows over the axis.
 
 const NS = "http://www.w3.org/2000/svg";
 const LEFT = 74, RIGHT = 16, SCALE = 70, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12;
+const ROW_HEIGHT = 40, NARROW = 460; // of bars in rows
 const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 const TOOLS = { cursor: "Cursor", harmonics: "Harmonics", sidebands: "Sidebands" };
 
@@ -17,6 +18,7 @@ export default function ({ data, parentElement, setStateValue }) {
 class Figure {
   constructor(root) {
     this.root = root;
+    this.left = LEFT;
     this.tool = "";
     this.at = null; // position of the cursor, or of the first harmonic, or of the carrier
     this.step = null; // distance of the sidebands
@@ -174,8 +176,8 @@ class Figure {
 
   // ---------- drawing
 
-  scale(x) { return LEFT + ((x - this.view[0]) / (this.view[1] - this.view[0])) * this.plotWidth; }
-  unscale(px) { return this.view[0] + ((px - LEFT) / this.plotWidth) * (this.view[1] - this.view[0]); }
+  scale(x) { return this.left + ((x - this.view[0]) / (this.view[1] - this.view[0])) * this.plotWidth; }
+  unscale(px) { return this.view[0] + ((px - this.left) / this.plotWidth) * (this.view[1] - this.view[0]); }
   rise(y) {
     const [low, high] = this.limits;
     const share = this.data.log ? Math.log(Math.max(y, 1e-300) / low) / Math.log(high / low) : (y - low) / (high - low);
@@ -193,6 +195,7 @@ class Figure {
     const { data, root } = this, style = getComputedStyle(root);
     this.width = root.clientWidth;
     if (!this.width) return;
+    if (data.rows) return this.drawRows(style);
     this.plotWidth = Math.max(this.width - LEFT - (data.map ? SCALE : RIGHT), 60);
     this.plotHeight = data.height;
     const named = this.placed();
@@ -220,6 +223,66 @@ class Figure {
     if (data.map) this.drawScale();
     this.selection = add(inside, "rect", { y: this.top, height: this.plotHeight, width: 0, fill: this.ink, opacity: 0.12 });
     this.drawPeaks();
+  }
+
+  // Bars below each other, with names left of them, or above them where there is little room; what they come to beside.
+  drawRows(style) {
+    const { data, svg } = this, isAbove = data.above || this.width < NARROW, beside = 16 + Math.max(...data.rows.map((row) => Math.max(7.8 * row.beside.length, 6.8 * row.below.length)));
+    this.ink = style.getPropertyValue("--ink").trim() || style.color;
+    this.rule = style.getPropertyValue("--rule").trim() || "#8884";
+    this.left = isAbove ? 8 : Math.min(0.42 * this.width, 14 + 6.6 * Math.max(...data.rows.map((row) => row.name.length)));
+    this.plotWidth = Math.max(this.width - this.left - beside, 60);
+    this.top = 6;
+    this.rowHeight = ROW_HEIGHT + (isAbove ? 8 : 0);
+    this.plotHeight = this.rowHeight * data.rows.length;
+    const bottom = this.top + this.plotHeight, right = this.left + this.plotWidth, height = bottom + BOTTOM, quiet = { fill: this.ink, opacity: 0.75 };
+    svg.replaceChildren();
+    set(svg, { width: this.width, height, viewBox: `0 0 ${this.width} ${height}`, "font-family": "system-ui, sans-serif", "font-size": 12, "aria-label": data.alternative });
+    const clip = `clip${Math.random().toString(36).slice(2)}`;
+    add(add(add(svg, "defs"), "clipPath", { id: clip }), "rect", { x: this.left, y: this.top, width: this.plotWidth, height: this.plotHeight });
+    const inside = add(svg, "g", { "clip-path": `url(#${clip})` });
+    const box = (low, high, y, tall, looks) => add(inside, "rect", { x: this.scale(Math.min(low, high)), width: Math.abs(this.scale(high) - this.scale(low)), y, height: tall, ...looks });
+    if (data.span) box(...data.span, this.top, this.plotHeight, { fill: data.quiet, opacity: 0.18 });
+    for (const value of ticks(...this.view, this.plotWidth / 75)) {
+      const x = this.scale(value);
+      add(svg, "line", { x1: x, x2: x, y1: this.top, y2: bottom + 5, stroke: this.rule });
+      text(svg, x, bottom + 18, plain(value, ...this.view), { ...quiet, "text-anchor": "middle" });
+    }
+    add(svg, "line", { x1: this.left, x2: right, y1: bottom, y2: bottom, stroke: this.ink, opacity: 0.5 });
+    const middle = Math.max(Math.min(this.left + this.plotWidth / 2, this.width - 3.4 * data.x.length), 3.4 * data.x.length);
+    text(svg, middle, bottom + 37, data.x, { ...quiet, "text-anchor": "middle" });
+    add(inside, "line", { x1: this.scale(0), x2: this.scale(0), y1: this.top, y2: bottom, stroke: this.ink, opacity: 0.5 });
+    data.rows.forEach((row, i) => {
+      const y = this.top + i * this.rowHeight, tall = isAbove ? 13 : 18, at = y + (isAbove ? 27 : (this.rowHeight - tall) / 2), centre = at + tall / 2;
+      const bold = row.strong ? { "font-weight": 600 } : {};
+      if (isAbove) text(svg, this.left, y + 19, cut(row.name, (this.width - this.left) / 6.3), { fill: this.ink, ...bold });
+      else {
+        const lines = wrapped(row.name, (this.left - 14) / 6.3);
+        lines.forEach((line, k) => text(svg, this.left - 8, centre + 4 + 14 * (k - (lines.length - 1) / 2), line, { fill: this.ink, "text-anchor": "end", ...bold }));
+      }
+      if (row.band !== null) box(-row.band, row.band, at - 6, tall + 12, { fill: data.quiet, opacity: 0.24 });
+      box(row.start, row.end, at, tall, { fill: row.colour, opacity: 0.85, rx: 2 });
+      if (row.interval) {
+        const [low, high] = row.interval.map((end) => this.scale(Math.min(Math.max(end, this.view[0] - 1), this.view[1] + 1)));
+        add(inside, "path", { d: `M${low},${centre}H${high}M${low},${centre - 4}v8M${high},${centre - 4}v8`, stroke: this.ink, fill: "none", "stroke-width": 1.2 });
+      }
+      if (row.mark !== null) add(inside, "path", { d: `M${this.scale(row.mark)},${centre - 6}l6,6l-6,6l-6,-6z`, fill: style.getPropertyValue("--paper").trim() || "#fff", stroke: data.mark_colour, "stroke-width": 2 });
+      if (row.beside) text(svg, right + 8, centre + (row.below ? -2 : 4), row.beside, { fill: row.verdict ?? this.ink, "font-weight": 600 });
+      if (row.below) text(svg, right + 8, centre + 13, row.below, quiet);
+    });
+    this.selection = add(inside, "rect", { y: this.top, height: this.plotHeight, width: 0, fill: this.ink, opacity: 0.12 });
+    this.drawPeaks();
+  }
+
+  // What a row says, with its unit.
+  rowWords(row) {
+    const { data } = this, unit = ` ${data.x_unit}`, said = [row.name];
+    const isChange = row.start !== 0;
+    said.push(`${data.bar}: ${isChange ? `${figure(row.start)} → ` : ""}${figure(row.end)}${unit}`);
+    if (row.interval) said.push(`90 % interval: ${figure(row.interval[0])} to ${row.interval[1] < 1e299 ? figure(row.interval[1]) : "any"}${unit}`);
+    if (row.mark !== null) said.push(`${data.mark}: ${figure(row.mark)}${unit}`);
+    if (row.band !== null) said.push(`${data.band}: ±${figure(row.band)}${unit}`);
+    return said;
   }
 
   ownLimits() {
@@ -354,11 +417,15 @@ class Figure {
 
   position(event) {
     const x = event.offsetX;
-    return x < LEFT || x > LEFT + this.plotWidth ? null : this.unscale(x);
+    return x < this.left || x > this.left + this.plotWidth ? null : this.unscale(x);
   }
 
   hover(event) {
     const x = this.position(event), { data } = this;
+    if (data.rows) {
+      const row = data.rows[Math.floor((event.offsetY - this.top) / this.rowHeight)];
+      return this.showTip(row && event.offsetY >= this.top ? this.rowWords(row) : null, event);
+    }
     if (x === null || event.offsetY < this.top || event.offsetY > this.top + this.plotHeight) return this.showTip(null);
     this.svg.style.cursor = this.held(x) ? "ew-resize" : "crosshair";
     const near = (4 / this.plotWidth) * (this.view[1] - this.view[0]), lines = [];
@@ -456,6 +523,13 @@ class Figure {
         entry.append(key, line.name);
         left.append(entry);
       }
+    for (const [name, colour] of this.keys()) {
+      const key = html("i");
+      key.style.background = colour;
+      const entry = html("span", "key");
+      entry.append(key, name);
+      left.append(entry);
+    }
     if (this.data.has_tools) {
       for (const [tool, label] of Object.entries(TOOLS).slice(0, this.data.dates ? 1 : 3)) // no harmonics of a date
         right.append(button(label, () => this.choose(tool), `${label}: drag it along, or use the arrow keys${tool === "sidebands" ? ", with Shift for their distance" : ""}`, this.tool === tool));
@@ -465,6 +539,13 @@ class Figure {
     right.append(button("Whole", () => this.look(this.whole, null), "Show all of it (double click, or key 0)"));
     for (const kind of ["PNG", "SVG", "CSV"]) right.append(button(kind, () => this.save(kind), `Save what is shown as ${kind}`));
     this.bar.replaceChildren(left, right);
+  }
+
+  // Of bars beside what they are compared with.
+  keys() {
+    const { data } = this;
+    if (!data.rows || !data.mark) return [];
+    return [[data.bar, data.rows[0].colour], [data.mark, data.mark_colour], [data.band, data.quiet]];
   }
 
   async save(kind) {
@@ -485,6 +566,11 @@ class Figure {
 
   csv() {
     const { data } = this, quoted = (value) => `"${String(value).replaceAll('"', '""').replace(/^[=+\-@]/, "'$&")}"`;
+    if (data.rows) {
+      const named = ["row", "from", data.x, "low end", "high end", data.mark || "mark", data.band || "band"];
+      const line = ({ name, start, end, interval, mark, band }) => [quoted(name), start, end, interval?.[0] ?? "", interval?.[1] ?? "", mark ?? "", band ?? ""];
+      return [named.map(quoted), ...data.rows.map(line)].map((row) => row.join(",")).join("\n");
+    }
     if (data.map) {
       const { map } = data, [low, high] = map.span, rows = [[data.x, data.y, map.unit].map(quoted)];
       for (let i = 0; i < this.levels.length; i++) {
@@ -531,6 +617,15 @@ function text(parent, x, y, words, looks) {
   made.textContent = words;
   return made;
 }
+
+// Two lines at most, the second cut where it must be.
+function wrapped(words, n) {
+  if (words.length <= n) return [words];
+  const at = words.lastIndexOf(" ", n), first = at > 0 ? at : Math.floor(n);
+  return [words.slice(0, first), cut(words.slice(first).trim(), n)];
+}
+
+const cut = (words, n) => (words.length <= n ? words : `${words.slice(0, Math.max(Math.floor(n) - 1, 1))}…`);
 
 function bytes(packed) {
   return Uint8Array.from(atob(packed ?? ""), (letter) => letter.charCodeAt(0));

@@ -33,7 +33,7 @@ class Picture {
   update(data) {
     const isNew = this.data?.svg !== data.svg;
     this.data = data;
-    this.values = data.ring && new Float64Array(Uint8Array.from(atob(data.ring.values), (letter) => letter.charCodeAt(0)).buffer);
+    this.curves = data.ring?.curves.map(({ name, values }) => [name, new Float64Array(Uint8Array.from(atob(values), (letter) => letter.charCodeAt(0)).buffer)]);
     this.image.classList.toggle("turned", data.turned);
     this.frame.setAttribute("aria-label", data.words);
     if (isNew) {
@@ -128,15 +128,16 @@ class Picture {
     for (const kind of ["pointerup", "pointercancel"]) this.frame.addEventListener(kind, stop);
   }
 
-  // Of a ring: angle, tooth and value under the pointer.
+  // Of a ring: angle, tooth and values under the pointer.
   read(event) {
     const { ring } = this.data;
     if (!ring) return;
     const [x, y] = this.at(event), [left, right, top, bottom] = this.whole;
     const turn = Math.atan2(x - (left + right) / 2, (top + bottom) / 2 - y) / (2 * Math.PI), share = turn < 0 ? turn + 1 : turn;
-    const value = this.values[Math.floor(share * this.values.length)];
+    const number = (value) => `${String(Number(value.toPrecision(4))).replace("-", "−")} ${ring.unit}`.trimEnd();
+    const values = this.curves.map(([name, curve]) => `${name ? `${name} ` : ""}${number(curve[Math.floor(share * curve.length)])}`);
     const tooth = ring.teeth ? `, tooth ${Math.floor(share * ring.teeth) + 1}` : "";
-    this.tip.textContent = `${(360 * share).toFixed(1)}°${tooth}: ${String(Number(value.toPrecision(4))).replace("-", "−")} ${ring.unit}`.trimEnd();
+    this.tip.textContent = `${(360 * share).toFixed(1)}°${tooth}: ${values.join(", ")}`;
     this.tip.hidden = event.buttons > 0;
     const isRight = event.offsetX > this.frame.clientWidth / 2;
     Object.assign(this.tip.style, { left: isRight ? "" : `${event.offsetX + 14}px`, right: isRight ? `${this.frame.clientWidth - event.offsetX + 14}px` : "", top: `${event.offsetY + 10}px` });

@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from hashlib import sha256
-from html import escape
 from math import isfinite
 from pathlib import Path
 from typing import IO, Any
@@ -21,15 +20,17 @@ import streamlit as st
 import gearsig.gap
 from app.dashboard import address, state
 from app.dashboard.gap.choice import Choice, files_of
-from app.dashboard.theme import as_typed, capitalised, one_line
+from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import (
     QUIET,
+    Ring,
     download,
     looked_at,
     offer_page,
     show_differences,
     show_lines,
     show_picture,
+    show_rows,
 )
 from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.verdict import Colour
@@ -38,6 +39,7 @@ from gearsig.cache import cache_folder, keep
 from gearsig.errors import GearsigError
 from gearsig.formatting import odds_text, percent
 from gearsig.gap import (
+    AngleCurves,
     AverageCurves,
     GapOutcome,
     GapReport,
@@ -46,7 +48,7 @@ from gearsig.gap import (
     gap_by_order,
     is_beyond,
 )
-from gearsig.plot import ChartLine, LinePanel, figure_svg, with_unit
+from gearsig.plot import ChartLine, ChartRow, LinePanel, RowPanel, figure_svg, with_unit
 from gearsig.report import (
     CHECK_FIRST,
     CauseRow,
@@ -305,32 +307,43 @@ TAB = "gap tab"
 def _show_panels(report: GapReport) -> None:
     """Show where, which and how far side by side, each as bars with its sentence, and the way to all of it."""
     said = dict(verdict_rows(report))
-    places = [(place.title, place.share, percent(place.share)) for place in report.places if isfinite(place.share)]
+    places = [
+        ChartRow(place.title, 0.0, 100.0 * place.share, beside=percent(place.share))
+        for place in report.places
+        if isfinite(place.share)
+    ]
     causes = [
-        (cause.title, cause.probability, odds_text(cause.probability))
+        ChartRow(cause.title, 0.0, 100.0 * cause.probability, beside=odds_text(cause.probability))
         for cause in report.causes
         if cause.probability >= LEAST
     ]
-    largest = max((step.remaining.value for step in report.steps), default=1.0) or 1.0
     steps = [
-        (step.label if i == 0 else f"+ {step.label}", step.remaining.value / largest, f"{step.remaining.value:.2g}")
+        ChartRow(
+            f"+ {step.label}" if i else step.label, 0.0, step.remaining.value,
+            beside=f"{step.remaining.value:.2g}", interval=(step.remaining.low, step.remaining.high),
+        )
         for i, step in enumerate(report.steps)
-    ]
-    about = {
-        "Where": "Share of the gap.",
-        "Which": "Probability.",
-        "How far": "Left of the whole gap, in structural floors. One is how far healthy machines differ from their "
-        "simulation or from their own reference.",
+    ]  # fmt: skip
+    share = (0.0, 105.0)
+    panels = {
+        "Where": RowPanel(places[:N_BARS], "share of the gap (%)", "share", limits=share),
+        "Which": RowPanel(causes[:N_BARS], "probability (%)", "probability", limits=share),
+        "How far": RowPanel(
+            steps[:N_BARS], "left of the gap (structural floors)", "left", limits=_reach(steps), span=(0.0, 1.0)
+        ),
     }
+    about = {"How far": "One floor, shaded, is how far healthy machines differ from their simulation or reference."}
     columns = st.container(key="gap-panels").columns(3)
-    for column, title, rows in zip(columns, TABS, (places, causes, steps), strict=False):
+    for column, (title, panel) in zip(columns, panels.items(), strict=True):
         with column.container(border=True, height="stretch"):
             st.button(
                 title, key=f"gap panel {title}", type="tertiary", icon=":material/zoom_in:",
                 on_click=_open_tab, args=(title,),
             )  # fmt: skip
-            if rows:
-                st.html(bars_html(rows[:N_BARS]))
+            if panel.rows:
+                words = "; ".join(f"{row.name}: {row.beside}" for row in panel.rows)
+                show_rows(panel, f"gap {title.lower()} panel", words, has_names_above=True)
+            if panel.rows and title in about:
                 st.caption(about[title])
             st.markdown(as_typed(said.get(title, "")))
     if said.get("Next"):
@@ -341,14 +354,9 @@ def _open_tab(title: str) -> None:
     st.session_state[TAB] = title
 
 
-def bars_html(rows: Sequence[tuple[str, float, str]]) -> str:
-    """Return a small table of bars: name, share from 0 to 1, what stands beside it; names may come from files."""
-    lines = (
-        f"<tr><td>{escape(one_line(name))}</td><td>{escape(text)}</td></tr>"
-        f'<tr class="bar"><td colspan="2"><i style="width:{100.0 * min(max(share, 0.0), 1.0):.1f}%"></i></td></tr>'
-        for name, share, text in rows
-    )
-    return f'<table class="bars">{"".join(lines)}</table>'
+def _reach(steps: Sequence[ChartRow]) -> tuple[float, float]:
+    ends = [end for row in steps for end in (row.end, *(row.interval or ())) if isfinite(end)]
+    return 0.0, 1.06 * max([1.2, *ends])
 
 
 def _show_remarks(report: GapReport) -> None:
@@ -543,8 +551,20 @@ def _show_figures(finished: Finished, question: Question) -> None:
 
 def _show_figure(finished: Finished, one: GapFigure) -> None:
     number = finished.figures.index(one)
-    show_picture(finished.picture(number), one.figure, one.shows, f"gap-{number} of {finished.key}")
+    key = f"gap-{number} of {finished.key}"
+    if isinstance(one.data, RowPanel):
+        show_rows(one.data, key, one.shows)
+    else:
+        ring = None if one.data is None else ring_of(one.data)
+        show_picture(finished.picture(number), one.figure, one.shows, key, ring=ring)
     st.caption(as_typed(one.look))
+
+
+def ring_of(curves: AngleCurves) -> Ring:
+    """Return levels of teeth, in dB over the measured median tooth, to be read off around the circle."""
+    named = {"measured": curves.measured, "simulated": curves.before, "with the effect": curves.after}
+    levels = {name: 10.0 * np.log10(np.maximum(energy, 1e-6)) for name, energy in named.items() if len(energy)}
+    return Ring(levels, curves.teeth if curves.has_mark else 0, "dB")
 
 
 def _table(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from base64 import b64encode
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -29,6 +29,7 @@ from gearsig.plot import (
     Cursor,
     LevelPanel,
     LinePanel,
+    RowPanel,
     figure_svg,
     figure_table,
     importance,
@@ -299,6 +300,66 @@ def show_map(
     _figure(key=key, data=data, on_range_change=partial(_take_zoom, key), default={"range": None})
 
 
+def show_rows(panel: RowPanel, key: str, words: str, *, has_names_above: bool = False) -> None:
+    """Show bars below each other, to be zoomed along their axis and read off.
+
+    Parameters
+    ----------
+    panel : RowPanel
+    key : str
+        Of the widget, unique on the page.
+    words : str
+        What it shows, for those who do not see it.
+    has_names_above : bool
+        Whether names stand above their bars, not left of them: where there is little room.
+    """
+    ends = [
+        end
+        for row in panel.rows
+        for end in (row.start, row.end, *(row.interval or ()), *((row.mark,) if row.mark is not None else ()))
+        if np.isfinite(end)
+    ]
+    whole = panel.limits or padded_limits([np.array(ends)])
+    shown = looked_at(key, whole)
+    rows = [
+        {
+            "name": one_line(row.name),
+            "start": row.start,
+            "end": row.end,
+            "colour": _shown_colour(row.colour),
+            "beside": row.beside,
+            "below": row.below,
+            "verdict": None if row.verdict is None else _shown_colour(row.verdict),
+            "interval": None if row.interval is None else [min(max(end, -1e300), 1e300) for end in row.interval],
+            "mark": row.mark,
+            "band": row.band,
+            "strong": row.is_total,
+        }
+        for row in panel.rows
+    ]
+    data = {
+        "rows": rows,
+        "above": has_names_above,
+        "span": panel.span,
+        "bar": panel.bar,
+        "mark": panel.mark,
+        "band": panel.band,
+        "mark_colour": _shown_colour(2),
+        "quiet": palette().quiet,
+        "lines": [],
+        "cursors": [],
+        "marked": [],
+        "x": one_line(panel.x),
+        "y": "",
+        "x_unit": re.split("[,;]", _unit_of(panel.x))[0],
+        "shown": list(shown),
+        "whole": list(whole),
+        "name": file_stem(key),
+        "alternative": one_line(words),
+    }
+    _figure(key=key, data=data, on_range_change=partial(_take_zoom, key), default={"range": None})
+
+
 def _described(
     panel: LinePanel | LevelPanel,
     key: str,
@@ -331,17 +392,23 @@ def _unit_of(label: str) -> str:
 
 def _sent(line: ChartLine, shown: tuple[float, float] | None, *, alone: bool = True) -> dict[str, object]:
     """Return a line as the component takes it, whole where `shown` is None; pale bands would hide other spectra."""
-    colours, colour = palette(), line.colour
-    cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
-    if isinstance(colour, int):
-        colour = colours.quiet if colour == QUIET else cycle[colour % len(cycle)]
-    elif is_dark():
-        on_paper = np.frombuffer(bytes.fromhex(colour.removeprefix("#")), np.uint8) / 255
-        colour = "#" + (255 * turned_over(on_paper)).astype(np.uint8).tobytes().hex()
     x, y, *band = (line.x, line.y) if shown is None else _columns(line, shown)
     band = band if alone or line.band is not None else []
     curves = {name: packed(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
+    colour = _shown_colour(line.colour)
     return {"name": one_line(line.name), "colour": colour, "dotted": line.dotted, "dots": line.dots, **curves}
+
+
+def _shown_colour(colour: int | str) -> str:
+    """Return a line's colour, see `ChartLine`, on the user's page."""
+    colours = palette()
+    cycle = (colours.measured, colours.fault, *(colours.cursors[kind] for kind in ("mesh", "bearing", "shaft")))
+    if isinstance(colour, int):
+        return colours.quiet if colour == QUIET else cycle[colour % len(cycle)]
+    if not is_dark():
+        return colour
+    on_paper = np.frombuffer(bytes.fromhex(colour.removeprefix("#")), np.uint8) / 255
+    return "#" + (255 * turned_over(on_paper)).astype(np.uint8).tobytes().hex()
 
 
 def packed(values: FloatArray) -> str:
@@ -390,7 +457,7 @@ BRIGHTEST = 0.93
 HALF_TURN = np.array([[-0.574, 1.430, 0.144], [0.426, 0.430, 0.144], [0.426, 1.430, -0.856]])
 
 
-def show_picture(svg: str, figure: PictureFigure, words: str, key: str) -> None:
+def show_picture(svg: str, figure: PictureFigure, words: str, key: str, *, ring: Ring | None = None) -> None:
     """Show a figure that no panel can show, to be zoomed, and offer it as files.
 
     Parameters
@@ -403,8 +470,10 @@ def show_picture(svg: str, figure: PictureFigure, words: str, key: str) -> None:
         What it shows, for those who do not see it.
     key : str
         Unique on the page.
+    ring : Ring or None
+        See `show_svg`.
     """
-    show_svg(svg, words, key, turned=is_dark())
+    show_svg(svg, words, key, turned=is_dark(), ring=ring)
     offer_picture(svg, lambda: figure, key)
 
 
@@ -435,7 +504,12 @@ def show_svg(svg: str, words: str, key: str, *, turned: bool = False, ring: Ring
         "words": one_line(words),
         "turned": turned,
         "shown": ends if len(ends) == 4 else None,
-        "ring": None if ring is None else {"values": packed(ring.values), "teeth": ring.teeth, "unit": ring.unit},
+        "ring": ring
+        and {
+            "curves": [{"name": name, "values": packed(values)} for name, values in ring.curves.items()],
+            "teeth": ring.teeth,
+            "unit": ring.unit,
+        },
     }
     _picture(key=key, data=data, on_range_change=partial(_take_zoom, key), default={"range": None})
 
@@ -445,9 +519,9 @@ _VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
 
 @dataclass(frozen=True)
 class Ring:
-    """Values over one revolution, clockwise from the top; `teeth` is 0 where they are not known."""
+    """Name → values over one revolution, clockwise from the top; `teeth` is 0 where they have no numbers."""
 
-    values: FloatArray
+    curves: Mapping[str, FloatArray]
     teeth: int
     unit: str
 

@@ -234,7 +234,7 @@ def show_ring(
     svg = svg_ring(average, n_teeth=n_teeth, marks=marks, ink=colours.quiet, line=colours.measured)
     # a place for each pixel of the ring, not for each sample
     values = average.values[:: max(len(average.values) // N_COLUMNS, 1)]
-    show_svg(svg, words, key, ring=Ring(values, n_teeth or 0, unit_text(average.unit)))
+    show_svg(svg, words, key, ring=Ring({"": values}, n_teeth or 0, unit_text(average.unit)))
     return svg
 
 
