@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
+from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
 
-from tests.browser.conftest import CHROMIUM, settle, soon
+from gearsig.diagnosis import Outcome
+from gearsig.indicators import Indicator
+from gearsig.report import Entry, write_index
+from tests.browser.conftest import CHROMIUM, FLAGS, settle, soon
 
 PAGES = ("", "analysis?sample=damaged_tooth", "laboratory", "flexible", "compare", "gap", "fleet")
 BROKEN = {"name": "broken.mat", "mimeType": "", "buffer": b"\x80\x04\x95 pickle"}
@@ -163,3 +168,21 @@ def test_a_page_of_the_navigation_bar_is_one_step_of_the_history(page: playwrigh
     page.go_back()
     page.get_by_role("button", name="Open the recording").first.wait_for()
     assert page.url == begun
+
+
+def test_an_index_of_recordings_with_dates_fits_a_narrow_window(tmp_path: Path) -> None:
+    kinds = {"FM4": "", "kurtosis": "", "sideband index": "m/s^2"}
+    indicators = tuple(Indicator(name, 3.21, unit, "a1") for name, unit in kinds.items())
+    names = ("gearbox_north_2026-11-28.csv.gz", "gearbox_south_2026-11-27.csv.gz")
+    entries = [Entry(name, "a.html", Outcome.FAULT, "", "A verdict of a few words.", 0.93, 41.2) for name in names]
+    machine = "Workshop gearbox, outer-race defect"
+    filled = [replace(entry, indicators=indicators, machine=machine) for entry in entries]
+    write_index(filled, path=tmp_path / "index.html")
+    assert "2026-11-28</td>" in (tmp_path / "index.html").read_text("utf-8")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        view = browser.new_page(viewport={"width": 800, "height": 900})
+        view.goto((tmp_path / "index.html").as_uri())
+        widths = "[...document.querySelectorAll('html, .scroll')].map(e => e.scrollWidth - e.clientWidth)"
+        assert set(view.evaluate(widths)) == {0}
+        browser.close()
