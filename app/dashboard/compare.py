@@ -25,6 +25,7 @@ from app.dashboard.widgets.charts import (
 from app.dashboard.widgets.chooser import FILE, SAMPLE, choose_file, choose_number, choose_sample, simulated_file
 from app.dashboard.widgets.messages import show_warnings
 from app.dashboard.widgets.spectrum import show_spectrum
+from app.dashboard.widgets.tables import show_table
 from app.dashboard.work import kept
 from gearsig.comparison import (
     ALIGN,
@@ -443,18 +444,18 @@ def _show_lines(comparison: Comparison, channel: ChannelComparison) -> None:
     del comparison
     unit = f" re 1 {unit_text(channel.unit)}" if channel.unit else ""
     shown = [line for line in (*channel.lines, *channel.other_lines) if line.is_seen]
-    st.dataframe(
+    show_table(
         {
             "line": [line.label for line in shown],
             "order": [line.order for line in shown],
-            f"recorded (dB{unit})": [round(line.level.recorded_db, 1) for line in shown],
-            f"simulated (dB{unit})": [round(line.level.simulated_db, 1) for line in shown],
-            "difference (dB)": [round(line.level.difference_db, 1) for line in shown],
-            "±": [round(2 * line.level.repeatability_db, 1) for line in shown],
+            f"recorded (dB{unit})": [line.level.recorded_db for line in shown],
+            f"simulated (dB{unit})": [line.level.simulated_db for line in shown],
+            "difference (dB)": [line.level.difference_db for line in shown],
+            "±": [2 * line.level.repeatability_db for line in shown],
             "remark": [missing_words(line) or ("" if line.level.is_beyond else "within the scatter") for line in shown],
         },
-        hide_index=True,
+        formats={"order": ".6g"},
+        number=".1f",
         width="stretch",
-        column_config={"order": st.column_config.NumberColumn(format="%.6g")},
     )
     st.caption("Levels are rms. ± is twice the standard error that follows from the halves of both records.")

@@ -18,6 +18,7 @@ from app.dashboard.state import ChosenFile
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import QUIET, padded_limits, show_lines
 from app.dashboard.widgets.chooser import open_file
+from app.dashboard.widgets.tables import show_table
 from app.dashboard.widgets.verdict import COLOURS
 from app.dashboard.work import kept
 from app.samples import EXAMPLE_PATTERN, write_example_fleet
@@ -209,7 +210,7 @@ def _show_point(fleet: Fleet, row: Row) -> None:
         over = _choose_over(fleet.recordings(machine, point))
         (_show_trend if over == "date" else partial(_show_over, over=over))(fleet, row)
         with st.expander(f"All {len(series)} indicators, the worst first", icon=":material/table:"):
-            st.dataframe(_series_table(series), hide_index=True)
+            show_table(_series_table(series))
     _show_recordings(fleet.recordings(machine, point).iloc[::-1])
 
 

@@ -5,6 +5,7 @@ from base64 import b64decode
 
 import numpy as np
 import pytest
+from streamlit.dataframe_util import convert_arrow_bytes_to_pandas_df
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
@@ -389,7 +390,7 @@ def test_a_zoomed_ring_of_teeth_is_kept_in_the_address_and_reads_off_its_values(
     (ring,) = pictures(page)
     assert ring["shown"] is None
     assert ring["ring"]["teeth"] == 29
-    values = numbers(ring["ring"]["values"])
+    values = numbers(ring["ring"]["curves"][0]["values"])
     tooth = 1 + int(29 * np.argmax(np.abs(values)) / len(values))
     assert tooth == 12
     key = key_of("ring of a1 input residual")
@@ -397,3 +398,14 @@ def test_a_zoomed_ring_of_teeth_is_kept_in_the_address_and_reads_off_its_values(
     page.run()
     assert pictures(page)[0]["shown"] == [200.0, 300.0, 100.0, 200.0]
     assert page.query_params["zoom"].endswith("_200_300_100_200")
+
+
+def test_numbers_of_tables_have_a_minus_sign_and_are_sorted_by_what_they_are() -> None:
+    page = opened(tab="Indicators")
+    table = page.dataframe[0]
+    written = convert_arrow_bytes_to_pandas_df(table.proto.arrow_data.styler.display_values)
+    changes = table.value["change (dB)"]
+    assert changes.dtype.kind == "f"
+    for value, text in zip(changes, written["change (dB)"], strict=True):
+        assert text == ("" if np.isnan(value) else f"{value:+.1f}".replace("-", "−"))
+    assert (changes < 0).any()

@@ -13,6 +13,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
+from app.dashboard.methods import crack
 from app.dashboard.methods.page import OVER_TIME, table_csv, waveforms_file
 from gearsig.methods import METHODS, TRANSFORMS, Waveforms, by_centre
 from gearsig.recording import read_recording
@@ -423,13 +424,18 @@ def test_wavelet_packets_share_the_energy_and_add_up_to_the_signal() -> None:
     assert len(page.error) == 1
 
 
-def test_the_reference_may_be_an_own_file() -> None:
+def test_the_reference_may_be_an_own_file_of_a_rate_that_is_stated(monkeypatch: pytest.MonkeyPatch) -> None:
     page = choose(opened_at("Crack severity", "root_crack_3mm"), "Reference", "Own file")
     healthy = SAMPLES["root_crack_0mm"].recording
     uploader = next(w for w in page.file_uploader if w.label == "Recording of the healthy gears")
     uploader.upload(healthy.name, healthy.read_bytes())
     page.run()
     assert "tooth 21" in page.error[0].value
+    asked = []
+    read = crack.recorded
+    monkeypatch.setattr(crack, "recorded", lambda request, *more: asked.append(request) or read(request, *more))
+    labelled(page, "number_input", "Its sampling rate (Hz)").set_value(20480.0).run()
+    assert [request.sampling_rate_hz for request in asked] == [20480.0]
 
 
 def test_what_crack_severity_cannot_tell_is_said() -> None:

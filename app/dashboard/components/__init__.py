@@ -1,4 +1,7 @@
-"""Components in plain JavaScript, one file each with its style: what Streamlit has no widget for."""
+"""Components in plain JavaScript, one file each with its style: what Streamlit has no widget for.
+
+They share `numbers.js`.
+"""
 
 from __future__ import annotations
 
@@ -14,5 +17,5 @@ if TYPE_CHECKING:
 def component_of(name: str) -> ComponentRenderer:
     """Return the component of `name`.js and `name`.css, which draws into an element of that class."""
     folder = Path(__file__).parent
-    css, js = ((folder / f"{name}.{ending}").read_text("utf-8") for ending in ("css", "js"))
-    return component(f"gearsig.{name}", html=f'<div class="{name}"></div>', css=css, js=js)
+    css, numbers, js = ((folder / file).read_text("utf-8") for file in (f"{name}.css", "numbers.js", f"{name}.js"))
+    return component(f"gearsig.{name}", html=f'<div class="{name}"></div>', css=css, js=numbers + js)

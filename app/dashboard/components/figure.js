@@ -462,7 +462,7 @@ class Figure {
     const level = map.low + (this.levels[row * map.columns + column] / 255) * (map.high - map.low);
     const y = this.ofShare(share);
     const also = map.also ? `, ${figure(map.also[row])} ${map.also_unit}` : "";
-    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}: ${level.toFixed(digits(map)).replace("-", "−")} ${map.unit}`;
+    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}: ${withMinus(level.toFixed(digits(map)))} ${map.unit}`;
   }
 
   showTip(lines, event) {
@@ -597,7 +597,7 @@ const range = (low, high) => Array.from({ length: high - low + 1 }, (_, i) => lo
 const same = (a, b) => a.length === b.length && a.every((value, i) => Math.abs(value - b[i]) <= 1e-9 * Math.abs(a[i | 1] - a[i & ~1]) + 1e-15);
 // A number as files have it, and as it is read: with the sign of minus that axes have.
 const exact = (value) => String(Number(value.toPrecision(6)));
-const figure = (value) => exact(value).replaceAll("-", "−");
+const figure = (value) => withMinus(exact(value));
 // Decimals that tell a map's colours apart.
 const digits = ({ low, high }) => Math.min(Math.max(Math.ceil(2 - Math.log10(high - low)), 1), 9);
 // A number beside a logarithmic axis; as a power of ten where some of them are far from one, then all of them.
@@ -673,8 +673,8 @@ function decades(low, high) {
 function plain(value, low, high) {
   const span = Math.abs(high - low), digits = Math.min(Math.max(Math.ceil(1 - Math.log10(span)) + 1, 0), 9);
   const largest = Math.max(Math.abs(low), Math.abs(high));
-  if (largest < 1e-3 || largest >= 1e6) return String(Number(value.toPrecision(4)).toExponential()).replace("e+0", "");
-  return String(Number(value.toFixed(digits))).replace("-", "−");
+  if (largest < 1e-3 || largest >= 1e6) return withMinus(Number(value.toPrecision(4)).toExponential().replace("e+0", ""));
+  return withMinus(Number(value.toFixed(digits)));
 }
 
 function give(blob, name) {

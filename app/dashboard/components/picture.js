@@ -134,7 +134,7 @@ class Picture {
     if (!ring) return;
     const [x, y] = this.at(event), [left, right, top, bottom] = this.whole;
     const turn = Math.atan2(x - (left + right) / 2, (top + bottom) / 2 - y) / (2 * Math.PI), share = turn < 0 ? turn + 1 : turn;
-    const number = (value) => `${String(Number(value.toPrecision(4))).replace("-", "−")} ${ring.unit}`.trimEnd();
+    const number = (value) => `${withMinus(Number(value.toPrecision(4)))} ${ring.unit}`.trimEnd();
     const values = this.curves.map(([name, curve]) => `${name ? `${name} ` : ""}${number(curve[Math.floor(share * curve.length)])}`);
     const tooth = ring.teeth ? `, tooth ${Math.floor(share * ring.teeth) + 1}` : "";
     this.tip.textContent = `${(360 * share).toFixed(1)}°${tooth}: ${values.join(", ")}`;

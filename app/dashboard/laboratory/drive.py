@@ -21,6 +21,7 @@ from app.dashboard.laboratory.setup import (
 from app.dashboard.laboratory.views import say_sliders, show_metrics, show_title
 from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import show_figure
+from app.dashboard.widgets.tables import show_table
 from app.dashboard.work import kept
 from gearsig import motion as motions
 from gearsig import plot
@@ -252,7 +253,7 @@ def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
         _show_impacts(run)
     elif view == "Indicators":
         rows = [{"indicator": i.name, "value": i.value, "unit": i.unit} for i in run.examined.indicators]
-        st.dataframe(rows, hide_index=True)
+        show_table(rows)
     else:
         words = "Speed of the pinion with the impacts, phase plane of the teeth, torque over twist"
         show_figure(plot.start_stop_figure(run.examined, title=shown_name(run.setup.preset)), words, "drive")
@@ -275,7 +276,7 @@ def _show_force(run: DriveRun) -> None:
         }
         for e in run.force.errors
     ]
-    st.dataframe(rows, hide_index=True)
+    show_table(rows)
 
 
 def _show_impacts(run: DriveRun) -> None:
@@ -296,7 +297,7 @@ def _show_impacts(run: DriveRun) -> None:
         }
         for i in run.examined.impacts
     ]
-    st.dataframe(rows, hide_index=True)
+    show_table(rows)
 
 
 def show_drive(preset: Preset) -> None:

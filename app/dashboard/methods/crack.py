@@ -10,11 +10,12 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.cached import recorded
 from app.dashboard.methods.form import MethodPage
-from app.dashboard.methods.page import cached, show_table
+from app.dashboard.methods.page import cached
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import show_figure
-from app.dashboard.widgets.chooser import choose_file, choose_sample
+from app.dashboard.widgets.chooser import choose_file, choose_reference_rate, choose_sample
 from app.dashboard.widgets.messages import show_error, show_facts
+from app.dashboard.widgets.tables import show_table
 from gearsig.angle import find_shaft_angle, resample_to_angle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
@@ -76,13 +77,15 @@ def _choose_reference(page: MethodPage) -> Recording | None:
     origin = page.choose(left, "Reference", (*given, NONE, FILE, SAMPLE), name="beside", about=about)
     if origin == SIDEBAR and analysis.reference is not None:
         return analysis.reference.recording
-    source = None
+    source, rate_hz = None, None
     with right:
         if origin == FILE:
-            about = "Read with the rig, and the sampling rate and speed, of the recording that is analysed."
+            about = "Read with the rig and the speed of the recording that is analysed."
             source = choose_file("Recording of the healthy gears", page.key("reference file"), about=about)
             if source is None:
                 st.caption("Without a reference until a file is given.")
+            else:
+                rate_hz = choose_reference_rate(page.key("reference rate"), name="beside_rate")
         elif origin == SAMPLE:
             label, without = "Sample of the healthy gears", analysis.recording.provenance.source
             source = choose_sample(
@@ -91,9 +94,9 @@ def _choose_reference(page: MethodPage) -> Recording | None:
     if source is None:
         return None
     chosen = state.chosen()
-    rate_hz, speed_rpm = None, None
+    speed_rpm = None
     if chosen is not None:
-        rate_hz, speed_rpm = chosen.request.sampling_rate_hz, chosen.request.speed_rpm
+        rate_hz, speed_rpm = rate_hz or chosen.request.sampling_rate_hz, chosen.request.speed_rpm
     return recorded(source.request(sampling_rate_hz=rate_hz, speed_rpm=speed_rpm), source.content, analysis.rig)
 
 

@@ -22,6 +22,7 @@ from app.dashboard.methods.form import MethodPage, ask_options
 from app.dashboard.theme import as_typed, capitalised, one_line, palette
 from app.dashboard.widgets import charts
 from app.dashboard.widgets.messages import in_page_words, show_error, show_unknown_speed, show_warnings
+from app.dashboard.widgets.tables import show_table
 from app.dashboard.work import Kept, kept
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, with_known_angle
@@ -179,17 +180,8 @@ def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | Cann
     for what, table in answer.tables.items():
         if len(next(iter(table.values()))) <= 200:
             with st.expander(f"{what.capitalize()} ({len(next(iter(table.values())))})"):
-                show_table(table)
+                show_table(table, number=".4g", width="stretch")
     _offer(page, answer)
-
-
-def show_table(columns: Mapping[str, Any]) -> None:
-    """Show a table whose first column is text and whose others are numbers."""
-    number = st.column_config.NumberColumn(format="%.4g")
-    config = dict.fromkeys(list(columns)[1:], number)
-    texts = {n for n, values in columns.items() if np.asarray(values).dtype.kind in "OU"}
-    shown = {name: column for name, column in config.items() if name not in texts}
-    st.dataframe(columns, hide_index=True, width="stretch", column_config=shown)
 
 
 def _show_space(page: MethodPage, path: np.ndarray) -> None:

@@ -208,11 +208,11 @@ def choose_number(
     return number
 
 
-def choose_reference_rate(key: str, *, of_several: bool = False) -> float | None:
+def choose_reference_rate(key: str, *, of_several: bool = False, name: str = "reference_rate") -> float | None:
     """Return the sampling rate in Hz that the user states of healthy references, None where the field is empty."""
     label = "Sampling rate of the references (Hz)" if of_several else "Its sampling rate (Hz)"
     about = "Of files that do not state it, where it is another one than the recording's."
-    rate_hz = choose_number(label, key, "as the recording's", minimum=0.0, name="reference_rate", about=about)
+    rate_hz = choose_number(label, key, "as the recording's", minimum=0.0, name=name, about=about)
     return rate_hz or None
 
 

@@ -22,6 +22,7 @@ from app.dashboard.widgets.machine import show_machine
 from app.dashboard.widgets.messages import in_page_words, show_error, show_facts, show_unknown_speed
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
 from app.dashboard.widgets.strip import choose_view
+from app.dashboard.widgets.tables import show_table
 from gearsig import plot
 from gearsig.angle import resample_to_angle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
@@ -186,12 +187,8 @@ def _show_quality(analysis: Analysis) -> None:
             for c in recording.channels
         ],
     }
-    number = st.column_config.NumberColumn(format="%.4g")
-    config = {
-        "channel": st.column_config.TextColumn(width="small"),
-        **dict.fromkeys(("smallest", "mean", "largest"), number),
-    }
-    st.dataframe(table, hide_index=True, column_config=config, width="stretch")
+    config = {"channel": st.column_config.TextColumn(width="small")}
+    show_table(table, number=".4g", column_config=config, width="stretch")
     for problem in problems:
         text = f"**{as_typed(problem.channel)}** is {problem.kind}: {as_typed(problem.evidence)}. "
         st.warning(f"{text}{as_typed(problem.remedy)}.", icon=":material/warning:")
@@ -212,16 +209,13 @@ def show_indicators(analysis: Analysis) -> None:
         key, read = state.view_key(f"indicator {name}", analysis), address.some_of(known)
         chosen = address.ask(column.multiselect, label, known, key=key, name=name, first=[], read=read)
         kept = kept[kept[name].isin(chosen)] if chosen else kept
-    number = st.column_config.NumberColumn(format="%.5g")
     config: dict[str, Any] = {
-        "value": number,
-        "reference": number,
-        "change (dB)": st.column_config.NumberColumn(format="%+.1f"),
         "indicator": st.column_config.TextColumn(width=190, pinned=True),
         "of": st.column_config.TextColumn(width=130),
         "band": st.column_config.TextColumn(width=130),
     }
-    st.dataframe(kept, hide_index=True, width="stretch", height=520, column_config=config, placeholder="–")
+    formats = {"change (dB)": "+.1f"} if "change (dB)" in kept else {}
+    show_table(kept, formats=formats, width="stretch", height=520, column_config=config, placeholder="–")
     left, right = st.columns((3, 1), vertical_alignment="center")
     left.caption(f"{len(kept)} of {len(table)} indicators")
     right.download_button(
