@@ -26,6 +26,8 @@ def test_two_samples_are_compared_in_every_view() -> None:
     text = shown_text(page)
     assert "root_crack_0mm.h5 beside root_crack_3mm.h5" in text  # what the analysis page had open stays open
     assert "do not differ by more than the records' own scatter" in text
+    (headline,) = (text.value for text in page.markdown if text.value.startswith("#### "))
+    assert headline.count(".") - headline.count("\\.") == 1  # one sentence; the others stand below it
     assert [button.label for button in page.get("download_button")] == ["Page (HTML)", "JSON", "Lines (CSV)"]
     drawn = {}
     for tab in ("Orders", "Angle", "Bands", "Lines"):

@@ -79,7 +79,15 @@ def test_bars_and_rings_are_read_off_and_zoomed(gap: playwright.Page, tmp_path: 
     gap.get_by_role("tab", name="Which").first.wait_for()
     settle(gap)
     report = effect_report()
-    which = gap.locator(".st-key-gap-panels .figure").nth(1)
+    panels = gap.locator(".st-key-gap-panels .figure")
+    playwright.expect(panels).to_have_count(3, timeout=60_000)
+    assert len({place(panel)[1] for panel in panels.all()}) == 1
+    gap.set_viewport_size({"width": 800, "height": 1600})
+    settle(gap)
+    assert len({place(panel)[0] for panel in panels.all()}) == 1  # below each other
+    gap.set_viewport_size({"width": 1280, "height": 1600})
+    settle(gap)
+    which = panels.nth(1)
     assert tip_at(gap, which, 0.3, 0.1).startswith(report.causes[0].title)
     with gap.expect_download() as waiting:
         which.get_by_role("button", name="CSV").click()
@@ -98,20 +106,25 @@ def test_bars_and_rings_are_read_off_and_zoomed(gap: playwright.Page, tmp_path: 
         f"predicted: {evidence.predicted_db:g} dB",
         f"structural floor: ±{evidence.floor_db:g} dB",
     ]
-    ticks = chart.locator("svg > text").all_inner_texts()
+    ticks = chart.locator("svg > text").all_text_contents()
     box = chart.locator("svg").bounding_box()
     gap.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 40)
     gap.mouse.down()
     gap.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 40, steps=4)
     gap.mouse.up()
     settle(gap)
-    assert chart.locator("svg > text").all_inner_texts() != ticks
+    assert chart.locator("svg > text").all_text_contents() != ticks
 
     gap.get_by_role("tab", name="Where").click()
     settle(gap)
     said = tip_at(gap, gap.locator(".picture").first, 0.7, 0.4)
     assert ": measured " in said
     assert "dB, simulated " in said
+
+
+def place(figure: playwright.Locator) -> tuple[int, int]:
+    box = figure.bounding_box()
+    return round(box["x"]), round(box["y"])
 
 
 def tip_at(page: playwright.Page, figure: playwright.Locator, across: float, down: float) -> str:
