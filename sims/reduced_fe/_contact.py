@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import ceil, floor
+from math import ceil, floor, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +44,9 @@ def rolls_rad(pair: PairGeometry, progress: FloatArray) -> tuple[FloatArray, Flo
     return rho_1 / pair.driver.base_radius_mm, rho_2 / pair.driven.base_radius_mm
 
 
-def corner_separation_m(pair: PairGeometry, progress: FloatArray) -> FloatArray:
+def corner_separation_m(
+    pair: PairGeometry, progress: FloatArray, tips_lost_mm: tuple[float, float] = (0.0, 0.0)
+) -> FloatArray:
     """Distance between the unloaded flanks of a pair along the line of action; 0 on the path of contact, else above 0.
 
     Before ζ = 0 the tip corner of the driven gear has not yet reached the line of action. The involute of the driver
@@ -56,6 +58,9 @@ def corner_separation_m(pair: PairGeometry, progress: FloatArray) -> FloatArray:
     pair : PairGeometry
     progress : array, (n,)
         ζ, base pitches since the ideal entry.
+    tips_lost_mm : (float, float)
+        Height that a chip took off the driver's and the driven gear's tooth. What is left ends in a corner, too, which
+        comes to the line of action later, or leaves it earlier.
 
     Returns
     -------
@@ -63,11 +68,14 @@ def corner_separation_m(pair: PairGeometry, progress: FloatArray) -> FloatArray:
         m.
     """
     rb1, rb2 = pair.driver.base_radius_mm, pair.driven.base_radius_mm
-    length, pitch = pair.action_length_mm, pair.base_pitch_mm
-    early = np.maximum(-progress, 0.0) * pitch
-    late = np.maximum(progress - pair.contact_ratio, 0.0) * pitch
-    entry = _corner_mm(rb1, rb2, length, pair.start_radius_mm, early)
-    leave = _corner_mm(rb2, rb1, length, length - pair.end_radius_mm, late)
+    length = pair.action_length_mm
+    end, mate_end = (
+        sqrt(max((gear.tip_radius_mm - lost) ** 2 - gear.base_radius_mm**2, 0.0))
+        for gear, lost in zip((pair.driver, pair.driven), tips_lost_mm, strict=True)
+    )
+    start, at = length - mate_end, pair.contact_radii_mm(progress)[0]
+    entry = _corner_mm(rb1, rb2, length, start, np.maximum(start - at, 0.0))
+    leave = _corner_mm(rb2, rb1, length, length - end, np.maximum(at - end, 0.0))
     result: FloatArray = 1e-3 * (entry + leave)
     return result
 

@@ -57,6 +57,18 @@ def test_entry_separation_is_the_turn_until_the_corner_meets_the_flank(pair, pro
     assert 1e3 * corner_separation_m(pair, np.array([progress]))[0] == pytest.approx(expected_mm, rel=1e-3)
 
 
+@pytest.mark.parametrize("lost", [(0.5, 0.0), (0.0, 0.5)])
+def test_what_a_chip_leaves_is_the_corner_of_a_shorter_tooth(lost):
+    """The entry of a driven gear whose teeth are shorter is later, by what the driver's contact then has behind it."""
+    pair = PAIRS[1]
+    shorter = PairGeometry(*(GearGeometry(z, 2.0, addendum=1.0 - h / 2.0) for z, h in zip((30, 75), lost, strict=True)))
+    late = (shorter.start_radius_mm - pair.start_radius_mm) / pair.base_pitch_mm
+    progress = np.linspace(-0.3, pair.contact_ratio + 0.3, 41)
+    chipped = corner_separation_m(pair, progress, lost)
+    assert chipped == pytest.approx(corner_separation_m(shorter, progress - late), abs=1e-15)
+    assert np.all(chipped >= corner_separation_m(pair, progress))
+
+
 def test_rolls_meet_on_the_line_of_action():
     pair = PAIRS[1]
     one, two = rolls_rad(pair, np.linspace(0.0, pair.contact_ratio, 9))
