@@ -15,11 +15,23 @@ from app.studies.gap.quasi_static import (
     QuasiStaticDay,
     StaticMachine,
     Structure,
+    crack_lever,
     record,
+    sinking_m,
     static_contact,
 )
 from gearsig.gap import reduce_recording
 from sims.effects import textbook
+from sims.mesh import (
+    STEEL,
+    GearGeometry,
+    PairGeometry,
+    RootCrack,
+    cracked_tooth_compliance,
+    deepest_crack_mm,
+    tooth_compliance,
+)
+from sims.reduced_fe import corner_separation_m
 
 
 @given(st.integers(0, 10**6))
@@ -46,6 +58,42 @@ def test_a_structure_follows_slow_motion_and_rings_at_its_modes() -> None:
     slow, ringing = (abs(one.accelerations(0, np.array([f]), MESH)[0]) / (2 * np.pi * f) ** 2 for f in (10.0, 1000.0))
     assert slow == pytest.approx(1.0, rel=1e-3)
     assert ringing == pytest.approx(50.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_mate_sinks_past_an_edge_as_past_the_corner_of_a_whole_tooth(side: int) -> None:
+    """Against the exact corner of a tooth that a chip has made shorter, up to a quarter of a pitch beyond it."""
+    made = machine()
+    pair = PairGeometry(*(GearGeometry(z, made.nominal.module_mm) for z in made.drawn.teeth))
+    lost, place = 0.7 * made.nominal.module_mm, made.path.places
+    gear = (pair.driver, pair.driven)[side]
+    edge_mm = np.sqrt((gear.tip_radius_mm - lost) ** 2 - gear.base_radius_mm**2)
+    at_edge_mm = edge_mm if side == 0 else pair.action_length_mm - edge_mm
+    beyond = (1 if side == 0 else -1) * (place - (at_edge_mm - pair.start_radius_mm) / pair.base_pitch_mm)
+    exact = corner_separation_m(pair, place, (lost, 0.0) if side == 0 else (0.0, lost))
+    near = (beyond > 0.05) & (beyond < 0.25)
+    assert sinking_m(made, side, np.maximum(beyond, 0.0))[near] == pytest.approx(exact[near], rel=0.2)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_crack_gives_way_as_that_of_a_beam(side: int) -> None:
+    """At the pitch point over the tip, within the span of what is drawn."""
+    made = machine()
+    gear = GearGeometry(made.drawn.teeth[side], made.nominal.module_mm, face_width_mm=20.0)
+    tip, pitch_point = gear.tip_roll_rad, np.tan(gear.pressure_angle_rad)
+    crack, roll = RootCrack(0.4 * deepest_crack_mm(gear)), np.array([pitch_point, tip])
+    added = cracked_tooth_compliance(gear, STEEL, roll, crack, 0.02) - tooth_compliance(gear, STEEL, roll).total / 0.02
+    place = np.argmin(np.abs(made.path.places - made.path.pitch_point))
+    shapes = [crack_lever(made, side, hinge)[place] ** 2 for hinge in (0.9, 1.5)]
+    assert shapes[0] - 0.05 < added[0] / added[1] < shapes[1] + 0.05
+
+
+def test_a_tooth_that_stays_bent_stands_back_from_its_load() -> None:
+    made = machine()
+    for seed in range(20):
+        state, healthy = made.healthy(), made.healthy()
+        EFFECTS["root_crack"](made, state, np.random.default_rng(seed))
+        assert all(np.all(now >= before) for now, before in zip(state.gaps_m, healthy.gaps_m, strict=True))
 
 
 def machine(seed: int = 3) -> StaticMachine:

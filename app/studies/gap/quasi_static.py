@@ -459,6 +459,36 @@ def _towards_tip(machine: StaticMachine, side: int) -> FloatArray:
     return at if side == 0 else 1.0 - at
 
 
+def _curvature_m(machine: StaticMachine) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the radii of curvature of both flanks over the path, and both base radii.
+
+    Of standard teeth; held at the path's ends.
+    """
+    nominal, path = machine.nominal, machine.path
+    alpha = radians(nominal.pressure_angle_deg)
+    base = np.array([0.5e-3 * z * nominal.module_mm * cos(alpha) for z in machine.drawn.teeth])
+    off = (np.clip(path.places, 0.0, path.ratio) - path.pitch_point) * path.base_pitch_m
+    return base[0] * tan(alpha) + off, base[1] * tan(alpha) - off, base
+
+
+def crack_lever(machine: StaticMachine, side: int, hinge_modules: float) -> FloatArray:
+    """Return how far along the tooth the force is from a hinge below the pitch circle, over the path, 1 at the tip."""
+    *radii, base = _curvature_m(machine)
+    hinge = 1e-3 * machine.nominal.module_mm * (0.5 * machine.drawn.teeth[side] - hinge_modules)
+    lever = np.maximum(np.hypot(base[side], radii[side]) - hinge, 0.0)
+    return np.asarray(lever / lever.max())
+
+
+def sinking_m(machine: StaticMachine, side: int, inside: FloatArray) -> FloatArray:
+    """Return how far a mate sinks past an edge on a flank over the path, s²/(2R), base pitches beyond it given.
+
+    s = ρ/r_b times the way along the path: a contact moves slower over the flank.
+    """
+    first, second, base = _curvature_m(machine)
+    along = inside * machine.path.base_pitch_m * (first, second)[side] / base[side]
+    return np.asarray(along**2 * (first + second) / (2.0 * first * second))
+
+
 def _band(machine: StaticMachine, centre: float, width: float, edge: float) -> FloatArray:
     place = machine.path.places
     band: FloatArray = 0.5 * (
@@ -468,33 +498,53 @@ def _band(machine: StaticMachine, centre: float, width: float, edge: float) -> F
 
 
 def _root_crack(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """A tooth that gives way, the more the nearer to its tip the force is; a deep one stays bent."""
+    """A tooth that gives way at a hinge in its root, as the square of the lever; a deep one stays bent, away from load.
+
+    A force that bends with a lever turns the hinge in proportion to it, and is moved by the turn in proportion, too.
+    """
     side, tooth = _tooth(machine, rng)
-    at_root, power, softer = rng.uniform(0.0, 0.5), rng.uniform(0.5, 3.0), log_uniform(rng, 0.05, 5.0)
-    state.weak[side][tooth] += softer * (at_root + (1.0 - at_root) * _towards_tip(machine, side) ** power)
+    lever, softer = crack_lever(machine, side, rng.uniform(0.9, 1.5)), log_uniform(rng, 0.05, 5.0)
+    state.weak[side][tooth] += softer * lever**2
     if rng.uniform() < 0.3:
-        state.gaps_m[side][tooth] += log_uniform(rng, 0.02, 0.5) * machine.rated_m * textbook.sign(rng)
+        state.gaps_m[side][tooth] += log_uniform(rng, 0.02, 0.5) * machine.rated_m
+
+
+PIT_M = (30e-6, 500e-6)
+"""Depths of pits."""
+ROUNDED = (0.5, 1.5)
+"""Of a chip's edge: what the mate sinks past it, over what it would past a sharp one."""
 
 
 def _tooth_spall(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """A pit near the pitch line: over part of the width less stiffness, over all of it a hole."""
+    """A pit near the pitch line: over part of the width less contact, over all of it the mate sinks in, or bridges it.
+
+    The contact holds up to some third of a pair's compliance, and grows as the width that is left shrinks.
+    """
     side, tooth = _tooth(machine, rng)
-    centre, width = machine.path.pitch_point + rng.uniform(-0.3, 0.3), rng.uniform(0.1, 0.45)
-    band = _band(machine, centre, width, rng.uniform(0.01, 0.06))
+    centre, width = machine.path.pitch_point + rng.uniform(-0.3, 0.3), rng.uniform(0.1, 0.7)
     if rng.uniform() < 0.5:
-        state.weak[side][tooth] += log_uniform(rng, 0.05, 6.0) * band
+        band = _band(machine, centre, width, rng.uniform(0.01, 0.06))
+        state.weak[side][tooth] += log_uniform(rng, 0.03, 2.0) * band
     else:
-        state.gaps_m[side][tooth] += log_uniform(rng, 0.1, 8.0) * machine.rated_m * band
+        inside = np.clip(0.5 * width - np.abs(machine.path.places - centre), 0.0, None)
+        state.gaps_m[side][tooth] += np.minimum(sinking_m(machine, side, inside), log_uniform(rng, *PIT_M))
 
 
 def _chipped_tooth(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """A tip that is gone, over all of the width or part of it: its pair loses hold early, or takes it late."""
+    """A tip that is gone, over all of the width or part of it: its pair loses hold early, or takes it late.
+
+    Over all of the width, its mate sinks past the edge that is left as past the corner of a whole tooth.
+    """
     side, tooth = _tooth(machine, rng)
-    lost = np.clip((_towards_tip(machine, side) - 1.0 + rng.uniform(0.08, 0.55)) / 0.1, 0.0, None)
+    lost_ratio = rng.uniform(0.08, 0.55)
     if rng.uniform() < 0.7:
-        state.gaps_m[side][tooth] += log_uniform(rng, 0.3, 20.0) * machine.rated_m * lost**2
+        at = machine.path.places
+        beyond = at - machine.path.ratio if side == 0 else -at
+        beyond = np.clip(beyond + lost_ratio * machine.path.ratio, 0.0, None)
+        state.gaps_m[side][tooth] += log_uniform(rng, *ROUNDED) * sinking_m(machine, side, beyond)
     else:
-        state.weak[side][tooth] += log_uniform(rng, 0.2, 6.0) * np.minimum(lost, 1.0)
+        lost = np.clip((_towards_tip(machine, side) - 1.0 + lost_ratio) / 0.1, 0.0, 1.0)
+        state.weak[side][tooth] += log_uniform(rng, 0.2, 6.0) * lost
 
 
 def _tooth_wear(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
