@@ -38,13 +38,33 @@ def test_descriptors_know_neither_the_tooth_nor_the_size(teeth: int, factor: flo
 
 
 def test_the_driven_gear_is_read_backwards() -> None:
-    """Its contact runs from tip to root; a step of the mean is between readings: 1/32 of a pitch."""
+    """Its contact runs from tip to root."""
     made = change()
     backwards = replace(
         made, side=1, pattern_um=made.pattern_um.ravel()[::-1].reshape(TEETH, STEPS), mesh_um=made.mesh_um[::-1]
     )
     here, there = tooth_error_descriptors(made), tooth_error_descriptors(backwards)
-    np.testing.assert_allclose(there, here, atol=0.15)
+    np.testing.assert_allclose(there, here, atol=1e-6)
+
+
+def test_a_crack_leans_to_the_tip_and_a_tooth_out_of_its_place_does_not() -> None:
+    """The last quarter over the first, from begin to end."""
+    place = (np.arange(54) + 0.5) / 54.0
+    quarters = []
+    for shape in (np.minimum(1.0, 0.2 + 1.2 * place), np.ones(54)):
+        wave = np.zeros(TEETH * STEPS)
+        wave[200:254] = shape
+        quarters.append(tooth_error_descriptors(replace(change(), pattern_um=wave.reshape(TEETH, STEPS)))[-5:-1])
+    assert quarters[0][3] - quarters[0][0] > 0.2
+    assert quarters[1][3] == pytest.approx(quarters[1][0], abs=0.05)
+
+
+def test_relief_beyond_the_deflection_turns_the_mesh_round() -> None:
+    """A pair that gives way for a third of a pitch, as where one carries; and the same the other way round."""
+    short = np.where(np.abs(np.arange(STEPS) - 12) < 5, 1.0, 0.0)
+    there, back = (tooth_error_descriptors(replace(change(), mesh_um=sign * short))[-1] for sign in (1.0, -1.0))
+    assert there > 0.2
+    assert back == pytest.approx(-there)
 
 
 def test_a_known_course_is_told_and_a_strange_one_is_not() -> None:

@@ -1,9 +1,10 @@
 """Learn the changes of transmission errors by which encoders tell tooth faults apart.
 
-`python -m app.studies.gap.tooth_errors` draws static contacts of two simulators that describe teeth and faults
-otherwise than each other – load shared by teeth of a rack's shape, and the quasi-static machines – and writes the
-descriptors of what each fault changes. It prints how often each simulator's faults are named rightly by what the other
-has taught. `--blind N` records faults on the independent rig, with encoders, and names them by both.
+`python -m app.studies.gap.tooth_errors` draws static contacts of three simulators that describe teeth and faults
+otherwise than each other – load shared by teeth of a rack's shape, the quasi-static machines, gears of finite elements
+whose slices of the face touch each by itself – and writes the descriptors of what each fault changes. It prints how
+often each simulator's faults are named rightly by what the others have taught. `--blind N` records faults on the
+independent rig, with encoders, and names them by all.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import exp, log
+from functools import cache
+from math import exp, floor, log
 from pathlib import Path
 from typing import Any
 
@@ -42,18 +44,27 @@ from gearsig.gap import (
 )
 from sims.blind import draw_case, record_case
 from sims.effects import ONE_TOOTH_SHARE, cumulative_pitch
+from sims.fe_gear import GearBlank, MeshSize, ReducedGear, ReductionPlan, reduce_gear
 from sims.machine import log_uniform
 from sims.mesh import (
+    HEALTHY,
     FlankDeviation,
     GearGeometry,
     GearMesh,
+    MeshTable,
     PairGeometry,
     RootCrack,
     ToothChip,
+    ToothRows,
     ToothSpall,
     deepest_crack_mm,
+    mesh_table,
+    separation_table,
     share_torque,
+    spans_face,
+    tooth_rows,
 )
+from sims.reduced_fe import corner_separation_m, mesh_maps, static_table
 
 SEED = 5501
 STEPS = 32
@@ -70,6 +81,11 @@ FAULTY_TOOTH = 5
 Drawn = Callable[[str, np.random.Generator], ToothErrorChange]
 
 
+# --------------------
+# Load shared by teeth of a rack's shape, and by gears of finite elements; both touch by their corners, too.
+# --------------------
+
+
 def shared_load(fault: str, rng: np.random.Generator) -> ToothErrorChange:
     """Return what a fault changes where teeth of a rack's shape share the load.
 
@@ -83,31 +99,99 @@ def shared_load(fault: str, rng: np.random.Generator) -> ToothErrorChange:
     module = float(rng.choice((1.5, 2.0, 2.5, 3.0, 4.0)))
     width = module * rng.uniform(6.0, 12.0)
     driver, driven = (GearGeometry(z, module, face_width_mm=width) for z in teeth)
-    pair = PairGeometry(driver, driven)
-    load = log_uniform(rng, *LOAD_N_PER_MM2) * module
-    relief = 0.0 if rng.uniform() < 0.25 else load / 14.0 * rng.uniform(0.2, 1.4)
-    flank = FlankDeviation(tip_relief_um=relief, tip_relief_length_mm=module * rng.uniform(0.7, 1.5))
-    healthy = GearMesh(pair, flank_1=flank, flank_2=flank, contact_law="load-dependent")
+    healthy, load = _loaded(PairGeometry(driver, driven), rng)
     side = int(rng.integers(2))
-    faulty = replace(healthy, **_fault(fault, (driver, driven)[side], flank, side + 1, rng))
-    torque = load * width * driver.base_radius_mm * 1e-3
+    faulty = replace(healthy, **_fault(fault, healthy, side, rng))
 
     def error_um(mesh: GearMesh) -> FloatArray:
-        return 1e6 * share_torque(mesh, torque, _cycles(teeth[side])).transmission_error_m
+        table, cycles = table_with_corners(mesh), _cycles(teeth[side]) + CORNERS
+        return 1e6 * share_torque(mesh, _torque_nm(mesh, load), cycles, table=table).transmission_error_m
 
     return _change(side, error_um(faulty), error_um(healthy), rng)
 
 
-def _fault(
-    name: str, gear: GearGeometry, flank: FlankDeviation, number: int, rng: np.random.Generator
-) -> dict[str, Any]:
+def finite_elements(fault: str, rng: np.random.Generator) -> ToothErrorChange:
+    """Return what a fault changes where gears of finite elements share the load, each slice of the face by itself.
+
+    A crack gives way as the elements about it do. Where spalls and chips are, slices lie lower; those beside them carry
+    on, and press the more into the tooth.
+
+    Raises
+    ------
+    InputError
+        If a fault was drawn that cannot be.
+    RefusalError
+        If no contact is found.
+    """
+    gears = _element_gear(int(rng.choice(ELEMENT_TEETH))), _element_gear(int(rng.choice(ELEMENT_TEETH)))
+    driver, driven = (gear.blank.geometry for gear in gears)
+    healthy, load = _loaded(PairGeometry(driver, driven), rng)
+    side = int(rng.integers(2))
+    fields = _fault(fault, healthy, side, rng)
+    in_slice = np.ones(len(gears[0].grid.z_m), dtype=bool)
+    for name in (f"spalls_{side + 1}", f"chips_{side + 1}"):
+        if name in fields:
+            (damage,) = fields[name]
+            n_lost = max(1, round(len(in_slice) * (damage.width_mm or 0.0) / driver.face_width_mm))
+            first = int(rng.integers(len(in_slice) - n_lost + 1)) if name.startswith("spalls") else 0
+            in_slice = np.isin(np.arange(len(in_slice)), np.arange(first, first + n_lost))
+            fields = {name: (replace(damage, width_mm=driver.face_width_mm),)}
+    faulty = replace(healthy, **fields)
+
+    def error_um(mesh: GearMesh) -> FloatArray:
+        # Only a crack changes what elements yield.
+        cracked = replace(mesh.healthy, cracks_1=mesh.cracks_1, cracks_2=mesh.cracks_2)
+        table = static_table(gears, cracked)
+        missing = separations_with_corners(mesh, table.progress)
+        rows = [
+            np.where(in_slice, of_gear[:, :, None], of_gear[:1, :, None])
+            for of_gear in (missing.gear(1), missing.gear(2))
+        ]
+        separation = missing._replace(rows=np.concatenate(rows))
+        table = replace(table, separation=separation, corner_m=np.zeros_like(table.corner_m))
+        torque, cycles = np.array([_torque_nm(mesh, load)]), _cycles(mesh.side(side + 1).gear.teeth)
+        return 1e6 * mesh_maps(gears, mesh, torque, cycles, table=table).transmission_error_m[:, 0]
+
+    return _change(side, error_um(faulty), error_um(healthy), rng)
+
+
+ELEMENT_TEETH = (19, 22, 26, 31, 37, 44, 52, 62, 74)
+
+
+@cache
+def _element_gear(teeth: int) -> ReducedGear:
+    geometry = GearGeometry(teeth, 2.0, bore_radius_mm=0.4 * teeth)
+    size = MeshSize(n_across=2, n_gap=1, n_up=6, n_rim=1, n_body=2, n_along=4)
+    return reduce_gear(GearBlank(geometry), ReductionPlan(size, n_modes=4))
+
+
+def _loaded(pair: PairGeometry, rng: np.random.Generator) -> tuple[GearMesh, float]:
+    """Draw a load, N/mm, and the tip relief of gears made for it."""
+    module = pair.driver.module_mm
+    load = log_uniform(rng, *LOAD_N_PER_MM2) * module
+    relief = 0.0 if rng.uniform() < 0.25 else load / 14.0 * rng.uniform(0.2, 1.4)
+    flank = FlankDeviation(tip_relief_um=relief, tip_relief_length_mm=module * rng.uniform(0.7, 1.5))
+    return GearMesh(pair, flank_1=flank, flank_2=flank, contact_law="load-dependent"), load
+
+
+def _torque_nm(mesh: GearMesh, load_n_per_mm: float) -> float:
+    return load_n_per_mm * mesh.pair.face_width_mm * mesh.pair.driver.base_radius_mm * 1e-3
+
+
+def _fault(name: str, mesh: GearMesh, side: int, rng: np.random.Generator) -> dict[str, Any]:
     """Return the fields of a mesh that change."""
+    number, pair = side + 1, mesh.pair
+    gear, flank = mesh.side(number).gear, mesh.side(number).flank
     module, width = gear.module_mm, gear.face_width_mm
     if name == "root_crack":
         depth = rng.uniform(0.15, 0.85) * deepest_crack_mm(gear)
         return {f"cracks_{number}": (RootCrack(depth, tooth=FAULTY_TOOTH),)}
     if name == "tooth_spall":
-        spall = ToothSpall(module * log_uniform(rng, 0.2, 1.0), width * rng.uniform(0.15, 0.85), 100.0, FAULTY_TOOTH)
+        part = 1.0 if rng.uniform() < 0.3 else rng.uniform(0.15, 0.85)
+        at = (pair.pitch_point_radius_mm - pair.start_radius_mm) / pair.base_pitch_mm + rng.uniform(-0.3, 0.3)
+        centre = float(np.clip(at / pair.contact_ratio, 0.0, 1.0))
+        centre = centre if side == 0 else 1.0 - centre
+        spall = ToothSpall(module * log_uniform(rng, 0.2, 1.0), width * part, 100.0, FAULTY_TOOTH, centre)
         return {f"spalls_{number}": (spall,)}
     if name == "chipped_tooth":
         part = float(rng.choice((0.3, 0.6, 0.85, 1.0)))
@@ -117,6 +201,75 @@ def _fault(
     else:
         pitch = rng.uniform(3.0, 20.0) * cumulative_pitch(gear.teeth, rng)
     return {f"flank_{number}": replace(flank, pitch_um=tuple(pitch.tolist()))}
+
+
+CORNERS = 0.35
+"""Base pitches before and after the path of contact within which corners may touch."""
+
+
+def table_with_corners(mesh: GearMesh) -> MeshTable:
+    """Return the table of a mesh whose pairs touch by corners before and after their path; cycles begin `CORNERS` late.
+
+    `sims.mesh` takes a pair up and gives it up within a twentieth of a pitch, and so does the edge of a chip. But a
+    tooth that lags by some µm leaves the load to its neighbours' corners: without them a pitch error of one tooth looks
+    like a crack.
+    """
+    table = mesh_table(mesh)
+    low, high = -CORNERS - mesh.ramp, mesh.pair.contact_ratio + CORNERS + mesh.ramp
+    progress = np.linspace(low, high, 512)
+    inside = np.clip(progress, 0.0, mesh.pair.contact_ratio)
+    compliance = []
+    for number in (1, 2):
+        side = mesh.side(number)
+        faults = [side.faults_of(tooth) for tooth in side.faulty_teeth]
+        rows = [mesh.gear_compliance(number, inside, of_tooth) for of_tooth in (HEALTHY, *faults)]
+        compliance.append((np.array(rows), _row_of_teeth(mesh, number)))
+    return replace(
+        table,
+        start=low + CORNERS,
+        step=progress[1] - progress[0],
+        compliance=tooth_rows(*compliance),
+        separation=separations_with_corners(mesh, progress),
+        contact_ratio=mesh.pair.contact_ratio + 2.0 * CORNERS,
+        n_slots=floor(mesh.pair.contact_ratio + 2.0 * CORNERS + mesh.ramp) + 1,
+    )
+
+
+def separations_with_corners(mesh: GearMesh, progress: FloatArray) -> ToothRows:
+    """Return what is missing between the flanks of each tooth and its mate's, their corners' way to each other with it.
+
+    Of a tooth chipped over the whole face, the corner is where the chip's edge is.
+    """
+    inside = np.clip(progress, 0.0, mesh.pair.contact_ratio)
+    ordinary, _ = separation_table(mesh.healthy, inside)
+    spalled, _ = separation_table(replace(mesh, chips_1=(), chips_2=()), inside)
+    corner = corner_separation_m(mesh.pair, progress)
+    gears = []
+    for number in (1, 2):
+        side, of = mesh.side(number), _row_of_teeth(mesh, number)
+        rows = [ordinary.gear(number)[0]]
+        for tooth in side.faulty_teeth:
+            _, spall, chip = side.faults_of(tooth)
+            row = ordinary.gear(number)[0] if spall is None else spalled.gear(number)[1]
+            if chip is not None and spans_face(chip.width_mm or mesh.pair.face_width_mm, mesh.pair.face_width_mm):
+                lost = (chip.height_mm, 0.0) if number == 1 else (0.0, chip.height_mm)
+                row = row + corner_separation_m(mesh.pair, progress, lost) - corner
+            rows.append(row)
+        gears.append((np.array(rows) + (corner if number == 1 else 0.0), of))
+    return tooth_rows(*gears)
+
+
+def _row_of_teeth(mesh: GearMesh, number: int) -> NDArray[np.int64]:
+    """Return 0 for a whole tooth, and the place of a faulty one among them."""
+    side = mesh.side(number)
+    of = np.zeros(side.gear.teeth, dtype=np.int64)
+    of[list(side.faulty_teeth)] = np.arange(1, 1 + len(side.faulty_teeth))
+    return of
+
+
+# --------------------
+# The quasi-static machines, and what all have in common.
+# --------------------
 
 
 def quasi_static(fault: str, rng: np.random.Generator) -> ToothErrorChange:
@@ -172,7 +325,11 @@ def _change(side: int, faulty_um: FloatArray, healthy_um: FloatArray, rng: np.ra
     return ToothErrorChange(side, np.roll(change, start).reshape(-1, STEPS), np.roll(mesh, start), size, 0.0)
 
 
-SIMULATORS: dict[str, Drawn] = {"shared load": shared_load, "quasi-static": quasi_static}
+SIMULATORS: dict[str, Drawn] = {
+    "shared load": shared_load,
+    "quasi-static": quasi_static,
+    "finite elements": finite_elements,
+}
 
 
 def known_tooth_errors_of(simulator: str, n_each: int) -> KnownToothErrors:
@@ -189,9 +346,15 @@ def known_tooth_errors_of(simulator: str, n_each: int) -> KnownToothErrors:
     return KnownToothErrors(np.array(rows), np.repeat(TOOTH_FAULTS, n_each))
 
 
+def together(several: Sequence[KnownToothErrors]) -> KnownToothErrors:
+    """Return what several simulators teach."""
+    descriptors = np.concatenate([known.descriptors for known in several])
+    return KnownToothErrors(descriptors, np.concatenate([known.faults for known in several]))
+
+
 def named(known: KnownToothErrors, rows: FloatArray) -> tuple[NDArray[np.str_], FloatArray]:
     """Return the likeliest fault of each row, and its probability where all four are as likely beforehand."""
-    levels = np.array([[known.log_likelihoods(row)[name] for name in TOOTH_FAULTS] for row in rows])
+    levels = np.array([[*known.log_likelihoods(row).values()] for row in rows])
     weights = np.exp(levels - levels.max(axis=1, keepdims=True))
     return np.array(TOOTH_FAULTS)[levels.argmax(axis=1)], weights.max(axis=1) / weights.sum(axis=1)
 
@@ -240,10 +403,10 @@ def main() -> None:
     arguments = parser.parse_args()
     by_simulator = {name: known_tooth_errors_of(name, arguments.each) for name in SIMULATORS}
     for name, held_out in by_simulator.items():
-        (fitted_to,) = (known for title, known in by_simulator.items() if title != name)
-        _print_accuracy(f"{name} left out", held_out.faults, *named(fitted_to, held_out.descriptors))
-    rows = np.concatenate([known.descriptors for known in by_simulator.values()]).astype(np.float16)
-    faults = np.concatenate([known.faults for known in by_simulator.values()])
+        taught = together([known for title, known in by_simulator.items() if title != name])
+        _print_accuracy(f"{name} left out", held_out.faults, *named(taught, held_out.descriptors))
+    everything = together([*by_simulator.values()])
+    rows, faults = everything.descriptors.astype(np.float16), everything.faults
     write_whole(
         arguments.to, lambda file: np.savez_compressed(file, allow_pickle=False, descriptors=rows, faults=faults)
     )
