@@ -77,12 +77,20 @@ def wait_until_up(health: str, server: subprocess.Popen[bytes]) -> None:
     pytest.fail("the server does not answer")
 
 
-@pytest.fixture
-def page(address: str) -> Iterator[playwright.Page]:
-    """Open the dashboard; afterwards nothing may have gone wrong in the browser, nor left this machine."""
+@pytest.fixture(scope="module")
+def browser() -> Iterator[playwright.Browser]:
+    """Start Chromium, once for the tests of a file: each has a window of its own that shares nothing with others."""
     with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        view = browser.new_page(viewport={"width": 1280, "height": 1600})
+        chromium = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def page(address: str, browser: playwright.Browser) -> Iterator[playwright.Page]:
+    """Open the dashboard; afterwards nothing may have gone wrong in the browser, nor left this machine."""
+    with browser.new_context(viewport={"width": 1280, "height": 1600}) as window:
+        view = window.new_page()
         view.set_default_timeout(90_000)  # the first analysis compiles
         wrong: list[str] = []
         view.on("pageerror", lambda error: wrong.append(str(error)))
@@ -93,7 +101,6 @@ def page(address: str) -> Iterator[playwright.Page]:
         yield view
         exceptions = view.get_by_test_id("stException").all_inner_texts()
         broken = view.evaluate("[...document.images].filter(i => i.complete && !i.naturalWidth).map(i => i.src)")
-        browser.close()
     assert not exceptions
     assert not broken
     assert not wrong

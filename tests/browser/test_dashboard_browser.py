@@ -234,7 +234,7 @@ def test_another_user_sees_nothing_of_the_first(page: playwright.Page, address: 
         other.goto(f"{address}analysis{query}")
         other.locator(".strip").first.wait_for()  # a sample's, which is open where nothing else is
         assert name not in other.locator("body").inner_text()
-    other.close()
+    other.context.close()
 
 
 def test_a_small_window_shows_the_verdict_above_its_picture(page: playwright.Page) -> None:

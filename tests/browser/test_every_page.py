@@ -12,7 +12,7 @@ import pytest
 from gearsig.diagnosis import Outcome
 from gearsig.indicators import Indicator
 from gearsig.report import Entry, write_index
-from tests.browser.conftest import CHROMIUM, FLAGS, settle, soon
+from tests.browser.conftest import CHROMIUM, settle, soon
 
 PAGES = ("", "analysis?sample=damaged_tooth", "laboratory", "flexible", "compare", "gap", "fleet")
 BROKEN = {"name": "broken.mat", "mimeType": "", "buffer": b"\x80\x04\x95 pickle"}
@@ -80,6 +80,7 @@ def test_two_users_at_once_see_the_same_page_each(page: playwright.Page, address
     settle(other)
     assert len(other.get_by_test_id("stMain").inner_text()) > 0.8 * len(mine) > 80
     assert other.get_by_test_id("stException").count() == 0
+    other.context.close()
 
 
 def part_shown(picture: playwright.Locator) -> list[float]:
@@ -170,7 +171,7 @@ def test_a_page_of_the_navigation_bar_is_one_step_of_the_history(page: playwrigh
     assert page.url == begun
 
 
-def test_an_index_of_recordings_with_dates_fits_a_narrow_window(tmp_path: Path) -> None:
+def test_an_index_of_recordings_with_dates_fits_a_narrow_window(browser: playwright.Browser, tmp_path: Path) -> None:
     kinds = {"FM4": "", "kurtosis": "", "sideband index": "m/s^2"}
     indicators = tuple(Indicator(name, 3.21, unit, "a1") for name, unit in kinds.items())
     names = ("gearbox_north_2026-11-28.csv.gz", "gearbox_south_2026-11-27.csv.gz")
@@ -179,10 +180,8 @@ def test_an_index_of_recordings_with_dates_fits_a_narrow_window(tmp_path: Path) 
     filled = [replace(entry, indicators=indicators, machine=machine) for entry in entries]
     write_index(filled, path=tmp_path / "index.html")
     assert "2026-11-28</td>" in (tmp_path / "index.html").read_text("utf-8")
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        view = browser.new_page(viewport={"width": 800, "height": 900})
-        view.goto((tmp_path / "index.html").as_uri())
-        widths = "[...document.querySelectorAll('html, .scroll')].map(e => e.scrollWidth - e.clientWidth)"
-        assert set(view.evaluate(widths)) == {0}
-        browser.close()
+    view = browser.new_page(viewport={"width": 800, "height": 900})
+    view.goto((tmp_path / "index.html").as_uri())
+    widths = "[...document.querySelectorAll('html, .scroll')].map(e => e.scrollWidth - e.clientWidth)"
+    assert set(view.evaluate(widths)) == {0}
+    view.close()
