@@ -17,6 +17,8 @@ from app.cli import options
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_SOME_FAILED, progress_bar, stopped
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from gearsig.fleet import AddResult, Fleet, OperatingTrend, Origin, PassedOver
     from gearsig.processes import Cluster
 
@@ -189,9 +191,10 @@ def trend(
     """
     from gearsig.checks import one_of
     from gearsig.errors import InputError
+    from gearsig.fleet import CONDITIONS
     from gearsig.formatting import unit_text
 
-    one_of(over, "--over", ("time", "load", "speed"))
+    one_of(over, "--over", ("time", *CONDITIONS))
     fleet = _open(store)
     if not indicator:
         if over != "time":
@@ -491,18 +494,21 @@ def _show_over(trends: Sequence[OperatingTrend], *, json: bool) -> None:
 
 
 def _over_json(shown: OperatingTrend) -> dict[str, Any]:
-    tables = {
-        name: json_text.loads(getattr(shown, name).to_json(orient="records", date_format="iso")) for name in _OVER
+    return _trend_json(shown.trend) | {
+        "over": shown.over,
+        "held": shown.held if isfinite(shown.held) else None,
+        "text": shown.text,
+        "table": _records(shown.table),
+        "curve": _records(shown.curve),
     }
-    held = shown.held if isfinite(shown.held) else None
-    return _trend_json(shown.trend) | {"over": shown.over, "held": held, "text": shown.text} | tables
 
 
-_OVER = ("table", "curve")
+def _records(table: DataFrame) -> Any:
+    return json_text.loads(table.to_json(orient="records", date_format="iso"))
 
 
 def _trend_json(trend: Any) -> dict[str, Any]:
     facts = {name: value for name, value in vars(trend).items() if name != "table"}
     facts["changed"] = trend.changed.isoformat() if trend.changed else None
-    facts["table"] = json_text.loads(trend.table.to_json(orient="records", date_format="iso"))
+    facts["table"] = _records(trend.table)
     return facts

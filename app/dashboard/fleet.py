@@ -24,7 +24,17 @@ from app.dashboard.work import kept
 from app.samples import EXAMPLE_PATTERN, write_example_fleet
 from gearsig.diagnosis import Outcome
 from gearsig.errors import InputError
-from gearsig.fleet import Fleet, Trend, TrendSettings, change_text, level_counts, open_fleet, series_level, trends_text
+from gearsig.fleet import (
+    CONDITIONS,
+    Fleet,
+    Trend,
+    TrendSettings,
+    change_text,
+    level_counts,
+    open_fleet,
+    series_level,
+    trends_text,
+)
 from gearsig.formatting import unit_text, with_minus
 from gearsig.plot import ChartLine, LinePanel, with_unit
 from gearsig.recording import sha256_of
@@ -32,6 +42,8 @@ from gearsig.rig import rig_file_beside
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from gearsig.checks import FloatArray
 
 STORE, EXAMPLE, SEARCHED, MACHINE, POINT, SERIES = (
     "fleet store",
@@ -251,8 +263,7 @@ def _series_table(series: DataFrame) -> dict[str, list[Any]]:
 
 def _choose_over(recordings: DataFrame) -> str:
     """Return what the indicator is shown over: the date, or what the recordings state of load and speed."""
-    columns = {"load": "load_nm", "speed": "speed_rpm"}
-    known = [name for name, column in columns.items() if recordings[column].max() > recordings[column].min()]
+    known = [name for name, column in CONDITIONS.items() if recordings[column].max() > recordings[column].min()]
     if not known:
         return "date"
     looks = {"key": "fleet over", "name": "over", "label_visibility": "collapsed", "required": True}
@@ -276,22 +287,31 @@ def _show_over(fleet: Fleet, row: Row, over: str) -> None:
         if chosen.any()
     ]
     steps = curve.iloc[:, 0].to_numpy(float)
-    expected, low, high, alarm = (curve[name].to_numpy(float) for name in ("expected", "low", "high", "alarm"))
-    if len(steps):
-        band = (np.where(np.isfinite(low), low, np.nanmin(value)), high)
-        lines.insert(0, ChartLine(steps, expected, "expected, within its limits", QUIET, band=band))
-    if np.isfinite(alarm).any():
-        lines.append(ChartLine(steps, alarm, "alarm", 1, dotted=True))
+    lines, limits = _within_limits(lines, steps, curve, value)
     beyond = table["level"].isin(["warning", "alarm"]).to_numpy()
     everywhere = np.concatenate([at, steps])
     margin = max(0.02 * float(np.ptp(everywhere)), 1e-3 * float(everywhere.max()))
     span = (float(everywhere.min()) - margin, float(everywhere.max()) + margin)
     x = "load (N·m)" if over == "load" else "speed (rpm)"
-    limits = padded_limits([value, *([high] if len(high) else [])])
     panel = LinePanel(lines, x, with_minus(with_unit(trend.name, trend.unit)), limits, x_limits=span)
     key = f"over {over} of {row['machine']} {row['point']} {_series_words(row)}"
     show_lines(panel, key, marked=list(zip(at[beyond], value[beyond], strict=True)), legend=True)
     st.caption(as_typed(shown.text))
+
+
+def _within_limits(
+    lines: list[ChartLine], x: FloatArray, table: DataFrame, value: FloatArray
+) -> tuple[list[ChartLine], tuple[float, float]]:
+    """Return lines in the band of their limits, with that of alarm where there is one, and the ends of their axis."""
+    expected, low, high, alarm = (table[name].to_numpy(float) for name in ("expected", "low", "high", "alarm"))
+    known = np.isfinite(high)
+    if known.any():
+        floor = np.where(np.isfinite(low), low, np.nanmin(value))
+        band = (floor[known], high[known])
+        lines = [ChartLine(x[known], expected[known], "expected, within its limits", QUIET, band=band), *lines]
+    if np.isfinite(alarm).any():
+        lines = [*lines, ChartLine(x, alarm, "alarm", 1, dotted=True)]
+    return lines, padded_limits([value, *([high] if known.any() else [])])
 
 
 def _show_trend(fleet: Fleet, row: Row) -> None:
@@ -301,21 +321,11 @@ def _show_trend(fleet: Fleet, row: Row) -> None:
     trend = next((one for one in found if one.band == row["band"]), found[0])
     table = trend.table
     days = table["date"].to_numpy("datetime64[s]").astype(float) / 86400.0
-    value, expected, low, high, alarm = (
-        table[name].to_numpy(float) for name in ("value", "expected", "low", "high", "alarm")
-    )
-    lines = [ChartLine(days, value, trend.name)]
-    if np.isfinite(high).any():
-        floor = np.where(np.isfinite(low), low, np.nanmin(value))
-        known = np.isfinite(high)
-        band = (np.where(known, floor, np.nan)[known], high[known])
-        lines.insert(0, ChartLine(days[known], expected[known], "expected, within its limits", QUIET, band=band))
-    if np.isfinite(alarm).any():
-        lines.append(ChartLine(days, alarm, "alarm", 1, dotted=True))
+    value = table["value"].to_numpy(float)
+    lines, limits = _within_limits([ChartLine(days, value, trend.name)], days, table, value)
     beyond = table["level"].isin(["warning", "alarm"]).to_numpy() & np.isfinite(value)
     marked = list(zip(days[beyond], value[beyond], strict=True))
     margin = max(0.02 * float(np.ptp(days)), 0.5)
-    limits = padded_limits([value, *([high] if np.isfinite(high).any() else [])])
     span = (float(days[0]) - margin, float(days[-1]) + margin)
     panel = LinePanel(lines, "date", with_minus(with_unit(trend.name, trend.unit)), limits, x_limits=span)
     key = f"trend of {row['machine']} {row['point']} {_series_words(row)}"

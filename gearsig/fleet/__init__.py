@@ -38,11 +38,12 @@ from gearsig.fleet._statistics import (
     regressors,
     standardised_innovations,
 )
-from gearsig.fleet._trends import AlarmEvent, Baseline, PointTrends, TrendSettings, events_of
+from gearsig.fleet._trends import CONDITIONS, AlarmEvent, Baseline, PointTrends, TrendSettings, events_of
 from gearsig.fleet._watch import WatchEvent, watch
 
 __all__ = [
     "ALARM",
+    "CONDITIONS",
     "FAILED",
     "LEVEL_NAMES",
     "OK",
