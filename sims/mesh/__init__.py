@@ -9,6 +9,7 @@ from sims.mesh._faults import (
     ToothSpall,
     check_crack,
     check_spall,
+    chip_separation_m,
     crack_depth_mm,
     crack_mouth_mm,
     crack_percent,
@@ -69,7 +70,14 @@ from sims.mesh._mesh_stiffness import (
     share_torque,
     tooth_rows,
 )
-from sims.mesh._pair import PairGeometry, arc_length_mm, curvature_radius_mm, flank_length_mm, part_inside
+from sims.mesh._pair import (
+    PairGeometry,
+    arc_length_mm,
+    corner_separation_m,
+    curvature_radius_mm,
+    flank_length_mm,
+    part_inside,
+)
 from sims.mesh._roughness import FlankRoughness, FractalSurface, TimeLockedRoughness, advance, height_now
 from sims.mesh._stiffness import (
     HEALTHY,
@@ -121,7 +129,9 @@ __all__ = [
     "body_compliance",
     "check_crack",
     "check_spall",
+    "chip_separation_m",
     "contact_friction_n",
+    "corner_separation_m",
     "crack_depth_mm",
     "crack_mouth_mm",
     "crack_percent",

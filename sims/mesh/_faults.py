@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import cos, pi, radians, sin, sqrt
+from math import cos, pi, radians, sin
 
 import numpy as np
 
@@ -16,11 +16,11 @@ from sims.mesh._pair import (
     arc_length_mm,
     contact_ends_mm,
     contact_half_width_mm,
+    corner_separation_m,
     curvature_radius_mm,
     flank_length_mm,
     part_inside,
     pitch_point_mm,
-    smooth_step,
 )
 
 MIN_SECTION = 0.1
@@ -322,10 +322,8 @@ def _ends_mm(pair: PairGeometry, side: int, spall: ToothSpall) -> tuple[float, f
 
 # A chipped tooth: a piece broken off its tip.
 
-GAP_M = 0.3e-3
-"""Separation beyond the edge of a chip over the whole face: many times the deflection of a loaded pair."""
-EDGE_BASE_PITCHES = 0.05
-"""Over this length beyond a chip's edge contact is lost, as it is at the tip of a whole tooth."""
+DEFLECTION_M = 10e-6
+"""What a loaded pair yields by: an edge that lies back by so much has let go of most of its load."""
 
 
 @dataclass(frozen=True)
@@ -343,9 +341,10 @@ class ToothChip:
 
     Notes
     -----
-    Where contact lies beyond the chip's edge, the compliance of tooth and contact grows by 1/(1 − w/b) for a chip over
-    part of the face; over the whole face there is nothing to touch. The driving flank alone is described, and the mass
-    of the piece is not taken off the gear.
+    Beyond the chip a pair touches by the edge that is left, which sinks away from the mate's flank as the corner of a
+    whole tooth does (`corner_separation_m`). Over the whole face this is a separation. Over part of the face that part
+    is lost by and by, and the compliance of tooth and contact grows by 1/(1 − w/b). The driving flank alone is
+    described, and the mass of the piece is not taken off the gear.
     """
 
     height_mm: float
@@ -378,40 +377,42 @@ def check_chip(pair: PairGeometry, side: int, chip: ToothChip) -> None:
     within(chip.tooth, "tooth of the chip", 0, gear.teeth - 1)
 
 
-def chip_share(pair: PairGeometry, side: int, chip: ToothChip, roll_length_mm: FloatArray) -> FloatArray:
+def chip_share(pair: PairGeometry, side: int, chip: ToothChip, progress: FloatArray) -> FloatArray:
     """Part of the width that a chip over part of the face takes away, 0 to 0.9; 0 if it spans the whole face.
+
+    λ = (w/b) [1 − exp(−s/s₀)], with the separation s of the edge that is left, and what a loaded pair yields by, s₀:
+    both parts of the width share the load until the edge has sunk away from the mate's flank.
 
     Parameters
     ----------
-    roll_length_mm : array
-        ρ of the gear that has the chip.
+    progress : array
+        ζ, base pitches since the pair's ideal entry.
     """
     if _is_whole(pair, chip):
-        return np.zeros(np.shape(roll_length_mm))
+        return np.zeros(np.shape(progress))
     part = (chip.width_mm or 0.0) / pair.face_width_mm
-    result: FloatArray = part * _beyond_edge(pair, side, chip, roll_length_mm)
+    result: FloatArray = -part * np.expm1(-_edge_separation_m(pair, side, chip, progress) / DEFLECTION_M)
     return result
 
 
-def chip_separation_m(pair: PairGeometry, side: int, chip: ToothChip, roll_length_mm: FloatArray) -> FloatArray:
-    """Separation by a chip over the whole face, up to 0.3 mm within 0.05 base pitches of its edge; 0 if less wide."""
-    if not _is_whole(pair, chip):
-        return np.zeros(np.shape(roll_length_mm))
-    result: FloatArray = GAP_M * _beyond_edge(pair, side, chip, roll_length_mm)
-    return result
+def chip_separation_m(pair: PairGeometry, side: int, chip: ToothChip, progress: FloatArray) -> FloatArray:
+    """Separation by a chip over the whole face, of the edge that is left from the mate's flank; 0 for a narrower chip.
+
+    Parameters
+    ----------
+    progress : array
+        ζ, base pitches since the pair's ideal entry.
+    """
+    whole = _is_whole(pair, chip)
+    return _edge_separation_m(pair, side, chip, progress) if whole else np.zeros(np.shape(progress))
 
 
 def _is_whole(pair: PairGeometry, chip: ToothChip) -> bool:
     return chip.width_mm is None or spans_face(chip.width_mm, pair.face_width_mm)
 
 
-def _beyond_edge(pair: PairGeometry, side: int, chip: ToothChip, roll_length_mm: FloatArray) -> FloatArray:
-    """0 below the chip's edge, 1 beyond it; less than 1 for a chip smaller than the edge's own length."""
-    gear = pair.driver if side == 1 else pair.driven
-    tip = gear.tip_roll_rad * gear.base_radius_mm
-    edge = sqrt((gear.tip_radius_mm - chip.height_mm) ** 2 - gear.base_radius_mm**2)
-    length = EDGE_BASE_PITCHES * pair.base_pitch_mm
-    # Contact on a whole tooth also goes on a little beyond the tip; without this it would jump with the first chip.
-    lost = min(1.0, (tip - edge) / length)
-    result: FloatArray = lost * smooth_step((np.asarray(roll_length_mm, dtype=np.float64) - edge) / length)
+def _edge_separation_m(pair: PairGeometry, side: int, chip: ToothChip, progress: FloatArray) -> FloatArray:
+    """0 up to the chip's edge, and what is more than at the corner of a whole tooth beyond it."""
+    lost = (chip.height_mm, 0.0) if side == 1 else (0.0, chip.height_mm)
+    result: FloatArray = corner_separation_m(pair, progress, lost) - corner_separation_m(pair, progress)
     return result

@@ -51,7 +51,7 @@ def _separation_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple
         if spall is not None:
             rows[surface[tooth]] += spall_separation_m(mesh.pair, number, spall, rho)
         if chip is not None:
-            rows[surface[tooth]] += chip_separation_m(mesh.pair, number, chip, rho)
+            rows[surface[tooth]] += chip_separation_m(mesh.pair, number, chip, progress)
     return rows, surface
 
 

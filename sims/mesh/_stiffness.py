@@ -535,7 +535,7 @@ class GearMesh:
         else:
             tooth = cracked_tooth_compliance(gear, material, roll, faults.crack, width)
         foundation = foundation_compliance(gear, material, roll - gear.base_half_angle_rad) / width
-        result: FloatArray = tooth + foundation + self._lost_width_compliance(side, rho, faults, tooth)
+        result: FloatArray = tooth + foundation + self._lost_width_compliance(side, progress, faults, tooth)
         return result + self._neighbour_compliance(side, progress) if self.body == "coupled" else result
 
     def _yielding(self, side: int, rho: FloatArray) -> tuple[GearGeometry, FloatArray, float]:
@@ -586,13 +586,16 @@ class GearMesh:
                 result[:, i, j] = body_compliance(gear, material, angle[:, i], angle[:, j], ahead) / width
         return result
 
-    def _lost_width_compliance(self, side: int, rho: FloatArray, faults: ToothFaults, tooth: FloatArray) -> FloatArray:
-        extra = np.zeros_like(rho)
+    def _lost_width_compliance(
+        self, side: int, progress: FloatArray, faults: ToothFaults, tooth: FloatArray
+    ) -> FloatArray:
+        extra = np.zeros_like(tooth)
         if faults.spall is not None:
-            lost = spall_share(self.pair, side, (self.material_1, self.material_2), faults.spall, rho)
+            materials = (self.material_1, self.material_2)
+            lost = spall_share(self.pair, side, materials, faults.spall, self.roll_length_mm(side, progress))
             extra += self.contact_compliance * lost / (1.0 - lost)
         if faults.chip is not None:
-            lost = chip_share(self.pair, side, faults.chip, rho)
+            lost = chip_share(self.pair, side, faults.chip, progress)
             extra += (tooth + self.contact_compliance) * lost / (1.0 - lost)
         return extra
 

@@ -3,7 +3,6 @@
 from sims.reduced_fe._contact import (
     MARGIN,
     MeshMaps,
-    corner_separation_m,
     folded,
     force_map,
     hertz_energy,
@@ -84,7 +83,6 @@ __all__ = [
     "check_convergence",
     "check_depth",
     "constants",
-    "corner_separation_m",
     "crack_growth",
     "eigenfrequencies_hz",
     "energy_release_m",

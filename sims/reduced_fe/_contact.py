@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import ceil, floor, sqrt
+from math import ceil, floor
 from typing import NamedTuple
 
 import numpy as np
@@ -24,13 +24,14 @@ from sims.mesh import (
     Lead,
     PairGeometry,
     ToothRows,
+    corner_separation_m,
     load_dependent_contact_coefficient,
     one_mesh_cycle,
     separation_table,
     tooth_rows,
 )
 
-# Where a tooth pair touches over its progress, and how far apart it is before and after: corner contact.
+# Where a tooth pair touches over its progress.
 
 
 def rolls_rad(pair: PairGeometry, progress: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -42,60 +43,6 @@ def rolls_rad(pair: PairGeometry, progress: FloatArray) -> tuple[FloatArray, Flo
     inside = np.clip(progress, 0.0, pair.contact_ratio)
     rho_1, rho_2 = pair.contact_radii_mm(inside)
     return rho_1 / pair.driver.base_radius_mm, rho_2 / pair.driven.base_radius_mm
-
-
-def corner_separation_m(
-    pair: PairGeometry, progress: FloatArray, tips_lost_mm: tuple[float, float] = (0.0, 0.0)
-) -> FloatArray:
-    """Distance between the unloaded flanks of a pair along the line of action; 0 on the path of contact, else above 0.
-
-    Before ζ = 0 the tip corner of the driven gear has not yet reached the line of action. The involute of the driver
-    that runs through the corner starts ahead of the driver's own flank, and r_b1 times that angle is what the driver
-    would have to yield by for the two to touch. Beyond ζ = ε the gears change places.
-
-    Parameters
-    ----------
-    pair : PairGeometry
-    progress : array, (n,)
-        ζ, base pitches since the ideal entry.
-    tips_lost_mm : (float, float)
-        Height that a chip took off the driver's and the driven gear's tooth. What is left ends in a corner, too, which
-        comes to the line of action later, or leaves it earlier.
-
-    Returns
-    -------
-    array, (n,)
-        m.
-    """
-    rb1, rb2 = pair.driver.base_radius_mm, pair.driven.base_radius_mm
-    length = pair.action_length_mm
-    end, mate_end = (
-        sqrt(max((gear.tip_radius_mm - lost) ** 2 - gear.base_radius_mm**2, 0.0))
-        for gear, lost in zip((pair.driver, pair.driven), tips_lost_mm, strict=True)
-    )
-    start, at = length - mate_end, pair.contact_radii_mm(progress)[0]
-    entry = _corner_mm(rb1, rb2, length, start, np.maximum(start - at, 0.0))
-    leave = _corner_mm(rb2, rb1, length, length - end, np.maximum(at - end, 0.0))
-    result: FloatArray = 1e-3 * (entry + leave)
-    return result
-
-
-def _corner_mm(rb_flank: float, rb_tip: float, length: float, start: float, before: FloatArray) -> FloatArray:
-    """Separation of a tip corner that still has `before` to go along the line of action, mm.
-
-    Origin at the flank's base tangent point, y along the line of action; centres at (−rb_flank, 0), (rb_tip, length).
-    """
-    turn = before / rb_tip
-    x, y = -rb_tip, start - length
-    corner_x = rb_tip + x * np.cos(turn) - y * np.sin(turn)
-    corner_y = length + x * np.sin(turn) + y * np.cos(turn)
-    across, up = corner_x + rb_flank, corner_y
-    radius = np.hypot(across, up)
-    tangent = np.sqrt(np.maximum((radius / rb_flank) ** 2 - 1.0, 0.0))
-    base_angle = np.arctan2(up, across) + tangent - np.arctan(tangent)
-    roll = (start - before) / rb_flank
-    result: FloatArray = np.where(before > 0.0, rb_flank * (base_angle - roll), 0.0)
-    return result
 
 
 def slice_progress(pair: PairGeometry, lead: Lead, z_m: FloatArray, progress: FloatArray) -> FloatArray:

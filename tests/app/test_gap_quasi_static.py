@@ -27,11 +27,11 @@ from sims.mesh import (
     GearGeometry,
     PairGeometry,
     RootCrack,
+    corner_separation_m,
     cracked_tooth_compliance,
     deepest_crack_mm,
     tooth_compliance,
 )
-from sims.reduced_fe import corner_separation_m
 
 
 @given(st.integers(0, 10**6))

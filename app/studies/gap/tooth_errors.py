@@ -57,14 +57,15 @@ from sims.mesh import (
     ToothChip,
     ToothRows,
     ToothSpall,
+    chip_separation_m,
+    corner_separation_m,
     deepest_crack_mm,
     mesh_table,
     separation_table,
     share_torque,
-    spans_face,
     tooth_rows,
 )
-from sims.reduced_fe import corner_separation_m, mesh_maps, static_table
+from sims.reduced_fe import mesh_maps, static_table
 
 SEED = 5501
 STEPS = 32
@@ -210,9 +211,8 @@ CORNERS = 0.35
 def table_with_corners(mesh: GearMesh) -> MeshTable:
     """Return the table of a mesh whose pairs touch by corners before and after their path; cycles begin `CORNERS` late.
 
-    `sims.mesh` takes a pair up and gives it up within a twentieth of a pitch, and so does the edge of a chip. But a
-    tooth that lags by some µm leaves the load to its neighbours' corners: without them a pitch error of one tooth looks
-    like a crack.
+    `sims.mesh` takes a pair up and gives it up within a twentieth of a pitch. But a tooth that lags by some µm leaves
+    the load to its neighbours' corners: without them a pitch error of one tooth looks like a crack.
     """
     table = mesh_table(mesh)
     low, high = -CORNERS - mesh.ramp, mesh.pair.contact_ratio + CORNERS + mesh.ramp
@@ -251,10 +251,7 @@ def separations_with_corners(mesh: GearMesh, progress: FloatArray) -> ToothRows:
         for tooth in side.faulty_teeth:
             _, spall, chip = side.faults_of(tooth)
             row = ordinary.gear(number)[0] if spall is None else spalled.gear(number)[1]
-            if chip is not None and spans_face(chip.width_mm or mesh.pair.face_width_mm, mesh.pair.face_width_mm):
-                lost = (chip.height_mm, 0.0) if number == 1 else (0.0, chip.height_mm)
-                row = row + corner_separation_m(mesh.pair, progress, lost) - corner
-            rows.append(row)
+            rows.append(row if chip is None else row + chip_separation_m(mesh.pair, number, chip, progress))
         gears.append((np.array(rows) + (corner if number == 1 else 0.0), of))
     return tooth_rows(*gears)
 

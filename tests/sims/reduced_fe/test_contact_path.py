@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from sims.mesh import GearGeometry, PairGeometry
-from sims.reduced_fe import corner_separation_m, rolls_rad
+from sims.mesh import GearGeometry, PairGeometry, corner_separation_m
+from sims.reduced_fe import rolls_rad
 
 PAIRS = (
     PairGeometry(GearGeometry(50, 3.0, bore_radius_mm=20.0), GearGeometry(50, 3.0, bore_radius_mm=20.0)),
