@@ -1,5 +1,6 @@
 """Settings of all tests."""
 
+import gc
 import os
 
 import pytest
@@ -14,6 +15,13 @@ settings.register_profile("gearsig", deadline=None, suppress_health_check=[Healt
 # In continuous integration the examples are the same each time: a change fails by what it changes, not by chance.
 settings.register_profile("ci", settings.get_profile("gearsig"), derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "gearsig")
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was imported and collected to garbage collection no more: walking it took an eighth of the time."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
 
 
 @pytest.fixture(scope="session", autouse=True)

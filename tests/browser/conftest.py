@@ -10,6 +10,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -45,13 +46,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.flaky(reruns=1))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Start `gearsig dashboard` on a free port, in a folder whose configuration would open it to everybody."""
+    """Start a dashboard, one for all tests of a process: imports and analyses of samples are made once."""
+    with dashboard(tmp_path_factory.mktemp("home")) as address:
+        yield address
+
+
+@contextmanager
+def dashboard(folder: Path) -> Iterator[str]:
+    """Run `gearsig dashboard` on a free port, in a folder whose configuration would open it to everybody."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    folder = tmp_path_factory.mktemp("home")
     (folder / ".streamlit").mkdir()
     (folder / ".streamlit" / "config.toml").write_text(OPEN)
     command = [sys.executable, "-m", "app.cli.main", "dashboard", "--port", str(port), "--no-browser"]
@@ -77,33 +84,45 @@ def wait_until_up(health: str, server: subprocess.Popen[bytes]) -> None:
     pytest.fail("the server does not answer")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[playwright.Browser]:
-    """Start Chromium, once for the tests of a file: each has a window of its own that shares nothing with others."""
     with playwright.sync_playwright() as driver:
         chromium = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield chromium
         chromium.close()
 
 
-@pytest.fixture
-def page(address: str, browser: playwright.Browser) -> Iterator[playwright.Page]:
-    """Open the dashboard; afterwards nothing may have gone wrong in the browser, nor left this machine."""
+@pytest.fixture(scope="session")
+def window(browser: playwright.Browser) -> Iterator[playwright.BrowserContext]:
+    """Open a window for all tests, each in a tab of its own: scripts of the page are fetched and compiled once."""
     with browser.new_context(viewport={"width": 1280, "height": 1600}) as window:
-        view = window.new_page()
-        view.set_default_timeout(90_000)  # the first analysis compiles
-        wrong: list[str] = []
-        view.on("pageerror", lambda error: wrong.append(str(error)))
-        view.on("console", lambda message: wrong.append(message.text) if is_error(message) else None)
-        view.on("request", lambda request: None if is_local(request.url) else wrong.append(request.url))
-        view.goto(address)
-        view.get_by_role("button", name="Open the recording").first.wait_for()
-        yield view
-        exceptions = view.get_by_test_id("stException").all_inner_texts()
-        broken = view.evaluate("[...document.images].filter(i => i.complete && !i.naturalWidth).map(i => i.src)")
+        yield window
+
+
+@pytest.fixture
+def blank(window: playwright.BrowserContext) -> Iterator[playwright.Page]:
+    """Open an empty tab; afterwards nothing may have gone wrong in it, nor left this machine."""
+    view = window.new_page()
+    view.set_default_timeout(90_000)  # the first analysis compiles
+    wrong: list[str] = []
+    view.on("pageerror", lambda error: wrong.append(str(error)))
+    view.on("console", lambda message: wrong.append(message.text) if is_error(message) else None)
+    view.on("request", lambda request: None if is_local(request.url) else wrong.append(request.url))
+    yield view
+    exceptions = view.get_by_test_id("stException").all_inner_texts()
+    broken = view.evaluate("[...document.images].filter(i => i.complete && !i.naturalWidth).map(i => i.src)")
+    view.close()
     assert not exceptions
     assert not broken
     assert not wrong
+
+
+@pytest.fixture
+def page(blank: playwright.Page, address: str) -> playwright.Page:
+    """Open the dashboard's start page."""
+    blank.goto(address)
+    blank.get_by_role("button", name="Open the recording").first.wait_for()
+    return blank
 
 
 def is_error(message: playwright.ConsoleMessage) -> bool:

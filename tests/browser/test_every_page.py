@@ -24,6 +24,12 @@ pytestmark = [
 playwright = pytest.importorskip("playwright.sync_api")
 
 
+@pytest.fixture
+def page(blank: playwright.Page) -> playwright.Page:
+    """Leave the start page out: each test opens a page by its address."""
+    return blank
+
+
 def opened(page: playwright.Page, address: str) -> str:
     page.goto(address)
     page.get_by_test_id("stMain").wait_for()

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.samples import sample_folder
-from tests.browser.conftest import CHROMIUM, settle
+from tests.browser.conftest import CHROMIUM, dashboard, settle
 from tests.gap.example_report import effect_report
 from tests.gap.stub_diagnosis import ALL_CURVES, SECONDS, environment
 
@@ -23,19 +23,13 @@ TABS = ("Where", "Which", "How far", "Next and facts")
 
 
 @pytest.fixture(scope="module")
-def stubbed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Let the processes of this module's server answer at once."""
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Start a dashboard whose processes answer at once."""
     with pytest.MonkeyPatch.context() as patch:
         for name, value in environment(tmp_path_factory.mktemp("site"), **{SECONDS: "4", ALL_CURVES: "1"}).items():
             patch.setenv(name, value)
-        yield
-
-
-@pytest.fixture(scope="module")
-def address(stubbed: None, address: str) -> str:
-    """Start the dashboard with the stub in force."""
-    del stubbed
-    return address
+        with dashboard(tmp_path_factory.mktemp("home")) as address:
+            yield address
 
 
 @pytest.fixture
