@@ -36,7 +36,7 @@ def dashboard(
     """Open the dashboard in a browser. It listens on localhost only and sends nothing anywhere."""
     from streamlit.runtime.pages_manager import PagesManager
 
-    from app import compiled
+    from app.dashboard import compiled
 
     # main.py lists the pages. Streamlit would take a folder called "pages" for a list of its own until main.py has run
     # once, and show that instead to who opens a page by its address first.

@@ -126,10 +126,8 @@ def _defect(support: BearingSupport) -> tuple[int, float, float, float]:
     defect, bearing = support.defect, support.bearing
     if defect is None:
         return 0, 0.0, 0.0, 1.0
-    ball, pitch = bearing.rolling_element_diameter_mm or 0.0, bearing.pitch_diameter_mm or 0.0
-    n = bearing.n_rolling_elements or 1
     outer = defect.race == "outer"
-    spacing = pi * (pitch + ball if outer else pitch - ball) / n
+    spacing = support.element_spacing_mm(defect.race) or 1.0
     share = (defect.length_mm + 2.0 * RACE_EDGE_MM) / spacing + 6.0 * defect.spacing_jitter
     if share > 1.0:
         longest = spacing * (1.0 - 6.0 * defect.spacing_jitter) - 2.0 * RACE_EDGE_MM
@@ -139,7 +137,7 @@ def _defect(support: BearingSupport) -> tuple[int, float, float, float]:
         )
     order = bearing.orders()["BPFO" if outer else "BPFI"]
     # A cage that slips falls behind: fewer passings outside, more inside, as n = BPFO + BPFI.
-    order += -defect.slip * order if outer else defect.slip * (n - order)
+    order += -defect.slip * order if outer else defect.slip * ((bearing.n_rolling_elements or 1) - order)
     return (1 if outer else 2), order, defect.length_mm / spacing, 1e-3 * spacing
 
 

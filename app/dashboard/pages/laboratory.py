@@ -7,8 +7,8 @@ from time import sleep
 
 import streamlit as st
 
-from app.compiled import is_being_made
 from app.dashboard import address
+from app.dashboard.compiled import is_being_made
 from app.dashboard.laboratory import views
 from app.dashboard.laboratory.drive import show_drive
 from app.dashboard.laboratory.run import (
