@@ -12,6 +12,7 @@ import argparse
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -145,11 +146,18 @@ def _named_from(fitted: GapCalibration, cases: Sequence[AttributedCase]) -> floa
     for threshold in THRESHOLDS:
         named = replace(fitted, named_from=threshold)
         if all(
-            sum(named.outcome(p) in NAMING for p in healthy_cases) <= rate * len(healthy_cases)
+            sum(named.outcome(p, groups_of_causes()) in NAMING for p in healthy_cases) <= rate * len(healthy_cases)
             for rate, healthy_cases in without
         ):
             return threshold
     return THRESHOLDS[-1]
+
+
+@cache
+def groups_of_causes() -> dict[str, str]:
+    """Return cause → the kind of fault that it is of."""
+    effects = cracked_gap_simulator().gap_effects()
+    return {name: effect.group for name, effect in effects.items()} | {NONE: NONE, UNKNOWN: UNKNOWN}
 
 
 # --------------------
@@ -256,8 +264,7 @@ def table(calibration: GapCalibration, cases: Sequence[AttributedCase]) -> list[
 
 
 def _line(name: str, calibration: GapCalibration, cases: Sequence[AttributedCase]) -> str:
-    effects = cracked_gap_simulator().gap_effects()
-    groups = {name: effect.group for name, effect in effects.items()} | {NONE: NONE, UNKNOWN: UNKNOWN}
+    groups = groups_of_causes()
     answers = [(case, case.by(calibration)) for case in cases]
     strong = [(c, p) for c, p in answers if c.size >= STRONG and c.truths[0] not in (NONE, UNKNOWN)]
     first = [next(iter(p)) == c.truths[0] for c, p in strong]
