@@ -30,7 +30,7 @@ from sims import simulate
 from sims.registry import gap_simulator
 
 POINT = OperatingCondition(1500.0, 60.0)
-CHIPPED = Added("chipped_tooth", 1.5, {"gear": "driver", "tooth": 3.0, "width_percent": 85.0})
+CHIPPED = Added("chipped_tooth", 2.5, {"gear": "driver", "tooth": 3.0, "width_percent": 85.0})
 
 
 @cache
