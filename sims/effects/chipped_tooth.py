@@ -38,8 +38,8 @@ EFFECT = Effect(
     group="tooth-local",
     title="piece broken off a tooth's tip",
     severity=Severity("height_mm", "mm", 0.0, 10.0, 1.0, "radially, from the tip down to the edge of the break"),
-    changes="The outer part of one tooth carries less, or, over the whole face, nothing: its pair lets go early (on "
-    "the driver) or takes up late (on the driven gear), and the neighbours carry instead.",
+    changes="The outer part of one tooth carries less, or, over the whole face, by the edge that is left: its pair "
+    "lets go early (on the driver) or takes up late (on the driven gear), and the neighbours carry instead.",
     signature="One burst per revolution of the gear's shaft, at the tooth's angle and where its tip is in mesh: in "
     "recess for the driver, in approach for the driven gear. A shock when the next pair takes the load over: wide "
     "sidebands of that shaft, ringing resonances, envelope lines at multiples of its order. Small chips lie in double "
