@@ -18,9 +18,8 @@ from app.dashboard.work import kept
 from app.gear_body import GearBodyStudy
 from app.papers import PAPERS, Paper, paper
 from gearsig.checks import FloatArray
-from gearsig.formatting import unit_text
 from gearsig.orders import OrderMap
-from gearsig.plot import LevelPanel, decibels, level_colours
+from gearsig.plot import LevelPanel, decibel_text, decibels, level_colours
 from sims import fe_gear
 from sims.fe_gear import GearBlank
 from sims.mesh import GearGeometry
@@ -173,8 +172,8 @@ def show_pair() -> None:
 
 def show_run_up(run_up: OrderMap) -> None:
     """Show levels over order and time, with the speed under the pointer."""
-    unit = f"dB re 1 {unit_text(run_up.unit)}"
-    levels = decibels(run_up.values, run_up.scaling)
+    unit = decibel_text(run_up.unit)
+    levels = decibels(run_up.values, run_up.scaling, run_up.unit)
     panel = LevelPanel(levels, run_up.positions, run_up.time_s, run_up.axis_label, "time (s)", unit)
     show_map(panel, "pair run_up", also=(run_up.speed_rpm, "rpm"))
 

@@ -14,7 +14,7 @@ from gearsig.formatting import counted, readable, unit_text
 from gearsig.methods._spectra import cursors_of, highest_order
 from gearsig.methods._table import HIGHEST, SHAFT, Method, MethodAnswer, MethodOption, signal_of, unit_of, waveforms_of
 from gearsig.orders import OrderMap, TrackedOrder, frequency_map, order_map, track_orders, track_vold_kalman
-from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibels, with_unit
+from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibel_text, decibels, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.rig import order_lines
 
@@ -34,12 +34,12 @@ def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, hig
     table = {"time (s)": levels.time_s, "speed (rpm)": levels.speed_rpm}
     lines = {f"order {p:.7g}" if over == "order" else f"{p:.7g} Hz": values[:, i] for i, p in enumerate(positions)}
     panel = LevelPanel(
-        decibels(values, levels.scaling),
+        decibels(values, levels.scaling, levels.unit),
         positions,
         levels.time_s,
         levels.axis_label,
         "time (s)",
-        f"dB re 1 {unit_text(levels.unit)}".strip(),
+        decibel_text(levels.unit),
         cursors=[c for c in cursors_of(prepared, levels) if c.kind != "sideband"],
     )
     numbers = {"resolution": levels.resolution, "scaling": levels.scaling, "unit": levels.unit, "shaft": levels.shaft}

@@ -14,7 +14,7 @@ from gearsig.formatting import axis_label, unit_text
 from gearsig.methods._spectra import cursors_of
 from gearsig.methods._table import LINES, OVER_ANGLE, SHAFT, Method, MethodAnswer, MethodOption, signal_of, waveforms_of
 from gearsig.orders import order_spectrum
-from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibels, with_unit
+from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibel_text, decibels, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.timefreq import Morse, Ridge, TimeFrequencyMap, UniformSignal, WaveletPackets
 
@@ -97,12 +97,12 @@ def levels_answer(
     table |= {f"{p:.7g} {unit}": levels.values[:, i] for i, p in enumerate(levels.positions)}
     lines = [ChartLine(ridge.at, ridge.positions, f"ridge {k}", 1) for k, ridge in enumerate(ridges, start=1)]
     panel = LevelPanel(
-        decibels(levels.values.T, levels.scaling),
+        decibels(levels.values.T, levels.scaling, levels.unit),
         levels.at,
         levels.positions,
         levels.at_label,
         levels.axis_label,
-        f"dB re 1 {unit_text(levels.unit)}".strip(),
+        decibel_text(levels.unit),
         levels.spacing == "logarithmic",
         [*_edges(levels), *lines],
     )

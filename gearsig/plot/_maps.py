@@ -9,7 +9,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError
-from gearsig.formatting import readable, unit_text
+from gearsig.formatting import readable
 from gearsig.orders import OrderMap
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
@@ -57,7 +57,7 @@ def order_map_figure(
     positions, values = _fewer_cells(order_map.positions[:stop], order_map.values[:, :stop], axis=1, n_max=N_COLUMNS)
     time, values = _fewer_cells(order_map.time_s, values, axis=0, n_max=N_ROWS)
     x, y = _cell_borders(positions), _cell_borders(time)
-    _draw_levels(axes, x, y, decibels(values, order_map.scaling), order_map.unit)
+    _draw_levels(axes, x, y, decibels(values, order_map.scaling, order_map.unit), order_map.unit)
     speed.set_ylim(float(y[0]), float(y[-1]))
     speed.plot(order_map.speed_rpm, order_map.time_s, color=style.MEASURED, linewidth=1.2)
     _hide_last_tick_label(speed)
@@ -78,7 +78,7 @@ def _draw_levels(
     axes.grid(visible=False)
     axes.set_xlim(float(x[0]), float(x[-1]))
     axes.set_ylim(float(y[0]), float(y[-1]))
-    style.colour_bar(axes, mesh, f"dB re 1 {unit_text(unit)}".strip())
+    style.colour_bar(axes, mesh, style.decibel_text(unit))
 
 
 def draw_level_map(
@@ -153,7 +153,7 @@ def time_frequency_figure(
     logarithmic = levels.spacing == "logarithmic"
     if logarithmic:
         axes.set_yscale("log")
-    level = decibels(levels.values.T, levels.scaling)
+    level = decibels(levels.values.T, levels.scaling, levels.unit)
     draw_level_map(axes, levels.at, levels.positions, level, levels.unit, dynamic_range_db)
     start, end = axes.get_xlim()
     inside = levels.edge < (end - start) / 2

@@ -21,7 +21,7 @@ from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
 from gearsig.plot._panels import ChartLine, LinePanel
 from gearsig.plot._series import N_POINTS, envelope, thin
-from gearsig.plot._style import Scale, above_zero, decibels, plain, with_unit
+from gearsig.plot._style import Scale, above_zero, decibel_text, decibels, plain, with_unit
 from gearsig.recording import Recording
 from gearsig.spectra import Scaling, Spectrum
 
@@ -106,7 +106,7 @@ def _draw_lines(
     drawn_as: Scale = "linear" if scale == "log" and not logarithmic else scale
 
     def displayed(values: FloatArray) -> FloatArray:
-        return displayed_values(values, spectrum.scaling, drawn_as)
+        return displayed_values(values, spectrum.scaling, drawn_as, spectrum.unit)
 
     if floor is not None:
         axes.plot(*thin(x, displayed(floor[start:stop]), N_POINTS // 2), color=style.FLOOR, linewidth=1.2, zorder=2.5)
@@ -135,10 +135,10 @@ def _draw_lines(
         style.no_offset(axes)
 
 
-def displayed_values(values: FloatArray, scaling: Scaling, scale: Scale) -> FloatArray:
+def displayed_values(values: FloatArray, scaling: Scaling, scale: Scale, unit: str) -> FloatArray:
     """Return what a scale draws of values: decibels, what has a logarithm, or the values themselves."""
     if scale == "decibel":
-        return decibels(values, scaling)
+        return decibels(values, scaling, unit)
     return above_zero(values) if scale == "log" else values
 
 
@@ -157,7 +157,7 @@ def value_limits(values: FloatArray, scale: Scale) -> tuple[float, float]:
 def _value_label(spectrum: Spectrum, scale: Scale) -> str:
     name = "" if spectrum.scaling == "dimensionless" else spectrum.scaling
     if scale == "decibel":
-        return f"{name or 'value'} (dB re 1 {unit_text(spectrum.unit)})".replace("1 )", "1)")
+        return f"{name or 'value'} ({decibel_text(spectrum.unit)})"
     return with_unit(name or "value", spectrum.unit)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from math import log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -31,14 +32,35 @@ Scale = Literal["log", "decibel", "linear"]
 """How values are drawn: on a logarithmic axis, in decibels on a linear one, or as they are."""
 
 
-def decibels(values: FloatArray, scaling: Scaling) -> FloatArray:
-    """Return values in dB re one unit: 20 lg of amplitudes, 10 lg of powers.
+SOUND_REFERENCE_PA = 20e-6
+"""Of sound pressure in air (ISO 1683)."""
+
+
+def decibels(values: FloatArray, scaling: Scaling, unit: str = "") -> FloatArray:
+    """Return values in dB re one unit, or re 20 µPa of sound: 20 lg of amplitudes, 10 lg of powers.
 
     Zeros are drawn 200 dB (amplitudes) or 100 dB (powers) below the largest value.
     """
     factor = 10.0 if scaling in ("power", "power density") else 20.0
     result: FloatArray = factor * np.log10(above_zero(values))
-    return result
+    return result - 20.0 * log10(SOUND_REFERENCE_PA) if _is_sound(unit) else result
+
+
+def decibel_text(unit: str) -> str:
+    """Return what levels in dB refer to.
+
+    Examples
+    --------
+    >>> decibel_text("m/s^2"), decibel_text("Pa"), decibel_text("Pa^2/Hz"), decibel_text("")
+    ('dB re 1 m/s²', 'dB re 20 µPa', 'dB re (20 µPa)²/Hz', 'dB re 1')
+    """
+    if _is_sound(unit):
+        return f"dB re {unit_text(unit.replace('Pa', '20 µPa' if unit == 'Pa' else '(20 µPa)'))}"
+    return f"dB re 1 {unit_text(unit)}".rstrip()
+
+
+def _is_sound(unit: str) -> bool:
+    return unit.partition("^2")[0] == "Pa"
 
 
 def above_zero(values: FloatArray) -> FloatArray:

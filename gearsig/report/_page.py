@@ -576,12 +576,12 @@ def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
     highest = highest_order_of_interest(analysis, order_map) if order_map.axis == "order" else np.inf
     kept = order_map.positions <= highest
     panel = plot.LevelPanel(
-        plot.decibels(order_map.values[:, kept], order_map.scaling),
+        plot.decibels(order_map.values[:, kept], order_map.scaling, order_map.unit),
         order_map.positions[kept],
         order_map.time_s,
         order_map.axis_label,
         "time (s)",
-        f"dB re 1 {unit_text(order_map.unit)}".strip(),
+        plot.decibel_text(order_map.unit),
         cursors=[c for c in line_cursors(analysis, order_map, n_sidebands=0) if c.position <= highest],
     )
     yield Picture.of_svg(

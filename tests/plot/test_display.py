@@ -2,12 +2,26 @@ import numpy as np
 import pytest
 
 from gearsig.formatting import unit_text
-from gearsig.plot import decibels, plain, with_unit
+from gearsig.plot import decibel_text, decibels, plain, with_unit
 
 
 def test_decibels_of_amplitudes_and_powers():
     np.testing.assert_allclose(decibels(np.array([1.0, 10.0, 0.1]), "amplitude peak"), [0, 20, -20])
     np.testing.assert_allclose(decibels(np.array([1.0, 10.0]), "power density"), [0, 10])
+
+
+def test_a_pascal_of_sound_is_94_decibels():
+    assert decibels(np.array([1.0]), "amplitude rms", "Pa")[0] == pytest.approx(93.979, abs=1e-3)
+    assert decibels(np.array([1.0]), "power density", "Pa^2/Hz")[0] == pytest.approx(93.979, abs=1e-3)
+    assert decibels(np.array([1.0]), "amplitude rms", "mm/s")[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "text"),
+    [("Pa", "dB re 20 µPa"), ("Pa^2/Hz", "dB re (20 µPa)²/Hz"), ("m/s^2", "dB re 1 m/s²"), ("", "dB re 1")],
+)
+def test_what_decibels_refer_to(unit, text):
+    assert decibel_text(unit) == text
 
 
 def test_decibels_of_zeros_are_finite():

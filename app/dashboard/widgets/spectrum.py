@@ -28,6 +28,7 @@ from gearsig.plot import (
     Cursor,
     LinePanel,
     Scale,
+    decibel_text,
     displayed_values,
     marks_of,
     polar_figure,
@@ -99,7 +100,7 @@ def show_spectrum(
     low, high = looked_at(chart, whole, shown)
     lines, shown_values = [], []
     for i, spectrum in enumerate(spectra):
-        values = displayed_values(spectrum.values, spectrum.scaling, scaled)
+        values = displayed_values(spectrum.values, spectrum.scaling, scaled, spectrum.unit)
         # of several spectra, a band would hide the other lines
         line_name = names[i] if names else spectrum.source
         lines.append(ChartLine(spectrum.positions, values, line_name, i, peaks=len(spectra) == 1))
@@ -108,8 +109,8 @@ def show_spectrum(
         n_offset = max(3, int(0.005 * (stop - start))) if start == 0 and stop - start > 9 else 0
         shown_values.append(values[start + n_offset : stop])
     text = quantity or ("value" if first.scaling == "dimensionless" else first.scaling)
-    in_db = f"{text} (dB re 1 {unit_text(first.unit)}".rstrip() + ")"
-    values = displayed_values(first.values, first.scaling, scaled)
+    in_db = f"{text} ({decibel_text(first.unit)})"
+    values = displayed_values(first.values, first.scaling, scaled, first.unit)
     # a finding names an order to less than a line: the tallest beside it is meant
     places = [(p, max(first.index_of(p) - 2, 0)) for p in marked]
     shafts = [cursor.position for cursor in cursors if cursor.kind == "shaft"]

@@ -286,12 +286,12 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
     # over frequency and speed an order is a ray
     rays = [] if lines == "Order" else [ChartLine(c / 60.0 * y, y, "mesh", 2) for c in _mesh_orders(analysis)]
     panel = plot.LevelPanel(
-        plot.decibels(shown_map.values[rows], shown_map.scaling),
+        plot.decibels(shown_map.values[rows], shown_map.scaling, shown_map.unit),
         shown_map.positions,
         y,
         shown_map.axis_label,
         "time (s)" if along == "Time" else "speed (rpm)",
-        f"dB re 1 {unit_text(shown_map.unit)}",
+        plot.decibel_text(shown_map.unit),
         lines=rays if along == "Speed" else (),
         cursors=cursors if lines == "Order" else (),
     )
