@@ -13,7 +13,9 @@ import typer.main
 from packaging.requirements import Requirement
 
 from app.cli.main import app
+from gearsig.gap import GapReport
 from gearsig.recording import FORMAT_OF_EXTENSION
+from gearsig.report import gap_to_dict
 from sims.effects import effects
 
 ROOT = Path(__file__).parents[1]
@@ -63,13 +65,27 @@ def test_python_of_the_pages_runs(page: Path, tmp_path: Path, monkeypatch: pytes
 
 
 @pytest.mark.slow
-def test_slow_python_of_the_gap_tutorial_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_gap_tutorial_finds_tooth_effect_and_depth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the sample's crack: 3 mm at tooth 21."""
     (tmp_path / "sample_data").symlink_to(ROOT / "sample_data")
     monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
+    names: dict[str, Any] = {}
     for _, code in blocks(GAP, "python"):
         exec(compile(code, GAP.name, "exec"), names)  # noqa: S102 - our own page
-    assert names["report"].causes[0].name in {"root_crack", "tooth_spall", "chipped_tooth"}  # type: ignore[attr-defined]
+    report: GapReport = names["report"]
+    assert report.kind is not None
+    assert report.kind.group == "tooth-local"
+    assert report.kind.probability > 0.95
+    assert "tooth 21 " in report.kind.place
+    assert json.loads(json.dumps(gap_to_dict(report)))["kind"]["group"] == "tooth-local"
+    crack = report.causes[0]
+    assert crack.name == "root_crack"
+    assert crack.probability > 0.9
+    assert crack.severity is not None
+    assert crack.severity.low <= 3.0 <= crack.severity.high
+    assert crack.severity.value == pytest.approx(3.0, rel=0.2)
+    assert crack.fitted is not None
+    assert crack.fitted.severity == pytest.approx(crack.severity.value)
 
 
 def test_notebooks_are_small_and_without_outputs() -> None:

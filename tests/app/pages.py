@@ -26,6 +26,8 @@ SAMPLES = {sample.rig.stem: sample for sample in samples()}
 
 # Tests set widgets ahead of the first run, which Streamlit would remark upon.
 config.set_option("global.disableWidgetStateDuplicationWarning", True)
+# As the command starts it; what Streamlit would count takes a tenth of a page's time.
+config.set_option("browser.gatherUsageStats", False)
 
 
 def opened(sample: str = "damaged_tooth", *, tab: str = "", **values: Any) -> AppTest:

@@ -2,12 +2,13 @@
 
 import re
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from gearsig.diagnosis import analyze
-from gearsig.recording import read_recording
+from gearsig.recording import Recording, read_recording
 from gearsig.rig import Bearing, ConstantSpeed, OperatingPoint, TachometerChannel
 from tests.diagnosis.machines import GOOD, MOTOR, MOTOR_HZ, MOTOR_RATE_HZ, codes, finding, motor, record
 from tests.kinematic.speed import ConstantProfile
@@ -121,8 +122,15 @@ def test_of_a_measured_race_at_a_rate_that_is_too_low(name: str, times: float) -
     ],
 )
 def test_of_a_measured_motor(name: str, right_hz: int, stated_hz: int) -> None:
+    recording, right_codes = measured_motor(name, right_hz)
+    assert CODE not in right_codes
+    wrong = analyze(replace(recording, sampling_rate_hz=stated_hz))
+    assert f"{right_hz} Hz" in finding(wrong, CODE).title
+
+
+@cache
+def measured_motor(name: str, right_hz: int) -> tuple[Recording, list[str]]:
+    """Return a recording at its right rate, and the codes of what is found in it."""
     rig = replace(MOTOR, bearings=(*MOTOR.bearings, Bearing("fan end", "motor", 8, 6.746, 28.5)), speed=None)
     recording = read_recording(DATA / f"bearing_cwru/{name}.mat", rig=rig, sampling_rate_hz=right_hz)
-    right, wrong = (analyze(replace(recording, sampling_rate_hz=rate_hz)) for rate_hz in (right_hz, stated_hz))
-    assert CODE not in codes(right)
-    assert f"{right_hz} Hz" in finding(wrong, CODE).title
+    return recording, codes(analyze(recording))

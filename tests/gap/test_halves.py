@@ -69,13 +69,12 @@ def next_file(start: str) -> str:
     return f"two_stage_gearbox/{found[0].name}"
 
 
-# Two without damage and one with it; the others take as long again.
+# Two without damage and one with it; the others take two minutes more.
 QUICK = {"cracked sample", "healthy sample", "measured gearbox, healthy"}
+FURTHER = pytest.mark.study
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in RECORDINGS]
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in QUICK else FURTHER) for name in RECORDINGS])
 def test_two_halves_of_one_recording_are_no_gap(name: str) -> None:
     first, second = halves(RECORDINGS[name]())
     assert first.rig is not None
@@ -97,11 +96,15 @@ def test_two_halves_of_one_recording_have_no_crack(name: str) -> None:
     assert isinstance(estimate_crack(second.with_rig(rig), reference=first.with_rig(rig)), NoCrackSeen)
 
 
+def marks_of(name: str) -> tuple[pytest.MarkDecorator, ...]:
+    return () if "unbalance" in name else (pytest.mark.slow,) if "OR007" in name else (FURTHER,)
+
+
 @needs_data
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(one.name, marks=() if "unbalance" in one.name else pytest.mark.slow)
+        pytest.param(one.name, marks=marks_of(one.name))
         for one in MEASURED_RECORDINGS
         if one.rig is not None and not one.rig.pairs
     ],
