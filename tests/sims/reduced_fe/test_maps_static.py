@@ -14,6 +14,7 @@ from sims.reduced_fe import (
     mesh_maps,
     mirror_groups,
     mirrors,
+    rolls_rad,
     static_table,
 )
 from tests.sims.reduced_fe.flexible_pairs import ready_mesh
@@ -33,6 +34,14 @@ def maps():
 
 def single(maps):
     return (maps.mesh_cycles > SINGLE[0]) & (maps.mesh_cycles < SINGLE[1])
+
+
+def test_rolls_meet_on_the_line_of_action():
+    pair = PairGeometry(GearGeometry(30, 2.0), GearGeometry(75, 2.0))
+    one, two = rolls_rad(pair, np.linspace(0.0, pair.contact_ratio, 9))
+    total = one * pair.driver.base_radius_mm + two * pair.driven.base_radius_mm
+    assert total == pytest.approx(pair.action_length_mm)
+    assert rolls_rad(pair, np.array([-0.2]))[0] == rolls_rad(pair, np.array([0.0]))[0]
 
 
 def test_pairs_carry_the_load_together_and_never_pull(maps):

@@ -5,7 +5,6 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from sims.mesh import GearGeometry, PairGeometry, corner_separation_m
-from sims.reduced_fe import rolls_rad
 
 PAIRS = (
     PairGeometry(GearGeometry(50, 3.0, bore_radius_mm=20.0), GearGeometry(50, 3.0, bore_radius_mm=20.0)),
@@ -67,11 +66,3 @@ def test_what_a_chip_leaves_is_the_corner_of_a_shorter_tooth(lost):
     chipped = corner_separation_m(pair, progress, lost)
     assert chipped == pytest.approx(corner_separation_m(shorter, progress - late), abs=1e-15)
     assert np.all(chipped >= corner_separation_m(pair, progress))
-
-
-def test_rolls_meet_on_the_line_of_action():
-    pair = PAIRS[1]
-    one, two = rolls_rad(pair, np.linspace(0.0, pair.contact_ratio, 9))
-    total = one * pair.driver.base_radius_mm + two * pair.driven.base_radius_mm
-    assert total == pytest.approx(pair.action_length_mm)
-    assert rolls_rad(pair, np.array([-0.2]))[0] == rolls_rad(pair, np.array([0.0]))[0]
