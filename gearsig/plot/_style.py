@@ -55,7 +55,8 @@ def decibel_text(unit: str) -> str:
     ('dB re 1 m/s²', 'dB re 20 µPa', 'dB re (20 µPa)²/Hz', 'dB re 1')
     """
     if _is_sound(unit):
-        return f"dB re {unit_text(unit.replace('Pa', '20 µPa' if unit == 'Pa' else '(20 µPa)'))}"
+        reference = "20 µPa" if unit == "Pa" else "(20 µPa)"  # of amplitudes; of powers, squared
+        return f"dB re {unit_text(unit.replace('Pa', reference))}"
     return f"dB re 1 {unit_text(unit)}".rstrip()
 
 

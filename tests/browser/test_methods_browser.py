@@ -21,14 +21,8 @@ pytestmark = [
 playwright = pytest.importorskip("playwright.sync_api")
 
 
-@pytest.fixture
-def page(blank: playwright.Page) -> playwright.Page:
-    """Leave the start page out: each test opens a page by its address."""
-    return blank
-
-
-def open_analysis(page: playwright.Page, address: str, sample: str = "damaged_tooth") -> None:
-    page.goto(f"{address}analysis?sample={sample}")
+def open_analysis(page: playwright.Page, sample: str = "damaged_tooth") -> None:
+    page.goto(f"{page.url.partition('?')[0]}analysis?sample={sample}")
     page.locator(".strip").first.wait_for()
     settle(page)
 
@@ -46,8 +40,8 @@ def choose(page: playwright.Page, panel: playwright.Locator, name: str) -> None:
     settle(page)
 
 
-def test_every_method_draws(page: playwright.Page, address: str) -> None:
-    open_analysis(page, address)
+def test_every_method_draws(page: playwright.Page) -> None:
+    open_analysis(page)
     for method in METHODS.values():
         if not method.view:
             continue
@@ -58,8 +52,8 @@ def test_every_method_draws(page: playwright.Page, address: str) -> None:
             assert panel.get_by_test_id("stAlert").count() == 0, method.title
 
 
-def test_the_chosen_mode_goes_on_to_the_squeezed_transform(page: playwright.Page, address: str) -> None:
-    open_analysis(page, address)
+def test_the_chosen_mode_goes_on_to_the_squeezed_transform(page: playwright.Page) -> None:
+    open_analysis(page)
     panel = open_method(page, "Modes")
     panel.get_by_text("is the most impulsive").first.wait_for()
     panel.get_by_role("combobox", name="The chosen mode goes on to").click()
@@ -70,8 +64,8 @@ def test_the_chosen_mode_goes_on_to_the_squeezed_transform(page: playwright.Page
     panel.get_by_text("Colours span").first.wait_for()
 
 
-def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page, address: str) -> None:
-    open_analysis(page, address)
+def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page) -> None:
+    open_analysis(page)
     panel = open_method(page, "Denoising")
     panel.get_by_test_id("stPopover").get_by_role("button").click()
     with page.expect_download() as download:
@@ -84,8 +78,8 @@ def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page, add
     np.testing.assert_allclose(found.values("without noise"), whole.values, atol=1e-12)
 
 
-def test_the_depth_of_a_crack_against_the_healthy_sample(page: playwright.Page, address: str) -> None:
-    open_analysis(page, address, "root_crack_3mm")
+def test_the_depth_of_a_crack_against_the_healthy_sample(page: playwright.Page) -> None:
+    open_analysis(page, "root_crack_3mm")
     panel = open_method(page, "Crack severity")
     panel.locator(".figure").first.wait_for()
     assert "tooth 21" in panel.get_by_test_id("stAlert").filter(has_text="tooth").inner_text().replace("\u2060", "")
