@@ -2,7 +2,14 @@
 
 from gearsig.angle._encoder import encoder_angle, speed_channel_angle
 from gearsig.angle._pulses import clock_tick, count_pulses, find_pulse_edges, pulse_train_angle
-from gearsig.angle._resample import REACH, delay_table, doubling_filter, interpolate, resample_to_angle, times_at
+from gearsig.angle._resample import (
+    REACH,
+    delay_table,
+    doubling_filter,
+    interpolate,
+    resample_to_angle,
+    times_of_revolutions,
+)
 from gearsig.angle._source import constant_speed_angle, find_shaft_angle, tachometer_edges
 from gearsig.angle._tachless import CombElsewhere, comb_elsewhere, estimate_shaft_angle, refine_by_phase
 from gearsig.angle._types import AngleSignal, ShaftAngle, check_shaft_angle
@@ -29,5 +36,5 @@ __all__ = [
     "resample_to_angle",
     "speed_channel_angle",
     "tachometer_edges",
-    "times_at",
+    "times_of_revolutions",
 ]

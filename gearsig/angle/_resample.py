@@ -355,6 +355,21 @@ def solve_cubic(a, b, c, rise, target, start):  # type: ignore[no-untyped-def]
     return u
 
 
+def times_of_revolutions(angle: ShaftAngle, first: float, step: float, n: int) -> FloatArray:
+    """Return the n times at which the shaft passes `first`, `first` + `step`, …; the angle holds all of them."""
+    knots, revolutions, speeds = _knots(angle)
+    out = np.empty(n)
+    interval = int(np.searchsorted(revolutions, first, side="right")) - 1
+    times_at(knots, revolutions, speeds, min(max(interval, 0), len(knots) - 2), float(first), float(step), out)
+    return out
+
+
+def _knots(angle: ShaftAngle) -> tuple[FloatArray, ...]:
+    """Times, revolutions and speeds of an angle as the one kind of array that the kernels are compiled for."""
+    arrays = angle.time_s, angle.revolutions, angle.speed_rev_per_s
+    return tuple(read_only(np.ascontiguousarray(a, np.float64)) for a in arrays)
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def scales_at(knots, speed, times, factor, lowest, out):  # type: ignore[no-untyped-def]
     """Take factor · speed at sorted times, kept between `lowest` and 1, and return the smallest of them.
@@ -530,9 +545,7 @@ def _fill(
     recording: Recording, rows: list[int], angle: ShaftAngle, first: int, n_per_rev: int, samples: FloatArray
 ) -> None:
     """Fill `samples` chunk by chunk; the kernels release the interpreter, so plain threads share the work."""
-    knots, revolutions, speeds = (
-        read_only(np.ascontiguousarray(a, np.float64)) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
-    )
+    knots, revolutions, speeds = _knots(angle)
     rate, n = recording.sampling_rate_hz, samples.shape[1]
     half_band, table, side = doubling_filter(), delay_table(), kernel_side()
     signals = [read_only(np.ascontiguousarray(recording.samples[i])) for i in rows]

@@ -24,9 +24,9 @@ from gearsig.angle._comb import (
     score_speeds,
     search_of,
 )
-from gearsig.angle._resample import resample_to_angle, times_at
+from gearsig.angle._resample import resample_to_angle, times_of_revolutions
 from gearsig.angle._types import AngleSignal, ShaftAngle, monotone_slopes
-from gearsig.checks import FloatArray, positive, read_only
+from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.rig import Rig
@@ -178,12 +178,7 @@ def _refined_once(
         return None
     n = best[0].baseband.shape[1]
     revolutions = signal.start_revolution + np.arange(n) * best[0].step_rev
-    times = np.empty(n)
-    knots, values, slopes = (
-        read_only(np.ascontiguousarray(a, np.float64)) for a in (angle.time_s, angle.revolutions, angle.speed_rev_per_s)
-    )
-    k = min(max(0, int(np.searchsorted(values, revolutions[0])) - 1), len(knots) - 2)
-    times_at(knots, values, slopes, k, float(revolutions[0]), float(revolutions[1] - revolutions[0]), times)
+    times = times_of_revolutions(angle, revolutions[0], revolutions[1] - revolutions[0], n)
     return _tachless(angle.shaft, times, np.maximum.accumulate(revolutions + _common_shift(best)))
 
 

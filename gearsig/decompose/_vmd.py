@@ -190,7 +190,8 @@ def _solve_here(
     start = first_centres(settings, fs, spectrum, rng)
     history = np.empty((settings.max_iterations + 1, settings.n_modes))
     grid, space = _grid(len(x)), working_space(settings.n_modes, len(x))
-    constants = (settings.penalty, settings.dual_step, settings.zero_mode)
+    # Floats: whole numbers would have the kernel compiled once more.
+    constants = (float(settings.penalty), float(settings.dual_step), settings.zero_mode)
     lines, n_done, change = iterate(spectrum, grid, space, start, *constants, threshold, len(history) - 1, history)
     lines *= scale
     if not np.isfinite(history[n_done]).all():  # the centres after the last iteration, which no row returned shows

@@ -7,7 +7,6 @@ from gearsig.orders._average import (
     mean_and_error,
     separate_shafts,
     synchronous_average,
-    times_of_revolutions,
     whole_revolutions,
 )
 from gearsig.orders._separate import SeparatedAverage, band_passed_mesh, check_average, mesh_modulation, separate
@@ -41,7 +40,6 @@ __all__ = [
     "separate",
     "separate_shafts",
     "synchronous_average",
-    "times_of_revolutions",
     "track_order_bands",
     "track_orders",
     "track_vold_kalman",

@@ -17,7 +17,7 @@ from gearsig.angle import (
     find_shaft_angle,
     resample_to_angle,
     speed_channel_angle,
-    times_at,
+    times_of_revolutions,
 )
 from gearsig.checks import FloatArray, count, listed, not_negative, one_of
 from gearsig.errors import InputError, RefusalError
@@ -65,22 +65,6 @@ def unit_of(signal: AngleSignal, channel: str) -> str:
     """Return the unit of a channel."""
     signal.values(channel)  # raises where there is no such channel
     return signal.units[signal.channel_names.index(channel)]
-
-
-def times_of_revolutions(angle: ShaftAngle, first: float, step: float, n: int) -> FloatArray:
-    """Return the times at which the shaft passes `first`, `first` + `step`, … revolutions: n times."""
-    out = np.empty(n)
-    interval = int(np.searchsorted(angle.revolutions, first, side="right")) - 1
-    times_at(
-        angle.time_s,
-        angle.revolutions,
-        angle.speed_rev_per_s,
-        min(max(interval, 0), len(angle.time_s) - 2),
-        float(first),
-        float(step),
-        out,
-    )
-    return out
 
 
 def block_times(

@@ -14,7 +14,7 @@ from gearsig.angle import (
     doubling_filter,
     find_shaft_angle,
     interpolate,
-    times_at,
+    times_of_revolutions,
 )
 from gearsig.checks import FloatArray, count, frozen_array, instance_of, positive, read_only
 from gearsig.errors import InputError, RefusalError
@@ -54,13 +54,10 @@ class CycleLock:
             If the angle is known in no part of that time.
         """
         part = self.angle.between(start_s, end_s)
-        cycles = part.revolutions * self.cycles_per_revolution - phase_cycles
-        first, last = np.ceil(cycles[0]), np.floor(cycles[-1])
-        times = np.empty(max(int(last - first) + 1, 0))
-        if len(times):
-            speed = part.speed_rev_per_s * self.cycles_per_revolution
-            times_at(part.time_s, read_only(cycles), read_only(speed), 0, first, 1.0, times)
-        return times
+        first = np.ceil(part.revolutions[0] * self.cycles_per_revolution - phase_cycles)
+        last = np.floor(part.revolutions[-1] * self.cycles_per_revolution - phase_cycles)
+        per_cycle = 1.0 / self.cycles_per_revolution
+        return times_of_revolutions(part, (first + phase_cycles) * per_cycle, per_cycle, max(int(last - first) + 1, 0))
 
 
 def find_lock(

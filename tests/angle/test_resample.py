@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from gearsig.angle import AngleSignal, ShaftAngle, constant_speed_angle, resample_to_angle, times_at
+from gearsig.angle import AngleSignal, ShaftAngle, constant_speed_angle, resample_to_angle, times_of_revolutions
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
 
@@ -98,15 +98,21 @@ def test_times_of_angles_solve_the_cubic(speeds: list[float], seed: int) -> None
     )
     angle = ShaftAngle("s", t, theta, slopes, "pulses")
     n = 500
-    out = np.empty(n)
     step = (theta[-1] - theta[0]) / (n + 1)
-    times_at(t, theta, slopes, 0, step, step, out)
+    out = times_of_revolutions(angle, step, step, n)
     wanted = step * np.arange(1, n + 1)
     np.testing.assert_allclose(angle.revolutions_at(out), wanted, rtol=1e-12, atol=1e-12 * theta[-1])
     i = n // 3
     by_brent = brentq(lambda s: float(angle.revolutions_at(np.array([s]))[0]) - wanted[i], t[0], t[-1], xtol=1e-14)
     assert angle.revolutions_at(np.array([by_brent]))[0] == pytest.approx(wanted[i], abs=1e-9)
     assert np.all(np.diff(out) >= 0)
+
+
+def test_times_of_revolutions_invert_the_angle():
+    knots = np.linspace(0.0, 10.0, 11)
+    angle = ShaftAngle("s", knots, 10 * knots + knots**2, 10 + 2 * knots, "pulses")
+    times = times_of_revolutions(angle, 3.0, 7.0, 20)
+    assert angle.revolutions_at(times) == pytest.approx(3.0 + 7.0 * np.arange(20), abs=1e-9)
 
 
 def test_default_grid_is_bounded_near_standstill() -> None:

@@ -12,7 +12,6 @@ from gearsig.orders import (
     order_map,
     order_spectrum,
     synchronous_average,
-    times_of_revolutions,
     track_orders,
     track_vold_kalman,
 )
@@ -88,13 +87,6 @@ def test_frequency_map_of_a_run_up_shows_the_speed():
     strongest = result.positions[np.argmax(result.values, axis=1)]
     assert strongest == pytest.approx(6 * result.speed_rpm / 60, abs=2 * result.resolution)
     assert result.speed_rpm == pytest.approx(60 * (10 + 2 * result.time_s))
-
-
-def test_times_of_revolutions_invert_the_angle():
-    knots = np.linspace(0.0, 10.0, 11)
-    angle = ShaftAngle("s", knots, 10 * knots + knots**2, 10 + 2 * knots, "pulses")
-    times = times_of_revolutions(angle, 3.0, 7.0, 20)
-    assert angle.revolutions_at(times) == pytest.approx(3.0 + 7.0 * np.arange(20), abs=1e-9)
 
 
 def test_less_than_a_revolution_is_refused(angle_signal):
