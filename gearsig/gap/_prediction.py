@@ -344,7 +344,7 @@ def transplanted(
     ----------
     names : sequence of str
         Of the changes, see `gearsig.gap`; those of patterns last, or none.
-    change : array, (n,)
+    change : array, (…, n)
         dB, with the effect less healthy, both simulated. `change.…`: the pattern's own value.
     simulated, real : mapping
         Feature → value of the healthy twin and of the healthy machine.
@@ -359,10 +359,10 @@ def transplanted(
 
     Returns
     -------
-    array, (n,)
+    array, (…, n)
         dB; `change.…` from what repetition gives.
     """
-    simulated_change = dict(zip(names, change.tolist(), strict=True))
+    simulated_change = dict(zip(names, np.moveaxis(change, -1, 0), strict=True))
     moved = dict(simulated_change)
     gain_db = real["mesh.total"] - simulated["mesh.total"]
     floor_db = real["floor.total"] - simulated["floor.total"] - gain_db
@@ -389,52 +389,46 @@ def transplanted(
         moved |= _tooth(f"tooth.{side}", moved, simulated_change, simulated, real)
         if f"change.{side}.level" in simulated_change:
             moved |= _pattern(f"change.{side}", simulated_change, usual, real[f"tooth.{side}.level"], level_db)
-    return np.array([moved[name] for name in names])
+    return np.stack([moved[name] for name in names], axis=-1)
 
 
-def _power(decibels: float) -> float:
-    return float(10.0 ** (decibels / 10.0))
+def _power(decibels: FloatArray | float) -> FloatArray:
+    power: FloatArray = np.power(10.0, np.asarray(decibels) / 10.0)
+    return power
 
 
-def _added(change_db: float, simulated_db: float, real_db: float, gain_db: float) -> float:
-    """Return the change that the same added power makes on the real baseline."""
-    if change_db <= 0.0:
-        return change_db
-    more = (_power(simulated_db + change_db) - _power(simulated_db)) * _power(gain_db)
-    return float(10.0 * np.log10(1.0 + more / _power(real_db)))
+def _added(change_db: FloatArray, simulated_db: float, real_db: float, gain_db: float) -> FloatArray:
+    """Return the change that the same added power makes on the real baseline; what falls, falls alike."""
+    risen = (_power(simulated_db + np.maximum(change_db, 0.0)) - _power(simulated_db)) * _power(gain_db - real_db)
+    return np.minimum(change_db, 0.0) + 10.0 * np.log10(1.0 + risen)
 
 
-def _mesh(change: Mapping[str, float], real: Mapping[str, float], level_db: float) -> dict[str, float]:
+def _mesh(change: Mapping[str, FloatArray], real: Mapping[str, float], level_db: float) -> dict[str, FloatArray]:
     """Return the mesh harmonics' changes: what is added comes as much louder, on the harmonics that the machine has."""
     shares = [name for name in change if name.startswith("mesh.share.")]
-    levels = [_change_at_level(change[name] + change["mesh.total"], level_db) for name in shares]
+    levels = np.array([_added(change[name] + change["mesh.total"], 0.0, 0.0, level_db) for name in shares])
     powers = np.array([_power(real[name]) for name in shares])
-    total = float(10.0 * np.log10(powers @ [_power(level) for level in levels] / powers.sum()))
-    return {"mesh.total": total} | {name: level - total for name, level in zip(shares, levels, strict=True)}
+    total = 10.0 * np.log10(np.tensordot(powers, _power(levels), axes=1) / powers.sum())
+    return {"mesh.total": total} | dict(zip(shares, levels - total, strict=True))
 
 
-def _change_at_level(change_db: float, level_db: float) -> float:
-    """Return the change in decibels if what is added were louder by a level; what falls, falls alike."""
-    return _added(change_db, 0.0, 0.0, level_db)
-
-
-def _part(change_db: float) -> float:
+def _part(change_db: FloatArray) -> FloatArray:
     """Return which part of the power is the effect's, if that raised it by so many decibels."""
-    return 1.0 - 1.0 / _power(change_db) if change_db > 0.0 else 0.0
+    return 1.0 - 1.0 / _power(np.maximum(change_db, 0.0))
 
 
-def _prominence_rise(born_db: float, alone_db: float, more_db: float) -> float:
+def _prominence_rise(born_db: float, alone_db: FloatArray, more_db: FloatArray) -> FloatArray:
     """Return by how much the strongest stands out further: as much as it rose, no further than by itself alone."""
-    return min(born_db + max(more_db, 0.0), max(alone_db, born_db)) - born_db
+    return np.minimum(born_db + np.maximum(more_db, 0.0), np.maximum(alone_db, born_db)) - born_db
 
 
 def _tooth(
     name: str,
-    moved: Mapping[str, float],
-    change: Mapping[str, float],
+    moved: Mapping[str, FloatArray],
+    change: Mapping[str, FloatArray],
     simulated: Mapping[str, float],
     real: Mapping[str, float],
-) -> dict[str, float]:
+) -> dict[str, FloatArray]:
     """Return the shape of a shaft's pattern where the effect's own is added to what the real teeth are born with."""
     peak, elsewhere = moved[f"{name}.peak"], moved[f"{name}.elsewhere"]
     part = _part(moved[f"{name}.level"])
@@ -448,13 +442,13 @@ def _tooth(
 
 
 def _pattern(
-    name: str, change: Mapping[str, float], usual: Mapping[str, float], pattern_db: float, level_db: float
-) -> dict[str, float]:
+    name: str, change: Mapping[str, FloatArray], usual: Mapping[str, float], pattern_db: float, level_db: float
+) -> dict[str, FloatArray]:
     """Return how far the pattern of the difference lies from what mere repetition gives."""
     moved = {}
     for detail in ("level", "elsewhere", "peak"):
         key = f"{name}.{detail}"
-        moved[key] = float(10.0 * np.log10(1.0 + _power(change[key] + level_db) / _power(usual[key])))
+        moved[key] = 10.0 * np.log10(1.0 + _power(change[key] + level_db - usual[key]))
     part = _part(moved[f"{name}.level"])
     for detail in _OF_A_PATTERN:
         key = f"{name}.{detail}"

@@ -721,11 +721,8 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
         compared, baseline = names, condition.learned.credibility * base[0] + usual
     real = dict(zip(base_names, baseline.tolist(), strict=True))
     repeated = dict(zip(floor.names, usual.tolist(), strict=True))
-    mean_changes = [bank.changes[bank.added.index(a)].mean(axis=0)[: len(compared)] for a in kept]
-    rows = [
-        [transplanted(compared, change, simulated, real, repeated, *way) for change in mean_changes] for way in WAYS_DB
-    ]
-    table = np.array(rows).reshape(len(WAYS_DB), len(kept), len(compared))
+    changes = bank.changes[[bank.added.index(a) for a in kept]].mean(axis=1)[:, : len(compared)]
+    table = np.array([transplanted(compared, changes, simulated, real, repeated, *way) for way in WAYS_DB])
     return np.where(shown_in(compared, shows_in), table, 0.0)
 
 

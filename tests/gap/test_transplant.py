@@ -41,6 +41,15 @@ def test_on_its_own_baseline_a_change_of_power_stays(change_db: float) -> None:
         assert moved({name: change_db}, healthy())[name] == pytest.approx(change_db, abs=1e-9)
 
 
+def test_many_changes_at_once_are_each_as_alone() -> None:
+    names = (*FEATURES, *NAMES)
+    changes = np.random.default_rng(3).normal(0.0, 8.0, (4, len(names)))
+    real = {name: value + 2.0 for name, value in healthy().items()}
+    together = transplanted(names, changes, healthy(), real, USUAL, 3.0, -6.0)
+    for change, row in zip(changes, together, strict=True):
+        assert transplanted(names, change, healthy(), real, USUAL, 3.0, -6.0) == pytest.approx(row, rel=1e-12)
+
+
 @given(st.floats(-20.0, 0.0))
 def test_what_falls_falls_alike_on_any_baseline(change_db: float) -> None:
     name = "sideband.driver.1"
