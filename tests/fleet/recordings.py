@@ -1,5 +1,7 @@
 """Small recordings, as files."""
 
+from collections.abc import Sequence
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -14,3 +16,19 @@ def write_recording_file(path: Path, level: float, rng: np.random.Generator, n: 
     path.parent.mkdir(parents=True, exist_ok=True)
     table = np.column_stack([time_s, values])
     np.savetxt(path, table, delimiter=",", header="time (s),a1 (m/s^2)", comments="", fmt="%.7g")
+
+
+def write_daily_recordings(
+    folder: Path,
+    machine: str,
+    levels: Sequence[float],
+    *,
+    point: str = "DE",
+    first: datetime = datetime(2026, 1, 1),
+) -> Path:
+    """Write a recording of each level, one a day; return the folder of all machines."""
+    rng = np.random.default_rng(len(machine) + len(levels))
+    for day, level in enumerate(levels):
+        date = first + timedelta(days=day)
+        write_recording_file(folder / machine / f"{point}_{date:%Y%m%d}.csv", level, rng)
+    return folder

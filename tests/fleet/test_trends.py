@@ -1,6 +1,8 @@
 """From recordings to alarms: raised, cleared, by zones, against a stated baseline, reported since last time."""
 
+import shutil
 from datetime import datetime
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,18 +11,26 @@ from gearsig.errors import InputError
 from gearsig.fleet import Fleet, TrendSettings, counts_text, fleet_changes, last_report, mark_reported, open_fleet
 from gearsig.report import fleet_page_html, fleet_page_pdf
 from gearsig.rig import ConstantSpeed, MachineSize, OperatingPoint, Rig, Sensor, Shaft
-from tests.fleet.recordings import PATTERN
+from tests.fleet.recordings import PATTERN, write_daily_recordings
+
+
+@pytest.fixture(scope="module")
+def analysed(tmp_path_factory) -> Path:
+    """Recordings and store of a machine that stays as it is, and of one that is louder on two days."""
+    folder = tmp_path_factory.mktemp("analysed")
+    write_daily_recordings(folder / "data", "calm", [1.0] * 12)
+    write_daily_recordings(folder / "data", "loud", [1.0] * 8 + [4.0] * 2 + [1.0] * 4)
+    opened = open_fleet(folder / "store", create=True)
+    opened.set(TrendSettings(n_baseline=8))
+    opened.add(folder / "data", pattern=PATTERN, n_processes=1)
+    return folder
 
 
 @pytest.fixture
-def fleet(make_recordings, tmp_path) -> Fleet:
-    """One machine that stays as it is, and one that is louder on two days."""
-    make_recordings("calm", [1.0] * 12)
-    data = make_recordings("loud", [1.0] * 8 + [4.0] * 2 + [1.0] * 4)
-    opened = open_fleet(tmp_path / "store", create=True)
-    opened.set(TrendSettings(n_baseline=8))
-    opened.add(data, pattern=PATTERN, n_processes=1)
-    return opened
+def fleet(analysed, tmp_path) -> Fleet:
+    """Of its own for each test."""
+    shutil.copytree(analysed, tmp_path, dirs_exist_ok=True)
+    return open_fleet(tmp_path / "store")
 
 
 def test_an_alarm_is_raised_and_cleared(fleet):
