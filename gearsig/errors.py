@@ -50,10 +50,13 @@ class RefusalError(GearsigError):
         Why there is no answer, with the evidence.
     remedy : str
         Which data or knowledge would allow one.
+    looked_at : object
+        What was found on the way, where there is something to look at: as the room that refuses has it, to be drawn by
+        `gearsig.plot.figure_of_refusal`.
     """
 
-    def __init__(self, reason: str, *, remedy: str = "") -> None:
-        self.reason, self.remedy = reason, remedy
+    def __init__(self, reason: str, *, remedy: str = "", looked_at: object = None) -> None:
+        self.reason, self.remedy, self.looked_at = reason, remedy, looked_at
         super().__init__(_one_line(f"{reason}; {remedy}" if remedy else reason))
 
 
@@ -81,7 +84,8 @@ def options_named(names: Mapping[str, str]) -> Iterator[None]:
             error.what, where=error.where, allowed=error.allowed, remedy=_with_options(error.remedy, names)
         ) from None
     except RefusalError as error:
-        raise RefusalError(error.reason, remedy=_with_options(error.remedy, names)) from None
+        remedy = _with_options(error.remedy, names)
+        raise RefusalError(error.reason, remedy=remedy, looked_at=error.looked_at) from None
 
 
 def _with_options(text: str, names: Mapping[str, str]) -> str:

@@ -80,6 +80,19 @@ def readable(value: float, n_digits: int = 4) -> str:
     return text.replace("-", "−", 1) if text.startswith("-") else text
 
 
+def seconds_text(seconds: float, n_digits: int = 4) -> str:
+    """Write a time in the unit that leaves a readable number: s, ms or µs.
+
+    Examples
+    --------
+    >>> seconds_text(7.8125e-05), seconds_text(0.0032), seconds_text(0.3), seconds_text(0.0)
+    ('78.12 µs', '3.2 ms', '0.3 s', '0 s')
+    """
+    size = abs(seconds)
+    scale, unit = (1.0, "s") if size >= 0.1 or size == 0.0 else (1e3, "ms") if size >= 1e-3 else (1e6, "µs")
+    return f"{readable(scale * seconds, n_digits)} {unit}"
+
+
 def signed(value: float, n_decimals: int = 1) -> str:
     """Write a change with its sign and one decimal; none where it is nothing.
 

@@ -104,7 +104,8 @@ class SynchronousAverage(Result, columns=("revolutions", "values", "standard_err
     shaft, channel, unit : str
     kind : str
         "average"; "residual": without mesh harmonics; "difference": without mesh harmonics and their first-order
-        sidebands; "regular": what was taken out for the difference; "band-passed mesh": lines around a mesh harmonic.
+        sidebands; "regular": what was taken out for the difference; "band-passed mesh": lines around a mesh harmonic;
+        "change": what differs from a reference's average.
     highest_order : float
         Orders above it are not in the average.
     """
@@ -115,7 +116,7 @@ class SynchronousAverage(Result, columns=("revolutions", "values", "standard_err
     shaft: str
     channel: str
     unit: str
-    kind: Literal["average", "residual", "difference", "regular", "band-passed mesh"]
+    kind: Literal["average", "residual", "difference", "regular", "band-passed mesh", "change"]
     highest_order: float
 
     def __post_init__(self) -> None:

@@ -9,7 +9,7 @@ from numba import njit
 
 from gearsig.checks import FloatArray, count, positive, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.formatting import percent
+from gearsig.formatting import percent, seconds_text
 from gearsig.phase._neighbours import nearest_apart, spaced
 from gearsig.phase._types import (
     EmbeddingDimension,
@@ -68,7 +68,7 @@ def delay_embedding(
     return PhasePortrait(
         points=delay_vectors(x, tau, d),
         sampling_rate_hz=rate,
-        axis_names=tuple("x(t)" if k == 0 else f"x(t + {k * tau / rate:.4g} s)" for k in range(d)),
+        axis_names=tuple("x(t)" if k == 0 else f"x(t + {seconds_text(k * tau / rate)})" for k in range(d)),
         units=(unit,) * d,
         kind="delay embedding",
         source=source,

@@ -193,23 +193,33 @@ def largest_lyapunov_exponent(
     )
     rate = portrait.sampling_rate_hz
     curve = replace(curve, saturation=_saturation(curve, memory))
-    if fit_s is None:
-        first, stop = fit_limits(curve, memory, max(MIN_STEPS, round(0.25 * period)))
-    else:
-        first, stop = _requested_limits(fit_s, rate, len(curve.log_distance))
-    slope, uncertainty = slope_of(curve, first, stop)
-    return LyapunovExponent(
-        exponent_per_s=slope * rate,
-        uncertainty_per_s=uncertainty * rate,
+    not_fitted = LyapunovExponent(
+        exponent_per_s=float("nan"),
+        uncertainty_per_s=float("nan"),
         log_distance=curve.log_distance,
         step_s=1.0 / rate,
-        fit_s=(first / rate, (stop - 1) / rate),
+        fit_s=(memory / rate, memory / rate),
         saturation_log_distance=curve.saturation,
-        verdict=_verdict(slope, uncertainty, stop - 1 - first, has_room=stop == len(curve.log_distance)),
+        verdict="undecided",
         method=method,
         n_references=curve.n_references,
         theiler_samples=window,
         source=portrait.source,
+    )
+    if fit_s is None:
+        try:
+            first, stop = fit_limits(curve, memory, max(MIN_STEPS, round(0.25 * period)))
+        except RefusalError as refusal:
+            raise RefusalError(refusal.reason, remedy=refusal.remedy, looked_at=not_fitted) from None
+    else:
+        first, stop = _requested_limits(fit_s, rate, len(curve.log_distance))
+    slope, uncertainty = slope_of(curve, first, stop)
+    return replace(
+        not_fitted,
+        exponent_per_s=slope * rate,
+        uncertainty_per_s=uncertainty * rate,
+        fit_s=(first / rate, (stop - 1) / rate),
+        verdict=_verdict(slope, uncertainty, stop - 1 - first, has_room=stop == len(curve.log_distance)),
     )
 
 

@@ -268,7 +268,7 @@ class LyapunovExponent(Result, columns=("times_s", "log_distance")):
     ----------
     exponent_per_s, uncertainty_per_s : float
         Slope of the curve and one standard deviation of it: scatter between segments of the signal, and dependence on
-        where the line is fitted.
+        where the line is fitted. Not numbers in what a `RefusalError` looked at.
     log_distance : array, (n_steps,)
         Mean logarithm of the distance of neighbours after 0, 1, 2, … steps of `step_s`.
     step_s : float

@@ -78,6 +78,7 @@ from gearsig.plot._panels import (
     LevelPanel,
     LinePanel,
     RowPanel,
+    cell_limits,
     curves_figure,
     figure_table,
     panels_figure,
@@ -94,7 +95,13 @@ from gearsig.plot._phase import (
     recurrence_figure,
 )
 from gearsig.plot._pictures import Captioned, Picture, embed, figure_svg, fleet_trend_picture, svg_panel, svg_ring
-from gearsig.plot._response import ResponseCase, crack_comparison_figure, response_figure
+from gearsig.plot._response import (
+    ResponseCase,
+    crack_comparison_figure,
+    figure_of_refusal,
+    response_figure,
+    search_panels,
+)
 from gearsig.plot._series import envelope, series_colours, thin
 from gearsig.plot._spectrum import (
     METHODS,
@@ -128,7 +135,9 @@ from gearsig.plot._style import (
     decibel_text,
     decibels,
     font_folder,
+    is_sound,
     level_colours,
+    level_name,
     new_figure,
     plain,
     with_unit,
@@ -166,6 +175,7 @@ __all__ = [
     "band_levels_figure",
     "bifurcation_figure",
     "calibration_figure",
+    "cell_limits",
     "cepstrum",
     "chaos_test_figure",
     "coherence_figure",
@@ -185,6 +195,7 @@ __all__ = [
     "envelope",
     "envelope_spectrum",
     "figure_of",
+    "figure_of_refusal",
     "figure_svg",
     "figure_table",
     "fleet_trend_picture",
@@ -205,9 +216,11 @@ __all__ = [
     "gear_stress_figure",
     "impacts_figure",
     "importance",
+    "is_sound",
     "kurtogram",
     "kurtogram_figure",
     "level_colours",
+    "level_name",
     "load_sharing_figure",
     "marks_of",
     "mesh_maps_figure",
@@ -236,6 +249,7 @@ __all__ = [
     "response_figure",
     "rhythm_cursors",
     "rig_cursors",
+    "search_panels",
     "series_colours",
     "spectral_coherence",
     "spectrum_figure",

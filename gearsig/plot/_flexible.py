@@ -106,7 +106,7 @@ def speed_sweep_figure(
     for word, hertz in {**natural, **(jumps_hz or {})}.items():
         axes.axvline(hertz, color=style.FLOOR, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1)
         series.write(axes, hertz, 1.01, word)
-    style.label_axes(axes, "mesh frequency (Hz)", "rms of the DTE (µm)")
+    style.label_axes(axes, "mesh frequency (Hz)", "dynamic transmission error, rms (µm)")
     series.head(figure, title, lines, "full: up, dashed: down" if len(sweeps) > 1 else "")
     return figure
 
@@ -154,7 +154,7 @@ def speed_spectra_figure(
         if natural_hz is not None:
             axes.axvline(natural_hz, color=style.FAULT, linewidth=0.9, linestyle=(0, (3, 2)), zorder=1)
         style.put_text(axes, 0.995, 0.93, name, colour=style.INK, transform=axes.transAxes, ha="right", va="top")
-        style.label_axes(axes, "frequency (Hz)" if axes is panels[-1] else "", "DTE (µm)")
+        style.label_axes(axes, "frequency (Hz)" if axes is panels[-1] else "", "transmission error (µm)")
     series.headline(figure, title)
     return figure
 

@@ -113,6 +113,8 @@ class LevelPanel:
     span : float or None
         Of the colours below the largest level; None: what the reader wants.
     title : str
+    square : bool
+        Whether both axes are of one kind and equally long, and levels are yes or no: no bar of colours tells them.
     """
 
     levels: FloatArray
@@ -126,6 +128,7 @@ class LevelPanel:
     cursors: Sequence[Cursor] = ()
     span: float | None = None
     title: str = ""
+    square: bool = False
 
 
 @dataclass(frozen=True)
@@ -193,10 +196,31 @@ class RowPanel:
     span: tuple[float, float] | None = None
 
 
+def cell_limits(positions: FloatArray, *, logarithmic: bool = False) -> tuple[float, float]:
+    """Return where the cells of ascending positions begin and end: half a step beyond the first and the last.
+
+    What cannot be negative does not begin below 0.
+
+    Examples
+    --------
+    >>> cell_limits(np.array([1.0, 2.0, 3.0])), cell_limits(np.array([0.0, 1.0]))
+    ((0.5, 3.5), (0.0, 1.5))
+    """
+    at = np.log(positions) if logarithmic else np.asarray(positions, dtype=np.float64)
+    if len(at) < 2:
+        return float(positions[0]), float(positions[-1])
+    ends = at[0] - (at[1] - at[0]) / 2.0, at[-1] + (at[-1] - at[-2]) / 2.0
+    low, high = np.exp(ends) if logarithmic else ends
+    return float(low if logarithmic or positions[0] < 0 else max(low, 0.0)), float(high)
+
+
 def pooled_levels(
     levels: FloatArray, positions: FloatArray, n_columns: int, n_rows: int, *, logarithmic: bool = False
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the largest level of each pixel, and the first row of `levels` in each row of pixels.
+    """Return the largest level of each pixel, and a row of `levels` that is in each row of pixels.
+
+    Rows of pixels share out the span of `cell_limits` equally. One that holds no position shows the nearest: speeds of
+    a run-up are not equally far apart, and the next one up would lie beside the orders that are drawn over them.
 
     Parameters
     ----------
@@ -207,13 +231,25 @@ def pooled_levels(
         At most.
     logarithmic : bool
     """
-    n_rows, n_columns = min(len(positions), n_rows), min(levels.shape[1], n_columns)
-    steps = (np.geomspace if logarithmic else np.linspace)(positions[0], positions[-1], n_rows)
-    rows = np.searchsorted(positions, steps).clip(0, len(positions) - 1)
-    edges = np.linspace(0, levels.shape[1], n_columns + 1).astype(int)[:-1]
-    if n_rows > 1:
-        levels = np.maximum.reduceat(levels, rows, axis=0)
-    return np.maximum.reduceat(levels, edges, axis=1), rows
+    n_columns = min(levels.shape[1], n_columns)
+    columns = np.linspace(0, levels.shape[1], n_columns + 1).astype(int)[:-1]
+    if len(positions) < 2:
+        return np.maximum.reduceat(levels, columns, axis=1), np.zeros(len(positions), dtype=np.intp)
+    ends, at = cell_limits(positions, logarithmic=logarithmic), np.asarray(positions, dtype=np.float64)
+    if logarithmic:
+        ends, at = (float(np.log(ends[0])), float(np.log(ends[1]))), np.log(at)
+    steps = np.append(np.diff(at), 2.0 * (at[0] - ends[0]))
+    if len(at) <= n_rows and np.allclose(steps, steps[0], rtol=1e-3):
+        n_rows = len(at)
+    edges = np.linspace(*ends, n_rows + 1)
+    first, past = np.searchsorted(at, edges[:-1]), np.searchsorted(at, edges[1:])
+    is_empty = first == past
+    nearest = np.searchsorted((at[:-1] + at[1:]) / 2.0, (edges[:-1] + edges[1:]) / 2.0)
+    rows = np.where(is_empty, nearest, first)
+    # a row more than there are, for empty rows of pixels past the last position
+    largest = np.maximum.reduceat(np.vstack([levels, levels[-1:]]), first, axis=0)
+    pooled = np.where(is_empty[:, None], levels[nearest], largest)
+    return np.maximum.reduceat(pooled, columns, axis=1), rows
 
 
 def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") -> Figure:
@@ -361,6 +397,12 @@ def _names_of_looks(figure: Figure, axes: Axes) -> dict[tuple[str, bool], str]:
     }
 
 
+def _own_name(drawn: Line2D | Collection) -> str:
+    """Return what the drawing calls a line; matplotlib's own names begin with an underscore."""
+    name = str(drawn.get_label())
+    return "" if name.startswith("_") else name
+
+
 def _is_broken(line: Line2D) -> bool:
     return line.get_linestyle() not in ("-", "None")
 
@@ -380,7 +422,7 @@ def _number_of(colour: str) -> int | str:
 
 
 def _words_of(axes: Axes) -> str:
-    named = _names_of_upright_lines(axes).values()
+    named = {*_names_of_upright_lines(axes).values(), *(str(line.get_label()) for line in axes.lines)}
     words = [axes.get_title(loc="left"), *(text.get_text() for text in axes.texts)]
     return " · ".join(word for word in words if word and word not in named)
 
@@ -420,7 +462,10 @@ def _level_panel(axes: Axes) -> LevelPanel:
     values = np.asarray(image.get_array(), dtype=np.float64)
     at, positions = (np.linspace(a, b, n) for a, b, n in ((left, right, values.shape[1]), (low, high, values.shape[0])))
     span = float(np.ptp(values)) or 1.0
-    return LevelPanel(values, at, positions, axes.get_xlabel(), axes.get_ylabel(), "", span=span, title=_words_of(axes))
+    names = (axes.get_xlabel(), axes.get_ylabel(), "")
+    return LevelPanel(
+        values, at, positions, *names, span=span, title=_words_of(axes), square=axes.get_aspect() in ("equal", 1.0)
+    )
 
 
 def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
@@ -431,9 +476,11 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
     limits = axes.get_xlim()
     named = _names_of_upright_lines(axes)
 
-    def take(x: Any, y: Any, colour: Any, **looks: Any) -> None:
+    def take(x: Any, y: Any, colour: Any, own: str = "", **looks: Any) -> None:
         is_quiet = isinstance(number := _number_of(name := _colour(colour)), int) and number < 0
-        about = "" if is_quiet else names.get((name, looks.get("dotted", False)), "") or names.get((name, False), "")
+        by_looks = names.get((name, looks.get("dotted", False)), "") or names.get((name, False), "")
+        # a legend of the whole figure may name a line of another panel in the same colour
+        about = own or ("" if is_quiet else by_looks)
         lines.append(ChartLine(np.asarray(x, float), np.asarray(y, float), about, number, **looks))
 
     for line in axes.lines:
@@ -444,15 +491,15 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
             at = float(np.ravel(x)[0])
             cursors.append(Cursor(at, "finding" if is_fault else "", named.get(at, "")))
         elif line.get_transform() == axes.get_yaxis_transform():
-            take(limits, np.ravel(y)[[0, 0]], line.get_color(), dotted=True)
+            take(limits, np.ravel(y)[[0, 0]], line.get_color(), _own_name(line), dotted=True)
         elif len(np.ravel(x)):
-            take(x, y, line.get_color(), dotted=_is_broken(line), dots=not joined)
+            take(x, y, line.get_color(), _own_name(line), dotted=_is_broken(line), dots=not joined)
     collections: list[Any] = [drawn for drawn in axes.collections if drawn.get_label() != UNDER_A_LINE]
     for collection in collections:  # upright lines
         ends = np.array(collection.get_segments()).reshape(-1, 2, 2)
         gaps = np.concatenate([ends, np.full((len(ends), 1, 2), np.nan)], axis=1)
         gaps[:, 2, 0] = ends[:, 1, 0]
-        take(gaps[..., 0].ravel(), gaps[..., 1].ravel(), collection.get_edgecolor()[0])
+        take(gaps[..., 0].ravel(), gaps[..., 1].ravel(), collection.get_edgecolor()[0], _own_name(collection))
     in_bars = {patch for bars in axes.containers for patch in bars}
     for bars in axes.containers:
         corners = [(b.get_x(), b.get_width(), b.get_y(), b.get_height()) for b in bars]

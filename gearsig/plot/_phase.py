@@ -10,6 +10,7 @@ import numpy as np
 from gearsig.angle import REACH
 from gearsig.checks import FloatArray, count
 from gearsig.errors import InputError
+from gearsig.formatting import seconds_text
 from gearsig.phase import (
     BifurcationDiagram,
     ChaosTest,
@@ -135,11 +136,11 @@ def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None 
         rows += [
             f"recurrence rate {measures.recurrence_rate:.3f}",
             f"determinism {measures.determinism:.3f}",
-            f"mean line {measures.mean_line_s:.4g} s",
-            f"longest line {measures.longest_line_s:.4g} s",
+            f"mean line {seconds_text(measures.mean_line_s)}",
+            f"longest line {seconds_text(measures.longest_line_s)}",
             f"entropy {measures.entropy_nats:.3g} nats",
             f"laminarity {measures.laminarity:.3f}",
-            f"trapping time {measures.trapping_time_s:.4g} s",
+            f"trapping time {seconds_text(measures.trapping_time_s)}",
         ]
     for i, text in enumerate(rows):
         at = 1.0 + 0.35 / side_in, 1.0 - (0.2 + 0.24 * i) / side_in
@@ -150,13 +151,13 @@ def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None 
 def embedding_figure(information: MutualInformation, dimension: EmbeddingDimension, *, title: str = "") -> Figure:
     """Draw mutual information over delay and false neighbours over dimension, with what was chosen from them."""
     figure, (left, right) = _two_panels()
-    left.plot(information.delays_s, information.information_nats, color=style.MEASURED, linewidth=1.2)
-    left.axvline(information.delay_s, color=style.FAULT, linewidth=1.0)
+    left.plot(1e3 * information.delays_s, information.information_nats, color=style.MEASURED, linewidth=1.2)
+    left.axvline(1e3 * information.delay_s, color=style.FAULT, linewidth=1.0)
     left.set_ylim(0.0)
-    left.set_xlim(0.0, float(information.delays_s[-1]))
+    left.set_xlim(0.0, 1e3 * float(information.delays_s[-1]))
     left.locator_params(axis="x", nbins=5)
-    style.label_axes(left, "delay (s)", "mutual information (nats)", title or information.source)
-    style.note(left, f"{information.delay_s:.4g} s: {information.rule}")
+    style.label_axes(left, "delay (ms)", "mutual information (nats)", title or information.source)
+    style.note(left, f"{seconds_text(information.delay_s)}: {information.rule}")
     d = np.asarray(dimension.dimensions)
     lines = [
         *right.plot(d, dimension.false_fraction, "o-", color=style.MEASURED, markersize=4, label="false neighbours"),
@@ -175,16 +176,26 @@ def embedding_figure(information: MutualInformation, dimension: EmbeddingDimensi
 
 
 def divergence_figure(exponent: LyapunovExponent, *, title: str = "") -> Figure:
-    """Draw the divergence curve with its fitted segment, line and saturation."""
+    """Draw the divergence curve with its fitted segment and line, and the distance of unrelated points.
+
+    Without a fit, as of what a `RefusalError` looked at, the curve and that distance alone.
+    """
     figure, (axes,) = style.panels((2.43,), top_in=0.42)
-    axes.plot(exponent.times_s, exponent.log_distance, color=style.MEASURED, linewidth=1.2)
-    axes.axhline(exponent.saturation_log_distance, color=style.FLOOR, linewidth=0.8, linestyle="--")
-    series.shade(axes, exponent.fit_s)
-    inside = (exponent.times_s >= exponent.fit_s[0]) & (exponent.times_s <= exponent.fit_s[1])
-    t, s = exponent.times_s[inside], exponent.log_distance[inside]
-    axes.plot(t, s.mean() + exponent.exponent_per_s * (t - t.mean()), color=style.FAULT, linewidth=1.2)
-    style.label_axes(axes, "time (s)", "mean ln distance", title or exponent.source or "divergence of neighbours")
-    style.note(axes, f"λ = {exponent.exponent_per_s:.4g} ± {exponent.uncertainty_per_s:.2g} 1/s, {exponent.verdict}")
+    axes.plot(exponent.times_s, exponent.log_distance, color=style.MEASURED, linewidth=1.2, label="neighbours")
+    unrelated = exponent.saturation_log_distance
+    axes.axhline(unrelated, color=style.MESH, linewidth=0.8, linestyle="--", label="unrelated points")
+    words = f"no exponent, {exponent.verdict}"
+    if isfinite(exponent.exponent_per_s):
+        series.shade(axes, exponent.fit_s)
+        inside = (exponent.times_s >= exponent.fit_s[0]) & (exponent.times_s <= exponent.fit_s[1])
+        t, s = exponent.times_s[inside], exponent.log_distance[inside]
+        fitted = s.mean() + exponent.exponent_per_s * (t - t.mean())
+        axes.plot(t, fitted, color=style.FAULT, linewidth=1.2, label="fit")
+        words = f"λ = {exponent.exponent_per_s:.4g} ± {exponent.uncertainty_per_s:.2g} 1/s, {exponent.verdict}"
+    style.label_axes(
+        axes, "time (s)", "ln of the mean distance", title or exponent.source or "divergence of neighbours"
+    )
+    style.note(axes, words)
     style.no_offset(axes)
     return figure
 

@@ -25,7 +25,7 @@ from gearsig.orders import SynchronousAverage
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import AngleMark, Cursor
-from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, line_colour, pooled_levels
+from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, cell_limits, line_colour, pooled_levels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -228,7 +228,7 @@ def _svg_levels(panel: LevelPanel, width: int, height: int) -> str:
     uri, colours = b64encode(image).decode("ascii"), style.level_colours()
     high, span = _range_of(panel)
     x_limits = (float(panel.at[0]), float(panel.at[-1]))
-    y_limits = (float(panel.positions[0]), float(panel.positions[-1]))
+    y_limits = cell_limits(panel.positions, logarithmic=panel.logarithmic)
     labels, n_rows = _placed(panel.cursors, x_limits, width - BAR)
     top = 10 + ROW * n_rows
     frame = _Panel(LEFT, top, width - LEFT - RIGHT - BAR, height, x_limits, y_limits, panel.logarithmic)

@@ -157,7 +157,7 @@ def value_limits(values: FloatArray, scale: Scale) -> tuple[float, float]:
 def _value_label(spectrum: Spectrum, scale: Scale) -> str:
     name = "" if spectrum.scaling == "dimensionless" else spectrum.scaling
     if scale == "decibel":
-        return f"{name or 'value'} ({decibel_text(spectrum.unit)})"
+        return f"{style.level_name(name, spectrum.unit) or 'value'} ({decibel_text(spectrum.unit)})"
     return with_unit(name or "value", spectrum.unit)
 
 

@@ -178,7 +178,7 @@ def _draw_planes(axes: Axes, drawn: Drawn) -> None:
 
 
 def _draw_loops(axes: Axes, drawn: Drawn) -> None:
-    style.label_axes(axes, "twist at the driver (mrad)", "torque (N m)", "torque over twist")
+    style.label_axes(axes, "twist at the driver (mrad)", "torque (N·m)", "torque over twist")
     for examined, colour in drawn:
         if examined.loop is None:
             series.write(axes, 0.5, 0.5, "no torque was measured")
@@ -204,7 +204,7 @@ def motion_profile_figure(examined: motions.StartStop, *, title: str = "") -> Fi
     motion = examined.motion
     rows: dict[str, FloatArray] = {"driver (rpm)": motion.driver_speed_rad_s * 30.0 / np.pi}
     if motion.torque_nm is not None:
-        rows["torque (N m)"] = motion.torque_nm
+        rows["torque (N·m)"] = motion.torque_nm
     if examined.portrait is not None:
         rows["compression (µm)"] = examined.portrait.points[:, 0] * MICRO
     figure, every = style.panels([1.5] * len(rows), top_in=0.8, row_gap_in=0.4, share_x=True)

@@ -39,11 +39,25 @@ SOUND_REFERENCE_PA = 20e-6
 def decibels(values: FloatArray, scaling: Scaling, unit: str = "") -> FloatArray:
     """Return values in dB re one unit, or re 20 µPa of sound: 20 lg of amplitudes, 10 lg of powers.
 
+    Levels of sound are those of root mean squares, as ISO 80000-8 has them: of peaks, 3 dB less.
     Zeros are drawn 200 dB (amplitudes) or 100 dB (powers) below the largest value.
     """
     factor = 10.0 if scaling in ("power", "power density") else 20.0
     result: FloatArray = factor * np.log10(above_zero(values))
-    return result - 20.0 * log10(SOUND_REFERENCE_PA) if _is_sound(unit) else result
+    if not is_sound(unit):
+        return result
+    return result - 20.0 * log10(SOUND_REFERENCE_PA) - (10.0 * log10(2.0) if scaling == "amplitude peak" else 0.0)
+
+
+def level_name(scaling: str, unit: str) -> str:
+    """Return what levels in dB are of: the scaling, or the sound pressure level.
+
+    Examples
+    --------
+    >>> level_name("amplitude peak", "Pa"), level_name("amplitude peak", "m/s^2")
+    ('sound pressure level', 'amplitude peak')
+    """
+    return "sound pressure level" if unit == "Pa" and scaling.startswith("amplitude") else scaling
 
 
 def decibel_text(unit: str) -> str:
@@ -54,13 +68,14 @@ def decibel_text(unit: str) -> str:
     >>> decibel_text("m/s^2"), decibel_text("Pa"), decibel_text("Pa^2/Hz"), decibel_text("")
     ('dB re 1 m/s²', 'dB re 20 µPa', 'dB re (20 µPa)²/Hz', 'dB re 1')
     """
-    if _is_sound(unit):
+    if is_sound(unit):
         reference = "20 µPa" if unit == "Pa" else "(20 µPa)"  # of amplitudes; of powers, squared
         return f"dB re {unit_text(unit.replace('Pa', reference))}"
     return f"dB re 1 {unit_text(unit)}".rstrip()
 
 
-def _is_sound(unit: str) -> bool:
+def is_sound(unit: str) -> bool:
+    """Whether values are sound pressures, or powers of them."""
     return unit.partition("^2")[0] == "Pa"
 
 

@@ -15,6 +15,7 @@ from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording, check_recording
 from gearsig.rig import GearPair, Rig
 from gearsig.severity._features import (
+    DB_OF_LOG_ENERGY,
     FEATURES,
     MAX_RELIEF_SHARE,
     STIFFNESS_N_PER_MM_UM,
@@ -30,6 +31,7 @@ from gearsig.severity._features import (
     mesh_energies,
     n_bands,
     reach_cycles,
+    search_levels,
     shaft_lines,
     squeezed_rise_db,
     without_regular_lines,
@@ -42,6 +44,7 @@ from gearsig.severity._model import (
     CrackEstimate,
     DepthModel,
     NoCrackSeen,
+    ToothSearch,
     kind_vector,
     load_calibration,
 )
@@ -564,6 +567,7 @@ def judge(
 ) -> CrackEstimate | NoCrackSeen:
     """Decide whether the clearest event is a crack, and how deep it is or may be."""
     best = max(gears, key=lambda evidence: model.score(evidence.features))
+    searched = tuple(_search(evidence, model, calibration, facts) for evidence in gears)
     clear = model.score(best.features) >= model.threshold
     agreements = {evidence.shaft.shaft: evidence.agreement for evidence in gears if evidence.agreement is not None}
     weakest = min(agreements, key=lambda shaft: agreements[shaft], default=None)
@@ -572,13 +576,17 @@ def judge(
         alone = calibration.models[ALONE]
         clear = alone.score(best.features) >= alone.threshold
     if clear:
-        return _crack_estimate(gears, best, model, calibration, facts)
+        try:
+            return _crack_estimate(gears, best, model, calibration, facts)
+        except RefusalError as refusal:
+            raise RefusalError(refusal.reason, remedy=refusal.remedy, looked_at=searched) from None
     if strange and weakest is not None:
         raise RefusalError(
             f"the teeth's own pattern on shaft {weakest!r} agrees with that of the reference by "
             f"{agreements[weakest]:.2f} only",
             remedy="take a reference of the same gears, same sensors, same speed and load; or leave it out. Teeth that "
             "hardly differ have no pattern to agree by: then a longer recording may help",
+            looked_at=searched,
         )
     limits = []
     for evidence in gears:
@@ -591,6 +599,7 @@ def judge(
             f"no crack stands out, but one of up to {below_mm:.1f} mm ({below_percent:.0f} % of the root) might hide "
             "among the teeth's own differences",
             remedy=healthy if best.agreement is None else "record longer, at higher load",
+            looked_at=searched,
         )
     return NoCrackSeen(
         below_mm,
@@ -599,6 +608,23 @@ def judge(
         best.agreement is not None,
         dict(zip(FEATURES, best.features.tolist(), strict=True)),
         (_reference_text(best),),
+        searched,
+    )
+
+
+def _search(evidence: GearEvidence, model: DepthModel, calibration: Calibration, facts: PairFacts) -> ToothSearch:
+    shaft = evidence.shaft
+    middles, levels = search_levels(evidence.searched)
+    at = (middles - calibration.lag_pitches / shaft.teeth) % 1.0  # as the place of a crack
+    order = np.argsort(at, kind="stable")
+    return ToothSearch(
+        f"{facts.pair.name}/{shaft.shaft}",
+        shaft.shaft,
+        shaft.teeth,
+        360.0 * at[order],
+        levels[order],
+        DB_OF_LOG_ENERGY * model.threshold_prominence(evidence.features),
+        evidence.agreement is not None,
     )
 
 

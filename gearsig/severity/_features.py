@@ -173,6 +173,20 @@ def event_windows(shaft: ShaftLines, event: ToothEvent) -> tuple[FloatArray, Flo
     return energy[:, :, round(event.centre_rev * n - width / 2) % n], median
 
 
+def search_levels(shaft: ShaftLines) -> tuple[FloatArray, FloatArray]:
+    """Return what `find_event` searches: middles of the windows in revolutions, 0 to 1, ascending, and levels in dB.
+
+    A level is that of the window's energy, relative to its band's median and mean over bands and channels, over the
+    median window's; the highest one is the event's prominence.
+    """
+    energy, median, width = _window_energies(shaft)
+    relative = np.divide(energy, median[..., None], out=np.ones_like(energy), where=median[..., None] > 0)
+    level = relative.mean(axis=(0, 1))
+    middles = (np.arange(len(level)) + width / 2.0) / len(level) % 1.0
+    order = np.argsort(middles, kind="stable")
+    return middles[order], 10.0 * np.log10(level[order] / np.median(level))
+
+
 def _window_energies(shaft: ShaftLines) -> tuple[FloatArray, FloatArray, int]:
     """Return the mean square envelope in the window from each angle on, its median, and the window's width."""
     envelopes = band_envelopes(shaft)

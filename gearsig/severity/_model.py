@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array
+from gearsig.checks import FloatArray, freeze, frozen_array
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent, with_minus
 from gearsig.results import Result
@@ -172,6 +172,15 @@ class DepthModel:
         result = np.array(features, dtype=np.float64)
         result[rising] += missing / gain
         return result
+
+    def threshold_prominence(self, features: FloatArray) -> float:
+        """Return ln of the prominence at which an event with these features would just be a crack, as `at_threshold`.
+
+        Of one that is a crack it lies below the event's own.
+        """
+        rising = [FEATURES.index(name) for name in RISING]
+        gain = float(np.sum(self.detection[rising] / self.scale[rising]))
+        return float(features[FEATURES.index("prominence")]) + (self.threshold - self.score(features)) / gain
 
 
 CRACKED, CHIPPED, SPALLED = KINDS = ("cracked", "chipped", "spalled")
@@ -400,6 +409,36 @@ class CrackEstimate(Result):
 
 
 @dataclass(frozen=True)
+class ToothSearch:
+    """What was looked at on one gear: how far each place stands out, and how far a crack would have to.
+
+    Parameters
+    ----------
+    gear, shaft : str
+    teeth : int
+    angle_deg : array, (n,)
+        Of the shaft, 0 to 360: the middle of the engagement that a tooth at this angle has.
+    level_db : array, (n,)
+        Energy of a window of 1.5 pitches over that of the median window, mean over bands about the mesh harmonics.
+    threshold_db : float
+        Level from which the clearest event of this gear would count as a crack, all its energies rising alike.
+    with_reference : bool
+        Whether it is the difference from the healthy gear that was searched.
+    """
+
+    gear: str
+    shaft: str
+    teeth: int
+    angle_deg: FloatArray
+    level_db: FloatArray
+    threshold_db: float
+    with_reference: bool
+
+    def __post_init__(self) -> None:
+        freeze(self, "angle_deg", "level_db")
+
+
+@dataclass(frozen=True)
 class NoCrackSeen(Result):
     """No crack was seen, and how deep one may be that would not have shown.
 
@@ -413,6 +452,8 @@ class NoCrackSeen(Result):
     features : mapping
         Of the clearest event.
     reasons : tuple of str
+    searched : tuple of ToothSearch
+        Of both gears.
     """
 
     below_mm: float
@@ -421,6 +462,7 @@ class NoCrackSeen(Result):
     with_reference: bool
     features: Mapping[str, float] = field(default_factory=dict)
     reasons: tuple[str, ...] = ()
+    searched: tuple[ToothSearch, ...] = field(default=(), repr=False, compare=False)
 
     @property
     def text(self) -> str:

@@ -37,7 +37,7 @@ def test_the_picture_shows_speed_plane_and_loop() -> None:
     assert left.get_xlabel() == "compression (µm)"
     walls = sorted(line.get_xdata()[0] for line in left.lines[1:])
     assert walls == pytest.approx([-150.0, 150.0], rel=0.02)
-    assert right.get_ylabel() == "torque (N m)"
+    assert right.get_ylabel() == "torque (N·m)"
     assert len(speeds.collections) == 2
 
 

@@ -80,8 +80,11 @@ def test_noise_is_refused(method, kind):
     rng = np.random.default_rng(3)
     x = rng.normal(size=N) if kind == "white" else narrow_band_noise(N, rng)
     portrait = _embedded(x, 1.0, 3 if kind == "white" else 12, 5)
-    with pytest.raises(RefusalError, match=r"% as far apart as unrelated points.*is stochastic"):
+    with pytest.raises(RefusalError, match=r"% as far apart as unrelated points.*is stochastic") as refused:
         largest_lyapunov_exponent(portrait, method=method)
+    looked_at = refused.value.looked_at
+    assert np.isnan(looked_at.exponent_per_s)
+    assert looked_at.log_distance[-1] == pytest.approx(looked_at.saturation_log_distance, abs=1.0)
 
 
 def test_two_percent_noise_keeps_the_exponent_and_ten_percent_is_not_answered():

@@ -16,6 +16,11 @@ def test_a_pascal_of_sound_is_94_decibels():
     assert decibels(np.array([1.0]), "amplitude rms", "mm/s")[0] == 0.0
 
 
+def test_levels_of_sound_are_of_root_mean_squares_whatever_the_scaling():
+    rms = decibels(np.array([1.0]), "amplitude rms", "Pa")
+    np.testing.assert_allclose(decibels(np.array([np.sqrt(2.0)]), "amplitude peak", "Pa"), rms)
+
+
 @pytest.mark.parametrize(
     ("unit", "text"),
     [("Pa", "dB re 20 µPa"), ("Pa^2/Hz", "dB re (20 µPa)²/Hz"), ("m/s^2", "dB re 1 m/s²"), ("", "dB re 1")],

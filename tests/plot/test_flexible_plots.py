@@ -42,7 +42,7 @@ def test_sweeps_show_both_ways_and_mark_the_mode():
     np.testing.assert_allclose(axes.lines[0].get_ydata(), up * 1e6)
     np.testing.assert_allclose(axes.lines[1].get_ydata(), down * 1e6)
     assert axes.lines[1].get_linestyle() != axes.lines[0].get_linestyle()
-    assert {"ωₙ", "ωₙ/2", "ωₙ/3", "jump up", "rms of the DTE (µm)"} <= set(texts(figure))
+    assert {"ωₙ", "ωₙ/2", "ωₙ/3", "jump up", "dynamic transmission error, rms (µm)"} <= set(texts(figure))
     with pytest.raises(InputError):
         speed_sweep_figure([])
 
@@ -83,7 +83,7 @@ def test_spectra_share_one_scale():
     limits = {axes.get_ylim() for axes in figure.axes}
     assert len(figure.axes) == 2
     assert len(limits) == 1
-    assert {"1000 rpm", "2000 rpm", "frequency (Hz)", "DTE (µm)"} <= set(texts(figure))
+    assert {"1000 rpm", "2000 rpm", "frequency (Hz)", "transmission error (µm)"} <= set(texts(figure))
 
 
 def test_natural_frequencies_that_move_stand_out():

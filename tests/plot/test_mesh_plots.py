@@ -8,7 +8,7 @@ import pytest
 from matplotlib.text import Text
 
 from gearsig.errors import InputError
-from gearsig.plot import load_sharing_figure, mesh_stiffness_figure, tooth_figure
+from gearsig.plot import load_sharing_figure, mesh_stiffness_figure, panels_of, tooth_figure
 
 CYCLES = np.linspace(0.0, 2.0, 401)
 STIFFNESS = {
@@ -80,6 +80,16 @@ def test_load_sharing_draws_forces_where_pairs_touch_and_errors_in_um():
     assert np.isnan(drawn[201:]).all()
     np.testing.assert_allclose(_line(lower, "healthy").get_ydata(), error * 1e6)
     assert {"force of a pair (N)", "transmission error (µm)", "mesh cycles (tooth passages)"} <= set(_texts(figure))
+
+
+def test_pairs_keep_their_names_beside_cases_of_the_same_colours():
+    """The legend of the errors below names lines by colours that the pairs above have as well."""
+    ones = np.ones(len(CYCLES))
+    figure = load_sharing_figure(CYCLES, {"pair 0": ones, "pair 1": 2 * ones}, {"10 N·m": ones, "500 N·m": 2 * ones})
+    ((upper,),), ((lower,),) = panels_of(figure)
+    assert [line.name for line in upper.lines] == ["pair 0", "pair 1"]
+    assert [line.name for line in lower.lines] == ["10 N·m", "500 N·m"]
+    assert not upper.title
 
 
 def test_load_sharing_refuses_wrong_lengths():

@@ -176,10 +176,10 @@ def test_embedding_marks_what_was_chosen(dimension, words):
     )
     figure = embedding_figure(information, false)
     delays, dimensions = figure.axes
-    np.testing.assert_allclose(delays.lines[0].get_xdata(), np.arange(30) * 0.002)
-    assert delays.lines[1].get_xdata()[0] == pytest.approx(0.016)
+    np.testing.assert_allclose(delays.lines[0].get_xdata(), np.arange(30) * 2.0)
+    assert delays.lines[1].get_xdata()[0] == pytest.approx(16.0)
     np.testing.assert_array_equal(dimensions.lines[0].get_ydata(), false.false_fraction)
-    assert {words, "0.016 s: first minimum", "false neighbours"} <= set(_texts(figure))
+    assert {words, "16 ms: first minimum", "false neighbours"} <= set(_texts(figure))
 
 
 def test_divergence_draws_the_fitted_line_on_the_curve():

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from gearsig.errors import InputError
-from gearsig.plot import envelope, thin
+from gearsig.plot import cell_limits, envelope, pooled_levels, thin
 
 lines = arrays(np.float64, st.integers(1, 500), elements=st.floats(-1e6, 1e6, width=32))
 
@@ -48,3 +48,36 @@ def test_lengths_must_agree_and_values_be_finite():
         thin(np.arange(3.0), np.arange(2.0))
     with pytest.raises(InputError, match="NaN"):
         thin(np.arange(2.0), np.array([0.0, np.nan]))
+
+
+def test_rows_of_pixels_show_the_nearest_speed_not_the_next():
+    """Of a run-up, whose speeds are not equally far apart: else its lines lie beside the orders drawn over them."""
+    speeds = np.array([600.0, 655.0, 700.0, 752.0, 806.0, 850.0, 897.0, 955.0])
+    pooled, rows = pooled_levels(np.eye(len(speeds)), speeds, 100, 360)
+    low, high = cell_limits(speeds)
+    middles = low + (np.arange(len(pooled)) + 0.5) * (high - low) / len(pooled)
+    shown = speeds[pooled.argmax(axis=1)]
+    holds_one = np.isclose(shown, middles, atol=(high - low) / len(pooled))
+    nearest = np.abs(speeds[:, None] - middles).min(axis=0)
+    assert np.all(holds_one | np.isclose(np.abs(shown - middles), nearest))
+    assert set(rows) == set(range(len(speeds)))
+
+
+@given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=200), st.integers(1, 60), st.booleans())
+def test_pooled_rows_lose_no_peak(steps, n_rows, logarithmic):
+    positions = 5.0 + np.cumsum(steps)
+    levels = np.diag(np.arange(1.0, len(positions) + 1))
+    pooled, _ = pooled_levels(levels, positions, len(positions), n_rows, logarithmic=logarithmic)
+    assert len(pooled) <= max(n_rows, 1)
+    if len(positions) <= 1:
+        return
+    low, high = cell_limits(positions, logarithmic=logarithmic)
+    assert low < positions[0] < positions[-1] < high
+    np.testing.assert_array_equal(pooled.max(axis=0), np.arange(1.0, len(positions) + 1))
+
+
+def test_rows_of_equal_steps_are_cells_of_their_own():
+    levels = np.arange(12.0).reshape(4, 3)
+    pooled, rows = pooled_levels(levels, np.array([1.0, 2.0, 3.0, 4.0]), 10, 360)
+    np.testing.assert_array_equal(pooled, levels)
+    assert rows.tolist() == [0, 1, 2, 3]

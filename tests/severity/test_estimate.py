@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.recording import Recording
-from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
+from gearsig.plot import figure_of_refusal
+from gearsig.recording import Recording, read_recording
+from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft, read_rig
 from gearsig.severity import CrackEstimate, NoCrackSeen, estimate_crack
 from tests.severity.gearbox import SPEED_RPM, Record
 
@@ -208,3 +209,30 @@ def test_without_a_rig_it_says_what_is_needed(record: Record) -> None:
 def test_a_channel_that_is_not_there_is_named(record: Record) -> None:
     with pytest.raises(InputError, match="tacho"):
         estimate_crack(record(2.0), channels=("tacho",))
+
+
+def test_what_was_looked_at_lies_below_the_threshold_where_nothing_is_seen(record: Record, healthy: Recording) -> None:
+    answer = estimate_crack(record(0.0), reference=healthy)
+    assert isinstance(answer, NoCrackSeen)
+    assert len({search.shaft for search in answer.searched}) == 2
+    for search in answer.searched:
+        assert search.level_db.max() < search.threshold_db
+        assert np.all(np.diff(search.angle_deg) >= 0)
+        assert np.median(search.level_db) == pytest.approx(0.0, abs=0.1)
+
+
+def test_what_was_looked_at_of_a_refusal_shows_the_event_above_its_threshold() -> None:
+    """A spall: unlike a crack, so that no depth is told."""
+    rig = read_rig("sample_data/damaged_tooth.toml")
+    files = ("sample_data/damaged_tooth.csv.gz", "sample_data/healthy.h5")
+    now, healthy = (read_recording(file, rig=rig) for file in files)
+    with pytest.raises(RefusalError, match="unlike the calibration's cracks") as refused:
+        estimate_crack(now, reference=healthy)
+    clearest, mate = refused.value.looked_at
+    assert clearest.level_db.max() > clearest.threshold_db
+    assert mate.level_db.max() < mate.threshold_db
+    at_deg = clearest.angle_deg[clearest.level_db.argmax()]
+    assert int(at_deg / 360.0 * clearest.teeth) + 1 == 12  # as the sample has it
+    figure = figure_of_refusal(refused.value)
+    assert figure is not None
+    assert len(figure.axes) == 2
