@@ -267,7 +267,7 @@ def _modulated(
         f"The mesh of {pair.name} is {how} {times} per revolution of shaft {shaft}.",
         # Of a ratio between lines, a frequency says nothing.
         replace(signals.where(strongest.spacing, channel, shaft=shaft, gear=f"{pair.name}/{shaft}"), frequency_hz=None),
-        Strength(value, "sideband/carrier", limit, "common on healthy machines", median - NOTABLE_DB),
+        Strength(value, "of the carrier", limit, "common on healthy machines", median - NOTABLE_DB),
         confidence=0.95 * (WITH_ASSUMED_DATA if rig.assumed else 1.0),
         confidence_basis=f"that it is there; {basis}",
         evidence=tuple(evidence),

@@ -118,8 +118,8 @@ def _modes(
         panels=(_spectra_panel(modes, names),),
         facts=(
             (
-                f"**{modes.n_modes} modes** at penalty **{settings.penalty:g}**, start **{settings.start}**. Mode "
-                f"**{chosen + 1}** is {'the most impulsive' if mode is None else 'chosen'}: kurtosis "
+                f"**{modes.n_modes} modes** at penalty **{settings.penalty:g}**, started from **{settings.start}**. "
+                f"Mode **{chosen + 1}** is {'the most impulsive' if mode is None else 'chosen'}: kurtosis "
                 f"{impulses[chosen]:.3g}, centre {modes.centres[chosen]:.5g} {unit}."
             ),
         ),
@@ -191,7 +191,10 @@ def _spectra_panel(modes: Modes, names: list[str]) -> LinePanel:
     highest = max(float(line.y[1:].max()) for line in lines)
     cursors = [Cursor(float(c), "mode", str(k), k) for k, c in enumerate(modes.centres, start=1)]
     label = with_unit("amplitude peak", modes.unit)
-    return LinePanel(lines[::-1], spectra[0].axis_label, label, (1e-3 * highest, 3.0 * highest), True, cursors)
+    # the residual lies behind the modes
+    return LinePanel(
+        [lines[-1], *lines[:-1]], spectra[0].axis_label, label, (1e-3 * highest, 3.0 * highest), True, cursors
+    )
 
 
 def _trials(trials: Any) -> dict[str, Any]:
@@ -320,7 +323,7 @@ PARTS = {
                 choices={"": "nothing", **NAMES},
             ),
             MethodOption(
-                "envelope_hz", "Modes of the envelope of (Hz)", "span", None,
+                "envelope_hz", "Envelope of the band (Hz)", "span", None,
                 "The envelope of a band shows what modulates it.", "the signal itself", unit="Hz", known=top_hz,
             ),
             OVER_ANGLE,
@@ -361,7 +364,7 @@ PARTS = {
             MethodOption(
                 "threshold", "Threshold", "choice", "universal",
                 "universal: next to no noise remains; sure: minimum estimated risk of each level; bayes: keeps most",
-                choices=_same("universal", "sure", "bayes"),
+                choices={"universal": "Universal", "sure": "SURE", "bayes": "Bayes"},
             ),
             MethodOption(
                 "rule", "Rule", "choice", "soft",

@@ -10,7 +10,7 @@ import numpy as np
 from gearsig import phase, plot
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
-from gearsig.formatting import percent
+from gearsig.formatting import counted, percent
 from gearsig.methods._table import SHAFT, Method, MethodAnswer, MethodOption, angle_or_none, unit_of
 from gearsig.plot import with_unit
 from gearsig.prepared import PreparedRecording
@@ -208,6 +208,7 @@ def _columns(path: phase.PhasePortrait) -> dict[str, FloatArray]:
 
 def _embedding(prepared: PreparedRecording, channel: str, **options: Any) -> MethodAnswer:
     _, information, curves, messages = _embedded(prepared, channel, **options)
+    delay = counted(information.delay_samples, "sample")
     yours = f" Neighbours are those at your delay of {curves.delay_samples}." if options["delay"] else ""
     return MethodAnswer(
         channel,
@@ -225,9 +226,9 @@ def _embedding(prepared: PreparedRecording, channel: str, **options: Any) -> Met
         numbers={"delay_samples": information.delay_samples, "dimension": curves.dimension},
         notes=(
             (
-                f"Delay {information.delay_samples} samples by the curve ({information.rule}); a dimension unfolds the "
-                f"path where fewer than {percent(curves.threshold)} of the nearest neighbours are false.{yours} E2 "
-                "near 1 at every dimension says random."
+                f"Delay {delay} by the curve ({information.rule}); a dimension unfolds the path where fewer than "
+                f"{percent(curves.threshold)} of the nearest neighbours are false.{yours} E2 near 1 at every dimension "
+                "says random."
             ),
         ),
         warnings=messages,
@@ -479,8 +480,9 @@ IN_PHASE = {
         MethodOption("theiler", "Theiler window (samples)", "count", None, "", "one mean period"),
         MethodOption("steps", "Steps followed", "count", None, "", "30 mean periods"),
         MethodOption(
-            "fit_s", "Fit from, to (s)", "span", None, "",
-            "from where the delayed values no longer overlap to where the distance nears that of unrelated points",
+            "fit_s", "Fit from, to (s)", "span", None,
+            "Else from where the delayed values overlap no more to where the distance nears that of unrelated points.",
+            "as the curve suggests",
             unit="s",
         ),
         *EMBEDDING,
@@ -497,7 +499,7 @@ IN_PHASE = {
         MethodOption(
             "n_points", "Points drawn", "count", 1000, choices={n: str(n) for n in (200, 500, 1000, 2000, 3000)},
         ),
-        MethodOption("every", "Every so-many-th sample", "count", None, "", "16 per mean period"),
+        MethodOption("every", "Take every n-th sample", "count", None, "", "16 per mean period"),
         MethodOption("shortest", "Shortest line (points)", "count", 2, minimum=2),
         *EMBEDDING,
     ),
@@ -511,7 +513,7 @@ IN_PHASE = {
             "Keeps noise on regular motion from being read as chaos; 0 is the plain test.", minimum=0.0,
         ),
         MethodOption(
-            "every", "Every so-many-th sample", "count", None, "Of the signal.", "from the mutual information",
+            "every", "Take every n-th sample", "count", None, "Of the signal.", "from the mutual information",
         ),
         MethodOption("c_rad", "Walk at c (rad)", "number", 1.2, minimum=0.1, maximum=3.0),
         PAIR,

@@ -14,6 +14,7 @@ from gearsig.diagnosis import Analysis, RecordBlocks, analyze
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import readable
 from gearsig.methods._table import (
+    IN_HZ,
     LINES,
     SHAFT,
     Method,
@@ -77,14 +78,25 @@ def columns_of(spectrum: Spectrum) -> dict[str, Any]:
     return {spectrum.axis_label: spectrum.positions, with_unit(spectrum.scaling, spectrum.unit): spectrum.values}
 
 
-def _panel(spectrum: Spectrum, cursors: Sequence[Cursor], *, linear: bool, name: str = "") -> LinePanel:
+def _panel(
+    spectrum: Spectrum,
+    cursors: Sequence[Cursor],
+    *,
+    linear: bool,
+    name: str = "",
+    shown: tuple[float, float] | None = None,
+) -> LinePanel:
     values = spectrum.values if linear else plot.above_zero(spectrum.values)
     line = ChartLine(spectrum.positions, values, spectrum.source, peaks=True)
     inside = values[min(3, len(values) - 1) :]
+    if shown is not None and shown[0] < shown[1]:  # what lies elsewhere may be a hundred times as large
+        within = values[(spectrum.positions >= shown[0]) & (spectrum.positions <= shown[1])]
+        inside = within[3 if shown[0] <= spectrum.positions[0] and len(within) > 9 else 0 :]
+        inside = inside if len(inside) else values
     high, low = float(inside.max()), float(np.percentile(inside, 5))
     limits = (min(0.0, float(inside.min())), 1.06 * high or 1.0) if linear else (max(low, high * 1e-8) / 2, 2 * high)
     text = name or ("value" if spectrum.scaling == "dimensionless" else spectrum.scaling)
-    return LinePanel((line,), spectrum.axis_label, with_unit(text, spectrum.unit), limits, not linear, cursors)
+    return LinePanel((line,), spectrum.axis_label, with_unit(text, spectrum.unit), limits, not linear, cursors, shown)
 
 
 def _spectrum_answer(
@@ -122,7 +134,7 @@ def _marked_spectrum(
         ),
         part,
         numbers=numbers,
-        panels=(_panel(spectrum, cursors, linear=is_quefrency),),
+        panels=(_panel(spectrum, cursors, linear=is_quefrency, name="cepstrum" if is_quefrency else "", shown=limits),),
     )
 
 
@@ -400,8 +412,9 @@ def _coherence(
     peaks = _above_noise(mean, cursors)
     where = list(peaks)
     level = ChartLine(spectrum.positions[[0, -1]], np.full(2, mean.level), "noise", -1, dotted=True)
-    enhanced = _panel(spectrum, cursors, linear=True, name="mean squared coherence")
-    enhanced = replace(enhanced, lines=(*enhanced.lines, level))
+    enhanced = _panel(spectrum, where, linear=True, name="mean squared coherence")
+    lines = (*(replace(line, name="mean over the carriers") for line in enhanced.lines), level)
+    enhanced = replace(enhanced, lines=lines)
     floor = coherence.level(1e-3)
     decibels = 10.0 * np.log10(np.maximum(coherence.coherence_squared.T, floor))
     levels = LevelPanel(
@@ -629,16 +642,19 @@ def _speed(prepared: PreparedRecording, channel: str) -> MethodAnswer:
 WHOLE = {
     "waveform": Method("Waveform", "The signal over time.", _waveform),
     "speed": Method("Speed", "The speed that everything over angle rests on.", _speed),
-    "spectrum": Method("Spectrum", "Tones and their amplitudes.", _spectrum, LINES),
+    "spectrum": Method("Spectrum", "Tones and their amplitudes.", _spectrum, IN_HZ),
     "density": Method(
-        "Density", "Noise over frequency.", _density, LINES, "Spectrum", 1_000_000, 20_000_000,
+        "Density", "Noise over frequency.", _density, IN_HZ, "Spectrum", 1_000_000, 20_000_000,
         in_blocks=_density_in_blocks,
     ),
     "cepstrum": Method(
         "Cepstrum",
         "Families of equally spaced lines, as one peak each.",
         _cepstrum,
-        LINES,
+        tuple(
+            replace(line, label=f"{name} quefrency (s)", empty="automatic", unit="s")
+            for line, name in zip(LINES, ("Lowest", "Highest"), strict=True)
+        ),
         "Spectrum",
         1_000_000,
         20_000_000,

@@ -318,6 +318,9 @@ SHAFT = MethodOption(
 LOWEST = MethodOption("lowest", "Lowest line (Hz or order)", "number", None, empty="all", minimum=0.0)
 HIGHEST = MethodOption("highest", "Highest line (Hz or order)", "number", None, empty="all", minimum=0.0)
 LINES = (LOWEST, HIGHEST)
+IN_HZ = tuple(
+    replace(line, label=line.label.replace("line (Hz or order)", "frequency (Hz)"), unit="Hz") for line in LINES
+)
 
 
 def top_hz(prepared: PreparedRecording, channel: str) -> tuple[float, float]:
