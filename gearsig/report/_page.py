@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
@@ -114,10 +114,34 @@ def marked_positions(
             continue
         if finding.where.channels and channel not in finding.where.channels:
             continue
+        if is_of_sidebands(finding.where):
+            positions += [at for at in sidebands_of(analysis, spectrum, finding.where) if at not in positions]
+            continue
         position = _position(analysis, spectrum, finding.where)
         if position is not None and all(abs(position / known - 1.0) > LARGEST_SLIP for known in positions):
             positions.append(position)
     return tuple(positions)
+
+
+def is_of_sidebands(where: Where) -> bool:
+    """Whether the order of a place is the distance of sidebands from a mesh: that of one gear's shaft."""
+    return "/" in where.gear and where.order is not None
+
+
+def sidebands_of(analysis: Analysis, spectrum: Spectrum, where: Where) -> tuple[float, ...]:
+    """Return the first sidebands at the mesh harmonic where they are largest; none where the mesh is not in reach."""
+    distance, scale = _position(analysis, spectrum, where), _per_order(analysis, spectrum)
+    pair = (
+        next((p for p in analysis.rig.pairs if p.name == where.gear.rpartition("/")[0]), None) if analysis.rig else None
+    )
+    if distance is None or scale is None or pair is None or analysis.rig is None:
+        return ()
+    mesh = analysis.rig.mesh_order(pair, spectrum.shaft or _reference(analysis))
+    if not mesh:
+        return ()
+    n = int((min(highest_order_of_interest(analysis, spectrum), spectrum.positions[-1]) - distance) / (mesh * scale))
+    sides = [(k * mesh * scale - distance, k * mesh * scale + distance) for k in range(1, n + 1)]
+    return max(sides, key=lambda both: sum(float(spectrum.values[spectrum.index_of(at)]) for at in both), default=())
 
 
 def _faults_first(finding: Finding) -> tuple[bool, bool]:
@@ -167,16 +191,21 @@ class VerdictPicture:
         Of a tooth.
     finding : Finding or None
         That it shows.
+    change : SynchronousAverage or None
+        Of a crack that was found beside a reference: what differs from it. A crack seldom shows in the ring itself.
     """
 
     about: Literal["tooth", "bearing", "resonance", "motion", "lines"]
     channel: ChannelAnalysis
     shaft: str = ""
     finding: Finding | None = None
+    change: SynchronousAverage | None = None
 
     @property
     def average(self) -> SynchronousAverage:
         """Of a tooth: the mean revolution in which a single tooth stands out most."""
+        if self.change is not None:
+            return self.change
         kinds = [kind for kind in ("residual", "difference", "average") if (self.shaft, kind) in self.channel.averages]
         return self.channel.averages[self.shaft, kinds[0]]
 
@@ -194,10 +223,28 @@ def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
         channel = next((channels[name] for name in where.channels if name in channels), next(iter(channels.values())))
         shaft = where.gear.rpartition("/")[2] or where.shaft
         if (where.tooth or where.angle_deg is not None) and any(of == shaft for of, _ in channel.averages):
-            return VerdictPicture("tooth", channel, shaft, finding)
+            change = _change_by_crack(analysis, shaft)
+            channel = channels[change.channel] if change is not None else channel
+            return VerdictPicture("tooth", channel, shaft, finding, change)
         if (about := _shown_by(finding, channel)) is not None:
             return VerdictPicture(about, channel, "", finding)
-    return VerdictPicture("lines", next(iter(channels.values())))
+    # that of what stands beside it in words
+    told = [name for f in analysis.findings if f.kind is not Kind.INFORMATION for name in f.where.channels]
+    return VerdictPicture("lines", channels[next((name for name in told if name in channels), next(iter(channels)))])
+
+
+def _change_by_crack(analysis: Analysis, shaft: str) -> SynchronousAverage | None:
+    """Return what the average of a cracked gear's shaft differs by from the reference's; None where none was found."""
+    crack = analysis.crack
+    if not isinstance(crack, CrackEstimate) or not crack.with_reference or crack.shaft != shaft:
+        return None
+    beside = _beside_reference(analysis, crack, teeth_of_shaft(analysis, shaft))
+    name, now, then = beside if beside is not None else ("", None, None)
+    if now is None or then is None:
+        return None
+    average = next(c for c in analysis.channels if c.channel == name).averages[shaft, "average"]
+    factor = float(si_factor("acceleration", average.unit) or 1.0)
+    return replace(average, values=(now - then) / factor, kind="change")
 
 
 def _shown_by(finding: Finding, channel: ChannelAnalysis) -> Literal["bearing", "resonance", "lines"] | None:
@@ -217,6 +264,43 @@ def crack_picture(analysis: Analysis) -> Picture | None:
         return None
     pair = next((p for p in analysis.rig.pairs if crack.gear == f"{p.name}/{crack.shaft}"), None)
     teeth = pair.teeth(crack.shaft) if pair is not None else None
+    beside = _beside_reference(analysis, crack, teeth) if teeth is not None else None
+    if teeth is None or beside is None:
+        return None
+    name, now, then = beside
+    # A tooth enters half a pitch before the middle of its own; the blow stands in the middle of the figure.
+    entry = (crack.angle_deg / 360.0 - 0.5 / teeth) % 1.0
+    turned = round((entry - 0.5) * len(now))
+    angle = (np.arange(len(now)) + turned) * 360.0 / len(now)
+    lines = [ChartLine(angle, np.roll(now, -turned), "now")]
+    if then is not None:
+        healthy = np.roll(then, -turned)
+        lines = [ChartLine(angle, healthy, "reference", QUIET), *lines]
+        lines.append(ChartLine(angle, lines[1].y - healthy, "change", FAULT))
+    reach = min(0.5, 8.0 / teeth)  # of a revolution: the blow and a few healthy teeth on either side
+    reference = " beside the reference" if then is not None else ""
+    caption = (
+        "A crack changes the few mesh cycles after its tooth enters, and nothing else; a change all round is another "
+        "load, speed or sensor."
+        if then is not None
+        else "A crack swings the few mesh cycles after its tooth enters out of the pattern of the others."
+    )
+    panel = LinePanel(
+        lines,
+        f"angle of {crack.shaft} (deg)",
+        f"{name} (m/s²)",
+        cursors=[Cursor(entry * 360.0, "finding", "the tooth enters", 0)],
+        x_limits=((entry - reach) * 360.0, (entry + reach) * 360.0),
+    )
+    return Picture.of_svg(
+        plot.svg_panel(panel), caption, f"Average of {name} over {crack.shaft}{reference}; marked: {crack.text}"
+    )
+
+
+def _beside_reference(
+    analysis: Analysis, crack: CrackEstimate, teeth: int | None
+) -> tuple[str, FloatArray, FloatArray | None] | None:
+    """Return the acceleration that changed most: its name, its average in m/s², and the reference's at its angles."""
     references = {} if analysis.reference is None else {c.channel: c for c in analysis.reference.channels}
     averages: list[tuple[float, str, FloatArray, FloatArray | None]] = []
     for channel in analysis.channels:
@@ -233,36 +317,7 @@ def crack_picture(analysis: Analysis) -> Picture | None:
             then = factor * _on_angles_of(average.values, reference.values, turn)
         change = float(np.std(now - then)) / size if then is not None and size > 0 else 0.0
         averages.append((change, channel.channel, now, then))
-    if teeth is None or not averages:
-        return None
-    _, name, now, then = max(averages, key=lambda entry: entry[0])
-    # A tooth enters half a pitch before the middle of its own; the blow stands in the middle of the figure.
-    entry = (crack.angle_deg / 360.0 - 0.5 / teeth) % 1.0
-    turned = round((entry - 0.5) * len(now))
-    angle = (np.arange(len(now)) + turned) * 360.0 / len(now)
-    lines = [ChartLine(angle, np.roll(now, -turned), "now")]
-    if then is not None:
-        healthy = np.roll(then, -turned)
-        lines = [ChartLine(angle, healthy, "reference", QUIET), *lines]
-        lines.append(ChartLine(angle, lines[1].y - healthy, "change", FAULT))
-    reach = min(0.5, 8.0 / teeth)  # of a revolution: the blow and a few healthy teeth on either side
-    beside = " beside the reference" if then is not None else ""
-    caption = (
-        "A crack changes the few mesh cycles after its tooth enters, and nothing else; a change all round is another "
-        "load, speed or sensor."
-        if then is not None
-        else "A crack swings the few mesh cycles after its tooth enters out of the pattern of the others."
-    )
-    panel = LinePanel(
-        lines,
-        f"angle of {crack.shaft} (deg)",
-        f"{name} (m/s²)",
-        cursors=[Cursor(entry * 360.0, "finding", "the tooth enters", 0)],
-        x_limits=((entry - reach) * 360.0, (entry + reach) * 360.0),
-    )
-    return Picture.of_svg(
-        plot.svg_panel(panel), caption, f"Average of {name} over {crack.shaft}{beside}; marked: {crack.text}"
-    )
+    return max(averages, key=lambda entry: entry[0])[1:] if averages else None
 
 
 def _on_angles_of(values: FloatArray, reference: FloatArray, largest_turn_rev: float) -> FloatArray:
@@ -535,32 +590,32 @@ def envelope_picture(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spe
     )
 
 
+def level_panel(analysis: Analysis, channel: ChannelAnalysis) -> tuple[LinePanel, list[tuple[float, float]]]:
+    """Return levels of orders over speed, and where each crosses a resonance that is named; there must be levels."""
+    levels = channel.order_levels
+    low, high = float(levels[0].speed_rpm[0]), float(levels[0].speed_rpm[-1])
+    colours = plot.series_colours(len(levels))
+    lines = [ChartLine(x.speed_rpm, x.amplitude, x.name, colour) for x, colour in zip(levels, colours, strict=True)]
+    unit = plot.with_unit("amplitude", levels[0].unit)
+    # what lies three and a half decades below the largest level is noise
+    top = max(float(x.amplitude.max()) for x in levels) or 1.0
+    floor = max(min(float(x.amplitude.min()) for x in levels), top * 10.0**-3.5)
+    panel = LinePanel(lines, "speed (rpm)", unit, (floor / 1.3, 1.3 * top), logarithmic=True, x_limits=(low, high))
+    named = [f.where for f in analysis.findings if f.code == "resonance" and channel.channel in f.where.channels]
+    at = [(60.0 * where.frequency_hz / x.order, x) for where in named if where.frequency_hz for x in levels]
+    return panel, [(rpm, float(np.interp(rpm, x.speed_rpm, x.amplitude))) for rpm, x in at if low <= rpm <= high]
+
+
 def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
     levels = channel.order_levels
     if not levels:
         return
-    places = [f.where for f in analysis.findings if f.code == "resonance" and channel.channel in f.where.channels]
-    resonances = [where.frequency_hz for where in places if where.frequency_hz is not None]
     largest = []
     for level in levels:
         amplitude, rpm, hertz = level.largest
         unit = f" {unit_text(level.unit)}" if level.unit else ""
         largest.append(f"{level.name} {readable(amplitude, 3)}{unit} at {rpm:.0f} rpm ({hertz:.4g} Hz)")
-    panel = LinePanel(
-        [
-            ChartLine(level.speed_rpm, level.amplitude, level.name, colour)
-            for level, colour in zip(levels, plot.series_colours(len(levels)), strict=True)
-        ],
-        "speed (rpm)",
-        plot.with_unit("amplitude", levels[0].unit),
-        logarithmic=True,
-        x_limits=(float(levels[0].speed_rpm[0]), float(levels[0].speed_rpm[-1])),
-    )
-    marked = [
-        (60.0 * hertz / level.order, float(np.interp(60.0 * hertz / level.order, level.speed_rpm, level.amplitude)))
-        for hertz in resonances
-        for level in levels
-    ]
+    panel, marked = level_panel(analysis, channel)
     yield Picture.of_svg(
         plot.svg_panel(panel, marked=marked),
         "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance. "

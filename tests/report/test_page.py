@@ -128,6 +128,18 @@ def test_the_picture_is_of_the_channel_that_the_first_finding_names(gearbox):
     assert (shown.about, shown.channel.channel) == ("lines", "a2")
 
 
+def test_a_finding_of_sidebands_is_marked_beside_its_mesh_not_at_its_distance(gearbox):
+    pair = gearbox.rig.pairs[0]
+    ratio = gearbox.rig.ratio(pair.driven, to=gearbox.shaft_angle.shaft)
+    channel = gearbox.channels[0]
+    where = Where((channel.channel,), gear=f"{pair.name}/{pair.driven}", order=ratio, order_shaft="input")
+    risen = replace(gearbox, findings=(Finding("sidebands-risen", Kind.SUSPICION, "Sidebands.", where),))
+    below, above = marked_positions(risen, channel.order_spectrum, channel.channel)
+    mesh = (below + above) / 2.0 / gearbox.rig.mesh_order(pair, gearbox.shaft_angle.shaft)
+    assert mesh == pytest.approx(round(mesh), rel=1e-9)
+    assert above - below == pytest.approx(2.0 * ratio)
+
+
 def test_what_would_make_it_surer_is_said_once(gearbox):
     remedy = "A recording of the same gears when they were healthy. Or more revolutions."
     gaps = tuple(Finding(code, Kind.CANNOT_TELL, f"{code}.", surer=remedy) for code in ("One gear", "Another gear"))
