@@ -32,6 +32,7 @@ from gearsig.rig import DAMPING_LAWS
 from sims.effects import EffectSetting, effect
 from sims.forging import MODES
 from sims.presets import Preset
+from sims.simulator import ParameterValue
 
 CRACK = "root_crack"
 
@@ -67,74 +68,91 @@ FAULTS = {
 }
 
 
-def choose_drive(chosen: Preset) -> Setup:
-    """Return what the user set; what is not offered is the preset's."""
+Parameters = list[tuple[str, ParameterValue]]
+RATES_HZ = (1000.0, 4000.0, 10000.0)
+COUNTS = [2**bits for bits in range(10, 25, 2)]
+ABOUT_LAWS = "What they really give: 0.947, 0.954 and 0.952 for a restitution of 0.95; 0.470, 0.725 and 0.663 for 0.5."
+
+
+def choose_drive(preset: Preset) -> Setup:
+    """Return what the user set in the sidebar; what is not offered is the preset's.
+
+    From what is changed most to what is seldom changed: how it runs, its teeth, its load, its faults, its measurement.
+    """
     with st.sidebar:
-        looks = {"key": "mode of the drive", "name": "mode"}
-        mode = address.ask_one(st.segmented_control, "Mode", MODES, **looks)
-        torque = choose_number("Torque of the motor (N·m)", "torque of the drive", chosen.torque_nm, 300.0)
-        speed = choose_number(
-            "Speed that the flow allows (rpm)", "speed of the drive", chosen.speed_rpm, 300.0, low=10.0
-        )
+        mode, torque_nm, speed_rpm = _choose_running(preset)
         with st.expander("Teeth", icon=":material/settings:"):
-            law = address.ask_one(
-                st.selectbox,
-                "Damping law",
-                DAMPING_LAWS,
-                first=str(chosen.parameters.get("damping_law", DAMPING_LAWS[0])),
-                key=f"law of {chosen.name}",
-                name="law",
-                help="What they really give: 0.947, 0.954 and 0.952 for a restitution of 0.95; 0.470, 0.725 and 0.663 "
-                "for 0.5.",
-            )
-            values = [
-                ("damping_law", law),
-                choose_parameter(chosen, "restitution", "Restitution", 1.0, low=0.1),
-                choose_parameter(chosen, "half_backlash_um", "Half backlash (µm)", 500.0),
-                choose_parameter(chosen, "friction_coefficient", "Friction of the flanks", 0.3),
-            ]
+            teeth = _choose_teeth(preset)
         with st.expander("Brake, press and load", icon=":material/weight:"):
-            values += [
-                choose_parameter(chosen, "brake_nm", "Brake (N·m)", 300.0),
-                choose_parameter(chosen, "press_nm", "Blow of the press (N·m)", 6000.0),
-                choose_parameter(chosen, "piece_mass_kg", "Mass of the piece (kg)", 2000.0),
-                choose_parameter(chosen, "piece_offset_mm", "Piece off centre (mm)", 200.0),
-                choose_parameter(chosen, "load_friction_nm", "Friction of the gripper (N·m)", 600.0),
-            ]
+            load = _choose_load(preset)
         st.markdown("**Faults** · *the healthy drive has none*")
-        effects = [_choose_effect(name, chosen) for name in FAULTS]
+        effects = [_choose_effect(name, preset) for name in FAULTS]
         with st.expander("Measurement", icon=":material/sensors:"):
-            duration = choose_number("Length (s)", "length of the drive", 6.0, 30.0, low=3.5)
-            rates = (1000.0, 4000.0, 10000.0)
-            rate = address.ask_one(
-                st.selectbox,
-                "Sampling rate (Hz)",
-                rates,
-                format_func="{:g}".format,
-                key="rate of the drive",
-                name="rate",
-            )
-            counts = address.ask_one(
-                st.select_slider,
-                "Counts of the encoders",
-                [2**bits for bits in range(10, 25, 2)],
-                first=2**20,
-                key="counts of the drive",
-                name="counts",
-            )
-            noise = choose_parameter(chosen, "angle_noise_urad", "Noise of the angles (µrad rms)", 200.0)
+            length_s, rate_hz, measured = _choose_measurement(preset)
         show_typed_toggle()
-    values += [("encoder_counts", float(counts)), noise, ("mode", mode)]
     return Setup(
-        chosen.name,
-        speed,
-        torque,
-        tuple(values),
-        tuple(setting for setting in effects if setting.severity > 0.0),
-        duration,
-        float(rate),
+        preset=preset.name,
+        speed_rpm=speed_rpm,
+        torque_nm=torque_nm,
+        parameters=(*teeth, *load, *measured, ("mode", mode)),
+        # an effect at zero changes nothing: without it the setup is that of the healthy drive, simulated once
+        effects=tuple(setting for setting in effects if setting.severity > 0.0),
+        duration_s=length_s,
+        sampling_rate_hz=rate_hz,
         model=DRIVE_MODEL,
     )
+
+
+def _choose_running(preset: Preset) -> tuple[str, float, float]:
+    """Return the mode, the torque of the motor and the speed that the flow of oil allows."""
+    looks = {"key": "mode of the drive", "name": "mode"}
+    mode = address.ask_one(st.segmented_control, "Mode", MODES, **looks)
+    torque_nm = choose_number("Torque of the motor (N·m)", "torque of the drive", preset.torque_nm, 300.0)
+    label, key = "Speed that the flow allows (rpm)", "speed of the drive"
+    return mode, torque_nm, choose_number(label, key, preset.speed_rpm, 300.0, low=10.0)
+
+
+def _choose_teeth(preset: Preset) -> Parameters:
+    """Return how the flanks strike back, how far apart they are, how they rub."""
+    law = address.ask_one(
+        st.selectbox,
+        "Damping law",
+        DAMPING_LAWS,
+        first=str(preset.parameters.get("damping_law", DAMPING_LAWS[0])),
+        key=f"law of {preset.name}",
+        name="law",
+        help=ABOUT_LAWS,
+    )
+    return [
+        ("damping_law", law),
+        choose_parameter(preset, "restitution", "Restitution", 1.0, low=0.1),
+        choose_parameter(preset, "half_backlash_um", "Half backlash (µm)", 500.0),
+        choose_parameter(preset, "friction_coefficient", "Friction of the flanks", 0.3),
+    ]
+
+
+def _choose_load(preset: Preset) -> Parameters:
+    """Return what stops the gripper, what it holds, and what strikes it."""
+    highest = {
+        "brake_nm": ("Brake (N·m)", 300.0),
+        "press_nm": ("Blow of the press (N·m)", 6000.0),
+        "piece_mass_kg": ("Mass of the piece (kg)", 2000.0),
+        "piece_offset_mm": ("Piece off centre (mm)", 200.0),
+        "load_friction_nm": ("Friction of the gripper (N·m)", 600.0),
+    }
+    return [choose_parameter(preset, name, label, high) for name, (label, high) in highest.items()]
+
+
+def _choose_measurement(preset: Preset) -> tuple[float, float, Parameters]:
+    """Return length and sampling rate of the recording, and how finely and quietly its angles are read."""
+    # a cycle lasts three seconds: a shorter recording shows none
+    length_s = choose_number("Length (s)", "length of the drive", 6.0, 30.0, low=3.5)
+    looks = {"format_func": "{:g}".format, "key": "rate of the drive", "name": "rate"}
+    rate_hz = address.ask_one(st.selectbox, "Sampling rate (Hz)", RATES_HZ, **looks)
+    looks = {"first": 2**20, "key": "counts of the drive", "name": "counts"}
+    counts = address.ask_one(st.select_slider, "Counts of the encoders", COUNTS, **looks)
+    noise = choose_parameter(preset, "angle_noise_urad", "Noise of the angles (µrad rms)", 200.0)
+    return length_s, float(rate_hz), [("encoder_counts", float(counts)), noise]
 
 
 def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
@@ -297,7 +315,7 @@ def _show_impacts(run: DriveRun) -> None:
         }
         for i in run.examined.impacts
     ]
-    show_table(rows)
+    show_table(rows, placeholder="–")
 
 
 def show_drive(preset: Preset) -> None:
