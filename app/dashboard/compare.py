@@ -417,14 +417,16 @@ def _show_bands(comparison: Comparison, channel: ChannelComparison) -> None:
     """Show levels of bands, noise included, over order and over frequency."""
     del comparison
     unit = f"level (dB re 1 {unit_text(channel.unit)}".rstrip() + ")"
-    for bands, name in ((channel.order_bands, "order"), (channel.third_octaves, "third octave, frequency (Hz)")):
+    for bands, name in ((channel.order_bands, "order"), (channel.third_octaves, "frequency of third octaves (Hz)")):
         if not bands:
             continue
         edges = np.array([edge for band in bands for edge in (band.low, band.high)])
         sides = [np.repeat([getattr(band.level, f"{side}_db") for band in bands], 2) for side in NAMES]
         lines = [ChartLine(edges, levels, side, i) for i, (levels, side) in enumerate(zip(sides, NAMES, strict=True))]
         panel = LinePanel(lines, name, unit, padded_limits(sides), x_limits=(float(edges[0]), float(edges[-1])))
-        show_lines(panel, f"bands over {name} comparison {channel.name}", height_px=240, legend=True)
+        show_lines(
+            panel, f"bands over {name} comparison {channel.name}", height_px=240, legend=True, log_x=name != "order"
+        )
 
 
 def show_downloads(comparison: Comparison, command: str) -> None:

@@ -141,7 +141,7 @@ def _show_how_to_begin() -> None:
     st.markdown(ABOUT_COMMANDS)
     about = "Three gearboxes made of the samples. Their recordings are analysed once, which takes about 20 s."
     look = ":material/play_arrow:"
-    st.button("See an example", icon=look, help=about, on_click=_see, args=(EXAMPLE_NAME,))
+    st.button("See an example", type="primary", icon=look, help=about, on_click=_see, args=(EXAMPLE_NAME,))
 
 
 def _see(store: str) -> None:

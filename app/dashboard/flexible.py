@@ -148,7 +148,7 @@ WORDS = {
 def show_pair() -> None:
     """A pair: what is looked at, of maps, sweeps with jumps, spectra."""
     names = sorted(presets("reduced-fe"), key=lambda name: "light" not in name)  # first the one whose teeth part
-    left, middle, right = st.columns(3)
+    left, middle, right = st.columns((2, 1, 1))
     preset = left.selectbox("Pair", names, format_func=lambda n: presets("reduced-fe")[n].title, key="pair preset")
     torque = middle.number_input("Torque (N·m)", 5.0, 1000.0, 85.0, key="pair torque", persist_state="session")
     sweep = right.select_slider("Length of a sweep (s)", (2.0, 5.0, 15.0), 15.0, key="pair sweep")

@@ -88,6 +88,20 @@ def one_line(text: object) -> str:
     return " ".join(line.split())
 
 
+_UNIT = re.compile(r"(?<=\d) (?=(?:\\?%|dB|k?Hz|rpm|[mµ]?m|m/s|N·m|k?N|m?s|J|g|of)(?![\w·]))")
+
+
+def unbroken(text: str) -> str:
+    r"""Return a text, also Markdown of `as_typed`, in which numbers stay on one line with their units.
+
+    Examples
+    --------
+    >>> unbroken(as_typed("2.3 mm (34 %) at 1500 rpm, 12 of 29"))
+    '2\\.3\xa0mm \\(34\xa0\\%\\) at 1500\xa0rpm\\, 12\xa0of 29'
+    """
+    return _UNIT.sub("\u00a0", text)
+
+
 def capitalised(text: str) -> str:
     """Return `text` with a capital first letter, the others as they are."""
     return text[:1].upper() + text[1:]

@@ -120,7 +120,7 @@ def test_the_form_of_the_machine_makes_the_rig_of_its_file() -> None:
     """Opened and left alone, the form changes nothing; a constant speed replaces the tachometer."""
     page = opened(tab="Machine")
     assert not [b for b in page.button if b.label.startswith("Analyse")]
-    next(w for w in page.main.selectbox if w.label == "Source").set_value("constant").run()
+    next(w for w in page.main.selectbox if w.label == "Speed from").set_value("constant").run()
     next(w for w in page.number_input if w.label == "Speed (rpm)").set_value(1497.0).run()
     press(page, "Analyse with this machine")
     assert not page.error

@@ -3,9 +3,10 @@
 // whole and zoomed along both axes. Bars with names stand in rows over the axis.
 
 const NS = "http://www.w3.org/2000/svg";
-const LEFT = 74, RIGHT = 16, SCALE = 70, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12;
+const LEFT = 74, RIGHT = 16, SCALE = 76, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12, N_FEW = 300, MOST_SQUARE = 560;
 const ROW_HEIGHT = 40, NARROW = 460; // of bars in rows
 const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+const DEGREES = [5, 10, 15, 30, 45, 90, 180];
 const TOOLS = { cursor: "Cursor", harmonics: "Harmonics", sidebands: "Sidebands" };
 
 export default function ({ data, parentElement, setStateValue }) {
@@ -176,8 +177,16 @@ class Figure {
 
   // ---------- drawing
 
-  scale(x) { return this.left + ((x - this.view[0]) / (this.view[1] - this.view[0])) * this.plotWidth; }
-  unscale(px) { return this.view[0] + ((px - this.left) / this.plotWidth) * (this.view[1] - this.view[0]); }
+  scale(x) {
+    const [low, high] = this.view;
+    const share = this.data.log_x ? Math.log(Math.max(x, 1e-300) / low) / Math.log(high / low) : (x - low) / (high - low);
+    return this.left + share * this.plotWidth;
+  }
+
+  unscale(px) {
+    const [low, high] = this.view, share = (px - this.left) / this.plotWidth;
+    return this.data.log_x ? low * (high / low) ** share : low + share * (high - low);
+  }
   rise(y) {
     const [low, high] = this.limits;
     const share = this.data.log ? Math.log(Math.max(y, 1e-300) / low) / Math.log(high / low) : (y - low) / (high - low);
@@ -196,8 +205,9 @@ class Figure {
     this.width = root.clientWidth;
     if (!this.width) return;
     if (data.rows) return this.drawRows(style);
-    this.plotWidth = Math.max(this.width - LEFT - (data.map ? SCALE : RIGHT), 60);
-    this.plotHeight = data.height;
+    this.plotWidth = Math.max(this.width - LEFT - (data.map && !data.square ? SCALE : RIGHT), 60);
+    if (data.square) this.plotWidth = Math.min(this.plotWidth, MOST_SQUARE);
+    this.plotHeight = data.square ? this.plotWidth : data.height;
     const named = this.placed();
     this.top = 10 + ROW * named.rows;
     const height = this.top + this.plotHeight + BOTTOM;
@@ -220,7 +230,7 @@ class Figure {
       add(inside, "circle", { cx: this.scale(x), cy: this.rise(y), r: 7, fill: "none", stroke: data.fault, "stroke-width": 2 });
     this.drawCursors(inside, named);
     this.drawOwn(inside);
-    if (data.map) this.drawScale();
+    if (data.map && !data.square) this.drawScale();
     this.selection = add(inside, "rect", { y: this.top, height: this.plotHeight, width: 0, fill: this.ink, opacity: 0.12 });
     this.drawPeaks();
   }
@@ -295,6 +305,7 @@ class Figure {
         high = Math.max(high, floor.length ? line.high[i] : y[i]);
       }
     }
+    if (this.data.log && high > 0) return [Math.max(low, high * 1e-6) / 1.3, high * 1.3];
     if (!(high > low)) [low, high] = Number.isFinite(low) ? [low - 1, low + 1] : [0, 1];
     const margin = 0.06 * (high - low);
     return [low - margin, high + margin];
@@ -309,15 +320,23 @@ class Figure {
       add(svg, "line", { x1: LEFT, x2: LEFT + plotWidth, y1: y, y2: y, stroke: this.rule });
       text(svg, LEFT - 7, y + 4, data.log ? short(value, powers) : plain(value, low, high), { ...quiet, "text-anchor": "end" });
     }
-    for (const value of data.dates ? days(...this.view, plotWidth / 95) : ticks(...this.view, plotWidth / 95)) {
-      const x = this.scale(value);
+    for (const value of data.dates ? days(...this.view, plotWidth / 95) : this.places()) {
+      const x = this.scale(value), words = data.dates ? date(value) : data.log_x ? short(value, false) : plain(value, ...this.view);
       add(svg, "line", { x1: x, x2: x, y1: bottom, y2: bottom + 5, stroke: this.ink, opacity: 0.5 });
-      text(svg, x, bottom + 18, data.dates ? date(value) : plain(value, ...this.view), { ...quiet, "text-anchor": "middle" });
+      text(svg, Math.min(x, this.width - 3.6 * words.length), bottom + 18, words, { ...quiet, "text-anchor": "middle" });
     }
     add(svg, "line", { x1: LEFT, x2: LEFT + plotWidth, y1: bottom, y2: bottom, stroke: this.ink, opacity: 0.5 });
     text(svg, LEFT + plotWidth / 2, bottom + 37, data.x, { ...quiet, "text-anchor": "middle" });
     const label = text(svg, 0, 0, data.y, { ...quiet, "text-anchor": "middle" });
     label.setAttribute("transform", `translate(13,${top + plotHeight / 2}) rotate(-90)`);
+  }
+
+  // Of the numbers along the x axis: as many as their own width leaves room for.
+  places() {
+    if (this.data.log_x) return decades(...this.view);
+    const steps = this.data.x_unit === "deg" ? DEGREES : null, n = (room) => Math.min(this.plotWidth / room, 12);
+    const wide = Math.max(...ticks(...this.view, n(95), steps).map((value) => String(plain(value, ...this.view)).length), 1);
+    return ticks(...this.view, n(Math.max(28 + 7 * wide, 48)), steps);
   }
 
   named(x) {
@@ -338,7 +357,7 @@ class Figure {
       for (let i = to - 1; i >= from; i--) band.push(`${this.scale(x[i]).toFixed(1)},${this.rise(low[i]).toFixed(1)}`);
       add(inside, "polygon", { points: band.join(" "), fill: line.colour, opacity: 0.22 });
     }
-    add(inside, "path", { d: parts.join(""), fill: "none", stroke: line.colour, "stroke-width": line.dots ? (plane && this.lines.length > 1 ? 2.5 : 4) : plane ? 0.8 : 1.2, opacity: plane && !line.dots ? 0.6 : null, "stroke-linecap": line.dots ? "round" : null, "stroke-linejoin": "round", "stroke-dasharray": line.dotted ? "2 3" : null });
+    add(inside, "path", { d: parts.join(""), fill: "none", stroke: line.colour, "stroke-width": line.dots ? (plane && this.lines.length > 1 && x.length > N_FEW ? 2.5 : 4.5) : plane ? 0.8 : 1.2, opacity: plane && !line.dots ? 0.6 : null, "stroke-linecap": line.dots ? "round" : null, "stroke-linejoin": "round", "stroke-dasharray": line.dotted ? "2 3" : null });
   }
 
   // Cursors that the machine implies, and the rows of their labels: they come most important first. A sideband has its
@@ -399,12 +418,16 @@ class Figure {
     const { map } = this.data, lut = bytes(map.colours), x = LEFT + this.plotWidth + 14, n = 48, step = this.plotHeight / n;
     for (let i = 0; i < n; i++) {
       const k = 3 * Math.round((255 * (n - 1 - i)) / (n - 1));
-      add(this.svg, "rect", { x, y: this.top + i * step, width: 10, height: step + 0.5, fill: `rgb(${lut.slice(k, k + 3)})` });
+      add(this.svg, "rect", { x, y: this.top + i * step, width: 10, height: step + 0.5, fill: `rgb(${lut.slice(k, k + 3)})`, "shape-rendering": "crispEdges" });
     }
-    for (const [share, value] of [[1, map.low], [0, map.high]])
-      text(this.svg, x + 14, this.top + share * this.plotHeight + (share ? 0 : 9), plain(value, map.low, map.high), { fill: this.ink, opacity: 0.75 });
-    const unit = text(this.svg, 0, 0, map.unit, { fill: this.ink, opacity: 0.75, "text-anchor": "middle" });
-    unit.setAttribute("transform", `translate(${x + 26},${this.top + this.plotHeight / 2}) rotate(-90)`);
+    const quiet = { fill: this.ink, opacity: 0.75 };
+    for (const value of ticks(map.low, map.high, this.plotHeight / 60)) {
+      const y = this.top + (1 - (value - map.low) / (map.high - map.low)) * this.plotHeight;
+      add(this.svg, "line", { x1: x + 10, x2: x + 13, y1: y, y2: y, stroke: this.ink, opacity: 0.5 });
+      text(this.svg, x + 16, y + 4, plain(value, map.low, map.high), quiet);
+    }
+    const unit = text(this.svg, 0, 0, map.unit, { ...quiet, "text-anchor": "middle" });
+    unit.setAttribute("transform", `translate(${x + 56},${this.top + this.plotHeight / 2}) rotate(-90)`);
   }
 
   band(from, to, tall = null) {
@@ -428,7 +451,7 @@ class Figure {
     }
     if (x === null || event.offsetY < this.top || event.offsetY > this.top + this.plotHeight) return this.showTip(null);
     this.svg.style.cursor = this.held(x) ? "ew-resize" : "crosshair";
-    const near = (4 / this.plotWidth) * (this.view[1] - this.view[0]), lines = [];
+    const near = this.unscale(this.scale(x) + 4) - x, lines = [];
     const cursors = data.cursors.filter(({ at }) => Math.abs(at - x) < near).slice(0, 6);
     if (data.map) lines.push(this.levelAt(x, event.offsetY));
     if (data.plane) lines.push(this.nearest(event.offsetX, event.offsetY));
@@ -462,7 +485,7 @@ class Figure {
     const level = map.low + (this.levels[row * map.columns + column] / 255) * (map.high - map.low);
     const y = this.ofShare(share);
     const also = map.also ? `, ${figure(map.also[row])} ${map.also_unit}` : "";
-    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}: ${withMinus(level.toFixed(digits(map)))} ${map.unit}`;
+    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}${this.data.square ? "" : `: ${withMinus(level.toFixed(digits(map)))} ${map.unit}`}`;
   }
 
   showTip(lines, event) {
@@ -516,7 +539,7 @@ class Figure {
     const left = html("span"), right = html("span");
     const named = this.lines.filter(({ name, dotted }, i, all) => name && all.findIndex((line) => line.name === name && line.dotted === dotted) === i);
     if (this.lines.length > 1 && this.data.legend)
-      for (const line of named) {
+      for (const line of this.data.front_first ? named.reverse() : named) {
         const key = html("i");
         key.style.background = line.dotted ? `repeating-linear-gradient(90deg, ${line.colour} 0 3px, transparent 3px 5px)` : line.colour;
         const entry = html("span", "key");
@@ -645,9 +668,11 @@ function lowerBound(x, value) {
   return low;
 }
 
-function ticks(low, high, n) {
+// At whole multiples of a round step, or of one of `steps` where the span takes it.
+function ticks(low, high, n, steps = null) {
   const rough = (high - low) / Math.max(n, 1), power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((times) => times * power >= rough * 0.999);
+  const round = power * [1, 2, 5, 10].find((times) => times * power >= rough * 0.999);
+  const step = (steps && rough > steps[0] / 2 && steps.find((length) => length >= rough * 0.999)) || round;
   const first = Math.ceil(low / step - 1e-9), last = Math.floor(high / step + 1e-9);
   return range(first, Math.min(last, first + 50)).map((k) => k * step);
 }
@@ -667,7 +692,9 @@ function decades(low, high) {
   const first = Math.ceil(Math.log10(low) - 1e-9), last = Math.floor(Math.log10(high) + 1e-9);
   const every = Math.max(1, Math.ceil((last - first + 1) / 9));
   const whole = range(first, last).filter((k) => (k - first) % every === 0).map((k) => 10 ** k);
-  return whole.length > 1 ? whole : ticks(low, high, 5).filter((value) => value > 0);
+  if (whole.length > 3) return whole;
+  if (!whole.length) return ticks(low, high, 5).filter((value) => value > 0);
+  return range(first - 1, last).flatMap((k) => [1, 2, 5].map((times) => times * 10 ** k)).filter((value) => value >= low * 0.999 && value <= high * 1.001);
 }
 
 function plain(value, low, high) {

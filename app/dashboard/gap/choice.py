@@ -183,6 +183,14 @@ ChosenFiles = tuple[tuple[ChosenFile, ...], tuple[ChosenFile, ...], tuple[Chosen
 """Recordings, references, rig files."""
 
 
+TITLES = {"cracked": "rigid gears", "reduced-fe": "flexible gears", "forging": "drive that starts and stops"}
+
+
+def simulator_title(name: str) -> str:
+    """Return what the page calls a simulator."""
+    return TITLES.get(name, name)
+
+
 def choose() -> Choice:
     """Return what the user chose; there may be no recording in it yet."""
     from sims.registry import gap_simulators
@@ -192,7 +200,8 @@ def choose() -> Choice:
         origin = address.ask_one(st.radio, "Recordings", (SAMPLES, FILES), **looks)
         recordings, references, rigs = _choose_samples() if origin == SAMPLES else _choose_files()
         names = tuple(gap_simulators())
-        model = address.ask_one(st.selectbox, "Simulator", names, key="gap simulator", name="simulator")
+        looks = {"key": "gap simulator", "name": "simulator", "format_func": simulator_title}
+        model = address.ask_one(st.selectbox, "Simulator", names, **looks)
         with st.expander("Not in the files?", icon=":material/tune:"):
             about = "Of the input shaft, for all recordings."
             torque = choose_number(

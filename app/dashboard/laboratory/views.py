@@ -16,7 +16,7 @@ from app.dashboard.laboratory import run as runs
 from app.dashboard.laboratory.bifurcation import show_bifurcation
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import Setup, effect_text, slider_values
-from app.dashboard.theme import as_typed, capitalised, palette
+from app.dashboard.theme import as_typed, capitalised, palette, unbroken
 from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, packed, padded_limits, show_lines
 from app.dashboard.widgets.spectrum import show_spectrum
 from gearsig.checks import FloatArray
@@ -41,12 +41,12 @@ SEGMENTS = {"1 revolution": 1.0, "3 revolutions": 3.0, "all": float("inf")}
 
 def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show a signal of both machines, and the difference."""
-    left, right = st.columns(2)
+    row = st.container(horizontal=True, vertical_alignment="bottom")  # which wraps where it is narrow
     names = (*healthy.vibration_channels, *MOTION)
-    looks = {"format_func": _shown, "key": "signal of the laboratory"}
-    name = address.ask_one(left.selectbox, "Signal", names, name="signal", **looks)
+    looks = {"format_func": _shown, "key": "signal of the laboratory", "width": 320}
+    name = address.ask_one(row.selectbox, "Signal", names, name="signal", **looks)
     looks = {"first": "3 revolutions", "key": "segment of the laboratory"}
-    shown = address.ask_one(right.segmented_control, "Shown, of the input shaft", list(SEGMENTS), name="shown", **looks)
+    shown = address.ask_one(row.segmented_control, "Shown, of the input shaft", list(SEGMENTS), name="shown", **looks)
     end = _end_s(healthy, SEGMENTS[shown])
     healthy_line, label = signal_of(healthy, name, end)
     if faulty is None:
@@ -54,7 +54,7 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
         return
     faulty_line, _ = signal_of(faulty, name, end)
     limits = padded_limits([healthy_line[1], faulty_line[1]])
-    left, right = st.columns(2)
+    left, right = st.container(key="panels of both machines over time").columns(2)
     with left:
         _show_line(healthy_line, "healthy", label, end, limits, height_px=HEIGHT_PX)
     with right:
@@ -274,16 +274,17 @@ Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show the portraits of one gear along the line of action."""
-    left, right = st.columns(2)
+    row = st.container(horizontal=True, gap="large")  # which wraps where it is narrow
     looks = {"key": "gear of the laboratory"}
-    gear = address.ask_one(left.segmented_control, "Gear", list(GEARS), name="gear", **looks)
+    gear = address.ask_one(row.segmented_control, "Gear", list(GEARS), name="gear", **looks)
     looks = {"key": "strobe of the laboratory"}
-    strobe = address.ask_one(right.segmented_control, "A point once per", list(STROBES), name="strobe", **looks)
+    strobe = address.ask_one(row.segmented_control, "A point once per", list(STROBES), name="strobe", **looks)
     n = STROBES[strobe] or healthy.machine.mesh.pair.driver.teeth
     both = [healthy] if faulty is None else [healthy, faulty]
     portraits = [portrait(run, GEARS[gear], n) for run in both]
     limits = [padded_limits([p[axis] for p in portraits]) for axis in (0, 1)]
-    for column, (y, v, y_points, v_points), name in zip(st.columns(2), portraits, ("healthy", "faulty"), strict=False):
+    places = st.container(key="panels of the phase portraits").columns(2)
+    for column, (y, v, y_points, v_points), name in zip(places, portraits, ("healthy", "faulty"), strict=False):
         path = ChartLine(y, v, name, MEASURED if name == "healthy" else FAULT)
         dots = ChartLine(y_points, v_points, "Poincaré points", SHAFT, dots=True)
         with column:
@@ -420,7 +421,7 @@ def show_title(setup: Setup, *, is_shown: bool) -> None:
     """Show what is switched on; `is_shown` if the faulty machine could be simulated."""
     title = " + ".join(effect_text(s) for s in setup.effects if s.severity > 0) if is_shown else ""
     otherwise = "Healthy: nothing is switched on" if setup.is_healthy else "The healthy machine alone"
-    st.subheader(as_typed(capitalised(title) or otherwise), anchor=False)
+    st.subheader(unbroken(as_typed(capitalised(title) or otherwise)), anchor=False)
 
 
 def show_expectation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from app.dashboard.cached import recorded
 from app.dashboard.methods.form import MethodPage
 from app.dashboard.methods.page import cached
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import show_figure
+from app.dashboard.widgets.charts import show_figure, show_lines
 from app.dashboard.widgets.chooser import choose_file, choose_reference_rate, choose_sample
 from app.dashboard.widgets.messages import show_error, show_facts
 from app.dashboard.widgets.tables import show_table
@@ -22,9 +23,9 @@ from gearsig.diagnosis import Analysis
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import percent, signed
 from gearsig.orders import separate, synchronous_average
-from gearsig.plot import crack_comparison_figure
+from gearsig.plot import crack_comparison_figure, search_panels
 from gearsig.recording import Recording, metres_per_second_squared
-from gearsig.severity import CrackEstimate, NoCrackSeen, estimate_crack
+from gearsig.severity import CrackEstimate, NoCrackSeen, ToothSearch, estimate_crack
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,12 +55,31 @@ def show_crack(page: MethodPage) -> None:
         remedy = f"\n\nWhat would help: {as_typed(refusal.remedy)}." if refusal.remedy else ""
         text = f"**The depth cannot be estimated**: {as_typed(refusal.reason)}.{remedy}"
         st.info(text, icon=":material/help:")
+        if isinstance(refusal.looked_at, tuple):
+            _show_search(page, refusal.looked_at)
         return
     _show_answer(estimate)
-    if isinstance(estimate, CrackEstimate):
+    if isinstance(estimate, NoCrackSeen):
+        _show_search(page, estimate.searched)
+    else:
         _show_figure(recording, reference, estimate, page.channel.channel)
     with st.expander("What the answer rests on"):
         show_table({"feature": list(estimate.features), "value": list(estimate.features.values())})
+
+
+def _show_search(page: MethodPage, searched: Sequence[ToothSearch]) -> None:
+    """Show what was looked at, tooth by tooth, and the level from which a crack would be seen."""
+    panels = search_panels(searched)
+    places = st.container(key="panels of the search for a crack").columns(max(len(panels), 1))
+    for place, panel in zip(places, panels, strict=True):
+        with place:
+            st.markdown(f"**{as_typed(panel.title)}**")
+            show_lines(panel, page.key(f"search {panel.x}"), height_px=260, legend=True)
+    if panels:
+        st.caption(
+            "How far each place stands out of the others, all bands and channels together. At the dotted level the "
+            "clearest event of the gear would be seen as a crack; one above it that is unlike a crack gets no depth."
+        )
 
 
 def _choose_reference(page: MethodPage) -> Recording | None:
@@ -71,14 +91,13 @@ def _choose_reference(page: MethodPage) -> Recording | None:
         If the file cannot be read.
     """
     analysis = page.analysis
-    left, right = st.columns(2, vertical_alignment="bottom")
     about = "The same gears, sensors, speed and load when they were healthy. Without it only deep cracks show."
     given = () if analysis.reference is None else (SIDEBAR,)
-    origin = page.choose(left, "Reference", (*given, NONE, FILE, SAMPLE), name="beside", about=about)
+    origin = page.choose(st, "Reference", (*given, NONE, FILE, SAMPLE), name="beside", about=about)
     if origin == SIDEBAR and analysis.reference is not None:
         return analysis.reference.recording
     source, rate_hz = None, None
-    with right:
+    with st.container(width=460):
         if origin == FILE:
             about = "Read with the rig and the speed of the recording that is analysed."
             source = choose_file("Recording of the healthy gears", page.key("reference file"), about=about)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import streamlit as st
 
@@ -20,6 +20,13 @@ from gearsig.prepared import PreparedRecording
 MIN_SAMPLES, MOST_NUMBERS = 16, 16
 MOST_SIDE_BY_SIDE = 3
 """Choices that are shown side by side; more are a list."""
+WIDTH_PX, MOST_WIDTH_PX = 210, 440
+
+
+def width_px(label: str, *texts: str, buttons_px: int = 60) -> int:
+    """Return the width of a field in which the longest of these texts can be read beside its buttons."""
+    longest = max(map(len, texts), default=0)
+    return min(max(WIDTH_PX, 7 * len(label) + 30, buttons_px + 7 * longest), MOST_WIDTH_PX)
 
 
 @dataclass(frozen=True)
@@ -101,10 +108,19 @@ class MethodPage:
         return value
 
     def range(
-        self, label: str, end: float, *, start: float = 0.0, shown: tuple[float, float] | None = None, name: str
+        self,
+        label: str,
+        end: float,
+        *,
+        start: float = 0.0,
+        shown: tuple[float, float] | None = None,
+        name: str,
+        width: int | Literal["stretch"] = "stretch",
     ) -> tuple[float, float]:
         """Return a range of an axis that the user chooses, `name` in the address; see `charts.choose_range`."""
-        return charts.choose_range(label, self.analysis, end, start=start, shown=shown, name=self.name, in_address=name)
+        return charts.choose_range(
+            label, self.analysis, end, start=start, shown=shown, name=self.name, in_address=name, width=width
+        )
 
     def segment(self, *, n_first: int) -> tuple[int, int]:
         """Let the user choose what is analysed; return its first sample and the one after its last.
@@ -145,12 +161,12 @@ def _as_suggested(option: MethodOption, page: MethodPage) -> MethodOption:
 def _ask_in_rows(
     page: MethodPage, options: Sequence[MethodOption], known: Mapping[str, Any], values: dict[str, Any]
 ) -> None:
-    n = 4 if len(options) > 3 else 3
-    for first in range(0, len(options), n):
-        row = options[first : first + n]
-        for place, option in zip(st.columns(n, vertical_alignment="bottom"), row, strict=False):
-            with place:
-                values[option.name] = _asked(page, option, known[option.name])
+    """Ask in a row that wraps: each widget is as wide as it needs to be, so that no choice is cut off."""
+    if not options:
+        return
+    with st.container(horizontal=True, vertical_alignment="bottom", gap="medium"):
+        for option in options:
+            values[option.name] = _asked(page, option, known[option.name])
 
 
 def _asked(page: MethodPage, option: MethodOption, known: Any) -> Any:
@@ -181,6 +197,7 @@ def _asked_name(page: MethodPage, option: MethodOption, known: Any) -> Any:
     return page.ask(
         st.selectbox, option.label, names, name=option.name, first="", read=address.one_of(names), about=option.about,
         key=f"{option.name} {list(known)}", format_func=lambda name: one_line(name) or capitalised(option.empty),
+        width=width_px(option.label, option.empty, *known),
     )  # fmt: skip
 
 
@@ -196,6 +213,7 @@ def _asked_of_several(page: MethodPage, option: MethodOption) -> Any:
     chosen = page.ask(
         widget, option.label, choices, name=option.name, first="" if free else option.default,
         read=address.one_of(choices), format_func=text, about=option.about,
+        width=width_px(option.label, *map(text, choices)),
     )  # fmt: skip
     return None if free and chosen == "" else chosen
 
@@ -211,6 +229,7 @@ def _asked_number(page: MethodPage, option: MethodOption, known: Any) -> Any:
         st.number_input, option.label, low, high, None, 1 if whole else None, "%d" if whole else "%g",
         name=option.name, first=first, read=address.number(low or 0, high, whole=whole), about=option.about,
         placeholder=placeholder or None, key=f"{option.label} {placeholder}",
+        width=width_px(option.label, placeholder, buttons_px=110),
     )  # fmt: skip
 
 
@@ -218,11 +237,11 @@ def _asked_span(page: MethodPage, option: MethodOption, known: Any) -> tuple[flo
     if not known:
         text = page.ask(
             st.text_input, option.label, name=option.name, first="", read=_two_numbers_in_words,
-            placeholder=option.empty, about=option.about,
+            placeholder=option.empty, about=option.about, width=width_px(option.label, option.empty),
         )  # fmt: skip
         return two_numbers(text, option.label)
     label = option.label if option.empty == "all" else f"{option.label}; all: {option.empty}"
-    low, high = page.range(label, known[1], start=known[0], name=option.name)
+    low, high = page.range(label, known[1], start=known[0], name=option.name, width=width_px(label))
     return None if (low, high) == tuple(known) else (low, high)
 
 
@@ -253,9 +272,10 @@ def _asked_numbers(page: MethodPage, option: MethodOption, known: Any) -> tuple[
         return [text for text in dict.fromkeys(texts) if text in by_text or is_positive([text])][:MOST_NUMBERS]
 
     chosen = page.ask(
-        st.multiselect, option.label, list(by_text), name=option.name, first=[], read=read, about=option.about,
+        st.multiselect, option.label, list(by_text), name=option.name, first=[], read=read,
+        about=f"{option.about} Choose, or type a number.".lstrip(),
         accept_new_options=True, max_selections=MOST_NUMBERS, key=f"{option.name} {list(by_text)}",
-        placeholder=f"{option.empty}; choose, or type a number",
+        placeholder=option.empty, width=width_px(option.label, option.empty),
     )  # fmt: skip
     return tuple(value_of(text) for text in chosen)
 

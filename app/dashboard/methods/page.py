@@ -28,7 +28,7 @@ from gearsig.angle import ShaftAngle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, with_known_angle
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.methods import METHODS, MethodAnswer, Waveforms, angle_or_none, apply_method, part_of
-from gearsig.plot import ChartLine, LevelPanel, LinePanel, with_unit
+from gearsig.plot import ChartLine, LevelPanel, LinePanel, figure_of_refusal, with_unit
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording, write_recording
 from gearsig.timefreq import at_label
@@ -110,14 +110,19 @@ def answer_of(
 def show_method(name: str, analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show a method's form and its answer for one channel."""
     st.caption(METHODS[name].about)
+    page = MethodPage(analysis, channel, name)
     try:
-        _show(name, MethodPage(analysis, channel, name))
+        _show(name, page)
     except RefusalError as error:
         angle = analysis.shaft_angle
         if isinstance(angle, CannotTell) and error.reason == angle.reason:
             show_unknown_speed(angle)
         else:
             _show_refusal(error)
+            figure = figure_of_refusal(error)
+            if figure is not None:
+                st.caption("What was looked at:")
+                charts.show_figure(figure, "What was looked at", page.key("looked at"))
     except GearsigError as error:
         show_error(error)
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 
 import streamlit as st
 
-from app.dashboard.gap.choice import Choice, choose, set_alike
+from app.dashboard.gap.choice import Choice, choose, set_alike, simulator_title
 from app.dashboard.gap.view import show_finished, show_running
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.messages import show_error
@@ -29,7 +29,7 @@ def show() -> None:
     st.subheader("Gap between simulation and recording", anchor=False)
     if choice.recordings:
         against = f", against {', '.join(one.name for one in choice.references)}" if choice.references else ""
-        st.caption(as_typed(f"{names}{against}; simulator {choice.model}"))
+        st.caption(as_typed(f"{names}{against}; simulator of {simulator_title(choice.model)}"))
     finished = show_running(choice)
     if finished is None:
         st.markdown(WELCOME)

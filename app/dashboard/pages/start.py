@@ -76,7 +76,7 @@ TO_TRY: tuple[tuple[str, str, str, Callable[[], str], str], ...] = (
     ),
     (
         "Dial a crack into a gearbox",
-        "A simulated pair that follows its sliders: pull the crack from 0 to 4 mm and see what an accelerometer would.",
+        "A simulated pair that follows its sliders: pull the crack to 4\u00a0mm, see what a sensor would.",
         "Open the laboratory",
         crack_dial,
         "laboratory",

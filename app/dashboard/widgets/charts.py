@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
+from colorsys import hls_to_rgb, rgb_to_hls
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 from zlib import crc32
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from app.dashboard import address, state
 from app.dashboard.components import component_of
-from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
+from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette, unbroken
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
 from gearsig.formatting import csv_text
@@ -30,6 +31,7 @@ from gearsig.plot import (
     LevelPanel,
     LinePanel,
     RowPanel,
+    cell_limits,
     figure_svg,
     figure_table,
     importance,
@@ -97,7 +99,7 @@ def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[f
 def show_panel(panel: LinePanel | LevelPanel, key: str, span_db: float) -> None:
     """Show a panel that a method gives, to be zoomed; of levels that range below the largest has colours."""
     if panel.title:
-        st.caption(as_typed(panel.title))
+        st.caption(unbroken(as_typed(panel.title)))
     if isinstance(panel, LevelPanel):
         show_map(panel, key, dynamic_range_db=span_db)
     else:
@@ -196,6 +198,8 @@ def show_lines(
     per_unit: tuple[float, str] | None = None,
     step: float | None = None,
     dates: bool = False,
+    front_first: bool = False,
+    log_x: bool = False,
 ) -> None:
     """Show lines with cursors and marked points; of long lines the extremes of each pixel column of what is shown.
 
@@ -219,6 +223,10 @@ def show_lines(
         Distance of the sidebands that are offered first.
     dates : bool
         Whether x is days since 1970.
+    front_first : bool
+        Name the line in front first: where later lines lie behind earlier ones to be seen.
+    log_x : bool
+        Whether the x axis is logarithmic: of third octaves.
     """
     lines, is_plane = panel.lines, panel.is_plane
     limits = panel.x_limits or (min(float(line.x.min()) for line in lines), max(float(line.x.max()) for line in lines))
@@ -230,6 +238,8 @@ def show_lines(
         "dates": dates,
         "marked": [[float(x), float(y)] for x, y in marked],
         "legend": legend,
+        "front_first": front_first,
+        "log_x": log_x,
         "limits": panel.limits,
         "per_unit": per_unit,
         "step": step,
@@ -283,12 +293,13 @@ def show_map(
         "lines": [_sent(line, span) for line in panel.lines],
         "cursors": _cursor_rows(panel.cursors, palette()),
         "marked": [],
+        "square": panel.square,
         "map": {
             "levels": b64encode(levels.tobytes()).decode("ascii"),
             "columns": levels.shape[1],
             "rows": levels.shape[0],
             "span": [first, last],
-            "limits": [float(y[0]), float(y[-1])],
+            "limits": list(cell_limits(y, logarithmic=panel.logarithmic)),
             "low": low,
             "high": high,
             "unit": panel.unit,
@@ -408,7 +419,12 @@ def _shown_colour(colour: int | str) -> str:
     if not is_dark():
         return colour
     on_paper = np.frombuffer(bytes.fromhex(colour.removeprefix("#")), np.uint8) / 255
-    return "#" + (255 * turned_over(on_paper)).astype(np.uint8).tobytes().hex()
+    hue, lightness, saturation = rgb_to_hls(*on_paper)
+    # A scale of colours turned over ends in pale ones that nobody tells apart: they grow lighter by different amounts.
+    shown = (
+        turned_over(on_paper) if saturation < 0.2 else np.array(hls_to_rgb(hue, 0.55 + 0.25 * lightness, saturation))
+    )
+    return "#" + (255 * shown).astype(np.uint8).tobytes().hex()
 
 
 def packed(values: FloatArray) -> str:
@@ -580,6 +596,7 @@ def choose_range(
     shown: tuple[float, float] | None = None,
     name: str = "",
     in_address: str,
+    width: int | Literal["stretch"] = "stretch",
 ) -> tuple[float, float]:
     """Return the chosen segment between `start` and `end`; never an empty one.
 
@@ -597,12 +614,14 @@ def choose_range(
         Of the view, where the same label occurs in several.
     in_address : str
         Its name there.
+    width : int or "stretch"
+        Pixels, or as much as there is.
     """
     step = (end - start) / 1000
     first = shown if shown is not None else (start, end)
     value = (max(start, first[0]), min(end, first[1]))
     key = state.view_key(f"{name} {label} {start!r} to {end!r}", source)
-    looks: dict[str, Any] = {"step": step, "format": "%.5g", "key": key}
+    looks: dict[str, Any] = {"step": step, "format": "%.5g", "key": key, "width": width}
     low, high = address.ask(
         st.slider, label, start, end, name=in_address, first=value, read=address.span(start, end), **looks
     )
@@ -637,7 +656,9 @@ def download(label: str, data: Any, name: str, mime: str, *, primary: bool = Fal
 _document = component_of("document")
 
 
-def offer_page(label: str, page: Callable[[], bytes], name: str, key: str) -> None:
+def offer_page(
+    label: str, page: Callable[[], bytes], name: str, key: str, *, pdf: Callable[[], bytes] | None = None
+) -> None:
     """Offer a page of HTML as a file, and to be looked at before; it is made when it is asked for.
 
     Parameters
@@ -650,9 +671,13 @@ def offer_page(label: str, page: Callable[[], bytes], name: str, key: str) -> No
         Of the file.
     key : str
         Unique on the page.
+    pdf : callable or None
+        Returns the same to be printed.
     """
     with st.container(horizontal=True, vertical_alignment="center"):
         download(label, page, name, "text/html", primary=True)
+        if pdf is not None:
+            download("As PDF", pdf, name.removesuffix(".html") + ".pdf", "application/pdf")
         is_shown = st.toggle("Preview", key=f"preview of {key}")
     if is_shown:
         with st.spinner("Making the page …"):

@@ -265,13 +265,10 @@ def _config(kind: str, rig: Table, channels: Sequence[str]) -> dict[str, Any]:
 
 
 def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: Sequence[str]) -> Table:
-    st.markdown("**Speed from**")
     source = str(speed.get("source", "none"))
     columns = st.columns(4)
     known = list(SPEED_SOURCES)
-    chosen = columns[0].selectbox(
-        "Source", known, known.index(source) if source in known else 0, key=key("speed"), label_visibility="collapsed"
-    )
+    chosen = columns[0].selectbox("Speed from", known, known.index(source) if source in known else 0, key=key("speed"))
     edited = dict(speed) if chosen == source else {}
     edited["source"] = chosen
     for place, name in zip(columns[1:], SPEED_SOURCES[chosen], strict=False):
@@ -305,7 +302,8 @@ def _show_consequences(table: Table, *, told: Rig | str | None) -> None:
     if not rig.shafts:
         st.caption(":material/account_tree: Name a shaft: its orders follow, and with teeth those of the mesh.")
         return
-    drawing, orders = st.columns((3, 4))
+    place = st.container(key="panels of the train")
+    drawing, orders = place.columns((1, 1), vertical_alignment="center")
     drawing.image(train_svg(rig, palette().quiet), width="stretch", alt="Drawing of the gear train")
     lines = [line for line in order_lines(rig, rig.reference_shaft, n_sidebands=0) if line.kind != "sideband"]
     turns = (rig.nominal_speed_rpm() or 0.0) / 60.0
@@ -318,7 +316,7 @@ def _show_consequences(table: Table, *, told: Rig | str | None) -> None:
 
 def train_svg(rig: Rig, ink: str) -> str:
     """Return a drawing of the shafts with their gears and bearings; names from files are escaped."""
-    width, gap, left = 420, 74, 96
+    width, gap, left = 330, 74, 100
     radii = {
         (pair.name, shaft): gap
         * abs(order[pair.driven] - order[pair.driver])
@@ -336,7 +334,7 @@ def train_svg(rig: Rig, ink: str) -> str:
     height = 2 * margin + gap * max(len(rows) - 1, 0)
     parts = [
         f'<line x1="{left}" x2="{width - 20}" y1="{y}" y2="{y}" stroke="{ink}" stroke-width="4"/>'
-        f'<text x="{left - 8}" y="{y + 4}" text-anchor="end">{escape(one_line(name)[:14])}</text>'
+        f'<text x="{left - 8}" y="{y + 4}" text-anchor="end">{escape(one_line(name)[:12])}</text>'
         for name, y in rows.items()
     ]
     for i, pair in enumerate(rig.pairs):
@@ -359,7 +357,7 @@ def train_svg(rig: Rig, ink: str) -> str:
                 for side in (-11, 3)
             ]
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:.0f}" font-size="12" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:.0f}" font-size="15" '
         f'font-family="sans-serif" fill="{ink}">{"".join(parts)}</svg>'
     )
 

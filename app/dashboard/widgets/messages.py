@@ -8,7 +8,7 @@ from typing import Any
 
 import streamlit as st
 
-from app.dashboard.theme import as_typed
+from app.dashboard.theme import as_typed, unbroken
 from gearsig.diagnosis import CannotTell
 from gearsig.errors import GearsigError, InputError
 
@@ -54,6 +54,7 @@ _PLACES = {
     "`gearsig rig bearings` lists them": "the column catalogue lists them",
     "set lowest to": "set the lowest line shown to",
     "[speed] in the rig file": "the speed under Machine",
+    "[machine] in the rig file": "the group of the machine in its rig file",
     "/s^2": "/s²",
 }
 """What the page calls the options of the command line, of functions and of rig files that messages name."""
@@ -118,7 +119,7 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
     """Show what an answer says about itself, as one warning or quietly as small print; names in it come from files."""
     if not warnings:
         return
-    said = [as_typed(in_page_words(text)) for text in warnings]
+    said = [unbroken(as_typed(in_page_words(text))) for text in warnings]
     text = said[0] if len(said) == 1 else "\n".join(f"- {one}" for one in said)
     if quiet:
         st.caption(text)

@@ -30,6 +30,8 @@ from gearsig.plot import (
     Scale,
     decibel_text,
     displayed_values,
+    is_sound,
+    level_name,
     marks_of,
     polar_figure,
     svg_ring,
@@ -92,6 +94,8 @@ def show_spectrum(
     """
     spectra = (spectra,) if isinstance(spectra, Spectrum) else spectra
     first = spectra[0]
+    if scale == "Logarithmic" and is_sound(first.unit):
+        scale = "dB"  # in which sound is read
     label, chosen = scale, list(KIND_NAMES)
     if not plain:
         label, chosen = _choose_looks(source, cursors, name, scale)
@@ -109,7 +113,7 @@ def show_spectrum(
         n_offset = max(3, int(0.005 * (stop - start))) if start == 0 and stop - start > 9 else 0
         shown_values.append(values[start + n_offset : stop])
     text = quantity or ("value" if first.scaling == "dimensionless" else first.scaling)
-    in_db = f"{text} ({decibel_text(first.unit)})"
+    in_db = f"{level_name(text, first.unit)} ({decibel_text(first.unit)})"
     values = displayed_values(first.values, first.scaling, scaled, first.unit)
     # a finding names an order to less than a line: the tallest beside it is meant
     places = [(p, max(first.index_of(p) - 2, 0)) for p in marked]
@@ -129,6 +133,7 @@ def show_spectrum(
         marked=[(p, float(values[start : start + 5].max())) for p, start in places],
         height_px=270 if plain else 340,
         legend=bool(names),
+        front_first=True,
         whole=whole,
         per_unit=per_unit,
         step=min(shafts, default=None),
@@ -168,9 +173,14 @@ def _choose_looks(source: Analysis | str, cursors: Sequence[Cursor], name: str, 
 
 
 def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:
-    """Give the cursor of a finding the first right to its label."""
-    found = any(abs(cursor.position - position) <= LARGEST_SLIP * position for position in marked)
-    return replace(cursor, number=0) if found else cursor
+    """Give the cursors of a finding the first right to their labels: of a bearing's its multiples, too."""
+    return replace(cursor, number=0) if any(_is_of(cursor, position) for position in marked) else cursor
+
+
+def _is_of(cursor: Cursor, position: float) -> bool:
+    if cursor.kind != "bearing":  # which does not slip
+        return abs(cursor.position - position) <= 1e-3 * position
+    return abs(cursor.position - max(cursor.number, 1) * position) <= LARGEST_SLIP * cursor.position
 
 
 KINDS = {

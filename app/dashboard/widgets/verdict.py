@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from html import escape
 from typing import Literal
 
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.theme import as_typed, one_line
+from app.dashboard.theme import as_typed, one_line, unbroken
 from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.spectrum import show_ring, show_spectrum
 from gearsig.diagnosis import BEARING_PARTS, CHANGED, Analysis, Finding, Kind, Outcome
 from gearsig.formatting import counted, enumerated, signed
-from gearsig.plot import ChartLine, LinePanel, marks_of, with_unit
+from gearsig.plot import marks_of
 from gearsig.report import (
     FindingCard,
     bearing_cursors,
@@ -22,9 +23,12 @@ from gearsig.report import (
     finding_card,
     headline_of,
     highest_order_of_interest,
+    is_of_sidebands,
+    level_panel,
     line_cursors,
     marked_positions,
     reference_text,
+    sidebands_of,
     teeth_of_shaft,
     verdict_picture,
 )
@@ -83,15 +87,15 @@ def _show_words(analysis: Analysis) -> None:
         f"**{as_typed(recording.provenance.source)}**",
         as_typed(machine) or ("machine without a name" if is_described else "machine not described"),
         f"{counted(n, 'channel')}",
-        f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz",
+        unbroken(f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz"),
     ]
     with st.container(key="verdict-head"):
         with st.container(horizontal=True, vertical_alignment="center"):
             show_kind(analysis.outcome)
             st.caption(" · ".join(facts), width="content")
-        st.subheader(as_typed(in_page_words(headline)), anchor=False)
+        st.subheader(unbroken(as_typed(in_page_words(headline))), anchor=False)
         if rest:
-            st.caption(as_typed(in_page_words(rest)))
+            st.caption(unbroken(as_typed(in_page_words(rest))))
     with st.container(key="verdict-grounds"):
         _show_grounds(analysis)
 
@@ -106,7 +110,7 @@ def _show_grounds(analysis: Analysis) -> None:
         if card.title.rstrip(".") not in analysis.verdict:
             st.markdown(f"**{as_typed(card.title)}**")
         if card.where:
-            st.caption(" · ".join(as_typed(text) for text in card.where))
+            st.caption(_places(card))
         with st.container(key="verdict-measures"):
             _show_measures(card)
 
@@ -141,12 +145,10 @@ def show_verdict_picture(analysis: Analysis) -> None:
         show_ring(picture.average, teeth, marks, words, state.view_key(place, analysis))
         return
     if picture.about == "resonance":
-        levels = channel.order_levels
-        lines = [ChartLine(level.speed_rpm, level.amplitude, level.name, i) for i, level in enumerate(levels)]
-        low, high = float(levels[0].speed_rpm[0]), float(levels[0].speed_rpm[-1])
-        panel = LinePanel(lines, "speed (rpm)", with_unit("amplitude", levels[0].unit), x_limits=(low, high))
-        found = [(level.largest[1], level.largest[0]) for level in levels]
-        show_lines(panel, state.view_key(place, analysis), marked=found, legend=True, height_px=260)
+        panel, marked_points = level_panel(analysis, channel)
+        lines = [replace(line, colour=i) for i, line in enumerate(panel.lines)]
+        panel = replace(panel, lines=lines)
+        show_lines(panel, state.view_key(place, analysis), marked=marked_points, legend=True, height_px=260)
         if picture.finding is not None:
             st.caption(as_typed(picture.finding.title))
         return
@@ -160,6 +162,14 @@ def show_verdict_picture(analysis: Analysis) -> None:
         spectrum = channel.order_spectrum or channel.spectrum
         cursors = line_cursors(analysis, spectrum, n_sidebands=1)
     if spectrum is None:
+        return
+    where = picture.finding.where if picture.finding is not None else None
+    sides = sidebands_of(analysis, spectrum, where) if where is not None and is_of_sidebands(where) else ()
+    if sides:
+        middle, reach = sum(sides) / 2.0, 4.5 * (sides[1] - sides[0]) / 2.0
+        shown = max(middle - reach, 0.0), min(middle + reach, float(spectrum.positions[-1]))
+        near = line_cursors(analysis, spectrum, n_sidebands=2)
+        show_spectrum(analysis, spectrum, near, place, marked=sides, shown=shown, plain=True)
         return
     is_bearing = picture.about == "bearing"
     families = [c.position for c in cursors if is_bearing and c.kind == "bearing"]
@@ -190,18 +200,20 @@ def show_kind(kind: Kind | Outcome) -> None:
 def _show_card(finding: Finding) -> None:
     card = finding_card(finding)
     with st.container(border=True):
-        kind, body = st.columns((1, 7))
-        with kind:
+        with st.container(horizontal=True, vertical_alignment="center"):
             show_kind(finding.kind)
             if card.confidence_percent is not None:
-                st.markdown(f"≤ **{card.confidence_percent} %** sure")
-        with body:
-            st.markdown(f"**{as_typed(card.title)}**")
+                st.markdown(f"≤ **{card.confidence_percent} %** sure", width="content")
             if card.where:
-                st.caption(" · ".join(as_typed(text) for text in card.where))
-            _show_measures(card)
-            if card.evidence:
-                st.caption("\n".join(f"- {as_typed(sentence)}" for sentence in card.evidence))
+                st.caption(_places(card), width="content")
+        st.markdown(f"**{unbroken(as_typed(in_page_words(card.title)))}**")
+        _show_measures(card)
+        if card.evidence:
+            st.caption("\n".join(f"- {unbroken(as_typed(in_page_words(sentence)))}" for sentence in card.evidence))
+
+
+def _places(card: FindingCard) -> str:
+    return " · ".join(unbroken(as_typed(text)) for text in card.where)
 
 
 def _show_measures(card: FindingCard) -> None:
@@ -210,6 +222,8 @@ def _show_measures(card: FindingCard) -> None:
         ("how sure", card.confidence_basis),
         ("surer with", card.surer),
     ]
-    text = "  \n".join(f":small[:gray[{name}:] {as_typed(in_page_words(value))}]" for name, value in lines if value)
+    text = "  \n".join(
+        f":small[:gray[{name}:] {unbroken(as_typed(in_page_words(value)))}]" for name, value in lines if value
+    )
     if text:
         st.markdown(text)

@@ -17,7 +17,7 @@ from app.dashboard.methods.form import MethodPage
 from app.dashboard.methods.page import cached, show_method
 from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import download, offer_page, show_figure, show_lines, show_map, show_panel
+from app.dashboard.widgets.charts import offer_page, show_figure, show_lines, show_map, show_panel
 from app.dashboard.widgets.machine import show_machine
 from app.dashboard.widgets.messages import in_page_words, show_error, show_facts, show_unknown_speed
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
@@ -216,16 +216,15 @@ def show_indicators(analysis: Analysis) -> None:
     }
     formats = {"change (dB)": "+.1f"} if "change (dB)" in kept else {}
     show_table(kept, formats=formats, width="stretch", height=520, column_config=config, placeholder="–")
-    left, right = st.columns((3, 1), vertical_alignment="center")
-    left.caption(f"{len(kept)} of {len(table)} indicators")
-    right.download_button(
+    below = st.container(horizontal=True, horizontal_alignment="distribute", vertical_alignment="center")
+    below.caption(f"{len(kept)} of {len(table)} indicators", width="content")
+    below.download_button(
         "Download CSV",
         csv_text(kept),
         file_name="indicators.csv",
         mime="text/csv",
         on_click="ignore",
         icon=":material/download:",
-        width="stretch",
     )
 
 
@@ -267,12 +266,14 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
     if isinstance(angle, CannotTell):
         show_unknown_speed(angle)
         return
-    left, right = st.columns(2)
+    row = st.container(horizontal=True, gap="large")
     axes, key = ("Order", "Frequency"), state.view_key("map lines", analysis)
-    lines = address.ask_one(left.segmented_control, "Lines over", axes, key=key, name="lines", required=True)
+    lines = address.ask_one(row.segmented_control, "Lines over", axes, key=key, name="lines", required=True)
     ways = ("Time",) if angle.is_steady(RUN_SHARE) else ("Time", "Speed")
-    key = state.view_key(f"map along {ways}", analysis)
-    along = address.ask_one(right.segmented_control, "Along", ways, key=key, name="along", required=True)
+    along = ways[0]
+    if len(ways) > 1:
+        key = state.view_key(f"map along {ways}", analysis)
+        along = address.ask_one(row.segmented_control, "Along", ways, key=key, name="along", required=True)
     shown_map = _map_of(analysis, channel, over_order=lines == "Order")
     rows = np.argsort(shown_map.speed_rpm, kind="stable") if along == "Speed" else np.arange(len(shown_map.time_s))
     y, also = shown_map.time_s[rows], (shown_map.speed_rpm[rows], "rpm")
@@ -343,13 +344,13 @@ def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
     )
     stem = safe_file_name(request.name).split(".")[0] or "recording"
     key = state.view_key("report", analysis)
-    offer_page("Download the report", lambda: report_page(request, analysis), f"{stem}.html", key)
+    pdf: Callable[[], bytes] | None = partial(page_pdf, analysis, command=command_of(request))
     try:
         check_pdf()
     except InputError as error:
+        pdf = None
         st.caption(as_typed(f"{error.what}: {error.remedy}"))
-    else:
-        download("As PDF", lambda: page_pdf(analysis, command=command_of(request)), f"{stem}.pdf", "application/pdf")
+    offer_page("Download the report", lambda: report_page(request, analysis), f"{stem}.html", key, pdf=pdf)
     st.markdown("The same diagnosis from the command line:")
     st.code(command_of(request), language="bash", wrap_lines=True)
     _show_provenance(analysis)
@@ -359,7 +360,8 @@ def _show_provenance(analysis: Analysis) -> None:
     rows = provenance_rows(analysis, "")
     st.markdown("Where it came from:")
     # a table of words, whose cells wrap
-    st.table({name: as_typed(text) for name, text in rows}, border="horizontal")
+    with st.container(key="provenance"):
+        st.table({name: as_typed(text) for name, text in rows}, border="horizontal")
 
 
 Of = Callable[[Analysis, ChannelAnalysis], None]
