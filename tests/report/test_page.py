@@ -6,11 +6,13 @@ from datetime import UTC, datetime
 from html.parser import HTMLParser
 from importlib.resources import files
 
+import numpy as np
 import pytest
 
-from gearsig.diagnosis import SURER_WITH, Finding, Kind, LevelChange, Outcome, Strength, Where
+from gearsig.diagnosis import SURER_WITH, Finding, Kind, LevelChange, OrderLevel, Outcome, Strength, Where, analyze
 from gearsig.indicators import Indicator
 from gearsig.plot import svg_ring
+from gearsig.recording import read_recording
 from gearsig.report import (
     analysis_text,
     bearing_cursors,
@@ -18,12 +20,14 @@ from gearsig.report import (
     finding_card,
     finding_cards,
     headline_of,
+    level_panel,
     marked_positions,
     page_html,
     page_pdf,
     verdict_picture,
     write_page,
 )
+from gearsig.rig import read_rig
 
 EVIL = "<script>alert(1)</script>"
 QUOTES = "\"rig\" onload='x' & <b>"
@@ -126,6 +130,33 @@ def test_the_picture_is_of_the_channel_that_the_first_finding_names(gearbox):
     where = Where(("a2",), shaft="input", order=1.0, order_shaft="input", frequency_hz=33.3)
     shown = verdict_picture(replace(gearbox, findings=(Finding("line", Kind.SUSPICION, "A line.", where),)))
     assert (shown.about, shown.channel.channel) == ("lines", "a2")
+
+
+def test_the_ring_of_a_crack_is_its_change_since_the_reference():
+    """In the mean revolution itself the teeth's own pattern hides it."""
+    rig = read_rig("sample_data/root_crack_2mm.toml")
+    now, healthy = (read_recording(f"sample_data/root_crack_{depth}mm.h5", rig=rig) for depth in (2, 0))
+    shown = verdict_picture(analyze(now, reference=healthy))
+    assert (shown.about, shown.average.kind) == ("tooth", "change")
+    largest = np.abs(shown.average.values).argmax() / len(shown.average.values)
+    assert abs(largest - (shown.finding.where.tooth - 0.5) / 55) < 1.5 / 55
+    others = np.abs(shown.average.values)
+    assert others.max() > 5.0 * np.sqrt(np.mean(others**2))
+
+
+def test_a_resonance_is_marked_where_each_order_crosses_it(gearbox):
+    speeds = np.linspace(600.0, 3000.0, 200)
+    levels = tuple(OrderLevel(f"{k}× mesh", 29.0 * k, speeds, speeds * k, "m/s^2", 0.5) for k in (1, 2))
+    channel = replace(gearbox.channels[0], order_levels=levels)
+    found = Finding("resonance", Kind.NOTICE, "A resonance.", Where((channel.channel,), frequency_hz=1160.0))
+    panel, marked = level_panel(replace(gearbox, findings=(found,)), channel)
+    assert marked == [pytest.approx((2400.0, 2400.0)), pytest.approx((1200.0, 2400.0))]
+    assert panel.limits[0] > 0.0
+
+
+def test_without_a_fault_the_picture_is_of_the_channel_beside_it_in_words(gearbox):
+    notice = Finding("mesh-modulated", Kind.NOTICE, "Modulated.", Where(("a2",)))
+    assert verdict_picture(replace(gearbox, findings=(notice,))).channel.channel == "a2"
 
 
 def test_a_finding_of_sidebands_is_marked_beside_its_mesh_not_at_its_distance(gearbox):
