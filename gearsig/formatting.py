@@ -93,6 +93,20 @@ def seconds_text(seconds: float, n_digits: int = 4) -> str:
     return f"{readable(scale * seconds, n_digits)} {unit}"
 
 
+def power_of_ten(value: float) -> str:
+    """Write a small positive number with one digit and a power of ten.
+
+    Examples
+    --------
+    >>> power_of_ten(3.2e-4), power_of_ten(3e-11)
+    ('3 × 10⁻⁴', '3 × 10⁻¹¹')
+    """
+    if not isfinite(value) or value == 0.0:
+        return readable(value)
+    digit, power = f"{value:.0e}".split("e")
+    return f"{digit} × {unit_text(f'10^{int(power)}')}"
+
+
 def signed(value: float, n_decimals: int = 1) -> str:
     """Write a change with its sign and one decimal; none where it is nothing.
 

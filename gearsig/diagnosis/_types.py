@@ -9,7 +9,7 @@ from math import e, exp, log
 
 from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray, count, positive, within
-from gearsig.formatting import unit_text
+from gearsig.formatting import power_of_ten
 from gearsig.indicators import Indicator
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
@@ -425,5 +425,4 @@ def p_text(p_value: float) -> str:
     """
     if p_value < 1e-6:
         return "< 10⁻⁶"
-    digit, power = f"{p_value:.0e}".split("e")
-    return f"{digit} × {unit_text(f'10^{int(power)}')}" if p_value < 0.01 else f"{p_value:.1g}"
+    return power_of_ten(p_value) if p_value < 0.01 else f"{p_value:.1g}"

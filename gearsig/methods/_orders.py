@@ -10,7 +10,7 @@ import numpy as np
 from gearsig import plot
 from gearsig.diagnosis import RecordBlocks
 from gearsig.errors import GearsigError
-from gearsig.formatting import counted, readable, unit_text
+from gearsig.formatting import counted, power_of_ten, readable, unit_text
 from gearsig.methods._spectra import cursors_of, highest_order
 from gearsig.methods._table import HIGHEST, SHAFT, Method, MethodAnswer, MethodOption, signal_of, unit_of, waveforms_of
 from gearsig.orders import OrderMap, TrackedOrder, frequency_map, order_map, track_orders, track_vold_kalman
@@ -220,7 +220,7 @@ def _vold_kalman(
             (
                 f"The residual has an rms of **{readable(residual)} {unit_text(unit)}**: "
                 f"{100.0 * residual**2 / power:.3g} % of the energy. Expected error of the solution: "
-                f"{separation.expected_error:.1g} of the largest component."
+                f"{power_of_ten(separation.expected_error)} of the largest component."
             ),
         ),
         notes=(*notes, *separation.notes),

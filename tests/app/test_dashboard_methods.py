@@ -287,10 +287,10 @@ def test_modes_that_share_their_lines_are_warned_of() -> None:
 
 def test_modes_of_envelopes_and_over_angle() -> None:
     page = opened_machine("Modes")
-    envelope = labelled(page, "slider", "Modes of the envelope")
+    envelope = labelled(page, "slider", "Envelope of the band")
     envelope.set_value((500.0, 900.0)).run()
     assert not page.error, shown_text(page)
-    labelled(page, "slider", "Modes of the envelope").set_value((0.0, 1000.0)).run()
+    labelled(page, "slider", "Envelope of the band").set_value((0.0, 1000.0)).run()
     choose(page, "Over", "Shaft angle")
     assert not page.error, shown_text(page)
     assert any("revolutions" in s.label for s in page.slider)

@@ -73,7 +73,7 @@ def test_every_effect_has_a_slider_that_switches_it_on() -> None:
         page.sidebar.multiselect[0].set_value(names).run()
         assert not page.exception, names
         assert not page.error, (names, shown_text(page))
-        title = page.subheader[0].value.replace("\\", "").lower()
+        title = page.subheader[0].value.replace("\\", "").replace("\u00a0", " ").lower()
         for name in names:
             found = effects()[name]
             own = slider(page, found.title.capitalize()[:8])
@@ -85,7 +85,7 @@ def test_every_effect_has_a_slider_that_switches_it_on() -> None:
 def test_two_effects_at_once() -> None:
     page = opened()
     page.sidebar.multiselect[0].set_value(["mains_hum", "eccentricity"]).run()
-    title = page.subheader[0].value.replace("\\", "")
+    title = page.subheader[0].value.replace("\\", "").replace("\u00a0", " ")
     assert title == "Gear off its axis, 20 µm + mains hum, 1 m/s²"
     for name in ("mains_hum", "eccentricity"):
         assert effects()[name].signature[:30] in shown_text(page)
@@ -97,7 +97,10 @@ def test_the_address_keeps_the_machine_and_what_was_pulled() -> None:
     page.session_state["length of the laboratory"] = 0.5
     page.run()
     assert not page.exception
-    assert page.subheader[0].value.replace("\\", "") == "Crack in a tooth root, 1.5 mm + mains hum, 1 m/s²"
+    assert (
+        page.subheader[0].value.replace("\\", "").replace("\u00a0", " ")
+        == "Crack in a tooth root, 1.5 mm + mains hum, 1 m/s²"
+    )
     slider(page, "Crack").set_value(0.0).run()
     assert "root_crack" not in page.query_params
     assert page.query_params["machine"] == "small_30_25"

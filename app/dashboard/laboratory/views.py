@@ -274,7 +274,7 @@ Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show the portraits of one gear along the line of action."""
-    row = st.container(horizontal=True, gap="large")  # which wraps where it is narrow
+    row = st.container(horizontal=True)  # which wraps where it is narrow
     looks = {"key": "gear of the laboratory"}
     gear = address.ask_one(row.segmented_control, "Gear", list(GEARS), name="gear", **looks)
     looks = {"key": "strobe of the laboratory"}

@@ -266,7 +266,7 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
     if isinstance(angle, CannotTell):
         show_unknown_speed(angle)
         return
-    row = st.container(horizontal=True, gap="large")
+    row = st.container(horizontal=True)
     axes, key = ("Order", "Frequency"), state.view_key("map lines", analysis)
     lines = address.ask_one(row.segmented_control, "Lines over", axes, key=key, name="lines", required=True)
     ways = ("Time",) if angle.is_steady(RUN_SHARE) else ("Time", "Speed")

@@ -348,7 +348,7 @@ def _coupling_notes(groups: Sequence[Group], neighbours: Sequence[Neighbours], t
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
+    return f"{100 * share:.2g} %" if share >= 1e-5 else "a thousandth of a percent"
 
 
 def _settled(bandwidth: FloatArray, valid: BoolArray, sampling_rate: float, skirt_poles: int) -> BoolArray:
