@@ -217,7 +217,7 @@ def trend(
         typer.echo(json_text.dumps([_trend_json(t) for t in trends], indent=1, ensure_ascii=False))
         return
     for series in trends:
-        typer.echo(repr(series))
+        typer.echo(f"{series!r}. {series.text}")
         rows = [
             (
                 row["level"] if not row["in_baseline"] else "baseline",

@@ -3,7 +3,6 @@
 from gearsig.fleet._add import FAILED, AddedRecording, AddResult, AnalysisOptions
 from gearsig.fleet._changes import (
     AlarmChange,
-    DiagnosisChange,
     FleetChanges,
     change_text,
     counts_text,
@@ -14,7 +13,16 @@ from gearsig.fleet._changes import (
     series_level,
     trends_text,
 )
-from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, TABLES, Fleet, OperatingTrend, Trend, open_fleet
+from gearsig.fleet._fleet import (
+    LEVEL_NAMES,
+    STATUS_LEVELS,
+    TABLES,
+    DiagnosisChange,
+    Fleet,
+    OperatingTrend,
+    Trend,
+    open_fleet,
+)
 from gearsig.fleet._origin import (
     FilePattern,
     Origin,

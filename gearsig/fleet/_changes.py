@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from gearsig.cache import write_whole
-from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, Fleet, level_name
+from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, DiagnosisChange, Fleet, level_name
 from gearsig.fleet._trends import events_of
 from gearsig.formatting import counted, readable, signed
 
@@ -53,18 +53,6 @@ class AlarmChange:
     change: float
     unit: str
     in_db: bool
-
-
-@dataclass(frozen=True)
-class DiagnosisChange:
-    """A measuring point whose last recording is diagnosed otherwise than the last one before."""
-
-    machine: str
-    point: str
-    date: datetime
-    before: str
-    now: str
-    verdict: str
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
     from pandas import DataFrame
 
-    from gearsig.fleet._changes import DiagnosisChange
     from gearsig.rig import Rig, SpeedSource
 
 LEVEL_NAMES = {OK: "ok", WARNING: "warning", ALARM: "alarm"}
@@ -116,6 +115,20 @@ class Trend:
     normalised: tuple[str, ...]
     false_alarm_rate: float
 
+    @property
+    def text(self) -> str:
+        """What the limits rest on, and how often they are wrong, in a few sentences."""
+        n = int(self.table["in_baseline"].sum())
+        if self.basis == NONE:
+            parts = [f"No limits yet: the baseline has {counted(n, 'recording')}."]
+        elif self.basis != STATISTICAL:
+            parts = [f"Limits are the zones of {self.basis}."]
+        else:
+            parts = [f"Limits from the {counted(n, 'recording')} of the baseline.", _false_alarms(self)]
+        if self.normalised:
+            parts.append(f"What is expected follows {' and '.join(self.normalised)}.")
+        return " ".join(parts)
+
     def __repr__(self) -> str:
         of = " ".join(part for part in (self.machine, self.point, self.place, self.channel) if part)
         since = f", changed since {self.changed:%Y-%m-%d}" if self.changed is not None else ""
@@ -171,8 +184,7 @@ class OperatingTrend:
         if np.isfinite(self.held) and self.trend.basis == STATISTICAL:
             parts.append(f"Values are moved to {readable(self.held, 4)} {unit} along its dependence on {other}.")
         if not self.curve.empty and self.trend.basis == STATISTICAL:
-            one_of_so_many = readable(1 / self.trend.false_alarm_rate, 4)
-            parts.append(f"An unchanged machine leaves them in at most one of {one_of_so_many} recordings.")
+            parts.append(_false_alarms(self.trend, "at most one"))
         n = int((self.table["level"] == "not judged").sum())
         if n and not self.curve.empty:
             parts.append(f"{counted(n, 'recording')} too far beyond the baseline's range: not judged.")
@@ -182,6 +194,22 @@ class OperatingTrend:
         n = int(self.table["level"].isin(["warning", "alarm"]).sum())
         beyond = "no limits yet" if self.curve.empty else f"{n} beyond the limits"
         return f"{self.trend!r}; over {self.over}: {counted(len(self.table), 'recording')}, {beyond}"
+
+
+def _false_alarms(trend: Trend, how_often: str = "one") -> str:
+    return f"An unchanged machine leaves them in {how_often} of {readable(1 / trend.false_alarm_rate)} recordings."
+
+
+@dataclass(frozen=True)
+class DiagnosisChange:
+    """A measuring point whose last recording is diagnosed otherwise than the last one before."""
+
+    machine: str
+    point: str
+    date: datetime
+    before: str
+    now: str
+    verdict: str
 
 
 class Fleet:
@@ -515,8 +543,6 @@ class Fleet:
 
     def news(self, since: datetime) -> tuple[int, int, tuple[tuple[str, str], ...], tuple[DiagnosisChange, ...]]:
         """Return what came into the store since: how many results, failures, the last of these, other diagnoses."""
-        from gearsig.fleet._changes import DiagnosisChange
-
         n_new, n_failed = self._rows(
             f"SELECT count(*), count(*) FILTER (outcome = '{FAILED}') FROM recordings WHERE added > ?", [since]
         )[0]

@@ -165,6 +165,9 @@ def test_over_load_the_limits_follow_the_baselines_dependence(make_recordings, t
     over_time = fleet.trend("mill", "rms")[0].table.set_index("date").loc[judged["date"]]
     assert judged["high"].to_numpy() == pytest.approx(over_time["high"].to_numpy())
     assert f"one of {1 / shown.trend.false_alarm_rate:.0f} recordings" in shown.text
+    assert shown.trend.text.startswith("Limits from the 10 recordings of the baseline.")
+    assert f"one of {1 / shown.trend.false_alarm_rate:.0f} recordings" in shown.trend.text
+    assert shown.trend.text.endswith("What is expected follows load.")
     with pytest.raises(InputError, match="no recording states its speed"):
         fleet.trend_over("speed", "mill", "rms")
 
