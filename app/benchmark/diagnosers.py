@@ -215,12 +215,12 @@ def diagnose_forest(case: VisibleCase) -> GapReport:
         [PreparedRecording(r) for r in given_recordings] for given_recordings in (case.recordings, case.references)
     )
     conditions, _ = conditions_of(recordings, references, twin)
-    attribution = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=0)
+    known = simulator.gap_effects()
+    attribution = attribute(conditions, known, (), twin, None, lambda *_: None, max_tried=0)
     probabilities = attribution.probabilities()
-    groups = {name: effect.group for name, effect in simulator.gap_effects().items()}
     changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
     shafts = {name: determined_options(name, changes, teeth) for name in probabilities}
-    return bare_report("forest", probabilities, shafts, attribution.calibration.outcome(probabilities, groups))
+    return bare_report("forest", probabilities, shafts, attribution.calibration.outcome(probabilities, known))
 
 
 # --------------------

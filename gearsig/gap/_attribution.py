@@ -114,7 +114,7 @@ class GapCalibration:
         return shares_of(levels)
 
     def outcome(
-        self, probabilities: Mapping[str, float], groups: Mapping[str, str] = MappingProxyType({})
+        self, probabilities: Mapping[str, float], known: Mapping[str, GapEffect] = MappingProxyType({})
     ) -> GapOutcome:
         """Return what may be said; nothing that is less likely than all else together.
 
@@ -122,8 +122,8 @@ class GapCalibration:
         ----------
         probabilities : mapping
             Cause → probability.
-        groups : mapping
-            Effect → group. Where effects of one group are likelier than all else, the kind of fault is told, whichever
+        known : mapping
+            Effects by name. Where those of one group are likelier than all else, the kind of fault is told, whichever
             of them it is.
         """
         none, unknown = probabilities[NONE], probabilities[UNKNOWN]
@@ -134,13 +134,19 @@ class GapCalibration:
         effects = {name: p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)}
         first, *remaining = sorted(effects.values(), reverse=True)
         second = remaining[0] if remaining else 0.0
-        together: dict[str, float] = {}
-        for name, p in effects.items():
-            together[groups.get(name, name)] = together.get(groups.get(name, name), 0.0) + p
-        if max(first + second, *together.values()) < LIKELIER_THAN_NOT:
+        if max(first + second, *group_probabilities(effects, known).values()) < LIKELIER_THAN_NOT:
             return GapOutcome.UNDECIDED
         alone = first >= LIKELIER_THAN_NOT and first / (first + second) >= self.apart
         return GapOutcome.EFFECT if alone else GapOutcome.CANNOT_SEPARATE
+
+
+def group_probabilities(probabilities: Mapping[str, float], known: Mapping[str, GapEffect]) -> dict[str, float]:
+    """Return group → probability of its causes together; a cause that is no known effect is a group by itself."""
+    together: dict[str, float] = {}
+    for name, p in probabilities.items():
+        group = known[name].group if name in known else name
+        together[group] = together.get(group, 0.0) + p
+    return together
 
 
 def score_of(shrink: float, placebo: float) -> float:

@@ -198,9 +198,8 @@ def diagnose_gap(
     # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
     unexpected, unexpected_messages, faults = unexpected_job.result()
-    groups = {name: effect.group for name, effect in known.items()}
-    outcome, unseen = with_unexpected(attribution.calibration.outcome(probabilities, groups), unexpected)
-    labels = _labelled_facts(attribution, _posterior(replace(attribution, labelled=None), clearest, known, gap), groups)
+    outcome, unseen = with_unexpected(attribution.calibration.outcome(probabilities, known), unexpected)
+    labels = _labelled_facts(attribution, _posterior(replace(attribution, labelled=None), clearest, known, gap), known)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
@@ -364,12 +363,12 @@ def _on_stage(
 
 
 def _labelled_facts(
-    attribution: Attribution[TriedEffect], without: Mapping[str, float], groups: Mapping[str, str]
+    attribution: Attribution[TriedEffect], without: Mapping[str, float], known: Mapping[str, GapEffect]
 ) -> LabelledFacts | None:
     """Return what labelled recordings changed; None where there are none."""
     if attribution.labelled is None:
         return None
-    return LabelledFacts(attribution.labelled.counts, without, attribution.calibration.outcome(without, groups))
+    return LabelledFacts(attribution.labelled.counts, without, attribution.calibration.outcome(without, known))
 
 
 def _refuse_labelled(learn: Sequence[LabelledRecording], machines: str) -> None:

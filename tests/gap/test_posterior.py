@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap import NONE, UNKNOWN, GapCalibration, GapOutcome, load_gap_calibration, score_of
+from gearsig.gap import NONE, UNKNOWN, GapCalibration, GapEffect, GapOutcome, load_gap_calibration, score_of
 
 PLAIN = GapCalibration(1.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.65)
 FOREST = {"root_crack": 0.5, "eccentricity": 0.2, NONE: 0.2, UNKNOWN: 0.1}
@@ -53,9 +53,10 @@ def test_outcomes() -> None:
 def test_a_certain_kind_is_told_where_no_effect_of_it_is() -> None:
     teeth = dict.fromkeys(("root_crack", "tooth_spall", "chipped_tooth", "pitch_error"), 0.19)
     found = {**teeth, "unbalance": 0.2, NONE: 0.02, UNKNOWN: 0.02}
-    groups = dict.fromkeys(("root_crack", "tooth_spall", "chipped_tooth"), "tooth-local")
+    of_teeth = ("root_crack", "tooth_spall", "chipped_tooth")
+    known = {name: GapEffect(name, "tooth-local", name, "depth", "mm") for name in of_teeth}
     assert PLAIN.outcome(found) is GapOutcome.UNDECIDED
-    assert PLAIN.outcome(found, groups) is GapOutcome.CANNOT_SEPARATE
+    assert PLAIN.outcome(found, known) is GapOutcome.CANNOT_SEPARATE
 
 
 def test_several_conditions_say_more_than_one_by_the_calibrated_factor() -> None:

@@ -29,10 +29,12 @@ from gearsig.gap import (
     UNKNOWN,
     Features,
     GapCalibration,
+    GapEffect,
     Learned,
     Population,
     Recogniser,
     gap_size,
+    group_probabilities,
     joint_probabilities,
     load_learned,
     load_population,
@@ -146,7 +148,7 @@ def _named_from(fitted: GapCalibration, cases: Sequence[AttributedCase]) -> floa
     for threshold in THRESHOLDS:
         named = replace(fitted, named_from=threshold)
         if all(
-            sum(named.outcome(p, groups_of_causes()) in NAMING for p in healthy_cases) <= rate * len(healthy_cases)
+            sum(named.outcome(p, known_effects()) in NAMING for p in healthy_cases) <= rate * len(healthy_cases)
             for rate, healthy_cases in without
         ):
             return threshold
@@ -154,10 +156,9 @@ def _named_from(fitted: GapCalibration, cases: Sequence[AttributedCase]) -> floa
 
 
 @cache
-def groups_of_causes() -> dict[str, str]:
-    """Return cause → the kind of fault that it is of."""
-    effects = cracked_gap_simulator().gap_effects()
-    return {name: effect.group for name, effect in effects.items()} | {NONE: NONE, UNKNOWN: UNKNOWN}
+def known_effects() -> Mapping[str, GapEffect]:
+    """Return the effects that a gear pair's twin can try."""
+    return cracked_gap_simulator().gap_effects()
 
 
 # --------------------
@@ -264,15 +265,15 @@ def table(calibration: GapCalibration, cases: Sequence[AttributedCase]) -> list[
 
 
 def _line(name: str, calibration: GapCalibration, cases: Sequence[AttributedCase]) -> str:
-    groups = groups_of_causes()
+    known = known_effects()
     answers = [(case, case.by(calibration)) for case in cases]
     strong = [(c, p) for c, p in answers if c.size >= STRONG and c.truths[0] not in (NONE, UNKNOWN)]
     first = [next(iter(p)) == c.truths[0] for c, p in strong]
     two = [c.truths[0] in list(p)[:2] for c, p in strong]
-    group = [_most_probable_group(p, groups) == groups[c.truths[0]] for c, p in strong]
+    group = [_most_probable_group(p, known) == known[c.truths[0]].group for c, p in strong]
     sure = [next(iter(p)) in c.truths for c, p in answers if max(p.values()) >= 0.9]
     healthy, unknown = (
-        [calibration.outcome(p, groups) in NAMING for c, p in answers if c.truths == (cause,)]
+        [calibration.outcome(p, known) in NAMING for c, p in answers if c.truths == (cause,)]
         for cause in (NONE, UNKNOWN)
     )
     return (
@@ -286,10 +287,8 @@ def _share(values: Sequence[bool]) -> str:
     return f"{np.mean(values):.2f}" if values else "-"
 
 
-def _most_probable_group(probabilities: Mapping[str, float], groups: Mapping[str, str]) -> str:
-    together: dict[str, float] = {}
-    for name, p in probabilities.items():
-        together[groups[name]] = together.get(groups[name], 0.0) + p
+def _most_probable_group(probabilities: Mapping[str, float], known: Mapping[str, GapEffect]) -> str:
+    together = group_probabilities(probabilities, known)
     return max(together, key=together.__getitem__)
 
 
