@@ -6,7 +6,7 @@ Orders are the same with either, so that both are said. A clock decides: the mai
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import log10
 
@@ -66,9 +66,9 @@ SHARE_OF_STATED = 0.25
 BY_ONE_RACE = 1 / 3
 """Share of another rate's sum from which the shafts and one race at the stated rate are explanation enough."""
 
-EXPLAINED_EACH = -3.5
-"""lg p of a spectrum, from which shafts, or one race beside them, explain its strongest lines at the stated rate: of
-measured recordings -5 or less at the right rate, -2 or more at one that is too high."""
+SHARE_OF_LEFT = 0.4
+"""A lower rate is none where the stated one explains what that leaves by that share of what it explains itself: of
+drawn motors 0.25 or less at a rate that is too high, at the right one 0.5 or more for rates 2.5 to 10 times lower."""
 
 AS_GOOD = 0.6
 """Share of the best factor's sum that makes a smaller one preferred, where it is far apart."""
@@ -271,6 +271,19 @@ class StrongSpectra:
         best, n_speeds = self._speeds(factor, tolerance)
         return min(self._log_p_at(speed, n_speeds, parts) for speed in (best, 1 / factor))
 
+    def without(self, factor: float, parts: Sequence[tuple[float, float]]) -> StrongSpectra:
+        """Return the lines that shafts and parts leave unexplained at a factor, at the speed that fits them best."""
+        if not self.spectra:
+            return self
+        speed, _ = self._speeds(factor, NEAR_TOLERANCE)
+        _, seen = self._on_shafts(speed)
+        for part in parts:
+            near = self._near_parts(*part, speed)
+            best = int(np.argmax(sum((x & ~y).sum(axis=1) for x, y in zip(near, seen, strict=True))))
+            seen = [x | y[best] for x, y in zip(seen, near, strict=True)]
+        left = [replace(x, orders=x.orders[~y]) for x, y in zip(self.spectra, seen, strict=True)]
+        return StrongSpectra(left, self.shafts)
+
     def _speed_of_shafts(self, factor: float, tolerance: float) -> tuple[float, int]:
         """Return the speed that puts most lines on multiples of the first shaft's, and how many were tried."""
         half_width = min(x.half_width for x in self.spectra)
@@ -385,12 +398,6 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     def has_stranger(highest: float, enough: float) -> bool:
         return _of_a_stranger(strong_to(highest)) <= enough
 
-    def has_plain_lines() -> bool:
-        """Whether shafts, or one race beside them, explain the strongest lines at the stated rate."""
-        strong = strong_to(HIGHEST_ORDER)
-        plain = min(strong.log_p(1.0, at, CLOSE_TOLERANCE) for at in ((), *([race] for race in races)))
-        return plain < EXPLAINED_EACH * len(strong.spectra)
-
     usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
     candidates = [*usual, *common]
     factors = _apart(candidates)
@@ -413,10 +420,20 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     if best > ENOUGH_EVIDENCE:
         return None
     factor = _preferred(sums, usual, of_one_part)
-    # Beside a lower rate, with more of the spectrum and more places, the strongest lines decide: at that rate hardly
-    # any is where the stated one puts a shaft's or a race's. Where no race is described, one or another part may
-    # knock: it asks for no mistake at all, and its order may be near a fraction of the shaft's.
-    if has_plain_lines() if factor < 1 else not races and has_stranger(ranges[factor], AS_GOOD * best):
+    if factor < 1 and races:
+        # At a rate k times too high all lies at multiples of k orders, of which a whole k makes those of the shaft and
+        # the races as well. The shaft's other orders and a race's first ones tell: at the right rate they are there,
+        # and at the lower one nothing would be. Multiples of the shaft's order alone are blades or poles as well.
+        sums[factor] = min(sums[factor], of_one_part(factor))
+        of_races = sums[factor] - evidence(factor, ranges[factor], at=())
+        left = _of_the_left(strong_to(ranges[factor]), factor, races)
+        if of_races > ENOUGH_OF_EACH or left <= SHARE_OF_LEFT * sums[factor]:
+            return None
+    # Where no race is described, one or another part may knock: it asks for no mistake at all, and its order may be
+    # near a fraction of the shaft's. So may one beside the shaft's own orders, of which a whole k keeps all.
+    is_whole = abs(round(1 / factor) * factor - 1) < CLOSE_TOLERANCE
+    enough = AS_GOOD * best if not races else sums[factor]
+    if (not races or (factor < 1 and not is_whole)) and has_stranger(ranges[factor], enough):
         return None
     for milder in sorted(f for f in factors if f in usual and 1 < f <= factor / FAR_APART):
         of_one = of_one_part(milder)
@@ -433,14 +450,9 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         return None
     stated = evidence(1.0, ranges[factor])
     by_shafts = evidence(1.0, ranges[factor], CLOSE_TOLERANCE, ())
-    if by_shafts <= sums[factor] or stated < SHARE_OF_STATED * sums[factor]:
-        return None
     explained, highest = sums[factor], ranges[factor]
-    if factor < 1 and races:
-        # Multiples of the shaft's order are blades or poles as well, and what is at no part's place is a stranger.
-        of_races = explained - evidence(factor, highest, at=())
-        if of_races > ENOUGH_OF_EACH or has_stranger(highest, explained):
-            return None
+    if (factor > 1 or not races) and (by_shafts <= explained or stated < SHARE_OF_STATED * explained):
+        return None
     close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
     factor = min(close, key=lambda f: evidence(f, highest, CLOSE_TOLERANCE))
     return _finding(
@@ -468,6 +480,13 @@ def _preferred(sums: dict[float, float], usual: Sequence[float], of_one_part: Ca
     if len(near) > 1:
         sums |= {f: min(sums[f], of_one_part(f)) for f in near if f > 1}
     return min(near, key=lambda f: sums[f])
+
+
+def _of_the_left(strong: StrongSpectra, factor: float, races: Sequence[tuple[float, float]]) -> float:
+    """Return lg p of shafts and one race, modulated or not, at the stated rate, for the lines that a factor leaves."""
+    left = strong.without(factor, races)
+    ones = [[(race, sideband)] for race, by in races for sideband in (by, 0.0)]
+    return min(left.log_p(1.0, at, CLOSE_TOLERANCE) for at in ((), *ones))
 
 
 def _of_a_stranger(strong: StrongSpectra, factor: float = 1.0) -> float:

@@ -108,6 +108,34 @@ def test_of_a_measured_race_at_a_rate_that_is_too_low(name: str, times: float) -
     assert f"{recording.sampling_rate_hz:g} Hz" in finding(stated, CODE).title.split("would fit best")[0]
 
 
+@needs_data
+@pytest.mark.parametrize(
+    ("name", "times"),
+    [
+        ("bearing_cwru/OR007@6_0.mat", 2.0),
+        ("bearing_cwru/OR007@6_0.mat", 5.0),
+        ("bearing_cwru/IR021_0.mat", 8.0),
+        ("bearing_cwru/IR021_0.mat", 10.0),
+        ("bearing_races/InnerRaceFault_vload_3.mat", 5.0),
+    ],
+)
+def test_of_a_measured_race_at_a_rate_that_is_too_high(name: str, times: float) -> None:
+    """Multiples of k orders are multiples of one as well: what is missing between them tells."""
+    recording = BY_NAME[name].read()
+    stated = analyze(replace(recording, sampling_rate_hz=recording.sampling_rate_hz * times))
+    assert f"{recording.sampling_rate_hz:g} Hz" in finding(stated, CODE).title.split("would fit best")[0]
+    assert not any(code.startswith("bearing") for code in codes(stated))
+
+
+@pytest.mark.parametrize("blades", [4, 5, 8])
+def test_blades_are_no_wrong_rate(blades: int) -> None:
+    """Their multiples stand far over the shaft's own, and a race is damaged: at one over the blades is no machine."""
+    recording = motor("BPFI", 2)
+    t = np.arange(recording.n_samples) / recording.sampling_rate_hz
+    passing = sum(3.0 * np.cos(2 * np.pi * k * blades * MOTOR_HZ * t) for k in range(1, 9))
+    assert CODE not in codes(analyze(replace(recording, samples=recording.samples + passing)))
+
+
 @pytest.mark.slow
 @needs_data
 @pytest.mark.parametrize(
