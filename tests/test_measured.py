@@ -37,6 +37,7 @@ def claims(analysis: Analysis, *kinds: Kind) -> set[str]:
     return {f.code for f in analysis.findings if f.kind in (kinds or (Kind.FAULT, Kind.SUSPICION))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nominal", [True, False], ids=["nominal speed given", "no speed given"])
 @pytest.mark.parametrize("channel", [12, 14])
 def test_gear_pair_without_tachometer(channel: int, nominal: bool) -> None:
@@ -86,6 +87,7 @@ def test_a_stated_speed_is_set_right_alike_from_either_half(file: str) -> None:
         assert angle.mean_speed_rpm == pytest.approx(1796.0, rel=6e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["InnerRaceFault_vload_3.mat", "OuterRaceFault_vload_4.mat"])
 def test_bearing_files_with_gears_in_the_rig_claim_no_gear_fault(file: str) -> None:
     rig = replace(PINION, operating_point=OperatingPoint(), speed=ConstantSpeed(1500.0, "input"))
@@ -93,6 +95,7 @@ def test_bearing_files_with_gears_in_the_rig_claim_no_gear_fault(file: str) -> N
     assert not claims(analysis) & {"tooth-local-damage", "mesh-modulated"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["h30hz50.csv.gz", "b30hz50.csv.gz"])
 def test_two_stage_gearbox_is_left_undecided(file: str) -> None:
     analysis = analyze(read_recording(DATA / "two_stage_gearbox" / file, rig=TWO_STAGES))
@@ -102,6 +105,7 @@ def test_two_stage_gearbox_is_left_undecided(file: str) -> None:
     assert "assumed" in found(analysis, "tooth-damage-undecided").title
 
 
+@pytest.mark.slow
 def test_car_run_up_reads_its_own_speed_channel() -> None:
     analysis = analyze(read_recording(DATA / "car_run_up" / "accel_with_rpm.wav"))
     assert not isinstance(analysis.shaft_angle, CannotTell)
@@ -122,6 +126,7 @@ def test_car_run_up_reads_its_own_speed_channel() -> None:
         assert abs(np.median(difference)) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["OR007@6_0.mat", "IR021_0.mat"])
 def test_impacts_of_an_unknown_bearing_are_placed_at_the_drive_end(file: str) -> None:
     recording = read_recording(DATA / "bearing_cwru" / file, sampling_rate_hz=CWRU_RATES_HZ[file])
@@ -129,6 +134,7 @@ def test_impacts_of_an_unknown_bearing_are_placed_at_the_drive_end(file: str) ->
     assert channel.endswith("DE_time")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "code"),
     [
@@ -154,6 +160,7 @@ def test_a_damaged_race_is_the_first_that_has_changed_since_the_motor_was_health
     assert found(analysis, f"bearing-{part.replace(' ', '-')}").kind is Kind.FAULT
 
 
+@pytest.mark.slow
 def test_a_rotor_with_more_unbalance_has_changed_first_of_all() -> None:
     before = BY_NAME["unbalance_rotor/unbalance.mat#1"].read()
     # Speeds: the peak at 1× of a spectrum padded to 2²² values; that at 2× says the same to 0.5 rpm.

@@ -167,6 +167,7 @@ def test_a_notebook_shows_what_is_said_first() -> None:
     assert "2 s at 4 Hz" in shown
 
 
+@pytest.mark.slow
 def test_figures_are_part_of_the_vocabulary() -> None:
     """As somebody writes who has imported nothing else."""
     code = "import gearsig, numpy; print(len(gearsig.plot.amplitude_spectrum(numpy.ones(64), 64.0).axes))"

@@ -65,6 +65,7 @@ def test_a_constant_stays_that_constant(value: float, n_per_rev: int, start: flo
     np.testing.assert_allclose(signal.samples, value, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_float32_recordings_are_as_good_as_their_digits() -> None:
     theta, angle = chirp(20.0, 40.0)
     x = np.sin(2 * np.pi * 50 * theta)

@@ -21,6 +21,7 @@ measured = pytest.mark.skipif(not DATA.exists(), reason="measured recordings are
 CHECK = np.linspace(0.5, 7.5, 400)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("teeth", "motion", "nominal", "tolerance", "worst"),
     [
@@ -133,6 +134,7 @@ def _gear_pair() -> Recording:
     )
 
 
+@pytest.mark.slow
 @measured
 @pytest.mark.parametrize("nominal", [2000.0, None])
 def test_measured_gear_pair(nominal: float | None) -> None:
@@ -162,6 +164,7 @@ def test_measured_bearings_are_no_gears(name: str, nominal: float | None, teeth:
             estimate_shaft_angle(recording, rig_of((number, None), nominal_rpm=nominal))
 
 
+@pytest.mark.slow
 @measured
 def test_measured_two_stage_gearbox() -> None:
     with gzip.open(DATA / "two_stage_gearbox" / "h30hz50.csv.gz", "rt") as file:
@@ -171,6 +174,7 @@ def test_measured_two_stage_gearbox() -> None:
     assert angle.mean_speed_rpm == pytest.approx(29.68 * 60, rel=1e-3)
 
 
+@pytest.mark.slow
 @measured
 def test_measured_car_is_not_claimed_wrongly() -> None:
     import warnings

@@ -121,6 +121,7 @@ def test_nonsense_in_an_address_is_ignored_and_taken_out(text: str) -> None:
     assert figures(page) == figures(usual)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["Kurtogram", "Orders (Vold–Kalman)", "Ridges", "Modes", "Lyapunov exponent"])
 def test_nonsense_among_the_options_of_a_method_is_ignored(method: str) -> None:
     usual = go(analysis("healthy"), method)
@@ -176,6 +177,7 @@ def opens(page: AppTest, script: str, query: dict[str, Any] | None = None) -> Ap
     return page
 
 
+@pytest.mark.slow
 def test_scale_and_zoom_of_a_view_outlast_another_page() -> None:
     page = analysis("healthy", view="Spectrum")
     choose(page, "Amplitude", "dB")
@@ -278,6 +280,7 @@ def test_no_option_of_a_method_is_called_as_another_choice_beside_it() -> None:
     assert not beside & {option.name for method in METHODS.values() if method.view for option in method.options}
 
 
+@pytest.mark.slow
 def test_the_indicator_of_a_fleet_is_named_and_restored(make_recordings, tmp_path):  # noqa: F811
     make_recordings("calm", [1.0])
     data = make_recordings("loud", [1.0] * 3)

@@ -42,6 +42,7 @@ def test_effects_come_in_turn_and_seeds_decide():
     assert plan == planned(100, 3) != planned(100, 4)
 
 
+@pytest.mark.slow
 def test_a_case_folder_holds_recordings_and_rigs_and_no_label(tmp_path):
     plan = DrivePlan(10, 2, "development", "with")
     case = plan.cases()[0]

@@ -252,6 +252,7 @@ def test_the_rate_of_a_reference_that_does_not_state_it_is_an_option(
     assert (code, out) == (0, run(capsys, *given[:-1], sample("root_crack_0mm"))[1])
 
 
+@pytest.mark.slow
 def test_analyze_against_a_reference_names_the_crack_once(capsys: pytest.CaptureFixture[str]) -> None:
     reference = ("--reference", sample("root_crack_0mm"))
     code, out, _ = run(capsys, "analyze", sample("root_crack_4mm"), *reference, "--json")
@@ -272,6 +273,7 @@ def test_the_recording_itself_is_no_reference(capsys: pytest.CaptureFixture[str]
     assert "itself" in err
 
 
+@pytest.mark.slow
 def test_report_with_a_reference_compares_all_but_itself(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     reference, cracked = sample("root_crack_0mm"), sample("root_crack_2mm")
     code, out, _ = run(capsys, "report", reference, cracked, "--reference", reference, "-o", tmp_path, "-j", 1)

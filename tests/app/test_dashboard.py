@@ -43,6 +43,7 @@ def test_a_sample_is_open_at_the_start() -> None:
     assert page.subheader[0].value.startswith("Fault")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(SAMPLES))
 def test_every_sample_opens_in_every_view(name: str) -> None:
     page = opened(name)
@@ -100,6 +101,7 @@ def test_an_upload_and_its_rig_give_the_diagnosis_of_the_same_files_on_disk() ->
     assert page.subheader[0].value == verdict
 
 
+@pytest.mark.slow
 def test_the_machine_can_be_changed_as_text_and_a_wrong_one_is_mended() -> None:
     page = opened(tab="Machine")
     before = page.text_area[0].value
@@ -316,6 +318,7 @@ def test_names_from_files_are_shown_as_typed() -> None:
         assert name in shown_text(page)
 
 
+@pytest.mark.slow
 def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> None:
     from app.dashboard.cached import read_and_analyze
     from app.dashboard.state import AnalysisRequest
@@ -341,6 +344,7 @@ def test_a_reference_changes_verdict_and_indicators_as_on_the_command_line() -> 
     assert headline_of(same)[0] in shown_text(page)
 
 
+@pytest.mark.slow
 def test_a_reference_with_a_rig_file_of_its_own_is_read_with_its_channels() -> None:
     """The eccentric wheel's tachometer is on ch2, that of the healthy gearbox on tacho."""
     page = opened("eccentric_wheel")

@@ -117,6 +117,7 @@ def test_dark_pictures_turn_paper_and_ink_over_and_keep_the_hue() -> None:
     assert blue[2] > blue[1] > blue[0] + 20
 
 
+@pytest.mark.slow
 def test_sessions_can_analyse_at_the_same_time() -> None:
     """Streamlit runs each session in a thread: kernels and figures have to bear that."""
     chosen = [s for s in samples() if s.rig.stem in ("damaged_tooth", "no_tachometer")]

@@ -73,6 +73,7 @@ DEAD = "time (s);a1;a2\n" + "\n".join(f"{i / 1000:g};1.5;{(i * 37) % 101}" for i
 SHORT = "time (s);a1\n" + "\n".join(f"{i / 1000:g};{(i * 37) % 101}" for i in range(700))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [DEAD, SHORT], ids=["constant channel", "short recording"])
 def test_what_cannot_be_analysed_is_at_most_one_message_in_every_method(content: str) -> None:
     page = opened_file("bad.csv", f"{content}\n".encode(), tab=view_of(METHOD))
@@ -82,6 +83,7 @@ def test_what_cannot_be_analysed_is_at_most_one_message_in_every_method(content:
         assert len(page.error) <= 1, method
 
 
+@pytest.mark.slow
 def test_names_are_shown_as_typed_and_a_segment_too_short_is_at_most_one_message_in_every_method() -> None:
     content, rig = machine()
     names = ("<script>alert(1)</script>", "**x** $y$ :smile:")
@@ -102,6 +104,7 @@ def test_names_are_shown_as_typed_and_a_segment_too_short_is_at_most_one_message
             assert len([*page.error, *page.info]) <= 1, method
 
 
+@pytest.mark.slow
 def test_modes_open_with_the_waveform_that_the_text_speaks_of_and_notes_are_a_list() -> None:
     page = opened_at("Modes", "root_crack_3mm")
     number = re.search(r"Mode \*\*(\d+)\*\* is the most impulsive", shown_text(page))[1]
@@ -338,6 +341,7 @@ def test_the_lowest_frequency_is_half_the_slowest_shaft_or_what_the_segment_allo
     assert "the lowest frequency" in shown_text(page)
 
 
+@pytest.mark.slow
 def test_a_longer_segment_than_can_be_answered_soon_is_cut_and_this_is_said() -> None:
     page = opened_at("Orders (Vold–Kalman)", "run_up")
     orders = page.multiselect[0]

@@ -18,6 +18,7 @@ def opened(folder: Path) -> AppTest:
     return page.switch_page("pages/fleet.py").run()
 
 
+@pytest.mark.slow
 def test_the_worst_is_first_its_trend_has_limits_and_its_recording_opens(make_recordings, tmp_path):  # noqa: F811
     make_recordings("calm", [1.0])
     data = make_recordings("loud [1]", [1.0] * 7 + [9.0] * 2)
@@ -45,6 +46,7 @@ def test_the_worst_is_first_its_trend_has_limits_and_its_recording_opens(make_re
     assert "DE_20260109.csv" in shown_text(page)
 
 
+@pytest.mark.slow
 def test_an_indicator_over_load_in_the_limits_that_follow_it(make_recordings, tmp_path):  # noqa: F811
     loads = [20.0, 40.0, 60.0, 80.0, 100.0, 30.0, 50.0, 70.0, 90.0]
     data = make_recordings("mill", [load / 50 for load in loads[:8]] + [20.0])

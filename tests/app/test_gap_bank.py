@@ -178,6 +178,7 @@ def test_a_damaged_or_foreign_file_is_made_again(tmp_path: Path, damage: str) ->
     assert same(bank(tmp_path, on_progress=_never), first)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2])
 def test_a_stop_ends_it_and_leaves_nothing(tmp_path: Path, processes: int) -> None:
     def stop(done: int, n: int) -> None:

@@ -60,6 +60,7 @@ def copied(folder: Path, stem: str, **changes: object) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_it_prints_the_verdict_and_leaves_three_files(capsys, stub, tmp_path) -> None:
     folder = tmp_path / "new" / "gap"
     code, out, err = run(capsys, CRACKED, "--reference", HEALTHY, "-o", folder)
@@ -88,6 +89,7 @@ def test_one_condition_is_told_of_what_a_second_would_give(capsys, stub, tmp_pat
     assert "5.4 structural floors apart" in out
 
 
+@pytest.mark.slow
 def test_results_of_an_earlier_diagnosis_are_replaced_and_an_old_twin_goes(capsys, stub, tmp_path) -> None:
     folder = tmp_path / "gap"
     assert run(capsys, CRACKED, "-o", folder)[0] == 0
@@ -137,6 +139,7 @@ def test_a_failure_while_writing_leaves_what_was_there(tmp_path, monkeypatch) ->
     assert [p.name for p in tmp_path.iterdir()] == ["gap"]
 
 
+@pytest.mark.slow
 def test_the_folder_one_is_in_may_be_given(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     check_folder(Path())
@@ -256,6 +259,7 @@ def test_bad_input_is_one_line(capsys, tmp_path, arguments, said) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_cache_is_the_users_own_or_a_given_one_and_can_be_made_anew(capsys, stub, tmp_path, monkeypatch) -> None:
     monkeypatch.delenv("GEARSIG_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

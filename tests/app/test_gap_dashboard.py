@@ -142,6 +142,7 @@ def test_another_choice_has_another_key() -> None:
     assert one.key == Choice((sample(CRACKED),), (sample(HEALTHY),)).key
 
 
+@pytest.mark.slow
 def test_a_run_from_the_button_to_the_answer(stub) -> None:
     stub(**{SECONDS: "1"})
     page = press(opened(), "Diagnose")
@@ -159,6 +160,7 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
     assert "what was chosen before" in text_of(page)
 
 
+@pytest.mark.slow
 def test_the_start_page_s_example_needs_one_click(stub) -> None:
     stub(**{SECONDS: "1"})
     page = AppTest.from_file(str(MAIN), default_timeout=60).run()
@@ -233,6 +235,7 @@ def test_stop_ends_it_and_says_so(stub) -> None:
     assert "Stopped." not in text_of(page)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("outcome", "said"), [("refusal", "the rig <file> has no teeth"), ("crash", "something nobody thought of")]
 )

@@ -121,6 +121,7 @@ def test_a_run_up_is_refused_but_beside_the_same_one() -> None:
             check_steady(rising, reference)
 
 
+@pytest.mark.slow
 def test_accelerations_in_g_are_compared_in_si_units_and_unknown_units_are_told() -> None:
     recording = run(noise=1)
     names = recording.vibration_names()

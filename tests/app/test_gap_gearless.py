@@ -65,6 +65,7 @@ def diagnosed(now: Recording, *references: Recording, rig: Rig = RIG, effects: S
     return report
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "name"), [("BPFO", "bearing_outer_race"), ("BPFI", "bearing_inner_race")])
 def test_a_damaged_race_is_named_with_its_place(order: str, name: str) -> None:
     report = diagnosed(recording(ORDERS[order]))
@@ -119,6 +120,7 @@ def named(record: Recording, number: int, *more: str) -> Recording:
     return replace(record, samples=np.concatenate([record.samples, noise]), channels=channels)
 
 
+@pytest.mark.slow
 def test_channels_that_differ_by_a_records_number_are_compared_and_one_that_is_not_there_is_told() -> None:
     report = diagnosed(named(recording(ORDERS["BPFO"]), 130, "FE"), named(recording(seed=1), 118))
     assert report.causes[0].name == "bearing_outer_race"
@@ -143,6 +145,7 @@ def test_a_reference_at_another_rate_is_read_at_its_own(tmp_path: Path) -> None:
     assert rates(asked) == [12e3, 24e3]
 
 
+@pytest.mark.slow
 def test_impacts_of_no_known_part_stay_unknown() -> None:
     strange = diagnosed(recording(5.9))
     assert strange.outcome is GapOutcome.UNKNOWN
@@ -214,6 +217,7 @@ def test_what_is_missing_is_said(rig: Rig, said: str) -> None:
         diagnose_gap([recording().with_rig(rig)], gap_simulator("cracked"))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not DATA.is_dir(), reason="the measured recordings are not here")
 @pytest.mark.parametrize(
     ("file", "name", "hertz"),

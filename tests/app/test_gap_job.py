@@ -44,6 +44,7 @@ def is_alive(pid):
         return False
 
 
+@pytest.mark.slow
 def test_the_result_is_the_report_and_its_files(job):
     wait(lambda: not job.is_running)
     assert job.report().verdict == effect_report().verdict
@@ -69,6 +70,7 @@ def test_a_users_own_app_in_the_working_folder_breaks_nothing(tmp_path, monkeypa
         job.close()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at processes where Linux shows them")
 @pytest.mark.parametrize("job", [{SECONDS: "60", CHILD: "{folder}/child"}], indirect=True)
 @pytest.mark.parametrize("way", ["stop", "parent gone"])
@@ -89,6 +91,7 @@ def test_it_and_what_it_started_end_together(job, tmp_path, way):
     assert job.result("gap.html") is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("job", [{OUTCOME: "refusal"}], indirect=True)
 def test_a_refusal_comes_over_as_it_is(job):
     wait(lambda: not job.is_running)
@@ -104,6 +107,7 @@ def test_a_crash_is_said_with_its_last_words(job):
         job.report()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("job", [{SECONDS: "60"}], indirect=True)
 def test_a_killed_process_is_told(job):
     wait(lambda: job.progress[1] > 0)

@@ -22,6 +22,7 @@ def test_a_day_repeats_the_machine_and_not_the_noise() -> None:
     assert 0.0 < np.std(first.samples - other.samples) < 0.2 * np.std(first.samples)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_machines_get_sidebands_and_shaft_lines_that_last(seed: int) -> None:
     ordinary = Ordinary.of(HEALTHY, seed)

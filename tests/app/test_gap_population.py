@@ -97,6 +97,7 @@ def test_drawn_machines_lie_every_way_and_most_stand_on_mounts() -> None:
     assert 130 < np.count_nonzero(on_mounts) < 170
 
 
+@pytest.mark.slow
 def test_an_unbalance_is_heard_where_the_housing_yields() -> None:
     """A body of mass M takes a force F at a = F/M; on rigid ground a bearing's spring hardly moves."""
     drawn = next(d for d in (draw_machine(np.random.default_rng([8, i])) for i in range(50)) if d.speed_rpm > 1500.0)

@@ -36,6 +36,7 @@ def test_equal_names_are_compared_as_they_are() -> None:
     assert matching_reference(run(0), RIG, healthy(run(1))) == (HealthyReference(run(1), RIG, "healthy.h5"), "")
 
 
+@pytest.mark.slow
 def test_few_revolutions_are_compared_with_as_many_of_a_longer_reference() -> None:
     whole = PreparedRecording(record(seed=1))
     short = reduce_recording(record(seed=0).between(1.0, 1.65), RIG)

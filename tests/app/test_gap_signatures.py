@@ -45,6 +45,7 @@ def test_only_the_vibration_changes_and_a_seed_repeats_it(name: str) -> None:
         assert np.array_equal(row, before) is not channel.is_vibration
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_channels", [1, 3])
 def test_a_machine_may_have_any_number_of_sensors(n_channels: int) -> None:
     kept = [i for i, channel in enumerate(HEALTHY.channels) if not channel.is_vibration]
@@ -58,6 +59,7 @@ def test_a_machine_may_have_any_number_of_sensors(n_channels: int) -> None:
         assert np.isfinite(now.samples).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXPECTED)
 def test_strong_ones_move_their_own_features(name: str, reference: ReducedRecording) -> None:
     changes = []

@@ -65,6 +65,7 @@ def diagnosed(recording, reference=None):
     return diagnose_gap([recording.with_name("now")], SIMULATOR, references=references)
 
 
+@pytest.mark.slow
 def test_more_play_is_named_measured_and_simulated_again(folder, tmp_path, capsys):
     out = tmp_path / "gap"
     files = [str(folder / "wide.h5"), "--reference", str(folder / "healthy.h5")]
@@ -93,6 +94,7 @@ def wider():
     return diagnose_start_stop([now], [healthy], SIMULATOR, effects)
 
 
+@pytest.mark.slow
 def test_what_is_left_is_told_on_cycles_that_the_severity_was_not_fitted_to(wider):
     before, after = drive_report(wider).steps
     assert (before.label, after.label) == ("before", "more backlash")
@@ -112,6 +114,7 @@ def test_where_no_effect_is_named_none_is_added(wider, outcome):
     assert report.verdict[2] == "How far: no effect was added."
 
 
+@pytest.mark.slow
 def test_a_heavier_load_is_named_by_its_own_name():
     report = diagnosed(made(3, wheel_inertia_kg_m2=80.0), made(4))
     assert report.causes[0].name == "load_inertia"
@@ -119,6 +122,7 @@ def test_a_heavier_load_is_named_by_its_own_name():
     assert report.references == (made(4).name,)
 
 
+@pytest.mark.slow
 def test_a_healthy_drive_has_no_gap_and_it_is_said_what_would_not_show():
     """A crack that would not stand out of the other teeth is named with its depth."""
     report = diagnosed(made(5), made(6))
@@ -152,6 +156,7 @@ def test_without_torque_the_play_can_still_be_told():
     assert report.causes[0].name == "backlash"
 
 
+@pytest.mark.slow
 def test_a_second_recording_without_torque_is_told_about():
     """Causes are weighed on all recordings, so that what one of them cannot tell is weighed on none."""
     first, second = made(7, ("backlash", 150.0)), without_torque(made(8, ("backlash", 150.0)))
@@ -214,6 +219,7 @@ def test_a_worn_drive_runs_as_its_teeth_at_rest_say(by_its_rig, depth_um):
     assert worn.play_um - healthy.play_um == pytest.approx(expected.mean(), abs=1.5)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_misreads_is_not_taken_for_another_load():
     first = diagnosed(made(2, torque_gain=0.8), made(1)).causes[0]
     assert first.name == "torque_gain"

@@ -30,6 +30,7 @@ def seen(
     return unexpected_findings(PreparedRecording(now.with_rig(rig).with_name("today")), prepared)
 
 
+@pytest.mark.slow
 def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_silences_them() -> None:
     struck, healthy = record(knocking), record(seed=1)
     standing, *_ = seen(struck, RIG, healthy)

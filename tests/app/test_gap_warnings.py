@@ -76,6 +76,7 @@ def test_another_specimen_is_noticed_and_a_damaged_gear_is_not_another_machine()
     assert "another machine" in remark
 
 
+@pytest.mark.slow
 def test_gears_without_a_pattern_are_not_another_machine() -> None:
     assert strange_pattern(reduce_recording(_flawless(1), rig()), reduce_recording(_flawless(2), rig()), "now") == []
 
@@ -92,6 +93,7 @@ def _flawless(seed: int) -> Recording:
     return replace(bare, samples=samples)
 
 
+@pytest.mark.slow
 def test_the_teeth_of_another_rig_are_noticed_and_the_right_number_is_told() -> None:
     for right in (gathered(0, 1), gathered(0, 1, chipped=True)):
         assert strange_teeth(right, "now") == []
@@ -119,6 +121,7 @@ def test_teeth_that_explain_little_are_a_remark_where_no_other_number_explains_m
     assert "37/53" in remark
 
 
+@pytest.mark.slow
 def test_recording_and_reference_exchanged_are_noticed_by_the_sign_of_the_change() -> None:
     healthy, chipped = gathered(0, 1), gathered(0, 2, chipped=True)
     (doubt,) = exchanged(healthy, chipped, "now")
@@ -148,6 +151,7 @@ def test_a_refusal_names_the_recording_that_is_too_short() -> None:
         conditions_of(prepared(short.with_name("today")), (), twin())
 
 
+@pytest.mark.slow
 def test_one_of_several_references_that_cannot_be_read_is_left_out() -> None:
     whole = recording(0, 1)
     short = replace(whole, samples=whole.samples[:, :4000]).with_name("the short one")
@@ -160,6 +164,7 @@ def test_one_of_several_references_that_cannot_be_read_is_left_out() -> None:
     assert any(n.startswith("the short one") and n.endswith("this reference is left out.") for n in notes)
 
 
+@pytest.mark.slow
 def test_one_of_several_recordings_that_is_too_short_is_left_out_and_told() -> None:
     whole = recording(0, 1).with_name("now")
     short = replace(whole, samples=whole.samples[:, :2000]).with_name("the short one")
@@ -169,6 +174,7 @@ def test_one_of_several_recordings_that_is_too_short_is_left_out_and_told() -> N
         assert any(n.startswith("the short one: ") and n.endswith("this recording is left out.") for n in notes)
 
 
+@pytest.mark.slow
 def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> None:
     whole = recording(0, 1).with_name("now")
     first, *_ = whole.vibration_names()

@@ -82,6 +82,7 @@ def test_every_effect_has_a_slider_that_switches_it_on() -> None:
             assert found.title.lower() in title, name
 
 
+@pytest.mark.slow
 def test_two_effects_at_once() -> None:
     page = opened()
     page.sidebar.multiselect[0].set_value(["mains_hum", "eccentricity"]).run()
@@ -91,6 +92,7 @@ def test_two_effects_at_once() -> None:
         assert effects()[name].signature[:30] in shown_text(page)
 
 
+@pytest.mark.slow
 def test_the_address_keeps_the_machine_and_what_was_pulled() -> None:
     page = AppTest.from_file(str(FOLDER / "pages" / "laboratory.py"), default_timeout=300)
     page.query_params.update(machine="small_30_25", root_crack="1.5", effects="mains_hum,nonsense")
@@ -123,6 +125,7 @@ def test_a_crack_deeper_than_the_tooth_is_one_message() -> None:
     assert "1 mm" in shown_text(page)
 
 
+@pytest.mark.slow
 def test_numbers_can_be_typed_and_carry_over() -> None:
     page = opened()
     slider(page, "Crack").set_value(1.3).run()
@@ -140,6 +143,7 @@ def test_numbers_can_be_typed_and_carry_over() -> None:
     assert "900 rpm, 75 N·m" in shown_text(page)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("speed", "torque"), [(0.0, 20.0), (1800.0, 0.0)])
 def test_standing_still_and_no_load_are_shown(speed: float, torque: float) -> None:
     page = opened()
@@ -160,6 +164,7 @@ def test_every_machine_opens(name: str) -> None:
     assert presets("cracked")[name].title in shown_text(page)
 
 
+@pytest.mark.slow
 def test_a_recording_of_the_laboratory_opens_in_the_analysis() -> None:
     setup = Setup("small_30_25", 1800.0, 20.0, effects=(EffectSetting("root_crack", 1.5),), duration_s=2.0)
     page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=300)

@@ -34,6 +34,7 @@ def test_the_machine_opens_with_all_effects(page) -> None:
     assert any("eccentric" in option or "off its axis" in option for option in shown)
 
 
+@pytest.mark.slow
 def test_every_view_shows_the_cracked_gear_beside_the_healthy_one(page) -> None:
     slider(page, "Crack").set_value(2.0).run()
     assert "Crack in a tooth root, 2 mm" in shown_text(page)

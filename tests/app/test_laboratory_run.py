@@ -126,6 +126,7 @@ def test_the_telling_band_is_where_the_carrier_is() -> None:
         telling_band_hz(recording, "a1", [])
 
 
+@pytest.mark.slow
 def test_files_hold_recording_rig_and_truth(tmp_path: Path, cracked: LaboratoryRun) -> None:
     setup = cracked.setup
     content = zipped((setup, setup.healthy), ".h5")

@@ -26,6 +26,7 @@ def test_every_question_is_answered_or_says_why_not(method):
     assert method != "Kind of motion" or "the signal as measured" in shown_text(page)
 
 
+@pytest.mark.slow
 def test_the_path_is_shown_in_space_with_its_own_dimension():
     page = opened_at("Portrait and section")
     number(page, "Dimension").set_value(2)

@@ -67,6 +67,7 @@ def test_a_crack_has_its_tooth_and_a_ripple_its_order() -> None:
     assert page.number_input(key="order of torque_ripple of the drive").value == 6
 
 
+@pytest.mark.slow
 def test_the_laboratory_goes_back_to_pairs_that_run_on() -> None:
     page = opened()
     page.sidebar.selectbox(key="machine of the laboratory").set_value("published_55_75").run()

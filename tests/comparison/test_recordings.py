@@ -212,6 +212,7 @@ def test_averages_of_equal_levels_that_do_not_correlate_are_told() -> None:
     assert "do not" not in teeth_or_average
 
 
+@pytest.mark.slow
 def test_records_of_one_state_do_not_differ_whatever_their_noise() -> None:
     for seed in range(1, 31):
         verdict = compare(gear_record(seed=seed, noise=0.5), gear_record(seed=100 + seed, noise=0.5)).verdict
@@ -272,6 +273,7 @@ def test_shafts_of_other_names_are_matched_by_their_gears() -> None:
     assert line(found, 23).level.difference_db == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_wandering_speed_without_tachometer_keeps_its_mesh_harmonics() -> None:
     """Half a cycle of the mesh, to and fro in ten seconds, must not cost a decibel."""
     rate, rng = 8000.0, np.random.default_rng(3)
@@ -285,6 +287,7 @@ def test_a_wandering_speed_without_tachometer_keeps_its_mesh_harmonics() -> None
         assert line(found, order).level.difference_db == pytest.approx(0.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_compared_is_refused() -> None:
     record = gear_record()
     with pytest.raises(InputError, match="measure different things: velocity and acceleration"):

@@ -19,6 +19,7 @@ def _tones(*cycles: float) -> np.ndarray:
     return sum((np.cos(2 * np.pi * f * SAMPLES + 40 * f) for f in cycles), start=np.zeros(N))
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(
     places=st.sets(st.integers(1, 9), min_size=1, max_size=5),

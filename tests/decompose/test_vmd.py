@@ -80,6 +80,7 @@ def test_equals_vmdpy_from_random_starts():
     _assert_equal(_signal(800), VmdSettings(4, start="random", tolerance=1e-5), np.random.Generator(twister))
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     n=st.integers(20, 200).map(lambda half: 2 * half),

@@ -127,6 +127,7 @@ def test_a_short_record_shows_no_good_bearing() -> None:
     assert "would not have stood out" in finding(analysis, "bearings-undecided").title
 
 
+@pytest.mark.slow
 def test_a_race_whose_order_is_a_multiple_of_the_shaft_within_slip_is_not_called_good() -> None:
     rig = replace(ONE_SHAFT, bearings=(Bearing("front", "in", 9, 7.94, 67.7),), speed=ConstantSpeed(1320.0, "in"))
     assert rig.bearings[0].orders()["BPFI"] == pytest.approx(5.03, abs=0.01)

@@ -66,6 +66,7 @@ def test_what_rests_on_a_line_that_the_mains_make_as_well_is_half_as_sure() -> N
     assert confidences[1500.0] == pytest.approx(np.array([1.0, 0.5]) * confidences[1560.0], rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_only_channels_of_both_are_compared_whatever_they_are_called() -> None:
     now, healthy = rotor(HEALTHY | {1.0: 0.5}, seed=1), rotor(HEALTHY, seed=2)
     as_named = analyze(now, reference=healthy)
@@ -129,6 +130,7 @@ def test_a_record_too_short_to_compare_says_so() -> None:
     assert "change-not-examined" in codes(analyze(short, reference=rotor(HEALTHY, seed=2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_damaged_race_is_what_changed_also_from_a_reference_at_another_rate(times: int) -> None:
     """The healthy motor is recorded at the same rate or at twice: bands up to the lower one's are compared."""

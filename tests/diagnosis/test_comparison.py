@@ -138,6 +138,7 @@ def test_without_a_reference_nothing_is_compared() -> None:
     assert analysis.crack is None
 
 
+@pytest.mark.slow
 def test_a_fault_says_whether_the_reference_shows_it() -> None:
     damaged = replace(GOOD, bearing_faults=(BearingFault("front", "outer", 12.0, 3000.0, 0.04, 0.01, 0.2),))
     new = analyze(record(damaged), reference=record(seed=1))
@@ -248,6 +249,7 @@ def test_another_part_or_order_is_another_finding() -> None:
         assert told(moved(RACE, **other), RACE) == NOT_THERE
 
 
+@pytest.mark.slow
 def test_channels_of_another_record_number_are_the_same_sensors() -> None:
     """X097_DE_time is X130_DE_time of another record; a channel that the reference lacks is not compared."""
 

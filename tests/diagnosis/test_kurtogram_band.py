@@ -30,6 +30,7 @@ def test_the_own_band_holds_the_resonance_at_which_the_race_rings(found: Analysi
     assert channel.kurtogram_band.kurtosis > 1.0
 
 
+@pytest.mark.slow
 def test_the_finding_says_what_the_own_band_shows(found: Analysis) -> None:
     race = finding(found, "bearing-inner-race")
     assert race.kind is Kind.FAULT

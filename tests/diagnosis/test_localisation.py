@@ -1,6 +1,7 @@
 """Tooth-local energy: found where it is, not seen in spectra without it, not taken from one shock."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -41,6 +42,7 @@ def test_a_burst_is_found_at_its_angle_at_any_gain(at: float, gain: float) -> No
     assert place.repeatability > 0.99
 
 
+@pytest.mark.slow
 def test_healthy_signals_seldom_have_small_p_values() -> None:
     rng = np.random.default_rng(2)
     p = []

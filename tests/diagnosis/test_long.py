@@ -102,6 +102,7 @@ def test_overview_of_a_record_that_is_dead_for_a_while():
         assert not figures[1].any()
 
 
+@pytest.mark.slow
 def test_parts_are_the_usual_the_loudest_and_the_most_impulsive(tmp_path, monkeypatch):
     monkeypatch.setattr("gearsig.diagnosis._long.PART_SAMPLES", 8192)
     monkeypatch.setattr("gearsig.diagnosis._long.BYTES_PER_SAMPLE", 24_000.0)
@@ -247,6 +248,7 @@ def test_a_long_record_as_one_analysis_says_of_which_part_it_is(tmp_path):
     assert one.recording.n_samples == 8192
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_memory")
 def test_a_long_record_is_compared_part_by_part_with_a_part_of_a_long_reference(tmp_path):
     quiet = replace(LONG, samples=0.1 * RNG.standard_normal(X.shape).astype(np.float32))

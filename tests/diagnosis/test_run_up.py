@@ -75,6 +75,7 @@ def test_largest_levels_lie_at_the_resonance(resonant: Analysis) -> None:
         assert amplitude > 4.0 * AMPLITUDES[level.harmonic - 1]
 
 
+@pytest.mark.slow
 def test_a_flat_path_has_no_resonance(flat: Analysis) -> None:
     assert "resonance" not in codes(flat)
     assert "resonance" not in codes(run_up(seed=1))

@@ -28,12 +28,14 @@ def test_of_a_motor(race: str, times: float) -> None:
     assert not any(code.startswith("bearing") for code in codes(analysis))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("race", ["", "BPFO", "BPFI", "BSF"])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_that_is_right(race: str, seed: int) -> None:
     assert CODE not in codes(analyze(motor(race, seed)))
 
 
+@pytest.mark.slow
 def test_that_is_right_in_a_short_record_whose_race_is_nearly_a_fraction_of_the_shaft() -> None:
     """5 BPFI is 27 turns within the resolution: all lines of the race are those of a shaft at a fifth of the rate."""
     rig = replace(MOTOR, bearings=(*MOTOR.bearings, Bearing("fan end", "motor", 8, 6.746, 28.5)))
@@ -89,6 +91,7 @@ def test_of_a_measured_race_that_nobody_described(race: str) -> None:
     assert CODE not in codes(analyze(read_recording(DATA / f"bearing_races/{race}.mat", speed=speed)))
 
 
+@pytest.mark.slow
 @needs_data
 @pytest.mark.parametrize(
     ("name", "times"),

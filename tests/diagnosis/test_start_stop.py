@@ -95,6 +95,7 @@ def test_an_encoder_that_wraps_unsaid_is_no_reversing_machine() -> None:
         analyze(replace(recording, samples=samples))
 
 
+@pytest.mark.slow
 def test_a_contact_in_the_rig_is_no_hindrance_to_the_other_examinations() -> None:
     """Long enough for averages; the mesh's order is reckoned without the pair, and so without its contact."""
     long = simulate("forging", parameters={"mode": "continuous"}, duration_s=20.0, sampling_rate_hz=1000.0)

@@ -73,6 +73,7 @@ def test_pulses_per_revolution_stated_too_low_are_noticed() -> None:
     assert analysis.outcome is not Outcome.NO_FAULT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 3])
 def test_several_equal_events_are_no_tooth(n: int) -> None:
     analysis = analyze(with_knocks(record(STEADY), np.arange(0.01, 5.0, 1 / (n * SHAFT_HZ))))
@@ -92,6 +93,7 @@ def test_a_perfect_machine_is_not_accused_of_the_ends_of_its_record() -> None:
     assert not codes(analyze(record(perfect)), Kind.FAULT, Kind.SUSPICION)
 
 
+@pytest.mark.slow
 def test_noise_that_would_hide_damage_leaves_the_teeth_undecided() -> None:
     loud = replace(GOOD, channels=(SensorChannel("a1", noise=ColouredNoise(25.0)),), tooth_damages=(DAMAGE,))
     analysis = analyze(record(loud))
@@ -136,6 +138,7 @@ def test_a_wrong_tooth_count_is_contradicted_by_the_mesh() -> None:
     assert "teeth-disagree" in codes(analysis)
 
 
+@pytest.mark.slow
 def test_an_event_that_does_not_come_back_from_turn_to_turn_is_withheld_and_that_is_said() -> None:
     """Bursts at one angle whose sign is drawn anew in each revolution: something is there, but it is no tooth's."""
     recording = record(replace(GOOD, speed=ConstantProfile(1320.0)))

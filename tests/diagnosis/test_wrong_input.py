@@ -82,6 +82,7 @@ def test_the_true_recording_has_no_such_problem():
     assert max(f.confidence for f in found.findings if f.kind is Kind.FAULT) > 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_spoiled_is_noticed_said_and_lowered(name):
     recording, codes = CASES[name]
@@ -131,6 +132,7 @@ def test_a_shaft_excuses_hum_at_its_own_frequency_only(speed_rpm, is_hum):
     assert ("line-of-mains-or-shaft" in codes) == (not is_hum)
 
 
+@pytest.mark.slow
 @needs_data
 @pytest.mark.parametrize(
     ("spoil", "code"),

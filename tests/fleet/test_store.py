@@ -29,6 +29,7 @@ from gearsig.fleet import (
 from tests.fleet.recordings import PATTERN, write_recording_file
 
 
+@pytest.mark.slow
 def test_what_is_known_is_passed_over_by_content_and_place(make_recordings, tmp_path):
     data = make_recordings("pump 1", [1.0, 1.1, 0.9])
     fleet = open_fleet(tmp_path / "store", create=True)
@@ -69,6 +70,7 @@ def test_tables_are_the_same_before_and_after_merging(make_recordings, tmp_path)
     assert len(fleet.recordings()) == 4
 
 
+@pytest.mark.slow
 def test_indicators_are_those_of_the_analysis(make_recordings, tmp_path):
     from gearsig.diagnosis import analyze
     from gearsig.recording import read_recording
@@ -106,6 +108,7 @@ def test_a_damaged_part_is_set_aside_and_analysed_again(make_recordings, tmp_pat
     assert len(messages) == 1
 
 
+@pytest.mark.slow
 def test_a_damaged_list_of_segments_loses_nothing(make_recordings, tmp_path):
     data = make_recordings("pump 1", [1.0, 1.1])
     fleet = open_fleet(tmp_path / "store", create=True, on_message=[].append)
@@ -119,6 +122,7 @@ def test_a_damaged_list_of_segments_loses_nothing(make_recordings, tmp_path):
     assert len(fleet.indicators(name="rms")) == 3
 
 
+@pytest.mark.slow
 def test_an_unreadable_recording_is_kept_as_a_failure_until_it_changes(make_recordings, tmp_path):
     data = make_recordings("pump 1", [1.0, 1.0])
     victim = data / "pump 1" / "DE_20260102.csv"
@@ -189,6 +193,7 @@ def test_a_merge_that_is_killed_before_it_deletes_doubles_nothing(make_recording
     assert len(fleet.indicators(name="rms")) == 2
 
 
+@pytest.mark.slow
 def test_a_store_that_many_make_at_once_is_made_for_each(tmp_path):
     for attempt in range(20):
         start = threading.Barrier(8)
@@ -375,6 +380,7 @@ def test_a_query_that_is_interrupted_is_an_interruption(tmp_path):
         signal.signal(signal.SIGALRM, before)
 
 
+@pytest.mark.slow
 def test_a_store_that_cannot_be_written_is_read_all_the_same(make_recordings, tmp_path):
     data, store = make_recordings("pump 1", [1.0, 1.1]), tmp_path / "store"
     open_fleet(store, create=True).add(data, pattern=PATTERN, n_processes=1)

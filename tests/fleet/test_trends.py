@@ -33,6 +33,7 @@ def fleet(analysed, tmp_path) -> Fleet:
     return open_fleet(tmp_path / "store")
 
 
+@pytest.mark.slow
 def test_an_alarm_is_raised_and_cleared(fleet):
     trend = fleet.trend("loud", "rms")[0]
     levels = list(trend.table["level"])
@@ -44,6 +45,7 @@ def test_an_alarm_is_raised_and_cleared(fleet):
     assert set(fleet.trend("calm", "rms")[0].table["level"]) == {"ok"}
 
 
+@pytest.mark.slow
 def test_status_has_the_worst_first(fleet, make_recordings, tmp_path):
     data = make_recordings("broken", [1.0] * 8 + [30.0])
     fleet.add(data, pattern=PATTERN, n_processes=1)
@@ -70,6 +72,7 @@ def test_a_point_of_which_nothing_can_be_said_is_not_ok(make_recordings, tmp_pat
     assert counts_text(status) == "1 measuring point: 1 unknown"
 
 
+@pytest.mark.slow
 def test_a_stated_baseline_replaces_the_first_recordings(fleet):
     fleet.set_baseline("loud", datetime(2026, 1, 9), datetime(2026, 1, 13))
     trend = fleet.trend("loud", "rms")[0]
@@ -79,6 +82,7 @@ def test_a_stated_baseline_replaces_the_first_recordings(fleet):
         fleet.trend("loud", "rsm")
 
 
+@pytest.mark.slow
 def test_zones_of_the_standard_apply_where_the_rig_says_the_machines_size(make_recordings, tmp_path):
     """90 Hz of 1.4 m/s² rms is 2.5 mm/s: zone B of group 2 on a rigid foundation; more are C and D."""
     data = make_recordings("fan", [2.0, 3.0, 8.0, 2.0])
@@ -97,6 +101,7 @@ def test_zones_of_the_standard_apply_where_the_rig_says_the_machines_size(make_r
     assert (trend.table["high"].iloc[0], trend.table["alarm"].iloc[0]) == (2.8, 4.5)
 
 
+@pytest.mark.slow
 def test_changes_are_those_since_the_last_report(fleet, make_recordings):
     first = fleet_changes(fleet)
     assert (first.n_new, {c.machine for c in first.raised}) == (26, {"loud"})
@@ -143,6 +148,7 @@ def loaded(fleet: Fleet, data, machine: str, loads: list[float], **more) -> None
         fleet.add(path, pattern=PATTERN, torque_nm=load, n_processes=1, **more)
 
 
+@pytest.mark.slow
 def test_over_load_the_limits_follow_the_baselines_dependence(make_recordings, tmp_path):
     """A level that grows with the load is no change; half as loud at full load as it was is none over time alone."""
     loads = [20.0, 40.0, 60.0, 80.0, 100.0, 30.0, 50.0, 70.0, 90.0, 25.0, 95.0, 100.0, 200.0]
@@ -172,6 +178,7 @@ def test_over_load_the_limits_follow_the_baselines_dependence(make_recordings, t
         fleet.trend_over("speed", "mill", "rms")
 
 
+@pytest.mark.slow
 def test_over_speed_values_are_moved_along_their_dependence_on_load(make_recordings, tmp_path):
     """Level = (speed/1500)² · load/50: at any load the same curve over speed."""
     rng = np.random.default_rng(7)

@@ -68,6 +68,7 @@ def test_a_file_that_grows_is_taken_once_it_stands_still(tmp_path):
     assert open_fleet(tmp_path / "store").recordings()["duration_s"].tolist() == [pytest.approx(1.0)]
 
 
+@pytest.mark.slow
 def test_a_copy_that_stalled_fails_once_and_is_mended(tmp_path):
     target = tmp_path / "in" / "pump" / "DE_20260101.csv"
     target.parent.mkdir(parents=True)
@@ -142,6 +143,7 @@ def test_add_says_what_the_pattern_leaves_out(make_recordings, tmp_path):
             ]
 
 
+@pytest.mark.slow
 def test_commands_show_tables_and_json(make_recordings, tmp_path):
     data = make_recordings("pump 1", [1.0, 1.1])
     (data / "pump 1" / "DE_20260109.csv").write_text("no recording")

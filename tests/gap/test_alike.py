@@ -71,6 +71,7 @@ def test_noise_alone_changes_noise_alone() -> None:
     assert change["mesh_noise.less"] == pytest.approx(-10.0, abs=0.8)
 
 
+@pytest.mark.slow
 def test_it_is_a_feature_of_a_change_with_a_name_in_words_and_no_part_of_its_size() -> None:
     now, healthy = reduce_recording(record(repeated, seed=1), RIG), reduce_recording(HEALTHY, RIG)
     names = change_features(now, healthy).names

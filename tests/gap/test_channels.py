@@ -29,6 +29,7 @@ def test_a_single_channel_has_nothing_to_differ_from() -> None:
     assert dict(apart_features(one, one)) == {"apart.mesh": 0.0, "apart.floor": 0.0}
 
 
+@pytest.mark.slow
 def test_it_is_a_feature_of_a_change_and_no_part_of_its_size() -> None:
     change = change_features(louder(2.0, 1.0), reduce_recording(HEALTHY, RIG))
     own = [change.names.index(f"apart.{name}") for name in ("mesh", "floor")]

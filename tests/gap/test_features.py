@@ -48,6 +48,7 @@ def test_mesh_harmonics_and_sidebands_have_their_levels(healthy: ReducedRecordin
     assert found["sideband.driver.3to5"] < expected - 10.0
 
 
+@pytest.mark.slow
 def test_scatter_is_that_of_repeated_records() -> None:
     """The jackknife's standard errors agree with the scatter over recordings, in the median over the features."""
     runs = [features_of(reduced(seed=seed)) for seed in range(1, 9)]
@@ -74,6 +75,7 @@ def test_a_train_of_no_known_order_is_strange(healthy: ReducedRecording) -> None
     assert changes["envelope.strange"] > 10.0
 
 
+@pytest.mark.slow
 def test_a_knock_at_one_tooth_stands_out_on_its_own_gear(healthy: ReducedRecording) -> None:
     changes = as_dict(change_features(reduced(lambda _, r: 0.5 * ringing(r - 0.4), seed=1), healthy))
     assert changes["change.driver.prominence"] > 15.0

@@ -74,6 +74,7 @@ QUICK = {"cracked sample", "healthy sample", "measured gearbox, healthy"}
 FURTHER = pytest.mark.study
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in QUICK else FURTHER) for name in RECORDINGS])
 def test_two_halves_of_one_recording_are_no_gap(name: str) -> None:
     first, second = halves(RECORDINGS[name]())
@@ -100,6 +101,7 @@ def marks_of(name: str) -> tuple[pytest.MarkDecorator, ...]:
     return () if "unbalance" in name else (pytest.mark.slow,) if "OR007" in name else (FURTHER,)
 
 
+@pytest.mark.slow
 @needs_data
 @pytest.mark.parametrize(
     "name",

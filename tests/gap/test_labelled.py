@@ -150,6 +150,7 @@ def knock(order: float, size: float) -> Callable[[np.ndarray, np.ndarray], np.nd
     return lambda _time, revolutions: size * ringing(order * revolutions)
 
 
+@pytest.mark.slow
 def test_a_fault_of_ones_own_is_a_class_and_what_was_read_is_kept(tmp_path: Path) -> None:
     simulator = gap_simulator("cracked")
     twin, effects = simulator.twin_of(RIG), simulator.gap_effects()

@@ -81,6 +81,7 @@ def test_an_unbalance_is_order_one_of_its_shaft(side: int, shaft: str) -> None:
     assert first.orders == pytest.approx((order,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", [0.1, 0.4, 0.83])
 @pytest.mark.parametrize("is_reference", [True, False])
 def test_a_knock_is_at_its_tooth(where: float, *, is_reference: bool) -> None:
@@ -120,6 +121,7 @@ def test_a_strange_tone_gets_its_order(order: float) -> None:
     assert first.orders == pytest.approx((order,), abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_tone_that_fills_a_band_is_no_noise() -> None:
     places = places_of(tone(41.41, 1.0))
     assert places[0].kind is PlaceKind.LINE

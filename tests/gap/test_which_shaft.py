@@ -104,6 +104,7 @@ def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, flo
     return over_floors(change_features(run(*added, noise=2, point=point), healthy(point)), floor, is_reference=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cause", ["root_crack", "tooth_spall", "chipped_tooth", "pitch_error", "eccentricity"])
 @pytest.mark.parametrize("side", SIDES)
 def test_a_simulated_effect_is_put_on_its_shaft(cause: str, side: str) -> None:
@@ -124,6 +125,7 @@ def test_what_shows_at_speed_or_load_only_is_put_on_its_shaft_there(
     assert list(determined_options(cause, [simulated(strong, point=point)], (29, 47)).values()) == [side]
 
 
+@pytest.mark.slow
 def test_a_healthy_machine_has_no_signs_on_either_shaft() -> None:
     again = simulated()
     assert all(determined_options(cause, [again], (29, 47)) == {} for cause in SIGNS)

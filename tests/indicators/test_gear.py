@@ -132,6 +132,7 @@ def family(a, residual, difference, band):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 @given(st.integers(0, 1000), st.floats(1e-3, 1e3), st.integers(0, N - 1))
 def test_gain_and_shift_of_the_shaft_angle(seed, gain, shift):
     rng = np.random.default_rng(seed)

@@ -50,6 +50,7 @@ def test_normal_noise_has_kurtosis_three():
     assert kurtosis(x) == pytest.approx(3.0, abs=4 * math.sqrt(24 / x.size))
 
 
+@pytest.mark.slow
 @given(signals)
 def test_agrees_with_scipy(x):
     if np.ptp(x) == 0:

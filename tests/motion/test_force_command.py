@@ -21,6 +21,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_text_data_table_and_pictures(capsys: pytest.CaptureFixture[str], file: Path) -> None:
     folder = file.parent / "force"
     code, out, _ = run(capsys, "force", file, "-o", folder, "--noise")

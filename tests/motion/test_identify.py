@@ -56,6 +56,7 @@ def test_other_values_than_the_rigs_are_found() -> None:
     assert fitted.parameter("driven_inertia_kg_m2").value == pytest.approx(42.0 + 0.5 * 800.0 * 0.15**2, rel=0.02)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth() -> None:
     """Nominally 95 %: of 8 parameters in 2 × 4 recordings at least 85 %, and they are not just wide."""
     inside = []
@@ -89,6 +90,7 @@ def test_continuous_rotation_tells_neither_play_nor_damping() -> None:
     assert fitted.parameter("driven_inertia_kg_m2").is_told
 
 
+@pytest.mark.slow
 def test_stiffness_from_one_flank_is_not_told() -> None:
     """A torque that a filter has smoothed makes the teeth seem twenty times stiffer, if nothing tells the zero."""
     both = {"mode": "continuous", "slow_channels": "filtered"}

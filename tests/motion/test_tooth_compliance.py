@@ -64,6 +64,7 @@ def test_the_cracked_tooth_and_the_stiffness_it_has_lost(preset: str, mode: str)
     assert found.extra_um[12] > 5.0 * found.uncertainty_um[12]
 
 
+@pytest.mark.slow
 def test_healthy_teeth_are_left_alone() -> None:
     for preset in ("manipulator_formula", "manipulator_table"):
         for mode in ("start-stop", "continuous"):

@@ -51,6 +51,7 @@ def levels_db(order, rate, speeds_rpm):
     return 10 * np.log10(power_at / 2 / REFERENCE_PA**2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("i", [0, 1])
 def test_levels_agree_with_the_other_software(car, separation, i):
     recording, _, table = car

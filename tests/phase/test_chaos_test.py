@@ -52,6 +52,7 @@ def test_transition_of_the_logistic_map_follows_its_exponent():
             assert zero_one_test(x).k == pytest.approx(float(exponent > 0), abs=0.15), r
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("force", "verdict"), [(0.2, "regular"), (0.28, "regular"), (0.5, "irregular")])
 def test_sections_of_a_forced_oscillator(force, verdict):
     states = duffing(force, 1500)

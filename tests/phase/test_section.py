@@ -187,6 +187,7 @@ def test_bifurcations_of_the_forced_oscillator():
     assert diagram.periods == (1, 2, 4)
 
 
+@pytest.mark.slow
 def test_branches_that_go_on_from_their_last_state_show_hysteresis():
     """The forced oscillator with a bow-shaped resonance curve: two motions at one frequency, by the way there."""
     state = {}

@@ -116,6 +116,7 @@ def test_spectrum_refuses_what_does_not_fit(spectrum_of):
         spectrum_figure(spectrum_of(np.ones(10)), scale="liner")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(1, 1), (1, 50), (3, 7), (900, 3000)])
 @pytest.mark.parametrize("level", [0.0, 1.0])
 def test_order_map_of_any_shape(shape, level):

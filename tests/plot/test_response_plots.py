@@ -151,6 +151,7 @@ def test_crack_comparison_refuses_what_does_not_fit(changes, message):
         crack_comparison_figure(REVOLUTIONS, **given)
 
 
+@pytest.mark.slow
 def test_figures_are_freed_with_their_last_reference():
     figure = response_figure([_case("a")], mesh_frequency_hz=MESH_HZ)
     _texts(figure)

@@ -164,6 +164,7 @@ def test_truncated(tmp_path, name, share):
     refused(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["x.mat", "z.mat", "x.h5", "x.wav"])
 def test_flipped_bytes_give_a_recording_or_one_line(tmp_path, name):
     data = make(tmp_path / name).read_bytes()

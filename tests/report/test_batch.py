@@ -242,6 +242,7 @@ def test_a_killed_worker_costs_only_its_own_file(script, tmp_path):
     assert done.stdout.startswith("['a.csv', 'b.csv'] [('killer.csv', 'the process that analysed it was killed")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of process groups are POSIX")
 def test_ctrl_c_ends_the_workers_and_tidies_up(script, tmp_path):
     out = tmp_path / "out"

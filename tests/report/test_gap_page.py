@@ -68,6 +68,7 @@ def pages():
     return {outcome: gap_page_html(report, command="gearsig gap", date=DATE) for outcome, report in REPORTS.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("outcome", list(REPORTS))
 def test_the_four_answers_stand_on_top(pages, outcome):
     text = text_of(pages[outcome])
@@ -167,6 +168,7 @@ def evil_report(text):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [EVIL, QUOTES, "{{ 7 * 7 }}", "$\\frac{1}$ \x07"])
 def test_texts_from_files_are_never_markup(text):
     report = evil_report(text)
@@ -179,6 +181,7 @@ def test_texts_from_files_are_never_markup(text):
         assert text in html
 
 
+@pytest.mark.slow
 def test_very_long_names_do_not_blow_the_page_up():
     html = gap_page_html(evil_report("x" * 20_000))
     parsed(html)

@@ -35,6 +35,7 @@ def recording(seed: int = 0) -> Recording:
     return Recording(x[None], RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),), speed=ConstantSpeed(1500.0), rig=RIG)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", METHODS)
 def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> None:
     answer = apply_method(name, recording(), **({"n_modes": 3} if name == "modes" else {}))

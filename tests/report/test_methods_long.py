@@ -51,6 +51,7 @@ def read_parts_only(monkeypatch):
     monkeypatch.setattr("gearsig.diagnosis._blocks.read_recording", read)
 
 
+@pytest.mark.slow
 def test_what_fits_is_as_if_it_had_been_read_before(path):
     found = apply_method_to_file("density", path, RIG, start_s=10.0, end_s=30.0)
     whole = apply_method("density", read_recording(path, rig=RIG), start_s=10.0, end_s=30.0)

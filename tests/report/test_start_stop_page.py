@@ -14,6 +14,7 @@ def examined() -> Analysis:
     return analyze(start_stop())
 
 
+@pytest.mark.slow
 def test_the_page_shows_course_planes_impacts_and_force(examined: Analysis) -> None:
     html = page_html(examined)
     assert "<h2>Starts and stops</h2>" in html

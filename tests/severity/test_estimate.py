@@ -47,6 +47,7 @@ def test_estimates_rise_with_the_depth(answers: Answers) -> None:
         assert answer.depth_percent / answer.depth_mm == pytest.approx(found[0].depth_percent / found[0].depth_mm)
 
 
+@pytest.mark.slow
 def test_neither_estimate_nor_bound_falls_from_half_a_millimetre_on(answers: Answers) -> None:
     deeper = [answers[depth] for depth in (0.5, *DEPTHS_MM, 4.0)]
     sizes = [(a.depth_mm, a.interval_mm[1]) if isinstance(a, CrackEstimate) else (0.0, 0.0) for a in deeper]

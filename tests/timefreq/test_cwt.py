@@ -132,6 +132,7 @@ def test_impulse_is_where_it_was():
     assert set(np.argmax(np.abs(found.values), axis=1)) == {12_345}
 
 
+@pytest.mark.slow
 def test_map_is_the_mean_or_largest_of_the_matrix():
     x = np.random.default_rng(5).normal(size=30_011)
     signal = UniformSignal(x, 100.0)

@@ -224,6 +224,7 @@ def test_a_meeting_that_lasts_to_the_end_is_read_and_not_drawn_flat():
         assert rising == pytest.approx(15 * (ridge.at[-60] - ridge.at[-300]), rel=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.0, 0.05, 0.3])
 @pytest.mark.parametrize("transform", [squeezed_cwt, squeezed_cwt_map, squeezed_stft, squeezed_stft_map])
 def test_noise_leaves_the_level_along_a_squeezed_ridge(transform, sigma):

@@ -37,6 +37,7 @@ def run_up():
     return squeezed_cwt_map(recording, "a1", wavelet=Morse(82.0)), mesh_hz
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_ridges", [1, 2, 3])
 def test_the_mesh_is_followed_from_where_it_is_weak(run_up: tuple[TimeFrequencyMap, object], n_ridges: int):
     levels, mesh_hz = run_up

@@ -106,6 +106,7 @@ def test_severity_rises_with_level() -> None:
         assert mid == pytest.approx(np.sqrt(low * high))
 
 
+@pytest.mark.slow
 def test_two_runs_are_the_same_and_two_draws_are_not() -> None:
     case = short(draw(7, effect="bearing_outer_race", level=0.7, n_conditions=1, with_reference=True))
     first, second = record_case(case), record_case(case)

@@ -27,6 +27,7 @@ def healthy() -> list:
     return made
 
 
+@pytest.mark.slow
 def test_transmission_error_is_some_um(healthy: list) -> None:
     for rig, motion, _ in healthy:
         x_um = 1e6 * (motion.squeeze_m - motion.squeeze_m.mean())

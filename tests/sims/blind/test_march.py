@@ -70,6 +70,7 @@ def test_modes_diagonalise_the_structure() -> None:
     assert modes.omega[2] > 2 * pi * 3
 
 
+@pytest.mark.slow
 def test_second_order_in_the_step() -> None:
     """The compression of the mesh converges with the square of the step, contact changes and friction on."""
     x = {n: run(smooth_scene(), sub_steps=n).squeeze_m for n in (4, 8, 16, 64)}

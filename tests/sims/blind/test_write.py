@@ -38,6 +38,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[BlindCase, P
     return made
 
 
+@pytest.mark.slow
 def test_the_folder_holds_what_the_page_says(written: list) -> None:
     for _, seen, _ in written:
         stems = ("condition_1", "condition_2", "reference_1", "reference_2")

@@ -145,6 +145,7 @@ def test_crack_strikes_once_per_revolution_and_harder_with_depth() -> None:
     assert np.all(np.diff(peaks) > 0.3 * peaks[0])
 
 
+@pytest.mark.slow
 def test_reach_of_the_crack_grows_with_its_depth() -> None:
     """Mesh cycles in which more than 1 % of the healthy transmission error's swing changes: about 3, later 7
     (published: 3, later 9). It rests on the torsional damping, which is not published: 0.4 N m s/rad here."""
@@ -225,6 +226,7 @@ def test_sidebands_round_the_mesh_frequency_grow_with_roughness(rough_runs: dict
     assert heights[1] < heights[2] < heights[3]
 
 
+@pytest.mark.slow
 def test_poincare_section_scatters_with_roughness(rough_runs: dict[float, Response]) -> None:
     """Once per mesh cycle: one point for the smooth pair (a closed curve), a growing cloud for rough ones."""
     spread = []

@@ -146,6 +146,7 @@ def test_eccentricity_is_transmission_error_at_its_shaft_s_order(gear: str, orde
     assert ill.lines(ACCELERATION, [other, Z - other, Z + other]).max() < 10 * FLOOR
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_rpm", [1000.0, 2000.0])
 def test_unbalance_pushes_the_bearings_with_the_square_of_the_speed(speed_rpm: float) -> None:
     """Far below resonance: half of u ω² on either bearing's spring, so an acceleration of u ω⁴/(2k)."""
@@ -226,6 +227,7 @@ def envelope_lines(ill: Run, orders: FloatArray) -> FloatArray:
     return Run(ill.revolutions[:n], {"envelope": np.abs(hilbert(added)) ** 2}).lines("envelope", orders)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("race", "order"), [("outer", BPFO), ("inner", BPFI)])
 def test_a_race_defect_knocks_at_its_passing_order(race: str, order: float) -> None:
     ill = faulty(f"bearing_{race}_race", 2.0, jitter_percent=0.0, slip_percent=0.0)
@@ -257,6 +259,7 @@ def test_slip_and_jitter_move_and_smear_the_passing_order() -> None:
     assert smeared < 0.5 * sharp
 
 
+@pytest.mark.slow
 def test_clearance_shows_at_the_elements_passing_and_beside_the_mesh() -> None:
     little, middle, much = (faulty("bearing_clearance", added) for added in (10.0, 30.0, 60.0))
     orders = BPFO * np.arange(1, 5)
@@ -294,6 +297,7 @@ def test_a_path_mode_raises_what_lies_in_its_band() -> None:
     assert ratio == pytest.approx(np.abs(1 + 0.8 / (1 - r**2 + 0.1j * r)), rel=0.02)
 
 
+@pytest.mark.slow
 def test_hum_stands_at_its_frequency_whatever_the_speed() -> None:
     hum = EffectSetting("mains_hum", 0.5)
     for speed_rpm in (1200.0, 1500.0):

@@ -162,6 +162,7 @@ def test_a_third_bearing_of_a_shaft_takes_part_when_it_is_wanted() -> None:
     assert hurt.bearings[0].defect is not None
 
 
+@pytest.mark.slow
 def test_the_same_seed_is_the_same_machine_and_another_noise_another_run() -> None:
     first, again, other = run(), run(), run(seed=1)
     np.testing.assert_array_equal(first.samples, again.samples)

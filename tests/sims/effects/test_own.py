@@ -69,6 +69,7 @@ def test_it_takes_its_place_in_the_catalogue_and_changes_machines(file: Path) ->
     assert len(effects()) == len(before) + 1
 
 
+@pytest.mark.slow
 def test_processes_that_are_started_know_it(file: Path) -> None:
     add_effect(file)
     code = "from sims.effects import effects; print('hissing_seal' in effects())"

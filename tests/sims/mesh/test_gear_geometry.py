@@ -107,6 +107,7 @@ def test_fillet_is_what_the_tools_round_leaves(gear: GearGeometry) -> None:
     assert dx == pytest.approx(slope, rel=1e-5, abs=1e-7 * m)
 
 
+@pytest.mark.slow
 @given(gears, st.floats(1.5, 4.0))
 def test_shape_scales_with_the_module(gear: GearGeometry, factor: float) -> None:
     other = GearGeometry(

@@ -142,6 +142,7 @@ meshes = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(meshes, st.floats(0.5, 400.0))
 @settings(max_examples=60)
 def test_pairs_share_exactly_the_load(mesh: GearMesh, torque_nm: float) -> None:

@@ -63,6 +63,7 @@ CONTACT_J = 0.5 * 170.0 / RB_M * 9e-6
 """Energy that the loaded flanks hold, about."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["exponential", "newmark"])
 def test_moving_contact_conserves_energy(method):
     pair = synthetic_pair(**UNDAMPED)
@@ -237,6 +238,7 @@ def test_restitution_turns_the_closing_speed_round():
         replace(pair, restitution=1.5)
 
 
+@pytest.mark.slow
 def test_all_slices_give_the_motion_of_mirrored_ones():
     """A misalignment of a femtometre keeps all five slices apart."""
     halves, whole = pair_of(), pair_of(lead_error_um=1e-9)
@@ -248,6 +250,7 @@ def test_all_slices_give_the_motion_of_mirrored_ones():
     assert np.sqrt(np.mean(off**2)) < 2e-3 * first[TRANSMISSION_ERROR].std()
 
 
+@pytest.mark.slow
 def test_convergence_of_the_preset_is_stated():
     found = check_convergence(pair_of(), STEADY, 5e-6, 0.02)
     assert found.converged

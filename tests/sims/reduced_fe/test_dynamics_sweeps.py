@@ -50,6 +50,7 @@ def test_light_damping_loses_contact_and_jumps_with_hysteresis(light_sweeps):
     assert np.all(from_above > 1.7 * np.interp(between, up.mesh_hz, up.rms_m))
 
 
+@pytest.mark.slow
 def test_outside_the_hysteresis_both_ways_agree(light_sweeps):
     up, down = light_sweeps
     high = np.linspace(2750.0, 2850.0, 5)

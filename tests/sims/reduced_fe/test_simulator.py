@@ -52,6 +52,7 @@ def test_mesh_harmonics_stand_out_of_the_spectrum(healthy):
         assert lines[near].max() > 20.0 * np.median(lines)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_recording(two_healthy_turns):
     again = sims.simulate(MODEL, **TWO_TURNS)
     np.testing.assert_array_equal(two_healthy_turns.samples, again.samples)
@@ -114,6 +115,7 @@ def test_bad_values_are_refused():
         sims.simulate(MODEL, parameters={"web_thickness_driver_mm": 30.0}, **SHORT)
 
 
+@pytest.mark.slow
 def test_parameters_have_units_ranges_and_defaults():
     model = simulator(MODEL)
     names = [p.name for p in model.parameters]

@@ -67,6 +67,7 @@ def test_the_twin_is_the_rig_with_this_model(twin, healthy):
     assert twin.key.startswith("reduced-fe ")
 
 
+@pytest.mark.slow
 def test_an_effect_alone_makes_the_difference(twin, healthy):
     cracked, other = run(twin, (CRACK,)), run(twin, seed=1)
     np.testing.assert_array_equal(healthy.samples, run(twin).samples)
