@@ -430,11 +430,9 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         if of_races > ENOUGH_OF_EACH or left <= SHARE_OF_LEFT * sums[factor]:
             return None
     # Where no race is described, one or another part may knock: it asks for no mistake at all, and its order may be
-    # near a fraction of the shaft's. So may one beside the shaft's own orders, of which a whole k keeps all; ratios to
-    # common rates are many, and one of them fits easily.
-    is_whole = factor in usual and abs(round(1 / factor) * factor - 1) < CLOSE_TOLERANCE
+    # near a fraction of the shaft's. So may one that nobody described beside the shaft's own orders.
     enough = AS_GOOD * best if not races else sums[factor]
-    if (not races or (factor < 1 and not is_whole)) and has_stranger(ranges[factor], enough):
+    if (not races or factor < 1) and has_stranger(ranges[factor], enough):
         return None
     for milder in sorted(f for f in factors if f in usual and 1 < f <= factor / FAR_APART):
         of_one = of_one_part(milder)

@@ -557,6 +557,8 @@ def _spectra(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRe
     name = families[0].recording if families else every[0].name
     channels = next(item for item in every if item.name == name).analysis.channels
     shown_channels = families[0].finding.where.channels if families else ()
+    if not channels:
+        return ()  # where the rate or speed is doubtful nothing was computed over orders
     channel = next((c for c in channels if c.channel in shown_channels), channels[0])
     spectrum, band = channel.envelope_spectrum, channel.envelope_band_hz
     if spectrum is None or band is None:

@@ -116,8 +116,8 @@ def test_of_a_measured_race_at_a_rate_that_is_too_low(name: str, times: float) -
     ("name", "times"),
     [
         ("bearing_cwru/OR007@6_0.mat", 2.0),
-        ("bearing_cwru/OR007@6_0.mat", 5.0),
-        ("bearing_cwru/IR021_0.mat", 8.0),
+        ("bearing_cwru/OR007@6_0.mat", 8.0),
+        ("bearing_cwru/IR021_0.mat", 2.0),
         ("bearing_cwru/IR021_0.mat", 10.0),
         ("bearing_races/InnerRaceFault_vload_3.mat", 5.0),
     ],
