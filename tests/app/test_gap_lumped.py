@@ -66,6 +66,7 @@ def test_one_tooth_out_of_place_is_found_on_its_gear(rig: LumpedRig) -> None:
     assert risen[1] > 2.0 * risen[0]
 
 
+@pytest.mark.study
 def test_every_effect_and_what_is_outside_can_be_recorded(rig: LumpedRig) -> None:
     rng = np.random.default_rng(8)
     faults = [effect(rig, LumpedGeometry.of(rig), rng) for effect in EFFECTS.values()]

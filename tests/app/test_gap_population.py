@@ -40,7 +40,7 @@ def outer_race() -> list[PopulationSample]:
     return independent.one_case(list(CATALOGUE).index("bearing_outer_race"))
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_case_of_the_independent_rig_gives_its_effect_and_the_same_machine_without_it(
     outer_race: list[PopulationSample],
 ) -> None:
@@ -75,7 +75,7 @@ def drawn_machine() -> DrawnRig:
     )
 
 
-@pytest.mark.parametrize("model", ["cracked", pytest.param("reduced-fe", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("model", ["cracked", pytest.param("reduced-fe", marks=pytest.mark.study)])
 def test_both_models_record_a_drawn_machine(model: str) -> None:
     drawn = drawn_machine()
     drawn = replace(drawn, duration_s=0.5 * drawn.duration_s)

@@ -68,7 +68,6 @@ def pages():
     return {outcome: gap_page_html(report, command="gearsig gap", date=DATE) for outcome, report in REPORTS.items()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("outcome", list(REPORTS))
 def test_the_four_answers_stand_on_top(pages, outcome):
     text = text_of(pages[outcome])
