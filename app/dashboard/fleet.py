@@ -27,7 +27,6 @@ from gearsig.errors import InputError
 from gearsig.fleet import (
     CONDITIONS,
     Fleet,
-    Trend,
     TrendSettings,
     change_text,
     level_counts,
@@ -330,21 +329,8 @@ def _show_trend(fleet: Fleet, row: Row) -> None:
     panel = LinePanel(lines, "date", with_minus(with_unit(trend.name, trend.unit)), limits, x_limits=span)
     key = f"trend of {row['machine']} {row['point']} {_series_words(row)}"
     show_lines(panel, key, marked=marked, legend=True, dates=True)
-    st.caption(as_typed(_about(trend)))
-
-
-def _about(trend: Trend) -> str:
-    n = int(trend.table["in_baseline"].sum())
-    words = {
-        "ISO 20816-3": "Limits are the zones of ISO 20816-3.",
-        "none": f"No limits yet: the baseline has {n} recordings.",
-    }.get(trend.basis, f"Limits from the {n} recordings of the baseline.")
-    rate = trend.false_alarm_rate
-    if trend.basis == "statistical" and rate > 0:
-        words += f" An unchanged machine leaves them in one of {1 / rate:,.0f} recordings.".replace(",", " ")
-    if trend.normalised:
-        words += f" What is expected follows {' and '.join(trend.normalised)}."
-    return words + (f" The level changed on {trend.changed:%Y-%m-%d}." if trend.changed is not None else "")
+    changed = f" The level changed on {trend.changed:%Y-%m-%d}." if trend.changed is not None else ""
+    st.caption(as_typed(trend.text + changed))
 
 
 def _show_recordings(recordings: DataFrame) -> None:

@@ -278,9 +278,7 @@ class StrongSpectra:
         speed, _ = self._speeds(factor, NEAR_TOLERANCE)
         _, seen = self._on_shafts(speed)
         for part in parts:
-            near = self._near_parts(*part, speed)
-            best = int(np.argmax(sum((x & ~y).sum(axis=1) for x, y in zip(near, seen, strict=True))))
-            seen = [x | y[best] for x, y in zip(seen, near, strict=True)]
+            _, _, seen = self._with_part(part, speed, seen)
         left = [replace(x, orders=x.orders[~y]) for x, y in zip(self.spectra, seen, strict=True)]
         return StrongSpectra(left, self.shafts)
 
@@ -305,6 +303,15 @@ class StrongSpectra:
         """Return which lines of each spectrum lie at a part's family, (slip, line)."""
         return [_near_family(lines, part * SLIPS * speed, sideband * speed) for lines in self.spectra]
 
+    def _with_part(
+        self, part: tuple[float, float], speed: float, seen: Sequence[NDArray[np.bool_]]
+    ) -> tuple[float, int, list[NDArray[np.bool_]]]:
+        """Return the slip at which a part explains most further lines, how many, and what is seen with it."""
+        near = self._near_parts(*part, speed)
+        new = sum((x & ~y).sum(axis=1) for x, y in zip(near, seen, strict=True))
+        best = int(np.argmax(new))
+        return float(SLIPS[best]), int(new[best]), [x | y[best] for x, y in zip(seen, near, strict=True)]
+
     def _log_p_at(self, speed: float, n_speeds: int, parts: Sequence[tuple[float, float]]) -> float:
         from scipy.special import betainc
 
@@ -312,14 +319,12 @@ class StrongSpectra:
         smeared = np.zeros(0)
         found = log10(n_speeds)
         for part, sideband in parts:
-            near = self._near_parts(part, sideband, speed)
-            new = sum((x & ~y).sum(axis=1) for x, y in zip(near, seen, strict=True))
-            best = int(np.argmax(new))
+            slip, n_new, seen_with_it = self._with_part((part, sideband), speed, seen)
             found += log10(3.0)
-            if new[best] >= 2:
-                family = _family(part * SLIPS[best], sideband, self.highest / speed) * speed
+            if n_new >= 2:
+                family = _family(part * slip, sideband, self.highest / speed) * speed
                 smeared = np.concatenate([smeared, family])
-                seen = [x | y[best] for x, y in zip(seen, near, strict=True)]
+                seen = seen_with_it
                 found += log10(len(SLIPS) / 3)
         for lines, on_place in zip(self.spectra, seen, strict=True):
             m, n = int(on_place.sum()), len(lines.orders)
@@ -448,9 +453,10 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     if factor > 1 and by_one_race - of_shafts <= ENOUGH_OF_EACH and by_one_race <= BY_ONE_RACE * sums[factor]:
         return None
     stated = evidence(1.0, ranges[factor])
-    by_shafts = evidence(1.0, ranges[factor], CLOSE_TOLERANCE, ())
     explained, highest = sums[factor], ranges[factor]
-    if (factor > 1 or not races) and (by_shafts <= explained or stated < SHARE_OF_STATED * explained):
+    if (factor > 1 or not races) and (
+        stated < SHARE_OF_STATED * explained or evidence(1.0, highest, CLOSE_TOLERANCE, ()) <= explained
+    ):
         return None
     close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
     factor = min(close, key=lambda f: evidence(f, highest, CLOSE_TOLERANCE))

@@ -210,7 +210,8 @@ def largest_lyapunov_exponent(
         try:
             first, stop = fit_limits(curve, memory, max(MIN_STEPS, round(0.25 * period)))
         except RefusalError as refusal:
-            raise RefusalError(refusal.reason, remedy=refusal.remedy, looked_at=not_fitted) from None
+            refusal.looked_at = not_fitted
+            raise
     else:
         first, stop = _requested_limits(fit_s, rate, len(curve.log_distance))
     slope, uncertainty = slope_of(curve, first, stop)

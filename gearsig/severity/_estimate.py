@@ -567,7 +567,6 @@ def judge(
 ) -> CrackEstimate | NoCrackSeen:
     """Decide whether the clearest event is a crack, and how deep it is or may be."""
     best = max(gears, key=lambda evidence: model.score(evidence.features))
-    searched = tuple(_search(evidence, model, calibration, facts) for evidence in gears)
     clear = model.score(best.features) >= model.threshold
     agreements = {evidence.shaft.shaft: evidence.agreement for evidence in gears if evidence.agreement is not None}
     weakest = min(agreements, key=lambda shaft: agreements[shaft], default=None)
@@ -579,7 +578,9 @@ def judge(
         try:
             return _crack_estimate(gears, best, model, calibration, facts)
         except RefusalError as refusal:
-            raise RefusalError(refusal.reason, remedy=refusal.remedy, looked_at=searched) from None
+            refusal.looked_at = _searched(gears, model, calibration, facts)
+            raise
+    searched = _searched(gears, model, calibration, facts)
     if strange and weakest is not None:
         raise RefusalError(
             f"the teeth's own pattern on shaft {weakest!r} agrees with that of the reference by "
@@ -610,6 +611,13 @@ def judge(
         (_reference_text(best),),
         searched,
     )
+
+
+def _searched(
+    gears: Sequence[GearEvidence], model: DepthModel, calibration: Calibration, facts: PairFacts
+) -> tuple[ToothSearch, ...]:
+    """Return what was looked at on each gear."""
+    return tuple(_search(evidence, model, calibration, facts) for evidence in gears)
 
 
 def _search(evidence: GearEvidence, model: DepthModel, calibration: Calibration, facts: PairFacts) -> ToothSearch:

@@ -156,8 +156,7 @@ def find_event(shaft: ShaftLines) -> ToothEvent:
         Its centre in revolutions from the angle's zero, 0 to 1; its prominence, a ratio of energies.
     """
     energy, median, width = _window_energies(shaft)
-    relative = np.divide(energy, median[..., None], out=np.ones_like(energy), where=median[..., None] > 0)
-    start, prominence = strongest_window(relative.mean(axis=(0, 1)))
+    start, prominence = strongest_window(_over_bands(energy, median))
     return ToothEvent(
         centre_rev=float((start + width / 2) / energy.shape[-1] % 1.0),
         prominence=prominence,
@@ -180,8 +179,7 @@ def search_levels(shaft: ShaftLines) -> tuple[FloatArray, FloatArray]:
     median window's; the highest one is the event's prominence.
     """
     energy, median, width = _window_energies(shaft)
-    relative = np.divide(energy, median[..., None], out=np.ones_like(energy), where=median[..., None] > 0)
-    level = relative.mean(axis=(0, 1))
+    level = _over_bands(energy, median)
     middles = (np.arange(len(level)) + width / 2.0) / len(level) % 1.0
     order = np.argsort(middles, kind="stable")
     return middles[order], 10.0 * np.log10(level[order] / np.median(level))
@@ -193,6 +191,13 @@ def _window_energies(shaft: ShaftLines) -> tuple[FloatArray, FloatArray, int]:
     width = round(WINDOW_PITCHES * envelopes.shape[-1] / shaft.teeth)
     energy = sliding_mean(envelopes, width)
     return energy, np.median(energy, axis=-1), width
+
+
+def _over_bands(energy: FloatArray, median: FloatArray) -> FloatArray:
+    """Return the energy of each window relative to its band's median, mean over bands and channels."""
+    relative = np.divide(energy, median[..., None], out=np.ones_like(energy), where=median[..., None] > 0)
+    mean: FloatArray = relative.mean(axis=(0, 1))
+    return mean
 
 
 def band_envelopes(shaft: ShaftLines) -> FloatArray:

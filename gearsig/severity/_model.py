@@ -166,11 +166,8 @@ class DepthModel:
         All energies of the event rise by the same factor until the score reaches the threshold. If it is there already,
         nothing changes.
         """
-        rising = [FEATURES.index(name) for name in RISING]
-        gain = float(np.sum(self.detection[rising] / self.scale[rising]))
-        missing = max(0.0, self.threshold - self.score(features))
         result = np.array(features, dtype=np.float64)
-        result[rising] += missing / gain
+        result[[FEATURES.index(name) for name in RISING]] += max(0.0, self._missing_rise(features))
         return result
 
     def threshold_prominence(self, features: FloatArray) -> float:
@@ -178,9 +175,13 @@ class DepthModel:
 
         Of one that is a crack it lies below the event's own.
         """
+        return float(features[FEATURES.index("prominence")]) + self._missing_rise(features)
+
+    def _missing_rise(self, features: FloatArray) -> float:
+        """Return by how much ln of all energies would have to rise to the threshold; below 0 beyond it."""
         rising = [FEATURES.index(name) for name in RISING]
         gain = float(np.sum(self.detection[rising] / self.scale[rising]))
-        return float(features[FEATURES.index("prominence")]) + (self.threshold - self.score(features)) / gain
+        return (self.threshold - self.score(features)) / gain
 
 
 CRACKED, CHIPPED, SPALLED = KINDS = ("cracked", "chipped", "spalled")
