@@ -97,8 +97,12 @@ def test_a_plane_is_zoomed_by_keys_along_both_axes(page: playwright.Page) -> Non
     assert near != whole
     page.keyboard.press("ArrowUp")
     assert figure.evaluate(numbers) != near
+    zoomed = "new URL(location).searchParams.get('zoom')?.split('_').length === 5"
+    page.wait_for_function(zoomed)
     page.keyboard.press("0")
     assert figure.evaluate(numbers) == whole
+    page.wait_for_function("!new URL(location).searchParams.has('zoom')")  # else what follows finds the old zoom there
+    settle(page)
     box = figure.bounding_box()
     assert box is not None
     page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 0.3 * box["height"])
@@ -107,7 +111,7 @@ def test_a_plane_is_zoomed_by_keys_along_both_axes(page: playwright.Page) -> Non
     page.mouse.up()
     near = figure.evaluate(numbers)
     assert near != whole
-    page.wait_for_function("new URL(location).searchParams.get('zoom')?.split('_').length === 5")
+    page.wait_for_function(zoomed)
     page.reload()  # the address keeps both axes
     figure.wait_for()
     settle(page)
