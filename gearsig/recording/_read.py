@@ -573,11 +573,12 @@ def _sampling_rate(
     def differ(a: float, b: float) -> bool:
         return abs(a - b) > 1e-3 * abs(b)
 
-    file_hz, timed_hz = table.sampling_rate_hz, None
+    file_hz, timed_hz, of_time = table.sampling_rate_hz, None, tuple[str, ...]()
     rig_hz = None if rig is None else rig.sampling_rate_hz
     if table.time is not None:
         scale_s = seconds_per_unit(table.time.name, table.time.unit) or 1.0
-        timed_hz = rate_of_time(table.time.values, scale_s, f"{source}, column {table.time.name!r}", table.row_place)
+        where = f"{source}, column {table.time.name!r}"
+        timed_hz, of_time = rate_of_time(table.time.values, scale_s, where, table.row_place)
     if file_hz is None:
         file_hz = timed_hz
     else:
@@ -607,8 +608,8 @@ def _sampling_rate(
         raise InputError("states no sampling rate", where=source, allowed="above 0 Hz", remedy=remedy)
     if file_hz is not None and rig_hz is not None and differ(file_hz, rig_hz):
         text = f"the rig states a sampling rate of {rig_hz:g} Hz, the file {file_hz:.9g} Hz: the file's was taken"
-        return file_hz, (text,)
-    return file_hz or rig_hz or 0.0, ()
+        return file_hz, (*of_time, text)
+    return file_hz or rig_hz or 0.0, of_time
 
 
 def _looks_like_times(column: RawColumn) -> bool:

@@ -253,8 +253,14 @@ SEPARATE_RUNS = "Are these separate runs?"
 """How the question begins whether columns are conditions."""
 
 
-def rate_of_time(values: NumberArray, scale_s: float, where: str, row_place: Callable[[int], str]) -> float:
-    r"""Return the sampling rate of a uniform time column.
+MAX_ROUNDING = 1e-4
+"""Of the whole time: stamps that are rounded to more do not tell the rate."""
+
+
+def rate_of_time(
+    values: NumberArray, scale_s: float, where: str, row_place: Callable[[int], str]
+) -> tuple[float, tuple[str, ...]]:
+    r"""Return the sampling rate of a uniform time column, and what is worth a warning.
 
     .. math:: f_s = (N - 1) / (t_{N-1} - t_0)
 
@@ -273,6 +279,8 @@ def rate_of_time(values: NumberArray, scale_s: float, where: str, row_place: Cal
     -------
     float
         In Hz, from the mean step.
+    tuple of str
+        Where times are rounded to more than a step: missing samples would not show.
 
     Raises
     ------
@@ -296,21 +304,30 @@ def rate_of_time(values: NumberArray, scale_s: float, where: str, row_place: Cal
             allowed="finite numbers",
             remedy="cut the file there or export it again",
         )
-    step = (t[-1] - t[0]) / (len(t) - 1)
+    span = float(t[-1] - t[0])
+    step = span / (len(t) - 1)
     steps = np.diff(t)
     i = int(np.argmin(steps))
-    if steps[i] <= 0:
+    jitters, roundings = _jitters_by_rounding(values, t)
+    is_uniform = bool(np.all(jitters <= np.maximum(0.01 * step, 0.51 * roundings)))
+    coarsest = float(roundings.max())
+    if steps[i] < 0 or (steps[i] == 0 and not (is_uniform and coarsest <= MAX_ROUNDING * span)):
         raise InputError(
             f"time does not increase at {row_place(i + 1)}: {t[i]:.9g} is followed by {t[i + 1]:.9g}",
             where=where,
             allowed="strictly increasing time",
             remedy="remove doubled rows, export time with more digits, or drop the column and give --fs",
         )
-    # Distance of the stamps from the straight line fitted to them.
-    k, centred = np.arange(len(t)) - (len(t) - 1) / 2, t - t.mean()
-    jitter = float(np.abs(centred - (k @ centred) / (k @ k) * k).max())
-    if jitter <= max(0.01 * step, 0.51 * _resolution(values, t)):
-        return float(1.0 / (step * scale_s))
+    if is_uniform:
+        rate_hz = float(1.0 / (step * scale_s))
+        if coarsest < 1.5 * step:
+            return rate_hz, ()
+        missing = counted(int(coarsest / step), "missing sample")
+        message = (
+            f"time is rounded to as much as {coarsest * scale_s:.1g} s, more than a step of {step * scale_s:.3g} s: "
+            f"the rate of {rate_hz:.7g} Hz is that of the whole record, and {missing} would not show"
+        )
+        return rate_hz, (message,)
     median = float(np.median(steps))
     i = int(np.argmax(np.abs(steps - median)))
     if steps[i] > 1.5 * median:
@@ -330,14 +347,34 @@ def rate_of_time(values: NumberArray, scale_s: float, where: str, row_place: Cal
     )
 
 
-def _resolution(values: NumberArray, t: FloatArray) -> float:
-    """Step of the rounding that the times went through: decimal digits in text, or float32.
+def _jitters_by_rounding(values: NumberArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the largest distance from the straight line fitted to times, and their rounding, for each power of ten.
 
-    Times printed with too few digits jitter by half a digit about a grid that was uniform when it was sampled.
+    Times printed with too few digits jitter by half a digit about a grid that was uniform when it was sampled. What
+    counts decimals rounds all alike, what counts digits (`%g`, spreadsheets) rounds each power of ten by itself, as
+    float32 does each power of two.
     """
-    if np.asarray(values).dtype == np.float32:
-        return float(np.spacing(np.float32(np.abs(t).max())))
-    some = t[:: max(1, len(t) // 2000)]
+    k, centred = np.arange(len(t)) - (len(t) - 1) / 2, t - t.mean()
+    jitter = np.abs(centred - (k @ centred) / (k @ k) * k)
+    size = np.abs(t)
+    with np.errstate(divide="ignore"):
+        power = np.floor(np.log10(size, out=np.full_like(t, -99.0), where=size > 0))
+    jitters, roundings = [], []
+    for decade in np.unique(power):
+        inside = power == decade
+        some, largest = t[inside], float(size[inside].max())
+        is_single = np.asarray(values).dtype == np.float32
+        jitters.append(float(jitter[inside].max()))
+        roundings.append(float(np.spacing(np.float32(largest))) if is_single else _decimal_step(some))
+    # Few times of a power of ten may all be round by chance: none is rounded to more than those of the next one.
+    return np.array(jitters), np.minimum.accumulate(np.array(roundings)[::-1])[::-1]
+
+
+def _decimal_step(t: FloatArray) -> float:
+    """Step of the decimal rounding that all of some times went through; 0 if there is none."""
+    some = t
+    if len(t) > 2000:  # drawn: of those at even distances all may be round
+        some = np.random.default_rng(0).choice(t, 2000)
     for digits in range(13):
         scaled = some * 10.0**digits
         if np.abs(scaled - np.round(scaled)).max() < 1e-5:

@@ -53,7 +53,8 @@ def read_rig(path: str | Path) -> Rig:
     Parameters
     ----------
     path : str or Path
-        A TOML file; the README lists its tables and keys. Where no [[shaft]] is given, the pairs name the shafts.
+        A TOML file; the README lists its tables and keys. Where no [[shaft]] is given, the pairs name the shafts;
+        pairs without a name are "stage 1", "stage 2", … in their order.
 
     Raises
     ------
@@ -139,6 +140,8 @@ def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
             raise InputError(f"{name!r} is not a list of tables", where=where, remedy=f"write [[{name}]]")
         if len(tables) > MAX_TABLES:
             raise InputError(f"{len(tables)} tables [[{name}]]", where=where, allowed=f"up to {MAX_TABLES}")
+        if kind is GearPair:
+            tables = [{"name": f"stage {i}"} | table for i, table in enumerate(tables, 1)]
         parts[name + "s"] = tuple(from_table(kind, t, f"{where}: [[{name}]] {i}") for i, t in enumerate(tables, 1))
     parts["shafts"] = _with_implied_shafts(parts["shafts"], parts["pairs"], parts["bearings"])
     if "operating_point" in data:

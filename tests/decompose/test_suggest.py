@@ -20,7 +20,7 @@ def _tones(*cycles: float) -> np.ndarray:
 
 
 @pytest.mark.slow
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(
     places=st.sets(st.integers(1, 9), min_size=1, max_size=5),
     seed=st.integers(0, 99),

@@ -137,9 +137,17 @@ def test_rig_is_applied_and_provenance_names_the_file_only(tmp_path):
     assert "taken as the shaft speed" in r.warnings[0]
 
 
-def test_time_printed_with_few_digits_is_uniform(tmp_path):
-    path = write(tmp_path / "x.csv", ["time,a", *(f"{i / FS_HZ:.6f},{i % 3}" for i in range(5000))])
-    assert read_recording(path).sampling_rate_hz == pytest.approx(FS_HZ, rel=1e-5)
+@pytest.mark.parametrize(("digits", "n", "said"), [(".6f", 5000, 0), (".6g", 5000, 0), (".6g", 300_000, 1)])
+def test_time_printed_with_few_digits_is_uniform(tmp_path, digits, n, said):
+    """Counted from the point or from the first digit; where they hide steps, that is said."""
+    lines = [f"{i / FS_HZ:{digits}},{i % 3}" for i in range(n)]
+    recording = read_recording(write(tmp_path / "x.csv", ["time,a", *lines]))
+    assert recording.sampling_rate_hz == pytest.approx(FS_HZ, rel=1e-5)
+    assert [("missing samples would not show" in w) for w in recording.warnings] == [True] * said
+    if n < 10_000:
+        del lines[2500:2503]
+        with pytest.raises(InputError, match="a gap of"):
+            read_recording(write(tmp_path / "y.csv", ["time,a", *lines]))
 
 
 @pytest.mark.parametrize(

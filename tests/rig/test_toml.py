@@ -62,9 +62,12 @@ def test_round_trip(name, channel, teeth, module, speed, tmp_path_factory) -> No
     assert read_rig(path) == rig
 
 
-def test_shafts_may_be_left_out() -> None:
-    rig = rig_from_dict({"pair": [{"name": "p", "driver": "in", "driven": "out", "driver_teeth": 23}]})
-    assert rig.shaft_names == ("in", "out")
+def test_shafts_and_names_of_pairs_may_be_left_out() -> None:
+    rig = rig_from_dict(
+        {"pair": [{"driver": "in", "driven": "out", "driver_teeth": 23}, {"driver": "out", "driven": "x"}]}
+    )
+    assert rig.shaft_names == ("in", "out", "x")
+    assert [pair.name for pair in rig.pairs] == ["stage 1", "stage 2"]
 
 
 @pytest.mark.parametrize(
