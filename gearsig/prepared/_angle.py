@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 
@@ -37,6 +38,9 @@ STEADY = 0.01
 N_SHAFT_HARMONICS = 8
 N_PHASE_HARMONICS = 3
 """Of the mesh, whose phase an angle may follow."""
+
+RULES_DB = 20.0
+"""By which a rotor's own line stands above the floor, or above all others within the tolerance of a stated speed."""
 
 MAINS_TOLERANCE = 0.002
 """How far a supply's frequency wanders at most; its harmonics, and those of motors, lie within a motor's slip.
@@ -150,7 +154,8 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     Each shows lines of its own, a bearing's above all; those of the shaft are common to them. A speed other than the
     stated one must show its first harmonic, and that clearer than a channel's own spectrum has one at the stated speed.
     A family on multiples of the mains says nothing, and is left out: a hum's would be taken for the shaft of any motor
-    of little slip.
+    of little slip. Cut as they are, common lines tell the fundamental to a fraction of their width only, and a line of
+    the mains beside a harmonic pulls it: the peaks in the channels' own spectra decide, see `_by_peaks`.
     """
     spectra = list(_spectra_of_shaft(recording))
     channels = spectra[: len(recording.vibration_names())]
@@ -169,12 +174,36 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
         comb = best_comb(lines, hertz - nearer, hertz + nearer, harmonics)
     if comb is None or comb.p_value > 1e-3:
         return _from_first_harmonic(channels, stated)
-    fundamental_hz = comb.fundamental
+    fundamental_hz = _by_peaks(channels, comb.fundamental)
     if abs(fundamental_hz - hertz) > resolution:
         first_db, stated_db = (max(_line_db(excess, place) for excess in channels) for place in (fundamental_hz, hertz))
         if _line_db(lines, fundamental_hz) <= CLEAR_LINE_DB or first_db < stated_db:
             return None
     return _at(stated, fundamental_hz, resolution / (3 * len(harmonics)), min(0.95, 1 - comb.p_value))
+
+
+def _by_peaks(channels: list[LinesOverFloor], fundamental_hz: float) -> float:
+    """Return the fundamental by the peaks of its harmonics that are far over the floor, each where it is clearest.
+
+    The median of peak over number, each weighing as much as its number, for so much preciser it is; what lies on the
+    magnetic pull of a supply is left out. Without such peaks it is returned as it is.
+    """
+    fundamentals, numbers = [], []
+    for k in range(1, N_SHAFT_HARMONICS + 1):
+        height_db, clearest = max(
+            ((_line_db(excess, k * fundamental_hz), excess) for excess in channels), key=itemgetter(0)
+        )
+        spectrum = clearest.spectrum
+        place = spectrum.largest_near(k * fundamental_hz, spectrum.resolution)[0]
+        peak_hz = peak_position(spectrum, spectrum.index_of(place))
+        nearest_pulls_hz = [2 * hz * max(1, round(peak_hz / (2 * hz))) for hz in MAINS_HZ]
+        is_pull = any(abs(peak_hz / pull_hz - 1) <= MAINS_TOLERANCE for pull_hz in nearest_pulls_hz)
+        if height_db >= RULES_DB and not is_pull:
+            fundamentals.append(peak_hz / k)
+            numbers.append(k)
+    if not fundamentals:
+        return fundamental_hz
+    return float(np.quantile(fundamentals, 0.5, weights=numbers, method="inverted_cdf"))
 
 
 def _distinguishing_harmonic(channels: list[LinesOverFloor], fundamental_hz: float, stated_hz: float) -> int | None:
@@ -201,10 +230,6 @@ def _at(stated: ShaftAngle, hertz: float, uncertainty_hz: float, quality: float)
         relative_speed_uncertainty=uncertainty_hz / hertz,
         quality=quality,
     )
-
-
-RULES_DB = 20.0
-"""By which a rotor's own line stands above all others within the tolerance of a stated speed."""
 
 
 def _from_first_harmonic(channels: list[LinesOverFloor], stated: ShaftAngle) -> ShaftAngle | None:

@@ -185,6 +185,16 @@ def test_a_stated_speed_is_not_replaced_by_a_third_of_a_bearings_tone() -> None:
     assert refined_angle(recording, ONE_SHAFT).mean_speed_rpm == pytest.approx(3600.0, rel=0.006)
 
 
+def test_twice_the_mains_beside_a_harmonic_does_not_pull_a_stated_speed() -> None:
+    """A motor of 1485 rpm, four turns of which take nearly as long as the pull of its supply, for a second only."""
+    t = np.arange(48_000) / 48_000.0
+    samples = 0.25 * np.random.default_rng(8).normal(size=len(t)) + 0.1 * np.cos(2 * np.pi * 100.0 * t)
+    for harmonic, size in ((1, 0.3), (2, 0.15), (5, 0.2)):
+        samples += size * np.cos(2 * np.pi * harmonic * 24.75 * t + harmonic)
+    recording = Recording(samples[None], 48_000.0, (Channel("a1", "acceleration"),), speed=ConstantSpeed(1485.0, "in"))
+    assert refined_angle(recording, ONE_SHAFT).mean_speed_rpm == pytest.approx(1485.0, rel=1e-3)
+
+
 def test_a_family_beyond_slip_of_a_stated_speed_may_be_the_part() -> None:
     found = finding(analyze(stated(2950.0, 2850.0, np.random.default_rng(1))), "bearing-outer-race")
     assert found.kind is Kind.SUSPICION
