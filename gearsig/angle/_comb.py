@@ -360,8 +360,8 @@ def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> 
     scores = score_speeds(evidence, comb, speeds)
     best = int(np.argmax(scores))
     speed = refine_speed(evidence, comb, float(speeds[best]))
-    # Within three bins of the lowest mesh line it is the same comb.
-    same = 3.0 * evidence.bin_width / (comb.meshes[0] * speed)
+    # Within three bins of the lowest mesh line it is the same comb; of a slow machine these reach down to zero.
+    same = min(1.0, 3.0 * evidence.bin_width / (comb.meshes[0] * speed))
     elsewhere = np.where(np.abs(speeds / speed - 1.0) > same, scores, -np.inf)
     other = int(np.argmax(elsewhere))
     rng = np.random.default_rng(20_230_501)  # fixed: the same recording gives the same answer

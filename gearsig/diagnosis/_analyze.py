@@ -14,10 +14,10 @@ from gearsig.checks import instance_of, positive
 from gearsig.diagnosis._bearing import detect_bearings
 from gearsig.diagnosis._change import change_findings, family_change, level_changes, with_clearest_band
 from gearsig.diagnosis._crack import Answer, crack_depth, with_crack
-from gearsig.diagnosis._lines import detect_lines, detect_mesh, speed_finding
+from gearsig.diagnosis._lines import detect_lines, detect_mesh, detect_standstill, speed_finding
 from gearsig.diagnosis._modulation import detect_sidebands
 from gearsig.diagnosis._overall import detect_vibration_zone
-from gearsig.diagnosis._reference import beside_reference, reference_unfit
+from gearsig.diagnosis._reference import beside_reference, reference_not_healthy, reference_unfit
 from gearsig.diagnosis._resonance import detect_resonances, order_levels
 from gearsig.diagnosis._sampling_rate import detect_sampling_rate
 from gearsig.diagnosis._signals import (
@@ -39,8 +39,10 @@ from gearsig.diagnosis._types import (
     Finding,
     Kind,
     LevelChange,
+    Outcome,
     Where,
     cannot_tell,
+    outcome_of,
 )
 from gearsig.diagnosis._verdict import (
     detect_data_problems,
@@ -170,6 +172,7 @@ def _examined(
         findings.append(doubt)
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
         return ended(findings)  # all orders are wrong, and what they would say
+    findings += detect_standstill(signals)
     # The reference is analysed by itself, without one of its own: an unfit one is said to be so, and left out.
     if healthy is not None:
         announce("the reference")
@@ -184,12 +187,7 @@ def _examined(
     # Against the reference, findings that it shows as well step down before what has changed adds findings of its own.
     compared: tuple[LevelChange, ...] = ()
     if healthy is not None and reference_analysis is not None and then is not None:
-        now, before = in_common_bands(signals, envelopes, *then, healthy)
-        beside = (signals, now, then[0], before)
-        findings = beside_reference(findings, reference_analysis, lambda f: family_change(f, *beside))
-        findings = with_clearest_band(findings, signals, then[0])
-        compared = level_changes(*beside)
-        findings += change_findings(compared, signals, then[0], findings)
+        findings, compared = _against(findings, signals, envelopes, reference_analysis, then, healthy)
     # Doubts come last, when all that they could lower is there; the crack's depth takes no channel that they spoil.
     findings, unfit = lowered(findings, names), dead | spoiled(findings, names)
     crack: Answer | None = withheld_crack(findings, asked=healthy is not None)
@@ -220,6 +218,24 @@ def _of_reference(
         return None, None
     _check_size(healthy.recording)
     return healthy.keep(("diagnosis", settings), lambda: _examined(healthy, settings, None, None, lambda _: None))
+
+
+def _against(
+    findings: list[Finding],
+    signals: AnalysisSignals,
+    envelopes: Sequence[BandEnvelope],
+    reference: Analysis,
+    then: Shown,
+    healthy: PreparedRecording,
+) -> tuple[list[Finding], tuple[LevelChange, ...]]:
+    """Return the findings beside those of the reference, with what has changed, and the levels compared."""
+    now, before = in_common_bands(signals, envelopes, *then, healthy)
+    beside = (signals, now, then[0], before)
+    not_healthy = reference_not_healthy(reference, shows_fault=outcome_of(findings) is Outcome.FAULT)
+    findings = beside_reference(findings, reference, lambda f: family_change(f, *beside))
+    findings = with_clearest_band(findings, signals, then[0])
+    compared = level_changes(*beside)
+    return [*findings, *change_findings(compared, signals, then[0], findings), *not_healthy], compared
 
 
 def _of_machine(

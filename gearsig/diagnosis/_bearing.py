@@ -23,7 +23,7 @@ from gearsig.diagnosis._bearing_families import (
     speed_is_only_stated,
     underlying_impulse_train,
 )
-from gearsig.diagnosis._lines import speed_is_confirmed
+from gearsig.diagnosis._lines import factor_left_open, speed_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, witness_text
 from gearsig.diagnosis._types import (
     WITH_ASSUMED_DATA,
@@ -48,9 +48,10 @@ MAX_PARTS = 2
 SHARED_BY_OTHERS = 0.5
 """Factor where impacts of another machine, a belt or an unknown shaft explain the lines as well as the part does."""
 
-WITH_STATED_SPEED, BEYOND_SLIP = 0.85, 0.5
-"""Factors where the speed is a stated one, and nothing but the family itself speaks for it; and where the family lies
-beyond a bearing's slip then: it is the part's only if the stated speed is wrong."""
+WITH_STATED_SPEED, AT_ANOTHER_SPEED = 0.85, 0.5
+"""Factors where the speed is a stated one, and nothing but the family itself speaks for it; and where another speed is
+as likely: the family lies beyond a bearing's slip then, and is the part's only if the stated speed is wrong, or the
+shafts' lines are those of a whole multiple of it as well, and it is the part's only if the stated speed is right."""
 
 WORTH_A_SUSPICION = 0.3
 """Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
@@ -102,28 +103,35 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     part = BEARING_PARTS[candidate.name][0]
     slip, only_stated = candidate.comb.fundamental / candidate.expected - 1, speed_is_only_stated(signals)
     is_beyond_slip = only_stated and abs(slip) > signals.settings.bearing_slip
+    times = factor_left_open(signals)
     is_shared = candidate.name == "FTF" or n_parts > MAX_PARTS
     is_hunting = _is_among_hunting_lines(signals, candidate)
 
     confidence = from_p_value(candidate.p_value) * candidate.share
     confidence *= WITH_ASSUMED_DATA if signals.rig.assumed else 1.0
     confidence *= SHARED_BY_OTHERS ** (is_shared + is_hunting)
-    if only_stated:
-        confidence *= BEYOND_SLIP if is_beyond_slip else WITH_STATED_SPEED
-    clear = not (is_shared or is_beyond_slip) and candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75
+    is_of_other_speed = is_beyond_slip or times > 1
+    if only_stated or is_of_other_speed:
+        confidence *= AT_ANOTHER_SPEED if is_of_other_speed else WITH_STATED_SPEED
+    is_open = is_shared or is_of_other_speed
+    clear = not is_open and candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75
     suspected = Kind.SUSPICION if confidence >= WORTH_A_SUSPICION else Kind.NOTICE
 
     place = f"the {part} of {_bearings_named(candidate)}"
     title = f"{'Damage' if clear else 'Perhaps damage'} at {place}."
     if is_beyond_slip:
         title = f"May be {place}: the speed is stated and not confirmed."
+    if times > 1:
+        title = f"May be {place}, or the sampling rate or the stated speed is wrong by a factor."
     evidence = [
         f"{_family_text(candidate)}, {signed(100 * slip, 2)} % from the kinematic order {candidate.expected:.4f}.",
         _modulation_text(candidate),
         *(["Bearings of the same orders cannot be told apart by their envelope."] if candidate.of_same_order else []),
         *(f"Within its slip, {rival} would show at the same order." for rival in candidate.rivals),
     ]
-    if only_stated:
+    if times > 1:
+        evidence.append(_other_speed_text(times))
+    elif only_stated:
         evidence.append("The speed is a stated one that no line of a shaft or mesh confirms.")
     if candidate.name == "FTF":
         evidence.append("Belts and other machines at the same rate look the same: lines at the cage's order alone.")
@@ -145,6 +153,15 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         "(all parts, bands, channels tried); never above 95 %, as one recording is looked at",
         tuple(evidence),
         surer,
+    )
+
+
+def _other_speed_text(times: int) -> str:
+    """Say which lines of the shafts stand out, and what else makes them."""
+    return (
+        f"All lines of shafts and meshes that stand out are at multiples of {times} times their order: those of shafts "
+        f"that turn {times} times as fast as stated, or of a sampling rate stated as many times too high, where every "
+        "part has another order."
     )
 
 
@@ -191,6 +208,8 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         if beside:
             by_density = "by their density: that is no damage there"
             causes.append(f"Multiples fall near the order of the {', '.join(beside)} {by_density}.")
+    if (times := factor_left_open(signals)) > 1:
+        causes.append(_other_speed_text(times))
     surer = "Give the bearings in the rig file: then the part is named, or they are ruled out."
     return Finding(
         "non-synchronous-impacts",
@@ -278,6 +297,8 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
     where = Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes)))
     if not speed_is_confirmed(signals):
         why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
+        if (times := factor_left_open(signals)) > 1:
+            why = f"{_other_speed_text(times)[:1].lower()}{_other_speed_text(times)[1:].rstrip('.')}"
         return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
     for seen, but in (
         (families.named, "something else explains them as well"),

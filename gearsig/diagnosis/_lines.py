@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
+from math import gcd, isfinite
 
 import numpy as np
 
 from gearsig.angle import ShaftAngle
+from gearsig.checks import FloatArray
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
 from gearsig.prepared import RUN_UP_FOOT_ORDERS, LinesOverFloor, lines_over_noise_floor, neighbour_levels, peak_position
@@ -18,6 +19,9 @@ from gearsig.spectra import Spectrum
 
 N_HARMONICS = 3
 """Multiples of a mesh or shaft order that are looked at."""
+
+N_COUNTED = 12
+"""Multiples whose common divisor is asked for: half of them would be between those of a shaft twice as fast."""
 
 CLEAR_DB = 12.0
 """A line that noise alone exceeds once in 10⁷: power over mean floor is exponential, exp(-15.8) (12 dB)."""
@@ -37,6 +41,11 @@ _UNKNOWN_CAUSE = f"{_OVER_FLOOR}; what causes it is not known"
 
 SPEED_UNKNOWN = "speed-unknown"
 """Code of the finding that the speed is not known."""
+
+NEAR_ZERO = "speed-near-zero"
+"""Code of the finding that the shaft comes near standstill within the record."""
+
+SURER_BEYOND_ZERO = "An encoder, which tells the direction; or analyse the parts before and after by themselves."
 
 
 def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
@@ -100,9 +109,105 @@ def mesh_is_confirmed(signals: AnalysisSignals, pair: GearPair) -> bool:
 
 
 def speed_is_confirmed(signals: AnalysisSignals) -> bool:
-    """Whether any mesh line, or where no mesh is known any shaft's line, stands where the speed puts it."""
+    """Whether any mesh line, or where no mesh is known any shaft's line, stands where the speed puts it.
+
+    Not so where all that stands would be there as well if the shafts turned a whole number of times as fast.
+    """
     orders = signals.known_mesh_orders.values() or signals.known_shaft_orders.values()
-    return signals.angle is not None and any(_is_confirmed(signals, order) for order in orders)
+    seen = signals.angle is not None and any(_is_confirmed(signals, order) for order in orders)
+    return seen and factor_left_open(signals) == 1
+
+
+def factor_left_open(signals: AnalysisSignals) -> int:
+    r"""Return the factor of speed or sampling rate that the lines of shafts and meshes do not rule out; 1: none.
+
+    With a rate m times too high, or a speed stated m times too low, the lines stand at the orders m, 2m, ... and a part
+    that is named by its order is another. They rule it out if the greatest common divisor of the multiples h at which a
+    line stands, over all shafts, meshes and channels, is 1: the first alone does, or the second and the third.
+
+    Parameters
+    ----------
+    signals : AnalysisSignals
+
+    Returns
+    -------
+    int
+        1 too where no line stands or a lone high one, and of a measured speed, whose orders a wrong rate does not move.
+    """
+    if signals.angle is None or signals.angle.method != "constant":
+        return 1
+    orders = {*signals.known_mesh_orders.values(), *signals.known_shaft_orders.values()}
+    seen = {
+        h
+        for excess in signals.order_excess.values()
+        for order in orders
+        for h in range(1, N_COUNTED + 1)
+        if (line := line_at(excess, h * order)) is not None and _is_clear(line)
+    }
+    if len(seen) == 1 and not seen & set(range(1, N_HARMONICS + 1)):
+        return 1  # a lone line so high may be anything's
+    return gcd(*seen) or 1
+
+
+STANDING_OUT_DB, GONE_DB = 24.0, 12.0
+"""By which a line stands out of a few revolutions where it can be followed, and below its usual level is gone: noise
+alone leaves 24 dB, and two lines that beat do not vanish together."""
+
+
+def detect_standstill(signals: AnalysisSignals) -> list[Finding]:
+    """Report that the lines of shafts and meshes are gone for a while, where no tachometer tells the speed.
+
+    A stated speed, or one estimated from the lines of most of the record, knows nothing of a stop or a reversal.
+    """
+    angle = signals.angle
+    if angle is None or angle.method not in ("constant", "tachless") or not angle.is_steady():
+        return []
+    gone = _without_lines(signals)
+    if gone is None:
+        return []
+    start_s, end_s = (angle.start_s + turns / angle.n_revolutions * (angle.end_s - angle.start_s) for turns in gone)
+    title = f"The lines of shafts and meshes are gone between {start_s:.3g} and {end_s:.3g} s: the machine stands then,"
+    where = Where(shaft=angle.shaft, time_s=(start_s, end_s))
+    title += " turns back or turns at another speed."
+    return [Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO)]
+
+
+def _without_lines(signals: AnalysisSignals) -> tuple[float, float] | None:
+    """Return from and to which revolution no line of a shaft or mesh is there, None where some always is.
+
+    Blocks of a few revolutions at half overlap are looked at, as short as two orders' lines stand out of them.
+    """
+    signal = signals.over_angle
+    orders = {h * order for order in signals.known_mesh_orders.values() for h in range(1, N_HARMONICS + 1)}
+    orders |= {h * order for order in signals.known_shaft_orders.values() for h in range(1, N_COUNTED + 1)}
+    for n_turns in (4, 8, 16) if signal is not None else ():
+        assert signal is not None  # noqa: S101 - no turns without it; narrows the type
+        n_block = n_turns * signal.samples_per_revolution
+        starts = np.arange(0, signal.samples.shape[1] - n_block + 1, n_block // 2)
+        places = sorted({round(order * n_turns) for order in orders if order > 0.5})
+        if len(starts) < 8:
+            break
+        courses: dict[int, list[FloatArray]] = {}
+        for values in signal.samples:
+            blocks = np.stack([values[start : start + n_block] for start in starts])
+            levels = np.abs(np.fft.rfft(blocks * np.hanning(n_block), axis=1))
+            for place in places:
+                beside = n_turns // 2  # half an order, between the sidebands
+                if place + beside >= levels.shape[1]:
+                    continue
+                course = levels[:, place - 1 : place + 2].max(axis=1)
+                usual = float(np.percentile(course, 75))
+                noise = float(np.median(levels[:, [place - beside, place + beside]]))
+                if usual > noise * 10 ** (STANDING_OUT_DB / 20):
+                    courses.setdefault(place, []).append(course / usual)
+        if len(courses) < 2:
+            continue
+        highest = np.max([course for every in courses.values() for course in every], axis=0)
+        gone = np.flatnonzero(highest < 10 ** (-GONE_DB / 20))
+        if not len(gone):
+            return None
+        return float(gone[0] * n_turns / 2), float(gone[-1] * n_turns / 2 + n_turns)
+    return None
 
 
 def detect_mesh(signals: AnalysisSignals) -> list[Finding]:

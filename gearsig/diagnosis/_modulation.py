@@ -309,11 +309,21 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
         evidence += [f"The spacing is 1/{n} {of_speed} {n}." for n in wrong[:1]]
     where = signals.where(comb.fundamental, channel, gear=pair.name)
     ratio = max(comb.ratios_db, default=None)
+    code, kind, which = "sidebands-of-unknown-shaft", Kind.NOTICE, "which no known shaft explains"
+    miscounted = _miscounted(signals, pair, teeth)
+    if miscounted is not None:
+        shaft, counted = miscounted
+        code, kind = "teeth-disagree", Kind.CANNOT_TELL
+        which = f"as {round(teeth)} teeth on shaft {shaft} instead of {counted} would make: check the teeth"
+        evidence.append(
+            "The speed was found from the mesh by its teeth; a shaft that is not in the rig file may do it."
+        )
+        surer = f"Count the teeth on shaft {shaft}, or measure the speed."
     yield Finding(
-        "sidebands-of-unknown-shaft",
-        Kind.NOTICE,
+        code,
+        kind,
         f"The mesh of {pair.name} has sidebands spaced by order {comb.fundamental:.4f} of {where.order_shaft} "
-        f"({signals.hertz_text(comb.fundamental, 4)}), which no known shaft explains.",
+        f"({signals.hertz_text(comb.fundamental, 4)}), {which}.",
         replace(where, frequency_hz=None),
         Strength(comb.amplitude, excess.spectrum.unit, comb.floor, "what lies beside it in the order spectrum", ratio),
         confidence=from_p_value(p_value, prior=0.3, limit=0.99),
@@ -322,6 +332,20 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
         evidence=tuple(evidence),
         surer=surer,
     )
+
+
+def _miscounted(signals: AnalysisSignals, pair: GearPair, teeth: float) -> tuple[str, int] | None:
+    """Return the shaft and the stated teeth of the gear that really has `teeth`, None where it is none.
+
+    A speed that was found from the mesh is wrong as the teeth are: the mesh stands where it should, and the sidebands
+    of the miscounted gear's shaft a little beside. Up to a tenth more or less, another shaft is not as likely.
+    """
+    if signals.angle is None or signals.angle.method != "tachless" or abs(teeth - round(teeth)) > 0.05:
+        return None
+    for shaft, stated in ((pair.driver, pair.driver_teeth), (pair.driven, pair.driven_teeth)):
+        if stated is not None and 0 < abs(round(teeth) - stated) <= 0.1 * stated:
+            return shaft, stated
+    return None
 
 
 MOST_PARTS = 16

@@ -7,9 +7,19 @@ from dataclasses import dataclass, replace
 from math import isfinite, log10
 from pathlib import Path
 
-from gearsig.diagnosis._types import MIN_CHANGE_DB, REFERENCE_UNFIT, Analysis, Finding, Kind, LevelChange, Where
+from gearsig.diagnosis._types import (
+    MIN_CHANGE_DB,
+    REFERENCE_NOT_HEALTHY,
+    REFERENCE_UNFIT,
+    Analysis,
+    Finding,
+    Kind,
+    LevelChange,
+    Outcome,
+    Where,
+)
 from gearsig.errors import InputError
-from gearsig.formatting import signed
+from gearsig.formatting import percent, signed
 from gearsig.indicators import Indicator
 from gearsig.rig import Rig, SpeedSource
 
@@ -148,6 +158,36 @@ def reference_unfit(reference: Analysis) -> Finding:
         surer="State the reference's sampling rate with --reference-fs, or rate and speed in a rig file beside it "
         "(NAME.toml), or take another one.",
     )
+
+
+def reference_not_healthy(reference: Analysis, *, shows_fault: bool) -> list[Finding]:
+    """Say which fault a reference shows itself: what it has is not new, and what has fallen is no improvement.
+
+    Parameters
+    ----------
+    reference : Analysis
+        Of the reference alone.
+    shows_fault : bool
+        Whether the recording shows one; else the two may have been exchanged.
+    """
+    if reference.outcome is not Outcome.FAULT:
+        return []
+    fault = next(f for f in reference.findings if f.kind is Kind.FAULT)
+    exchanged = "" if shows_fault else " This recording shows none: the two may have been exchanged."
+    return [
+        Finding(
+            REFERENCE_NOT_HEALTHY,
+            Kind.DATA_PROBLEM,
+            f"The reference is not healthy itself: {fault.title.removesuffix('.')} (at most "
+            f"{percent(fault.confidence)} sure).{exchanged}",
+            fault.where,
+            fault.strength,
+            fault.confidence,
+            fault.confidence_basis,
+            fault.evidence,
+            "A recording of the machine when it was healthy.",
+        )
+    ]
 
 
 def beside_reference(

@@ -50,8 +50,8 @@ MIN_CHANGE_DB = 6.0
 CHANGED, UNCHANGED = "changed-since-reference", "unchanged-since-reference"
 """Codes of the findings that levels have changed since the reference, or not."""
 
-REFERENCE_UNFIT = "reference-unfit"
-"""Code of the finding that a given reference is not compared, and why."""
+REFERENCE_UNFIT, REFERENCE_NOT_HEALTHY = "reference-unfit", "reference-not-healthy"
+"""Codes of the findings that a given reference is not compared, and why; and that it shows a fault itself."""
 
 HINDERING = (
     *("channel-clipped", "channel-stuck", "channel-dead", "channel-wrapped", "channel-stepped", "channel-reversed"),

@@ -6,13 +6,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from gearsig.angle import ShaftAngle
-from gearsig.diagnosis._lines import MESH_ELSEWHERE, SPEED_UNKNOWN
+from gearsig.diagnosis._lines import MESH_ELSEWHERE, NEAR_ZERO, SPEED_UNKNOWN, SURER_BEYOND_ZERO
 from gearsig.diagnosis._overall import VIBRATION_ZONE
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import (
     CHANGED,
     EXAMINED,
     HINDERING,
+    REFERENCE_NOT_HEALTHY,
     REFERENCE_UNFIT,
     UNCHANGED,
     CannotTell,
@@ -53,17 +54,17 @@ def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) -> str:
     """Return the sentences a hurried reader takes away: a doubtful rate, what has changed, what it comes to.
 
-    Why a given reference did not help is always part of it.
+    Why a given reference did not help, or that it shows a fault itself, is always part of it.
     """
     doubt = said_first(findings, claims=outcome_of(findings) in (Outcome.FAULT, Outcome.SUSPICION))
-    unfit = next((f.title for f in findings if f.code == REFERENCE_UNFIT), "")
+    unfit = next((f.title for f in findings if f.code in (REFERENCE_UNFIT, REFERENCE_NOT_HEALTHY)), "")
     zone = next((f.title for f in findings if f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE), "")
     changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
     others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED))
     claims = [f for f in others if f.is_claim]
     # A change that no pattern explains is a suspicion by itself, and said already.
     if not claims and outcome_of(findings) is Outcome.SUSPICION:
-        return " ".join(filter(None, (doubt, changed, zone)))  # with a change, the reference was compared
+        return " ".join(filter(None, (doubt, changed, zone, unfit)))
     said = _said(others, has_reference=has_reference)
     if zone and said.startswith(NO_FAULT):
         said = f"{zone} What is wrong does not show.{said.removeprefix(NO_FAULT)}"
@@ -145,7 +146,7 @@ def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset
 # --------------------
 
 
-OFF_NOMINAL, NEAR_ZERO = "speed-off-nominal", "speed-near-zero"
+OFF_NOMINAL = "speed-off-nominal"
 MAINS_OR_SHAFT = "line-of-mains-or-shaft"
 
 TRUST = {
@@ -204,8 +205,8 @@ def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
         )
     if low < NEAR_ZERO_SHARE * high:
         title = f"The speed falls to {low:.3g} rpm, near standstill: whether the shaft turns on or back is not told."
-        surer = "An encoder, which tells the direction; or analyse the parts before and after by themselves."
-        found.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, Where(shaft=angle.shaft), surer=surer))
+        where = Where(shaft=angle.shaft)
+        found.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO))
     return found
 
 

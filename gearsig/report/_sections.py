@@ -329,13 +329,15 @@ def setting_text(name: str, value: str | float | int | None) -> str:
 
 
 def reference_text(reference: Analysis | None) -> str:
-    """Return which recording was compared with; empty without one. What the reference itself shows is told."""
+    """Return which recording was compared with, and what it gives a suspicion of; empty without one.
+
+    Of a fault of the reference the verdict tells.
+    """
     if reference is None:
         return ""
     text = f"Compared with {reference.recording.provenance.source or 'a reference'}"
-    itself = {Outcome.FAULT: "is not healthy itself", Outcome.SUSPICION: "gives a suspicion itself"}
-    if reference.outcome in itself:
-        return f"{text}, which {itself[reference.outcome]}: {reference.verdict}"
+    if reference.outcome is Outcome.SUSPICION:
+        return f"{text}, which gives a suspicion itself: {reference.verdict}"
     return f"{text}."
 
 

@@ -126,10 +126,19 @@ def test_a_reference_without_a_rate_asks_for_its_own_option(tmp_path: Path) -> N
 
 
 def test_a_reference_that_is_suspected_is_not_called_faulty() -> None:
-    good = good_analysis()
-    for kind, said in ((Kind.FAULT, "is not healthy itself"), (Kind.SUSPICION, "gives a suspicion itself")):
-        then = replace(good, findings=(Finding("bearing-outer-race", kind, "Damage."),), verdict="Damage.")
-        assert reference_text(then).endswith(f", which {said}: Damage.")
+    then = replace(good_analysis(), findings=(Finding("bearing-outer-race", Kind.SUSPICION, "D."),), verdict="D.")
+    assert reference_text(then).endswith(", which gives a suspicion itself: D.")
+
+
+@pytest.mark.slow
+def test_a_reference_that_is_damaged_itself_is_said_to_be_so() -> None:
+    sound, outer, inner = (motor(race, 1) for race in ("", "BPFO", "BPFI"))
+    beside = analyze(inner, reference=outer)
+    said = finding(beside, "reference-not-healthy")
+    assert (said.where.bearing, said.title in beside.verdict) == ("drive end", True)
+    assert "exchanged" not in said.title
+    assert "exchanged" in finding(analyze(sound, reference=outer), "reference-not-healthy").title
+    assert "reference-not-healthy" not in codes(analyze(outer, reference=sound))
 
 
 def test_without_a_reference_nothing_is_compared() -> None:
