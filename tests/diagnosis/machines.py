@@ -66,12 +66,12 @@ MOTOR = Rig(
 
 
 @cache
-def motor(race: str, seed: int) -> Recording:
+def motor(race: str, seed: int, multiples: tuple[int, ...] = (1, 2, 3, 4, 5, 6)) -> Recording:
     """A motor with its shaft's lines in noise, and a damaged race or element whose impacts ring at 2.8 kHz."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(6.0 * MOTOR_RATE_HZ)) / MOTOR_RATE_HZ
     x = rng.standard_normal(len(t))
-    for k in range(1, 7):
+    for k in multiples:
         x += rng.uniform(0.1, 0.5) * np.cos(2 * np.pi * k * MOTOR_HZ * t + rng.uniform(0, 6))
     if race:
         rate_hz = {"BPFO": 3.585, "BPFI": 5.415, "BSF": 2 * 2.357}[race] * 0.997 * MOTOR_HZ

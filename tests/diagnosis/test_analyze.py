@@ -9,7 +9,7 @@ from gearsig.diagnosis import Analysis, CannotTell, Kind, Outcome, analyze
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
 from gearsig.report import analysis_text
-from gearsig.rig import ConstantSpeed, GearPair, TachometerChannel
+from gearsig.rig import ConstantSpeed, GearPair, OperatingPoint, TachometerChannel
 from sims.measure import Tachometer
 from tests.diagnosis.machines import GOOD, RIG, codes, finding, good_analysis, record
 from tests.kinematic.model import BearingFault, MeshModulation, ToothDamage
@@ -72,6 +72,23 @@ def test_a_wheel_whose_teeth_are_not_given_shows_by_its_sidebands() -> None:
     found = finding(analysis, "sidebands-of-unknown-shaft")
     assert found.where.order == pytest.approx(27 / 43, abs=0.002)
     assert any("43 teeth" in text for text in found.evidence)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("pinion", "wheel", "said"), [(26, 43, "27 teeth on shaft in"), (27, 45, "43 teeth on shaft out")]
+)
+def test_miscounted_teeth_of_a_speed_that_is_found_by_them_are_noticed(pinion: int, wheel: int, said: str) -> None:
+    """The mesh is where speed and teeth put it, as the speed is wrong as well; the sidebands are not."""
+    steady = record(replace(GOOD, speed=ConstantProfile(1320.0)), seconds=6.0).select(["a1"])
+    miscounted = (GearPair("stage", "in", "out", pinion, wheel),)
+    rig = replace(RIG, pairs=miscounted, operating_point=OperatingPoint("in", 1320.0))
+    analysis = analyze(replace(steady, speed=None, rig=rig))
+    assert said in finding(analysis, "teeth-disagree").title
+    assert analysis.outcome is Outcome.CANNOT_TELL
+    if pinion != 27:  # a stated speed goes before the one that these teeth ask for
+        stated = analyze(replace(steady, speed=ConstantSpeed(1320.0, "in"), rig=rig))
+        assert finding(stated, "teeth-disagree").where.order == pytest.approx(27.0, abs=0.02)
 
 
 def test_strong_modulation_by_a_shaft_is_a_suspicion_where_the_reference_lacks_it() -> None:

@@ -19,7 +19,7 @@ from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft, SpeedChannel
 from gearsig.spectra import amplitude_spectrum
 from sims.measure import ColouredNoise
-from tests.diagnosis.machines import GOOD, RIG, SAMPLING_RATE_HZ, codes, finding, record
+from tests.diagnosis.machines import GOOD, RIG, SAMPLING_RATE_HZ, codes, finding, motor, record
 from tests.kinematic.model import BearingFault, KinematicModel, SensorChannel
 from tests.kinematic.speed import ConstantProfile
 
@@ -201,6 +201,20 @@ def test_a_family_beyond_slip_of_a_stated_speed_may_be_the_part() -> None:
     assert found.confidence <= 0.5
     assert found.title.startswith("May be the outer race")
     assert "not confirmed" in found.title
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("multiples", "is_sure"), [((2, 3), True), ((6,), True), ((2, 4, 6), False)])
+def test_a_part_is_unsure_where_a_shaft_of_twice_the_speed_has_the_same_lines(
+    multiples: tuple[int, ...], is_sure: bool
+) -> None:
+    analysis = analyze(motor("BPFO", 3, multiples))
+    (found,) = [f for f in analysis.findings if f.code.startswith("bearing")]
+    assert (found.kind, found.confidence > 0.5) == ((Kind.FAULT, True) if is_sure else (Kind.SUSPICION, False))
+    if not is_sure:
+        sound = analyze(motor("", 3, multiples))
+        assert codes(sound, Kind.CANNOT_TELL)[0] == "bearings-undecided"
+        assert "2 times" in sound.verdict
 
 
 @pytest.mark.parametrize("scale", [1.0005, 1.02])

@@ -8,9 +8,11 @@ import pytest
 
 from app.samples import sample_folder
 from gearsig import analyze
-from gearsig.diagnosis import Kind
+from gearsig.diagnosis import Kind, Outcome
 from gearsig.recording import Recording, find_problems, read_recording
-from gearsig.rig import ConstantSpeed, Rig, Shaft, read_rig
+from gearsig.rig import ConstantSpeed, OperatingPoint, Rig, Shaft, read_rig
+from tests.diagnosis.machines import GOOD, record
+from tests.kinematic.speed import ConstantProfile
 from tests.measured import BY_NAME, DATA, MOTOR, RECORDINGS, needs_data
 
 FOLDER = Path(sample_folder())
@@ -94,6 +96,26 @@ def test_spoiled_is_noticed_said_and_lowered(name):
     problems = {f.code for f in found.findings if f.kind is Kind.DATA_PROBLEM}
     assert problems <= codes | {"sampling-rate-doubtful", "channel-stuck"}
     assert any(seen[code].title in found.verdict for code in problems) or not problems
+
+
+@pytest.mark.slow
+def test_a_stop_or_a_reversal_is_noticed_without_a_tachometer():
+    """A stated speed, and one that most of the record shows, know nothing of it."""
+    steady = record(replace(GOOD, speed=ConstantProfile(1320.0)), seconds=6.0).select(["a1"])
+    steady = replace(steady, speed=None, rig=replace(steady.rig, operating_point=OperatingPoint("in", 1320.0)))
+    assert "speed-near-zero" not in {f.code for f in analyze(steady).findings}
+    time, noise = np.linspace(0, 1, steady.n_samples), np.random.default_rng(0).standard_normal(steady.n_samples)
+    stops = np.clip(np.maximum(0.4 - time, time - 0.65) * 20, 0, 1)
+    for course, speed in ((stops, ConstantSpeed(1320.0, "in")), (np.clip((0.5 - time) * 40, -1, 1), None)):
+        turned = np.cumsum(course) - np.cumsum(course).min()
+        x = np.interp(turned, np.arange(steady.n_samples), steady.values("a1")) + 0.02 * noise
+        found = analyze(replace(steady, samples=x[None].astype(np.float32), speed=speed))
+        (problem,) = [f for f in found.findings if f.code == "speed-near-zero"]
+        start_s, end_s = problem.where.time_s
+        assert start_s < 3.0 < end_s
+        assert end_s - start_s < 2.4
+        assert problem.title in found.verdict
+        assert found.outcome is Outcome.CANNOT_TELL
 
 
 def test_noise_tones_and_pulse_trains_have_no_such_problem():
