@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.diagnosis._lines import magnetic_pull_at
 from gearsig.diagnosis._signals import MINIMUM_LINES, SEEN_THERE, AnalysisSignals, BandEnvelope
-from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at
-from gearsig.recording import MAINS_HZ
+from gearsig.prepared import Comb, LinesOverFloor, best_comb, comb_at
 from gearsig.rig import Bearing
+from gearsig.spectra import Spectrum
 
 AS_STRONG_DB = 9.0
 """Scatter of a train's lines about a smooth course: a line of two resonances' beats is weakened by so much."""
@@ -137,6 +138,10 @@ N_MULTIPLES = 6
 """Of a family's fundamental that are looked at."""
 
 
+ALTERNATING_DB = 6.0
+"""By which the odd lines of half a rate lie below the even ones, where strikes at that rate are strong in turn."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """One family found, and what it may be.
@@ -163,6 +168,16 @@ class Candidate:
         highest = (N_MULTIPLES + 0.5) * self.comb.fundamental
         lines = zip(self.comb.positions, self.comb.ratios_db, strict=True)
         return float(sum(ratio for position, ratio in lines if position < highest)) / N_MULTIPLES
+
+    @property
+    def has_odd_lines(self) -> bool:
+        """Whether odd multiples are about as high as even ones: strikes twice as fast do not make them."""
+        highest_db = [0.0, 0.0]
+        for position, ratio_db in zip(self.comb.positions, self.comb.ratios_db, strict=True):
+            number = round(position / self.comb.fundamental)
+            if number <= N_MULTIPLES:
+                highest_db[number % 2] = max(highest_db[number % 2], ratio_db)
+        return highest_db[1] > highest_db[0] - ALTERNATING_DB
 
     @property
     def modulation(self) -> float:
@@ -442,7 +457,8 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         if name == candidate.name and abs(order / order_of_part - 1) < SAME_BEARING_ORDER:
             of_same_order.append(bearing)
             continue
-        slip = min((candidate.comb.fundamental / (order * m) - 1 for m in (0.5, 1.0, 2.0)), key=abs)
+        multiples = (1.0, 2.0) if candidate.has_odd_lines else (0.5, 1.0, 2.0)
+        slip = min((candidate.comb.fundamental / (order * m) - 1 for m in multiples), key=abs)
         if abs(slip) <= slip_of(signals):
             others += _weight(signals, name, slip) * (1.0 if near in (None, bearing) else 0.5)
             rivals.append(f"the {part_text(name, bearing.name)}")
@@ -476,9 +492,21 @@ def _shaft_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
     for shaft, order in signals.known_shaft_orders.items():
         k = round(own / order)
         is_beside = k >= 1 and 0 < abs(own / (k * order) - 1) <= BESIDE_SHAFT
-        if is_beside and spectrum.largest_near(k * order, 2 * spectrum.resolution)[1] >= 0.5 * amplitude:
+        if is_beside and _amplitude_beside(spectrum, k * order, own) >= 0.5 * amplitude:
             return f"the {k}-fold order of shaft {shaft or 'of reference'}"
     return ""
+
+
+def _amplitude_beside(spectrum: Spectrum, place: float, own: float) -> float:
+    """Return the largest amplitude within two lines of a place, without the lobe of another line where it reaches in.
+
+    Two places nearer to each other than two lines are one.
+    """
+    reach = 2 * spectrum.resolution
+    if abs(place - own) <= reach:
+        return spectrum.largest_near(own, reach)[1]
+    near = (np.abs(spectrum.positions - place) <= reach) & (np.abs(spectrum.positions - own) > 1.25 * reach)
+    return float(spectrum.values[near].max(initial=0.0))
 
 
 def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[int, list[str]]:
@@ -531,13 +559,7 @@ def _half_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
 
 def mains_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
     """Name the multiple of twice the mains' frequency that the family's fundamental is on: magnetic forces modulate."""
-    own_hz = candidate.comb.fundamental * signals.frequency_per_order_hz
-    for mains_hz in MAINS_HZ:
-        pull_hz = 2 * mains_hz
-        k = round(own_hz / pull_hz)
-        if k and abs(own_hz / (k * pull_hz) - 1) <= MAINS_TOLERANCE:
-            return f"the magnetic pull of a {mains_hz:g} Hz supply ({k * pull_hz:g} Hz)"
-    return ""
+    return magnetic_pull_at(candidate.comb.fundamental * signals.frequency_per_order_hz)
 
 
 def _elements_differ(signals: AnalysisSignals, candidate: Candidate) -> bool:

@@ -12,7 +12,14 @@ from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
-from gearsig.prepared import RUN_UP_FOOT_ORDERS, LinesOverFloor, lines_over_noise_floor, neighbour_levels, peak_position
+from gearsig.prepared import (
+    MAINS_TOLERANCE,
+    RUN_UP_FOOT_ORDERS,
+    LinesOverFloor,
+    lines_over_noise_floor,
+    neighbour_levels,
+    peak_position,
+)
 from gearsig.recording import MAINS_HZ, MAINS_WANDER
 from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
@@ -436,6 +443,16 @@ def _is_synchronous(signals: AnalysisSignals, hertz: float, slower: float) -> bo
     return any(abs(order / o - round(order / o)) * o < 0.01 for o in candidates)
 
 
+def magnetic_pull_at(hertz: float) -> str:
+    """Name the multiple of twice the mains' frequency that a frequency is on; empty if it is on none."""
+    for mains_hz in MAINS_HZ:
+        pull_hz = 2 * mains_hz
+        k = round(hertz / pull_hz)
+        if k and abs(hertz / (k * pull_hz) - 1) <= MAINS_TOLERANCE:
+            return f"the magnetic pull of a {mains_hz:g} Hz supply ({k * pull_hz:g} Hz)"
+    return ""
+
+
 def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding | None:
     """Return the strongest order line that is no multiple of a known shaft's order, and no low one of a bearing's."""
     best: tuple[float, str, int, LinesOverFloor] | None = None
@@ -471,13 +488,14 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
         "The strongest line of no single shaft or mesh" if origin else "The strongest line of no known shaft or mesh"
     )
     evidence = [] if origin or hunting is None else [f"It is near {hunting[1]}, as chance may have it."]
+    pull = "" if signals.speed_varies else magnetic_pull_at(line.position * signals.frequency_per_order_hz)
     if signals.rig.bearings:
         evidence.append(f"The first {BEARING_MULTIPLES} multiples of the bearings' orders are left aside.")
     title += f" is at order {line.position:.4f} ({signals.hertz_text(line.position)})"
     return Finding(
         "unexplained-line",
         Kind.NOTICE,
-        f"{title}: {origin}." if origin else f"{title}.",
+        f"{title}: {origin or pull}." if origin or pull else f"{title}.",
         replace(where, order_shaft=excess.spectrum.shaft),
         line.strength("noise floor"),
         0.95,
