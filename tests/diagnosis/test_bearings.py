@@ -359,6 +359,16 @@ def test_impacts_at_twice_a_parts_order_are_not_the_parts() -> None:
     assert all(f.confidence < 0.5 for f in analysis.findings if f.code in NAMED)
 
 
+def test_a_part_of_twice_the_rate_is_no_rival_where_odd_lines_are_as_high() -> None:
+    recording = at_sensors(1.7597, (6.0, 2.0))  # twice that is 1.8 % from the drive end's outer race
+    assert recording.rig is not None
+    slow = Bearing("slow", recording.rig.shafts[0].name, bpfi_order=1.7597)
+    analysis = analyze(replace(recording, rig=replace(recording.rig, bearings=(*recording.rig.bearings, slow))))
+    found = finding(analysis, "bearing-inner-race")
+    assert found.where.bearing == "slow"
+    assert found.confidence > 0.9
+
+
 def outer_race_at(order: float, n: int, name: str) -> Bearing:
     """Return a bearing of n balls whose outer race strikes at an order."""
     return Bearing(name, "motor", n, 40.0 * (1 - 2 * order / n), 40.0)
