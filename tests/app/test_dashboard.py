@@ -67,7 +67,7 @@ def test_views_draw_what_they_promise() -> None:
     assert drawn["Waveform"] == (2, 0, 1)
     assert drawn["Speed"] == drawn["Spectrum"] == drawn["Order spectrum"] == drawn["Envelope"] == (1, 0, 0)
     assert drawn["Map"] == (1, 0, 0)
-    assert drawn["Average"] == (1, 1, 0)
+    assert drawn["Average"] == (1, 0, 0)  # its ring stands beside the verdict
     assert drawn["Machine"] == (0, 0, 5)
     page.session_state[state.TAB] = "Machine"
     page.run()
@@ -391,17 +391,25 @@ def test_a_machine_that_starts_and_stops_opens_on_its_motion(tmp_path) -> None:
 
 def test_a_zoomed_ring_of_teeth_is_kept_in_the_address_and_reads_off_its_values() -> None:
     page = opened(tab="Average")
-    (ring,) = pictures(page)
+    (ring,) = sent_to(page, "picture")  # once: that of the verdict
     assert ring["shown"] is None
     assert ring["ring"]["teeth"] == 29
     values = numbers(ring["ring"]["curves"][0]["values"])
     tooth = 1 + int(29 * np.argmax(np.abs(values)) / len(values))
     assert tooth == 12
-    key = key_of("ring of a1 input residual")
-    page.session_state[state.ZOOMS] = {key: [200.0, 300.0, 100.0, 200.0]}
+    page.session_state[state.ZOOMS] = {key_of("verdict tooth"): [200.0, 300.0, 100.0, 200.0]}
     page.run()
-    assert pictures(page)[0]["shown"] == [200.0, 300.0, 100.0, 200.0]
+    assert sent_to(page, "picture")[0]["shown"] == [200.0, 300.0, 100.0, 200.0]
     assert page.query_params["zoom"].endswith("_200_300_100_200")
+
+
+def test_the_average_of_a_crack_opens_on_what_changed_since_the_reference() -> None:
+    page = opened("root_crack_3mm", tab="Average")
+    (ring,) = sent_to(page, "picture")
+    (average,) = figures(page)
+    assert "change" in average["y"]
+    values, over_angle = numbers(ring["ring"]["curves"][0]["values"]), numbers(average["lines"][0]["y"])
+    assert np.abs(values).max() == pytest.approx(np.abs(over_angle).max(), rel=0.2)
 
 
 def test_numbers_of_tables_have_a_minus_sign_and_are_sorted_by_what_they_are() -> None:

@@ -38,6 +38,7 @@ from gearsig.plot import (
     value_limits,
     with_unit,
 )
+from gearsig.report import verdict_picture
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
@@ -184,6 +185,7 @@ def _is_of(cursor: Cursor, position: float) -> bool:
 
 
 KINDS = {
+    "change": "What differs from the reference at the same angle: what both have in common, such as the mesh, is gone.",
     "residual": "Without the mesh harmonics: a single damaged tooth stands out here.",
     "difference": "Without the mesh harmonics and their first sidebands: what is left is local.",
     "average": "The mean revolution: mesh cycles, and whatever returns every turn.",
@@ -192,21 +194,28 @@ KINDS = {
 
 
 def show_average(analysis: Analysis, channel: ChannelAnalysis) -> None:
-    """Show one mean revolution of a chosen shaft."""
+    """Show one mean revolution of a chosen shaft: at first the signal that the verdict is seen in best."""
+    averages, picture = dict(channel.averages), verdict_picture(analysis)
+    shown = picture if picture is not None and picture.about == "tooth" and picture.channel is channel else None
+    if shown is not None and shown.change is not None:
+        averages[shown.shaft, "change"] = shown.change
     shafts = list(dict.fromkeys(shaft for shaft, _ in channel.averages))
     if not shafts:
         st.info("There is no synchronous average: it takes a known speed and enough revolutions.")
         return
     left, right = st.columns((1, 2), vertical_alignment="bottom")
-    key = state.view_key("average shaft", analysis)
-    shaft = address.ask_one(left.selectbox, "Shaft", shafts, key=key, name="shaft")
-    kinds = [kind for kind in KINDS if (shaft, kind) in channel.averages]
+    key, first = state.view_key("average shaft", analysis), shown.shaft if shown is not None else shafts[0]
+    shaft = address.ask_one(left.selectbox, "Shaft", shafts, first=first, key=key, name="shaft")
+    kinds = [kind for kind in KINDS if (shaft, kind) in averages]
     key = state.view_key(f"average kind {kinds}", analysis)
     looks = {"key": key, "name": "signal", "format_func": str.capitalize}
-    kind = address.ask_one(right.segmented_control, "Signal", kinds, **looks)
-    n_teeth = teeth_choice(analysis, shaft)
-    _show(analysis, channel.averages[shaft, kind], n_teeth)
-    st.caption(f"{KINDS[kind]} Band: ± 2 standard errors of the mean, from the scatter of the revolutions.")
+    average = averages[shaft, address.ask_one(right.segmented_control, "Signal", kinds, **looks)]
+    is_above = shown is not None and average is shown.average
+    _show(analysis, average, teeth_choice(analysis, shaft), is_above=is_above)
+    words = KINDS[average.kind]
+    if average.kind != "change":
+        words += " Band: ± 2 standard errors of the mean, from the scatter of the revolutions."
+    st.caption(f"{words} The same as a ring stands beside the verdict." if is_above else words)
 
 
 def teeth_choice(analysis: Analysis, shaft: str) -> int | None:
@@ -222,8 +231,13 @@ def teeth_choice(analysis: Analysis, shaft: str) -> int | None:
     return gears[address.ask_one(st.selectbox, "Gear", list(gears), first=list(gears)[first], **looks)]
 
 
-def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) -> None:
+def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, *, is_above: bool) -> None:
+    """Show the ring of teeth beside the same over the angle, which alone is shown of a ring that the page has above."""
     marks = marks_of(analysis.findings, average.shaft, n_teeth)
+    cursors = [Cursor(mark.angle_deg, "finding", mark.label) for mark in marks]
+    if is_above:
+        _show_unrolled(analysis, average, n_teeth, cursors)
+        return
     seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
     words = f"Polar picture: {average.kind} of {average.channel} over one revolution of {average.shaft}{seen}"
     with st.container(key="average"):
@@ -231,10 +245,9 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None) 
         with polar:
             key = f"ring of {average.channel} {average.shaft} {average.kind}"
             ring = show_ring(average, n_teeth, marks, words, state.view_key(key, analysis))
-            drawn = partial(polar_figure, average, n_teeth=n_teeth, marks=marks)
-            offer_picture(ring, drawn, f"ring-{average.shaft} of {average.channel} {average.kind}")
+            offer_ring(ring, average, n_teeth, marks)
         with unrolled:
-            _show_unrolled(analysis, average, n_teeth, [Cursor(m.angle_deg, "finding", m.label) for m in marks])
+            _show_unrolled(analysis, average, n_teeth, cursors)
 
 
 def show_ring(
@@ -249,11 +262,19 @@ def show_ring(
     return svg
 
 
+def offer_ring(svg: str, average: SynchronousAverage, n_teeth: int | None, marks: Sequence[AngleMark]) -> None:
+    """Offer the ring of teeth as files."""
+    drawn = partial(polar_figure, average, n_teeth=n_teeth, marks=marks)
+    offer_picture(svg, drawn, f"ring-{average.shaft} of {average.channel} {average.kind}")
+
+
 def _show_unrolled(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, marks: list[Cursor]) -> None:
     """Show the same over the angle, with its largest swing in words."""
     values, error = average.values, 2 * average.standard_error
     angle = np.arange(len(values)) * 360 / len(values)
-    line = ChartLine(angle, values, average.kind, band=(values - error, values + error))
+    # the scatter of a change is that of two recordings, of which this one's alone is known here
+    band = None if average.kind == "change" else (values - error, values + error)
+    line = ChartLine(angle, values, average.kind, band=band)
     key = state.view_key(f"average {average.channel} {average.shaft} {average.kind}", analysis)
     x, y = f"angle of {average.shaft or 'the shaft'} (deg)", with_unit(average.kind, average.unit)
     show_lines(LinePanel([line], x, y, cursors=marks, x_limits=(0.0, 360.0)), key, height_px=360)

@@ -12,7 +12,7 @@ from app.dashboard import state
 from app.dashboard.theme import as_typed, one_line, unbroken
 from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.messages import in_page_words
-from app.dashboard.widgets.spectrum import show_ring, show_spectrum
+from app.dashboard.widgets.spectrum import offer_ring, show_ring, show_spectrum
 from gearsig.diagnosis import BEARING_PARTS, CHANGED, Analysis, Finding, Kind, Outcome
 from gearsig.formatting import counted, enumerated, signed
 from gearsig.plot import marks_of
@@ -142,7 +142,10 @@ def show_verdict_picture(analysis: Analysis) -> None:
         marks = marks_of(analysis.findings, picture.shaft, teeth)
         stand_out = f"{enumerated([mark.label for mark in marks])} {'stand' if len(marks) > 1 else 'stands'} out"
         words = f"Mean revolution of {picture.shaft}: {stand_out if marks else 'no tooth stands out'}"
-        show_ring(picture.average, teeth, marks, words, state.view_key(place, analysis))
+        average = picture.average
+        ring = show_ring(average, teeth, marks, words, state.view_key(place, analysis))
+        with st.container(key="verdict-files"):
+            offer_ring(ring, average, teeth, marks)
         return
     if picture.about == "resonance":
         panel, marked_points = level_panel(analysis, channel)

@@ -41,6 +41,7 @@ from gearsig.report import (
     page_pdf,
     provenance_rows,
     speed_is_constant,
+    verdict_picture,
 )
 
 if TYPE_CHECKING:
@@ -75,16 +76,15 @@ STARTS_AND_STOPS = (
 
 
 def show_of_channel(analysis: Analysis, view: Callable[[Analysis, ChannelAnalysis], None]) -> None:
-    """Show a view of the channel that the user chooses; the first is the one with the most important finding."""
+    """Show a view of the channel that the user chooses; the first is the one that the verdict's picture is of."""
     channels = {channel.channel: channel for channel in analysis.channels}
     if not channels:
         is_unsteady = any(finding.code == "start-stop" for finding in analysis.findings)
         st.info(STARTS_AND_STOPS if is_unsteady else "There is no vibration channel with a signal.")
         return
-    named = [name for finding in analysis.findings for name in finding.where.channels if name in channels]
-    names = list(dict.fromkeys([*named, *channels]))
-    name = names[0]
-    if len(names) > 1:
+    picture = verdict_picture(analysis)
+    name = picture.channel.channel if picture is not None else next(iter(channels))
+    if len(channels) > 1:
         # By what comes first: another machine is another verdict, which may rest on another channel.
         looks = {
             "key": state.view_key(f"{state.CHANNEL} {name}", analysis),
