@@ -677,10 +677,16 @@ function ticks(low, high, n, steps = null) {
   return range(first, Math.min(last, first + 50)).map((k) => k * step);
 }
 
-// Days since 1970: steps of hours, days, weeks, months and years by their lengths.
+// Days since 1970: steps of hours and days; of weeks, which begin on Mondays; from there on starts of months or years.
 function days(low, high, n) {
-  const rough = (high - low) / Math.max(n, 1), step = [1 / 24, 1 / 4, 1, 2, 7, 14, 30, 91, 182, 365, 1826].find((length) => length >= rough) ?? 3652;
-  return range(Math.ceil(low / step - 1e-9), Math.floor(high / step + 1e-9)).map((k) => k * step);
+  const rough = (high - low) / Math.max(n, 1), step = [1 / 24, 1 / 4, 1, 2, 7, 14].find((length) => length >= rough);
+  if (step) {
+    const start = step < 7 ? 0 : 4; // 1970-01-05 was a Monday
+    return range(Math.ceil((low - start) / step - 1e-9), Math.floor((high - start) / step + 1e-9)).map((k) => start + k * step);
+  }
+  const months = [1, 2, 3, 6, 12, 24, 60, 120, 240].find((count) => 30.5 * count >= rough) ?? 600;
+  const monthOf = (day) => new Date(day * 864e5).getUTCFullYear() * 12 + new Date(day * 864e5).getUTCMonth();
+  return range(Math.floor(monthOf(low) / months), Math.ceil((monthOf(high) + 1) / months)).map((k) => Date.UTC(2000, k * months - 24000) / 864e5).filter((day) => day >= low && day <= high);
 }
 
 function date(day) {
