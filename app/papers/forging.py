@@ -143,7 +143,7 @@ def _force_figure(estimate: ForceEstimate, mode: str) -> Figure:
         "piecewise": estimate.forces_n[PIECEWISE][shown],
         "Hunt–Crossley": estimate.forces_n[HUNT_CROSSLEY][shown],
     }
-    forces = {"torque / rb1": measured} | models
+    forces = {FROM_TORQUE: measured} | models
     errors = {name: force - measured for name, force in models.items()}
     panels = [
         CurvePanel(time[shown], {k: 1e-3 * v for k, v in curves.items()}, "time (s)", f"{label} (kN)", title)

@@ -177,7 +177,7 @@ AS_PRINTED = "piecewise, as printed"
 HUNT_CROSSLEY = "Hunt–Crossley"
 KELVIN_VOIGT = "Kelvin–Voigt"
 TEETH = "piecewise, teeth alone"
-FROM_TORQUE, TOOTH_FORCE = "torque / rb1", "tooth force"
+FROM_TORQUE, TOOTH_FORCE = "torque / base radius", "tooth force"
 
 
 def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> ForceEstimate:

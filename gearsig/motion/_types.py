@@ -158,7 +158,7 @@ class ForceEstimate(Result):
     forces_n : mapping
         Model → (n,).
     references_n : mapping
-        "torque / rb1" or "tooth force" → (n,); empty where nothing was measured.
+        "torque / base radius" or "tooth force" → (n,); empty where nothing was measured.
     errors : tuple of ForceError
         Of every model against every reference it can be compared with.
     descriptions : mapping

@@ -354,6 +354,6 @@ def noise_figure(study: motions.NoiseStudy, *, title: str = "") -> Figure:
     if study.crossover_um is not None:
         axes.axvline(study.crossover_um, color=style.FLOOR, linewidth=0.9)
         style.note(axes, f"grey line: no longer nearer from {study.crossover_um:.3g} µm on")
-    style.label_axes(axes, "noise added to the compression (µm rms)", f"error against {study.reference} (kN rms)")
+    style.label_axes(axes, "noise added to the compression (µm rms)", f"rms error against {study.reference} (kN)")
     series.head(figure, title or "error over noise", lines)
     return figure

@@ -57,10 +57,10 @@ def force_text(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
     ]
     if estimate.errors:
         lines.append(
-            f"{'model':<24} {'against':<14} {'rms N':>10} {'rms %':>8} {'bias N':>10} {'largest N':>11} {'r':>7}"
+            f"{'model':<24} {'against':<20} {'rms N':>10} {'rms %':>8} {'bias N':>10} {'largest N':>11} {'r':>7}"
         )
         lines += [
-            f"{e.model:<24} {e.reference:<14} {e.rms_n:>10.1f} {100 * e.relative_rms:>8.1f} {e.bias_n:>10.1f} "
+            f"{e.model:<24} {e.reference:<20} {e.rms_n:>10.1f} {100 * e.relative_rms:>8.1f} {e.bias_n:>10.1f} "
             f"{e.largest_n:>11.1f} {e.correlation:>7.3f}"
             for e in estimate.errors
         ]
@@ -76,7 +76,7 @@ def force_text(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
     if limit is not None:
         each = motion.contact.driver_inertia_kg_m2 / motion.path.base_radii_m[0]
         text = (
-            f"Noise on the driver's acceleration adds J1/rb1 = {each:.3g} N per rad/s²: the piecewise model is nearer "
+            f"Noise on the driver's acceleration adds J1/r_b1 = {each:.3g} N per rad/s²: the piecewise model is nearer "
             f"up to {limit:.0f} rad/s² rms. Noise on the speeds moves the damping alone."
         )
         lines.append(fill(text, WIDTH))

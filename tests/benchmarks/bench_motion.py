@@ -37,7 +37,7 @@ def recorded(preset: str, rate_hz: float = 1000.0, seed: int = 0, **parameters: 
 
 
 def forces() -> None:
-    print("force against torque / rb1: rms error in N over noise added to the compression")
+    print("force against torque / base radius: rms error in N over noise added to the compression")
     for preset in PRESETS:
         for mode in ("start-stop", "continuous"):
             study = noise_study(recorded(preset, mode=mode), rng=np.random.default_rng(1))

@@ -26,20 +26,20 @@ def test_text_data_table_and_pictures(capsys: pytest.CaptureFixture[str], file: 
     folder = file.parent / "force"
     code, out, _ = run(capsys, "force", file, "-o", folder, "--noise")
     assert code == 0
-    assert "piecewise                torque / rb1" in out
+    assert "piecewise                torque / base radius" in out
     assert "nearer than Hunt–Crossley up to" in out
-    assert "J1/rb1 = 0.213 N per rad/s²" in out
+    assert "J1/r_b1 = 0.213 N per rad/s²" in out
     assert sorted(p.name for p in folder.iterdir()) == ["force.csv", "force.json", "force.png", "noise.png"]
     data = json.loads((folder / "force.json").read_text())
     errors = {(e["model"], e["reference"]): e["relative_rms"] for e in data["errors"]}
-    assert errors["piecewise", "torque / rb1"] < 0.3 * errors["Hunt–Crossley", "torque / rb1"]
+    assert errors["piecewise", "torque / base radius"] < 0.3 * errors["Hunt–Crossley", "torque / base radius"]
     assert data["noise"]["crossover_um"] > 1.0
     with (folder / "force.csv").open() as text:
         rows = list(csv.DictReader(text))
     assert len(rows) == 6000
-    torque = np.array([float(row["torque / rb1 [N]"]) for row in rows])
+    torque = np.array([float(row["torque / base radius [N]"]) for row in rows])
     piecewise = np.array([float(row["piecewise [N]"]) for row in rows])
-    expected = errors["piecewise", "torque / rb1"]
+    expected = errors["piecewise", "torque / base radius"]
     assert np.std(piecewise - torque) / np.sqrt(np.mean(torque**2)) == pytest.approx(expected, rel=0.02)
 
 

@@ -13,8 +13,8 @@ def test_forces_above_errors_below_and_the_blow_beside() -> None:
     estimate = estimate_forces(measure_motion(start_stop()))
     figure = force_figure(estimate)
     upper, near, lower, near_errors = figure.axes
-    assert [line.get_label() for line in upper.lines] == ["torque / rb1", "piecewise", "Hunt–Crossley"]
-    measured = estimate.references_n["torque / rb1"]
+    assert [line.get_label() for line in upper.lines] == ["torque / base radius", "piecewise", "Hunt–Crossley"]
+    measured = estimate.references_n["torque / base radius"]
     assert max(upper.lines[0].get_ydata()) == pytest.approx(measured.max() * 1e-3)
     worst = np.max(np.abs(estimate.forces_n["Hunt–Crossley"] - measured))
     assert np.max(np.abs(lower.lines[1].get_ydata())) == pytest.approx(worst * 1e-3)
