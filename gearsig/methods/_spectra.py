@@ -10,7 +10,7 @@ import numpy as np
 
 from gearsig import plot, spectra
 from gearsig.angle import ShaftAngle, resample_to_angle
-from gearsig.diagnosis import Analysis, RecordBlocks, analyze
+from gearsig.diagnosis import CHANGED, Analysis, RecordBlocks, analyze
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import readable
 from gearsig.methods._table import (
@@ -505,15 +505,18 @@ def _deconvolution(
         if angle is not None and not angle.is_steady():
             warnings.append("the speed changes, and the rate of impacts with it: choose a part of even speed")
         result = spectra.multipoint_deconvolution(x, fs, 1.0 / rate_hz, n_taps=taps)
-        chance = np.sqrt(taps / len(x))
-        fact = f"Likeness to a train of {rate_hz:.5g} Hz: **{result.score:.3g}** (white noise: {chance:.2g})."
-        notes = (f"{rate_hz:.5g} Hz: {rhythm}.", *notes) if rhythm else notes
+        of = f" ({rhythm})" if rhythm else ""
+        facts: tuple[str, ...] = (_train_fact(f"{rate_hz:.5g} Hz{of}", result.score, taps, len(x)),)
     else:
         result = spectra.minimum_entropy_deconvolution(x, fs, n_taps=taps)
-        fact = f"Kurtosis **{result.score:.3g}** (3: Gaussian noise)."
+        before = float(np.mean((x - x.mean()) ** 4) / np.var(x) ** 2)
+        facts = (f"Sharpened, the kurtosis is **{result.score:.3g}**, of the signal {before:.3g} (Gaussian noise: 3).",)
     y = result.values * float(np.std(x) / np.std(result.values))
     columns = {"signal": x, "sharpened": np.concatenate([np.zeros(len(x) - len(y)), y])}
-    waveforms = waveforms_of(prepared, channel, signal_of(prepared, channel), columns, result.source)
+    first_s = N_IMPACTS_SHOWN / rate_hz if rate_hz and by == "multipoint" else None
+    waveforms = waveforms_of(
+        prepared, channel, signal_of(prepared, channel), columns, result.source, first_length=first_s
+    )
     time_s = waveforms.at()
     panel = LinePanel(
         [ChartLine(time_s, columns[name], name, k) for k, name in enumerate(columns)],
@@ -526,13 +529,29 @@ def _deconvolution(
         lambda: plot.panels_figure([panel], title=f"{channel}: impacts sharpened"),
         waveforms.table(),
         numbers={"score": result.score},
-        facts=(fact,),
+        facts=facts,
         notes=notes,
         warnings=warnings,
         waveforms=waveforms,
     )
 
 
+def _train_fact(train: str, score: float, taps: int, n_samples: int) -> str:
+    """Say whether a train of impacts is in a signal more than in white noise.
+
+    The square of the norm is there the share of a random direction that lies in a space of `taps` among `n_samples`
+    dimensions: a beta distribution of mean taps/n and of relative deviation √(2/taps). Three of them are more than
+    chance.
+    """
+    chance = np.sqrt(taps / n_samples)
+    if score <= chance * np.sqrt(1.0 + 3.0 * np.sqrt(2.0 / taps)):
+        how = f"is **no clearer than in white noise**: likeness {score:.3g} of 1, white noise {chance:.2g}"
+    else:
+        how = f"is **{score / chance:.2g} times as clear as in white noise**: likeness {score:.3g} of 1"
+    return f"A train of impacts at {train} {how}."
+
+
+N_IMPACTS_SHOWN = 5
 ASSUMED_RATE_HZ = 100.0
 """Rate of impacts where nothing tells one."""
 
@@ -543,7 +562,8 @@ def suggested_rate_hz(analysis: Analysis) -> float | None:
     The first of: impacts that a finding names; turns of the shaft of a damaged tooth; elements that pass the outer race
     of the first bearing, which is damaged most often; turns of the reference shaft.
     """
-    for finding in analysis.findings:
+    # what has changed since a reference stands at a part's kinematic rate, from which a bearing slips
+    for finding in sorted(analysis.findings, key=lambda finding: finding.code == CHANGED):
         if finding.where.band_hz is not None and finding.where.frequency_hz:
             return finding.where.frequency_hz
     angle = analysis.shaft_angle
@@ -723,7 +743,8 @@ RHYTHMS = {
     ),
     "deconvolution": Method(
         "Deconvolution",
-        "Undoes the path between impacts and sensor, so that each is sharp again: for bearings that ring long.",
+        "Undoes the path between impacts and sensor, so that each is sharp again: for bearings that ring long. "
+        "If there is such a train, the sharpened signal shows needles one period apart.",
         _deconvolution,
         (
             MethodOption(

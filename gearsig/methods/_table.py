@@ -104,6 +104,8 @@ class Waveforms:
     shaft, residual, shown_first : str
         Residual: the column that remains of the signal, if there is one. Shown first: the column that the answer
         speaks of; empty: the first.
+    first_length : float or None
+        Of the first view, in s or revolutions; None: a few mesh cycles.
     """
 
     columns: Mapping[str, FloatArray]
@@ -116,6 +118,7 @@ class Waveforms:
     shaft: str = ""
     residual: str = ""
     shown_first: str = ""
+    first_length: float | None = None
 
     @property
     def n_samples(self) -> int:
@@ -297,13 +300,14 @@ def waveforms_of(
     *,
     residual: str = "",
     shown_first: str = "",
+    first_length: float | None = None,
 ) -> Waveforms:
     """Return waveforms on the axis and in the unit of a signal that was made of a channel."""
     measured = prepared.recording.channels[prepared.recording.index(channel)]
     same = signal.unit == measured.unit and signal.source == channel
     return Waveforms(
         columns, signal.rate, signal.start, signal.unit, measured.quantity if same else "unknown",
-        f"{step}, of {channel}", signal.axis, signal.shaft, residual, shown_first,
+        f"{step}, of {channel}", signal.axis, signal.shaft, residual, shown_first, first_length,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from app.cli.main import main
-from gearsig.diagnosis import CannotTell, Finding, Kind, Where, analyze
+from gearsig.diagnosis import CHANGED, CannotTell, Finding, Kind, Where, analyze
 from gearsig.errors import InputError, RefusalError
 from gearsig.methods import METHODS, apply_method, suggested_rate_hz
 from gearsig.prepared import prepare
@@ -96,8 +96,8 @@ def test_modes_show_the_waveform_that_their_text_speaks_of() -> None:
     assert asked.waveforms.shown_first.startswith("mode 1,")
 
 
-def where_from(analysis, finding: Finding | None = None, **changes) -> float | None:
-    return suggested_rate_hz(replace(analysis, findings=() if finding is None else (finding,), **changes))
+def where_from(analysis, *findings: Finding, **changes) -> float | None:
+    return suggested_rate_hz(replace(analysis, findings=findings, **changes))
 
 
 def test_impacts_are_sought_at_the_rate_that_was_found_or_is_described() -> None:
@@ -106,7 +106,9 @@ def test_impacts_are_sought_at_the_rate_that_was_found_or_is_described() -> None
     analysis = analyze(replace(recording(), rig=rig))
     impacts = Where(("a1",), order=3.2, frequency_hz=80.0, band_hz=(1000.0, 2000.0))
     tooth = Where(("a1",), shaft="output", gear="stage 1/output", tooth=3)
-    assert where_from(analysis, Finding("impacts", Kind.SUSPICION, "", impacts)) == 80.0
+    found = Finding("impacts", Kind.SUSPICION, "", impacts)
+    changed = Finding(CHANGED, Kind.SUSPICION, "", replace(impacts, frequency_hz=81.0))
+    assert where_from(analysis, changed, found) == 80.0
     assert where_from(analysis, Finding("tooth", Kind.FAULT, "", tooth)) == pytest.approx(12.5, rel=1e-3)
     assert where_from(analysis) == pytest.approx(12.5 * 3.5848, rel=1e-3)
     assert where_from(analysis, rig=None) == pytest.approx(25.0, rel=1e-3)
@@ -117,10 +119,11 @@ def test_a_rate_that_nothing_tells_is_said_to_be_assumed() -> None:
     noise = Recording(np.random.default_rng(1).normal(size=(1, N)), RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),))
     assumed = apply_method("deconvolution", noise)
     assert "100 impacts per second are assumed" in assumed.warnings[0]
-    assert "train of 100 Hz" in assumed.facts[0]
+    assert "at 100 Hz is **no clearer than in white noise**" in assumed.facts[0]
     described = apply_method("deconvolution", recording(), rate_hz=25.0)
     assert not described.warnings
-    assert described.notes[0] == "25 Hz: 1× input."
+    assert "at 25 Hz (1× input) is" in described.facts[0]
+    assert described.waveforms.first_length == pytest.approx(0.2)  # five impacts
 
 
 def test_an_envelope_has_plain_numbers_and_the_lines_of_bearings() -> None:

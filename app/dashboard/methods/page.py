@@ -209,8 +209,10 @@ def _show_space(page: MethodPage, path: np.ndarray) -> None:
 def first_length(page: MethodPage, waveforms: Waveforms, angle: ShaftAngle | CannotTell) -> float:
     """Return the length of a waveform's first view in s or revolutions: five mesh cycles, so that their shape is seen.
 
-    Three revolutions where no mesh is known, 3000 samples where the speed is not.
+    Three revolutions where no mesh is known, 3000 samples where the speed is not; or what the method asks for.
     """
+    if waveforms.first_length is not None:
+        return waveforms.first_length
     if isinstance(angle, CannotTell):
         return 3000.0 / waveforms.rate
     rig = page.analysis.rig
