@@ -361,11 +361,12 @@ class Figure {
   }
 
   // Cursors that the machine implies, and the rows of their labels: they come most important first. A sideband has its
-  // label in the row of the mesh lines only, so that none is named unless the others are.
+  // label in the row of the mesh lines only, so that none is named unless the others are. Quiet ones are named under the
+  // pointer alone.
   placed() {
     const rows = Array.from({ length: MAX_ROWS }, () => []), labels = [];
     const seen = this.data.cursors.filter((cursor) => cursor.at >= this.view[0] && cursor.at <= this.view[1]);
-    for (const cursor of seen) {
+    for (const cursor of seen.filter(({ is_quiet }) => !is_quiet)) {
       const x = this.scale(cursor.at), half = cursor.label.length * 3.4 + 4;
       const row = rows.findIndex((taken) => taken.every(([low, high]) => x + half < low || x - half > high));
       if (row < 0 || (cursor.is_sideband && row > 0) || x + half > this.width || x - half < 0) continue;
@@ -376,8 +377,8 @@ class Figure {
   }
 
   drawCursors(inside, { seen, labels }) {
-    for (const { at, colour, dash } of seen)
-      add(inside, "line", { x1: this.scale(at), x2: this.scale(at), y1: this.top, y2: this.top + this.plotHeight, stroke: colour, opacity: 0.6, "stroke-dasharray": dash });
+    for (const { at, colour, dash, is_quiet } of seen)
+      add(inside, "line", { x1: this.scale(at), x2: this.scale(at), y1: this.top, y2: this.top + this.plotHeight, stroke: colour, opacity: is_quiet ? 0.3 : 0.6, "stroke-dasharray": dash });
     for (const { x, row, label, colour } of labels)
       text(this.svg, x, this.top - 5 - ROW * row, label, { fill: colour, "text-anchor": "middle" });
   }

@@ -39,6 +39,7 @@ from gearsig.plot import (
     plain,
     pooled_levels,
 )
+from gearsig.spectra import LARGEST_SLIP
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as PictureFigure
@@ -234,7 +235,7 @@ def show_lines(
     shown = looked_at(key, ends, limits)
     data = _described(panel, key, shown, ends, height_px, has_tools=not is_plane) | {
         "lines": [_sent(line, None if is_plane else shown, alone=len(lines) == 1) for line in lines],
-        "cursors": _cursor_rows(panel.cursors, palette()),
+        "cursors": _cursor_rows(panel.cursors, palette(), lines[-1] if lines and not is_plane else None, shown),
         "dates": dates,
         "marked": [[float(x), float(y)] for x, y in marked],
         "legend": legend,
@@ -451,18 +452,43 @@ def _columns(line: ChartLine, shown: tuple[float, float]) -> tuple[FloatArray, .
     return x[chosen], y[chosen], *(edge[chosen] for edge in band)
 
 
-def _cursor_rows(cursors: Sequence[Cursor], colours: Palette) -> list[dict[str, object]]:
+N_NAMED = 6
+"""Lines of bearings that have their names above them: more would hide each other, and what is told of."""
+
+
+def _cursor_rows(
+    cursors: Sequence[Cursor],
+    colours: Palette,
+    line: ChartLine | None = None,
+    shown: tuple[float, float] = (-np.inf, np.inf),
+) -> list[dict[str, object]]:
+    """Return cursors as the component takes them, the most important first.
+
+    Of the bearings' within the range that is shown those of a finding have names, then those where `line` is highest;
+    the others are named under the pointer.
+    """
+    bearings = [c for c in cursors if c.kind == "bearing" and shown[0] <= c.position <= shown[1]]
+    if line is not None:
+        bearings.sort(key=lambda cursor: (cursor.number > 0, -_height_near(line, cursor.position)))
+    quiet = set() if line is None else {id(cursor) for cursor in bearings[N_NAMED:]}
     dashes = {"solid": None, "dot": "2 3", "dash": "6 4", "dashdot": "7 3 2 3"}
     return [
         {
             "at": float(cursor.position),
             "label": plain(cursor.label, LONGEST),
             "is_sideband": cursor.kind == "sideband",
+            "is_quiet": id(cursor) in quiet,
             "colour": colours.cursors.get(cursor.kind, colours.quiet),
             "dash": dashes[DASHES.get(cursor.kind, "dot")],
         }
         for cursor in sorted(cursors, key=importance)
     ]
+
+
+def _height_near(line: ChartLine, position: float) -> float:
+    """Return a line's highest value within a bearing's slip about a position."""
+    low, high = np.searchsorted(line.x, [(1 - LARGEST_SLIP) * position, (1 + LARGEST_SLIP) * position])
+    return float(line.y[low : high + 1].max()) if low < len(line.y) else 0.0
 
 
 DOTS_PER_INCH = 180
