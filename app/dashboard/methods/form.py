@@ -146,9 +146,9 @@ def ask_options(page: MethodPage, method: Method, prepared: PreparedRecording, m
     names = {o.name: o.known(prepared, page.channel.channel) if o.known is not None else () for o in shown}
     shown = [_as_suggested(option, page) for option in shown if option.kind != "name" or len(names[option.name]) > 1]
     few, more = ([option for option in shown if option.more is is_more] for is_more in (False, True))
-    _ask_in_rows(page, few, names, values)
+    _ask_in_rows(page, few, names, values, key="settings")
     with more_of:
-        _ask_in_rows(page, more, names, values)
+        _ask_in_rows(page, more, names, values, key="settings-more")
     return values
 
 
@@ -159,12 +159,15 @@ def _as_suggested(option: MethodOption, page: MethodPage) -> MethodOption:
 
 
 def _ask_in_rows(
-    page: MethodPage, options: Sequence[MethodOption], known: Mapping[str, Any], values: dict[str, Any]
+    page: MethodPage, options: Sequence[MethodOption], known: Mapping[str, Any], values: dict[str, Any], *, key: str
 ) -> None:
-    """Ask in a row that wraps: each widget is as wide as it needs to be, so that no choice is cut off."""
+    """Ask in a row that wraps: each widget is as wide as it needs to be, so that no choice is cut off.
+
+    In a narrow window a field takes at most half of the row, by the page's style.
+    """
     if not options:
         return
-    with st.container(horizontal=True, vertical_alignment="bottom", gap="medium"):
+    with st.container(horizontal=True, vertical_alignment="bottom", gap="small", key=key):
         for option in options:
             values[option.name] = _asked(page, option, known[option.name])
 
