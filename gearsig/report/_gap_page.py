@@ -105,8 +105,11 @@ def size_text(report: GapReport) -> str:
     return f"{interval_text(report.size)} structural floors, {readable(report.repeatability, 2)} repeatability floors"
 
 
-def floors_text(report: GapReport) -> str:
-    """Say what the recordings are compared with, and what the two floors are; empty where nothing was simulated."""
+def floors_text(report: GapReport, *, of_pictures: bool = True) -> str:
+    """Say what the recordings are compared with, and what the two floors are; empty where nothing was simulated.
+
+    With `of_pictures` also which pictures of the page show what beside the recording.
+    """
     if not report.is_simulated:
         return ""
     structural, beside = "what healthy machines differ by from that", ""
@@ -116,7 +119,11 @@ def floors_text(report: GapReport) -> str:
         if 0 < len(alone) < len(report.conditions):
             known += f"Without a reference at its point, with what the simulation lets expect: {', '.join(alone)}. "
         structural = "what healthy machines change by from one recording to another"
-        beside = " The first pictures show the recording beside the reference, the further ones beside the simulation."
+        beside = (
+            ""
+            if not of_pictures
+            else " The first pictures show the recording beside the reference, the further ones beside the simulation."
+        )
     else:
         known = "Compared with what the simulation of the healthy machine lets expect, as far as it is credible. "
     return (

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
@@ -33,6 +33,7 @@ from app.dashboard.widgets.charts import (
     show_rows,
 )
 from app.dashboard.widgets.messages import show_warnings
+from app.dashboard.widgets.tables import show_table
 from app.dashboard.widgets.verdict import Colour
 from app.gap_job import JSON, PAGE, TWIN, Job, private_folder
 from gearsig.cache import cache_folder, keep
@@ -258,8 +259,8 @@ LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
     GapOutcome.UNKNOWN: ("gray", ":material/help:"),
     GapOutcome.UNDECIDED: ("gray", ":material/balance:"),
 }
-TWO_LINES = 72
-"""Height of a table's row, in pixels, from which its texts are broken."""
+TWO_LINES, PX_PER_LETTER = 72, 7
+"""Height of a table's row, in pixels, from which its texts are broken; what a letter takes of its width."""
 WITHOUT_FLOORS = (
     "Nothing was simulated, so that a gap has no size and no shares. Levels are those of the strongest line over the "
     "noise beside it, or over the reference where that shows it as well."
@@ -382,7 +383,8 @@ def _show_where(finished: Finished) -> None:
     both = tuple(zip(rows, report.places, strict=True))
     if report.is_simulated:
         st.markdown(f"The whole gap: {as_typed(size_text(report))}.")
-        st.caption(as_typed(f"{floors_text(report)} Changes are given as multiples of both, the structural one first."))
+        floors = floors_text(report, of_pictures=False)
+        st.caption(as_typed(f"{floors} Changes are given as multiples of both, the structural one first."))
     else:
         st.caption(WITHOUT_FLOORS)
     if rows and not report.is_simulated:
@@ -391,28 +393,58 @@ def _show_where(finished: Finished) -> None:
     elif rows:
         _table(
             {
-                "share": [row.bar_percent if isfinite(place.share) else None for row, place in both],
+                "share": [place.share if isfinite(place.share) else None for _, place in both],
                 "place": [row.title for row in rows],
                 "change": [row.change for row in rows],
                 "× both floors": [f"{row.structural}, {row.repeatability}" for row in rows],
                 "at": [", ".join(row.where[1:]) for row in rows],  # the title says the kind
             },
-            bars=("share",),
+            written={"share": percent},
             widths={"place": 380, "at": 230},
         )
     else:
         st.markdown("No place stands out of the floor.")
-    for curves in report.spectra:
-        if len(curves.orders) and len(curves.reference):
-            _show_spectra(against_reference(curves), "reference", scored=report.is_beyond)
-    for average in report.averages:
-        _show_average(average)
-    for curves in report.spectra:
-        if len(curves.orders) and len(curves.before):
-            _show_spectra(curves, "simulated", scored=report.is_beyond and not len(curves.reference))
-        elif len(curves.orders) and not len(curves.reference):
-            _show_spectra(curves, "", scored=False)
+    _show_pictures_of_places(finished)
+
+
+def _show_pictures_of_places(finished: Finished) -> None:
+    """Show what shows the first place best, then offer the other pictures by their kinds."""
+    report = finished.report
+    first = report.places[0] if report.places else None
+    is_local = first is not None and (first.tooth is not None or first.angle_deg is not None)
+    beside_reference = [curves for curves in report.spectra if len(curves.orders) and len(curves.reference)]
+    others = [c for c in report.spectra if len(c.orders) and (len(c.before) or not len(c.reference))]
+    shown = [average for average in report.averages if len(average.angle_deg)]
+    averages = [(average, partial(_show_average, average)) for average in shown]
+    pictures: dict[str, list[Callable[[], None]]] = {
+        "Mean revolutions": [draw for _, draw in averages],
+        "Spectra beside the healthy reference": [
+            partial(_show_spectra, against_reference(curves), "reference", scored=report.is_beyond)
+            for curves in beside_reference
+        ],
+        "Spectra beside the simulation" if report.is_simulated else "Spectra": [
+            partial(
+                _show_spectra,
+                curves,
+                "simulated" if len(curves.before) else "",
+                scored=bool(len(curves.before)) and report.is_beyond and not len(curves.reference),
+            )
+            for curves in others
+        ],
+    }
+    best = [draw for average, draw in averages if is_local and first is not None and average.shaft == first.shaft]
+    if not is_local:
+        best = next((draws[:1] for name, draws in pictures.items() if draws and name.startswith("Spectra")), [])
     _show_figures(finished, "where")
+    for draw in best:
+        draw()
+    for name, draws in pictures.items():
+        rest = [draw for draw in draws if draw not in best]
+        if rest:
+            title = name if len(rest) == len(draws) else f"Further {name.lower()}"
+            with st.expander(f"{title} ({len(rest)})"):
+                for draw in rest:
+                    draw()
 
 
 def _show_spectra(curves: SpectrumCurves, beside: str, *, scored: bool) -> None:
@@ -449,8 +481,6 @@ def _show_spectra(curves: SpectrumCurves, beside: str, *, scored: bool) -> None:
 
 def _show_average(average: AverageCurves) -> None:
     """Show one mean revolution of a recording and of its healthy reference, without what all teeth have in common."""
-    if not len(average.angle_deg):
-        return
     st.markdown(
         as_typed(f"One mean revolution of shaft {average.shaft} at {average.channel}, what tells its teeth apart")
     )
@@ -470,13 +500,13 @@ def _show_which(finished: Finished) -> None:
     severities = {"severity (interval of the fit)": [row.severity for row in rows]} if report.is_simulated else {}
     _table(
         {
-            "probability": [row.bar_percent for row in rows],
+            "probability": [row.bar_percent / 100.0 for row in rows],
             "cause": [row.title for row in rows],
             "group": [row.group for row in rows],
             "place": [row.place for row in rows],
             **severities,
         },
-        bars=("probability",),
+        written={"probability": odds_text},
     )
     groups = ", ".join(group_texts(report))
     st.caption(as_typed(f"{others_text(report)} {f'By group: {groups}.' if groups else ''}"))
@@ -544,7 +574,8 @@ def _show_figures(finished: Finished, question: Question) -> None:
             _show_figure(finished, one)
     small = [one for one in chosen if one.is_small]
     if small:
-        for one, column in zip(small, st.columns(max(2, len(small))), strict=False):
+        columns = st.container(key=f"panels of {question}").columns(max(2, len(small)))
+        for one, column in zip(small, columns, strict=False):
             with column:
                 _show_figure(finished, one)
 
@@ -568,13 +599,13 @@ def ring_of(curves: AngleCurves) -> Ring:
 
 
 def _table(
-    columns: Mapping[str, Sequence[Any]], bars: tuple[str, ...] = (), widths: dict[str, int] | None = None
+    columns: Mapping[str, Sequence[Any]],
+    written: Mapping[str, Callable[[float], str]] | None = None,
+    widths: dict[str, int] | None = None,
 ) -> None:
-    """Show a table; columns of stated widths, in pixels, are broken into two lines."""
-    config: dict[str, Any] = {
-        name: st.column_config.ProgressColumn(format="%.0f %%", min_value=0, max_value=100, width="small")
-        for name in bars
-    }
-    config |= {name: st.column_config.TextColumn(width=width) for name, width in (widths or {}).items()}
-    height = TWO_LINES if widths else None
-    st.dataframe(columns, hide_index=True, width="stretch", column_config=config, row_height=height)
+    """Show a table; columns of stated widths, in pixels, are broken into two lines where a text needs them."""
+    config: dict[str, Any] = {name: st.column_config.TextColumn(width=width) for name, width in (widths or {}).items()}
+    config |= {name: st.column_config.Column(width="small") for name in written or {}}
+    is_long = any(PX_PER_LETTER * len(text) > width for name, width in (widths or {}).items() for text in columns[name])
+    looks = {"row_height": TWO_LINES} if is_long else {}
+    show_table(columns, formats=written, width="stretch", column_config=config, **looks)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isnan
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def show_table(
     columns: DataFrame | Mapping[str, Any] | Sequence[Mapping[str, Any]],
     *,
-    formats: Mapping[str, str] | None = None,
+    formats: Mapping[str, str | Callable[[float], str]] | None = None,
     number: str = ".5g",
     **looks: Any,
 ) -> None:
@@ -28,7 +28,7 @@ def show_table(
     ----------
     columns : DataFrame, mapping of columns, or sequence of rows
     formats : mapping or None
-        Format of single columns.
+        Format of single columns, or what writes their numbers.
     number : str
         Format of the other numbers.
     **looks
@@ -38,8 +38,10 @@ def show_table(
 
     frame = pd.DataFrame(columns)
     named = {name: number for name in frame if frame[name].dtype.kind in "fiu"} | dict(formats or {})
-    written: dict[Any, Any] = {name: partial(number_text, form=form) for name, form in named.items()}
-    st.dataframe(frame.style.format(written), hide_index=True, **looks)
+    written: dict[Any, Any] = {
+        name: form if callable(form) else partial(number_text, form=form) for name, form in named.items()
+    }
+    st.dataframe(frame.style.format(written, na_rep=""), hide_index=True, **looks)
 
 
 def number_text(value: float, form: str) -> str:
