@@ -694,10 +694,15 @@ def curves_figure(
         row_gap_in=0.78 if any(panel.title for panel in panels) else 0.6,
     )
     lines: list[Line2D] = []
+    # a curve has the same colour in a panel that shows some of another's
+    most = max(panels, key=lambda panel: len(panel.curves)).curves
+    colours = {name: colour for name, _, colour in series.coloured(most)}
     for place, panel in zip(axes, panels, strict=False):
         series.check_number(len(panel.curves), f"{len(panel.curves)} curves in one panel")
         lines = []
-        for k, (name, values, colour) in enumerate(series.coloured(panel.curves)):
+        some = panel.curves.keys() <= colours.keys()
+        for k, (name, values, own) in enumerate(series.coloured(panel.curves)):
+            colour = colours[name] if some else own
             if len(values) != len(panel.x):
                 raise InputError(f"{name} has {len(values)} points, its axis {len(panel.x)}", allowed="equal lengths")
             line = {"line": "-", "dots": "", "both": "-"}[panel.looks]
