@@ -14,7 +14,7 @@ from sims.reduced_fe._contact import (
     solve_contacts,
     static_table,
 )
-from sims.reduced_fe._eigenfrequencies import SpreadingCheck, eigenfrequencies_hz, spreading_check, torsional_mode
+from sims.reduced_fe._eigenfrequencies import SpreadingCheck, eigenfrequencies_hz, spreading_check
 from sims.reduced_fe._growth import (
     STEEL_IN_AIR,
     CrackGrowth,
@@ -34,7 +34,7 @@ from sims.reduced_fe._pair import (
     constants,
     kept_modes,
     residual_compliance,
-    start_state,
+    torsional_mode,
 )
 from sims.reduced_fe._respond import (
     STEP_S,
@@ -46,6 +46,7 @@ from sims.reduced_fe._respond import (
     growth,
     respond,
     speed_sweep,
+    start_state,
 )
 from sims.reduced_fe._simulator import (
     NAME,

@@ -11,11 +11,7 @@ from gearsig.checks import FloatArray
 from sims.fe_gear import MeshSize, ReductionPlan, Spread, reduce_gear
 from sims.machine import Operation
 from sims.mesh import one_mesh_cycle
-from sims.reduced_fe._contact import contact_state
-from sims.reduced_fe._pair import MIN_FORCE_N, FlexiblePair, FlexiblePairConstants, constants
-
-MIN_TORSIONAL_HZ = 200.0
-"""Modes below it are those of rotors on their couplings."""
+from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, torsional_over_cycle, undamped_modes
 
 
 def eigenfrequencies_hz(
@@ -42,107 +38,8 @@ def eigenfrequencies_hz(
     pair_constants = constants(pair, operation) if ready is None else ready
     cycles = one_mesh_cycle(50) if mesh_cycles is None else mesh_cycles
     return np.array(
-        [np.sqrt(np.maximum(_squares(pair, pair_constants, operation, c)[0], 0.0)) / (2.0 * pi) for c in cycles]
+        [np.sqrt(np.maximum(undamped_modes(pair, pair_constants, operation, c)[0], 0.0)) / (2.0 * pi) for c in cycles]
     )
-
-
-@dataclass(frozen=True)
-class TorsionalMode:
-    """The mode in which the flanks move most against each other, mean over a mesh cycle.
-
-    Parameters
-    ----------
-    frequency_hz : float
-    contact_part : float
-        Part of its energy that lies in the compliance of the contact.
-    other_damping_ratio : float
-        ζ by shafts, bearings and gear bodies alone.
-    """
-
-    frequency_hz: float
-    contact_part: float
-    other_damping_ratio: float
-
-    def damping_time_s(self, damping_ratio: float) -> float:
-        """Time τ of the contact's damping, with which the mode has a damping ratio in all; 0 if it has more without.
-
-        2ζω = 2ζ₀ω + τ ω² · contact part
-        """
-        omega = 2.0 * pi * self.frequency_hz
-        return max(2.0 * (damping_ratio - self.other_damping_ratio) / (omega * self.contact_part), 0.0)
-
-
-def torsional_mode(
-    pair: FlexiblePair, operation: Operation, *, ready: FlexiblePairConstants | None = None
-) -> TorsionalMode:
-    """Return the torsional mode of the pair about its loaded state, mean over 20 mesh angles of a cycle.
-
-    Parameters
-    ----------
-    pair : FlexiblePair
-    operation : Operation
-        Its greatest torque loads the contact.
-    ready : FlexiblePairConstants or None
-        Where they are at hand.
-    """
-    pair_constants = constants(pair, operation) if ready is None else ready
-    modes = _torsional(pair, pair_constants, operation, one_mesh_cycle(20))
-    return TorsionalMode(*(float(mean) for mean in modes.mean(axis=0)))
-
-
-def torsional_curve_hz(pair: FlexiblePair, operation: Operation, mesh_cycles: FloatArray) -> FloatArray:
-    """Frequency of the torsional mode at each mesh angle, (n_c,)."""
-    return _torsional(pair, constants(pair, operation), operation, mesh_cycles)[:, 0]
-
-
-def _torsional(
-    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, mesh_cycles: FloatArray
-) -> FloatArray:
-    """Frequency, contact part and damping ratio of others at each mesh angle, (n_c, 3)."""
-    rates = np.concatenate([side.damping_rate for side in pair_constants.sides])
-    modes = []
-    for c in mesh_cycles:
-        squares, shapes, rows, stiff = _squares(pair, pair_constants, operation, c)
-        energy = np.einsum("ij,ik,kj->j", rows @ shapes, stiff, rows @ shapes)
-        part = energy / np.maximum(squares, (2.0 * pi * MIN_TORSIONAL_HZ) ** 2)
-        mode = int(np.argmax(part))
-        omega = float(np.sqrt(squares[mode]))
-        modes.append((omega / (2.0 * pi), part[mode], float(rates @ shapes[:, mode] ** 2) / (2.0 * omega)))
-    return np.array(modes)
-
-
-def _squares(
-    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Squared angular frequencies, shapes, and what `contact_rows` returns, at one mesh angle."""
-    rows, stiff = contact_rows(pair, pair_constants, operation, cycles)
-    k = np.diag(np.concatenate([side.omega_rad_s for side in pair_constants.sides]) ** 2) + rows.T @ stiff @ rows
-    squares, shapes = np.linalg.eigh(k)
-    return squares, shapes, rows, stiff
-
-
-def contact_rows(
-    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return ∂D/∂η of the points that touch under the set torque, (n, n_modes), and their stiffness, (n, n)."""
-    force = max(operation.torque_nm.largest / pair_constants.base_radius_m[0], MIN_FORCE_N)
-    at = contact_state(pair_constants.table, pair.machine.mesh, force, cycles)
-    driver, driven = pair_constants.sides
-    turn, n = pair_constants.turn(), driver.n_modes
-    rows = np.zeros((len(at.force_n), 2 * n))
-    for point, (number, column, part) in enumerate(zip(at.pair, at.column, at.part, strict=True)):
-        for index, side in enumerate((driver, driven)):
-            tooth = int(number % pair_constants.record["teeth"][index])
-            s = point % pair_constants.table.n_slices
-            in_sector = (1.0 - part) * side.rows[column, s] + part * side.rows[column + 1, s]
-            cosine, sine = turn[index, tooth]
-            c, d = np.split(in_sector[side.n_single :], 2)
-            full = np.concatenate((in_sector[: side.n_single], cosine * c - sine * d, sine * c + cosine * d))
-            rows[point, index * n : index * n + len(full)] = full
-    touching = at.force_n > 0.0
-    rows = rows[touching]
-    stiff: FloatArray = np.linalg.inv(at.compliance[np.ix_(touching, touching)])
-    return rows, stiff
 
 
 # --------------------
@@ -201,7 +98,7 @@ def spreading_check(pair: FlexiblePair, operation: Operation, mesh_cycles: Float
         reduced = reduce_gear(first, plan)
         gears = (reduced, reduced if second == first else reduce_gear(second, plan))
         respread = replace(pair, gears=gears)
-        frequency[spread] = torsional_curve_hz(respread, operation, mesh_cycles)
+        frequency[spread] = torsional_over_cycle(respread, constants(respread, operation), operation, mesh_cycles)[:, 0]
         inner = slice(2, N_HEIGHTS - 2)  # the ends of the involute have neighbours on one side only
         compliance = np.log(np.diag(reduced.clamped_compliance_m_per_n[0])[:N_HEIGHTS][inner])
         roll = reduced.grid.roll_rad[inner]

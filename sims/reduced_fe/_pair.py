@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, pi, sin
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +23,15 @@ from sims.gear_pair import (
     machine_fields,
 )
 from sims.machine import BearingSupport, Machine, Operation
-from sims.mesh import GearMesh
+from sims.mesh import GearMesh, one_mesh_cycle
 from sims.reduced_fe._contact import (
     FLANK,
     SIGNS,
     ContactTable,
     MeshMaps,
+    contact_state,
     contact_table,
     folded,
-    force_map,
     mesh_maps,
     mirror_groups,
     mirrors,
@@ -41,10 +41,6 @@ from sims.reduced_fe._contact import (
     static_table,
     teeth_of,
 )
-
-if TYPE_CHECKING:
-    from sims.reduced_fe._respond import FlexState
-
 
 # Bearings with rolling elements as springs about their static load: softness across it, feet that move.
 #
@@ -624,8 +620,6 @@ def constants(
     rng : numpy.random.Generator or None
         Draws the places of rolling elements in bearings with a defect; None: always the same ones.
     """
-    from sims.reduced_fe._eigenfrequencies import torsional_mode  # which takes these constants
-
     machine, mesh = pair.machine, pair.machine.mesh
     base = np.array(mesh.pair.base_radii_m)
     force = max(operation.torque_nm.largest / base[0], MIN_FORCE_N)
@@ -745,71 +739,101 @@ def _pad(side: FlexibleSide, single: int, pairs: int, silent: int) -> FlexibleSi
     )
 
 
-# Where a run starts: the static balance at the first torque, so that no blow has to die out.
+# The pair as a linear system about its loaded state: its undamped modes, the torsional one among them.
 
-DEEPEST_M = 1e-3
-"""Beyond any approach of flanks."""
-MIN_HZ = 1.0
-"""Of modes that the balance bends; slower ones are rigid motion."""
+MIN_TORSIONAL_HZ = 200.0
+"""Modes below it are those of rotors on their couplings."""
 
 
-def start_state(
-    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, start_s: float
-) -> FlexState:
-    """Return the state in which the flanks carry the first torque, everything turning evenly, tooth 0 at its entry.
+@dataclass(frozen=True)
+class TorsionalMode:
+    """The mode in which the flanks move most against each other, mean over a mesh cycle.
 
-    The modes take the deflection of the mean contact force; the driven side is turned back until the contact carries.
+    Parameters
+    ----------
+    frequency_hz : float
+    contact_part : float
+        Part of its energy that lies in the compliance of the contact.
+    other_damping_ratio : float
+        ζ by shafts, bearings and gear bodies alone.
     """
-    from sims.reduced_fe._respond import FlexState
 
-    torque = float(operation.torque_nm.at(start_s))
-    q = np.zeros((2, pair_constants.sides[0].n_modes))
-    force = torque / pair_constants.base_radius_m[0]
-    column = pair_constants.table.column(0.0)
-    for index, side in enumerate(pair_constants.sides):
-        drive = torque if index == 0 else -torque * float(pair_constants.record["ratio"])
-        load = side.inputs[0] * drive
-        load[: side.rows.shape[-1]] -= force * side.rows[column].mean(axis=0)
-        soft = side.omega_rad_s > 2.0 * np.pi * MIN_HZ
-        q[index, soft] = load[soft] / side.omega_rad_s[soft] ** 2
-    shape = pair_constants.table.n_slots, pair_constants.table.n_slices
-    small = float(pair_constants.record["small"])
-    state = FlexState(
-        q,
-        np.zeros_like(q),
-        np.zeros_like(q),
-        np.zeros_like(q),
-        np.zeros(shape),
-        np.full(shape, small**-0.1),
-        np.full(pair_constants.table.n_slots, -1e9),
-        np.zeros(3),
-    )
-    return state if force <= 0.0 else _closed(pair, pair_constants, state, force)
+    frequency_hz: float
+    contact_part: float
+    other_damping_ratio: float
+
+    def damping_time_s(self, damping_ratio: float) -> float:
+        """Time τ of the contact's damping, with which the mode has a damping ratio in all; 0 if it has more without.
+
+        2ζω = 2ζ₀ω + τ ω² · contact part
+        """
+        omega = 2.0 * pi * self.frequency_hz
+        return max(2.0 * (damping_ratio - self.other_damping_ratio) / (omega * self.contact_part), 0.0)
 
 
-def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: FlexState, force: float) -> FlexState:
-    """Turn the driven side as a whole until the flanks carry `force` at ζ = 0."""
-    from scipy.optimize import brentq
+def torsional_mode(
+    pair: FlexiblePair, operation: Operation, *, ready: FlexiblePairConstants | None = None
+) -> TorsionalMode:
+    """Return the torsional mode of the pair about its loaded state, mean over 20 mesh angles of a cycle.
 
-    table = pair_constants.table
-    rigid = pair_constants.sides[1]
-    free = np.flatnonzero(rigid.omega_rad_s == 0.0)
-    free = free[np.abs(rigid.hub[free]) > 0.0][0]
-    column = table.column(0.0)
+    Parameters
+    ----------
+    pair : FlexiblePair
+    operation : Operation
+        Its greatest torque loads the contact.
+    ready : FlexiblePairConstants or None
+        Where they are at hand.
+    """
+    pair_constants = constants(pair, operation) if ready is None else ready
+    modes = torsional_over_cycle(pair, pair_constants, operation, one_mesh_cycle(20))
+    return TorsionalMode(*(float(mean) for mean in modes.mean(axis=0)))
 
-    def approach(q: FloatArray) -> float:
-        total = 0.0
-        for index, side in enumerate(pair_constants.sides):
-            n = side.rows.shape[-1]
-            total += float(side.rows[column].mean(axis=0) @ q[index, :n])
-        return total
 
-    def missing(depth: float) -> float:
-        return float(force_map(table, pair.machine.mesh, np.array([depth]), np.zeros(1)).force_n[0, 0]) - force
+def torsional_over_cycle(
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, mesh_cycles: FloatArray
+) -> FloatArray:
+    """Frequency, contact part and damping ratio of others at each mesh angle, (n_c, 3)."""
+    rates = np.concatenate([side.damping_rate for side in pair_constants.sides])
+    modes = []
+    for c in mesh_cycles:
+        squares, shapes, rows, stiff = undamped_modes(pair, pair_constants, operation, c)
+        energy = np.einsum("ij,ik,kj->j", rows @ shapes, stiff, rows @ shapes)
+        part = energy / np.maximum(squares, (2.0 * pi * MIN_TORSIONAL_HZ) ** 2)
+        mode = int(np.argmax(part))
+        omega = float(np.sqrt(squares[mode]))
+        modes.append((omega / (2.0 * pi), part[mode], float(rates @ shapes[:, mode] ** 2) / (2.0 * omega)))
+    return np.array(modes)
 
-    # Below 0: a tooth that stands ahead of its place carries before the others would touch.
-    depth = float(brentq(missing, -DEEPEST_M, DEEPEST_M, xtol=1e-12))
-    q = state.q.copy()
-    per_unit = float(rigid.rows[column].mean(axis=0)[free])
-    q[1, free] += (depth - approach(q)) / per_unit
-    return replace(state, q=q)
+
+def undamped_modes(
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Squared angular frequencies, shapes, and what `contact_rows` returns, at one mesh angle."""
+    rows, stiff = contact_rows(pair, pair_constants, operation, cycles)
+    k = np.diag(np.concatenate([side.omega_rad_s for side in pair_constants.sides]) ** 2) + rows.T @ stiff @ rows
+    squares, shapes = np.linalg.eigh(k)
+    return squares, shapes, rows, stiff
+
+
+def contact_rows(
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return ∂D/∂η of the points that touch under the set torque, (n, n_modes), and their stiffness, (n, n)."""
+    force = max(operation.torque_nm.largest / pair_constants.base_radius_m[0], MIN_FORCE_N)
+    at = contact_state(pair_constants.table, pair.machine.mesh, force, cycles)
+    driver, driven = pair_constants.sides
+    turn, n = pair_constants.turn(), driver.n_modes
+    rows = np.zeros((len(at.force_n), 2 * n))
+    for point, (number, column, part) in enumerate(zip(at.pair, at.column, at.part, strict=True)):
+        for index, side in enumerate((driver, driven)):
+            tooth = int(number % pair_constants.record["teeth"][index])
+            s = point % pair_constants.table.n_slices
+            in_sector = (1.0 - part) * side.rows[column, s] + part * side.rows[column + 1, s]
+            cosine, sine = turn[index, tooth]
+            c, d = np.split(in_sector[side.n_single :], 2)
+            full = np.concatenate((in_sector[: side.n_single], cosine * c - sine * d, sine * c + cosine * d))
+            rows[point, index * n : index * n + len(full)] = full
+    touching = at.force_n > 0.0
+    rows = rows[touching]
+    stiff: FloatArray = np.linalg.inv(at.compliance[np.ix_(touching, touching)])
+    return rows, stiff

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
 
@@ -17,15 +17,15 @@ from sims.fe_gear import one_thread
 from sims.gear_pair import COORDINATES, YIELDS, PairResponse, RunPlan, StepConvergence, profile_points
 from sims.machine import Operation, Profile
 from sims.mesh import one_mesh_cycle
-from sims.reduced_fe._eigenfrequencies import contact_rows
+from sims.reduced_fe._contact import force_map
 from sims.reduced_fe._integrate import Method, march, room, step_coefficients
 from sims.reduced_fe._pair import (
     FlexiblePair,
     FlexiblePairConstants,
     back_rows,
     constants,
+    contact_rows,
     hub_inertia,
-    start_state,
 )
 
 # Whether a step can be followed: errors must not grow from step to step.
@@ -318,6 +318,74 @@ def _place(pair_constants: FlexiblePairConstants, name: str, factors: FloatArray
     else:
         factors[(number - 8) // 4] = pair_constants.sides[(number - 8) // 4].shapes[4 + (number - 8) % 4]
     return 0.0
+
+
+# Where a run starts: the static balance at the first torque, so that no blow has to die out.
+
+DEEPEST_M = 1e-3
+"""Beyond any approach of flanks."""
+MIN_HZ = 1.0
+"""Of modes that the balance bends; slower ones are rigid motion."""
+
+
+def start_state(
+    pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, start_s: float
+) -> FlexState:
+    """Return the state in which the flanks carry the first torque, everything turning evenly, tooth 0 at its entry.
+
+    The modes take the deflection of the mean contact force; the driven side is turned back until the contact carries.
+    """
+    torque = float(operation.torque_nm.at(start_s))
+    q = np.zeros((2, pair_constants.sides[0].n_modes))
+    force = torque / pair_constants.base_radius_m[0]
+    column = pair_constants.table.column(0.0)
+    for index, side in enumerate(pair_constants.sides):
+        drive = torque if index == 0 else -torque * float(pair_constants.record["ratio"])
+        load = side.inputs[0] * drive
+        load[: side.rows.shape[-1]] -= force * side.rows[column].mean(axis=0)
+        soft = side.omega_rad_s > 2.0 * np.pi * MIN_HZ
+        q[index, soft] = load[soft] / side.omega_rad_s[soft] ** 2
+    shape = pair_constants.table.n_slots, pair_constants.table.n_slices
+    small = float(pair_constants.record["small"])
+    state = FlexState(
+        q,
+        np.zeros_like(q),
+        np.zeros_like(q),
+        np.zeros_like(q),
+        np.zeros(shape),
+        np.full(shape, small**-0.1),
+        np.full(pair_constants.table.n_slots, -1e9),
+        np.zeros(3),
+    )
+    return state if force <= 0.0 else _closed(pair, pair_constants, state, force)
+
+
+def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: FlexState, force: float) -> FlexState:
+    """Turn the driven side as a whole until the flanks carry `force` at ζ = 0."""
+    from scipy.optimize import brentq
+
+    table = pair_constants.table
+    rigid = pair_constants.sides[1]
+    free = np.flatnonzero(rigid.omega_rad_s == 0.0)
+    free = free[np.abs(rigid.hub[free]) > 0.0][0]
+    column = table.column(0.0)
+
+    def approach(q: FloatArray) -> float:
+        total = 0.0
+        for index, side in enumerate(pair_constants.sides):
+            n = side.rows.shape[-1]
+            total += float(side.rows[column].mean(axis=0) @ q[index, :n])
+        return total
+
+    def missing(depth: float) -> float:
+        return float(force_map(table, pair.machine.mesh, np.array([depth]), np.zeros(1)).force_n[0, 0]) - force
+
+    # Below 0: a tooth that stands ahead of its place carries before the others would touch.
+    depth = float(brentq(missing, -DEEPEST_M, DEEPEST_M, xtol=1e-12))
+    q = state.q.copy()
+    per_unit = float(rigid.rows[column].mean(axis=0)[free])
+    q[1, free] += (depth - approach(q)) / per_unit
+    return replace(state, q=q)
 
 
 # Slow sweeps over speed, up and down: rms of the dynamic transmission error, contact loss, jumps.

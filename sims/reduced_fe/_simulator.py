@@ -38,8 +38,8 @@ from sims.measure import plain
 from sims.mesh import Material, corner_separation_m
 from sims.presets import Preset
 from sims.reduced_fe._contact import MARGIN
-from sims.reduced_fe._eigenfrequencies import eigenfrequencies_hz, torsional_mode
-from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants
+from sims.reduced_fe._eigenfrequencies import eigenfrequencies_hz
+from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, torsional_mode
 from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, check_convergence, followed_step_s, respond
 from sims.simulator import Parameter, ParameterValue, ParameterValues, Values
 
