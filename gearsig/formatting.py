@@ -80,7 +80,7 @@ def readable(value: float, n_digits: int = 4) -> str:
     return text.replace("-", "−", 1) if text.startswith("-") else text
 
 
-def seconds_text(seconds: float, n_digits: int = 4) -> str:
+def seconds_text(seconds: float) -> str:
     """Write a time in the unit that leaves a readable number: s, ms or µs.
 
     Examples
@@ -90,7 +90,7 @@ def seconds_text(seconds: float, n_digits: int = 4) -> str:
     """
     size = abs(seconds)
     scale, unit = (1.0, "s") if size >= 0.1 or size == 0.0 else (1e3, "ms") if size >= 1e-3 else (1e6, "µs")
-    return f"{readable(scale * seconds, n_digits)} {unit}"
+    return f"{readable(scale * seconds, 4)} {unit}"
 
 
 def power_of_ten(value: float) -> str:

@@ -107,12 +107,10 @@ from gearsig.plot._spectrum import (
     METHODS,
     displayed_values,
     modes_figure,
-    order_levels_figure,
     spectrum_figure,
     speed_figure,
     speed_panel,
     time_figure,
-    trend_figure,
     value_limits,
 )
 from gearsig.plot._start_stop import (
@@ -231,7 +229,6 @@ __all__ = [
     "new_figure",
     "noise_figure",
     "order_cursors",
-    "order_levels_figure",
     "order_map",
     "order_map_figure",
     "order_overlay_figure",
@@ -272,7 +269,6 @@ __all__ = [
     "tooth_figure",
     "track_orders",
     "tracked_panel",
-    "trend_figure",
     "value_limits",
     "vmd",
     "with_unit",

@@ -1,10 +1,9 @@
-"""Signals, speed and modes over time; spectra over frequency, order or quefrency; levels of orders; trends."""
+"""Signals, speed and modes over time; spectra over frequency, order or quefrency."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import isfinite
-from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +11,8 @@ import numpy as np
 from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray, one_of
 from gearsig.decompose import Modes, mode_spectra
-from gearsig.diagnosis import OrderLevel
 from gearsig.errors import InputError
 from gearsig.formatting import unit_text
-from gearsig.indicators import Indicator
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
@@ -28,7 +25,6 @@ from gearsig.spectra import Scaling, Spectrum
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 
 def spectrum_figure(
@@ -147,7 +143,7 @@ def value_limits(values: FloatArray, scale: Scale) -> tuple[float, float]:
     high = float(values.max())
     if scale == "linear":
         low = min(float(values.min()), 0.0)
-        return low, high + 0.05 * (high - low) if high > low else low + 1.0
+        return 0.0, high + 0.05 * (high - low) if high > low else low + 1.0
     low = float(np.percentile(values, 5))
     if scale == "log":
         return max(low, high * 1e-8) / 2.0, high * 2.0
@@ -246,115 +242,6 @@ def speed_figure(shaft_angle: ShaftAngle) -> Figure:
     return figure
 
 
-def order_levels_figure(
-    levels: Sequence[OrderLevel], *, resonances_hz: Sequence[float] = (), title: str = ""
-) -> Figure:
-    """Draw amplitudes of orders over speed, the largest of each marked.
-
-    Parameters
-    ----------
-    levels : sequence of OrderLevel
-        1 to 8, of one channel.
-    resonances_hz : sequence of float
-        Each order is marked where it crosses them, by letters, which the title names.
-    title : str
-
-    Returns
-    -------
-    Figure
-
-    Raises
-    ------
-    InputError
-        Without levels, or with more than a figure can tell apart.
-    """
-    series.check_number(len(levels), f"{len(levels)} levels")
-    top_in = 0.85 if resonances_hz else 0.65
-    figure, (axes,) = style.panels((3.45 - top_in,), top_in=top_in)
-    lines: list[Line2D] = []
-    for level, colour in zip(levels, series.series_colours(len(levels)), strict=True):
-        lines += axes.plot(level.speed_rpm, level.amplitude, color=colour, linewidth=1.2, label=level.name)
-        amplitude, rpm, _ = level.largest
-        axes.plot([rpm], [amplitude], "o", color=colour, markersize=5, zorder=4)
-    top = max(float(level.amplitude.max()) for level in levels) or 1.0
-    # What lies more than three and a half decades below the largest level is noise.
-    bottom = max(min(float(level.amplitude.min()) for level in levels) / 1.5, top / 10**3.5)
-    axes.set_yscale("log")
-    axes.set_ylim(bottom, 2.0 * top)
-    axes.set_xlim(min(float(x.speed_rpm[0]) for x in levels), max(float(x.speed_rpm[-1]) for x in levels))
-    named = list(zip(ascii_uppercase, resonances_hz, strict=False))
-    for letter, hertz in named:
-        for level in levels:
-            rpm = 60.0 * hertz / level.order
-            if level.speed_rpm[0] < rpm < level.speed_rpm[-1]:
-                amplitude = float(np.interp(rpm, level.speed_rpm, level.amplitude))
-                axes.plot([rpm, rpm], [bottom, amplitude], color=style.FAULT, linewidth=0.8, linestyle=":")
-                axes.plot([rpm], [amplitude], "v", color=style.FAULT, markersize=6, zorder=5)
-                series.write(axes, rpm, 1.02, letter, colour=style.FAULT)
-    style.label_axes(axes, "speed (rpm)", with_unit("amplitude", levels[0].unit))
-    style.no_offset(axes)
-    resonances = ", ".join(f"{letter} {hertz:.4g} Hz" for letter, hertz in named)
-    series.head(figure, f"{title}; resonances: {resonances}" if named else title, lines)
-    return figure
-
-
-def trend_figure(
-    recordings: Mapping[str, Sequence[Indicator]],
-    *,
-    names: Sequence[str] = (),
-    highlighted: Sequence[str] = (),
-    n_max: int = 6,
-) -> Figure:
-    """Draw one panel of dots per indicator, one row per recording.
-
-    Where an indicator has several values in a recording (channels, gears), each is a dot.
-
-    Parameters
-    ----------
-    recordings : mapping
-        Name of the recording → its indicators. Undefined (nan) values are left out.
-    names : sequence of str
-        Indicators to draw; empty: the first `n_max` that occur. One without any value gets no panel.
-    highlighted : sequence of str
-        Recordings drawn in the colour of faults.
-
-    Returns
-    -------
-    Figure
-    """
-    defined = dict.fromkeys(i.name for items in recordings.values() for i in items if isfinite(i.value))
-    shown = [name for name in names or defined if name in defined][:n_max]
-    n_columns = max(1, min(3, len(shown)))
-    n_rows = max(1, -(-len(shown) // n_columns))
-    figure, panels = style.panels(
-        (0.22 * max(len(recordings), 1) + 0.1,) * n_rows,
-        (1.0,) * n_columns,
-        left_in=2.3,
-        top_in=0.35,
-        bottom_in=0.45,
-        row_gap_in=0.75,
-        column_gap_in=0.4,
-    )
-    for axes in panels[len(shown) :]:
-        axes.remove()
-    for number, (axes, name) in enumerate(zip(panels, shown, strict=False)):
-        units = set()
-        for row, (recording, indicators) in enumerate(recordings.items()):
-            chosen = [i for i in indicators if i.name == name and isfinite(i.value)]
-            units |= {i.unit for i in chosen}
-            colour = style.FAULT if recording in highlighted else style.MEASURED
-            axes.plot([i.value for i in chosen], [row] * len(chosen), "o", color=colour, markersize=5, alpha=0.75)
-        axes.set_ylim(len(recordings) - 0.5, -0.5)
-        labels = [plain(recording, 30) if number % n_columns == 0 else "" for recording in recordings]
-        axes.set_yticks(range(len(recordings)), labels, parse_math=False)
-        axes.tick_params(axis="y", length=0)
-        axes.spines["left"].set_visible(False)
-        style.label_axes(axes, title=with_unit(name, units.pop() if len(units) == 1 else ""))
-        axes.locator_params(axis="x", nbins=4)
-        style.no_offset(axes)
-    return figure
-
-
 # --------------------
 # Modes of a signal: waveform and spectrum of each, by rising centre, the residual last.
 # --------------------
@@ -389,8 +276,8 @@ def modes_figure(
         raise InputError(f"there are {modes.n_modes} modes", allowed="up to 12 in a figure")
     spectra = mode_spectra(modes)
     rate = modes.sampling_rate
-    shown = _limits_within(limits, 0.0, float(modes.positions[-1]), 2.0 / rate, "limits")
-    lines = _limits_within(spectrum_limits, 0.0, rate / 2, 2.0 * spectra[0].resolution, "spectrum_limits")
+    shown = _limits_within(limits, float(modes.positions[-1]), 2.0 / rate, "limits")
+    lines = _limits_within(spectrum_limits, rate / 2, 2.0 * spectra[0].resolution, "spectrum_limits")
     within = slice(max(0, int(np.floor(shown[0] * rate))), int(np.ceil(shown[1] * rate)) + 1)
     highest = max(float(above_zero(s.values[1:]).max()) for s in spectra)
     lowest = 1e-5 * highest  # of the axis that all spectra share
@@ -438,16 +325,14 @@ def _digits(value: float, n: int) -> str:
     return np.format_float_positional(value, precision=n, unique=False, fractional=False, trim="-")
 
 
-def _limits_within(
-    limits: tuple[float, float] | None, low: float, high: float, min_span: float, name: str
-) -> tuple[float, float]:
+def _limits_within(limits: tuple[float, float] | None, high: float, min_span: float, name: str) -> tuple[float, float]:
     """Return limits within the axis, wide enough for two points."""
     if limits is None:
-        return low, high
-    cut = max(low, float(limits[0])), min(high, float(limits[1]))
+        return 0.0, high
+    cut = max(0.0, float(limits[0])), min(high, float(limits[1]))
     if not cut[1] - cut[0] >= min_span:
         raise InputError(
             f"{name} is {limits[0]:g} to {limits[1]:g}",
-            allowed=f"ascending, between {low:g} and {high:g}, {min_span:g} apart",
+            allowed=f"ascending, between 0 and {high:g}, {min_span:g} apart",
         )
     return cut

@@ -510,14 +510,12 @@ def _draw_parts(rng: np.random.Generator, pair: SpurPair, rated_nm: float) -> Pa
     )
 
 
-def texture(
-    rng: np.random.Generator, pair: SpurPair, n_teeth: int, rms_m: float, shortest_mm: float = 0.2
-) -> FloatArray:
+def texture(rng: np.random.Generator, pair: SpurPair, n_teeth: int, rms_m: float) -> FloatArray:
     """Random flank heights along the path, (n_teeth, N_PATH), smoothed over the width of the Hertzian contact."""
     from scipy.ndimage import gaussian_filter1d
 
     spacing_mm = float(pair.path[1] - pair.path[0]) * pair.base_pitch_m * 1000
-    rough = gaussian_filter1d(rng.standard_normal((n_teeth, N_PATH)), max(shortest_mm / spacing_mm / 2.5, 0.4), axis=1)
+    rough = gaussian_filter1d(rng.standard_normal((n_teeth, N_PATH)), max(0.2 / spacing_mm / 2.5, 0.4), axis=1)
     return np.asarray(rough * rms_m / rough.std())
 
 

@@ -13,11 +13,19 @@ from sims.forging._drive import (
     build_rig,
     schedule,
 )
-from sims.forging._gap_twin import ForgingGapSimulator, ForgingTwin, forging_gap_simulator
 from sims.forging._kernels import bristle, position, reach, weight, younger_pair
 from sims.forging._measure import record, sensors
 from sims.forging._respond import DriveResponse, FirstState, check_convergence, drive_numbers, respond
-from sims.forging._simulator import NAME, WITH_MEANING, ForgingManipulator, PreparedDrive, with_effects
+from sims.forging._simulator import (
+    NAME,
+    WITH_MEANING,
+    ForgingGapSimulator,
+    ForgingManipulator,
+    ForgingTwin,
+    PreparedDrive,
+    forging_gap_simulator,
+    with_effects,
+)
 
 __all__ = [
     "MODES",

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import pi, radians
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearsig.checks import closest_match_hint, within
+from gearsig.checks import FloatArray, closest_match_hint, within
 from gearsig.errors import InputError
+from gearsig.gap import Added, DriveFacts, GapEffect, OperatingCondition
 from gearsig.recording import Recording
+from gearsig.rig import standard_path
 from sims.effects import EffectSetting, completed, effect, effects
 from sims.forging._drive import (
+    MESH_RAMP_RANGE,
     PARAMETERS,
     Cycle,
     ForgingDrive,
@@ -24,9 +28,11 @@ from sims.forging._drive import (
     schedule,
 )
 from sims.machine import Operation, Profile, WeakTooth
-from sims.mesh import PairGeometry
+from sims.mesh import GearGeometry, PairGeometry, wear_profile
+from sims.presets import Preset, preset_text
 from sims.simulator import (
     Parameter,
+    ParameterValue,
     ParameterValues,
     SimulationSetup,
     Simulator,
@@ -200,3 +206,248 @@ def _constant(speed_rpm: Profile) -> float:
     if len(speed_rpm.values) > 1 and float(speed_rpm.values.max() - speed_rpm.values.min()) > 0.0:
         raise InputError("speed_rpm varies", allowed="one speed that the flow allows", remedy="vary --torque instead")
     return within(float(speed_rpm.values[0]), "speed_rpm", *SPEED_RANGE_RPM, "rpm")
+
+
+# --------------------
+# What the gap diagnosis of start–stop machines asks of this model: a drive set to a rig and to how it is driven.
+# --------------------
+
+
+N_CYCLES = 2
+SAMPLING_RATE_HZ = 1000.0
+SEED = 11
+SPEED_BAND = 0.3
+NOISE_FREE: dict[str, ParameterValue] = {
+    "encoder_counts": 0,
+    "angle_noise_urad": 0.0,
+    "speed_noise_mrad_per_s": 0.0,
+    "acceleration_noise_rad_per_s2": 0.0,
+    "torque_noise_nm": 0.0,
+}
+"""What an effect changes is asked for, not what noise does to it."""
+
+Parameters = Mapping[str, ParameterValue]
+
+_SHOWS_IN = {
+    "backlash": ("play", "impact"),
+    "tooth_wear": ("play", "curve"),
+    "sliding_friction": ("flank_friction",),
+    "root_crack": ("tooth",),
+    "torque_ripple": ("ripple",),
+}
+"""Of the catalogue's effects: changes of starts and stops (`gearsig.gap.start_stop.NAMES`); those of `sims.effects` are
+of vibration."""
+
+_WRONG_VALUES = {
+    name: GapEffect(name, group, title, "added_percent", "%", signature, shows_in)
+    for name, group, title, signature, shows_in in (
+        (
+            "load_inertia",
+            "drive and load",
+            "another inertia of the load",
+            "torque against acceleration of the driven gear, in starts and stops",
+            ("inertia",),
+        ),
+        (
+            "load_friction",
+            "drive and load",
+            "more friction of the load's bearings",
+            "torque that turns the load without accelerating it",
+            ("load_friction",),
+        ),
+        (
+            "torque_gain",
+            "measurement",
+            "a torque sensor that reads too much or too little",
+            "inertia and friction of the load seem to change alike",
+            ("inertia", "load_friction", "deflection"),
+        ),
+    )
+}
+"""Effects that are a parameter's wrong value and no effect of the catalogue."""
+
+
+@dataclass(frozen=True)
+class ForgingTwin:
+    """A simulated drive by a rig's drawing, driven as a recording shows it; see `gearsig.gap.DriveTwin`.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Of `sims.forging`.
+    point : OperatingCondition
+        Torque of the motor's open valve; the speed that the flow allows.
+    """
+
+    parameters: Parameters
+    point: OperatingCondition
+
+    def run(self, added: Sequence[Added] = ()) -> Recording:
+        """Return a recording of `N_CYCLES` cycles."""
+        parameters = self.parameters
+        for setting in added:
+            parameters = _with_wrong_value(setting, parameters)
+        operation = Operation.steady(self.point.speed_rpm, self.point.torque_nm)
+        return ForgingManipulator().simulate(
+            SimulationSetup("", parameters, _settings(added), operation),
+            np.random.default_rng(SEED),
+            sampling_rate_hz=SAMPLING_RATE_HZ,
+            duration_s=N_CYCLES * (float(parameters["on_s"]) + float(parameters["off_s"])) - 1e-6,
+        )
+
+    def at_torque(self, factor: float) -> ForgingTwin:
+        """Return the drive with another torque of the motor, and so another top speed."""
+        return replace(self, point=replace(self.point, torque_nm=self.point.torque_nm * factor))
+
+    def worn_curve_um(self, deflection_um: float, depth_um: float, n_places: int) -> FloatArray:
+        """Return how much further the driver turns, at each place of the mesh cycle, with worn teeth, (n_places,).
+
+        A pair whose flank has lost h touches later: Σ (δ − h_i)₊^λ = n g^λ at an equal load, g the deflection of n
+        healthy pairs. Where two pairs share the load, the less worn one decides. Wear is that of the driver's teeth,
+        by Archard's law (`sims.mesh.wear_profile`).
+
+        Parameters
+        ----------
+        deflection_um : float
+            Of one pair under the ordinary load; 20 µm where it is not known.
+        depth_um : float
+            Where the wear is greatest.
+        n_places : int
+        """
+        module = float(self.parameters["module_mm"])
+        teeth = int(float(self.parameters["teeth_driver"])), int(float(self.parameters["teeth_driven"]))
+        driver, driven = (GearGeometry(z, module, 20.0, face_width_mm=16.0 * module) for z in teeth)
+        pair = PairGeometry(driver, driven)
+        path = standard_path(teeth, 1e-3 * module, radians(20.0))
+        u = (np.arange(n_places) + 0.5) / n_places
+        positions = np.stack([u, u + 1.0])
+        touches = positions < path.contact_ratio
+        worn = depth_um * np.stack([wear_profile(pair, 1, 1e3 * path.driver_lever_m(row)) for row in positions])
+        exponent = float(self.parameters["exponent"])
+        g = deflection_um if np.isfinite(deflection_um) and deflection_um > 0.0 else 20.0
+        n = np.sum(touches, axis=0)
+        load = g**exponent  # of one pair: with two the compression is less
+        healthy = g / n ** (1.0 / exponent)
+        low, high = np.zeros(n_places), healthy + depth_um
+        for _ in range(40):  # bisections: 1e-12 of the first interval
+            middle = 0.5 * (low + high)
+            carried = np.sum(np.where(touches, np.maximum(middle - worn, 0.0) ** exponent, 0.0), axis=0)
+            low, high = np.where(carried < load, middle, low), np.where(carried < load, high, middle)
+        curve: FloatArray = 0.5 * (low + high) - healthy
+        return curve
+
+    def crack_stiffness_loss(self, crack: Added) -> float:
+        """Return which part of its stiffness a cracked tooth loses."""
+        _, weak = with_effects(complete_values(PARAMETERS, self.parameters), _settings((crack,)))
+        assert weak is not None  # noqa: S101 - a crack of some depth makes a tooth weak
+        return float(weak.loss)
+
+    def preset_toml(self, added: Added, notes: Sequence[str]) -> str:
+        """Return the drive as a preset file that `gearsig simulate forging --preset FILE` runs."""
+        torque_nm = self.point.torque_nm
+        if added.name == "torque_gain":  # the motor's torque was read with the same wrong gain
+            torque_nm /= 1.0 + 0.01 * added.severity
+        preset = Preset(
+            "",
+            NAME,
+            "Forging drive set to a rig and to its starts and stops",
+            ("the rig file, and the recording's own torque and motion",),
+            ("times of valve and brake, friction of the load, noise: read off the recording or usual",),
+            ("press blows, elastic shafts, pitch errors",),
+            dict(_with_wrong_value(added, self.parameters)),  # type: ignore[arg-type]  # read only
+            round(self.point.speed_rpm, 2),
+            round(torque_nm, 3),
+            _settings((added,)),
+        )
+        return preset_text(preset, notes)
+
+
+@dataclass(frozen=True)
+class ForgingGapSimulator:
+    """The forging drive as the gap diagnosis takes it; see `gearsig.gap.DriveSimulator`."""
+
+    name: str = field(default=NAME)
+
+    def gap_effects(self) -> dict[str, GapEffect]:
+        """Return the effects that have a meaning for this model."""
+        known = [(effect(name), shows_in) for name, shows_in in _SHOWS_IN.items()]
+        return {
+            known_effect.name: GapEffect(
+                known_effect.name,
+                known_effect.group,
+                known_effect.title,
+                known_effect.severity.name,
+                known_effect.severity.unit,
+                shows_in=shows_in,
+            )
+            for known_effect, shows_in in known
+        } | _WRONG_VALUES
+
+    def drive_twin_of(self, facts: DriveFacts) -> ForgingTwin:
+        """Return the drive by the rig's contact; what neither rig nor recording tells is usual for its size."""
+        contact, path = facts.contact, facts.path
+        ratio = path.teeth[1] / path.teeth[0]
+        torque_nm, friction_nm, top_rad_s = facts.motor_torque_nm, facts.load_friction_nm, facts.top_speed_rad_s
+        drag_nm = 0.05 * torque_nm
+        needed = min((drag_nm + friction_nm / ratio) / torque_nm, 0.95)
+        limit_rpm = top_rad_s / (1.0 - SPEED_BAND * needed) * 30.0 / pi
+        parameters: dict[str, ParameterValue] = {
+            "teeth_driver": path.teeth[0],
+            "teeth_driven": path.teeth[1],
+            "module_mm": facts.module_mm,
+            "contact_ratio": min(path.contact_ratio, 1.84),
+            "mesh_phase": contact.mesh_phase,
+            "mesh_ramp": min(max(contact.mesh_ramp, MESH_RAMP_RANGE[0]), MESH_RAMP_RANGE[1]),
+            "stiffness_n_per_m_lambda": contact.stiffness_n_per_m_lambda,
+            "exponent": contact.exponent,
+            "restitution": max(contact.restitution, 0.05),
+            "damping_law": contact.damping_law,
+            "impact_speed_floor_mps": contact.impact_speed_floor_mps,
+            "half_backlash_um": contact.half_backlash_um,
+            "friction_coefficient": contact.friction_coefficient,
+            "motor_inertia_kg_m2": contact.motor_inertia_kg_m2,
+            "pinion_inertia_kg_m2": max(contact.driver_inertia_kg_m2, 1e-4),
+            "wheel_inertia_kg_m2": contact.driven_inertia_kg_m2 or 0.0,
+            "piece_mass_kg": 0.0,
+            "on_s": facts.on_s,
+            "off_s": facts.off_s,
+            "valve_rise_s": 0.02,
+            "brake_nm": facts.brake_torque_nm,
+            "press_nm": 0.0,
+            "motor_speed_band": SPEED_BAND,
+            "drag_nm": drag_nm,
+            **NOISE_FREE,
+            "drag_viscous_nm_s_per_rad": 0.002 * torque_nm,
+            "load_friction_nm": 0.95 * friction_nm,
+            "load_viscous_nm_s_per_rad": 0.1 * friction_nm / (top_rad_s / ratio),
+        }
+        rounded = {k: v if isinstance(v, str) else float(f"{v:.6g}") for k, v in parameters.items()}
+        return ForgingTwin(rounded, OperatingCondition(limit_rpm, torque_nm))
+
+
+def forging_gap_simulator() -> ForgingGapSimulator:
+    """Return the model as the gap diagnosis takes it."""
+    return ForgingGapSimulator()
+
+
+def _settings(added: Sequence[Added]) -> tuple[EffectSetting, ...]:
+    """Return the catalogue's settings; none of what is a parameter's wrong value."""
+    return tuple(
+        EffectSetting(setting.name, setting.severity, dict(setting.options))
+        for setting in added
+        if setting.name not in _WRONG_VALUES
+    )
+
+
+def _with_wrong_value(added: Added, parameters: Parameters) -> Parameters:
+    """Return the parameters with the wrong value of one; effects of the catalogue leave them as they are."""
+    factor = 1.0 + 0.01 * added.severity
+    if added.name == "load_inertia":
+        return {**parameters, "wheel_inertia_kg_m2": float(parameters["wheel_inertia_kg_m2"]) * factor}
+    if added.name == "load_friction":
+        names = ("load_friction_nm", "load_viscous_nm_s_per_rad")
+        return {**parameters, **{key: float(parameters[key]) * factor for key in names}}
+    if added.name == "torque_gain":  # what was read off the recording was misread as well
+        read = ("brake_nm", "drag_nm", "drag_viscous_nm_s_per_rad")
+        return {**parameters, **{key: float(parameters[key]) / factor for key in read}, "torque_gain": factor}
+    return parameters

@@ -18,7 +18,7 @@ from sims.gear_pair._drive import (
     machine_fields,
     total_inertia_kg_m2,
 )
-from sims.gear_pair._installed import Installed, completed
+from sims.gear_pair._installed import Installed, completed_bearing
 from sims.gear_pair._measurement import COORDINATES, MIN_MOTION_HZ, YIELDS, MeasuredRun, Measurement
 from sims.gear_pair._parameters import PARAMETERS
 from sims.gear_pair._rolling import (
@@ -29,13 +29,16 @@ from sims.gear_pair._rolling import (
     stiffness_under_load_n_per_m,
 )
 from sims.gear_pair._run import PairResponse, RunPlan, StepConvergence, profile_points
-from sims.gear_pair._simulator import PairModel, ReadyPair, SimulationRequest, check_load
-from sims.gear_pair._twin import (
+from sims.gear_pair._simulator import (
     BODY_KG,
     BODY_SHAPES,
     PairGapSimulator,
+    PairModel,
     PairTwin,
+    ReadyPair,
+    SimulationRequest,
     body_gain,
+    check_load,
 )
 
 __all__ = [
@@ -66,7 +69,7 @@ __all__ = [
     "build_rig",
     "carried_part",
     "check_load",
-    "completed",
+    "completed_bearing",
     "contact_n_per_m15",
     "draw_roughness",
     "element_forces",

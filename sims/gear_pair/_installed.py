@@ -192,7 +192,7 @@ def installed_of_rig(rig: Rig, size: float, modes: Sequence[HousingMode], used: 
     bearings: list[Bearing] = []
     for side in range(2):
         of_shaft = sorted(own_bearings(rig, shafts[side]), key=lambda b: b.name not in used)[:2]
-        bearings += [completed(b, size) for b in of_shaft]
+        bearings += [completed_bearing(b, size) for b in of_shaft]
         bearings += [_spare(rig, shafts[side], 2 * side + n + 1, size) for n in range(len(of_shaft), 2)]
     pickup = _pickup(rig, shafts)
     return Installed(
@@ -209,7 +209,7 @@ def own_bearings(rig: Rig, shaft: str) -> list[Bearing]:
     return [b for b in rig.bearings if b.shaft == shaft]
 
 
-def completed(bearing: Bearing, size: float) -> Bearing:
+def completed_bearing(bearing: Bearing, size: float) -> Bearing:
     """Return a bearing with a geometry that gives its orders; where nothing is known, a usual one's.
 
     n = BPFO + BPFI and d/D = (BPFI − BPFO)/n, with contact angle 0.

@@ -3,18 +3,57 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from functools import cached_property
+from hashlib import sha256
+from math import cos, pi, radians, sin, sqrt, tan
+from types import MappingProxyType
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from gearsig.checks import within
+from gearsig.checks import count, within
+from gearsig.errors import InputError, RefusalError
+from gearsig.gap import Added, GapEffect, OperatingCondition
 from gearsig.recording import Recording
-from sims.effects import EffectSetting, completed
-from sims.gear_pair._installed import Installed, installed_of
+from gearsig.rig import OperatingPoint, Rig, rig_to_dict
+from sims.effects import GEARS, EffectSetting, MachineFacts, Options, as_gap_effect, completed, effect, effects
+from sims.gear_pair._build import build_rig
+from sims.gear_pair._installed import (
+    HousingMode,
+    Installed,
+    SensorSeat,
+    completed_bearing,
+    further_seats,
+    installed_of,
+    installed_of_rig,
+    table_of,
+)
 from sims.gear_pair._measurement import MeasuredRun
-from sims.machine import Machine, Operation
-from sims.simulator import HasText, Parameter, SimulationSetup, Simulator, Values, complete_values, truth_of
+from sims.machine import (
+    Machine,
+    Nominal,
+    Operation,
+    log_uniform,
+    nominal_of,
+    pitch_tolerance_um,
+    runout_tolerance_um,
+    usual_mass_kg,
+)
+from sims.mesh import PairGeometry
+from sims.presets import Preset, preset_text
+from sims.simulator import (
+    HasText,
+    Parameter,
+    ParameterValue,
+    SimulationSetup,
+    Simulator,
+    Values,
+    complete_values,
+    sources_digest,
+    truth_of,
+)
 
 # What a simulated gear pair can be asked for: speeds, loads, sampling rates, durations.
 
@@ -142,8 +181,6 @@ class PairModel(Simulator, Generic[Ready]):
         self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
     ) -> Recording:
         """Make a recording with rig and truth; see `sims.simulator.Simulator.simulate`."""
-        from sims.gear_pair._build import build_rig
-
         within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
         ready = self.prepare(setup, rng, sampling_rate_hz=sampling_rate_hz)
         rig = build_rig(
@@ -173,3 +210,399 @@ class PairModel(Simulator, Generic[Ready]):
     def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> HasText:
         """Tell how far a smaller step of the integrator changes the result of this very machine."""
         return self._converges(self.prepare(setup, rng), rng)
+
+
+# --------------------
+# A model set to a rig, for the gap diagnosis: see `gearsig.gap`.
+# --------------------
+
+# Parameters of a pair of which only the rig's data are known: the rest is usual for its size.
+#
+# Middles of the ranges from which gearboxes for calibrations are drawn. They are plausible, not measured.
+
+RELIEF_SHARE, RELIEF_LENGTH_MODULES = 0.8, 1.1
+"""Tip relief over the deflection under the nominal load; its length along the line of action."""
+PITCH_RMS_SHARE, RUNOUT_SHARE = 0.1, 0.3
+"""A ground gear's rms pitch deviation over f_pt, its eccentricity over F_r: tolerances of class 5 of ISO 1328."""
+BODY_KG, MOUNTS_HZ, MOUNTS_DAMPING = 40.0, 6.0, 0.3
+"""A housing with its bed, of a machine of size 1; below its mounts' frequency nothing that turns is slow enough."""
+BODY_SHAPES = ((1.0, 1.0, 1.0, 1.0), (1.0, -1.0, 1.0, -1.0))
+"""Heave and pitch of that housing at bearings 1 to 4, the first two at the ends of one shaft."""
+UNBALANCE_UM = 30.0
+"""Offset of the centre of mass; 40 um are balance grade G 6.3 at 1500 rpm."""
+COUPLING_BENDING_SHARE = 0.01
+"""A coupling's bending stiffness over the torsional one of shaft and coupling: catalogues have 0.002 (steel discs) to
+0.05 (elastomer)."""
+
+
+def usual_parameters(nominal: Nominal) -> dict[str, ParameterValue]:
+    """Return the parameters of the model "cracked" that do not depend on the specimen."""
+    m, z, size = nominal.module_mm, nominal.teeth, nominal.size
+    shifts = [_shift(teeth, nominal.pressure_angle_deg) for teeth in z]
+    rotor = 4.5e-3 * size**4 * (sum(z) / 80.0) ** 3
+    torsional = 1.1e4 * size**3
+    return {
+        "teeth_driver": z[0],
+        "teeth_driven": z[1],
+        "module_mm": m,
+        "pressure_angle_deg": nominal.pressure_angle_deg,
+        "face_width_mm": nominal.face_width_mm,
+        "tool_tip_radius": _tool_tip_radius(nominal.pressure_angle_deg),
+        "profile_shift_driver": shifts[0],
+        "profile_shift_driven": shifts[1],
+        "contact_law": "load-dependent",
+        "mesh_damping_ratio": 0.06,
+        "half_backlash_um": 40.0 * sqrt(size),
+        "tip_relief_um": RELIEF_SHARE * nominal.deflection_um,
+        "tip_relief_length_mm": RELIEF_LENGTH_MODULES * m,
+        "roughness_um": 0.1,
+        "roughness_locked_to": "flank",
+        "viscosity_cp": 20.0,
+        "bearing_stiffness_n_per_m": 2e8 * size,
+        "bearing_damping_n_s_per_m": 1200.0 * size,
+        "bearing_mass_kg": 0.7 * size**2,
+        "bending_stiffness_n_per_m": 2.6e8 * size,
+        "bending_damping_n_s_per_m": 630.0 * size,
+        "torsional_stiffness_nm_per_rad": torsional,
+        "torsional_damping_nm_s_per_rad": 1.5 * size**3,
+        "coupling_bending_nm_per_rad": COUPLING_BENDING_SHARE * torsional,
+        "rotor_inertia_input_kg_m2": rotor,
+        "rotor_inertia_output_kg_m2": rotor,
+        "governor_nm_s_per_rad": 1.6 * size**4,
+        "bearing_distance_mm": 50.0 * m,
+        "noise_mps2": 0.1,
+        "noise_slope": 0.5,
+        "sensor_range_mps2": 5000.0,
+        "sensor_resonance_hz": 0.0,
+    }
+
+
+def specimen_parameters(nominal: Nominal, rng: np.random.Generator) -> dict[str, ParameterValue]:
+    """Return what differs between machines of one drawing: tolerances, half to twice the usual, and their places."""
+    parameters: dict[str, ParameterValue] = {"tolerance_seed": int(rng.integers(10**6))}
+    widest = max(nominal.pitch_diameters_mm)
+    parameters["pitch_deviation_um"] = PITCH_RMS_SHARE * pitch_tolerance_um(nominal.module_mm, widest) * _spread(rng)
+    for side, name in enumerate(("driver", "driven")):
+        diameter = nominal.pitch_diameters_mm[side]
+        parameters[f"runout_{name}_um"] = RUNOUT_SHARE * runout_tolerance_um(nominal.module_mm, diameter) * _spread(rng)
+        parameters[f"unbalance_{name}_g_mm"] = UNBALANCE_UM * usual_mass_kg(nominal, side) * _spread(rng)
+        for quantity in ("runout", "unbalance"):
+            parameters[f"{quantity}_angle_{name}_deg"] = float(rng.uniform(0.0, 360.0))
+    return parameters
+
+
+def usual_housing(rng: np.random.Generator) -> tuple[HousingMode, ...]:
+    """Draw the modes of a housing that nobody has measured."""
+    return tuple(
+        HousingMode(
+            _rounded(log_uniform(rng, 600.0, 8000.0)),
+            _rounded(log_uniform(rng, 0.01, 0.05)),
+            _rounded(rng.uniform(0.02, 0.08)),
+            tuple(_rounded(s) for s in rng.uniform(-1.0, 1.0, 4)),  # type: ignore[arg-type]  # four of them
+        )
+        for _ in range(int(rng.integers(2, 6)))
+    )
+
+
+def body_on_mounts(nominal: Nominal) -> tuple[HousingMode, ...]:
+    """Return the housing as a rigid body on soft mounts, as which it answers to a shaft's low orders: heave and pitch.
+
+    Above the mounts' frequency a = Σ F/M; with F = k x the force of a bearing whose acceleration is −ω² x, that is a
+    mode of static gain k/(M ω₀²). On rigid ground a machine shakes some 50 dB less at 25 Hz. A pair of opposite forces
+    on a shaft's two bearings, as a bending moment makes, leaves the sum nothing and turns the body: at arms ±l/2,
+    a = ±(l/2) Σ ±F (l/2)/J with J = M i². A block 1.5 l long and l high has i = 0.52 l, here l/2: the same gain.
+
+    Source: H. Himelblau and S. Rubin, Vibration of a resiliently supported rigid body, in *Harris' Shock and Vibration
+    Handbook*.
+    """
+    stiffness = float(usual_parameters(nominal)["bearing_stiffness_n_per_m"])
+    gain = body_gain(stiffness, BODY_KG * nominal.size**2, MOUNTS_HZ)
+    return tuple(HousingMode(MOUNTS_HZ, MOUNTS_DAMPING, gain, shape) for shape in BODY_SHAPES)
+
+
+def body_gain(bearing_stiffness_n_per_m: float, mass_kg: float, mounts_hz: float) -> float:
+    """Return the static gain k/(M ω₀²) of a body on mounts, see `body_on_mounts`."""
+    return bearing_stiffness_n_per_m / (mass_kg * (2.0 * pi * mounts_hz) ** 2)
+
+
+def _shift(teeth: int, pressure_angle_deg: float) -> float:
+    """Least profile shift without undercut, in modules: (z_min − z)/z_min, z_min = 2/sin²α of the rack."""
+    min_teeth = 2.0 / sin(radians(pressure_angle_deg)) ** 2
+    return max(0.0, (min_teeth - teeth) / min_teeth)
+
+
+def _tool_tip_radius(pressure_angle_deg: float) -> float:
+    """0.38 modules, or what a rack of 1.25 modules dedendum has room for: (π/4 − 1.25 tan α)/(sec α − tan α)."""
+    alpha = radians(pressure_angle_deg)
+    return min(0.38, 0.95 * (pi / 4.0 - 1.25 * tan(alpha)) / (1.0 / cos(alpha) - tan(alpha)))
+
+
+def _spread(rng: np.random.Generator) -> float:
+    return float(2.0 ** rng.uniform(-1.0, 1.0))
+
+
+def as_plain(values: dict[str, Any]) -> dict[str, Any]:
+    """Round numbers to six digits: what a preset file holds is what runs."""
+    return {name: _rounded(v) if isinstance(v, float) else v for name, v in values.items()}
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+LONGEST_LEAD_REV = 8.0
+"""Of the driver, that another run starts later."""
+EVEN = 0.01
+"""Of a quiet machine's tolerances, what is left: none at all would leave lines of power 0."""
+_UNEVEN = (
+    "pitch_deviation_um",
+    *(f"{what}_{gear}_{unit}" for what, unit in (("runout", "um"), ("unbalance", "g_mm")) for gear in GEARS),
+)
+_NOISES = ("noise_mps2", "sensor_noise_mps2_per_sqrt_hz")
+VIBRATION_S = 0.5
+"""Length of the run that tells how strongly the healthy machine vibrates."""
+
+
+@dataclass(frozen=True)
+class PairTwin:
+    """A rig's twin, whatever model runs it: its own geometry, the rest usual for its size.
+
+    A seed is one specimen with its housing.
+
+    Parameters
+    ----------
+    rig : Rig
+    nominal : Nominal
+    further : tuple of SensorSeat
+        Sensors beside the rig's own.
+    is_quiet : bool
+        On soft mounts, without the vibration of the surroundings, its gears nearly even.
+    """
+
+    rig: Rig
+    nominal: Nominal
+    further: tuple[SensorSeat, ...] = ()
+    is_quiet: bool = False
+
+    @property
+    def key(self) -> str:
+        """Model, state of its code, and what is known of the rig."""
+        known = {name: value for name, value in rig_to_dict(self.rig).items() if name not in ("name", "sources")}
+        text = repr(known) + (repr(self.further) if self.further else "") + ("quiet" if self.is_quiet else "")
+        return f"{self.model} {sources_digest()} {sha256(text.encode()).hexdigest()[:16]}"
+
+    @property
+    def pair_model(self) -> PairModel[Any]:
+        """The model that runs the twin."""
+        raise NotImplementedError
+
+    @property
+    def model(self) -> str:
+        """Name of the model whose preset the twin is."""
+        return self.pair_model.name
+
+    @property
+    def point(self) -> OperatingCondition:
+        """The rig's nominal operating point, as is usual for its size where the rig does not tell."""
+        return OperatingCondition(self.nominal.speed_rpm, self.nominal.torque_nm)
+
+    def run(
+        self,
+        point: OperatingCondition,
+        added: Sequence[Added] = (),
+        *,
+        seed: int,
+        duration_s: float,
+        sampling_rate_hz: float,
+        noise: int = 0,
+    ) -> Recording:
+        """Return a recording that carries the rig; another `noise` is another run of the same machine.
+
+        Flanks, tolerances and housing follow from `seed` alone. Sensor noise, tachometer jitter and where the run
+        starts follow from seed and noise; run 0 starts at the driver's first tooth.
+        """
+        count(seed, "seed", minimum=0)
+        preset_at_point = self.preset(point, added, seed=seed)
+        run_rng = np.random.default_rng([seed, count(noise, "noise", minimum=0)])
+        skipped = 0
+        if noise:
+            skipped = round(run_rng.uniform(0.0, LONGEST_LEAD_REV) * 60.0 / point.speed_rpm * sampling_rate_hz)
+        machine_rng = np.random.default_rng(seed)
+        ready = self._prepared(preset_at_point, machine_rng, sampling_rate_hz)
+        run: MeasuredRun[Any] = MeasuredRun(
+            machine_rng,
+            sampling_rate_hz,
+            duration_s + skipped / sampling_rate_hz,
+            self._rig_at(point),
+            step_s=self._step_s(preset_at_point),
+            noise_rng=run_rng if noise else None,
+        )
+        recording = self.pair_model.record(ready, run)
+        recording = replace(recording, truth={**(recording.truth or {}), "seed": seed, "noise": noise})
+        return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
+
+    def quiet(self) -> Self:
+        """Return the machine on soft mounts where nothing else vibrates and its own gears hardly do.
+
+        What an effect adds is neither lost in noise nor, as a second unbalance would, weighed up against what the
+        specimen happens to have there.
+        """
+        return replace(self, is_quiet=True)
+
+    def candidates(self, name: str) -> Sequence[Added]:
+        """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
+        plausible = effect(name).plausible_range
+        indices = range(plausible.n_severities)
+        return self._settings(name, [(options, indices) for options in plausible.choices(self._facts)])
+
+    def further_settings(self, name: str) -> Sequence[Added]:
+        """Return further settings, with which a tooth's fault takes another profile over the engagement."""
+        return self._settings(name, effect(name).plausible_range.further_settings(self._facts))
+
+    def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[float]]]) -> list[Added]:
+        """Return each set of options with some of its severities, counted from 0; 0.5 lies between the first two."""
+        last, settings = effect(name).plausible_range.n_severities - 1, []
+        for options, places in chosen:
+            low, high = effect(name).plausible_severities(self._facts, options)
+            severities = [low * (high / low) ** (place / last) for place in places]
+            settings += [Added(name, float(f"{severity:.4g}"), options) for severity in severities]
+        return settings
+
+    def with_further_sensors(self) -> tuple[Self, Mapping[str, str]]:
+        """Return the machine with an upright sensor over each bearing that has none, and those channels' places."""
+        further = further_seats(installed_of_rig(self.rig, self.nominal.size, ()))
+        return replace(self, further=further), {seat.channel: seat.position for seat in further}
+
+    def draw(self, name: str, rng: np.random.Generator, *, above: float = 0.0) -> Added:
+        """Draw a setting from the range of the candidates, its options at random.
+
+        Parameters
+        ----------
+        name : str
+        rng : numpy.random.Generator
+        above : float
+            Share of the range, in logarithms, that is left out at its lower end.
+
+        Raises
+        ------
+        RefusalError
+            If the rig lacks what the effect needs: a bearing.
+        """
+        plausible, machine = effect(name).plausible_range, self._facts
+        if not plausible.choices(machine):
+            raise RefusalError(f"the rig has nothing that {name} could be in", remedy="describe its bearings")
+        options = plausible.drawn(machine, rng)
+        low, high = effect(name).plausible_severities(machine, options)
+        return Added(name, log_uniform(rng, low * (high / low) ** above, high), options)
+
+    def preset(
+        self, point: OperatingCondition, added: Sequence[Added] = (), *, seed: int = 0, notes: Sequence[str] = ()
+    ) -> Preset:
+        """Return the specimen `seed` with its effects as a preset."""
+        drawn = np.random.default_rng([seed, 1])
+        values = usual_parameters(self.nominal) | specimen_parameters(self.nominal, drawn)
+        housing = usual_housing(drawn)
+        if self.is_quiet:
+            values |= dict.fromkeys(_NOISES, 0.0) | {name: EVEN * float(values[name]) for name in _UNEVEN}
+            housing = (*body_on_mounts(self.nominal), *housing)
+        used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
+        installed = installed_of_rig(self.rig, self.nominal.size, housing, used)
+        installed = replace(installed, sensors=(*installed.sensors, *self.further))
+        title = f"Twin of {self.rig.name}" if self.rig.name else "Twin of a rig"
+        return Preset(
+            name="twin",
+            model=self.model,
+            title=f"{title}: {self.nominal.teeth[0]}/{self.nominal.teeth[1]}, module {self.nominal.module_mm:g}",
+            sources=(*self.rig.sources, *notes),
+            assumed=(
+                "usual for its size: masses, inertias, shafts, stiffness and damping, tip relief, tolerances, oil",
+                "transfer path: drawn",
+                f"profiles of the flanks, and angles of its effects: those of seed {seed}",
+                *(f"{name}: usual, the rig does not tell" for name in self.nominal.assumed),
+            ),
+            does_not_represent=("the real machine's own flanks, tolerances and housing",),
+            parameters=MappingProxyType(as_plain(self._model_parameters(values))),
+            speed_rpm=point.speed_rpm,
+            torque_nm=point.torque_nm,
+            effects=tuple(EffectSetting(a.name, a.severity, dict(a.options)) for a in added),
+            installed=table_of(installed),
+        )
+
+    def preset_toml(
+        self, point: OperatingCondition, added: Sequence[Added], notes: Sequence[str], *, seed: int = 0
+    ) -> str:
+        """Return the machine with the effects as a preset file for `gearsig simulate MODEL --preset FILE`."""
+        comments = [f"The flanks' profiles are not in this file: simulate with --seed {seed} for those of the twin."]
+        return preset_text(self.preset(point, added, seed=seed, notes=notes), comments)
+
+    def pair_geometry(self) -> PairGeometry:
+        """Return the geometry of the pair.
+
+        Raises
+        ------
+        InputError
+            If the model cannot have such gears.
+        """
+        return self._prepared(self.preset(self.point), np.random.default_rng(0)).machine.mesh.pair
+
+    @cached_property
+    def _facts(self) -> MachineFacts:
+        machine = self._prepared(self.preset(self.point), np.random.default_rng(0)).machine
+        pair = machine.mesh.pair
+        shafts = (self.rig.pairs[0].driver, self.rig.pairs[0].driven)
+        bearings = tuple(completed_bearing(b, self.nominal.size) for b in self.rig.bearings if b.shaft in shafts)
+        healthy = self.run(self.point, seed=0, duration_s=VIBRATION_S, sampling_rate_hz=20480.0)
+        rms = np.mean([np.std(healthy.values(name)) for name in healthy.vibration_names()])
+        play_um = 2.0 * machine.half_backlash_um
+        return MachineFacts(self.nominal, (pair.driver, pair.driven), bearings, float(rms), play_um)
+
+    def _prepared(self, preset: Preset, rng: np.random.Generator, sampling_rate_hz: float = 20480.0) -> ReadyPair:
+        ready: ReadyPair = self.pair_model.prepare(SimulationSetup(preset), rng, sampling_rate_hz=sampling_rate_hz)
+        return ready
+
+    def _step_s(self, preset: Preset) -> float:
+        """Longest step of the integrator."""
+        raise NotImplementedError
+
+    def _model_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
+        """Return what is usual in the model's own parameters."""
+        return values
+
+    def _rig_at(self, point: OperatingCondition) -> Rig:
+        operating_point = OperatingPoint(self.rig.pairs[0].driver, point.speed_rpm, torque_nm=point.torque_nm)
+        return replace(self.rig, operating_point=operating_point)
+
+
+@dataclass(frozen=True)
+class PairGapSimulator:
+    """A model of a gear pair as the gap diagnosis takes it.
+
+    Parameters
+    ----------
+    name : str
+        As on the command line.
+    make : callable
+        Makes a twin of a rig and of what it says of its pair.
+    """
+
+    name: str
+    make: Callable[[Rig, Nominal], PairTwin]
+
+    def gap_effects(self) -> Mapping[str, GapEffect]:
+        """Return all effects of the catalogue: each has a meaning for a gear pair."""
+        return {name: as_gap_effect(e) for name, e in effects().items()}
+
+    def twin_of(self, rig: Rig) -> PairTwin:
+        """Return a twin of the rig, whose machine has been built to see that it can be.
+
+        Raises
+        ------
+        RefusalError
+            If there is not exactly one pair, its teeth or module are not known, or the model cannot have such gears.
+        """
+        twin = self.make(rig, nominal_of(rig))
+        try:
+            twin.pair_geometry()
+        except InputError as error:
+            raise RefusalError(f"the model {self.name!r} cannot be set to this rig: {error}") from None
+        return twin

@@ -15,7 +15,6 @@ from PIL import Image
 
 from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError
-from gearsig.indicators import Indicator
 from gearsig.orders import OrderMap
 from gearsig.plot import (
     FAULT,
@@ -34,7 +33,6 @@ from gearsig.plot import (
     speed_figure,
     svg_panel,
     time_figure,
-    trend_figure,
 )
 
 
@@ -174,14 +172,6 @@ def test_speed_at_rest_and_turning(uncertainty):
         time = np.array([0.0, 1.0])
         angle = ShaftAngle("input", time, speed * time, np.full(2, speed), "pulses", uncertainty)
         assert "speed of input" in _drawn(speed_figure(angle))
-
-
-def test_trend_skips_undefined_values_and_empty_recordings():
-    rows = {"one": [Indicator("FM4", 3.0), Indicator("NA4", float("nan"))], "two": []}
-    texts = _drawn(trend_figure(rows))
-    assert "FM4" in texts
-    assert "NA4" not in texts
-    assert _drawn(trend_figure({})) == []
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from gearsig.rig import Bearing, EncoderChannel, GearPair, OperatingPoint, Rig, 
 from sims import simulate
 from sims.cracked import CrackedPair, CrackedTwin
 from sims.effects import effect, effects
-from sims.gear_pair import BODY_KG, completed
+from sims.gear_pair import BODY_KG, completed_bearing
 from sims.machine import nominal_of
 from sims.registry import gap_simulator
 from sims.simulator import SimulationSetup
@@ -146,7 +146,7 @@ def test_an_encoder_gives_the_speed_without_a_mark() -> None:
     ],
 )
 def test_a_bearing_gets_a_geometry_with_its_orders(bearing: Bearing) -> None:
-    whole = completed(bearing, 1.5)
+    whole = completed_bearing(bearing, 1.5)
     from_geometry = replace(whole, bpfo_order=None, bpfi_order=None).orders()
     for name, order in bearing.orders().items():
         assert whole.orders()[name] == order
