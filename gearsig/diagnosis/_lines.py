@@ -13,12 +13,12 @@ from gearsig.checks import FloatArray
 from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
 from gearsig.diagnosis._types import CannotTell, Finding, Kind, Where, cannot_tell
 from gearsig.prepared import (
-    MAINS_TOLERANCE,
     RUN_UP_FOOT_ORDERS,
     LinesOverFloor,
     lines_over_noise_floor,
     neighbour_levels,
     peak_position,
+    supply_pulling_at,
 )
 from gearsig.recording import MAINS_HZ, MAINS_WANDER
 from gearsig.rig import GearPair, hunting_tooth_order
@@ -445,12 +445,11 @@ def _is_synchronous(signals: AnalysisSignals, hertz: float, slower: float) -> bo
 
 def magnetic_pull_at(hertz: float) -> str:
     """Name the multiple of twice the mains' frequency that a frequency is on; empty if it is on none."""
-    for mains_hz in MAINS_HZ:
-        pull_hz = 2 * mains_hz
-        k = round(hertz / pull_hz)
-        if k and abs(hertz / (k * pull_hz) - 1) <= MAINS_TOLERANCE:
-            return f"the magnetic pull of a {mains_hz:g} Hz supply ({k * pull_hz:g} Hz)"
-    return ""
+    mains_hz = supply_pulling_at(hertz)
+    if mains_hz is None:
+        return ""
+    pull_hz = 2 * mains_hz * round(hertz / (2 * mains_hz))
+    return f"the magnetic pull of a {mains_hz:g} Hz supply ({pull_hz:g} Hz)"
 
 
 def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding | None:

@@ -6,7 +6,13 @@
 >>> analyze(now, reference=healthy), estimate_crack(now, reference=healthy)  # doctest: +SKIP
 """
 
-from gearsig.prepared._angle import MAINS_TOLERANCE, STATED_SPEED_TOLERANCE, envelope_bands, refined_angle
+from gearsig.prepared._angle import (
+    MAINS_TOLERANCE,
+    STATED_SPEED_TOLERANCE,
+    envelope_bands,
+    refined_angle,
+    supply_pulling_at,
+)
 from gearsig.prepared._lines import (
     INNER_LINES,
     LOG_RATIO_LIMIT,
@@ -60,6 +66,7 @@ __all__ = [
     "shift_scores",
     "sliding_mean",
     "strongest_window",
+    "supply_pulling_at",
     "tail_probability",
     "turned_lines",
 ]

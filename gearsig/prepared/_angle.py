@@ -184,6 +184,15 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     return _at(stated, fundamental_hz, resolution / (3 * len(harmonics)), min(0.95, 1 - comb.p_value))
 
 
+def supply_pulling_at(hertz: float) -> float | None:
+    """Return the supply's frequency whose magnetic pull, at multiples of twice that, is at a frequency in Hz, if any."""
+    for mains_hz in MAINS_HZ:
+        pull_hz = 2 * mains_hz * round(hertz / (2 * mains_hz))
+        if pull_hz > 0 and abs(hertz / pull_hz - 1) <= MAINS_TOLERANCE:
+            return mains_hz
+    return None
+
+
 def _by_peaks(channels: list[LinesOverFloor], fundamental_hz: float) -> float:
     """Return the fundamental by the peaks of its harmonics that are far over the floor, each where it is clearest.
 
@@ -198,9 +207,7 @@ def _by_peaks(channels: list[LinesOverFloor], fundamental_hz: float) -> float:
         spectrum = clearest.spectrum
         place = spectrum.largest_near(k * fundamental_hz, spectrum.resolution)[0]
         peak_hz = peak_position(spectrum, spectrum.index_of(place))
-        nearest_pulls_hz = [2 * hz * max(1, round(peak_hz / (2 * hz))) for hz in MAINS_HZ]
-        is_pull = any(abs(peak_hz / pull_hz - 1) <= MAINS_TOLERANCE for pull_hz in nearest_pulls_hz)
-        if height_db >= RULES_DB and not is_pull:
+        if height_db >= RULES_DB and supply_pulling_at(peak_hz) is None:
             fundamentals.append(peak_hz / k)
             numbers.append(k)
     if not fundamentals:
