@@ -185,7 +185,7 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
 
 
 def supply_pulling_at(hertz: float) -> float | None:
-    """Return the supply's frequency whose magnetic pull, at multiples of twice that, is at a frequency in Hz, if any."""
+    """Return the supply's frequency, multiples of twice which (its magnetic pull) are at a frequency in Hz, if any."""
     for mains_hz in MAINS_HZ:
         pull_hz = 2 * mains_hz * round(hertz / (2 * mains_hz))
         if pull_hz > 0 and abs(hertz / pull_hz - 1) <= MAINS_TOLERANCE:

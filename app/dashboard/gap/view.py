@@ -432,9 +432,11 @@ def _show_pictures_of_places(finished: Finished) -> None:
             for curves in others
         ],
     }
-    best = [draw for average, draw in averages if is_local and first is not None and average.shaft == first.shaft]
-    if not is_local:
-        best = next((draws[:1] for name, draws in pictures.items() if draws and name.startswith("Spectra")), [])
+    best: list[Callable[[], None]] = []
+    if is_local and first is not None:
+        best = [draw for average, draw in averages if average.shaft == first.shaft]
+    else:
+        best = next((draws[:1] for name, draws in pictures.items() if draws and name.startswith("Spectra")), best)
     _show_figures(finished, "where")
     for draw in best:
         draw()
@@ -607,5 +609,5 @@ def _table(
     config: dict[str, Any] = {name: st.column_config.TextColumn(width=width) for name, width in (widths or {}).items()}
     config |= {name: st.column_config.Column(width="small") for name in written or {}}
     is_long = any(PX_PER_LETTER * len(text) > width for name, width in (widths or {}).items() for text in columns[name])
-    looks = {"row_height": TWO_LINES} if is_long else {}
+    looks: dict[str, Any] = {"row_height": TWO_LINES} if is_long else {}
     show_table(columns, formats=written, width="stretch", column_config=config, **looks)
