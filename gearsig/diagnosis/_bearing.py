@@ -23,7 +23,7 @@ from gearsig.diagnosis._bearing_families import (
     speed_is_only_stated,
     underlying_impulse_train,
 )
-from gearsig.diagnosis._lines import factor_left_open, shows_shaft, speed_is_confirmed
+from gearsig.diagnosis._lines import factor_left_open, speed_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, witness_text
 from gearsig.diagnosis._types import (
     WITH_ASSUMED_DATA,
@@ -50,9 +50,8 @@ SHARED_BY_OTHERS = 0.5
 
 WITH_STATED_SPEED, AT_ANOTHER_SPEED = 0.85, 0.5
 """Factors where the speed is a stated one, and nothing but the family itself speaks for it; and where another speed is
-as likely: the family lies beyond a bearing's slip then, and is the part's only if the stated speed is wrong; or the
-shafts' lines are those of a whole multiple of it as well, or nothing shows at a shaft's order, not even in an envelope,
-and the family is the part's only if the stated speed is right."""
+as likely: the family lies beyond a bearing's slip then, and is the part's only if the stated speed is wrong, or the
+shafts' lines are those of a whole multiple of it as well, and it is the part's only if the stated speed is right."""
 
 WORTH_A_SUSPICION = 0.3
 """Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
@@ -79,17 +78,14 @@ def detect_bearings(
         short = cannot_tell("bearings-not-examined", title, surer="A longer recording.")
         return [short] if signals.rig.bearings else []
     families = find_families(signals, cleaned)
-    seen_in = (*signals.order_excess.values(), *(envelope.excess for envelope in envelopes))
-    is_bare = speed_is_only_stated(signals) and not shows_shaft(signals, seen_in)
     findings = []
     for candidate in families.named:
-        finding = _named_finding(signals, candidate, len(families.named), is_bare=is_bare)
+        finding = _named_finding(signals, candidate, len(families.named))
         order, band_hz = candidate.comb.fundamental, candidate.envelope.band_hz
         witnesses = witness_text(kurtogram_bands, candidate.envelope.channel, band_hz, order)
         findings.append(replace(finding, evidence=(*finding.evidence, *witnesses)))
     findings += [
-        _unnamed_finding(signals, c) if c.bearing is None else _named_finding(signals, c, 1, is_bare=is_bare)
-        for c in families.trains
+        _unnamed_finding(signals, c) if c.bearing is None else _named_finding(signals, c, 1) for c in families.trains
     ]
     claimed = any(f.is_claim for f in findings)
     if not claimed and signals.rig.bearings and cleaned:
@@ -101,8 +97,7 @@ def detect_bearings(
 # Families that were found.
 
 
-def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int, *, is_bare: bool) -> Finding:
-    """Say that a part may be damaged; `is_bare`: the speed is stated, and nothing shows at any shaft's order."""
+def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int) -> Finding:
     bearing = candidate.bearing
     assert bearing is not None  # noqa: S101 - a named candidate has one; narrows the type
     part = BEARING_PARTS[candidate.name][0]
@@ -115,7 +110,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int,
     confidence = from_p_value(candidate.p_value) * candidate.share
     confidence *= WITH_ASSUMED_DATA if signals.rig.assumed else 1.0
     confidence *= SHARED_BY_OTHERS ** (is_shared + is_hunting)
-    is_of_other_speed = is_beyond_slip or is_bare or times > 1
+    is_of_other_speed = is_beyond_slip or times > 1
     if only_stated or is_of_other_speed:
         confidence *= AT_ANOTHER_SPEED if is_of_other_speed else WITH_STATED_SPEED
     is_open = is_shared or is_of_other_speed
@@ -124,7 +119,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int,
 
     place = f"the {part} of {_bearings_named(candidate)}"
     title = f"{'Damage' if clear else 'Perhaps damage'} at {place}."
-    if is_beyond_slip or is_bare:
+    if is_beyond_slip:
         title = f"May be {place}: the speed is stated and not confirmed."
     if times > 1:
         title = f"May be {place}, or the sampling rate or the stated speed is wrong by a factor."
@@ -137,8 +132,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int,
     if times > 1:
         evidence.append(_other_speed_text(times))
     elif only_stated:
-        nor = ", nor any modulation" if is_bare else ""
-        evidence.append(f"The speed is a stated one that no line of a shaft or mesh confirms{nor}.")
+        evidence.append("The speed is a stated one that no line of a shaft or mesh confirms.")
     if candidate.name == "FTF":
         evidence.append("Belts and other machines at the same rate look the same: lines at the cage's order alone.")
     if is_hunting:

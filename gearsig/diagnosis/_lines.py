@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import gcd, isfinite
 
@@ -123,13 +123,6 @@ def speed_is_confirmed(signals: AnalysisSignals) -> bool:
     orders = signals.known_mesh_orders.values() or signals.known_shaft_orders.values()
     seen = signals.angle is not None and any(_is_confirmed(signals, order) for order in orders)
     return seen and factor_left_open(signals) == 1
-
-
-def shows_shaft(signals: AnalysisSignals, spectra: Iterable[LinesOverFloor]) -> bool:
-    """Whether a low multiple of any shaft's order stands out of any of the spectra, those of envelopes, say."""
-    places = [h * order for order in signals.known_shaft_orders.values() for h in range(1, N_HARMONICS + 1)]
-    lines = (line_at(excess, place) for excess in spectra for place in places)
-    return any(line is not None and _is_clear(line) for line in lines)
 
 
 def factor_left_open(signals: AnalysisSignals) -> int:
