@@ -9,13 +9,14 @@ from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from gearsig.errors import GearsigError
+from gearsig.errors import GearsigError, unexpected_text
 from gearsig.formatting import file_label
 from gearsig.processes import killed_text, n_processors, run_jobs
 
 if TYPE_CHECKING:
+    from gearsig.fleet import AnalysisOptions
     from gearsig.report import Entry, Failure
     from gearsig.rig import Rig, SpeedSource
 
@@ -54,18 +55,12 @@ class _Job:
     path: Path
     name: str
     page: Path
-    rig: Rig | None
-    sampling_rate_hz: float | None
-    speed: SpeedSource | None
+    options: AnalysisOptions
     command: str
-    reference: Path | None = None
-    reference_rate_hz: float | None = None
-    torque_nm: float | None = None
-    is_reference: bool = False
+    is_reference: bool
+    pdf: bool
+    methods: tuple[str, ...] | None
     made_of: str = ""
-    pdf: bool = False
-    methods: tuple[str, ...] | None = None
-    memory_bytes: float = 2e9
 
 
 def report_many(
@@ -143,7 +138,7 @@ def report_many(
     """
     from gearsig.cache import made_folder, remove_parts
     from gearsig.checks import count
-    from gearsig.fleet import find_recordings, no_recordings
+    from gearsig.fleet import AnalysisOptions, find_recordings, no_recordings
     from gearsig.report import Entry, Failure, check_pdf, named_method, page_names, write_index
 
     # What can be refused is refused before anything is written: no recordings, no typst, a wrong method or folder.
@@ -170,13 +165,9 @@ def report_many(
         compared = None if is_healthy else healthy.get(file.resolve())
         path = folder / f"{page}.html"
         stated_hz = reference_rate_hz if is_healthy and reference_rate_hz is not None else sampling_rate_hz
-        facts = (rig, stated_hz, speed, command)
-        jobs.append(
-            _Job(
-                file, name, path, *facts, compared, reference_rate_hz if compared else None, torque_nm,
-                is_reference=is_healthy, pdf=pdf, methods=chosen, memory_bytes=memory_bytes,
-            )
-        )  # fmt: skip
+        its_rate_hz = reference_rate_hz if compared else None
+        options = AnalysisOptions(rig, stated_hz, speed, compared, torque_nm, memory_bytes, its_rate_hz)
+        jobs.append(_Job(file, name, path, options, command, is_reference=is_healthy, pdf=pdf, methods=chosen))
     # Pages that were made of the same files and options by the same gearsig stay as they are.
     made_of = _made_of()
     jobs = [replace(job, made_of=made_of(job)) for job in jobs]
@@ -228,17 +219,15 @@ def _made_of() -> Callable[[_Job], str]:
         return str(path.absolute()), stat.st_size, stat.st_mtime_ns
 
     def made_of(job: _Job) -> str:
+        reference = job.options.reference
         try:
-            beside = rig_file_beside(job.path) if job.rig is None else None
-            then = rig_file_beside(job.reference) if job.reference is not None else None
-            files = [state(path) for path in (job.path, beside, job.reference, then) if path is not None]
+            beside = rig_file_beside(job.path) if job.options.rig is None else None
+            then = rig_file_beside(reference) if reference is not None else None
+            files = [state(path) for path in (job.path, beside, reference, then) if path is not None]
         except OSError:
             return ""
-        parts = [__version__, files, job.name, repr(job.rig), repr(job.speed), job.sampling_rate_hz, job.torque_nm]
-        parts.append(job.reference_rate_hz)
-        return hashlib.sha256(
-            json.dumps([*parts, job.is_reference, job.methods, job.memory_bytes]).encode("utf-8", "surrogateescape")
-        ).hexdigest()
+        parts = [__version__, files, job.name, repr(job.options), job.is_reference, job.methods]
+        return hashlib.sha256(json.dumps(parts).encode("utf-8", "surrogateescape")).hexdigest()
 
     return made_of
 
@@ -265,19 +254,11 @@ def _kept(job: _Job) -> Entry | None:
 def _report_one(job: _Job) -> Entry | Failure:
     """Analyse one recording and write its page; every error becomes a reason."""
     from gearsig.cache import write_text
-    from gearsig.diagnosis import LongAnalysis, analyze_file, read_reference
+    from gearsig.diagnosis import LongAnalysis
     from gearsig.report import Entry, entry_of, from_plain, page_pdf, plain, recording_mark, write_page, write_pdf
-    from gearsig.rig import read_rig, rig_file_beside
 
     try:
-        beside = rig_file_beside(job.path) if job.rig is None else None
-        rig = read_rig(beside) if beside is not None else job.rig
-        given: dict[str, Any] = {"sampling_rate_hz": job.sampling_rate_hz, "speed": job.speed}
-        given["memory_bytes"] = job.memory_bytes
-        reference = None
-        if job.reference is not None:
-            reference = read_reference(job.reference, rig, reference_rate_hz=job.reference_rate_hz, **given)
-        found = analyze_file(job.path, rig, reference=reference, torque_nm=job.torque_nm, **given)
+        found = job.options.analyze(job.path)
         analysis = found.as_one() if isinstance(found, LongAnalysis) else found
         mark = recording_mark(job.path)
         write_page(analysis, job.page, command=job.command, index="index.html", methods=job.methods, mark=mark)
@@ -291,7 +272,7 @@ def _report_one(job: _Job) -> Entry | Failure:
     except GearsigError as error:
         return _failure(job, str(error).removeprefix(f"{job.name}: "))
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
-        return _failure(job, f"unexpected error, please report: {type(error).__name__}: {' '.join(str(error).split())}")
+        return _failure(job, unexpected_text(error))
 
 
 def _killed(job: _Job) -> Failure:

@@ -15,14 +15,14 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gearsig.errors import GearsigError, InputError
+from gearsig.errors import GearsigError, InputError, unexpected_text
 from gearsig.fleet._origin import Origin, PassedOver
 from gearsig.fleet._store import Row, Store
 from gearsig.processes import killed_text, n_processors, run_jobs
 from gearsig.rig import Rig, SpeedSource, read_rig, rig_file_beside, rig_to_dict
 
 if TYPE_CHECKING:
-    from gearsig.diagnosis import Analysis
+    from gearsig.diagnosis import Analysis, LongAnalysis
 
 Progress = Callable[[int, int, "AddedRecording"], object]
 
@@ -59,6 +59,20 @@ class AnalysisOptions:
     torque_nm: float | None = None
     memory_bytes: float = 2e9
     reference_rate_hz: float | None = None
+
+    def analyze(self, path: Path) -> Analysis | LongAnalysis:
+        """Analyse a recording, with the reference unless it is that itself; see `gearsig.diagnosis.analyze_file`."""
+        from gearsig.diagnosis import analyze_file, read_reference
+
+        rig = self.rig
+        if rig is None and (rig_file := rig_file_beside(path)) is not None:
+            rig = read_rig(rig_file)
+        reading: dict[str, Any] = {"sampling_rate_hz": self.sampling_rate_hz, "speed": self.speed}
+        reading["memory_bytes"] = self.memory_bytes
+        healthy = None
+        if self.reference is not None and self.reference.resolve() != path.resolve():
+            healthy = read_reference(self.reference, rig, reference_rate_hz=self.reference_rate_hz, **reading)
+        return analyze_file(path, rig, reference=healthy, torque_nm=self.torque_nm, **reading)
 
 
 @dataclass(frozen=True)
@@ -207,31 +221,22 @@ COMPACT_FROM = 128
 
 def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
     """Analyse one recording; every error becomes a reason. The key is empty where nothing is to be kept."""
-    from gearsig.diagnosis import LongAnalysis, analyze_file, read_reference
+    from gearsig.diagnosis import LongAnalysis
     from gearsig.recording import sha256_of
 
-    options, path, began = job.options, job.origin.path, time.process_time()
+    path, began = job.origin.path, time.process_time()
     try:
-        rig = options.rig
-        if rig is None and (rig_file := rig_file_beside(path)) is not None:
-            rig = read_rig(rig_file)
-        reading: dict[str, Any] = {"sampling_rate_hz": options.sampling_rate_hz, "speed": options.speed}
-        reading["memory_bytes"] = options.memory_bytes
-        reference = None
-        if options.reference is not None and options.reference.resolve() != path.resolve():
-            rate_hz = options.reference_rate_hz
-            reference = read_reference(options.reference, rig, reference_rate_hz=rate_hz, **reading)
-        result = analyze_file(path, rig, reference=reference, torque_nm=options.torque_nm, **reading)
+        result = job.options.analyze(path)
         analysis = result.as_one() if isinstance(result, LongAnalysis) else result
         if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # of parts no hash is taken
             return _row(job, outcome=FAILED, reason="it was written while it was read", key=""), [], job.origin
     except GearsigError as error:
         return _row(job, outcome=FAILED, reason=str(error)), [], job.origin
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
-        text = " ".join(str(error).split())
-        reason = f"unexpected error, please report: {type(error).__name__}: {text}"
-        return _row(job, outcome=FAILED, reason=reason), [], job.origin
-    facts = _facts(analysis, options) | ({"duration_s": result.duration_s} if isinstance(result, LongAnalysis) else {})
+        return _row(job, outcome=FAILED, reason=unexpected_text(error)), [], job.origin
+    facts = _facts(analysis, job.options)
+    if isinstance(result, LongAnalysis):
+        facts["duration_s"] = result.duration_s
     row = _row(job, **facts, cpu_s=time.process_time() - began)
     return row, _indicators(analysis), job.origin
 

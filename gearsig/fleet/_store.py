@@ -180,6 +180,12 @@ class Store:
     def _segment(self, name: str) -> Path:
         return self.folder / SEGMENTS / name
 
+    def _parquets(self, segments: Sequence[str]) -> tuple[list[str], list[str]]:
+        """Files of recordings and files of indicators, one each a segment."""
+        tables = ("recordings", "indicators")
+        recordings, indicators = ([str(self._segment(s) / f"{table}.parquet") for s in segments] for table in tables)
+        return recordings, indicators
+
     def _new(self) -> list[Path]:
         return sorted((self.folder / NEW).glob("[0-9a-f]*.parquet"))
 
@@ -218,8 +224,7 @@ class Store:
         try:
             segments, replaced = self._manifest()
             loose = self._new()
-            recordings = [str(self._segment(name) / "recordings.parquet") for name in segments]
-            indicators = [str(self._segment(name) / "indicators.parquet") for name in segments]
+            recordings, indicators = self._parquets(segments)
             self._drop_doubled(connection, loose, recordings)
             loose = [path for path in loose if path.stem not in self._doubled and path.exists()]
             replaced += self._replaced_by(connection, [*recordings, *map(str, loose)])
@@ -234,12 +239,7 @@ class Store:
                 f"{_parts(of_recording, files, RECORDING, kept)}"
             )
             every = {"key": "string", "machine": "string", "point": "string", "date": "timestamp"} | INDICATOR
-            loose_indicators = (
-                f"SELECT key, machine, point, date, {', '.join(f'i.{name} AS {name}' for name in INDICATOR)} FROM "
-                f"(SELECT key, machine, point, date, unnest(indicators) AS i FROM read_parquet({_list(files)}){kept})"
-                if files
-                else _parts("", [], every, "")
-            )
+            loose_indicators = _nested_indicators(files, kept) if files else _parts("", [], every, "")
             columns = f"key, machine, point, date, {of_indicator}"
             connection.execute(
                 f"CREATE TEMP VIEW indicators AS {_parts(columns, indicators, every, kept)} "
@@ -405,8 +405,7 @@ class Store:
         if not loose and len(merged) < 2 and not (everything and replaced):
             return
         files = [str(path) for path in loose]
-        old = [str(self._segment(name) / "recordings.parquet") for name in merged]
-        of = [str(self._segment(name) / "indicators.parquet") for name in merged]
+        old, of = self._parquets(merged)
         connection.execute("CREATE OR REPLACE TEMP TABLE gone AS SELECT unnest(?::VARCHAR[]) AS key", [replaced])
         columns, kept = ", ".join(RECORDING), " WHERE key NOT IN (FROM gone)"
         name = f"{time.time_ns():020d}-{secrets.token_hex(4)}"
@@ -421,10 +420,7 @@ class Store:
             query = f"SELECT * FROM ({union}){once} ORDER BY machine, point, date"
             write_query(connection, query, part / "recordings.parquet", form)
             names = ", ".join(INDICATOR)
-            of_loose = (
-                f"SELECT key, machine, point, date, {', '.join(f'i.{n} AS {n}' for n in INDICATOR)} FROM (SELECT key, "
-                f"machine, point, date, unnest(indicators) AS i FROM read_parquet({_list(files)}){kept})"
-            )
+            of_loose = _nested_indicators(files, kept)
             of_old = f"SELECT key, machine, point, date, {names} FROM read_parquet({_list(of)}){kept}"
             rows = " UNION ALL ".join(sql for sql, exists in ((of_old, of), (of_loose, files)) if exists)
             order = ", ".join(("machine", "point", *SERIES, "date"))
@@ -504,6 +500,13 @@ def _text(value: str) -> str:
 def _list(paths: Iterable[str]) -> str:
     """Return paths as SQL writes them; marks of patterns in a folder's name stand for themselves."""
     return "[" + ", ".join(_text("".join(f"[{c}]" if c in "*?[" else c for c in path)) for path in paths) + "]"
+
+
+def _nested_indicators(files: Sequence[str], kept: str) -> str:
+    """Select the indicators that loose files hold as lists."""
+    columns = ", ".join(f"i.{name} AS {name}" for name in INDICATOR)
+    nested = f"SELECT key, machine, point, date, unnest(indicators) AS i FROM read_parquet({_list(files)}){kept}"
+    return f"SELECT key, machine, point, date, {columns} FROM ({nested})"
 
 
 def _parts(columns: str, files: Sequence[str], types: dict[str, str], kept: str) -> str:

@@ -113,7 +113,7 @@ def test_each_machine_is_compared_with_its_own_reference(recordings, tmp_path, m
     jobs = {}
 
     def seen(job):
-        jobs[job.name] = job.reference, job.is_reference
+        jobs[job.name] = job.options.reference, job.is_reference
         return _page_for(job)
 
     monkeypatch.setattr(batch, "_report_one", seen)
@@ -127,7 +127,7 @@ def test_the_reference_has_its_own_rate_on_its_page_and_beside_the_others(record
     rates = {}
 
     def page(job):
-        rates[job.name] = job.sampling_rate_hz, job.reference_rate_hz
+        rates[job.name] = job.options.sampling_rate_hz, job.options.reference_rate_hz
         return _page_for(job)
 
     monkeypatch.setattr(batch, "_report_one", page)
