@@ -143,6 +143,7 @@ def test_measured_gear_pair(nominal: float | None) -> None:
     assert angle.quality > 0.6
 
 
+@pytest.mark.slow
 @measured
 @pytest.mark.parametrize(
     ("name", "nominal", "teeth"),

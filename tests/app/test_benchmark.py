@@ -74,6 +74,7 @@ def everything_but_samples(folder):
     return found
 
 
+@pytest.mark.slow
 def test_cases_of_different_kind_differ_in_their_samples_only(folders):
     healthy, *others = (everything_but_samples(folder) for folder, _ in folders.values())
     assert all(other == healthy for other in others)
@@ -131,6 +132,7 @@ def test_the_diagnosing_simulator_makes_the_same_cases_too(tmp_path):
     assert largest.startswith(("sideband", "shaft"))
 
 
+@pytest.mark.slow
 def test_the_same_cases_have_the_same_gears_conditions_and_effects():
     plan = Plan(n_cases=10, seed=4, role="development", same_simulator=True, longest_s=2.0)
     same = next(c for c in plan.cases() if c.source == SAME and c.kind == "pair" and c.n_conditions == 1)

@@ -41,6 +41,7 @@ def asked(*arguments):
     return end.value.code or 0
 
 
+@pytest.mark.slow
 def test_figure_table_and_summary(tmp_path, capsys):
     assert asked("--vary", "torque=10..20Nm:3", "--speed", "1500rpm", "-o", tmp_path / "out") == 0
     told = capsys.readouterr().out

@@ -351,6 +351,7 @@ def with_second_channel(stem: str, gain: float, path: Path) -> Path:
     return write_recording(replace(recording, samples=rows, channels=channels), path)
 
 
+@pytest.mark.slow
 def test_crack_leaves_a_dead_channel_out(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     now = with_second_channel("root_crack_3mm", 0.0, tmp_path / "now.h5")
     then = with_second_channel("root_crack_0mm", 1.0, tmp_path / "then.h5")

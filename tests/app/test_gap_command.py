@@ -124,6 +124,7 @@ def test_a_stop_leaves_nothing(capsys, stub, tmp_path, stop) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_failure_while_writing_leaves_what_was_there(tmp_path, monkeypatch) -> None:
     folder = tmp_path / "gap"
     write_results(with_few_curves(effect_report()), folder)

@@ -98,6 +98,7 @@ def test_against_a_healthy_reference_that_is_alike_there_is_no_gap() -> None:
     assert "healthy reference" in report.verdict[0]
 
 
+@pytest.mark.slow
 def test_a_race_that_the_healthy_reference_does_not_show_is_named() -> None:
     report = diagnosed(recording(ORDERS["BPFO"]), recording(seed=1))
     assert report.causes[0].name == "bearing_outer_race"

@@ -231,6 +231,7 @@ def without_force(recording):
     return recording.select([name for name in recording.channel_names if name != "interaction force"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parameters", "name"), [({"torque_gain": 1.4}, "torque_gain"), ({"piece_mass_kg": 2500.0}, "load_inertia")]
 )

@@ -103,6 +103,7 @@ def test_the_teeth_of_another_rig_are_noticed_and_the_right_number_is_told() -> 
     assert "37 teeth" in doubt
 
 
+@pytest.mark.slow
 def test_a_healthy_reference_that_fits_the_teeth_lifts_the_doubt_of_them() -> None:
     unlike = with_wrong_teeth()
     assert len(wrong_teeth(unlike, "now", unlike)) == 1

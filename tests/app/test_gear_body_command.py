@@ -29,7 +29,7 @@ def _run(*arguments):
     return CliRunner().invoke(app, ["gear-body", *arguments])
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_mesh_modes_stress_and_reductions_are_written(tmp_path, monkeypatch):
     monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path / "kept"))
     found = _run("-o", str(tmp_path / "out"), *SMALL, "--vtk", "--reduce", "--modes", "8")

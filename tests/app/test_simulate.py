@@ -179,6 +179,7 @@ def test_the_list_of_a_preset_says_what_is_assumed(capsys: pytest.CaptureFixture
         assert text in flowing
 
 
+@pytest.mark.slow
 def test_the_convergence_check_writes_nothing(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -240,6 +241,7 @@ def test_nonsense_is_one_line_and_code_2(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_sweep_and_its_index(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     arguments = (
         "sweep", "cracked", "--preset", "workshop_29_47", "--vary", "speed=600..1200rpm:2",

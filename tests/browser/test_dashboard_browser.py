@@ -113,6 +113,7 @@ def test_a_view_can_be_sent_as_its_address_and_an_own_file_survives_a_reload(pag
     assert verdict(page) == said
 
 
+@pytest.mark.study
 def test_what_is_chosen_in_a_view_is_in_its_address_and_leaves_it_with_the_view(page: playwright.Page) -> None:
     open_sample(page)
     view = open_view(page, "Envelope")

@@ -77,7 +77,7 @@ def test_a_broken_file_is_one_message_on_the_other_pages(page: playwright.Page, 
     assert "Traceback" not in page.get_by_test_id("stMain").inner_text()
 
 
-@pytest.mark.parametrize("path", PAGES[2:])
+@pytest.mark.parametrize("path", ["compare", "fleet"])
 def test_two_users_at_once_see_the_same_page_each(page: playwright.Page, address: str, path: str) -> None:
     other = page.context.browser.new_context().new_page()
     other.goto(address + path)

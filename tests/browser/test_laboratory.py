@@ -81,6 +81,7 @@ def test_the_finite_element_pair_follows_its_slider_to_the_end(laboratory: playw
     assert laboratory.get_by_test_id("stAlert").count() == 0
 
 
+@pytest.mark.study
 def test_a_recording_is_saved_with_rig_and_truth(laboratory: playwright.Page) -> None:
     pull_the_crack(laboratory, 50, "1 mm")
     laboratory.get_by_role("button", name="Save as recording").click()

@@ -124,6 +124,7 @@ DISTANCE_OF_RIDGE = """async (image, ray) => {
 }"""
 
 
+@pytest.mark.study
 def test_the_chosen_mode_goes_on_to_the_squeezed_transform(page: playwright.Page) -> None:
     open_analysis(page)
     panel = open_method(page, "Modes")
@@ -136,6 +137,7 @@ def test_the_chosen_mode_goes_on_to_the_squeezed_transform(page: playwright.Page
     panel.get_by_text("Colours span").first.wait_for()
 
 
+@pytest.mark.study
 def test_the_denoised_signal_can_be_taken_along_whole(page: playwright.Page) -> None:
     open_analysis(page)
     panel = open_method(page, "Denoising")

@@ -111,6 +111,7 @@ def test_of_a_measured_race_at_a_rate_that_is_too_low(name: str, times: float) -
     assert f"{recording.sampling_rate_hz:g} Hz" in finding(stated, CODE).title.split("would fit best")[0]
 
 
+@pytest.mark.slow
 @needs_data
 @pytest.mark.parametrize(
     ("name", "times"),

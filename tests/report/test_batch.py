@@ -332,6 +332,7 @@ def test_importing_the_batch_is_light():
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_drawing_never_loads_pyplot():
     code = (
         "import sys, io, numpy as np\n"

@@ -44,6 +44,7 @@ def test_chirp_and_its_frequency_error(crossing, kind):
         assert np.sqrt(np.mean(error**2)) < 0.25  # the parabola reads between the lines
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MAPS)
 @pytest.mark.parametrize(("second", "noise", "seed"), [(1.0, 0.0, 0), (0.3, 0.0, 0), (1.0, 0.5, 1), (3.0, 0.5, 2)])
 def test_crossing_chirps_do_not_change_over(crossing, kind, second, noise, seed):
@@ -177,6 +178,7 @@ def test_fewer_ridges_than_asked_where_there_are_no_more():
     assert len(ridges(stft_map(UniformSignal(np.cos(2 * np.pi * 200 * t), 2000.0)), 3)) == 1
 
 
+@pytest.mark.slow
 def test_the_strongest_are_kept_not_the_clearest():
     t = np.arange(20_001) / 2000.0
     noise = np.random.default_rng(3).normal(size=len(t))

@@ -83,6 +83,7 @@ def _tone_and_chirp() -> tuple[UniformSignal, np.ndarray]:
     return UniformSignal(x, 2000.0), 100 + 40 * t
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "transform",
     [

@@ -74,6 +74,7 @@ def test_a_tooth_makes_low_wide_sidebands_of_its_own_shaft(name: str, severity: 
     assert ill.lines(ACCELERATION, Z + other * np.array([-2, -1, 1, 2])).max() < 30 * FLOOR
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "severities"), [(n, (0.4 * s, 0.7 * s, s)) for n, s in TOOTH_LOCAL])
 def test_a_tooth_s_burst_grows_with_the_damage(name: str, severities: tuple[float, ...]) -> None:
     energy = [faulty(name, s).residual_over_teeth(ERROR, Z).std() for s in severities]

@@ -291,6 +291,7 @@ ADDED = (
 )
 
 
+@pytest.mark.slow
 def test_the_preset_gives_the_twins_mesh_levels(tmp_path: Path) -> None:
     """The twin's step is longer than that of a single simulation; nothing else differs."""
     file = tmp_path / "twin.toml"

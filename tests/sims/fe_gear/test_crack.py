@@ -74,6 +74,7 @@ def test_closing_a_crack_leaves_what_two_solutions_differ_by() -> None:
     np.testing.assert_allclose(opened.added_m_per_n(2), found, atol=1e-9 * apart[0].max())
 
 
+@pytest.mark.slow
 def test_the_whole_gear_with_one_cracked_sector_agrees() -> None:
     """Every sector assembled, one of them cracked, the bore held: compliance of the tooth, to the solver's rounding."""
     cracked = crack_meshes(SMALL, RootCrack(1.5, 60.0), SIZE)[1]

@@ -89,6 +89,7 @@ def test_a_reduced_gear_is_free_and_keeps_its_modes() -> None:
     assert len(accuracy.table().splitlines()) == 1 + len(accuracy.full_hz)
 
 
+@pytest.mark.slow
 def test_more_modes_come_closer() -> None:
     worst = [craig_bampton(small_cyclic().mesh, replace(PLAN, n_dof=n), 12).accuracy.worst_error for n in (50, 90, 140)]
     assert worst[0] > worst[1] > worst[2]

@@ -275,6 +275,7 @@ def slice_stiffness(gear: ReducedGear, height: int, support: str) -> float:
     return float(np.linalg.inv(matrix[0, height, :, 0, height, :]).sum())
 
 
+@pytest.mark.slow
 def test_compliance_agrees_with_potential_energy() -> None:
     """Tooth and body at five flank heights within 4 %: bending, shear, compression, foundation."""
     mesh = sector_mesh(PAPER, MeshSize(4, 1, 12, 3, 3, 1))

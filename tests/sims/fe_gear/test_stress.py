@@ -44,6 +44,7 @@ def test_a_loaded_tooth_moves_as_the_reduced_gear_says() -> None:
     assert mirrored.mean() == pytest.approx(-load.displacement_m[0][:, 1].mean(), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_root_stress_is_that_of_a_loaded_cantilever_with_a_notch() -> None:
     """Highest stress in the fillet: bending by a force at mid-flank times 1 to 2.5 for the notch, and it converges."""
     blank = GearBlank(GearGeometry(24, 3.0, face_width_mm=10.0, bore_radius_mm=12.0))

@@ -9,6 +9,7 @@ from sims.reduced_fe import speed_sweep, torsional_mode
 from tests.sims.reduced_fe.flexible_pairs import pair_of
 
 
+@pytest.mark.slow
 def test_torsional_peak_and_superharmonics_with_the_source_damping():
     """900 to 4100 rpm, 750 to 3417 Hz: the peak at ω_n, and those where the second and third mesh harmonic meet it."""
     pair = pair_of()
@@ -58,11 +59,13 @@ def test_outside_the_hysteresis_both_ways_agree(light_sweeps):
     assert first == pytest.approx(second, rel=0.12)
 
 
+@pytest.mark.slow
 def test_damping_of_the_source_leaves_no_jump():
     sweep = speed_sweep(pair_of(), 170.0, 1900.0, 3500.0, 2.0, n_parts=100)
     assert sweep.jump_hz(1700.0, 2900.0) is None
 
 
+@pytest.mark.slow
 def test_relieved_tips_lose_contact_and_jump_with_the_source_damping():
     """20 µm of tip relief, 8 % damping: the flanks part, and the sweep down keeps the great motion longer."""
     pair = pair_of(tip_relief_um=20.0)

@@ -138,6 +138,7 @@ def test_misaligned_flanks_carry_at_one_end():
     assert force[0] > 4.0 * force[-1]
 
 
+@pytest.mark.slow
 def test_helical_slices_of_a_spur_gear_run_into_each_other():
     """β → 0 is the spur pair; with an overlap the transmission error varies less, for the same mean stiffness."""
     cycles = (np.arange(40) + 0.5) / 40

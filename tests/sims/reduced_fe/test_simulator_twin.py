@@ -76,6 +76,7 @@ def test_an_effect_alone_makes_the_difference(twin, healthy):
     assert not np.array_equal(run(twin, noise=1).samples[0], healthy.samples[0])
 
 
+@pytest.mark.slow
 def test_a_small_spall_in_a_bearing_knocks_as_in_the_other_model(twin, healthy):
     """The knock's force is that of the rolling element's load, and bearing and sensor are the same in both."""
     other = gap_simulator("cracked").twin_of(RIG)
