@@ -505,8 +505,8 @@ def _deconvolution(
         if angle is not None and not angle.is_steady():
             warnings.append("the speed changes, and the rate of impacts with it: choose a part of even speed")
         result = spectra.multipoint_deconvolution(x, fs, 1.0 / rate_hz, n_taps=taps)
-        of = f" ({rhythm})" if rhythm else ""
-        facts: tuple[str, ...] = (_train_fact(f"{rate_hz:.5g} Hz{of}", result.score, taps, len(x)),)
+        facts: tuple[str, ...] = (_train_fact(f"{rate_hz:.5g} Hz", result.score, taps, len(x)),)
+        notes = (f"{rate_hz:.5g} Hz: {rhythm}.", *notes) if rhythm else notes  # a shaft's name has no place in a fact
     else:
         result = spectra.minimum_entropy_deconvolution(x, fs, n_taps=taps)
         before = float(np.mean((x - x.mean()) ** 4) / np.var(x) ** 2)
