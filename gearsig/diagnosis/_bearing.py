@@ -35,7 +35,7 @@ from gearsig.diagnosis._types import (
     from_p_value,
     p_text,
 )
-from gearsig.formatting import enumerated, named, percent, signed
+from gearsig.formatting import enumerated, named, percent, sentence, signed
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
 from gearsig.rig import Rig, hunting_tooth_order
 
@@ -130,7 +130,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         *(f"Within its slip, {rival} would show at the same order." for rival in candidate.rivals),
     ]
     if times > 1:
-        evidence.append(_other_speed_text(times))
+        evidence.append(sentence(_other_speed_text(times)))
     elif only_stated:
         evidence.append("The speed is a stated one that no line of a shaft or mesh confirms.")
     if candidate.name == "FTF":
@@ -157,11 +157,11 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
 
 
 def _other_speed_text(times: int) -> str:
-    """Say which lines of the shafts stand out, and what else makes them."""
+    """Say which lines of the shafts stand out, and what else makes them; not a sentence yet."""
     return (
-        f"All lines of shafts and meshes that stand out are at multiples of {times} times their order: those of shafts "
+        f"all lines of shafts and meshes that stand out are at multiples of {times} times their order: those of shafts "
         f"that turn {times} times as fast as stated, or of a sampling rate stated as many times too high, where every "
-        "part has another order."
+        "part has another order"
     )
 
 
@@ -209,7 +209,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
             by_density = "by their density: that is no damage there"
             causes.append(f"Multiples fall near the order of the {', '.join(beside)} {by_density}.")
     if (times := factor_left_open(signals)) > 1:
-        causes.append(_other_speed_text(times))
+        causes.append(sentence(_other_speed_text(times)))
     surer = "Give the bearings in the rig file: then the part is named, or they are ruled out."
     return Finding(
         "non-synchronous-impacts",
@@ -298,7 +298,7 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
     if not speed_is_confirmed(signals):
         why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
         if (times := factor_left_open(signals)) > 1:
-            why = f"{_other_speed_text(times)[:1].lower()}{_other_speed_text(times)[1:].rstrip('.')}"
+            why = _other_speed_text(times)
         return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
     for seen, but in (
         (families.named, "something else explains them as well"),

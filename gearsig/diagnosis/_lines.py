@@ -16,9 +16,9 @@ from gearsig.prepared import (
     RUN_UP_FOOT_ORDERS,
     LinesOverFloor,
     lines_over_noise_floor,
+    magnetic_pull_near,
     neighbour_levels,
     peak_position,
-    supply_pulling_at,
 )
 from gearsig.recording import MAINS_HZ, MAINS_WANDER
 from gearsig.rig import GearPair, hunting_tooth_order
@@ -173,9 +173,11 @@ def detect_standstill(signals: AnalysisSignals) -> list[Finding]:
     if gone is None:
         return []
     start_s, end_s = (angle.start_s + turns / angle.n_revolutions * (angle.end_s - angle.start_s) for turns in gone)
-    title = f"The lines of shafts and meshes are gone between {start_s:.3g} and {end_s:.3g} s: the machine stands then,"
+    title = (
+        f"The lines of shafts and meshes are gone between {start_s:.3g} and {end_s:.3g} s: the machine stands then, "
+        "turns back or turns at another speed."
+    )
     where = Where(shaft=angle.shaft, time_s=(start_s, end_s))
-    title += " turns back or turns at another speed."
     return [Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO)]
 
 
@@ -185,10 +187,11 @@ def _without_lines(signals: AnalysisSignals) -> tuple[float, float] | None:
     Blocks of a few revolutions at half overlap are looked at, as short as two orders' lines stand out of them.
     """
     signal = signals.over_angle
+    if signal is None:
+        return None
     orders = {h * order for order in signals.known_mesh_orders.values() for h in range(1, N_HARMONICS + 1)}
     orders |= {h * order for order in signals.known_shaft_orders.values() for h in range(1, N_COUNTED + 1)}
-    for n_turns in (4, 8, 16) if signal is not None else ():
-        assert signal is not None  # noqa: S101 - no turns without it; narrows the type
+    for n_turns in (4, 8, 16):
         n_block = n_turns * signal.samples_per_revolution
         starts = np.arange(0, signal.samples.shape[1] - n_block + 1, n_block // 2)
         places = sorted({round(order * n_turns) for order in orders if order > 0.5})
@@ -438,10 +441,10 @@ def _is_synchronous(signals: AnalysisSignals, hertz: float, slower: float) -> bo
 
 def magnetic_pull_at(hertz: float) -> str:
     """Name the multiple of twice the mains' frequency that a frequency is on; empty if it is on none."""
-    mains_hz = supply_pulling_at(hertz)
-    if mains_hz is None:
+    pull = magnetic_pull_near(hertz)
+    if pull is None:
         return ""
-    pull_hz = 2 * mains_hz * round(hertz / (2 * mains_hz))
+    mains_hz, pull_hz = pull
     return f"the magnetic pull of a {mains_hz:g} Hz supply ({pull_hz:g} Hz)"
 
 

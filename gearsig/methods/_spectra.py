@@ -13,6 +13,7 @@ from gearsig.angle import ShaftAngle, resample_to_angle
 from gearsig.diagnosis import CHANGED, Analysis, RecordBlocks, analyze
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import readable
+from gearsig.indicators import kurtosis
 from gearsig.methods._table import (
     IN_HZ,
     LINES,
@@ -336,8 +337,8 @@ def _kurtosis_panel(grid: spectra.Kurtogram, band: spectra.BandCandidate, rate_h
     n = 3 * 2 ** int(np.ceil(-levels.min()))
     at = (np.arange(n) + 0.5) * rate_hz / 2.0 / n
     rows = np.zeros((len(levels), n))
-    for low, high, level, kurtosis in zip(grid.low_hz, grid.high_hz, grid.level, grid.kurtosis, strict=True):
-        rows[np.searchsorted(levels, -level), (at >= low) & (at < high)] = kurtosis
+    for low, high, level, value in zip(grid.low_hz, grid.high_hz, grid.level, grid.kurtosis, strict=True):
+        rows[np.searchsorted(levels, -level), (at >= low) & (at < high)] = value
     # Levels are not equally far apart: the row of each reaches halfway to its neighbours, over many lines of the map.
     halves = np.diff(levels) / 2.0 if len(levels) > 1 else np.array([0.5])
     edges = np.concatenate([levels[:1] - halves[:1], levels[:-1] + np.diff(levels) / 2.0, levels[-1:] + halves[-1:]])
@@ -509,8 +510,9 @@ def _deconvolution(
         notes = (f"{rate_hz:.5g} Hz: {rhythm}.", *notes) if rhythm else notes  # a shaft's name has no place in a fact
     else:
         result = spectra.minimum_entropy_deconvolution(x, fs, n_taps=taps)
-        before = float(np.mean((x - x.mean()) ** 4) / np.var(x) ** 2)
-        facts = (f"Sharpened, the kurtosis is **{result.score:.3g}**, of the signal {before:.3g} (Gaussian noise: 3).",)
+        facts = (
+            f"Sharpened, the kurtosis is **{result.score:.3g}**, of the signal {kurtosis(x):.3g} (Gaussian noise: 3).",
+        )
     y = result.values * float(np.std(x) / np.std(result.values))
     columns = {"signal": x, "sharpened": np.concatenate([np.zeros(len(x) - len(y)), y])}
     first_s = N_IMPACTS_SHOWN / rate_hz if rate_hz and by == "multipoint" else None

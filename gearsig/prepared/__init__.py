@@ -10,8 +10,8 @@ from gearsig.prepared._angle import (
     MAINS_TOLERANCE,
     STATED_SPEED_TOLERANCE,
     envelope_bands,
+    magnetic_pull_near,
     refined_angle,
-    supply_pulling_at,
 )
 from gearsig.prepared._lines import (
     INNER_LINES,
@@ -56,6 +56,7 @@ __all__ = [
     "has_mark",
     "lines_over_floor",
     "lines_over_noise_floor",
+    "magnetic_pull_near",
     "neighbour_level",
     "neighbour_levels",
     "over_floor_db",
@@ -66,7 +67,6 @@ __all__ = [
     "shift_scores",
     "sliding_mean",
     "strongest_window",
-    "supply_pulling_at",
     "tail_probability",
     "turned_lines",
 ]

@@ -184,12 +184,12 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     return _at(stated, fundamental_hz, resolution / (3 * len(harmonics)), min(0.95, 1 - comb.p_value))
 
 
-def supply_pulling_at(hertz: float) -> float | None:
-    """Return the supply's frequency, multiples of twice which (its magnetic pull) are at a frequency in Hz, if any."""
+def magnetic_pull_near(hertz: float) -> tuple[float, float] | None:
+    """Return a supply's frequency and the multiple of twice it, its magnetic pull, that is at a frequency, in Hz."""
     for mains_hz in MAINS_HZ:
         pull_hz = 2 * mains_hz * round(hertz / (2 * mains_hz))
         if pull_hz > 0 and abs(hertz / pull_hz - 1) <= MAINS_TOLERANCE:
-            return mains_hz
+            return mains_hz, pull_hz
     return None
 
 
@@ -207,7 +207,7 @@ def _by_peaks(channels: list[LinesOverFloor], fundamental_hz: float) -> float:
         spectrum = clearest.spectrum
         place = spectrum.largest_near(k * fundamental_hz, spectrum.resolution)[0]
         peak_hz = peak_position(spectrum, spectrum.index_of(place))
-        if height_db >= RULES_DB and supply_pulling_at(peak_hz) is None:
+        if height_db >= RULES_DB and magnetic_pull_near(peak_hz) is None:
             fundamentals.append(peak_hz / k)
             numbers.append(k)
     if not fundamentals:

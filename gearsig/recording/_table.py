@@ -308,7 +308,12 @@ def rate_of_time(
     step = span / (len(t) - 1)
     steps = np.diff(t)
     i = int(np.argmin(steps))
-    jitters, roundings = _jitters_by_rounding(values, t)
+    # Distance of the stamps from the straight line fitted to them.
+    k, centred = np.arange(len(t)) - (len(t) - 1) / 2, t - t.mean()
+    jitter = np.abs(centred - (k @ centred) / (k @ k) * k)
+    if jitter.max() < 0.01 * step:  # then stamps increase, and no rounding hides any
+        return float(1.0 / (step * scale_s)), ()
+    jitters, roundings = _jitters_by_rounding(values, t, jitter)
     is_uniform = bool(np.all(jitters <= np.maximum(0.01 * step, 0.51 * roundings)))
     coarsest = float(roundings.max())
     if steps[i] < 0 or (steps[i] == 0 and not (is_uniform and coarsest <= MAX_ROUNDING * span)):
@@ -347,23 +352,20 @@ def rate_of_time(
     )
 
 
-def _jitters_by_rounding(values: NumberArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest distance from the straight line fitted to times, and their rounding, for each power of ten.
+def _jitters_by_rounding(values: NumberArray, t: FloatArray, jitter: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the largest jitter of times, and the rounding that they went through, for each power of ten.
 
     Times printed with too few digits jitter by half a digit about a grid that was uniform when it was sampled. What
     counts decimals rounds all alike, what counts digits (`%g`, spreadsheets) rounds each power of ten by itself, as
     float32 does each power of two.
     """
-    k, centred = np.arange(len(t)) - (len(t) - 1) / 2, t - t.mean()
-    jitter = np.abs(centred - (k @ centred) / (k @ k) * k)
     size = np.abs(t)
-    with np.errstate(divide="ignore"):
-        power = np.floor(np.log10(size, out=np.full_like(t, -99.0), where=size > 0))
+    power = np.floor(np.log10(size, out=np.full_like(t, -99.0), where=size > 0))
+    is_single = np.asarray(values).dtype == np.float32
     jitters, roundings = [], []
     for decade in np.unique(power):
         inside = power == decade
         some, largest = t[inside], float(size[inside].max())
-        is_single = np.asarray(values).dtype == np.float32
         jitters.append(float(jitter[inside].max()))
         roundings.append(float(np.spacing(np.float32(largest))) if is_single else _decimal_step(some))
     # Few times of a power of ten may all be round by chance: none is rounded to more than those of the next one.

@@ -119,11 +119,10 @@ def floors_text(report: GapReport, *, of_pictures: bool = True) -> str:
         if 0 < len(alone) < len(report.conditions):
             known += f"Without a reference at its point, with what the simulation lets expect: {', '.join(alone)}. "
         structural = "what healthy machines change by from one recording to another"
-        beside = (
-            ""
-            if not of_pictures
-            else " The first pictures show the recording beside the reference, the further ones beside the simulation."
-        )
+        if of_pictures:
+            beside = (
+                " The first pictures show the recording beside the reference, the further ones beside the simulation."
+            )
     else:
         known = "Compared with what the simulation of the healthy machine lets expect, as far as it is credible. "
     return (

@@ -411,7 +411,6 @@ def _show_pictures_of_places(finished: Finished) -> None:
     """Show what shows the first place best, then offer the other pictures by their kinds."""
     report = finished.report
     first = report.places[0] if report.places else None
-    is_local = first is not None and (first.tooth is not None or first.angle_deg is not None)
     beside_reference = [curves for curves in report.spectra if len(curves.orders) and len(curves.reference)]
     others = [c for c in report.spectra if len(c.orders) and (len(c.before) or not len(c.reference))]
     shown = [average for average in report.averages if len(average.angle_deg)]
@@ -432,11 +431,10 @@ def _show_pictures_of_places(finished: Finished) -> None:
             for curves in others
         ],
     }
-    best: list[Callable[[], None]] = []
-    if is_local and first is not None:
-        best = [draw for average, draw in averages if average.shaft == first.shaft]
+    if first is not None and (first.tooth is not None or first.angle_deg is not None):
+        best: list[Callable[[], None]] = [draw for average, draw in averages if average.shaft == first.shaft]
     else:
-        best = next((draws[:1] for name, draws in pictures.items() if draws and name.startswith("Spectra")), best)
+        best = next((draws[:1] for name, draws in pictures.items() if draws and name.startswith("Spectra")), [])
     _show_figures(finished, "where")
     for draw in best:
         draw()
