@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import gcd, isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray
@@ -192,22 +193,18 @@ def _without_lines(signals: AnalysisSignals) -> tuple[float, float] | None:
     orders = {h * order for order in signals.known_mesh_orders.values() for h in range(1, N_HARMONICS + 1)}
     orders |= {h * order for order in signals.known_shaft_orders.values() for h in range(1, N_COUNTED + 1)}
     for n_turns in (4, 8, 16):
-        n_block = n_turns * signal.samples_per_revolution
-        starts = np.arange(0, signal.samples.shape[1] - n_block + 1, n_block // 2)
-        places = sorted({round(order * n_turns) for order in orders if order > 0.5})
-        if len(starts) < 8:
+        n_block, beside = n_turns * signal.samples_per_revolution, n_turns // 2  # half an order, between the sidebands
+        if signal.samples.shape[1] < 4.5 * n_block:  # eight blocks at half overlap
             break
+        above = {round(order * n_turns) for order in orders if order > 0.5}
+        places = sorted(place for place in above if place + beside <= n_block // 2)
+        bins = np.array(places, np.int64)[:, None] + np.array([-beside, -1, 0, 1, beside])
         courses: dict[int, list[FloatArray]] = {}
         for values in signal.samples:
-            blocks = np.stack([values[start : start + n_block] for start in starts])
-            levels = np.abs(np.fft.rfft(blocks * np.hanning(n_block), axis=1))
-            for place in places:
-                beside = n_turns // 2  # half an order, between the sidebands
-                if place + beside >= levels.shape[1]:
-                    continue
-                course = levels[:, place - 1 : place + 2].max(axis=1)
+            for place, levels in zip(places, _levels_over_blocks(values, n_block, bins), strict=True):
+                course = levels[:, 1:4].max(axis=1)
                 usual = float(np.percentile(course, 75))
-                noise = float(np.median(levels[:, [place - beside, place + beside]]))
+                noise = float(np.median(levels[:, [0, 4]]))
                 if usual > noise * 10 ** (STANDING_OUT_DB / 20):
                     courses.setdefault(place, []).append(course / usual)
         if len(courses) < 2:
@@ -218,6 +215,20 @@ def _without_lines(signals: AnalysisSignals) -> tuple[float, float] | None:
             return None
         return float(gone[0] * n_turns / 2), float(gone[-1] * n_turns / 2 + n_turns)
     return None
+
+
+def _levels_over_blocks(values: FloatArray, n_block: int, bins: NDArray[np.int64]) -> FloatArray:
+    """Return the Hann-windowed spectrum's moduli at some bins, (n_lines, n_blocks, n_bins), of blocks at half overlap.
+
+    The blocks are a view, and transformed some at a time: no copy of a long signal is made.
+    """
+    blocks = np.lib.stride_tricks.sliding_window_view(values, n_block)[:: n_block // 2]
+    window, n_at_once = np.hanning(n_block), max(1, 2**20 // n_block)
+    parts = [
+        np.abs(np.fft.rfft(blocks[start : start + n_at_once] * window, axis=1)[:, bins])
+        for start in range(0, len(blocks), n_at_once)
+    ]
+    return np.concatenate(parts).transpose(1, 0, 2)
 
 
 def detect_mesh(signals: AnalysisSignals) -> list[Finding]:
