@@ -185,14 +185,14 @@ def _choose_and_show(run: LaboratoryRun) -> None:
 def _run_and_show(run: LaboratoryRun, request: BifurcationRequest, chosen: Range) -> None:
     """Run what is missing if that was asked for, showing it as it comes; what is complete stays when it is stopped."""
     question = repr(request.definition())
-    with st.container(horizontal=True):
-        st.button("Draw", type="primary", icon=":material/play_arrow:", on_click=_ask, args=(question,))
-        st.button("Stop", icon=":material/stop:", on_click=_ask, args=("",))
     known, branches = st.session_state.get(DONE, ("", {}))
     if known != question:
         branches = {name: [] for name in request.branches}
-    more = False
-    if st.session_state.get(ASKED) == question:
+    is_running = st.session_state.get(ASKED) == question and _n_done(branches) < request.n_values
+    with st.container(horizontal=True):
+        st.button("Draw", type="primary", icon=":material/play_arrow:", on_click=_ask, args=(question,))
+        st.button("Stop", icon=":material/stop:", disabled=not is_running, on_click=_ask, args=("",))
+    if is_running:
         motion = motion_s(run, request)
         if motion > MAX_MOTION_S:
             raise InputError(
@@ -201,12 +201,12 @@ def _run_and_show(run: LaboratoryRun, request: BifurcationRequest, chosen: Range
                 remedy="take fewer values, one direction, the mesh cycle, or `gearsig bifurcation` on the command line",
             )
         st.session_state[DONE] = (question, branches)
-        more = _fill(request, branches)
+        _fill(request, branches)
     if any(measured_of(values) for values in branches.values()):
         _show(request, branches, chosen)
     else:
         st.caption("Nothing is drawn yet: a value takes about half a second, in either direction.")
-    if more:
+    if is_running:
         _go_on()
 
 
@@ -218,25 +218,28 @@ def _go_on() -> None:
         st.rerun()
 
 
-def _fill(request: BifurcationRequest, branches: Branches) -> bool:
-    """Run values for a while; return whether some are left."""
+def _fill(request: BifurcationRequest, branches: Branches) -> None:
+    """Run values for a while."""
     n, bar, until = request.n_values, st.progress(0.0, "Simulating …"), monotonic() + PASS_S
     for name in request.branches:
         values = request.branch.values[:: -1 if name == "down" else 1]
         for value in values[len(branches[name]) :]:
-            done = sum(len(kept) for kept in branches.values())
+            done = _n_done(branches)
             bar.progress(done / n, f"{NAMES[name]}: {value:.5g} ({done} of {n} values)")
             if monotonic() > until:
-                return True
+                return
             ends = [kept.end for kept in branches[name] if kept.end is not None]
             before = ends[-1] if ends and name != "rest" else None
             branches[name].append(run_value(request, value, before))
     bar.empty()
-    return False
+
+
+def _n_done(branches: Branches) -> int:
+    return sum(len(kept) for kept in branches.values())
 
 
 def _show(request: BifurcationRequest, branches: Branches, chosen: Range) -> None:
-    n_done = sum(len(kept) for kept in branches.values())
+    n_done = _n_done(branches)
     show_figure(figure_of(request.branch, branches), f"Poincaré points over {chosen.title}", "bifurcation")
     st.caption(
         "Upper panel: one point per cycle; a single point is a motion that repeats each cycle, two a motion that takes "
