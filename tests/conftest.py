@@ -5,6 +5,7 @@ import os
 
 import pytest
 from hypothesis import HealthCheck, settings
+from xdist.scheduler import LoadScopeScheduling
 
 # Before numpy is loaded: workers share the processors, and threads of linear algebra that wait keep them busy.
 for library in ("OMP", "OPENBLAS", "MKL"):
@@ -15,6 +16,23 @@ settings.register_profile("gearsig", deadline=None, suppress_health_check=[Healt
 # In continuous integration the examples are the same each time: a change fails by what it changes, not by chance.
 settings.register_profile("ci", settings.get_profile("gearsig"), derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "gearsig")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> LoadScopeScheduling | None:
+    """With `--dist loadfile`, let one worker run all that needs the browser: one dashboard serves all of it.
+
+    Browser tests wait half of the time, for which the other workers have what computes.
+    """
+    return BrowserApart(config, log) if config.getvalue("dist") == "loadfile" else None
+
+
+class BrowserApart(LoadScopeScheduling):
+    """Gives each worker whole files, one of them the folder of the browser's tests."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.partition("::")[0]
+        return "tests/browser" if file.startswith("tests/browser/") else file
 
 
 def pytest_collection_finish() -> None:

@@ -122,7 +122,17 @@ def test_nonsense_in_an_address_is_ignored_and_taken_out(text: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["Kurtogram", "Orders (Vold–Kalman)", "Ridges", "Modes", "Lyapunov exponent"])
+@pytest.mark.parametrize(
+    "method",
+    [
+        "Kurtogram",
+        "Ridges",
+        *(
+            pytest.param(name, marks=pytest.mark.study)
+            for name in ("Orders (Vold–Kalman)", "Modes", "Lyapunov exponent")
+        ),
+    ],
+)
 def test_nonsense_among_the_options_of_a_method_is_ignored(method: str) -> None:
     usual = go(analysis("healthy"), method)
     asked = {name: usual.query_params[name] for name in ("view", "show") if name in usual.query_params}

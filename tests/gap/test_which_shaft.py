@@ -105,7 +105,15 @@ def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, flo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("cause", ["root_crack", "tooth_spall", "chipped_tooth", "pitch_error", "eccentricity"])
+@pytest.mark.parametrize(
+    "cause",
+    [
+        "root_crack",
+        "pitch_error",
+        "eccentricity",
+        *(pytest.param(cause, marks=pytest.mark.study) for cause in ("tooth_spall", "chipped_tooth")),
+    ],
+)
 @pytest.mark.parametrize("side", SIDES)
 def test_a_simulated_effect_is_put_on_its_shaft(cause: str, side: str) -> None:
     *_, strong = (added for added in twin().candidates(cause) if added.options["gear"] == side)

@@ -14,14 +14,14 @@ from sims.presets import presets
 USUAL = "workshop_29_47"
 OTHERS = [preset for preset in presets("cracked") if preset != USUAL]
 BEARINGS = [name for name, e in effects().items() if e.group == "bearing"]
-# Of each group one effect, and each machine once, say most; all of them take minutes.
+# Of each group one effect, and each machine once, say most; all of them, on demand, take minutes.
 OF_EACH_GROUP = {e.group: name for name, e in effects().items()}.values()
 QUICK = {*((USUAL, name) for name in OF_EACH_GROUP), *((preset, BEARINGS[0]) for preset in OTHERS)}
 CASES = [(USUAL, name) for name in effects()] + [(preset, name) for preset in OTHERS for name in BEARINGS]
 
 
-def slow_but(cases: list[tuple[str, str]]) -> list[Any]:
-    return [pytest.param(*case, marks=() if case in QUICK else pytest.mark.slow) for case in cases]
+def study_but(cases: list[tuple[str, str]]) -> list[Any]:
+    return [pytest.param(*case, marks=() if case in QUICK else pytest.mark.study) for case in cases]
 
 
 @cache
@@ -31,7 +31,7 @@ def recorded(preset: str, effect: str) -> Recording:
     )
 
 
-@pytest.mark.parametrize(("preset", "effect"), slow_but(CASES))
+@pytest.mark.parametrize(("preset", "effect"), study_but(CASES))
 def test_a_recording_begins_settled(preset: str, effect: str) -> None:
     """Filters, governor and bearings have forgotten the start: the first tenth is like the last."""
     recording = recorded(preset, effect)
@@ -46,7 +46,7 @@ def test_a_recording_begins_settled(preset: str, effect: str) -> None:
 
 @pytest.mark.parametrize(
     ("preset", "effect"),
-    slow_but([(p, e) for p in (USUAL, *OTHERS) for e in ("root_crack", *BEARINGS, "eccentricity")]),
+    study_but([(p, e) for p in (USUAL, *OTHERS) for e in ("root_crack", *BEARINGS, "eccentricity")]),
 )
 def test_a_typical_fault_stays_inside_the_range(preset: str, effect: str) -> None:
     recording = recorded(preset, effect)

@@ -119,7 +119,7 @@ PUBLISHED_DIAMETERS = [2, 0, 3, 2, 1]
 """50 teeth, module 3, of a mesh with 277 200 degrees of freedom; its inertia tells 7800 kg/m³, its E is not known."""
 
 
-@pytest.mark.parametrize("n_dof", [70_000, pytest.param(277_200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("n_dof", [70_000, pytest.param(277_200, marks=pytest.mark.study)])
 def test_frequencies_of_the_paper_gear(n_dof: int) -> None:
     blank = replace(PAPER, material=Material(density_kg_m3=7800.0))
     modes = cyclic_modes(CyclicGear(sector_mesh(blank, mesh_size_for(blank, n_dof))), 9, elastic=True)
