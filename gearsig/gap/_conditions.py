@@ -102,12 +102,17 @@ class Condition:
     @property
     def trial_s(self) -> float:
         """Length of a simulation that tries an effect at this point."""
-        return max(TRIAL_S, TRIAL_REVOLUTIONS / _slower_hz(self.now))
+        return trial_length_s(self.now)
 
     @cached_property
     def over_floors(self) -> dict[str, float]:
         """Changes over the larger of both floors, with their signs."""
         return over_floors(self.change, self.floor, is_reference=self.reference is not None)
+
+
+def trial_length_s(now: ReducedRecording) -> float:
+    """Return the length in s of a simulation that tries an effect on the machine of a recording."""
+    return max(TRIAL_S, TRIAL_REVOLUTIONS / _slower_hz(now))
 
 
 def run_length_s(now: ReducedRecording) -> float:
@@ -518,6 +523,7 @@ def conditions_of(
     *,
     tell: Stage = lambda _what, _done: None,
     learned: Learned | None = None,
+    on_read: Callable[[ConditionFacts, ReducedRecording], object] = lambda _facts, _now: None,
 ) -> tuple[list[Condition], list[str]]:
     """Return the conditions, and what is worth a remark.
 
@@ -530,6 +536,8 @@ def conditions_of(
         Is told what is being done, and which share of the whole is complete.
     learned : Learned or None
         Default: what comes with this version.
+    on_read : callable
+        Is given what a recording shows before its healthy twin is simulated.
 
     Raises
     ------
@@ -544,7 +552,7 @@ def conditions_of(
     def condition_of(recording: PreparedRecording) -> tuple[Condition, list[str]]:
         name = recording.recording.name
         tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * next(done) / len(recordings))
-        return _condition(recording, healthy, twin, learned)
+        return _condition(recording, healthy, twin, learned, on_read)
 
     conditions = readable(recordings, condition_of, "recording", messages)
     if not references:
@@ -602,7 +610,11 @@ def read_healthy(recording: PreparedRecording) -> tuple[HealthyReference, list[s
 
 
 def _condition(
-    recording: PreparedRecording, healthy: Sequence[HealthyReference], twin: Twin, learned: Learned
+    recording: PreparedRecording,
+    healthy: Sequence[HealthyReference],
+    twin: Twin,
+    learned: Learned,
+    on_read: Callable[[ConditionFacts, ReducedRecording], object],
 ) -> tuple[Condition, list[str]]:
     """Return a recording beside its reference and the healthy twin at its point, and what is worth a remark."""
     name, (now, messages) = recording.recording.name, _reduced(recording)
@@ -619,6 +631,7 @@ def _condition(
         now = with_common_channels(now, match.reduced, healthy, name, messages)
     reference = None if match is None else match.reduced
     check_steady(now, reference)
+    on_read(facts, now)
     condition = Condition(facts, now, simulated(twin, facts, now), reference, learned)
     if reference is not None:
         messages += strange_pattern(now, reference, name)

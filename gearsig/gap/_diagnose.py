@@ -23,6 +23,7 @@ from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._places import counted_against, gap_places, ranked_places
 from gearsig.gap._population import load_learned
+from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
     GapReport,
     in_order,
@@ -41,6 +42,7 @@ from gearsig.gap._trials import (
     cause_place,
     observed_changes,
     run_for_a_moment,
+    start_healthy_trial,
     steps_of,
 )
 from gearsig.gap._types import NAMING, GapCause, GapPlace, Interval, LabelledFacts, NextRecording
@@ -171,7 +173,14 @@ def diagnose_gap(
     start_early(run_for_a_moment, twin)
     _check_user_effects(twin, set(allowed) - set(learned.causes))
     tell("reading the recordings", 0.02)
-    conditions, messages = conditions_of(prepared, healthy, twin, tell=tell, learned=learned)
+    conditions, messages = conditions_of(
+        prepared,
+        healthy,
+        twin,
+        tell=tell,
+        learned=learned,
+        on_read=lambda facts, now: start_healthy_trial(twin, facts, now),
+    )
     clearest = max(conditions, key=lambda condition: condition.size.structural.value)
     recording = next(item for item in prepared if item.recording.name == clearest.facts.name)
 
@@ -211,11 +220,12 @@ def diagnose_gap(
     named = causes[0] if outcome in NAMING else None
     warnings = (*warnings, *unbounded_fits(causes, outcome))
     fitted = None if named is None else named.fitted
-    after = None if fitted is None else simulated(twin, clearest.facts, clearest.now, (fitted,))
 
-    # 7. What would tell more.
+    # 7. The twin with the effect, and what would tell more.
     tell("looking for what would tell more", 0.88)
-    next_ones = () if named is None else _next(causes, known, tried, twin, conditions)
+    after, next_ones = (
+        (None, ()) if named is None else _after_and_next(causes, known, tried, twin, conditions, clearest)
+    )
 
     uncalibrated = () if is_calibrated() else (UNCALIBRATED,)
     reference = clearest.reference
@@ -539,6 +549,22 @@ CRACK = "root_crack"
 def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) -> str:
     note = fitted_words(cause, fitted.severity, condition.facts.name)
     return twin.preset_toml(condition.facts.point, (fitted,), (note,))
+
+
+def _after_and_next(
+    causes: Sequence[GapCause],
+    known: Mapping[str, GapEffect],
+    tried: Mapping[str, TriedEffect],
+    twin: Twin,
+    conditions: Sequence[Condition],
+    clearest: Condition,
+) -> tuple[ReducedRecording | None, tuple[NextRecording, ...]]:
+    """Return the twin with the likeliest effect, as it was fitted, and what would tell more: both at once."""
+    fitted = causes[0].fitted
+    with ThreadPoolExecutor(1) as executor:
+        after = executor.submit(simulated, twin, clearest.facts, clearest.now, (fitted,)) if fitted else None
+        next_ones = _next(causes, known, tried, twin, conditions)
+    return (after.result() if after else None), next_ones
 
 
 def _next(

@@ -16,7 +16,7 @@ import numpy as np
 from gearsig.cache import keep, made_folder, modules_digest, read_arrays
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.gap._conditions import SEED, Condition, halves, observed
+from gearsig.gap._conditions import SEED, Condition, halves, observed, trial_length_s
 from gearsig.gap._evidence import SIGNS, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS, determined_options
 from gearsig.gap._features import whole_and_parts
 from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
@@ -37,7 +37,7 @@ from gearsig.gap._prediction import (
 )
 from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording
 from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, HasFurtherSettings, OperatingCondition, Twin
-from gearsig.gap._types import GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
+from gearsig.gap._types import ConditionFacts, GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
 from gearsig.gap._waveform import (
     N_HARMONICS,
     OFFSETS,
@@ -50,7 +50,7 @@ from gearsig.gap._waveform import (
     waveform_match,
 )
 from gearsig.gap._words import shaft_words
-from gearsig.processes import active_cluster, can_be_sent, killed_text, run_jobs
+from gearsig.processes import active_cluster, can_be_sent, killed_text, run_jobs, start_early
 from gearsig.rig import SIDES
 
 # --------------------
@@ -561,7 +561,7 @@ def try_effects(
             n: [a for a in twin.further_settings(n) if determined[n].items() <= a.options.items()] for n in determined
         }
     banks = banks_of(
-        [_run(twin, condition) for condition in conditions],
+        [trial_run(twin, condition.facts, condition.now) for condition in conditions],
         {name: [*candidates[name], *further_settings.get(name, ())] for name in determined},
         seeds=[SEED],
         folder=cache,
@@ -679,16 +679,20 @@ def observed_changes(conditions: Sequence[Condition]) -> list[ObservedChange]:
     return [observed(condition, k, n) for k, condition in enumerate(conditions)]
 
 
-def _run(twin: Twin, condition: Condition) -> TwinRun:
+def trial_run(twin: Twin, facts: ConditionFacts, now: ReducedRecording) -> TwinRun:
     """Return where an effect is simulated: without noise, if the twin can, in which what it adds would drown.
 
     It starts as the healthy run does, so that all that differs is the effect. The machine's own baseline is put under
     it, see `_distances`.
     """
     still = twin.quiet() if isinstance(twin, CanBeQuiet) else twin
-    return TwinRun(
-        still, condition.facts.point, float(f"{condition.trial_s:.3g}"), condition.facts.sampling_rate_hz, noise=0
-    )
+    return TwinRun(still, facts.point, float(f"{trial_length_s(now):.3g}"), facts.sampling_rate_hz, noise=0)
+
+
+def start_healthy_trial(twin: Twin, facts: ConditionFacts, now: ReducedRecording) -> None:
+    """Let workers run the healthy machine that trials are compared with, before it is known which are made."""
+    run = trial_run(twin, facts, now)
+    start_early(reduced_in_worker, [Task(replace(run, point=rounded(run.point)), SEED, None)])
 
 
 def _paths(
