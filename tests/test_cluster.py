@@ -151,7 +151,9 @@ def branches_over(folder: Path, on_progress: Callable[..., object]) -> list[str]
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("work", [report_on, sweep_over, branches_over])
+@pytest.mark.parametrize(
+    "work", [report_on, *(pytest.param(work, marks=pytest.mark.study) for work in (sweep_over, branches_over))]
+)
 def test_reports_sweeps_and_bifurcations_lose_a_worker_and_nothing_else(scheduler, tmp_path, work):
     address, workers = scheduler
 

@@ -39,7 +39,7 @@ def claims(analysis: Analysis, *kinds: Kind) -> set[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("nominal", [True, False], ids=["nominal speed given", "no speed given"])
-@pytest.mark.parametrize("channel", [12, 14])
+@pytest.mark.parametrize("channel", [12, pytest.param(14, marks=pytest.mark.study)])
 def test_gear_pair_without_tachometer(channel: int, nominal: bool) -> None:
     rig = PINION if nominal else replace(PINION, operating_point=OperatingPoint())
     analysis = analyze(read_recording(DATA / "gear_pair_23_46" / f"3027_217_Data_Chan{channel}.mat", rig=rig))
@@ -127,7 +127,7 @@ def test_car_run_up_reads_its_own_speed_channel() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", ["OR007@6_0.mat", "IR021_0.mat"])
+@pytest.mark.parametrize("file", ["OR007@6_0.mat", pytest.param("IR021_0.mat", marks=pytest.mark.study)])
 def test_impacts_of_an_unknown_bearing_are_placed_at_the_drive_end(file: str) -> None:
     recording = read_recording(DATA / "bearing_cwru" / file, sampling_rate_hz=CWRU_RATES_HZ[file])
     (channel,) = found(analyze(recording), "non-synchronous-impacts").where.channels
@@ -153,7 +153,10 @@ def test_motor_bench_names_the_right_part_of_the_right_bearing_or_none(file: str
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("file", "part"), [("OR007@6_0.mat", "outer race"), ("IR021_0.mat", "inner race")])
+@pytest.mark.parametrize(
+    ("file", "part"),
+    [("OR007@6_0.mat", "outer race"), pytest.param("IR021_0.mat", "inner race", marks=pytest.mark.study)],
+)
 def test_a_damaged_race_is_the_first_that_has_changed_since_the_motor_was_healthy(file: str, part: str) -> None:
     analysis = analyze(BY_NAME[f"bearing_cwru/{file}"].read(), reference=BY_NAME["bearing_cwru/normal_0.mat"].read())
     assert analysis.verdict.startswith(f"Changed since the reference: {part} of drive end +")

@@ -98,7 +98,7 @@ def test_two_halves_of_one_recording_have_no_crack(name: str) -> None:
 
 
 def marks_of(name: str) -> tuple[pytest.MarkDecorator, ...]:
-    return () if "unbalance" in name else (pytest.mark.slow,) if "OR007" in name else (FURTHER,)
+    return () if "unbalance" in name else (FURTHER,)
 
 
 @pytest.mark.slow

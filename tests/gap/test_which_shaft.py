@@ -120,7 +120,7 @@ def test_a_simulated_effect_is_put_on_its_shaft(cause: str, side: str) -> None:
     assert determined_options(cause, [simulated(strong)], (29, 47)) == {"gear": side}
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("cause", "point"),
     [("unbalance", OperatingCondition(4500.0, 50.0)), ("misalignment", OperatingCondition(3000.0, 200.0))],

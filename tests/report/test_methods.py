@@ -25,6 +25,8 @@ RIG = Rig(
     pairs=(GearPair("stage 1", "input", "output", 20, 40),),
     speed=ConstantSpeed(1500.0),
 )
+OF_EACH_KIND = ("spectrum", "average", "order-map", "kurtogram", "ridges", "modes", "poincare", "recurrence", "motion")
+"""Methods whose answers differ in kind: lines, maps, places, portraits, tables."""
 
 
 def recording(seed: int = 0) -> Recording:
@@ -36,7 +38,9 @@ def recording(seed: int = 0) -> Recording:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in OF_EACH_KIND else pytest.mark.study) for name in METHODS]
+)
 def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> None:
     answer = apply_method(name, recording(), **({"n_modes": 3} if name == "modes" else {}))
     png, svg, csv, h5, numbers = write_answer(answer, tmp_path)
