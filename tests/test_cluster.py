@@ -27,6 +27,7 @@ from gearsig.processes import cluster, run_jobs
 from sims.continuation import Branch
 from sims.sweep import Axis, Sweep, run_sweep
 from tests.fleet.recordings import PATTERN, write_recording_file
+from tests.marks import further
 
 ROOT = Path(__file__).parents[1]
 SETTINGS = {
@@ -151,9 +152,7 @@ def branches_over(folder: Path, on_progress: Callable[..., object]) -> list[str]
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize(
-    "work", [report_on, *(pytest.param(work, marks=pytest.mark.study) for work in (sweep_over, branches_over))]
-)
+@pytest.mark.parametrize("work", [report_on, further(sweep_over), further(branches_over)])
 def test_reports_sweeps_and_bifurcations_lose_a_worker_and_nothing_else(scheduler, tmp_path, work):
     address, workers = scheduler
 

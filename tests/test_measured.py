@@ -11,6 +11,7 @@ from gearsig.prepared import refined_angle
 from gearsig.recording import Recording, read_recording
 from gearsig.rig import ConstantSpeed, OperatingPoint
 from gearsig.severity import CrackEstimate, NoCrackSeen, estimate_crack
+from tests.marks import further
 from tests.measured import (
     BEARING,
     BY_NAME,
@@ -39,7 +40,7 @@ def claims(analysis: Analysis, *kinds: Kind) -> set[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("nominal", [True, False], ids=["nominal speed given", "no speed given"])
-@pytest.mark.parametrize("channel", [12, pytest.param(14, marks=pytest.mark.study)])
+@pytest.mark.parametrize("channel", [12, further(14)])
 def test_gear_pair_without_tachometer(channel: int, nominal: bool) -> None:
     rig = PINION if nominal else replace(PINION, operating_point=OperatingPoint())
     analysis = analyze(read_recording(DATA / "gear_pair_23_46" / f"3027_217_Data_Chan{channel}.mat", rig=rig))
@@ -127,7 +128,7 @@ def test_car_run_up_reads_its_own_speed_channel() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", ["OR007@6_0.mat", pytest.param("IR021_0.mat", marks=pytest.mark.study)])
+@pytest.mark.parametrize("file", ["OR007@6_0.mat", further("IR021_0.mat")])
 def test_impacts_of_an_unknown_bearing_are_placed_at_the_drive_end(file: str) -> None:
     recording = read_recording(DATA / "bearing_cwru" / file, sampling_rate_hz=CWRU_RATES_HZ[file])
     (channel,) = found(analyze(recording), "non-synchronous-impacts").where.channels
@@ -155,7 +156,7 @@ def test_motor_bench_names_the_right_part_of_the_right_bearing_or_none(file: str
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "part"),
-    [("OR007@6_0.mat", "outer race"), pytest.param("IR021_0.mat", "inner race", marks=pytest.mark.study)],
+    [("OR007@6_0.mat", "outer race"), further("IR021_0.mat", "inner race")],
 )
 def test_a_damaged_race_is_the_first_that_has_changed_since_the_motor_was_healthy(file: str, part: str) -> None:
     analysis = analyze(BY_NAME[f"bearing_cwru/{file}"].read(), reference=BY_NAME["bearing_cwru/normal_0.mat"].read())

@@ -16,6 +16,7 @@ from gearsig.methods import METHODS
 from tests.app.pages import FOLDER, SAMPLES, at, choose, figures, go, key_of, labelled, press, shown_text
 from tests.fleet.conftest import make_recordings  # noqa: F401 - a fixture
 from tests.fleet.recordings import PATTERN
+from tests.marks import further
 
 PAGE = {"sample", "described", "file", "view", "zoom", "reference", "reference_file", "torque"}
 """What stands in the address of the analysis page in every view."""
@@ -123,15 +124,7 @@ def test_nonsense_in_an_address_is_ignored_and_taken_out(text: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "method",
-    [
-        "Kurtogram",
-        "Ridges",
-        *(
-            pytest.param(name, marks=pytest.mark.study)
-            for name in ("Orders (Vold–Kalman)", "Modes", "Lyapunov exponent")
-        ),
-    ],
+    "method", ["Kurtogram", further("Orders (Vold–Kalman)"), "Ridges", further("Modes"), further("Lyapunov exponent")]
 )
 def test_nonsense_among_the_options_of_a_method_is_ignored(method: str) -> None:
     usual = go(analysis("healthy"), method)

@@ -121,7 +121,7 @@ def test_the_diagnosing_process_finds_no_label(folders):
     assert sum(c.probability for c in answers["rules"].causes) == pytest.approx(1.0)
 
 
-@pytest.mark.study
+@pytest.mark.slow
 def test_the_diagnosing_simulator_makes_the_same_cases_too(tmp_path):
     truth = SHORT.make(case("single", "eccentricity", SAME), tmp_path)
     seen = read_visible(tmp_path)

@@ -31,11 +31,12 @@ from tests.app.pages import (
     shown_text,
     upload,
 )
+from tests.marks import further
 
 SLOW = ("Modes", "Phase", "Time–frequency")
+"""Views that compute: they have tests of their own."""
 OF_EACH_KIND = ("damaged_tooth", "no_tachometer", "outer_race", "run_up", "two_stage")
 """Samples that differ in what can be shown; the others are like one of them."""
-"""Views that compute: they have tests of their own."""
 
 
 def test_a_sample_is_open_at_the_start() -> None:
@@ -46,9 +47,7 @@ def test_a_sample_is_open_at_the_start() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=() if n in OF_EACH_KIND else pytest.mark.study) for n in sorted(SAMPLES)]
-)
+@pytest.mark.parametrize("name", [name if name in OF_EACH_KIND else further(name) for name in sorted(SAMPLES)])
 def test_every_sample_opens_in_every_view(name: str) -> None:
     page = opened(name)
     assert not page.exception

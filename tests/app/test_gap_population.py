@@ -27,6 +27,7 @@ from gearsig.gap import (
 )
 from sims.blind import CATALOGUE
 from sims.effects import EffectSetting
+from tests.marks import further
 
 FLOOR = load_learned().floor(with_reference=True)
 
@@ -75,7 +76,7 @@ def drawn_machine() -> DrawnRig:
     )
 
 
-@pytest.mark.parametrize("model", ["cracked", pytest.param("reduced-fe", marks=pytest.mark.study)])
+@pytest.mark.parametrize("model", ["cracked", further("reduced-fe")])
 def test_both_models_record_a_drawn_machine(model: str) -> None:
     drawn = drawn_machine()
     drawn = replace(drawn, duration_s=0.5 * drawn.duration_s)

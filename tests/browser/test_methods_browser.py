@@ -14,6 +14,7 @@ from gearsig.methods import METHODS
 from gearsig.recording import read_recording
 from tests.app.pages import SAMPLES
 from tests.browser.conftest import CHROMIUM, open_view, settle
+from tests.marks import further
 
 pytestmark = [
     pytest.mark.browser,
@@ -66,7 +67,7 @@ def assert_figures_are_well_lettered(panel: playwright.Locator, name: str) -> No
     assert not panel.locator("[data-testid=stButtonGroup], [data-testid=stButtonGroup] *").evaluate_all(cut), name
 
 
-@pytest.mark.parametrize("width", [800, pytest.param(1440, marks=pytest.mark.study)])
+@pytest.mark.parametrize("width", [800, further(1440)])
 def test_no_choice_of_a_method_is_cut_off(page: playwright.Page, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 1600})
     open_analysis(page)

@@ -12,12 +12,10 @@ from gearsig.recording import Recording, read_recording
 from gearsig.rig import Bearing, ConstantSpeed, OperatingPoint, TachometerChannel
 from tests.diagnosis.machines import GOOD, MOTOR, MOTOR_HZ, MOTOR_RATE_HZ, codes, finding, motor, record
 from tests.kinematic.speed import ConstantProfile
+from tests.marks import further
 from tests.measured import BY_NAME, DATA, needs_data
 
 CODE = "sampling-rate-doubtful"
-
-FURTHER = pytest.mark.study
-"""Further cases of what others hold."""
 
 
 @pytest.mark.parametrize(("race", "times"), [("BPFO", 0.1), ("BPFI", 0.25), ("BPFI", 4.0), ("BPFI", 12.8 / 12)])
@@ -33,7 +31,7 @@ def test_of_a_motor(race: str, times: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("race", ["", "BPFO", "BPFI", "BSF"])
-@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=FURTHER) for seed in (2, 3))])
+@pytest.mark.parametrize("seed", [1, further(2), further(3)])
 def test_that_is_right(race: str, seed: int) -> None:
     assert CODE not in codes(analyze(motor(race, seed)))
 
@@ -100,10 +98,10 @@ def test_of_a_measured_race_that_nobody_described(race: str) -> None:
     ("name", "times"),
     [
         ("bearing_races/OuterRaceFault_vload_4.mat", 0.1),
-        pytest.param("bearing_races/OuterRaceFault_vload_4.mat", 0.2, marks=FURTHER),
+        further("bearing_races/OuterRaceFault_vload_4.mat", 0.2),
         ("bearing_races/InnerRaceFault_vload_3.mat", 0.25),
-        pytest.param("bearing_cwru/OR007@6_0.mat", 0.1, marks=FURTHER),
-        pytest.param("bearing_cwru/OR007@6_0.mat", 0.2, marks=FURTHER),
+        further("bearing_cwru/OR007@6_0.mat", 0.1),
+        further("bearing_cwru/OR007@6_0.mat", 0.2),
         ("bearing_cwru/B007_0.mat", 0.1),
     ],
 )
@@ -120,9 +118,9 @@ def test_of_a_measured_race_at_a_rate_that_is_too_low(name: str, times: float) -
     ("name", "times"),
     [
         ("bearing_cwru/OR007@6_0.mat", 2.0),
-        pytest.param("bearing_cwru/OR007@6_0.mat", 8.0, marks=FURTHER),
-        pytest.param("bearing_cwru/IR021_0.mat", 2.0, marks=FURTHER),
-        pytest.param("bearing_cwru/IR021_0.mat", 10.0, marks=FURTHER),
+        further("bearing_cwru/OR007@6_0.mat", 8.0),
+        further("bearing_cwru/IR021_0.mat", 2.0),
+        further("bearing_cwru/IR021_0.mat", 10.0),
         ("bearing_races/InnerRaceFault_vload_3.mat", 5.0),
     ],
 )
@@ -149,11 +147,11 @@ def test_blades_are_no_wrong_rate(blades: int) -> None:
     ("name", "right_hz", "stated_hz"),
     [
         ("normal_0", 48_000, 12_000),
-        pytest.param("IR021_0", 12_000, 48_000, marks=FURTHER),
+        further("IR021_0", 12_000, 48_000),
         ("OR007@6_0", 12_000, 25_600),
-        pytest.param("OR007@6_0", 12_000, 30_720, marks=FURTHER),
-        pytest.param("IR021_0", 12_000, 30_720, marks=FURTHER),
-        pytest.param("normal_0", 48_000, 4_800, marks=FURTHER),
+        further("OR007@6_0", 12_000, 30_720),
+        further("IR021_0", 12_000, 30_720),
+        further("normal_0", 48_000, 4_800),
     ],
 )
 def test_of_a_measured_motor(name: str, right_hz: int, stated_hz: int) -> None:

@@ -13,6 +13,7 @@ from gearsig.recording import Recording, read_recording
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft, read_rig
 from gearsig.severity import NoCrackSeen, estimate_crack
 from sims.registry import gap_simulator
+from tests.marks import further
 from tests.measured import BY_NAME, needs_data
 from tests.measured import RECORDINGS as MEASURED_RECORDINGS
 
@@ -71,11 +72,10 @@ def next_file(start: str) -> str:
 
 # Two without damage and one with it; the others take two minutes more.
 QUICK = {"cracked sample", "healthy sample", "measured gearbox, healthy"}
-FURTHER = pytest.mark.study
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in QUICK else FURTHER) for name in RECORDINGS])
+@pytest.mark.parametrize("name", [name if name in QUICK else further(name) for name in RECORDINGS])
 def test_two_halves_of_one_recording_are_no_gap(name: str) -> None:
     first, second = halves(RECORDINGS[name]())
     assert first.rig is not None
@@ -97,19 +97,13 @@ def test_two_halves_of_one_recording_have_no_crack(name: str) -> None:
     assert isinstance(estimate_crack(second.with_rig(rig), reference=first.with_rig(rig)), NoCrackSeen)
 
 
-def marks_of(name: str) -> tuple[pytest.MarkDecorator, ...]:
-    return () if "unbalance" in name else (FURTHER,)
+GEARLESS = [one.name for one in MEASURED_RECORDINGS if one.rig is not None and not one.rig.pairs]
 
 
 @pytest.mark.slow
 @needs_data
 @pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(one.name, marks=marks_of(one.name))
-        for one in MEASURED_RECORDINGS
-        if one.rig is not None and not one.rig.pairs
-    ],
+    "name", [name if "unbalance" in name or "OR007" in name else further(name) for name in GEARLESS]
 )
 def test_two_halves_of_one_recording_without_gears_are_no_gap(name: str) -> None:
     """A damaged machine is no healthy reference: it is said to be none, and not compared with."""

@@ -24,6 +24,7 @@ from gearsig.gap import (
 )
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 from sims.registry import gap_simulator
+from tests.marks import further
 
 TEETH = (23, 37)
 
@@ -106,13 +107,7 @@ def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, flo
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "cause",
-    [
-        "root_crack",
-        "pitch_error",
-        "eccentricity",
-        *(pytest.param(cause, marks=pytest.mark.study) for cause in ("tooth_spall", "chipped_tooth")),
-    ],
+    "cause", ["root_crack", further("tooth_spall"), further("chipped_tooth"), "pitch_error", "eccentricity"]
 )
 @pytest.mark.parametrize("side", SIDES)
 def test_a_simulated_effect_is_put_on_its_shaft(cause: str, side: str) -> None:
@@ -120,7 +115,7 @@ def test_a_simulated_effect_is_put_on_its_shaft(cause: str, side: str) -> None:
     assert determined_options(cause, [simulated(strong)], (29, 47)) == {"gear": side}
 
 
-@pytest.mark.study
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cause", "point"),
     [("unbalance", OperatingCondition(4500.0, 50.0)), ("misalignment", OperatingCondition(3000.0, 200.0))],

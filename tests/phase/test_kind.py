@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 from gearsig.errors import RefusalError
 from gearsig.phase import PhasePortrait, constant_period_lock, embedding_dimension, kind_of_motion, phase_plane
+from tests.marks import further
 from tests.phase.systems import DUFFING_PERIOD_S, duffing, quasi_periodic
 
 RATE = 64 / DUFFING_PERIOD_S
@@ -64,7 +65,7 @@ def test_noise_is_called_stochastic():
     assert any("no dimension" in sentence for sentence in found.evidence)
 
 
-@pytest.mark.parametrize(("per_period", "n_periods"), [(32, 600), pytest.param(128, 300, marks=pytest.mark.study)])
+@pytest.mark.parametrize(("per_period", "n_periods"), [(32, 600), further(128, 300)])
 def test_clean_chaos_whose_usual_delay_is_too_long_is_not_called_stochastic(per_period, n_periods):
     rate = per_period / DUFFING_PERIOD_S
     path = PhasePortrait(duffing(0.5, n_periods, per_period), rate, ("x", "v"), ("m", "m/s"), "states", "duffing")
@@ -75,7 +76,7 @@ def test_clean_chaos_whose_usual_delay_is_too_long_is_not_called_stochastic(per_
 
 
 @pytest.mark.parametrize("smooth", [0.5, 0.95])
-@pytest.mark.parametrize("seed", [0, pytest.param(2, marks=pytest.mark.study)])
+@pytest.mark.parametrize("seed", [0, further(2)])
 def test_filtered_noise_stays_stochastic(smooth, seed):
     x = lfilter([1.0], [1.0, -smooth], np.random.default_rng(seed).normal(size=8_000))
     path = PhasePortrait(np.stack([x, np.gradient(x)], 1), 1000.0, ("x", "v"), ("m", "m/s"), "states", "noise")

@@ -18,7 +18,7 @@ KINDS = ("csv", "gzip", "mat", "hdf5", "parquet", "wav", "tdms", "uff", "mf4", "
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peak memory is read from Linux' /proc")
 @pytest.mark.parametrize("kind", KINDS)
 def test_mutated_files(kind, tmp_path):
-    n_files = os.environ.get("GEARSIG_FUZZ_FILES", "150")
+    n_files = os.environ.get("GEARSIG_FUZZ_FILES", "250")
     run = subprocess.run(
         [sys.executable, READER, kind, n_files, "1", tmp_path], capture_output=True, text=True, check=False
     )

@@ -16,6 +16,7 @@ from gearsig.prepared import prepare
 from gearsig.recording import Channel, Recording, write_recording
 from gearsig.report import answer_json, fitting_methods, named_method, write_answer
 from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft
+from tests.marks import further
 
 RATE_HZ, N = 8192.0, 16384
 T = np.arange(N) / RATE_HZ
@@ -38,9 +39,7 @@ def recording(seed: int = 0) -> Recording:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name in OF_EACH_KIND else pytest.mark.study) for name in METHODS]
-)
+@pytest.mark.parametrize("name", [name if name in OF_EACH_KIND else further(name) for name in METHODS])
 def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> None:
     answer = apply_method(name, recording(), **({"n_modes": 3} if name == "modes" else {}))
     png, svg, csv, h5, numbers = write_answer(answer, tmp_path)

@@ -10,6 +10,7 @@ from gearsig.recording import Recording
 from sims import simulate
 from sims.effects import effects
 from sims.presets import presets
+from tests.marks import further
 
 USUAL = "workshop_29_47"
 OTHERS = [preset for preset in presets("cracked") if preset != USUAL]
@@ -21,7 +22,7 @@ CASES = [(USUAL, name) for name in effects()] + [(preset, name) for preset in OT
 
 
 def study_but(cases: list[tuple[str, str]]) -> list[Any]:
-    return [pytest.param(*case, marks=() if case in QUICK else pytest.mark.study) for case in cases]
+    return [case if case in QUICK else further(*case) for case in cases]
 
 
 @cache

@@ -17,6 +17,7 @@ from gearsig.timefreq import (
     squeezed_cwt_map,
     tops_of_parted_paths,
 )
+from tests.marks import further
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
 RATE = 4096.0
@@ -55,7 +56,7 @@ def test_the_mesh_is_followed_from_where_it_is_weak(run_up: tuple[TimeFrequencyM
 
 
 @pytest.mark.parametrize("transform", [cwt_map, squeezed_cwt_map])
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.study) for seed in (1, 2))])
+@pytest.mark.parametrize("seed", [0, further(1), further(2)])
 @pytest.mark.parametrize("course", ["chirp", "step"])
 def test_a_ridge_in_noise_of_more_power_is_followed(transform, seed: int, course: str):
     t = np.arange(int(8 * RATE)) / RATE

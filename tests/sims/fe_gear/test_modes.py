@@ -19,6 +19,7 @@ from sims.fe_gear import (
     sector_mesh,
 )
 from sims.mesh import Material
+from tests.marks import further
 from tests.sims.fe_gear.fe_gears import COARSE, PAPER, SMALL, full_matrices, full_modes, small_cyclic
 
 
@@ -119,7 +120,7 @@ PUBLISHED_DIAMETERS = [2, 0, 3, 2, 1]
 """50 teeth, module 3, of a mesh with 277 200 degrees of freedom; its inertia tells 7800 kg/m³, its E is not known."""
 
 
-@pytest.mark.parametrize("n_dof", [70_000, pytest.param(277_200, marks=pytest.mark.study)])
+@pytest.mark.parametrize("n_dof", [70_000, further(277_200)])
 def test_frequencies_of_the_paper_gear(n_dof: int) -> None:
     blank = replace(PAPER, material=Material(density_kg_m3=7800.0))
     modes = cyclic_modes(CyclicGear(sector_mesh(blank, mesh_size_for(blank, n_dof))), 9, elastic=True)
