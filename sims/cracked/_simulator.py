@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from gearsig.gap import Added, OperatingCondition
 from gearsig.recording import Recording
 from sims.cracked._respond import (
     PairState,
@@ -87,7 +89,9 @@ def simulate_with_motion(
     longest = default_step_s(machine, operation) if run.step_s is None else run.step_s
     measured = Measurement.of(machine, run, longest)
     machine_rng, chain_rng = run.streams()
-    response = respond(machine, operation, rng=machine_rng, **measured.motion)
+    response = respond(machine, operation, rng=machine_rng, **measured.rest)
+    if run.before is not None:
+        response = run.before.followed_by(response)
     frequencies = eigenfrequencies_hz(machine, mesh_force_n(machine, operation))
     recording = measured.record(
         response,
@@ -125,6 +129,11 @@ STEP_ANGLE_RAD = 0.9
 """Step times the greatest angular eigenfrequency: three times that of a single simulation, see `_step_s`."""
 
 
+_LEAD_INS: dict[tuple[str, OperatingCondition, int, float], Response | None] = {}
+MAX_LEAD_INS = 4
+"""Kept in a process, some 5 MB each: specimens and operating points of the last diagnosis."""
+
+
 @dataclass(frozen=True)
 class CrackedTwin(PairTwin):
     """A rig's twin with 16 degrees of freedom; see `sims.gear_pair.PairTwin`."""
@@ -133,6 +142,28 @@ class CrackedTwin(PairTwin):
     def pair_model(self) -> CrackedPair:
         """The model that runs the twin."""
         return CrackedPair()
+
+    def _planned(
+        self, point: OperatingCondition, added: Sequence[Added], seed: int, sampling_rate_hz: float
+    ) -> tuple[ReadyPair, MeasuredRun[PairState]]:
+        """Let a tooth be damaged while the healthy specimen runs, whose start is simulated once for all such faults.
+
+        They last one engagement, and so leave the drive and a body on soft mounts, which settle slowly, as they are.
+        The motion has as many points as the step asks for: the model has no modes that would fold back.
+        """
+        ready, run = super()._planned(point, added, seed, sampling_rate_hz)
+        run = replace(run, min_motion_hz=0.0)
+        if not added or not all("tooth" in a.options for a in added):
+            return ready, run
+        key = self.key, point, seed, sampling_rate_hz
+        if key not in _LEAD_INS:
+            if len(_LEAD_INS) >= MAX_LEAD_INS:
+                _LEAD_INS.clear()
+            healthy, of_healthy = self._planned(point, (), seed, sampling_rate_hz)
+            lead_in = Measurement.of(healthy.machine, of_healthy, of_healthy.step_s or 0.0).lead_in
+            rng = of_healthy.streams()[0]
+            _LEAD_INS[key] = lead_in and respond(healthy.machine, healthy.operation, rng=rng, **lead_in)
+        return ready, replace(run, before=_LEAD_INS[key])
 
     def _step_s(self, preset: Preset) -> float:
         """Step of the integrator: that of the healthy machine, so that effects leave the drawn noise as it is.

@@ -40,6 +40,8 @@ POINTS_PER_CYCLE = 6
 """Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
 MIN_MOTION_HZ = 80_000.0
 """Rate of that motion at least: what the model still holds above half of it would fold back."""
+GOES_ON_S = 0.1
+"""Of the lead-in that a run has to itself where it goes on from another."""
 SETTLING = 6.0
 """Time constants of the slowest start-up motion that are left out ahead of the recording."""
 
@@ -66,6 +68,10 @@ class MeasuredRun(Generic[State]):
         Signals of the model wanted in the motion besides those that are measured.
     first : state of the model or None
         Where the lead-in starts; None: at the static balance.
+    before : PairResponse or None
+        `Measurement.lead_in` of the same machine in another state: the run goes on from its end, as a tooth breaks.
+    min_motion_hz : float
+        Rate of the motion at least that is handed to the measurement chain.
     noise_rng : numpy.random.Generator or None
         For the chain, instead of the stream made of `rng`: the same machine with other noise.
     on_progress : callable or None
@@ -80,6 +86,8 @@ class MeasuredRun(Generic[State]):
     step_s: float | None = None
     also: Sequence[str] = ()
     first: State | None = None
+    before: PairResponse[State] | None = None
+    min_motion_hz: float = MIN_MOTION_HZ
     noise_rng: np.random.Generator | None = None
     on_progress: Callable[[float], None] | None = None
 
@@ -129,7 +137,7 @@ class Measurement(Generic[State]):
         positive(run.duration_s, "duration_s", "s")
         rate = positive(run.sampling_rate_hz, "sampling_rate_hz", "Hz")
         chain = replace(machine.chain, sampling_rate_hz=rate)
-        rate_hz = motion_rate_hz(chain)
+        rate_hz = motion_rate_hz(chain, run.min_motion_hz)
         per_sample = ceil(max(1.0 / positive(longest_step_s, "step_s", "s"), rate_hz) / rate - 1e-9)
         return cls(
             machine,
@@ -155,6 +163,22 @@ class Measurement(Generic[State]):
             "first": self.run.first,
             "on_progress": self.run.on_progress,
         }
+
+    @property
+    def lead_in(self) -> dict[str, Any] | None:
+        """The same up to `GOES_ON_S` before the recording, if it begins earlier: runs in another state go on there."""
+        n_points = floor((self.lead_in_s - GOES_ON_S) / (self.step_s * self.stride))
+        return {**self.motion, "duration_s": n_points * self.step_s * self.stride} if n_points > 0 else None
+
+    @property
+    def rest(self) -> dict[str, Any]:
+        """The same from where the run before it ended."""
+        before = self.run.before
+        if before is None:
+            return self.motion
+        at_s = before.ends_s
+        duration_s = self.motion["duration_s"] - (at_s + self.lead_in_s)
+        return {**self.motion, "start_s": at_s, "duration_s": duration_s, "first": before.last}
 
     def _signals_at(self, position: str) -> tuple[str, ...]:
         place = position.removesuffix(" yield")
@@ -222,11 +246,11 @@ def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
     return max(chain.lead_in_s, SETTLING * recovery, 0.1)
 
 
-def motion_rate_hz(chain: MeasurementChain) -> float:
+def motion_rate_hz(chain: MeasurementChain, min_motion_hz: float = MIN_MOTION_HZ) -> float:
     """Points per second that the chain needs of the motion at least."""
     modes = [mode.frequency_hz for channel in chain.channels for mode in channel.path.modes]
     sensors = [channel.accelerometer.resonance_hz or 0.0 for channel in chain.channels]
-    return max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), MIN_MOTION_HZ, 4.0 * chain.sampling_rate_hz)
+    return max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), min_motion_hz, 4.0 * chain.sampling_rate_hz)
 
 
 def used_positions(chain: MeasurementChain) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Generic, TypeVar
 
@@ -48,9 +48,21 @@ class PairResponse(Result, Generic[State], columns=("time_s", "signals")):
         """Times of the points."""
         return self.start_s + self.interval_s * np.arange(len(next(iter(self.signals.values()))))
 
+    @property
+    def ends_s(self) -> float:
+        """When a run that goes on from `last` begins."""
+        return self.start_s + self.interval_s * len(self.time_s)
+
     def __getitem__(self, name: str) -> FloatArray:
         """Return a signal by its name."""
         return self.signals[name]
+
+    def followed_by(self, other: PairResponse[State]) -> PairResponse[State]:
+        """Return this run and one that went on from its last state, of the same signals, as one."""
+        signals = {name: np.concatenate((values, other[name])) for name, values in self.signals.items()}
+        return replace(
+            other, start_s=self.start_s, signals=signals, energy_j=np.concatenate((self.energy_j, other.energy_j))
+        )
 
 
 @dataclass(frozen=True)

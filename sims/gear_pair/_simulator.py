@@ -421,25 +421,25 @@ class PairTwin:
         Flanks, tolerances and housing follow from `seed` alone. Sensor noise, tachometer jitter and where the run
         starts follow from seed and noise; run 0 starts at the driver's first tooth.
         """
-        count(seed, "seed", minimum=0)
-        preset_at_point = self.preset(point, added, seed=seed)
-        run_rng = np.random.default_rng([seed, count(noise, "noise", minimum=0)])
+        run_rng = np.random.default_rng([count(seed, "seed", minimum=0), count(noise, "noise", minimum=0)])
         skipped = 0
         if noise:
             skipped = round(run_rng.uniform(0.0, LONGEST_LEAD_REV) * 60.0 / point.speed_rpm * sampling_rate_hz)
-        machine_rng = np.random.default_rng(seed)
-        ready = self._prepared(preset_at_point, machine_rng, sampling_rate_hz)
-        run: MeasuredRun[Any] = MeasuredRun(
-            machine_rng,
-            sampling_rate_hz,
-            duration_s + skipped / sampling_rate_hz,
-            self._rig_at(point),
-            step_s=self._step_s(preset_at_point),
-            noise_rng=run_rng if noise else None,
-        )
+        ready, run = self._planned(point, added, seed, sampling_rate_hz)
+        run = replace(run, duration_s=duration_s + skipped / sampling_rate_hz, noise_rng=run_rng if noise else None)
         recording = self.pair_model.record(ready, run)
         recording = replace(recording, truth={**(recording.truth or {}), "seed": seed, "noise": noise})
         return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
+
+    def _planned(
+        self, point: OperatingCondition, added: Sequence[Added], seed: int, sampling_rate_hz: float
+    ) -> tuple[ReadyPair, MeasuredRun[Any]]:
+        """Return a specimen with its effects, and a run of it that lasts one sample."""
+        preset_at_point = self.preset(point, added, seed=seed)
+        rng = np.random.default_rng(seed)
+        ready = self._prepared(preset_at_point, rng, sampling_rate_hz)
+        step_s = self._step_s(preset_at_point)
+        return ready, MeasuredRun(rng, sampling_rate_hz, 1.0 / sampling_rate_hz, self._rig_at(point), step_s=step_s)
 
     def quiet(self) -> Self:
         """Return the machine on soft mounts where nothing else vibrates and its own gears hardly do.

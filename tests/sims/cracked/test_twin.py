@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import cache
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from gearsig.rig import Bearing, EncoderChannel, GearPair, OperatingPoint, Rig, 
 from sims import simulate
 from sims.cracked import CrackedPair, CrackedTwin
 from sims.effects import effect, effects
-from sims.gear_pair import BODY_KG, completed_bearing
+from sims.gear_pair import BODY_KG, PairTwin, completed_bearing
 from sims.machine import nominal_of
 from sims.registry import gap_simulator
 from sims.simulator import SimulationSetup
@@ -47,6 +48,20 @@ def twin(rig: Rig = RIG) -> CrackedTwin:
 
 def run(added: tuple[Added, ...] = (), *, seed: int = 0, noise: int = 0, duration_s: float = 0.3) -> Recording:
     return twin().run(POINT, added, seed=seed, noise=noise, duration_s=duration_s, sampling_rate_hz=FS)
+
+
+def test_a_tooth_breaks_while_the_healthy_machine_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is recorded then is what a machine records that was broken from its static balance on."""
+    made, crack = twin().quiet(), (Added("root_crack", 2.0, {"gear": "driver", "tooth": 3.0}),)
+    healthy, going_on = (made.run(POINT, a, seed=1, duration_s=0.3, sampling_rate_hz=FS) for a in ((), crack))
+
+    def from_the_static_balance(self: CrackedTwin, *asked: Any) -> tuple[Any, Any]:
+        ready, plan = PairTwin._planned(self, *asked)
+        return ready, replace(plan, min_motion_hz=0.0)
+
+    monkeypatch.setattr(CrackedTwin, "_planned", from_the_static_balance)
+    broken = made.run(POINT, crack, seed=1, duration_s=0.3, sampling_rate_hz=FS)
+    assert difference(going_on, broken) < 0.01 * difference(healthy, broken)
 
 
 def difference(one: Recording, other: Recording) -> float:
