@@ -6,7 +6,6 @@ from gearsig.gap._attribution import (
     Attribution,
     GapCalibration,
     attribute,
-    group_probabilities,
     is_calibrated,
     joint_probabilities,
     load_gap_calibration,
@@ -131,7 +130,40 @@ from gearsig.gap._reduction import (
     reduce_recording,
     speed_figures,
 )
-from gearsig.gap._report import GapReport, is_settled, unbounded_fits, within_the_floor
+from gearsig.gap._report import (
+    KIND_TITLES,
+    NAMING,
+    NONE,
+    UNKNOWN,
+    AngleCurves,
+    AverageCurves,
+    ConditionFacts,
+    Evidence,
+    GapCause,
+    GapKind,
+    GapOutcome,
+    GapPlace,
+    GapReport,
+    GapStep,
+    Interval,
+    LabelledFacts,
+    NextRecording,
+    NextStep,
+    PlaceKind,
+    Shrinkage,
+    SpectrumCurves,
+    group_probabilities,
+    hardly_predicted,
+    is_settled,
+    point_text,
+    rivals,
+    same_condition,
+    severity_unit,
+    shares_of,
+    stance_words,
+    unbounded_fits,
+    within_the_floor,
+)
 from gearsig.gap._simulator import (
     Added,
     DriveFacts,
@@ -165,41 +197,9 @@ from gearsig.gap._trials import (
     rounded,
     try_effects,
 )
-from gearsig.gap._types import (
-    KIND_TITLES,
-    NAMING,
-    NONE,
-    UNKNOWN,
-    AngleCurves,
-    AverageCurves,
-    ConditionFacts,
-    Evidence,
-    GapCause,
-    GapKind,
-    GapOutcome,
-    GapPlace,
-    GapStep,
-    Interval,
-    LabelledFacts,
-    NextRecording,
-    NextStep,
-    PlaceKind,
-    Shrinkage,
-    SpectrumCurves,
-    rivals,
-    shares_of,
-)
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
 from gearsig.gap._waveform import SimulatedWaveform, WaveformMatch, compare_waveform, waveform_match
-from gearsig.gap._words import (
-    ComparedPair,
-    feature_words,
-    hardly_predicted,
-    point_text,
-    same_condition,
-    severity_unit,
-    stance_words,
-)
+from gearsig.gap._words import ComparedPair, feature_words
 from gearsig.rig import SIDES
 
 __all__ = [

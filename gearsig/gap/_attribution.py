@@ -20,9 +20,18 @@ import numpy as np
 from gearsig.gap._conditions import Condition
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._labelled import LabelledChange, LabelledEvidence, labelled_evidence, with_labelled
+from gearsig.gap._report import (
+    LIKELIER_THAN_NOT,
+    NONE,
+    UNKNOWN,
+    GapOutcome,
+    Shrinkage,
+    group_probabilities,
+    likeliest_first,
+    shares_of,
+)
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
-from gearsig.gap._types import LIKELIER_THAN_NOT, NONE, UNKNOWN, GapOutcome, Shrinkage, shares_of
 from gearsig.rig import GearPair
 
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
@@ -134,19 +143,16 @@ class GapCalibration:
         effects = {name: p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)}
         first, *remaining = sorted(effects.values(), reverse=True)
         second = remaining[0] if remaining else 0.0
-        if max(first + second, *group_probabilities(effects, known).values()) < LIKELIER_THAN_NOT:
+        if (
+            max(
+                first + second,
+                *group_probabilities(effects, known).values(),
+            )
+            < LIKELIER_THAN_NOT
+        ):
             return GapOutcome.UNDECIDED
         alone = first >= LIKELIER_THAN_NOT and first / (first + second) >= self.apart
         return GapOutcome.EFFECT if alone else GapOutcome.CANNOT_SEPARATE
-
-
-def group_probabilities(probabilities: Mapping[str, float], known: Mapping[str, GapEffect]) -> dict[str, float]:
-    """Return group → probability of its causes together; a cause that is no known effect is a group by itself."""
-    together: dict[str, float] = {}
-    for name, p in probabilities.items():
-        group = known[name].group if name in known else name
-        together[group] = together.get(group, 0.0) + p
-    return together
 
 
 def score_of(shrink: float, placebo: float) -> float:
@@ -334,7 +340,7 @@ def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, f
     weights = {name: probabilities[name] * exp(value - top) for name, value in matches.items()}
     total = sum(weights.values())
     parted = {name: together * weight / total for name, weight in weights.items()} if total > 0.0 else {}
-    return dict(sorted({**probabilities, **parted}.items(), key=lambda item: -item[1]))
+    return likeliest_first({**probabilities, **parted})
 
 
 def with_unknown_shared(probabilities: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
@@ -348,7 +354,7 @@ def with_unknown_shared(probabilities: Mapping[str, float], scores: Mapping[str,
     passed_on = probabilities[UNKNOWN] * max(positive.values(), default=0.0)
     shared = {**probabilities, UNKNOWN: probabilities[UNKNOWN] - passed_on}
     shared |= {name: passed_on * score / total if total else 0.0 for name, score in positive.items()}
-    return dict(sorted(shared.items(), key=lambda item: -item[1]))
+    return likeliest_first(shared)
 
 
 def attribute(

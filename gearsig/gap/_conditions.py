@@ -22,8 +22,8 @@ from gearsig.gap._population import load_learned
 from gearsig.gap._prediction import ObservedChange
 from gearsig.gap._recognition import Learned
 from gearsig.gap._reduction import DRIVEN, DRIVER, NOMINAL_REVOLUTIONS, GearFrame, ReducedRecording, reduce_recording
+from gearsig.gap._report import ConditionFacts
 from gearsig.gap._simulator import Added, OperatingCondition, Twin
-from gearsig.gap._types import ConditionFacts
 from gearsig.gap._words import shaft_words
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import find_problems, metres_per_second_squared

@@ -14,7 +14,7 @@ from gearsig.gap._features import MAX_SHAFT_ORDERS, SIDEBANDS, STEPS_PER_TOOTH, 
 from gearsig.gap._floors import StructuralFloor
 from gearsig.gap._places import changed_pattern, pattern_of_recording
 from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ReducedRecording
-from gearsig.gap._types import AngleCurves, AverageCurves, SpectrumCurves
+from gearsig.gap._report import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.gap._words import shaft_words
 from gearsig.prepared import circular_correlation
 from gearsig.rig import SIDES

@@ -25,9 +25,17 @@ from gearsig.gap._places import counted_against, gap_places, ranked_places
 from gearsig.gap._population import load_learned
 from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
+    NAMING,
+    GapCause,
+    GapPlace,
     GapReport,
+    Interval,
+    LabelledFacts,
+    NextRecording,
+    fitted_words,
     in_order,
     is_settled,
+    likeliest_first,
     most_probable_two,
     named_cause,
     unbounded_fits,
@@ -45,9 +53,7 @@ from gearsig.gap._trials import (
     start_healthy_trial,
     steps_of,
 )
-from gearsig.gap._types import NAMING, GapCause, GapPlace, Interval, LabelledFacts, NextRecording
 from gearsig.gap._waveform import gain_scatter
-from gearsig.gap._words import fitted_words
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
 from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool, start_early
@@ -420,8 +426,7 @@ def _waveform_messages(
     if not matches or condition.reference is None:
         return []
     missed_db = 20.0 / np.log(10.0) * gain_scatter(condition.reference, condition.simulated)
-    ranked = sorted(matches.items(), key=lambda item: -item[1])
-    values = ", ".join(f"{title} {correlation:.2f}" for title, correlation in ranked)
+    values = ", ".join(f"{title} {correlation:.2f}" for title, correlation in likeliest_first(matches).items())
     is_decided = any(trial.match is not None and trial.match.is_good for trial in tried.values())
     meant = "the highest is likeliest" if is_decided else "too little to part them: the twin is not like this machine"
     message = (
@@ -452,8 +457,8 @@ def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[st
         slower = "At a few revolutions per second or less its profile tells crack, spall and chip apart."
         return [f"{changed}, which at this speed tells no fault from another: the drive swings along. {slower}"]
     levels = ToothErrorEvidence(mean_log_likelihoods(evidences), clearest.rms_um, clearest.gear).probabilities
-    ranked = sorted(levels.items(), key=lambda item: -item[1])
-    likely = ", ".join(f"{known[name].title} {odds_text(p)}" for name, p in ranked if p >= 0.05 and name in known)
+    shown = {known[name].title: p for name, p in levels.items() if p >= 0.05 and name in known}
+    likely = ", ".join(f"{title} {odds_text(p)}" for title, p in shown.items())
     where = {"driver": ", on the driver", "driven": ", on the driven gear"}.get(clearest.gear, "")
     return [f"{changed}{where}; by its profile alone, all faults of teeth as likely before: {likely}."]
 

@@ -12,7 +12,7 @@ from gearsig.gap._features import Features
 from gearsig.gap._floors import REPEATABLE, StructuralFloor, family_members, pooled_scatter
 from gearsig.gap._prediction import Fit, ObservedChange
 from gearsig.gap._reduction import GearFrame
-from gearsig.gap._types import Evidence
+from gearsig.gap._report import Evidence
 from gearsig.gap._words import feature_words
 from gearsig.rig import SIDES
 

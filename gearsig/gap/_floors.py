@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
 from gearsig.gap._features import Feature, Features
-from gearsig.gap._types import Interval, PlaceKind
+from gearsig.gap._report import Interval, PlaceKind
 
 # --------------------
 # Which features say the same thing about which place of the spectrum, angle or signal.

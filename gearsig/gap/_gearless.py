@@ -26,9 +26,19 @@ from gearsig.diagnosis import (
 from gearsig.errors import RefusalError
 from gearsig.formatting import enumerated, named, percent, signed
 from gearsig.gap._conditions import Stage, readable
-from gearsig.gap._report import GapReport, named_cause
+from gearsig.gap._report import (
+    NONE,
+    UNKNOWN,
+    ConditionFacts,
+    GapCause,
+    GapOutcome,
+    GapPlace,
+    GapReport,
+    PlaceKind,
+    SpectrumCurves,
+    named_cause,
+)
 from gearsig.gap._simulator import GapEffect, OperatingCondition
-from gearsig.gap._types import NONE, UNKNOWN, ConditionFacts, GapCause, GapOutcome, GapPlace, PlaceKind, SpectrumCurves
 from gearsig.gap._words import band_words, hertz
 from gearsig.prepared import PreparedRecording
 from gearsig.rig import Rig

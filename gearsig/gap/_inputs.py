@@ -14,7 +14,7 @@ from gearsig.diagnosis import REFERENCE_OPTIONS, read_whole, rig_and_rate_of_ref
 from gearsig.errors import InputError, RefusalError, options_named
 from gearsig.formatting import counted
 from gearsig.gap._labelled import LabelledRecording
-from gearsig.gap._types import NONE, UNKNOWN
+from gearsig.gap._report import NONE, UNKNOWN
 from gearsig.recording import Recording
 from gearsig.rig import Bearing, ConstantSpeed, Rig, read_rig, rig_file_beside
 

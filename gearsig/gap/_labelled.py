@@ -18,9 +18,9 @@ from gearsig.gap._conditions import Condition, HealthyReference, facts_of, match
 from gearsig.gap._features import Features
 from gearsig.gap._recognition import Learned, within_reach
 from gearsig.gap._reduction import ReducedRecording, reduce_recording
+from gearsig.gap._report import shares_of
 from gearsig.gap._simulator import OperatingCondition, Twin
 from gearsig.gap._trials import features_digest
-from gearsig.gap._types import shares_of
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
 

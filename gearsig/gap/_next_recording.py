@@ -10,10 +10,18 @@ from gearsig.checks import FloatArray
 from gearsig.gap._conditions import SEED, Condition
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._floors import family_members
+from gearsig.gap._report import (
+    SLOW_RPM,
+    STEPS,
+    GapCause,
+    GapOutcome,
+    NextRecording,
+    NextStep,
+    point_text,
+    same_condition,
+)
 from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin
 from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared
-from gearsig.gap._types import GapCause, GapOutcome, NextRecording, NextStep
-from gearsig.gap._words import point_text, same_condition
 
 FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
 """Speeds and torques that are looked at, over those of the first recording, beside the recordings' own."""
@@ -152,26 +160,12 @@ def _family_distance(conditions: Sequence[Condition], difference: FloatArray) ->
 LIKELY = 0.1
 """Probability from which an effect is one of those to be told apart."""
 
-SLOW_RPM = 300.0
-"""Up to which crack, chip and spall begin to part: of 121 at 120 to 240 rpm 62 in 100 were told rightly, of 227 at 600
-to 3000 rpm 55."""
-
 WIDE = 2.0
 """Ratio of speeds from which a resonance is told from an order."""
 
 PASSED_ON = ("transfer_path", "tooth_wear", "surface_roughness", "sliding_friction", "bearing_clearance")
 AROUND_A_SHAFT = ("unbalance", "eccentricity", "misalignment")
 """Effects that are taken for each other."""
-
-HEALTHY_MACHINE = "the same machine when it was healthy"
-STEPS = {
-    "healthy": f"{HEALTHY_MACHINE}, at the same speed and load; then only what has changed since counts",
-    "encoders": "encoders on both shafts: no path distorts their transmission error, whose profile over one engagement "
-    "tells a damaged tooth from a displaced one",
-    "slow_loads": f"two loads below {SLOW_RPM:.0f} rpm, at which the gears ring less over one engagement",
-    "run_up": "a run-up of the healthy machine, which shows what the path to the sensors and what the gears make of it",
-    "label": "two labelled recordings of each likely cause on this rig (--learn): nothing else tells so much",
-}
 
 
 def next_steps(

@@ -41,8 +41,8 @@ from gearsig.gap._floors import (
     pooled_scatter,
 )
 from gearsig.gap._reduction import DRIVER, N_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording
+from gearsig.gap._report import UNKNOWN, GapPlace, PlaceKind, likeliest_first
 from gearsig.gap._simulator import GapEffect
-from gearsig.gap._types import UNKNOWN, GapPlace, PlaceKind
 from gearsig.gap._words import ComparedPair, LocatedChange, band_words, by_decibels, feature_words, hertz, shaft_words
 from gearsig.prepared import MAINS_TOLERANCE
 from gearsig.recording import MAINS_HZ
@@ -136,7 +136,7 @@ def counted_against(
             if not _can_make(effects[name].shows_in, place):
                 lowered[name] *= 2.0 * (1.0 - place.share)
     lowered[UNKNOWN] += 1.0 - sum(lowered.values())
-    return dict(sorted(lowered.items(), key=lambda item: -item[1]))
+    return likeliest_first(lowered)
 
 
 def _is_an_order(place: GapPlace, frame: GearFrame) -> bool:

@@ -31,7 +31,7 @@ from gearsig.gap._recognition import (
     within_reach,
     write_learned,
 )
-from gearsig.gap._types import NONE, UNKNOWN
+from gearsig.gap._report import NONE, UNKNOWN
 from gearsig.recording import sha256_of
 
 # --------------------

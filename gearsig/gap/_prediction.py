@@ -13,8 +13,8 @@ from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.gap._features import Feature
 from gearsig.gap._floors import family_members, t_quantile
+from gearsig.gap._report import MIN_PREDICTED, Interval, Shrinkage
 from gearsig.gap._simulator import Added
-from gearsig.gap._types import MIN_PREDICTED, Interval, Shrinkage
 from gearsig.rig import SIDES
 
 STEPS = 41

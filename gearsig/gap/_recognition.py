@@ -18,8 +18,8 @@ from gearsig.errors import InputError
 from gearsig.gap._change import beyond_the_mesh, contrast_rows, counted_from_the_mesh
 from gearsig.gap._features import Features
 from gearsig.gap._floors import REPEATABLE, StructuralFloor
+from gearsig.gap._report import UNKNOWN
 from gearsig.gap._simulator import GapEffect
-from gearsig.gap._types import UNKNOWN
 from gearsig.rig import SIDES
 
 # --------------------

@@ -24,6 +24,7 @@ from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, InputError
 from gearsig.gap._evidence import TOOTH_FAULTS
+from gearsig.gap._report import shares_of
 from gearsig.motion import TransmissionError, transmission_error
 from gearsig.prepared import circular_correlation
 from gearsig.recording import Recording
@@ -314,10 +315,8 @@ class ToothErrorEvidence:
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """Return fault → probability, were all as likely beforehand."""
-        top = max(self.log_likelihoods.values())
-        weights = {name: exp(value - top) for name, value in self.log_likelihoods.items()}
-        return {name: weight / sum(weights.values()) for name, weight in weights.items()}
+        """Return fault → probability, were all as likely beforehand, likeliest first."""
+        return shares_of(self.log_likelihoods)
 
     @property
     def is_unlike_any(self) -> bool:

@@ -36,8 +36,8 @@ from gearsig.gap._prediction import (
     transplanted,
 )
 from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording
+from gearsig.gap._report import ConditionFacts, GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
 from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, HasFurtherSettings, OperatingCondition, Twin
-from gearsig.gap._types import ConditionFacts, GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
 from gearsig.gap._waveform import (
     N_HARMONICS,
     OFFSETS,

@@ -31,8 +31,8 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.gap._change import lines_of_shaft, turned_difference
 from gearsig.gap._reduction import ComplexArray, ReducedRecording
+from gearsig.gap._report import Interval
 from gearsig.gap._simulator import Added
-from gearsig.gap._types import Interval
 from gearsig.rig import SIDES
 
 N_HARMONICS = 8

@@ -1,65 +1,10 @@
-"""What features and units are called in sentences."""
+"""What features, shafts and bands are called in sentences."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from math import isclose
-
 from gearsig.gap._features import ECHO_LAGS_PITCHES, N_QUARTERS
-from gearsig.gap._reduction import GearFrame, ReducedRecording
-from gearsig.gap._simulator import OperatingCondition
-from gearsig.gap._types import Evidence, GapCause, PlaceKind, Shrinkage
+from gearsig.gap._reduction import GearFrame
 from gearsig.rig import SIDES
-
-# --------------------
-# Where exactly within one place: the comparison that is searched, and what is found.
-# --------------------
-
-
-@dataclass(frozen=True)
-class ComparedPair:
-    """A recording and what it is compared with.
-
-    Parameters
-    ----------
-    now, baseline : ReducedRecording
-    is_reference : bool
-        Whether `baseline` is a healthy recording of the same machine; otherwise a simulation.
-    change_db : mapping
-        Feature → change from what healthy machines change by.
-    size : mapping
-        Feature → the same over the floors, with its sign.
-    """
-
-    now: ReducedRecording
-    baseline: ReducedRecording
-    is_reference: bool
-    change_db: Mapping[str, float]
-    size: Mapping[str, float]
-
-    def strongest(self, *beginnings: str) -> str:
-        """Return the feature with the largest change over the floors among those whose names begin so."""
-        return max((name for name in self.size if name.startswith(beginnings)), key=lambda name: abs(self.size[name]))
-
-
-@dataclass(frozen=True)
-class LocatedChange:
-    """What `GapPlace` says of where; its sizes are added later.
-
-    `kind` is given where the place turns out to be of another kind than the features that led to it; `follows` where
-    it only follows from what other places say.
-    """
-
-    title: str
-    change_db: float
-    orders: tuple[float, ...] = ()
-    band_hz: tuple[float, float] | None = None
-    angle_deg: float | None = None
-    tooth: int | None = None
-    channel: str = ""
-    kind: PlaceKind | None = None
-    follows: bool = False
 
 
 def shaft_words(frame: GearFrame, side: int) -> str:
@@ -87,8 +32,6 @@ def band_words(band_hz: tuple[float, float]) -> str:
         low = low.rpartition(" ")[0]
     return f"{low} to {high}"
 
-
-_UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "m/s^2": "m/s²", "1": ""}
 
 _SIDEBANDS = {
     "1": "first sidebands",
@@ -177,17 +120,6 @@ _OTHER = {
 }
 
 
-def severity_unit(unit: str) -> str:
-    """Write the unit of a severity for people.
-
-    Examples
-    --------
-    >>> severity_unit("um"), severity_unit("mm")
-    ('µm', 'mm')
-    """
-    return _UNITS.get(unit, unit)
-
-
 def feature_words(name: str, frame: GearFrame) -> str:
     """Return a feature's name in words, e.g. "input shaft: sidebands 6 to 12"."""
     if name in _OTHER:
@@ -205,46 +137,3 @@ def feature_words(name: str, frame: GearFrame) -> str:
     if remainder.endswith("_shaft"):
         return f"{where}: orders of {shaft_words(frame, SIDES.index(remainder.removesuffix('_shaft')))}"
     return f"{where}: {_CYCLIC[remainder]}"
-
-
-def hardly_predicted(shrinkage: Shrinkage) -> str:
-    """Return what is said of an effect that the simulator does not make large enough to judge."""
-    return f"hardly shows on the simulator at these conditions (at most {shrinkage.predicted or 0.0:.2g} floors)"
-
-
-def stance_words(evidence: Evidence) -> str:
-    """Return "speaks for it", "further than predicted" or "speaks against it"."""
-    if evidence.speaks_for:
-        return "speaks for it"
-    return "further than predicted" if evidence.is_further else "speaks against it"
-
-
-def fitted_words(cause: GapCause, severity: float, recording: str) -> str:
-    """Return what a twin's file says of the effect in it: severity, its fit, what it was fitted to, probability."""
-    within = f"interval of the fit {cause.severity.words('{:.3g}'.format)}; " if cause.severity else ""
-    size = f"{severity:.3g} {cause.unit}".rstrip()
-    return f"{cause.title}: {size}, {within}fitted to {recording}, probability {cause.probability:.2f}"
-
-
-SAME_SPEED, SAME_TORQUE = 0.03, 0.1
-"""Relative: recordings nearer than this to each other are of one operating condition."""
-
-
-def point_text(point: OperatingCondition) -> str:
-    """Write an operating point for people."""
-    return f"{float(f'{point.speed_rpm:.4g}'):.6g} rpm and {point.torque_nm:.3g} N·m"
-
-
-def same_condition(first: OperatingCondition, second: OperatingCondition) -> bool:
-    """Whether two points are one operating condition."""
-    return same_speed(first, second) and same_load(first, second)
-
-
-def same_speed(first: OperatingCondition, second: OperatingCondition) -> bool:
-    """Whether two points are at one speed."""
-    return isclose(first.speed_rpm, second.speed_rpm, rel_tol=SAME_SPEED)
-
-
-def same_load(first: OperatingCondition, second: OperatingCondition) -> bool:
-    """Whether two points are at one torque."""
-    return isclose(first.torque_nm, second.torque_nm, rel_tol=SAME_TORQUE)

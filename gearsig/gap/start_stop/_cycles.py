@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gearsig import motion as motions
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.gap._types import PlaceKind
+from gearsig.gap._report import PlaceKind
 
 Mask = NDArray[np.bool_]
 NAN = float("nan")

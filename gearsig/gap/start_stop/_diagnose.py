@@ -23,14 +23,24 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import readable
-from gearsig.gap import _types as types
+from gearsig.gap import _report as types
 from gearsig.gap._attribution import Attribution, is_calibrated
 from gearsig.gap._evidence import evidence_of_feature
 from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
-from gearsig.gap._report import GapReport, in_order, most_probable_two, named_cause
+from gearsig.gap._report import (
+    NAMING,
+    GapCause,
+    GapOutcome,
+    GapPlace,
+    GapReport,
+    Interval,
+    fitted_words,
+    in_order,
+    most_probable_two,
+    named_cause,
+    severity_unit,
+)
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
-from gearsig.gap._types import NAMING, GapCause, GapOutcome, GapPlace, Interval
-from gearsig.gap._words import fitted_words, severity_unit
 from gearsig.gap.start_stop._attribution import (
     CRACK,
     FLOORS_FILE,
