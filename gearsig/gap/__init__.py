@@ -57,6 +57,7 @@ from gearsig.gap._evidence import (
     determined_options,
     evidence_of,
     evidence_of_feature,
+    feature_words,
     over_floors,
     shaft_signs,
 )
@@ -76,7 +77,15 @@ from gearsig.gap._gearless import UnexpectedFinding, place_of_unexpected, unexpe
 from gearsig.gap._inputs import GapRequest, read_gap_inputs, read_labelled, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes, labelled_support, with_labelled
 from gearsig.gap._next_recording import next_recordings, next_steps
-from gearsig.gap._places import counted_against, gap_places, locate_all_round, locate_mesh, locate_tail, ranked_places
+from gearsig.gap._places import (
+    ComparedPair,
+    counted_against,
+    gap_places,
+    locate_all_round,
+    locate_mesh,
+    locate_tail,
+    ranked_places,
+)
 from gearsig.gap._population import (
     BY_HAND,
     INDEPENDENT,
@@ -155,9 +164,7 @@ from gearsig.gap._report import (
     group_probabilities,
     hardly_predicted,
     is_settled,
-    point_text,
     rivals,
-    same_condition,
     severity_unit,
     shares_of,
     stance_words,
@@ -174,6 +181,8 @@ from gearsig.gap._simulator import (
     HasFurtherPlaces,
     OperatingCondition,
     Twin,
+    point_text,
+    same_condition,
 )
 from gearsig.gap._tooth_error import (
     TOOTH_ERRORS_FILE,
@@ -199,7 +208,6 @@ from gearsig.gap._trials import (
 )
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
 from gearsig.gap._waveform import SimulatedWaveform, WaveformMatch, compare_waveform, waveform_match
-from gearsig.gap._words import ComparedPair, feature_words
 from gearsig.rig import SIDES
 
 __all__ = [

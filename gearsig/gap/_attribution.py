@@ -143,13 +143,7 @@ class GapCalibration:
         effects = {name: p for name, p in probabilities.items() if name not in (NONE, UNKNOWN)}
         first, *remaining = sorted(effects.values(), reverse=True)
         second = remaining[0] if remaining else 0.0
-        if (
-            max(
-                first + second,
-                *group_probabilities(effects, known).values(),
-            )
-            < LIKELIER_THAN_NOT
-        ):
+        if max(first + second, *group_probabilities(effects, known).values()) < LIKELIER_THAN_NOT:
             return GapOutcome.UNDECIDED
         alone = first >= LIKELIER_THAN_NOT and first / (first + second) >= self.apart
         return GapOutcome.EFFECT if alone else GapOutcome.CANNOT_SEPARATE

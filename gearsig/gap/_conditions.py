@@ -17,14 +17,21 @@ from gearsig.formatting import percent
 from gearsig.gap._change import change_features, difference_features, lines_of_shaft, turned_difference
 from gearsig.gap._evidence import over_floors
 from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_energy
-from gearsig.gap._floors import REPEATABLE, GapSize, StructuralFloor, gap_size, pooled_scatter
+from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, GapSize, StructuralFloor, gap_size, pooled_scatter
 from gearsig.gap._population import load_learned
 from gearsig.gap._prediction import ObservedChange
 from gearsig.gap._recognition import Learned
-from gearsig.gap._reduction import DRIVEN, DRIVER, NOMINAL_REVOLUTIONS, GearFrame, ReducedRecording, reduce_recording
+from gearsig.gap._reduction import (
+    DRIVEN,
+    DRIVER,
+    NOMINAL_REVOLUTIONS,
+    GearFrame,
+    ReducedRecording,
+    reduce_recording,
+    shaft_words,
+)
 from gearsig.gap._report import ConditionFacts
 from gearsig.gap._simulator import Added, OperatingCondition, Twin
-from gearsig.gap._words import shaft_words
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import find_problems, metres_per_second_squared
 from gearsig.rig import Rig
@@ -295,7 +302,7 @@ def observed(condition: Condition, index: int, n: int, change: Features | None =
     """Return a condition's distances and floors of the first `n` features; `change` instead of its own."""
     used = change or condition.change
     structural = condition.floor
-    floors = (structural.of(used.names) ** 2 + (REPEATABLE * pooled_scatter(used)) ** 2) ** 0.5
+    floors = (structural.of(used.names) ** 2 + (FLOOR_IN_DEVIATIONS * pooled_scatter(used)) ** 2) ** 0.5
     return ObservedChange(index, structural.from_centre(used.names, used.values)[:n], floors[:n])
 
 

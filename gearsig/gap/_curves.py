@@ -13,9 +13,8 @@ from gearsig.gap._change import turned_difference
 from gearsig.gap._features import MAX_SHAFT_ORDERS, SIDEBANDS, STEPS_PER_TOOTH, floor_ratio
 from gearsig.gap._floors import StructuralFloor
 from gearsig.gap._places import changed_pattern, pattern_of_recording
-from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ReducedRecording
+from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ReducedRecording, shaft_words
 from gearsig.gap._report import AngleCurves, AverageCurves, SpectrumCurves
-from gearsig.gap._words import shaft_words
 from gearsig.prepared import circular_correlation
 from gearsig.rig import SIDES
 from gearsig.severity import load_calibration
@@ -206,15 +205,11 @@ def gap_by_order(curves: SpectrumCurves, simulated: FloatArray) -> FloatArray:
     a, b = (20.0 * np.log10(np.maximum(values, floor)) for values in (curves.measured, simulated))
     up, down = a - b, a - b
     if curves.orders[1] - curves.orders[0] < CLOSER_THAN_A_SHAFTS:
-        up, down = a - _largest_of_three(b), _largest_of_three(a) - b
+        from scipy.ndimage import maximum_filter1d
+
+        up, down = a - maximum_filter1d(b, 3), maximum_filter1d(a, 3) - b
     gap = np.maximum(up, 0.0) + np.minimum(down, 0.0)
     return np.where((curves.measured > floor) | (simulated > floor), gap, np.nan)
-
-
-def _largest_of_three(values: FloatArray) -> FloatArray:
-    padded = np.pad(values, 1, mode="edge")
-    largest: FloatArray = np.maximum(np.maximum(padded[:-2], padded[2:]), values)
-    return largest
 
 
 def angle_curves(
@@ -223,7 +218,6 @@ def angle_curves(
     after: ReducedRecording | None = None,
     *,
     healthy: ReducedRecording | None = None,
-    simulated_healthy: ReducedRecording | None = None,
 ) -> tuple[AngleCurves, ...]:
     """Return, for both shafts, the energy within one pitch over that of the measured median tooth.
 
@@ -234,19 +228,17 @@ def angle_curves(
     ----------
     now, before, after : ReducedRecording
         Measured, simulated without and with the likeliest effect.
-    healthy, simulated_healthy : ReducedRecording or None
-        Where both are given, the curves are those of the differences from them; a simulation that *is* the healthy one
-        has none, and its curve is 0.
+    healthy : ReducedRecording or None
+        Where it is given, the curves are those of the differences: of the recording from it, of the simulations from
+        `before`, whose own curve is 0.
     """
-    compared = healthy is not None and simulated_healthy is not None
+    simulated_healthy = None if healthy is None else before
     curves_of_shafts = []
     for side in (DRIVER, DRIVEN):
-        measured = _energy(now, healthy if compared else None, side)
+        measured = _energy(now, healthy, side)
         median = max(float(np.median(measured)), 1e-300)
         simulated = [
-            _turned(
-                _energy(run, simulated_healthy if compared else None, side), measured, run.marks[side], now.marks[side]
-            )
+            _turned(_energy(run, simulated_healthy, side), measured, run.marks[side], now.marks[side])
             for run in (before, after)
             if run is not None
         ]

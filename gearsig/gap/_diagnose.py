@@ -261,7 +261,6 @@ def diagnose_gap(
             clearest.simulated,
             after,
             healthy=reference,
-            simulated_healthy=clearest.simulated if reference is not None else None,
         ),
         averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recording.recording)),
         notes=(
@@ -487,8 +486,8 @@ def _places(condition: Condition) -> tuple[GapPlace, ...]:
             condition.now,
             condition.baseline,
             condition.floor,
+            condition.change,
             is_reference=condition.reference is not None,
-            change=condition.change,
         )
     except RefusalError:
         return ()

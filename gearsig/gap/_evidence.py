@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gearsig.checks import FloatArray
 from gearsig.gap._change import beyond_the_mesh
-from gearsig.gap._features import Features
-from gearsig.gap._floors import REPEATABLE, StructuralFloor, family_members, pooled_scatter
+from gearsig.gap._features import ECHO_LAGS_PITCHES, N_QUARTERS, Features
+from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, StructuralFloor, family_members, pooled_scatter
 from gearsig.gap._prediction import Fit, ObservedChange
-from gearsig.gap._reduction import GearFrame
+from gearsig.gap._reduction import GearFrame, shaft_words
 from gearsig.gap._report import Evidence
-from gearsig.gap._words import feature_words
 from gearsig.rig import SIDES
 
 MAX_SHOWN, MAX_OF_A_FAMILY = 10, 3
@@ -21,7 +21,7 @@ CLEAR = 1.0
 """Floors from which a change, predicted or observed, says something."""
 
 SMALLEST = 0.3
-"""Floors from which the sign of a prediction says something."""
+"""Floors from which the sign of a prediction says something, and a predicted start–stop change is worth a line."""
 
 OWN_FEATURE_WEIGHT = 2.0
 
@@ -213,14 +213,138 @@ def over_floors(change: Features, floor: StructuralFloor, *, is_reference: bool)
     is_reference : bool
         Whether it is a reference: a level relative to the mesh then counts as far as it changed by itself.
     """
+    distances, *floors = against_floors(change, floor, is_reference=is_reference)
+    return dict(zip(change.names, (distances / np.maximum(*floors)).tolist(), strict=True))
+
+
+def against_floors(
+    change: Features, floor: StructuralFloor, *, is_reference: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return each feature's distance from healthy machines', its structural floor and its repeatability floor, in dB.
+
+    Parameters
+    ----------
+    change, floor, is_reference
+        As of `over_floors`.
+    """
     distances = floor.from_centre(change.names, change.values)
     if is_reference:
         distances = beyond_the_mesh(change.names, distances)
-    floors = np.maximum(floor.of(change.names), REPEATABLE * pooled_scatter(change))
-    return dict(zip(change.names, (distances / floors).tolist(), strict=True))
+    return distances, floor.of(change.names), FLOOR_IN_DEVIATIONS * pooled_scatter(change)
 
 
 def _rises(signs: Sequence[str], side: str, change: Mapping[str, float]) -> list[float]:
     """Return how far each sign that the comparison has rose on one shaft, `MAX_RISE` at most."""
     names = [sign.format(side) for sign in signs]
     return [float(np.clip(change[name], 0.0, MAX_RISE)) for name in names if name in change]
+
+
+# --------------------
+# What features are called in sentences.
+# --------------------
+
+
+_SIDEBANDS = {
+    "1": "first sidebands",
+    "2": "second sidebands",
+    "3to5": "sidebands 3 to 5",
+    "6to12": "sidebands 6 to 12",
+    "own": "first sidebands over their own mesh harmonic",
+    "strongest": "strongest sideband over the others",
+}
+_SHAFT = {
+    "1": "order 1",
+    "2": "order 2",
+    "3": "order 3",
+    "1.to_mesh": "order 1 over the mesh",
+    "2.to_mesh": "order 2 over the mesh",
+    "3.to_mesh": "order 3 over the mesh",
+    "strongest": "strongest of the orders above 3 over the others",
+    "strongest.to_mesh": "strongest of the orders above 3 over the mesh",
+    "low": "orders above 3",
+}
+_TOOTH = {
+    "level": "level besides the mesh",
+    "elsewhere": "level at the median tooth",
+    "peak": "level of the burst at the strongest tooth",
+    "prominence": "burst over the median tooth",
+    "second": "burst over the next strongest tooth",
+    "kurtosis": "kurtosis",
+    "width": "number of teeth within 3 dB of the strongest",
+    "below_mesh": "part below the mesh order",
+    "centroid": "middle of the spectrum",
+    "agreement": "agreement with the reference",
+}
+_OF_A_SHAFT = {
+    "sideband": ("", _SIDEBANDS),
+    "shaft": ("", _SHAFT),
+    "tooth": ("average, ", _TOOTH),
+    "change": ("change of the average, ", _TOOTH),
+    "surprise": ("change of the average over its noise, ", _TOOTH),
+}
+_CYCLIC = {
+    "outer": "outer races",
+    "inner": "inner races",
+    "ball": "rolling elements",
+    "cage": "cages",
+    "mesh": "mesh order",
+    "strange": "an order that belongs to nothing known",
+    "depth": "depth of modulation",
+    "half_mesh": "half the mesh order",
+}
+_ALIKE_PARTS = {"mesh": "harmonics", "repeated": "what either gear repeats", "noise": "what nothing repeats"}
+_ALIKE = {
+    f"{key}{suffix}": f"{words}{', ' if said else ''}{said}"
+    for key, words in _ALIKE_PARTS.items()
+    for suffix, said in (("", ""), (".spread", "spread"), (".rise", "rise from one to the next"))
+} | {
+    f"{a}_{b}.{suffix}": f"{_ALIKE_PARTS[a]} and {_ALIKE_PARTS[b]}, {said}"
+    for a, b in (("mesh", "repeated"), ("repeated", "noise"), ("mesh", "noise"))
+    for suffix, said in (("less", "the former over the latter"), ("apart", "apart"), ("together", "changed alike"))
+}
+_BURST_WAYS = {"plain": "as it is", "even": "magnitudes made even"}
+_BURST = (
+    {f"course.{i}": f"share of quarter pitch {i}" for i in range(N_QUARTERS)}
+    | {f"echo.{i}": f"autocorrelation at lag {lag:.2f} pitches" for i, lag in enumerate(ECHO_LAGS_PITCHES)}
+    | {"elsewhere": "share further away"}
+)
+_OTHER = {
+    "mesh.total": "mesh harmonics together",
+    "mesh.half": "half mesh orders",
+    "apart.mesh": "mesh harmonics, difference between sensors",
+    "apart.floor": "floor, difference between sensors",
+    **{f"alike.{key}": f"about the mesh harmonics: {words}" for key, words in _ALIKE.items()},
+    **{
+        f"burst.{way}.{key}": f"burst of a tooth, {said}: {words}"
+        for way, said in _BURST_WAYS.items()
+        for key, words in _BURST.items()
+    },
+    "floor.total": "floor, all bands",
+    "floor.to_signal": "floor over the whole signal",
+    "raw.level": "level of the whole signal",
+    "raw.kurtosis": "kurtosis of the whole signal",
+    "raw.near_the_extreme": "samples close to the extreme",
+    "speed.drift": "drift of the speed",
+    "speed.swing": "swing of the speed",
+    "speed.swing_line": "strongest line of the speed's swing",
+    "hum": "mains lines",
+}
+
+
+def feature_words(name: str, frame: GearFrame) -> str:
+    """Return a feature's name in words, e.g. "input shaft: sidebands 6 to 12"."""
+    if name in _OTHER:
+        return _OTHER[name]
+    first, _, remainder = name.partition(".")
+    side, _, detail = remainder.partition(".")
+    if first == "mesh":
+        return f"mesh harmonic {detail} over all"
+    if first in _OF_A_SHAFT and side in SIDES:
+        kind, table = _OF_A_SHAFT[first]
+        return f"{shaft_words(frame, SIDES.index(side))}: {kind}{table[detail]}"
+    if first == "floor":
+        return f"floor, band {detail}" if side == "band" else f"kurtosis of the floor, band {detail}"
+    where = "envelope" if first == "envelope" else "lines"
+    if remainder.endswith("_shaft"):
+        return f"{where}: orders of {shaft_words(frame, SIDES.index(remainder.removesuffix('_shaft')))}"
+    return f"{where}: {_CYCLIC[remainder]}"

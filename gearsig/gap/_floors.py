@@ -104,35 +104,27 @@ def family_of(name: str) -> Family:
     return _KIND[key], feature.side
 
 
-def family_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
+@cache
+def family_members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
     """Return for each family the positions of its features."""
-    return _members(tuple(names))
-
-
-def sized_members(names: Sequence[str]) -> dict[Family, np.ndarray]:
-    """Return for each family the positions of those of its features that the size of a gap is made of."""
-    return _sized(tuple(names))
-
-
-@cache
-def _sized(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
-    kept = {
-        family: np.array([i for i in rows if not names[i].startswith(UNPREDICTED)], dtype=np.intp)
-        for family, rows in _members(names).items()
-    }
-    return {family: rows for family, rows in kept.items() if len(rows)}
-
-
-@cache
-def _members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
     members_of: dict[Family, list[int]] = {}
     for i, name in enumerate(names):
         members_of.setdefault(family_of(name), []).append(i)
     return {family: np.array(members, dtype=np.intp) for family, members in members_of.items()}
 
 
-REPEATABLE = 1.96
-"""Standard errors: 19 of 20 repeated records stay below."""
+@cache
+def sized_members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
+    """Return for each family the positions of those of its features that the size of a gap is made of."""
+    kept = {
+        family: np.array([i for i in rows if not names[i].startswith(UNPREDICTED)], dtype=np.intp)
+        for family, rows in family_members(names).items()
+    }
+    return {family: rows for family, rows in kept.items() if len(rows)}
+
+
+FLOOR_IN_DEVIATIONS = 1.96
+"""A floor holds 19 of 20: so many standard deviations."""
 
 WITHIN, ACROSS = 8, 4
 """Orders of the means within a family of features, and of the sum over families."""
@@ -267,7 +259,7 @@ def gap_size(change: Features, structural: StructuralFloor) -> GapSize:
         With `left_out`.
     structural : StructuralFloor
     """
-    scatter = REPEATABLE * pooled_scatter(change)
+    scatter = FLOOR_IN_DEVIATIONS * pooled_scatter(change)
     floors = structural.of(change.names)
     return GapSize(
         _size(change, structural, floors, structural.whole_of(change.names)),
@@ -310,7 +302,7 @@ def soft_size(names: Sequence[str], normalised: FloatArray) -> float:
     normalised : array, (n,)
         Changes over their floors.
     """
-    sizes = np.array([family_size(normalised[members]) for members in sized_members(names).values()])
+    sizes = np.array([family_size(normalised[members]) for members in sized_members(tuple(names)).values()])
     largest = float(sizes.max(initial=0.0))
     return largest * float(np.sum((sizes / largest) ** ACROSS) ** (1 / ACROSS)) if largest > 0.0 else 0.0
 
@@ -370,7 +362,7 @@ def independent_whole(names: tuple[str, ...]) -> float:
     names : tuple of str
         Of the features.
     """
-    draws = np.random.default_rng(0).standard_normal((_N_DRAWS, len(names))) / REPEATABLE
+    draws = np.random.default_rng(0).standard_normal((_N_DRAWS, len(names))) / FLOOR_IN_DEVIATIONS
     total = np.zeros(_N_DRAWS)
     for members in sized_members(names).values():
         total += np.mean(np.abs(draws[:, members]) ** WITHIN, axis=1) ** (ACROSS / WITHIN)

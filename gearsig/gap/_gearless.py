@@ -26,6 +26,7 @@ from gearsig.diagnosis import (
 from gearsig.errors import RefusalError
 from gearsig.formatting import enumerated, named, percent, signed
 from gearsig.gap._conditions import Stage, readable
+from gearsig.gap._places import band_words, hertz
 from gearsig.gap._report import (
     NONE,
     UNKNOWN,
@@ -39,7 +40,6 @@ from gearsig.gap._report import (
     named_cause,
 )
 from gearsig.gap._simulator import GapEffect, OperatingCondition
-from gearsig.gap._words import band_words, hertz
 from gearsig.prepared import PreparedRecording
 from gearsig.rig import Rig
 from gearsig.severity import LARGEST_SPEED_DIFFERENCE
@@ -383,9 +383,6 @@ def place_of_unexpected(part: UnexpectedFinding, rig: Rig, *, name: str = "") ->
         PlaceKind.LINE if part.finding.code == LINE else PlaceKind.ENVELOPE,
         f"{_part_text(part, rig)} (order {order:.4g}, {hertz(frequency)}), {over}{since}{in_recording}",
         part.over_floor_db if part.rise_db is None else part.rise_db,
-        repeatability=NAN,
-        structural=NAN,
-        share=NAN,
         shaft=where.shaft,
         orders=(order / (driver or 1.0),),
         band_hz=where.band_hz,

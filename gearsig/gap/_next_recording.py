@@ -10,17 +10,8 @@ from gearsig.checks import FloatArray
 from gearsig.gap._conditions import SEED, Condition
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._floors import family_members
-from gearsig.gap._report import (
-    SLOW_RPM,
-    STEPS,
-    GapCause,
-    GapOutcome,
-    NextRecording,
-    NextStep,
-    point_text,
-    same_condition,
-)
-from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin
+from gearsig.gap._report import SLOW_RPM, STEPS, GapCause, GapOutcome, NextRecording, NextStep
+from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin, point_text, same_condition
 from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared
 
 FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))

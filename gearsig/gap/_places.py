@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap._change import (
-    beyond_the_mesh,
-    change_features,
-    difference_features,
     difference_residuals,
     lines_of_shaft,
     turned_difference,
 )
+from gearsig.gap._evidence import against_floors, feature_words
 from gearsig.gap._features import (
     LOWEST_STRANGE,
     MAX_SHAFT_ORDERS,
@@ -32,18 +30,15 @@ from gearsig.gap._features import (
     tooth_energy,
 )
 from gearsig.gap._floors import (
-    REPEATABLE,
     Family,
     StructuralFloor,
     family_members,
     family_size,
     kinds_of,
-    pooled_scatter,
 )
-from gearsig.gap._reduction import DRIVER, N_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording
+from gearsig.gap._reduction import DRIVER, N_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording, shaft_words
 from gearsig.gap._report import UNKNOWN, GapPlace, PlaceKind, likeliest_first
 from gearsig.gap._simulator import GapEffect
-from gearsig.gap._words import ComparedPair, LocatedChange, band_words, by_decibels, feature_words, hertz, shaft_words
 from gearsig.prepared import MAINS_TOLERANCE
 from gearsig.recording import MAINS_HZ
 from gearsig.rig import SIDES
@@ -156,6 +151,55 @@ def _can_make(shows_in: Sequence[str], place: GapPlace) -> bool:
 
 
 # --------------------
+# Where exactly within one family of features: the comparison that is searched, and what is found. Sizes come later.
+# --------------------
+
+
+@dataclass(frozen=True)
+class ComparedPair:
+    """A recording and what it is compared with.
+
+    Parameters
+    ----------
+    now, baseline : ReducedRecording
+    is_reference : bool
+        Whether `baseline` is a healthy recording of the same machine; otherwise a simulation.
+    change_db : mapping
+        Feature → change from what healthy machines change by.
+    size : mapping
+        Feature → the same over the floors, with its sign.
+    """
+
+    now: ReducedRecording
+    baseline: ReducedRecording
+    is_reference: bool
+    change_db: Mapping[str, float]
+    size: Mapping[str, float]
+
+    def strongest(self, *beginnings: str) -> str:
+        """Return the feature with the largest change over the floors among those whose names begin so."""
+        return max((name for name in self.size if name.startswith(beginnings)), key=lambda name: abs(self.size[name]))
+
+
+def by_decibels(change_db: float) -> str:
+    """Return "up by 14 dB" or "down by 3 dB"."""
+    return f"{'up' if change_db >= 0 else 'down'} by {abs(change_db):.2g} dB"
+
+
+def hertz(frequency_hz: float) -> str:
+    """Return "850 Hz" or "2.1 kHz"."""
+    return f"{frequency_hz / 1e3:.2g} kHz" if frequency_hz >= 999.5 else f"{frequency_hz:.3g} Hz"
+
+
+def band_words(band_hz: tuple[float, float]) -> str:
+    """Return "300 Hz to 2.1 kHz"."""
+    low, high = (hertz(edge) for edge in band_hz)
+    if low[-3:] == high[-3:]:
+        low = low.rpartition(" ")[0]
+    return f"{low} to {high}"
+
+
+# --------------------
 # Which bearing, race or strange order: lines that no shaft repeats, in envelopes and in the residual.
 # --------------------
 
@@ -202,7 +246,7 @@ class _StrongestRise:
     row: int
 
 
-def locate_envelope(comparison: ComparedPair) -> LocatedChange:
+def locate_envelope(comparison: ComparedPair) -> GapPlace:
     """Return whose order modulates what no shaft repeats."""
     now, names = comparison.now, tuple(comparison.now.channels)
     ratios = [
@@ -216,10 +260,10 @@ def locate_envelope(comparison: ComparedPair) -> LocatedChange:
     change = sign * family.rise_db
     title = f"envelope lines {family.words}, {by_decibels(change)} in {band_words(bands[family.row])}"
     channel = names[family.row // len(now.bands_hz)]
-    return LocatedChange(title, change, family.orders, bands[family.row], channel=channel)
+    return GapPlace(PlaceKind.ENVELOPE, title, change, orders=family.orders, band_hz=bands[family.row], channel=channel)
 
 
-def locate_line(comparison: ComparedPair) -> LocatedChange:
+def locate_line(comparison: ComparedPair) -> GapPlace:
     """Return which line of the residual changed most: the supply's, a bearing's, or a strange one."""
     strongest = comparison.strongest("line.outer", "line.inner", "line.ball", "line.cage", "line.strange", "hum")
     levels, sign = _with_rising_change(_residual_levels(comparison), comparison.size[strongest])
@@ -229,7 +273,7 @@ def locate_line(comparison: ComparedPair) -> LocatedChange:
     return _line(comparison, _family_or_line(_best_race(comparison, levels), line), sign)
 
 
-def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_db: float) -> LocatedChange | None:
+def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_db: float) -> GapPlace | None:
     """Return the line that makes up most of what a band of the residual has more; None where it is noise."""
     if change_db <= 0:
         return None
@@ -250,13 +294,13 @@ def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_d
     levels = _residual_levels(comparison)
     rise = float((levels.now - levels.baseline)[row, min(peak, len(levels.taken) - 1)])
     words = _order_words(comparison, order)
-    return replace(_line(comparison, _StrongestRise(words, rise, (order,), row), 1.0), kind=PlaceKind.LINE)
+    return _line(comparison, _StrongestRise(words, rise, (order,), row), 1.0)
 
 
-def _line(comparison: ComparedPair, line: _StrongestRise, sign: float) -> LocatedChange:
+def _line(comparison: ComparedPair, line: _StrongestRise, sign: float) -> GapPlace:
     change = sign * line.rise_db
     title = f"line {line.words} ({hertz(line.orders[0] * comparison.now.speed_hz)}), {by_decibels(change)}"
-    return LocatedChange(title, change, line.orders, channel=list(comparison.now.channels)[line.row])
+    return GapPlace(PlaceKind.LINE, title, change, orders=line.orders, channel=list(comparison.now.channels)[line.row])
 
 
 def _residual_levels(comparison: ComparedPair) -> LineLevels:
@@ -406,12 +450,14 @@ def _is_mains_order(comparison: ComparedPair, order: float) -> bool:
     return bool((np.abs(order * speed_hz - lines) < width).any())
 
 
-def _hum(comparison: ComparedPair) -> LocatedChange:
+def _hum(comparison: ComparedPair) -> GapPlace:
     now = comparison.now
     supply = MAINS_HZ[int(np.argmax(now.hum))]
     change = comparison.change_db["hum"]
     orders = tuple(k * supply / now.speed_hz for k in range(1, N_HARMONICS + 1))
-    return LocatedChange(f"mains hum at {supply:g} Hz and multiples, {by_decibels(change)}", change, orders)
+    return GapPlace(
+        PlaceKind.LINE, f"mains hum at {supply:g} Hz and multiples, {by_decibels(change)}", change, orders=orders
+    )
 
 
 # --------------------
@@ -429,12 +475,14 @@ EXPLAINED = 0.5
 """Of the largest change of power, what a shaft's own lines must hold of it."""
 
 
-def locate_mesh(comparison: ComparedPair) -> LocatedChange | None:
+def locate_mesh(comparison: ComparedPair) -> GapPlace | None:
     """Return the mesh harmonic that changed most."""
     frame = comparison.now.frame
     if comparison.strongest("mesh", "line.half_mesh") in ("mesh.half", "line.half_mesh"):
         half = comparison.change_db[comparison.strongest("mesh.half", "line.half_mesh")]
-        return LocatedChange(f"half the mesh order, {by_decibels(half)}", half, (frame.teeth[0] / 2.0,))
+        return GapPlace(
+            PlaceKind.MESH, f"half the mesh order, {by_decibels(half)}", half, orders=(frame.teeth[0] / 2.0,)
+        )
     lines_of_both = _lines_of_both(comparison, DRIVER, relative=not comparison.is_reference)
     lines = [
         k * frame.teeth[0]
@@ -451,14 +499,14 @@ def locate_mesh(comparison: ComparedPair) -> LocatedChange | None:
         title = f"{feature_words(scored, frame)}, {by_decibels(change)}"
         if scored.startswith("alike."):
             title = "what lies beside the mesh harmonics, which themselves hardly moved"
-        return LocatedChange(title, change, _harmonic_order(scored, frame))
+        return GapPlace(PlaceKind.MESH, title, change, orders=_harmonic_order(scored, frame))
     total = comparison.change_db["mesh.total"]
     alike = comparison.is_reference and abs(total) > 0.7 * abs(change) and total * change > 0
     every = f"mesh harmonics, together {by_decibels(total)}, " if alike else "mesh harmonics, "
     title = f"{every}most at {_times(best + 1)}mesh ({by_decibels(change)})"
     if not comparison.is_reference:
         title += " against the other harmonics"
-    return LocatedChange(title, change, (float(lines[best]),), channel=_channel(comparison, row))
+    return GapPlace(PlaceKind.MESH, title, change, orders=(float(lines[best]),), channel=_channel(comparison, row))
 
 
 def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
@@ -467,7 +515,7 @@ def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
     return (float(int(harmonic) * frame.teeth[DRIVER]),) if harmonic.isdigit() else ()
 
 
-def locate_sidebands(comparison: ComparedPair, side: int) -> LocatedChange | None:
+def locate_sidebands(comparison: ComparedPair, side: int) -> GapPlace | None:
     """Return about which mesh harmonic a shaft's sidebands changed most, and which of them."""
     now, before = _lines_of_both(comparison, side, relative=not comparison.is_reference)
     frame = comparison.now.frame
@@ -487,10 +535,10 @@ def locate_sidebands(comparison: ComparedPair, side: int) -> LocatedChange | Non
     carrier = (best + 1) * teeth
     title += _spacing_text([abs(line - carrier) for line in lines])
     orders = tuple(float(line * frame.shaft_orders[side]) for line in lines)
-    return LocatedChange(title, change, orders, channel=_channel(comparison, row))
+    return GapPlace(PlaceKind.SIDEBANDS, title, change, orders=orders, channel=_channel(comparison, row))
 
 
-def locate_shaft(comparison: ComparedPair, side: int) -> LocatedChange | None:
+def locate_shaft(comparison: ComparedPair, side: int) -> GapPlace | None:
     """Return the low order of a shaft that changed most."""
     lines_of_both = _lines_of_both(comparison, side, relative=False)
     frame = comparison.now.frame
@@ -504,7 +552,8 @@ def locate_shaft(comparison: ComparedPair, side: int) -> LocatedChange | None:
     row, best, change = strongest
     order = groups[best][0]
     title = f"order {order} of {shaft_words(frame, side)}, {by_decibels(change)}"
-    return LocatedChange(title, change, (order * frame.shaft_orders[side],), channel=_channel(comparison, row))
+    change_order = (order * frame.shaft_orders[side],)
+    return GapPlace(PlaceKind.SHAFT, title, change, orders=change_order, channel=_channel(comparison, row))
 
 
 @dataclass(frozen=True)
@@ -595,7 +644,7 @@ PILED_UP = 1e-3
 """Share of samples within half a percent of the extreme; of a vibration with random peaks, some 1e-5 lie there."""
 
 
-def locate_band(comparison: ComparedPair) -> LocatedChange:
+def locate_band(comparison: ComparedPair) -> GapPlace:
     """Return the band of the residual that changed most: its level, or how impulsive it is."""
     name = comparison.strongest("floor.band", "floor.kurtosis")
     kind, _, number = Feature.of(name).detail.partition(".")
@@ -607,7 +656,7 @@ def locate_band(comparison: ComparedPair) -> LocatedChange:
     quantity = "noise" if kind == "band" else "kurtosis of the noise"
     title = f"{quantity} between {band_words(band).replace(' to ', ' and ')}, {by_decibels(change)}"
     channel = _most_changed_channel(comparison, int(number) - 1, kurtosis=kind != "band")
-    return LocatedChange(title, change, band_hz=band, channel=channel, follows=kind != "band")
+    return GapPlace(PlaceKind.BAND, title, change, band_hz=band, channel=channel, follows=kind != "band")
 
 
 def _most_changed_channel(comparison: ComparedPair, band: int, *, kurtosis: bool) -> str:
@@ -621,7 +670,7 @@ def _most_changed_channel(comparison: ComparedPair, band: int, *, kurtosis: bool
     return max(comparison.now.channels, key=change)
 
 
-def locate_speed(comparison: ComparedPair) -> LocatedChange | None:
+def locate_speed(comparison: ComparedPair) -> GapPlace | None:
     """Return what the speed does otherwise; None where it hardly does anything."""
     name = comparison.strongest("speed.")
     change = comparison.change_db[name]
@@ -629,12 +678,12 @@ def locate_speed(comparison: ComparedPair) -> LocatedChange | None:
     if max(abs(drift), swing, *(abs(figure) for figure in comparison.baseline.speed[:2])) < MIN_SPEED_CHANGE:
         return None
     if name == "speed.drift":
-        return LocatedChange(f"speed drifts by {100 * drift:.2g} % along the record", change)
-    orders = (frequency_hz / comparison.now.speed_hz,)
-    return LocatedChange(f"speed swings by {100 * swing:.2g} % rms, most at {frequency_hz:.2g} Hz", change, orders)
+        return GapPlace(PlaceKind.SPEED, f"speed drifts by {100 * drift:.2g} % along the record", change)
+    title = f"speed swings by {100 * swing:.2g} % rms, most at {frequency_hz:.2g} Hz"
+    return GapPlace(PlaceKind.SPEED, title, change, orders=(frequency_hz / comparison.now.speed_hz,))
 
 
-def locate_tail(comparison: ComparedPair) -> LocatedChange:
+def locate_tail(comparison: ComparedPair) -> GapPlace:
     """Return how the amplitudes are distributed otherwise."""
     name = comparison.strongest("raw.near", "raw.kurtosis")
     change = comparison.change_db[name]
@@ -643,10 +692,10 @@ def locate_tail(comparison: ComparedPair) -> LocatedChange:
         piled = float(comparison.now.channels[channel].tail[:, 2].mean()) > PILED_UP
         clipping = ", as clipping makes them" if change > 0 and piled else ""
         title = f"samples close to the largest amplitude{clipping}, {by_decibels(change)}"
-        return LocatedChange(title, change, channel=channel, follows=not clipping)
+        return GapPlace(PlaceKind.TAIL, title, change, channel=channel, follows=not clipping)
     tails = "heavier" if change > 0 else "lighter"
     title = f"{tails} tails of the amplitudes (kurtosis {by_decibels(change)})"
-    return LocatedChange(title, change, channel=channel, follows=True)
+    return GapPlace(PlaceKind.TAIL, title, change, channel=channel, follows=True)
 
 
 # --------------------
@@ -719,7 +768,7 @@ def _pattern(
     return ToothPattern(energy, lines, synchronous / max(whole, 1e-300))
 
 
-def locate_tooth(comparison: ComparedPair, side: int) -> LocatedChange | None:
+def locate_tooth(comparison: ComparedPair, side: int) -> GapPlace | None:
     """Return the angle and tooth that stands out, or that the teeth's pattern changed all round.
 
     None where most of the pattern is noise, or leaks into the average.
@@ -738,10 +787,10 @@ def locate_tooth(comparison: ComparedPair, side: int) -> LocatedChange | None:
     tooth = int(place * teeth) % teeth + 1 if now.marks[side] else None
     at = f"tooth {tooth} ({angle:.0f}°)" if tooth else f"one tooth (at {angle:.0f}°; no mark)"
     title = f"burst once per revolution at {at} of {shaft}, {above:.2g} dB above the other teeth"
-    return LocatedChange(title, above, angle_deg=angle, tooth=tooth, channel=name)
+    return GapPlace(PlaceKind.TOOTH, title, above, angle_deg=angle, tooth=tooth, channel=name)
 
 
-def locate_all_round(comparison: ComparedPair, side: int, shaft: str, channel: str) -> LocatedChange:
+def locate_all_round(comparison: ComparedPair, side: int, shaft: str, channel: str) -> GapPlace:
     """Return that no tooth in particular stands out, with the figure of the feature that was scored."""
     scored = comparison.strongest(*(f"{kind}.{SIDES[side]}." for kind in ("tooth", "change", "surprise")))
     level = f"tooth.{SIDES[side]}.level"
@@ -750,11 +799,11 @@ def locate_all_round(comparison: ComparedPair, side: int, shaft: str, channel: s
     change = comparison.change_db[scored]
     if not scored.endswith(ALL_ROUND):
         title = f"shape of the teeth's pattern of {shaft}, no tooth in particular"
-        return LocatedChange(title, change, channel=channel, follows=True)
+        return GapPlace(PlaceKind.TOOTH, title, change, channel=channel, follows=True)
     of_difference = not scored.startswith("tooth.")
     by = f"{by_decibels(change)} against what healthy machines change by" if of_difference else by_decibels(change)
     subject = "what has changed of the pattern of the teeth" if of_difference else "pattern of the teeth"
-    return LocatedChange(f"{subject} of {shaft} all round, {by}", change, channel=channel)
+    return GapPlace(PlaceKind.TOOTH, f"{subject} of {shaft} all round, {by}", change, channel=channel)
 
 
 MIN_SHARE = 0.01
@@ -767,9 +816,9 @@ def gap_places(
     now: ReducedRecording,
     baseline: ReducedRecording,
     structural: StructuralFloor,
+    change: Features,
     *,
     is_reference: bool,
-    change: Features | None = None,
 ) -> tuple[GapPlace, ...]:
     """Return where a recording differs, largest share first; last what only follows from other places.
 
@@ -784,27 +833,21 @@ def gap_places(
     baseline : ReducedRecording
         A healthy recording of the same machine, or its simulation.
     structural : StructuralFloor
+    change : Features
+        What `change_features` or `difference_features` made of the two.
     is_reference : bool
         Whether `baseline` is a recording of the same machine: the teeth's patterns can then be subtracted.
-    change : Features or None
-        What `change_features` or `difference_features` made of the two; None: made here.
 
     Raises
     ------
     RefusalError
         If the reference was taken at another speed.
     """
-    if change is None:
-        change = change_features(now, baseline) if is_reference else difference_features(now, baseline)
-    distances = structural.from_centre(change.names, change.values)
-    if is_reference:
-        distances = beyond_the_mesh(change.names, distances)
-    floors = structural.of(change.names), REPEATABLE * pooled_scatter(change)
+    distances, *floors = against_floors(change, structural, is_reference=is_reference)
     # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
     ratios = distances / np.maximum(*floors)
-    comparison = ComparedPair(
-        now, baseline, is_reference, _named(change.names, distances), _named(change.names, ratios)
-    )
+    change_db, size = (dict(zip(change.names, values.tolist(), strict=True)) for values in (distances, ratios))
+    comparison = ComparedPair(now, baseline, is_reference, change_db, size)
     members = {family: _located_rows(change.names, rows) for family, rows in family_members(change.names).items()}
     energies = {family: max(family_size(ratios[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
     min_energy = MIN_SHARE * sum(energies.values())
@@ -816,7 +859,8 @@ def gap_places(
         if spot is not None:
             sizes = [family_size(distances[members[family]] / floor[members[family]]) for floor in floors]
             share = float("nan") if family in following else energies[family] / total
-            places.append(_place(family, spot, (sizes[0], sizes[1]), share, now))
+            shaft = now.frame.shafts[SIDES.index(family[1])] if family[1] else ""
+            places.append(replace(spot, structural=sizes[0], repeatability=sizes[1], share=share, shaft=shaft))
     return ranked_places(_merged(places))
 
 
@@ -837,11 +881,7 @@ def _located_rows(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
     return np.array(kept, dtype=np.intp)
 
 
-def _named(names: tuple[str, ...], values: FloatArray) -> Mapping[str, float]:
-    return dict(zip(names, values.tolist(), strict=True))
-
-
-def _spot(comparison: ComparedPair, family: Family) -> LocatedChange | None:
+def _spot(comparison: ComparedPair, family: Family) -> GapPlace | None:
     kind, shaft = family
     of_a_shaft = {PlaceKind.SIDEBANDS: locate_sidebands, PlaceKind.SHAFT: locate_shaft, PlaceKind.TOOTH: locate_tooth}
     plain = {
@@ -853,24 +893,3 @@ def _spot(comparison: ComparedPair, family: Family) -> LocatedChange | None:
         PlaceKind.TAIL: locate_tail,
     }
     return of_a_shaft[kind](comparison, SIDES.index(shaft)) if kind in of_a_shaft else plain[kind](comparison)
-
-
-def _place(
-    family: Family, spot: LocatedChange, sizes: tuple[float, float], share: float, now: ReducedRecording
-) -> GapPlace:
-    kind, side = family
-    return GapPlace(
-        spot.kind or kind,
-        spot.title,
-        spot.change_db,
-        repeatability=sizes[1],
-        structural=sizes[0],
-        share=share,
-        shaft=now.frame.shafts[SIDES.index(side)] if side else "",
-        orders=spot.orders,
-        band_hz=spot.band_hz,
-        angle_deg=spot.angle_deg,
-        tooth=spot.tooth,
-        channel=spot.channel,
-        follows=spot.follows,
-    )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.gap._features import Feature
-from gearsig.gap._floors import family_members, t_quantile
+from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, family_members, t_quantile
 from gearsig.gap._report import MIN_PREDICTED, Interval, Shrinkage
 from gearsig.gap._simulator import Added
 from gearsig.rig import SIDES
@@ -29,9 +29,6 @@ LARGEST_DISTANCE = 6.0
 INTERVAL_COST = 2.71
 """Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval, 1.645², where the best fit is
 as near as floors allow, which is a cost of 1 for each family; in proportion more where it is not."""
-
-FLOOR_IN_DEVIATIONS = 1.96
-"""A floor holds 19 of 20: so many standard deviations."""
 
 LEVELS_DB = tuple(float(level) for level in (*range(-30, 30, 5), *range(30, 61, 10)))
 LEVEL_SCATTER_DB = 10.0

@@ -17,7 +17,7 @@ from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
 from gearsig.gap._change import beyond_the_mesh, contrast_rows, counted_from_the_mesh
 from gearsig.gap._features import Features
-from gearsig.gap._floors import REPEATABLE, StructuralFloor
+from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, StructuralFloor
 from gearsig.gap._report import UNKNOWN
 from gearsig.gap._simulator import GapEffect
 from gearsig.rig import SIDES
@@ -363,7 +363,7 @@ class Recogniser:
     def _rule_factors(self, change: Features, rules: Iterable[tuple[str, Signs]]) -> FloatArray:
         """Return the factors of the causes, by how far features are from usual, in standard deviations."""
         names = self.floor.names
-        spreads = self.floor.of(names) / REPEATABLE
+        spreads = self.floor.of(names) / FLOOR_IN_DEVIATIONS
         deviations = self.floor.from_centre(names, change.values) / spreads
         strengths = textbook_strengths(rules, dict(zip(names, deviations.tolist(), strict=True)))
         factors: FloatArray = np.exp(
@@ -392,7 +392,7 @@ def input_rows(
     kept = [i for i, name in enumerate(floor.names) if not name.startswith(left_out)]
     names = [floor.names[i] for i in kept]
     distances = floor.from_centre(floor.names, changes)[:, kept]
-    scatters = np.hypot(floor.of(names) / REPEATABLE, scatter[:, kept])
+    scatters = np.hypot(floor.of(names) / FLOOR_IN_DEVIATIONS, scatter[:, kept])
     held = contrast_rows(names, beyond_the_mesh(names, distances) / scatters)
     further = np.ones(held.shape[1], dtype=bool)
     further[: 2 * len(names)] = np.tile(counted_from_the_mesh(names) != 0.0, 2)  # the others are as they were

@@ -77,6 +77,14 @@ class GearFrame:
         return 1.0, self.teeth[0] / self.teeth[1]
 
 
+def shaft_words(frame: GearFrame, side: int) -> str:
+    """Return "the input shaft" or "shaft 2"."""
+    name = frame.shafts[side]
+    if "shaft" in name.lower():
+        return name
+    return f"the {name} shaft" if name.replace(" ", "").isalpha() else f"shaft {name}"
+
+
 def gear_frame(rig: Rig) -> GearFrame:
     """Return the frame of a rig's first gear pair, the one under study; other pairs are background.
 

@@ -5,43 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from math import exp, inf, isclose, isfinite, isinf, nan
+from math import exp, inf, isfinite, isinf, nan
 
 import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.formatting import odds_text, percent
-from gearsig.gap._simulator import Added, GapEffect, OperatingCondition
+from gearsig.gap._simulator import Added, GapEffect, OperatingCondition, same_load, same_speed
 from gearsig.results import Result, verdict_html
-
-# --------------------
-# Operating points and units, for people.
-# --------------------
-
-
-SAME_SPEED, SAME_TORQUE = 0.03, 0.1
-"""Relative: recordings nearer than this to each other are of one operating condition."""
-
-
-def point_text(point: OperatingCondition) -> str:
-    """Write an operating point for people."""
-    return f"{float(f'{point.speed_rpm:.4g}'):.6g} rpm and {point.torque_nm:.3g} N·m"
-
-
-def same_condition(first: OperatingCondition, second: OperatingCondition) -> bool:
-    """Whether two points are one operating condition."""
-    return same_speed(first, second) and same_load(first, second)
-
-
-def same_speed(first: OperatingCondition, second: OperatingCondition) -> bool:
-    """Whether two points are at one speed."""
-    return isclose(first.speed_rpm, second.speed_rpm, rel_tol=SAME_SPEED)
-
-
-def same_load(first: OperatingCondition, second: OperatingCondition) -> bool:
-    """Whether two points are at one torque."""
-    return isclose(first.torque_nm, second.torque_nm, rel_tol=SAME_TORQUE)
-
 
 _UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "m/s^2": "m/s²", "1": ""}
 
@@ -217,9 +188,9 @@ class GapPlace(Result):
     kind: PlaceKind
     title: str
     change_db: float
-    repeatability: float
-    structural: float
-    share: float
+    repeatability: float = nan
+    structural: float = nan
+    share: float = nan
     shaft: str = ""
     orders: tuple[float, ...] = ()
     band_hz: tuple[float, float] | None = None

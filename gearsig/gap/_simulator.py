@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isclose
 from typing import Protocol, runtime_checkable
 
 from gearsig.checks import FloatArray
@@ -67,6 +68,30 @@ class OperatingCondition:
 
     speed_rpm: float
     torque_nm: float
+
+
+SAME_SPEED, SAME_TORQUE = 0.03, 0.1
+"""Relative: recordings nearer than this to each other are of one operating condition."""
+
+
+def point_text(point: OperatingCondition) -> str:
+    """Write an operating point for people."""
+    return f"{float(f'{point.speed_rpm:.4g}'):.6g} rpm and {point.torque_nm:.3g} N·m"
+
+
+def same_condition(first: OperatingCondition, second: OperatingCondition) -> bool:
+    """Whether two points are one operating condition."""
+    return same_speed(first, second) and same_load(first, second)
+
+
+def same_speed(first: OperatingCondition, second: OperatingCondition) -> bool:
+    """Whether two points are at one speed."""
+    return isclose(first.speed_rpm, second.speed_rpm, rel_tol=SAME_SPEED)
+
+
+def same_load(first: OperatingCondition, second: OperatingCondition) -> bool:
+    """Whether two points are at one torque."""
+    return isclose(first.torque_nm, second.torque_nm, rel_tol=SAME_TORQUE)
 
 
 class Twin(Protocol):

@@ -35,7 +35,7 @@ from gearsig.gap._prediction import (
     shrinkage,
     transplanted,
 )
-from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording
+from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording, shaft_words
 from gearsig.gap._report import ConditionFacts, GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
 from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, HasFurtherSettings, OperatingCondition, Twin
 from gearsig.gap._waveform import (
@@ -49,7 +49,6 @@ from gearsig.gap._waveform import (
     sideband_noise,
     waveform_match,
 )
-from gearsig.gap._words import shaft_words
 from gearsig.processes import active_cluster, can_be_sent, killed_text, run_jobs, start_early
 from gearsig.rig import SIDES
 

@@ -94,7 +94,7 @@ def test_energy_peaks_at_the_tooth_and_is_over_the_median_one() -> None:
 def test_the_simulated_change_has_the_size_of_the_measured_one() -> None:
     """Half the knock has a quarter of the energy, in the units of the measured median tooth."""
     simulated = knocking(0.75, seed=2)
-    driver = angle_curves(knocking(), healthy(), simulated, healthy=healthy(), simulated_healthy=healthy())[0]
+    driver = angle_curves(knocking(), healthy(), simulated, healthy=healthy())[0]
     assert driver.after.max() / driver.measured.max() == pytest.approx(0.25, rel=0.1)
     assert not driver.before.any()  # compared with itself
 

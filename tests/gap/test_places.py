@@ -48,7 +48,8 @@ def floor(is_reference: bool) -> StructuralFloor:
 
 def places_of(added: Added | None = None, *, is_reference: bool = True, **settings: float) -> tuple[GapPlace, ...]:
     now = reduce_recording(record(added, seed=1, **settings), RIG)
-    return gap_places(now, healthy(), floor(is_reference), is_reference=is_reference)
+    change = (change_features if is_reference else difference_features)(now, healthy())
+    return gap_places(now, healthy(), floor(is_reference), change, is_reference=is_reference)
 
 
 def tone(order: float, amplitude: float) -> Added:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap._attribution import Attribution, GapCalibration, calibration_values
-from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
+from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import NONE, UNKNOWN, Interval, Shrinkage, shares_of
 from gearsig.gap.start_stop._cycles import FEATURES, NAMES
 

@@ -15,7 +15,7 @@ whatever the valve and the brake do, so that a simulated drive need not repeat t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,8 +25,9 @@ from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import readable
 from gearsig.gap import _report as types
 from gearsig.gap._attribution import Attribution, is_calibrated
-from gearsig.gap._evidence import evidence_of_feature
-from gearsig.gap._prediction import FLOOR_IN_DEVIATIONS
+from gearsig.gap._conditions import Stage
+from gearsig.gap._evidence import SMALLEST, evidence_of_feature
+from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import (
     NAMING,
     GapCause,
@@ -64,10 +65,6 @@ from gearsig.gap.start_stop._comparison import (
 from gearsig.gap.start_stop._cycles import COMPRESSION, FEATURES, NAMES, UNITS, change_of, prediction_errors
 from gearsig.motion import is_start_stop, measure_motion, motion_segments
 from gearsig.recording import Recording
-
-Stage = Callable[[str, float], object]
-SMALLEST = 0.3
-"""Floors from which a predicted change is worth a line."""
 
 
 @dataclass(frozen=True)
@@ -366,7 +363,7 @@ def _phases(compared: DriveComparison) -> list[GapPlace]:
             )
             channel = "" if quantity == COMPRESSION else quantity
             kind = types.PlaceKind.SPEED
-            places.append(GapPlace(kind, title, change_db, nothing, nothing, nothing, channel=channel, follows=True))
+            places.append(GapPlace(kind, title, change_db, channel=channel, follows=True))
     return sorted(places, key=lambda place: -place.change_db)[:3]
 
 
