@@ -88,8 +88,14 @@ class Condition:
         return self.reference if self.reference is not None else self.simulated
 
     def change_of(self, part: ReducedRecording) -> Features:
-        """Return the change of the recording, or of some of its blocks, against what it is compared with."""
-        return compare(part, self.simulated, self.reference, self.learned)
+        """Return the change of the recording, or of some of its blocks, against what it is compared with.
+
+        That is the reference; without one it is x − c y: x the features, y the healthy twin's, c the credibility of
+        each feature, 0 to 1, learned from machines whose twin is known.
+        """
+        if self.reference is not None:
+            return change_features(part, self.reference)
+        return difference_features(part, self.simulated, self.learned.credibility)
 
     @cached_property
     def change(self) -> Features:
@@ -167,35 +173,6 @@ def with_channels_of(simulation: ReducedRecording, now: ReducedRecording) -> Red
     return simulation.with_channels(
         {name: simulated_channels[i % len(simulated_channels)] for i, name in enumerate(now.channels)}
     )
-
-
-def compare(
-    now: ReducedRecording, simulation: ReducedRecording, reference: ReducedRecording | None, learned: Learned
-) -> Features:
-    """Return the change against the reference, or else against the simulation as far as it is credible.
-
-    Without a reference it is x − c y: x the recording's features, y the healthy twin's, c the credibility of each
-    feature, 0 to 1, learned from machines whose twin is known.
-
-    Parameters
-    ----------
-    now : ReducedRecording
-        The recording.
-    simulation : ReducedRecording
-        The healthy twin at the same operating point.
-    reference : ReducedRecording or None
-        The healthy machine at the same operating point.
-    learned : Learned
-        Has the credibility.
-
-    Returns
-    -------
-    Features
-        dB, or ten times the decadic logarithm, with their standard errors.
-    """
-    if reference is not None:
-        return change_features(now, reference)
-    return difference_features(now, simulation, learned.credibility)
 
 
 def facts_of(prepared: PreparedRecording, now: ReducedRecording, twin: Twin) -> ConditionFacts:
@@ -712,7 +689,7 @@ def _messages_of_recording(prepared: PreparedRecording, facts: ConditionFacts) -
 
 def _strange_reference(condition: Condition) -> list[str]:
     """Say so where the reference itself is far from the simulation of a healthy machine."""
-    change = compare(condition.baseline, condition.simulated, None, condition.learned)
+    change = difference_features(condition.baseline, condition.simulated, condition.learned.credibility)
     size = gap_size(change, condition.learned.floor(with_reference=False)).structural.value
     if size < CLEAR_WITHOUT:
         return []

@@ -287,14 +287,14 @@ def cyclic_features(reduced: ReducedRecording, channels: Sequence[ChannelSums]) 
     for side, order in enumerate(frame.shaft_orders):
         yield f"envelope.{SIDES[side]}_shaft", _family(levels, order, N_SHAFT_FAMILY, step, (), 0.0)
     yield "envelope.mesh", _family(levels, float(frame.teeth[0]), 1, step, (), 0.0)
-    yield "envelope.strange", _unexplained_excess(envelopes, step, known_modulation(frame), first=LOWEST_STRANGE)
+    yield "envelope.strange", _unexplained_excess(envelopes, step, known_modulation(frame))
     depth = max(float(c.envelope_power.mean(axis=0)[:, 2:].sum(axis=1).max()) for c in channels)
     yield "envelope.depth", decibel(depth)
     residuals = residual_ratios(reduced, channels)
     levels = excesses(residuals)
     yield from _families(frame, levels, reduced.order_step, known, "line")
     yield "line.half_mesh", _family(levels, frame.teeth[0] / 2.0, 1, reduced.order_step, (), 0.0)
-    yield "line.strange", _unexplained_excess(residuals, reduced.order_step, known_lines(frame), first=LOWEST_STRANGE)
+    yield "line.strange", _unexplained_excess(residuals, reduced.order_step, known_lines(frame))
 
 
 def envelope_ratios(reduced: ReducedRecording, sums: ChannelSums) -> FloatArray:
@@ -318,13 +318,7 @@ def _families(
 def _family(
     levels: FloatArray, order: float, n_harmonics: int, step: float, known: Sequence[float], slip: float
 ) -> float:
-    return best_of_family(levels, order, n_harmonics, step, known, slip)[0]
-
-
-def best_of_family(
-    levels: FloatArray, order: float, n_harmonics: int, step: float, known: Sequence[float], slip: float
-) -> tuple[float, int, float]:
-    """Return the mean excess in dB of a family's lines, the spectrum that shows it best, and its order with slip.
+    """Return the mean excess in dB of a family's lines, in the spectrum and with the slip that show it best.
 
     `levels` are excesses in dB, not below 0; the larger of a line and its neighbours counts.
     """
@@ -333,13 +327,10 @@ def best_of_family(
         harmonics = harmonics[np.min(np.abs(np.asarray(known) - harmonics[:, None]), axis=1) >= 1.5 * step]
     harmonics = harmonics[harmonics * (1.0 + slip) / step < levels.shape[1] - 1]
     if not len(harmonics):
-        return 0.0, 0, order
+        return 0.0
     n_slips = min(MAX_SLIPS, 2 * int(np.ceil(slip * harmonics.max() / step)) + 1)  # a line apart at the highest
-    shifts = np.linspace(-slip, slip, n_slips)
-    places = np.rint(np.outer(1.0 + shifts, harmonics) / step).astype(np.intp)
-    means = levels[:, places].mean(axis=2)
-    row, best = np.unravel_index(int(np.argmax(means)), means.shape)
-    return float(means[row, best]), int(row), order * (1.0 + float(shifts[best]))
+    places = np.rint(np.outer(1.0 + np.linspace(-slip, slip, n_slips), harmonics) / step).astype(np.intp)
+    return float(levels[:, places].mean(axis=2).max())
 
 
 def excesses(ratios: FloatArray) -> FloatArray:
@@ -350,21 +341,14 @@ def excesses(ratios: FloatArray) -> FloatArray:
     return level
 
 
-def _unexplained_excess(ratios: FloatArray, step: float, known: Sequence[Known], *, first: float) -> float:
-    """Return the excess in dB of the strongest line that belongs to nothing known."""
-    free = free_lines(ratios.shape[1], step, known, first=first)
-    return max(decibel(float(ratios[:, free].max())), 0.0) if free.any() else 0.0
-
-
-def free_lines(n_lines: int, step: float, known: Sequence[Known], *, first: float) -> NDArray[np.bool_]:
-    """Return which lines belong to nothing known."""
-    positions = np.arange(n_lines) * step
-    near = np.zeros(n_lines, dtype=bool)
+def _unexplained_excess(ratios: FloatArray, step: float, known: Sequence[Known]) -> float:
+    """Return the excess in dB of the strongest line that belongs to nothing known; 0 where there is none."""
+    positions = np.arange(ratios.shape[1]) * step
+    free = positions > LOWEST_STRANGE
     for order, slip in known:
         low = np.searchsorted(positions, order - slip - 2.0 * step)
-        near[low : np.searchsorted(positions, order + slip + 2.0 * step)] = True
-    free: NDArray[np.bool_] = ~near & (positions > first)
-    return free
+        free[low : np.searchsorted(positions, order + slip + 2.0 * step)] = False
+    return max(decibel(float(ratios[:, free].max())), 0.0) if free.any() else 0.0
 
 
 def residual_ratios(reduced: ReducedRecording, channels: Sequence[ChannelSums]) -> FloatArray:

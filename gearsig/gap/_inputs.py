@@ -90,7 +90,9 @@ def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lamb
     for path, name, rig in zip(files, names, _rigs(request, files), strict=True):
         on_file(path.name)
         is_reference = len(recordings) >= n
-        rate_hz = _rate_hz_of_reference(path, request) if is_reference else request.sampling_rate_hz
+        rate_hz = request.sampling_rate_hz
+        if is_reference:
+            _, rate_hz = rig_and_rate_of_reference(path, None, rate_hz, request.reference_rate_hz)
         with options_named(REFERENCE_OPTIONS if is_reference else {}):
             recording = read_whole(path, rig, sampling_rate_hz=rate_hz, speed=speed)
         recordings.append(recording.with_name(name))
@@ -100,10 +102,6 @@ def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lamb
             request.learn, rig=recordings[0].rig, sampling_rate_hz=request.sampling_rate_hz, on_file=on_file
         )
     return GapInputs(tuple(recordings[:n]), tuple(recordings[n:]), labelled)
-
-
-def _rate_hz_of_reference(path: Path, request: GapRequest) -> float | None:
-    return rig_and_rate_of_reference(path, None, request.sampling_rate_hz, request.reference_rate_hz)[1]
 
 
 def _check_files(request: GapRequest) -> None:

@@ -149,10 +149,6 @@ class Fit:
         way = int(np.argmin(costs + _level_costs(self.path)))
         return replace(self, ways={**self.ways, observed.condition: way})
 
-    def level_db(self, condition: int) -> float:
-        """Return by how much louder than on the twin the effect is."""
-        return self.path.levels_db[self.ways[condition]]
-
 
 def paths_of(
     names: tuple[str, ...],

@@ -248,14 +248,11 @@ class KnownToothErrors:
 
     def log_likelihoods(self, descriptors: FloatArray) -> dict[str, float]:
         """Return fault → ln L, of each of `TOOTH_FAULTS`; equal where the profile is like none that is known."""
-        root = self._root()
+        within = np.mean([_covariance(self.descriptors[self.faults == name]) for name in TOOTH_FAULTS], axis=0)
+        root = np.linalg.cholesky(np.linalg.inv(within))
         apart = np.sum(((self.descriptors - descriptors) @ root) ** 2, axis=1)
         beyond = exp(-0.5 * FAR**2) * len(TOOTH_FAULTS) / len(self.faults)
         return {name: log(float(np.mean(np.exp(-0.5 * apart[self.faults == name]))) + beyond) for name in TOOTH_FAULTS}
-
-    def _root(self) -> FloatArray:
-        within = np.mean([_covariance(self.descriptors[self.faults == name]) for name in TOOTH_FAULTS], axis=0)
-        return np.asarray(np.linalg.cholesky(np.linalg.inv(within)))
 
 
 SHRINKAGE = 0.2

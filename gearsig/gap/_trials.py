@@ -16,9 +16,10 @@ import numpy as np
 from gearsig.cache import keep, made_folder, modules_digest, read_arrays
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import GearsigError, RefusalError
+from gearsig.gap._change import change_once
 from gearsig.gap._conditions import SEED, Condition, halves, observed, trial_length_s
 from gearsig.gap._evidence import SIGNS, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS, determined_options
-from gearsig.gap._features import whole_and_parts
+from gearsig.gap._features import once, whole_and_parts
 from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
 from gearsig.gap._places import SAME_ORDER
 from gearsig.gap._prediction import (
@@ -35,7 +36,7 @@ from gearsig.gap._prediction import (
     shrinkage,
     transplanted,
 )
-from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording, shaft_words
+from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording, reduce_recording, shaft_words
 from gearsig.gap._report import ConditionFacts, GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
 from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, HasFurtherSettings, OperatingCondition, Twin
 from gearsig.gap._waveform import (
@@ -221,9 +222,6 @@ def reduced_apart(tasks: Sequence[Task]) -> list[Reduced | str]:
 
 
 def _reduced(task: Task, known: Known) -> Reduced | str:
-    from gearsig.gap._change import change_once
-    from gearsig.gap._features import once
-
     run = task.run
     key = run.healthy_key, task.seed
     try:
@@ -250,8 +248,6 @@ def _of_channels(reduced: ReducedRecording, *channels: str) -> ReducedRecording:
 
 
 def _reduced_run(run: TwinRun, seed: int, added: Added | None, noise: int) -> ReducedRecording:
-    from gearsig.gap._reduction import reduce_recording
-
     recording = run.twin.run(
         run.point,
         () if added is None else (added,),
@@ -368,56 +364,33 @@ def banks_of(
         If the healthy machine cannot be simulated or its recording is too short for the features.
     """
     within = seeds[: min(count(n_change_seeds, "n_change_seeds"), len(seeds))]
-    requests = [
-        _BankRequest.of(run, tuple(added), seeds, within, folder) for run in runs for added in candidates.values()
-    ]
-    banks_by_request = {w: read_bank(w.path, w.key) if w.path is not None and not fresh else None for w in requests}
-    missing = [w for w in requests if banks_by_request[w] is None]
-    healthy = {w.run.healthy_key: w.run for w in missing}
-    tasks = [Task(run, seed, None) for run in healthy.values() for seed in seeds]
-    tasks += [Task(w.run, seed, added) for w in missing for added in w.candidates for seed in within]
-    rows = iter(finished_runs(tasks, processes, on_progress) if tasks else ())
-    healthy_rows = {key: list(islice(rows, len(seeds))) for key in healthy}
-    for w in missing:
-        of_request = list(islice(rows, len(w.candidates) * len(within)))
-        banks_by_request[w] = bank = _assembled(
-            w.run.point, w.candidates, len(within), healthy_rows[w.run.healthy_key], of_request
-        )
-        if w.path is not None:
-            write_bank(w.path, w.key, bank)
-    banks = iter(banks_by_request[w] for w in requests)
-    return [{name: bank for name, bank in zip(candidates, banks, strict=False) if bank is not None} for _ in runs]
-
-
-@dataclass(frozen=True, eq=False)
-class _BankRequest:
-    """One effect's bank at one point, and where it is kept."""
-
-    run: TwinRun
-    candidates: tuple[Added, ...]
-    key: str
-    path: Path | None
-
-    @classmethod
-    def of(
-        cls,
-        run: TwinRun,
-        candidates: tuple[Added, ...],
-        seeds: Sequence[int],
-        within: Sequence[int],
-        folder: Path | None,
-    ) -> _BankRequest:
-        """Return what is wanted, at the rounded point."""
+    folder = None if folder is None else made_folder(folder, "choose another with --cache")
+    requests: dict[str, tuple[TwinRun, Sequence[Added]]] = {}
+    keys = []
+    for run in runs:
         positive(run.duration_s, "duration_s", "s")
         at = replace(run, point=rounded(run.point))
-        key = bank_key(at, candidates, seeds, within)
-        path = (
-            None
-            if folder is None
-            else made_folder(folder, "choose another with --cache")
-            / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
-        )
-        return cls(at, candidates, key, path)
+        for added in candidates.values():
+            keys.append(bank_key(at, added, seeds, within))
+            requests[keys[-1]] = at, added
+    banks = {key: None if folder is None or fresh else read_bank(_bank_path(folder, key), key) for key in requests}
+    missing = {key: requests[key] for key, bank in banks.items() if bank is None}
+    healthy = {run.healthy_key: run for run, _ in missing.values()}
+    tasks = [Task(run, seed, None) for run in healthy.values() for seed in seeds]
+    tasks += [Task(run, seed, setting) for run, added in missing.values() for setting in added for seed in within]
+    rows = iter(finished_runs(tasks, processes, on_progress) if tasks else ())
+    healthy_rows = {key: list(islice(rows, len(seeds))) for key in healthy}
+    for key, (run, added) in missing.items():
+        of_request = list(islice(rows, len(added) * len(within)))
+        banks[key] = bank = _assembled(run.point, added, len(within), healthy_rows[run.healthy_key], of_request)
+        if folder is not None:
+            write_bank(_bank_path(folder, key), key, bank)
+    in_order = iter(banks[key] for key in keys)
+    return [{name: bank for name, bank in zip(candidates, in_order, strict=False) if bank is not None} for _ in runs]
+
+
+def _bank_path(folder: Path, key: str) -> Path:
+    return folder / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
 
 
 def rounded(point: OperatingCondition) -> OperatingCondition:

@@ -183,7 +183,8 @@ def test_an_effect_that_is_louder_on_the_machine_is_fitted_at_its_level() -> Non
     effect = louder(n_conditions=2)
     at_two_levels = [seen(predicted(effect, 2.0, 0, level=2)), seen(predicted(effect, 2.0, 1, level=0), 1)]
     fit = fit_path(effect, at_two_levels)
-    assert fit.level_db(0) - fit.level_db(1) == pytest.approx(20.0)
+    first, second = (fit.path.levels_db[fit.ways[condition]] for condition in (0, 1))
+    assert first - second == pytest.approx(20.0)
     assert fit.at(0) == pytest.approx(at_two_levels[0].distances, abs=1.5)
     assert fit.at(1) == pytest.approx(at_two_levels[1].distances, abs=1.5)
 
@@ -192,7 +193,7 @@ def test_the_twin_s_own_level_is_the_likeliest() -> None:
     """What fits as well with a larger severity as at a higher level is a larger severity."""
     effect = louder()
     fit = fit_path(effect, [seen(predicted(effect, 4.0, 0, level=1))])
-    assert fit.level_db(0) == pytest.approx(0.0)
+    assert fit.path.levels_db[fit.ways[0]] == pytest.approx(0.0)
     assert fit.severity.value == pytest.approx(4.0, rel=0.1)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.gap._simulator import Added, DriveFacts, DriveSimulator, DriveTwin, GapEffect, OperatingCondition
+from gearsig.gap._simulator import Added, DriveFacts, DriveSimulator, DriveTwin, GapEffect
 from gearsig.gap.start_stop._attribution import (
     CRACK,
     HALF,
@@ -95,11 +95,6 @@ class SimulatedDrive:
 
     twin: DriveTwin
     exponent: float
-
-    @property
-    def point(self) -> OperatingCondition:
-        """Torque and speed of the open valve."""
-        return self.twin.point
 
     @cached_property
     def healthy_run(self) -> PreparedCycles:
@@ -245,16 +240,12 @@ class DriveComparison:
 
         A simulated drive has no noise.
         """
-        rows = np.zeros((1, len(NAMES)))
-        if (reference := self.reference) is not None:
-            without_blocks = [reference.features(kept) for kept in _leave_one_out(reference.every)]
-            rows = np.array(
-                [
-                    change_of(self.features, without_block, self.drive.shape, self.spot)
-                    for without_block in without_blocks
-                ]
-            )
-        return np.hypot(_jackknife(self.without), _jackknife(rows))
+        scatter = _jackknife(self.without)
+        if (reference := self.reference) is None:
+            return scatter
+        kept = [reference.features(cycles) for cycles in _leave_one_out(reference.every)]
+        rows = [change_of(self.features, baseline, self.drive.shape, self.spot) for baseline in kept]
+        return np.hypot(scatter, _jackknife(np.array(rows)))
 
     def floor(self, *, of_half: bool = False) -> DriveFloor:
         """Return how far healthy drives lie from what this is compared with, as far as it can be told of this one."""
@@ -292,7 +283,7 @@ def _leave_one_out(every: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 def _jackknife(rows: FloatArray) -> FloatArray:
     """Return the standard error by leaving out each block, (n,)."""
-    error: FloatArray = np.sqrt((len(rows) - 1.0) * np.nanvar(np.nan_to_num(rows), axis=0))
+    error: FloatArray = np.sqrt((len(rows) - 1.0) * np.var(np.nan_to_num(rows), axis=0))
     return error
 
 

@@ -182,7 +182,7 @@ def _repeatability_limit(compared: DriveComparison) -> FloatArray:
 def _facts(compared: DriveComparison) -> types.ConditionFacts:
     m = compared.now.motion
     top_rpm = float(np.quantile(np.abs(m.driver_speed_rad_s), 0.98)) * 30.0 / np.pi
-    torque_nm = float("nan") if m.torque_nm is None else compared.drive.point.torque_nm
+    torque_nm = float("nan") if m.torque_nm is None else compared.drive.twin.point.torque_nm
     return types.ConditionFacts(
         compared.name,
         OperatingCondition(top_rpm, torque_nm),
@@ -456,10 +456,10 @@ def _next_recordings(
         if distance > 1.1 * now:
             titles = " and ".join(effects[name].title for name in pair)
             text = (
-                f"starts and stops at {drive.point.torque_nm:.3g} N·m; {titles} are then "
+                f"starts and stops at {drive.twin.point.torque_nm:.3g} N·m; {titles} are then "
                 f"{distance:.2g} structural floors apart instead of {now:.2g}."
             )
-            recordings.append(types.NextRecording(drive.point, pair, distance, now, text))
+            recordings.append(types.NextRecording(drive.twin.point, pair, distance, now, text))
     return tuple(sorted(recordings, key=lambda recording: -recording.standard_deviations))
 
 
