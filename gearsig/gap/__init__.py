@@ -2,7 +2,6 @@
 
 from gearsig.gap._attribution import (
     CALIBRATION_FILE,
-    LIGHT_LOAD_N_PER_MM,
     Attribution,
     GapCalibration,
     attribute,
@@ -10,7 +9,6 @@ from gearsig.gap._attribution import (
     joint_probabilities,
     load_gap_calibration,
     score_of,
-    tooth_load_n_per_mm,
     with_likelihoods,
     with_unknown_shared,
 )
@@ -26,6 +24,7 @@ from gearsig.gap._change import (
     segment_changes,
 )
 from gearsig.gap._conditions import (
+    LIGHT_LOAD_N_PER_MM,
     Condition,
     HealthyReference,
     check_steady,
@@ -35,6 +34,7 @@ from gearsig.gap._conditions import (
     run_length_s,
     strange_pattern,
     strange_teeth,
+    tooth_load_n_per_mm,
     with_channels_of,
     with_common_channels,
     wrong_teeth,

@@ -10,14 +10,14 @@ import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from math import cos, exp, radians
+from math import exp
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from gearsig.gap._conditions import Condition
+from gearsig.gap._conditions import LIGHT_LOAD_N_PER_MM, Condition
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._labelled import LabelledChange, LabelledEvidence, labelled_evidence, with_labelled
 from gearsig.gap._report import (
@@ -32,7 +32,6 @@ from gearsig.gap._report import (
 )
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
-from gearsig.rig import GearPair
 
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
 
@@ -180,28 +179,6 @@ def calibration_values(file: Path = CALIBRATION_FILE) -> dict[str, Any]:
     """Return what a calibration's file holds, "with_reference", "without_reference" and "provenance"."""
     values: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return values
-
-
-USUAL_PRESSURE_ANGLE_DEG = 20.0
-
-LIGHT_LOAD_N_PER_MM = 50.0
-"""Up to which flanks may part and the backlash shows: where dynamic loads can reach the static one, by order."""
-
-
-def tooth_load_n_per_mm(pair: GearPair, torque_nm: float) -> float:
-    """Return the tooth force over the face width, T/(r_b b), N/mm; nan where module or width are not known.
-
-    Parameters
-    ----------
-    pair : GearPair
-    torque_nm : float
-        Of the driver.
-    """
-    if pair.driver_teeth is None or pair.module_mm is None or pair.face_width_mm is None:
-        return float("nan")
-    angle = radians(pair.pressure_angle_deg or USUAL_PRESSURE_ANGLE_DEG)
-    base_radius_mm = pair.driver_teeth * pair.module_mm * cos(angle) / 2.0
-    return 1e3 * abs(torque_nm) / (base_radius_mm * pair.face_width_mm)
 
 
 NOT_SEEN = 0.2
@@ -405,14 +382,14 @@ def attribute(
     with_reference = all(c.reference is not None for c in conditions)
     size = max(condition.size.structural.value for condition in conditions)
     calibration = load_gap_calibration(with_reference=with_reference)
-    evidence = labelled_evidence(conditions, _loads(conditions), labelled) if labelled else None
+    evidence = labelled_evidence(conditions, labelled) if labelled else None
     log_likelihoods = {name: value for name, value in tooth_error_log_likelihoods.items() if name in forest}
     attribution = Attribution[TriedEffect](
         forest, {}, calibration, size, len(conditions), labelled=evidence, tooth_error_log_likelihoods=log_likelihoods
     )
     first = attribution.probabilities()
     likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
-    trained = _trained_effects(conditions)
+    trained = conditions[0].learned.causes
     untrained = [name for name in effects or known if name not in trained] if max_tried else []
     if max_tried and any(name in TOOTH_FAULTS for name in likely):  # waveforms part them: all are tried, or none
         likely += [name for name in TOOTH_FAULTS if name in first and name in known and name not in likely]
@@ -422,21 +399,10 @@ def attribute(
     return replace(attribution, tried=tried, untrained=tuple(untrained))
 
 
-def _trained_effects(conditions: Sequence[Condition]) -> set[str]:
-    return {name for c in conditions for name in c.learned.causes}
-
-
 def _forest(
     conditions: Sequence[Condition], effects: Sequence[str], known: Mapping[str, GapEffect]
 ) -> dict[str, float]:
     """Return the forests' joint probabilities over what may be named."""
-    allowed = {NONE, UNKNOWN, *(effects or known)} & _trained_effects(conditions)
-    per_condition, loads = [], _loads(conditions)
-    for condition, load in zip(conditions, loads, strict=True):
-        recogniser = condition.learned.recognisers[condition.reference is not None]
-        per_condition.append(recogniser.probabilities(condition.change, load, known.values()))
-    return joint_probabilities(per_condition, loads, allowed)
-
-
-def _loads(conditions: Sequence[Condition]) -> list[float]:
-    return [tooth_load_n_per_mm(condition.now.frame.pair, condition.facts.point.torque_nm) for condition in conditions]
+    allowed = {NONE, UNKNOWN, *(effects or known)} & set(conditions[0].learned.causes)
+    per_condition = [c.recogniser.probabilities(c.change, c.tooth_load_n_per_mm, known.values()) for c in conditions]
+    return joint_probabilities(per_condition, [c.tooth_load_n_per_mm for c in conditions], allowed)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import cos, inf, radians
 from typing import TypeVar
 
 import numpy as np
@@ -20,7 +20,7 @@ from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_ener
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, GapSize, StructuralFloor, gap_size, pooled_scatter
 from gearsig.gap._population import load_learned
 from gearsig.gap._prediction import ObservedChange
-from gearsig.gap._recognition import Learned
+from gearsig.gap._recognition import Learned, Recogniser
 from gearsig.gap._reduction import (
     DRIVEN,
     DRIVER,
@@ -34,7 +34,7 @@ from gearsig.gap._report import ConditionFacts
 from gearsig.gap._simulator import Added, OperatingCondition, Twin
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import find_problems, metres_per_second_squared
-from gearsig.rig import Rig
+from gearsig.rig import GearPair, Rig
 from gearsig.severity import (
     LARGEST_SPEED_DIFFERENCE,
     ShaftLines,
@@ -105,12 +105,22 @@ class Condition:
     @cached_property
     def floor(self) -> StructuralFloor:
         """How far healthy machines lie from what it is compared with."""
-        return self.learned.floor(with_reference=self.reference is not None)
+        return self.recogniser.floor
 
     @cached_property
     def size(self) -> GapSize:
         """How large the whole gap is."""
         return gap_size(self.change, self.floor)
+
+    @property
+    def recogniser(self) -> Recogniser:
+        """By which its change is recognised."""
+        return self.learned.recognisers[self.reference is not None]
+
+    @property
+    def tooth_load_n_per_mm(self) -> float:
+        """See `tooth_load_n_per_mm`."""
+        return tooth_load_n_per_mm(self.now.frame.pair, self.facts.point.torque_nm)
 
     @property
     def trial_s(self) -> float:
@@ -121,6 +131,28 @@ class Condition:
     def over_floors(self) -> dict[str, float]:
         """Changes over the larger of both floors, with their signs."""
         return over_floors(self.change, self.floor, is_reference=self.reference is not None)
+
+
+USUAL_PRESSURE_ANGLE_DEG = 20.0
+
+LIGHT_LOAD_N_PER_MM = 50.0
+"""Up to which flanks may part and the backlash shows: where dynamic loads can reach the static one, by order."""
+
+
+def tooth_load_n_per_mm(pair: GearPair, torque_nm: float) -> float:
+    """Return the tooth force over the face width, T/(r_b b), N/mm; nan where module or width are not known.
+
+    Parameters
+    ----------
+    pair : GearPair
+    torque_nm : float
+        Of the driver.
+    """
+    if pair.driver_teeth is None or pair.module_mm is None or pair.face_width_mm is None:
+        return float("nan")
+    angle = radians(pair.pressure_angle_deg or USUAL_PRESSURE_ANGLE_DEG)
+    base_radius_mm = pair.driver_teeth * pair.module_mm * cos(angle) / 2.0
+    return 1e3 * abs(torque_nm) / (base_radius_mm * pair.face_width_mm)
 
 
 def trial_length_s(now: ReducedRecording) -> float:
@@ -268,7 +300,7 @@ def _torque_difference(rig: Rig, reference: Rig) -> float:
     recording_nm, reference_nm = _torque_nm(rig), _torque_nm(reference)
     if recording_nm is None or reference_nm is None:
         return 0.0
-    return abs(recording_nm / reference_nm - 1.0) if reference_nm else math.inf
+    return abs(recording_nm / reference_nm - 1.0) if reference_nm else inf
 
 
 def _torque_nm(rig: Rig) -> float | None:

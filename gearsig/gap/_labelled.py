@@ -238,16 +238,13 @@ class LabelledEvidence:
     alike: Mapping[str, float]
 
 
-def labelled_evidence(
-    conditions: Sequence[Condition], loads_n_per_mm: Sequence[float], labelled: Sequence[LabelledChange]
-) -> LabelledEvidence:
+def labelled_evidence(conditions: Sequence[Condition], labelled: Sequence[LabelledChange]) -> LabelledEvidence:
     """Return what labelled recordings say of the conditions, see `LabelSpace`."""
     labels = list(dict.fromkeys(change.label for change in labelled))
     ratios: dict[str, list[float]] = {label: [] for label in labels}
     alike: dict[str, list[float]] = {}
-    for condition, load in zip(conditions, loads_n_per_mm, strict=True):
-        way = condition.reference is not None
-        recogniser = condition.learned.recognisers[way]
+    for condition in conditions:
+        way, recogniser, load = condition.reference is not None, condition.recogniser, condition.tooth_load_n_per_mm
         row = within_reach(recogniser.input_row(condition.change, load))
         unlabelled = recogniser.probabilities(condition.change, load)
         for label in labels:
