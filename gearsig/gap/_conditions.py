@@ -181,7 +181,7 @@ def _slower_hz(now: ReducedRecording) -> float:
 
 
 def simulated(
-    twin: Twin, facts: ConditionFacts, now: ReducedRecording, added: Sequence[Added] = (), noise: int = 0
+    twin: Twin, facts: ConditionFacts, now: ReducedRecording, added: Sequence[Added] = ()
 ) -> ReducedRecording:
     """Return the twin's run at a recording's point, reduced."""
     recording = twin.run(
@@ -190,7 +190,6 @@ def simulated(
         seed=SEED,
         duration_s=run_length_s(now),
         sampling_rate_hz=facts.sampling_rate_hz,
-        noise=noise,
     )
     if recording.rig is None:
         raise InputError("the simulator's recording has no rig", remedy="a twin's recordings must carry the rig")
@@ -200,7 +199,7 @@ def simulated(
 def with_channels_of(simulation: ReducedRecording, now: ReducedRecording) -> ReducedRecording:
     """Return a simulation with the recording's channels: those of equal name, or else in their order."""
     if set(now.channels) <= set(simulation.channels):
-        return simulation.with_channels({name: simulation.channels[name] for name in now.channels})
+        return simulation.of_channels(now.channels)
     simulated_channels = list(simulation.channels.values())
     return simulation.with_channels(
         {name: simulated_channels[i % len(simulated_channels)] for i, name in enumerate(now.channels)}
@@ -284,7 +283,7 @@ def as_long_as(recording: PreparedRecording, reduced: ReducedRecording, shorter:
 def _with_names_of(reference: ReducedRecording, now: ReducedRecording) -> ReducedRecording | None:
     """Return the reference with those of the recording's channels that it has, or the only one of each; else None."""
     if common := [name for name in now.channels if name in reference.channels]:
-        return reference.with_channels({name: reference.channels[name] for name in common})
+        return reference.of_channels(common)
     if len(reference.channels) == len(now.channels) == 1:
         return reference.with_channels(dict(zip(now.channels, reference.channels.values(), strict=True)))
     return None
@@ -668,7 +667,7 @@ def with_common_channels(
     left_out = [channel for channel in now.channels if channel not in reference.channels]
     if left_out:
         messages.append(f"{name}: {', '.join(left_out)} is left out, for the reference has no such channel.")
-    return now.with_channels({channel: now.channels[channel] for channel in reference.channels})
+    return now.of_channels(reference.channels)
 
 
 def check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> None:

@@ -17,7 +17,7 @@ from gearsig.gap._change import change_features, difference_features
 from gearsig.gap._conditions import Condition, HealthyReference, facts_of, matching_reference, read_healthy, simulated
 from gearsig.gap._features import Features
 from gearsig.gap._recognition import Learned, within_reach
-from gearsig.gap._reduction import ReducedRecording, reduce_recording
+from gearsig.gap._reduction import reduce_recording
 from gearsig.gap._report import shares_of
 from gearsig.gap._simulator import OperatingCondition, Twin
 from gearsig.gap._trials import features_digest
@@ -131,27 +131,21 @@ def _change(
     kept = None if cache is None else _read_kept(cache, key, labelled.effect)
     if kept is not None:
         return kept
-    now = _with_channels(reduce_recording(prepared), channels)
+    now = reduce_recording(prepared)
+    # The diagnosed recordings' channels; all its own where it has none of them.
+    now = now.of_channels([name for name in channels if name in now.channels] or now.channels)
     facts = facts_of(prepared, now, twin)
     healthy = list(shared) if labelled.reference is None else [read_healthy(PreparedRecording(labelled.reference))[0]]
     match, why = matching_reference(now, prepared.rig, healthy)
     changes: dict[bool, Features] = {}
     if True in ways and match is not None:
-        common = match.reduced.channels
-        recorded = now.with_channels({name: now.channels[name] for name in common})
-        changes[True] = change_features(recorded, match.reduced)
+        changes[True] = change_features(now.of_channels(match.reduced.channels), match.reduced)
     if False in ways:
         changes[False] = difference_features(now, simulated(twin, facts, now), learned.credibility)
     if not changes:
         reason = why or "it has no healthy reference, and the diagnosis compares with one"
         raise RefusalError(reason, remedy="name its reference in the table")
     return LabelledChange(labelled.effect, facts.point, changes, key)
-
-
-def _with_channels(reduced: ReducedRecording, channels: Sequence[str]) -> ReducedRecording:
-    """Return a recording with those of the diagnosed ones' channels that it has; with all its own where it has none."""
-    common = {name: reduced.channels[name] for name in channels if name in reduced.channels}
-    return reduced.with_channels(common) if common else reduced
 
 
 def _key(

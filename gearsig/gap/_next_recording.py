@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.gap._conditions import SEED, Condition
+from gearsig.gap._conditions import Condition
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._floors import family_members
 from gearsig.gap._report import SLOW_RPM, STEPS, GapCause, GapOutcome, NextRecording, NextStep
@@ -65,11 +65,10 @@ def next_recordings(
             p,
             OF_A_TRIAL * conditions[0].trial_s * max(1.0, base.point.speed_rpm / p.speed_rpm),
             base.sampling_rate_hz,
-            noise=0,
         )
         for p in points
     ]
-    tasks = [Task(run, SEED, tried.fit.added, tuple(places)) for run in runs for tried in (first, second)]
+    tasks = [Task(run, tried.fit.added, tuple(places)) for run in runs for tried in (first, second)]
     rows = simulate(tasks, PROCESSES, lambda *_: None, n_together=2)
     at = {
         point: _distances(conditions, of_first, of_second)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -386,6 +386,10 @@ class ReducedRecording:
     def with_channels(self, channels: dict[str, ChannelSums]) -> ReducedRecording:
         """Return the recording with other sums."""
         return replace(self, channels=channels, kept={})
+
+    def of_channels(self, names: Iterable[str]) -> ReducedRecording:
+        """Return the recording with some of its channels."""
+        return self.with_channels({name: self.channels[name] for name in names})
 
     def average(self, channel: str, side: int) -> ShaftAverage:
         """Return what the driver (0) or the driven shaft (1) repeats in a channel."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gearsig.cache import keep, made_folder, modules_digest, read_arrays
-from gearsig.checks import FloatArray, count, positive
+from gearsig.checks import FloatArray, positive
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.gap._change import change_once
 from gearsig.gap._conditions import SEED, Condition, halves, observed, trial_length_s
@@ -54,109 +54,52 @@ from gearsig.processes import active_cluster, can_be_sent, killed_text, run_jobs
 from gearsig.rig import SIDES
 
 # --------------------
-# A bank on disk: arrays without pickles, whole or not at all; a file that does not fit is made again.
-# --------------------
-
-
-_ARRAYS = ("healthy", "changes", "sidebands")
-SIDEBAND_AXES = 5
-MAX_BYTES = 100_000_000
-"""Of a bank's arrays; a real one has less than one."""
-
-
-def read_bank(path: Path, key: str) -> Bank | None:
-    """Return the bank that a file holds for this key, None where there is no such file, or it is damaged or foreign."""
-    data = read_arrays(path, MAX_BYTES)
-    if data is None:
-        return None
-    try:
-        about = json.loads(str(data["about"]))
-        return _checked(about, {name: data[name] for name in _ARRAYS}) if about["key"] == key else None
-    except (ValueError, KeyError, TypeError, IndexError):
-        return None
-
-
-def write_bank(path: Path, key: str, bank: Bank) -> None:
-    """Keep a bank for the next diagnosis of its rig, where the folder can be written."""
-    about = {
-        "key": key,
-        "point": [bank.point.speed_rpm, bank.point.torque_nm],
-        "feature_names": bank.feature_names,
-        "change_names": bank.change_names,
-        "added": [_plain(a) for a in bank.added],
-        "left_out": [[_plain(a), why] for a, why in bank.left_out],
-    }
-    arrays: dict[str, Any] = {name: getattr(bank, name) for name in _ARRAYS}
-    keep(path, lambda file: np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays))
-
-
-def _checked(about: dict[str, Any], arrays: dict[str, Any]) -> Bank | None:
-
-    names, changes = tuple(about["feature_names"]), tuple(about["change_names"])
-    added = tuple(_added(row) for row in about["added"])
-    healthy, changed, sidebands = (arrays[name] for name in _ARRAYS)
-    n, m = len(names), len(changes)
-    shapes = healthy.ndim == 2 and changed.ndim == 3 and sidebands.ndim == SIDEBAND_AXES
-    if not shapes or len(sidebands) != len(added):
-        return None
-    if sidebands.shape[2:] != (len(SIDES), N_HARMONICS, len(OFFSETS)) or sidebands.dtype != np.complex128:
-        return None
-    if healthy.shape[1] != n or changed.shape[::2] != (len(added), m):
-        return None
-    if any(a.dtype != np.float64 for a in (healthy, changed)):
-        return None
-    left_out = tuple((_added(row), str(why)) for row, why in about["left_out"])
-    return Bank(
-        OperatingCondition(*map(float, about["point"])), names, changes, healthy, added, changed, sidebands, left_out
-    )
-
-
-def _plain(added: Added) -> list[Any]:
-    return [added.name, added.severity, dict(added.options)]
-
-
-def _added(row: list[Any]) -> Added:
-    name, severity, options = row
-    return Added(str(name), float(severity), dict(options))
-
-
-# --------------------
 # The simulations of a bank, in processes of their own or in this one.
 # --------------------
 
 
-SoundKey = tuple[str, OperatingCondition, float, float]
+RunKey = tuple[str, OperatingCondition, float, float]
 
 
 @dataclass(frozen=True)
 class TwinRun:
-    """Where and how long a twin runs."""
+    """Where and how long a twin runs: with the noise and start of its healthy run, so that only an effect differs."""
 
     twin: Twin
     point: OperatingCondition
     duration_s: float
     sampling_rate_hz: float
-    noise: int
 
     @property
-    def healthy_key(self) -> SoundKey:
-        """What the twin's healthy runs depend on; twins need not hash."""
+    def key(self) -> RunKey:
+        """What its runs depend on; twins need not hash."""
         return self.twin.key, self.point, self.duration_s, self.sampling_rate_hz
+
+    def reduced(self, added: Added | None) -> ReducedRecording:
+        """Return a run with an effect, or healthy, reduced."""
+        recording = self.twin.run(
+            self.point,
+            () if added is None else (added,),
+            seed=SEED,
+            duration_s=self.duration_s,
+            sampling_rate_hz=self.sampling_rate_hz,
+        )
+        assert recording.rig is not None  # noqa: S101  part of the protocol
+        return reduce_recording(recording, recording.rig)
 
 
 @dataclass(frozen=True)
 class Task:
-    """One simulation: a specimen with an effect, or healthy; each of the `further` channels is looked at by itself."""
+    """One simulation with an effect, or healthy; each of the `further` channels is looked at by itself."""
 
     run: TwinRun
-    seed: int
     added: Added | None
     further: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """One simulation's features, of a healthy specimen only, and its change against the specimen's healthy first run.
+    """One simulation's features, of a healthy one only, and its change against the healthy run.
 
     `sidebands` are the change's, see `mesh_sidebands`. `alone` has each channel's own change where there are further
     channels; they have no part in `change`.
@@ -205,9 +148,9 @@ def run_for_a_moment(twin: Twin, added: Sequence[Added] = ()) -> None:
     twin.run(twin.point, added, seed=SEED, duration_s=0.05, sampling_rate_hz=20480.0)
 
 
-Known = dict[tuple[SoundKey, int], ReducedRecording]
+Known = dict[RunKey, ReducedRecording]
 _KNOWN: Known = {}
-"""Healthy first runs by twin, point, length and seed, of the one diagnosis that a worker works for."""
+"""Healthy runs by twin, point and length, of the one diagnosis that a worker works for."""
 
 
 def reduced_in_worker(tasks: Sequence[Task]) -> list[Reduced | str]:
@@ -222,20 +165,19 @@ def reduced_apart(tasks: Sequence[Task]) -> list[Reduced | str]:
 
 
 def _reduced(task: Task, known: Known) -> Reduced | str:
-    run = task.run
-    key = run.healthy_key, task.seed
+    key = task.run.key
     try:
         if key not in known:
-            known[key] = _reduced_run(run, task.seed, None, 0)
+            known[key] = task.run.reduced(None)
         healthy = known[key]
-        now = healthy if task.added is None else _reduced_run(run, task.seed, task.added, run.noise)
+        now = healthy if task.added is None else task.run.reduced(task.added)
         alone = {}
         if task.further:
             alone = {
-                name: change_once(_of_channels(now, name), _of_channels(healthy, name))[1] for name in healthy.channels
+                name: change_once(now.of_channels([name]), healthy.of_channels([name]))[1] for name in healthy.channels
             }
             of_the_rig = [name for name in healthy.channels if name not in task.further]
-            now, healthy = _of_channels(now, *of_the_rig), _of_channels(healthy, *of_the_rig)
+            now, healthy = now.of_channels(of_the_rig), healthy.of_channels(of_the_rig)
         names, values = once(healthy) if task.added is None else ((), np.empty(0))
         sidebands = mesh_sidebands(now, healthy, is_turned=False)
         return Reduced(names, values, *change_once(now, healthy), sidebands, alone)
@@ -243,27 +185,14 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
         return str(error)
 
 
-def _of_channels(reduced: ReducedRecording, *channels: str) -> ReducedRecording:
-    return reduced.with_channels({name: reduced.channels[name] for name in channels})
-
-
-def _reduced_run(run: TwinRun, seed: int, added: Added | None, noise: int) -> ReducedRecording:
-    recording = run.twin.run(
-        run.point,
-        () if added is None else (added,),
-        seed=seed,
-        duration_s=run.duration_s,
-        sampling_rate_hz=run.sampling_rate_hz,
-        noise=noise,
-    )
-    assert recording.rig is not None  # noqa: S101  part of the protocol
-    return reduce_recording(recording, recording.rig)
-
-
 # --------------------
-# Which state of the code made the features of a bank.
+# What each effect would change on one rig at one operating point: simulated once, kept on disk.
 # --------------------
 
+
+Progress = Callable[[int, int], object]
+POINT_DIGITS = 3
+"""Speed and torque are rounded to so many digits: recordings of one set point share a bank."""
 
 _MODULES = (
     *(f"gearsig.gap.{name}" for name in ("_reduction", "_features", "_change", "_waveform")),
@@ -279,57 +208,38 @@ def features_digest() -> str:
     return modules_digest(_MODULES)
 
 
-# --------------------
-# What each effect would change on one rig at one operating point: simulated once, kept on disk.
-# --------------------
-
-
-Progress = Callable[[int, int], object]
-POINT_DIGITS = 3
-"""Speed and torque are rounded to so many digits: recordings of one set point share a bank."""
-
-
 @dataclass(frozen=True)
 class Bank:
     """Simulated features of the healthy machine, and what each candidate of one effect changes in them.
 
     Parameters
     ----------
-    point : OperatingCondition
-        At which it was simulated.
     feature_names : tuple of str
         Of `healthy`; see `gearsig.gap`.
     change_names : tuple of str
         Of the changes, the features' names first; see `gearsig.gap`.
-    healthy : array, (n_seeds, n_features)
-        One row per specimen.
+    healthy : array, (n_features,)
     added : tuple of Added
         The candidates that could be simulated.
-    changes : array, (n_added, n_change_seeds, n_changes)
-        Each candidate's run against the healthy first run of the same specimen.
+    changes : array, (n_added, n_changes)
+        Each candidate's run against the healthy run.
     sidebands : complex array, (n_added, n_channels, 2, n_harmonics, n_offsets)
-        The same beside the mesh harmonics, mean over specimens, see `mesh_sidebands`.
-    left_out : tuple of (Added, str)
-        Candidates that could not be simulated, and why.
+        The same beside the mesh harmonics, see `mesh_sidebands`.
     """
 
-    point: OperatingCondition
     feature_names: tuple[str, ...]
     change_names: tuple[str, ...]
     healthy: FloatArray
     added: tuple[Added, ...]
     changes: FloatArray
     sidebands: ComplexArray
-    left_out: tuple[tuple[Added, str], ...] = ()
 
 
 def banks_of(
     runs: Sequence[TwinRun],
     candidates: Mapping[str, Sequence[Added]],
     *,
-    seeds: Sequence[int],
     folder: Path | None,
-    n_change_seeds: int = 1,
     processes: int = 2,
     fresh: bool = False,
     on_progress: Progress = lambda _done, _all: None,
@@ -338,17 +248,12 @@ def banks_of(
 
     Parameters
     ----------
-    runs : sequence of Run
-        Twin, point, length of what is simulated; the point is rounded to `POINT_DIGITS` digits. Noise 0: candidates
-        have the noise and start of the healthy run, so that only the effect differs.
+    runs : sequence of TwinRun
+        Twin, point, length of what is simulated; the point is rounded to `POINT_DIGITS` digits.
     candidates : mapping
         Effect → its settings that are simulated; each effect has a file of its own.
-    seeds : sequence of int
-        Specimens of the healthy machine.
     folder : Path or None
         Where they are kept; None: nowhere.
-    n_change_seeds : int
-        On so many of the specimens, the first ones, each candidate is simulated.
     processes : int
         1: in this process. Otherwise the twins must pickle.
     fresh : bool
@@ -363,7 +268,6 @@ def banks_of(
     RefusalError
         If the healthy machine cannot be simulated or its recording is too short for the features.
     """
-    within = seeds[: min(count(n_change_seeds, "n_change_seeds"), len(seeds))]
     folder = None if folder is None else made_folder(folder, "choose another with --cache")
     requests: dict[str, tuple[TwinRun, Sequence[Added]]] = {}
     keys = []
@@ -371,26 +275,21 @@ def banks_of(
         positive(run.duration_s, "duration_s", "s")
         at = replace(run, point=rounded(run.point))
         for added in candidates.values():
-            keys.append(bank_key(at, added, seeds, within))
+            keys.append(bank_key(at, added))
             requests[keys[-1]] = at, added
     banks = {key: None if folder is None or fresh else read_bank(_bank_path(folder, key), key) for key in requests}
     missing = {key: requests[key] for key, bank in banks.items() if bank is None}
-    healthy = {run.healthy_key: run for run, _ in missing.values()}
-    tasks = [Task(run, seed, None) for run in healthy.values() for seed in seeds]
-    tasks += [Task(run, seed, setting) for run, added in missing.values() for setting in added for seed in within]
+    healthy = {run.key: run for run, _ in missing.values()}
+    tasks = [Task(run, None) for run in healthy.values()]
+    tasks += [Task(run, setting) for run, added in missing.values() for setting in added]
     rows = iter(finished_runs(tasks, processes, on_progress) if tasks else ())
-    healthy_rows = {key: list(islice(rows, len(seeds))) for key in healthy}
+    healthy_rows = {key: next(rows) for key in healthy}
     for key, (run, added) in missing.items():
-        of_request = list(islice(rows, len(added) * len(within)))
-        banks[key] = bank = _assembled(run.point, added, len(within), healthy_rows[run.healthy_key], of_request)
+        banks[key] = bank = _assembled(added, healthy_rows[run.key], list(islice(rows, len(added))))
         if folder is not None:
             write_bank(_bank_path(folder, key), key, bank)
     in_order = iter(banks[key] for key in keys)
     return [{name: bank for name, bank in zip(candidates, in_order, strict=False) if bank is not None} for _ in runs]
-
-
-def _bank_path(folder: Path, key: str) -> Path:
-    return folder / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
 
 
 def rounded(point: OperatingCondition) -> OperatingCondition:
@@ -398,46 +297,76 @@ def rounded(point: OperatingCondition) -> OperatingCondition:
     return OperatingCondition(*(float(f"{v:.{POINT_DIGITS}g}") for v in (point.speed_rpm, point.torque_nm)))
 
 
-def bank_key(run: TwinRun, candidates: Sequence[Added], seeds: Sequence[int], change_seeds: Sequence[int]) -> str:
+def bank_key(run: TwinRun, candidates: Sequence[Added]) -> str:
     """Return all that a bank's numbers depend on, as text."""
-    settings = [[a.name, a.severity, dict(a.options)] for a in candidates]
-    runs = [list(seeds), list(change_seeds), run.duration_s, run.sampling_rate_hz, run.noise]
-    known = [run.twin.key, features_digest(), [run.point.speed_rpm, run.point.torque_nm], settings, runs]
+    settings, lengths = [_plain(added) for added in candidates], [run.duration_s, run.sampling_rate_hz]
+    known = [run.twin.key, features_digest(), [run.point.speed_rpm, run.point.torque_nm], settings, lengths]
     return json.dumps(known, sort_keys=True)
 
 
-def _assembled(
-    point: OperatingCondition,
-    candidates: Sequence[Added],
-    n_seeds: int,
-    healthy_rows: Sequence[Reduced | str],
-    rows: Sequence[Reduced | str],
-) -> Bank:
-    healthy = [row for row in healthy_rows if isinstance(row, Reduced)]
-    if len(healthy) < len(healthy_rows):
-        why = next(row for row in healthy_rows if isinstance(row, str))
-        raise RefusalError(f"the healthy machine cannot be simulated: {why}", remedy="check the rig file")
-    first = healthy[0]
-    kept, changes, sidebands, left_out = [], [], [], []
-    for i, added in enumerate(candidates):
-        of_setting = rows[i * n_seeds : (i + 1) * n_seeds]
-        whole = [row for row in of_setting if isinstance(row, Reduced) and row.change_names == first.change_names]
-        if len(whole) == n_seeds:
-            kept.append(added)
-            changes.append([row.change for row in whole])
-            sidebands.append(np.mean([row.sidebands for row in whole], axis=0))
-        else:
-            left_out.append((added, next((r for r in of_setting if isinstance(r, str)), "it has other features")))
+def _assembled(candidates: Sequence[Added], healthy: Reduced | str, rows: Sequence[Reduced | str]) -> Bank:
+    """Return a bank of the candidates that could be simulated."""
+    if isinstance(healthy, str):
+        raise RefusalError(f"the healthy machine cannot be simulated: {healthy}", remedy="check the rig file")
+    names = healthy.change_names
+    kept = [
+        (added, row)
+        for added, row in zip(candidates, rows, strict=True)
+        if isinstance(row, Reduced) and row.change_names == names
+    ]
+    changes = np.array([row.change for _, row in kept]).reshape(len(kept), len(names))
+    sidebands = np.array([row.sidebands for _, row in kept], dtype=np.complex128)
     return Bank(
-        point,
-        first.names,
-        first.change_names,
-        np.stack([row.values for row in healthy]),
-        tuple(kept),
-        np.array(changes).reshape(len(kept), n_seeds, len(first.change_names)),
-        np.array(sidebands, dtype=np.complex128).reshape(len(kept), *first.sidebands.shape),
-        tuple(left_out),
+        healthy.names,
+        names,
+        healthy.values,
+        tuple(added for added, _ in kept),
+        changes,
+        sidebands.reshape(len(kept), *healthy.sidebands.shape),
     )
+
+
+# A bank on disk: arrays without pickles, whole or not at all; a file that does not fit is made again.
+
+_ARRAYS = ("healthy", "changes", "sidebands")
+MAX_BYTES = 100_000_000
+"""Of a bank's arrays; a real one has less than one."""
+
+
+def _bank_path(folder: Path, key: str) -> Path:
+    return folder / f"bank-{sha256(key.encode()).hexdigest()[:24]}.npz"
+
+
+def write_bank(path: Path, key: str, bank: Bank) -> None:
+    """Keep a bank for the next diagnosis of its rig, where the folder can be written."""
+    names, added = [bank.feature_names, bank.change_names], [_plain(added) for added in bank.added]
+    about = np.array(json.dumps({"key": key, "names": names, "added": added}))
+    arrays: dict[str, Any] = {name: getattr(bank, name) for name in _ARRAYS}
+    keep(path, lambda file: np.savez_compressed(file, about=about, **arrays))
+
+
+def read_bank(path: Path, key: str) -> Bank | None:
+    """Return the bank that a file holds for this key, None where there is no such file, or it is damaged or foreign."""
+    data = read_arrays(path, MAX_BYTES)
+    if data is None:
+        return None
+    try:
+        about = json.loads(str(data["about"]))
+        if about["key"] != key:
+            return None
+        names, changes = map(tuple, about["names"])
+        added = tuple(Added(name, float(severity), options) for name, severity, options in about["added"])
+        bank = Bank(names, changes, data["healthy"], added, data["changes"], data["sidebands"])
+    except (ValueError, KeyError, TypeError, IndexError):
+        return None
+    shapes = bank.healthy.shape, bank.changes.shape, (len(bank.sidebands), *bank.sidebands.shape[2:])
+    expected = (len(names),), (len(added), len(changes)), (len(added), len(SIDES), N_HARMONICS, len(OFFSETS))
+    types = [array.dtype for array in (bank.healthy, bank.changes, bank.sidebands)]
+    return bank if shapes == expected and types == [np.float64, np.float64, np.complex128] else None
+
+
+def _plain(added: Added) -> list[Any]:
+    return [added.name, added.severity, dict(added.options)]
 
 
 PROCESSES = 2
@@ -535,7 +464,6 @@ def try_effects(
     banks = banks_of(
         [trial_run(twin, condition.facts, condition.now) for condition in conditions],
         {name: [*candidates[name], *further_settings.get(name, ())] for name in determined},
-        seeds=[SEED],
         folder=cache,
         processes=PROCESSES,
         fresh=fresh,
@@ -658,13 +586,13 @@ def trial_run(twin: Twin, facts: ConditionFacts, now: ReducedRecording) -> TwinR
     it, see `_distances`.
     """
     still = twin.quiet() if isinstance(twin, CanBeQuiet) else twin
-    return TwinRun(still, facts.point, float(f"{trial_length_s(now):.3g}"), facts.sampling_rate_hz, noise=0)
+    return TwinRun(still, facts.point, float(f"{trial_length_s(now):.3g}"), facts.sampling_rate_hz)
 
 
 def start_healthy_trial(twin: Twin, facts: ConditionFacts, now: ReducedRecording) -> None:
     """Let workers run the healthy machine that trials are compared with, before it is known which are made."""
     run = trial_run(twin, facts, now)
-    start_early(reduced_in_worker, [Task(replace(run, point=rounded(run.point)), SEED, None)])
+    start_early(reduced_in_worker, [Task(replace(run, point=rounded(run.point)), None)])
 
 
 def _paths(
@@ -689,7 +617,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     """
     floor, names = condition.floor, bank.feature_names
     usual = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
-    simulated = dict(zip(names, bank.healthy.mean(axis=0).tolist(), strict=True))
+    simulated = dict(zip(names, bank.healthy.tolist(), strict=True))
     base_names, base = whole_and_parts(condition.baseline)
     if condition.reference is not None:
         compared, baseline = bank.change_names, base[0]
@@ -697,7 +625,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
         compared, baseline = names, condition.learned.credibility * base[0] + usual
     real = dict(zip(base_names, baseline.tolist(), strict=True))
     repeated = dict(zip(floor.names, usual.tolist(), strict=True))
-    changes = bank.changes[[bank.added.index(a) for a in kept]].mean(axis=1)[:, : len(compared)]
+    changes = bank.changes[[bank.added.index(a) for a in kept], : len(compared)]
     table = np.array([transplanted(compared, changes, simulated, real, repeated, *way) for way in WAYS_DB])
     return np.where(shown_in(compared, shows_in), table, 0.0)
 

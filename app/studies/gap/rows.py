@@ -122,7 +122,7 @@ def reduced(recording: Recording, rig: int) -> ReducedRecording:
     if draw.uniform() >= ONE_SENSOR_SHARE:
         return reduced_recording
     name = str(draw.choice(sorted(reduced_recording.channels)))
-    return reduced_recording.with_channels({name: reduced_recording.channels[name]})
+    return reduced_recording.of_channels([name])
 
 
 def put_in_by_hand(
