@@ -14,6 +14,7 @@ from gearsig.gap._features import (
     NamedValue,
     burst_features,
     clearness,
+    jackknife_variance,
     once,
     pattern_features,
     whole_and_parts,
@@ -266,7 +267,7 @@ def difference_features(
 def _with_scatter(names: tuple[str, ...], values: FloatArray, *left_out: FloatArray) -> Features:
     variance = 2.0 * whole_record_variance(names)
     for rows in left_out:
-        variance += (len(rows) - 1.0) * np.var(rows, axis=0)
+        variance += jackknife_variance(rows)
     return Features(names, values, np.sqrt(variance), left_out)
 
 

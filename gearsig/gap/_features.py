@@ -453,10 +453,17 @@ class Features:
     left_out: tuple[FloatArray, ...] = ()
 
 
+def jackknife_variance(rows: FloatArray) -> FloatArray:
+    """Return the variance of what is known from B blocks, (B − 1)/B Σ_b (f_(b) − mean)², f_(b) without block b, (B, …).
+
+    0 where there is one block only.
+    """
+    variance: FloatArray = (len(rows) - 1.0) * np.var(rows, axis=0)
+    return variance
+
+
 def features_of(reduced: ReducedRecording) -> Features:
     """Return a recording's features with their standard errors by the jackknife over blocks of revolutions.
-
-    SE² = (B − 1)/B Σ_b (f_(b) − mean)², f_(b) without block b of B.
 
     Parameters
     ----------
@@ -468,9 +475,8 @@ def features_of(reduced: ReducedRecording) -> Features:
         In the order of the names; dB, or ten times the decadic logarithm.
     """
     names, values = whole_and_parts(reduced)
-    without = values[1:]
-    variance = (len(without) - 1.0) * without.var(axis=0) + whole_record_variance(names)
-    return Features(names, values[0], np.sqrt(variance), (without,))
+    variance = jackknife_variance(values[1:]) + whole_record_variance(names)
+    return Features(names, values[0], np.sqrt(variance), (values[1:],))
 
 
 def whole_and_parts(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:

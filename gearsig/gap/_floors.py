@@ -10,7 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, frozen_array
 from gearsig.errors import InputError
-from gearsig.gap._features import Feature, Features
+from gearsig.gap._features import Feature, Features, jackknife_variance
 from gearsig.gap._report import Interval, PlaceKind
 
 # --------------------
@@ -250,8 +250,8 @@ def gap_size(change: Features, structural: StructuralFloor) -> GapSize:
     hangs on one number and its jackknife on chance. Means of high order lie between, and are smooth. Features of one
     family say nearly the same: their mean counts once however many they are; families add.
 
-    The interval is ± t SE, SE² = (B − 1)/B Σ_b (s_(b) − mean)², s_(b) the size without block b: correlated features
-    change together in it, so that nothing is assumed of them.
+    The interval is ± t SE, by the jackknife over the sizes without each block: correlated features change together in
+    it, so that nothing is assumed of them.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def _size(change: Features, structural: StructuralFloor, floors: FloatArray, who
         return soft_size(change.names, structural.from_centre(change.names, values) / floors) / whole
 
     value = size(change.values)
-    variance = sum((len(rows) - 1.0) * float(np.var([size(row) for row in rows])) for rows in change.left_out)
+    variance = sum(float(jackknife_variance(np.array([size(row) for row in rows]))) for rows in change.left_out)
     return Interval.around(value, t_quantile(_degrees(change)) * variance**0.5, low=0.0)
 
 

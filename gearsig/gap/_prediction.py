@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.gap._features import Feature
+from gearsig.gap._features import Feature, jackknife_variance
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, family_members, t_quantile
 from gearsig.gap._report import MIN_PREDICTED, Interval, Shrinkage
 from gearsig.gap._simulator import Added
@@ -169,7 +169,7 @@ def paths_of(
     """
     groups: dict[tuple[tuple[str, float | str], ...], list[int]] = {}
     for i, added in enumerate(candidates):
-        groups.setdefault(tuple(sorted(added.options.items())), []).append(i)
+        groups.setdefault(added.place, []).append(i)
     paths = []
     for options, rows in groups.items():
         order = sorted(rows, key=lambda i: candidates[i].severity)
@@ -645,8 +645,7 @@ def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPat
     ]
     variances = np.zeros(3)
     for group in fold.again:
-        rows = np.array([_before_and_after(fit, change, used) for change in group])
-        variances += (len(rows) - 1.0) * rows.var(axis=0)
+        variances += jackknife_variance(np.array([_before_and_after(fit, change, used) for change in group]))
     return _Score(
         _before_and_after(fit, fold.scored, used),
         variances,

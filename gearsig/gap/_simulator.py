@@ -55,6 +55,11 @@ class Added:
     severity: float
     options: Mapping[str, float | str] = field(default_factory=dict)
 
+    @property
+    def place(self) -> tuple[tuple[str, float | str], ...]:
+        """The options, for a key."""
+        return tuple(sorted(self.options.items()))
+
 
 @dataclass(frozen=True)
 class OperatingCondition:

@@ -498,12 +498,8 @@ def worth_simulating(candidates: Sequence[Added], determined: Mapping[str, str])
     placed = [added for added in candidates if determined.items() <= added.options.items()]
     if not placed:
         return list(candidates)
-    elsewhere: dict[tuple[tuple[str, float | str], ...], Added] = {}
-    for added in sorted(
-        (candidate for candidate in candidates if candidate not in placed), key=lambda candidate: candidate.severity
-    ):
-        elsewhere[tuple(sorted(added.options.items()))] = added
-    return [*placed, *elsewhere.values()]
+    others = sorted((added for added in candidates if added not in placed), key=lambda added: added.severity)
+    return [*placed, *{added.place: added for added in others}.values()]
 
 
 def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEffect) -> WaveformMatch | None:

@@ -320,7 +320,7 @@ def waveform_match(
     """
     groups: dict[tuple[tuple[str, float | str], ...], list[SimulatedWaveform]] = {}
     for waveform in sorted(waveforms, key=lambda waveform: waveform.added.severity):
-        groups.setdefault(tuple(sorted(waveform.added.options.items())), []).append(waveform)
+        groups.setdefault(waveform.added.place, []).append(waveform)
     if not groups:
         return None
     log_severity = np.linspace(np.log(_EXTENSION * min_severity), np.log(max_severity), _N_SEVERITIES)
@@ -397,8 +397,7 @@ def joined_waveforms(conditions: Sequence[Sequence[SimulatedWaveform]]) -> list[
     by_setting: dict[tuple[float, tuple[tuple[str, float | str], ...]], list[SimulatedWaveform]] = {}
     for waveforms in conditions:
         for waveform in waveforms:
-            key = waveform.added.severity, tuple(sorted(waveform.added.options.items()))
-            by_setting.setdefault(key, []).append(waveform)
+            by_setting.setdefault((waveform.added.severity, waveform.added.place), []).append(waveform)
     whole = [same for same in by_setting.values() if len(same) == len(conditions)]
     return [
         SimulatedWaveform(

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
+from gearsig.gap._features import jackknife_variance
 from gearsig.gap._simulator import Added, DriveFacts, DriveSimulator, DriveTwin, GapEffect
 from gearsig.gap.start_stop._attribution import (
     CRACK,
@@ -240,12 +241,12 @@ class DriveComparison:
 
         A simulated drive has no noise.
         """
-        scatter = _jackknife(self.without)
-        if (reference := self.reference) is None:
-            return scatter
-        kept = [reference.features(cycles) for cycles in _leave_one_out(reference.every)]
-        rows = [change_of(self.features, baseline, self.drive.shape, self.spot) for baseline in kept]
-        return np.hypot(scatter, _jackknife(np.array(rows)))
+        scatter: FloatArray = np.sqrt(jackknife_variance(np.nan_to_num(self.without)))
+        if self.reference is not None:
+            kept = [self.reference.features(cycles) for cycles in _leave_one_out(self.reference.every)]
+            rows = [change_of(self.features, baseline, self.drive.shape, self.spot) for baseline in kept]
+            scatter = np.hypot(scatter, np.sqrt(jackknife_variance(np.nan_to_num(np.array(rows)))))
+        return scatter
 
     def floor(self, *, of_half: bool = False) -> DriveFloor:
         """Return how far healthy drives lie from what this is compared with, as far as it can be told of this one."""
@@ -279,12 +280,6 @@ def _leave_one_out(every: tuple[int, ...]) -> list[tuple[int, ...]]:
     """Return all cycles but one, for each; or but one of eight blocks."""
     blocks = np.array_split(np.array(every), min(len(every), 8))
     return [tuple(c for c in every if c not in block) for block in blocks]
-
-
-def _jackknife(rows: FloatArray) -> FloatArray:
-    """Return the standard error by leaving out each block, (n,)."""
-    error: FloatArray = np.sqrt((len(rows) - 1.0) * np.var(np.nan_to_num(rows), axis=0))
-    return error
 
 
 def read_cycles(recording: Recording) -> PreparedCycles:

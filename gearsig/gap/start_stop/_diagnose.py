@@ -27,6 +27,7 @@ from gearsig.gap import _report as types
 from gearsig.gap._attribution import Attribution, is_calibrated
 from gearsig.gap._conditions import Stage
 from gearsig.gap._evidence import SMALLEST, evidence_of_feature
+from gearsig.gap._features import jackknife_variance
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import (
     NAMING,
@@ -375,7 +376,7 @@ def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[typ
     mean_nm = float(np.quantile(np.abs(cycles.motion.torque_nm), 0.9))
     every = cycles.every
     rows = np.array([cycles.features(tuple(c for c in every if c != cycle)).ripple for cycle in every])
-    scatter = np.sqrt((len(rows) - 1.0) * np.var(rows, axis=0))
+    scatter = np.sqrt(jackknife_variance(rows))
     after = baseline.copy() if fitted is not None else np.zeros(0)
     if fitted is not None and fitted.name == RIPPLE:
         after[compared.spot.order] = np.hypot(after[compared.spot.order], 0.01 * fitted.severity)
