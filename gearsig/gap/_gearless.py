@@ -104,9 +104,7 @@ class ExaminedRecording:
 
     Parameters
     ----------
-    name : str
     analysis : Analysis
-    angle : ShaftAngle
     reference : Analysis or None
         Of the healthy machine at its speed.
     unexpected : tuple of UnexpectedFinding
@@ -114,12 +112,15 @@ class ExaminedRecording:
     notes : tuple of str
     """
 
-    name: str
     analysis: Analysis
-    angle: ShaftAngle
     reference: Analysis | None
     unexpected: tuple[UnexpectedFinding, ...]
     notes: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the recording."""
+        return self.analysis.recording.name
 
     @property
     def is_healthy(self) -> bool:
@@ -128,35 +129,34 @@ class ExaminedRecording:
         return "no-bearing-damage" in codes and self.analysis.outcome is Outcome.NO_FAULT
 
 
-def analysed(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
-    """Analyse a recording whose speed must be known.
+def _angle(analysis: Analysis) -> ShaftAngle:
+    """Return the angle that an analysis found, which must be known.
 
     Raises
     ------
     RefusalError
         If there is no speed.
     """
-    analysis = analyze(recording)
-    if isinstance(analysis.shaft_angle, CannotTell):
-        raise RefusalError(analysis.shaft_angle.reason, remedy=analysis.shaft_angle.remedy)
-    return analysis, analysis.shaft_angle
+    angle = analysis.shaft_angle
+    if isinstance(angle, CannotTell):
+        raise RefusalError(angle.reason, remedy=angle.remedy)
+    return angle
 
 
-def _with_bearings(recording: PreparedRecording) -> tuple[Analysis, ShaftAngle]:
-    """Analyse a recording, once, whose bearings must be examined, as there is nothing else."""
-    analysis_and_angle = recording.keep(("gap", "analysed"), lambda: analysed(recording))
-    for finding in analysis_and_angle[0].findings:
+def _with_bearings(recording: PreparedRecording) -> Analysis:
+    """Analyse a recording, once, whose speed must be known and whose bearings examined, as there is nothing else."""
+    analysis = recording.keep(("gap", "analysed"), lambda: analyze(recording))
+    _angle(analysis)
+    for finding in analysis.findings:
         if finding.code in ("all-channels-dead", "bearings-not-examined"):
             raise RefusalError(finding.title, remedy=finding.surer or "check the measurement chain")
-    return analysis_and_angle
+    return analysis
 
 
-def examined(
-    name: str, analysis_and_angle: tuple[Analysis, ShaftAngle], references: Sequence[tuple[Analysis, ShaftAngle]]
-) -> ExaminedRecording:
+def examined(analysis: Analysis, references: Sequence[Analysis]) -> ExaminedRecording:
     """Return what stands out of a recording, beyond the reference at its speed where there is one."""
-    analysis, angle = analysis_and_angle
-    reference, messages = _reference(name, analysis_and_angle, references)
+    name = analysis.recording.name
+    reference, messages = _reference(analysis, references)
     unexpected = []
     for finding in analysis.findings:
         if finding.code not in (*RACES, *IMPACTS, LINE):
@@ -168,7 +168,7 @@ def examined(
         elif rise_db is None:
             messages.append(f"{name}: {finding.title.rstrip('.')}; the reference shows it too, in another band. {GREW}")
     warnings = tuple(f"{name}: {f.title}" for f in analysis.findings if f.kind in (Kind.DATA_PROBLEM, Kind.CANNOT_TELL))
-    return ExaminedRecording(name, analysis, angle, reference, tuple(unexpected), (*messages, *warnings))
+    return ExaminedRecording(analysis, reference, tuple(unexpected), (*messages, *warnings))
 
 
 def surest(every: Sequence[ExaminedRecording]) -> list[UnexpectedFinding]:
@@ -208,19 +208,16 @@ def _rise_db(finding: Finding, earlier: Earlier) -> float | None:
     return None if differ else earlier.change_db
 
 
-def _reference(
-    name: str, analysis_and_angle: tuple[Analysis, ShaftAngle], references: Sequence[tuple[Analysis, ShaftAngle]]
-) -> tuple[Analysis | None, list[str]]:
+def _reference(analysis: Analysis, references: Sequence[Analysis]) -> tuple[Analysis | None, list[str]]:
     """Return the healthy reference at the recording's speed, and what it cannot be asked; or none and why."""
     if not references:
         return None, []
-    analysis, angle = analysis_and_angle
-    speed = angle.mean_speed_rpm
-    nearest, its_angle = min(references, key=lambda candidate: abs(candidate[1].mean_speed_rpm - speed))
+    name, speed = analysis.recording.name, _angle(analysis).mean_speed_rpm
+    nearest = min(references, key=lambda reference: abs(_angle(reference).mean_speed_rpm - speed))
     channels = {c.channel for c in analysis.channels}
     missing = sorted(channels - {c.channel for c in nearest.channels})
     why = ""
-    if abs(its_angle.mean_speed_rpm / speed - 1.0) > LARGEST_SPEED_DIFFERENCE:
+    if abs(_angle(nearest).mean_speed_rpm / speed - 1.0) > LARGEST_SPEED_DIFFERENCE:
         why = f"no reference is within {percent(LARGEST_SPEED_DIFFERENCE)} of its speed"
     elif len(missing) == len(channels):
         why = f"the reference has no channel {', '.join(missing)}"
@@ -456,10 +453,9 @@ def diagnose_gearless(
     done, rig = iter(range(len(recordings))), recordings[0].rig
 
     def examine(recording: PreparedRecording) -> tuple[ExaminedRecording, list[str]]:
-        name = recording.recording.name
-        tell(f"analysing {name}", 0.2 + 0.7 * next(done) / len(recordings))
+        tell(f"analysing {recording.recording.name}", 0.2 + 0.7 * next(done) / len(recordings))
         healthy = [named_alike(recording.recording, reference) for reference in usable]
-        alone = examined(name, _with_bearings(recording), [_with_bearings(reference) for reference in healthy])
+        alone = examined(_with_bearings(recording), [_with_bearings(reference) for reference in healthy])
         pairs = zip(usable, healthy, strict=True)
         taken = [f.title for then, named in pairs for f in only_channel_taken(then.recording, named.recording)]
         return _beyond_reference(recording, alone, healthy), taken
@@ -547,12 +543,12 @@ def _limits(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRec
 
 
 def _facts(examined_recording: ExaminedRecording) -> ConditionFacts:
-    recording = examined_recording.analysis.recording
+    recording, angle = examined_recording.analysis.recording, _angle(examined_recording.analysis)
     torque = None if recording.rig is None else recording.rig.nominal_torque_nm()
     return ConditionFacts(
         examined_recording.name,
-        OperatingCondition(examined_recording.angle.mean_speed_rpm, NAN if torque is None else torque),
-        examined_recording.angle.n_revolutions,
+        OperatingCondition(angle.mean_speed_rpm, NAN if torque is None else torque),
+        angle.n_revolutions,
         recording.duration_s,
         recording.sampling_rate_hz,
     )
@@ -605,22 +601,20 @@ def unexpected_findings(
     there and easily lost. The analysis looks for it by itself. A strange line and a family that may well be chance are
     notes; a fault of the reference is a doubt about everything else.
     """
-    name = recording.recording.name
-    try:
-        now = analysed(recording)
-    except RefusalError:  # without a speed no family of impacts has an order
+    name, now = recording.recording.name, analyze(recording)
+    if isinstance(now.shaft_angle, CannotTell):  # without a speed no family of impacts has an order
         return [], [], []
     speeds: list[tuple[float, int, PreparedRecording]] = []
     for reference in references if len(references) > 1 else ():
         with suppress(RefusalError):  # a reference without a speed is no help
-            speeds.append((abs(reference.shaft_angle.mean_speed_rpm - now[1].mean_speed_rpm), len(speeds), reference))
+            speeds.append(
+                (abs(reference.shaft_angle.mean_speed_rpm - now.shaft_angle.mean_speed_rpm), len(speeds), reference)
+            )
     nearest = min(speeds)[2] if speeds else references[0] if len(references) == 1 else None
-    healthy: list[tuple[Analysis, ShaftAngle]] = []
-    if nearest is not None:
-        with suppress(RefusalError):
-            healthy = [analysed(named_alike(recording.recording, nearest))]
-    now_examined = examined(name, now, healthy)
-    warnings = _fault_of_reference(healthy[0][0], now[0], name) if healthy else []
+    healthy = [] if nearest is None else [analyze(named_alike(recording.recording, nearest))]
+    healthy = [analysis for analysis in healthy if isinstance(analysis.shaft_angle, ShaftAngle)]
+    now_examined = examined(now, healthy)
+    warnings = _fault_of_reference(healthy[0], now, name) if healthy else []
     weak = [part for part in now_examined.unexpected if part.finding.code == LINE or part.finding.kind is Kind.NOTICE]
     strong = [part for part in now_examined.unexpected if part not in weak]
     messages = [
