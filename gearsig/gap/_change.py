@@ -258,7 +258,7 @@ def difference_features(
     ----------
     now, simulated : ReducedRecording
     credibility : array, (n_features,), or float
-        How much of what the simulation says of each feature is subtracted, see `gearsig.gap`.
+        How much of what the simulation says of each feature is subtracted, see `credibility_of`.
     """
     (names, measured), before = whole_and_parts(now), credibility * whole_and_parts(simulated)[1]
     return _with_scatter(names, measured[0] - before[0], measured[1:] - before[0], measured[0] - before[1:])
@@ -453,7 +453,7 @@ def contrast_rows(names: Sequence[str], distances: FloatArray) -> FloatArray:
     Parameters
     ----------
     names : sequence of str
-        Of changes, see `gearsig.gap` or `gearsig.gap`.
+        Of changes, see `change_features` and `difference_features`.
     distances : array, (n_rows, n)
         Changes in units that healthy machines reach.
 

@@ -115,7 +115,7 @@ def diagnose_gap(
     """Diagnose the gap between recordings of one machine and its simulation.
 
     A rig with bearings and no gear pair cannot be simulated: what stands out of its recordings is named where it is a
-    damaged race, see `gearsig.gap`.
+    damaged race.
 
     Parameters
     ----------

@@ -20,12 +20,12 @@ MAX_SHOWN, MAX_OF_A_FAMILY = 10, 3
 CLEAR = 1.0
 """Floors from which a change, predicted or observed, says something."""
 
-SMALLEST = 0.3
+MIN_SIGN_FLOORS = 0.3
 """Floors from which the sign of a prediction says something, and a predicted start–stop change is worth a line."""
 
 OWN_FEATURE_WEIGHT = 2.0
 
-AGREES = 0.5
+MIN_AGREEING_RATIO = 0.5
 """Observed over predicted, from here to its inverse, speaks for the effect."""
 
 
@@ -81,10 +81,10 @@ def evidence_of_feature(
         Floors from which a prediction of the right size speaks for the effect.
     """
     size, remainder = abs(predicted_db), abs(predicted_db - observed_db)
-    if size == 0.0 or size < SMALLEST * floor_db:
+    if size == 0.0 or size < MIN_SIGN_FLOORS * floor_db:
         return Evidence(feature, predicted_db, observed_db, floor_db, speaks_for=False)
     ratio, is_clear = observed_db / predicted_db, size >= CLEAR * floor_db
-    alike = size >= min_floors * floor_db and AGREES <= ratio <= 1.0 / AGREES
+    alike = size >= min_floors * floor_db and MIN_AGREEING_RATIO <= ratio <= 1.0 / MIN_AGREEING_RATIO
     agrees = alike or (is_clear and remainder <= floor_db)
     further = not agrees and ratio > 1.0 and (is_clear or remainder <= floor_db)
     return Evidence(feature, predicted_db, observed_db, floor_db, agrees, further)
@@ -127,7 +127,7 @@ FIRST_ORDER = {"misalignment": 2}
 MAX_RISE = 6.0
 """Floors that one sign counts for."""
 
-TIMES = 1.5
+MIN_SHAFT_RATIO = 1.5
 """The signs on the one shaft over those on the other."""
 
 
@@ -149,11 +149,11 @@ class ShaftSigns:
     @property
     def side(self) -> int | None:
         """0: driver, 1: driven, None: cannot be told."""
-        if self.slow is not None and TIMES * self.rise[self.slow] > self.rise[1 - self.slow]:
+        if self.slow is not None and MIN_SHAFT_RATIO * self.rise[self.slow] > self.rise[1 - self.slow]:
             return self.slow if self.rise[self.slow] >= CLEAR else None
         larger = int(np.argmax(self.rise))
         larger_rise, smaller_rise = self.rise[larger], self.rise[1 - larger]
-        return larger if larger_rise >= CLEAR and larger_rise >= TIMES * smaller_rise else None
+        return larger if larger_rise >= CLEAR and larger_rise >= MIN_SHAFT_RATIO * smaller_rise else None
 
 
 def shaft_signs(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> ShaftSigns | None:

@@ -539,7 +539,7 @@ SMOOTH_STEPS = 6
 NEAR_PITCHES = (-2.0, 3.5)
 """Beyond which energy is elsewhere."""
 
-LEAST_SHARE, LEAST_ECHO = 1e-4, 1e-3
+MIN_BURST_SHARE, MIN_ECHO = 1e-4, 1e-3
 """Added before the logarithm: smaller ones are noise."""
 
 WAYS = ("plain", "even")
@@ -585,14 +585,14 @@ def burst_features(lines: ComplexArray, noise: FloatArray, teeth: int) -> Iterat
         course = _cut(energy, COURSE_PITCHES).reshape(N_QUARTERS, width).sum(axis=1)
         shares = course / max(float(course.sum()), 1e-300)
         for i, share in enumerate(shares):
-            yield f"burst.{way}.course.{i}", decibel(share + LEAST_SHARE)
+            yield f"burst.{way}.course.{i}", decibel(share + MIN_BURST_SHARE)
         smooth = convolve1d(_cut(energy, ECHO_PITCHES), _window(SMOOTH_STEPS), mode="reflect")
         whole = max(float(np.sum(smooth**2)), 1e-300)
         for i, lag in enumerate((ECHO_LAGS_PITCHES * STEPS_PER_PITCH).astype(int)):
             echo = float(np.sum(smooth[:-lag] * smooth[lag:])) / whole
-            yield f"burst.{way}.echo.{i}", decibel(echo + LEAST_ECHO)
+            yield f"burst.{way}.echo.{i}", decibel(echo + MIN_ECHO)
         elsewhere = max(1.0 - float(_cut(energy, NEAR_PITCHES).sum()), 0.0)
-        yield f"burst.{way}.elsewhere", decibel(elsewhere + LEAST_ECHO)
+        yield f"burst.{way}.elsewhere", decibel(elsewhere + MIN_ECHO)
 
 
 def _energy(lines: ComplexArray, noise: FloatArray, teeth: int, *, even: bool) -> FloatArray:

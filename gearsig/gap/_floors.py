@@ -144,7 +144,7 @@ class StructuralFloor:
     Parameters
     ----------
     names : tuple of str
-        Of features, see `gearsig.gap`.
+        Of features, see `once` and `change_once`.
     values : array, (n,), above 0
         dB: 19 of 20 healthy machines lie within `centres` ± `values`.
     centres : array, (n,)

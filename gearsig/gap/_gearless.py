@@ -63,7 +63,7 @@ PARTS = {f"bearing-{part.replace(' ', '-')}": (part, name) for name, (part, _) i
 
 SAME_EDGE = 0.1
 """Relative, of a band's edges."""
-GREW = "Whether it has grown cannot be told."
+GROWTH_NOT_KNOWN = "Whether it has grown cannot be told."
 
 MIN_RISE_DB = 6.0
 """Twice the reference's level: less is between two recordings of the same machine."""
@@ -166,7 +166,9 @@ def examined(analysis: Analysis, references: Sequence[Analysis]) -> ExaminedReco
         if earlier is None or finding.kind is Kind.FAULT or (rise_db is not None and rise_db >= MIN_RISE_DB):
             unexpected.append(UnexpectedFinding(finding, name, rise_db))
         elif rise_db is None:
-            messages.append(f"{name}: {finding.title.rstrip('.')}; the reference shows it too, in another band. {GREW}")
+            messages.append(
+                f"{name}: {finding.title.rstrip('.')}; the reference shows it too, in another band. {GROWTH_NOT_KNOWN}"
+            )
     warnings = tuple(f"{name}: {f.title}" for f in analysis.findings if f.kind in (Kind.DATA_PROBLEM, Kind.CANNOT_TELL))
     return ExaminedRecording(analysis, reference, tuple(unexpected), (*messages, *warnings))
 
@@ -234,7 +236,7 @@ def _reference(analysis: Analysis, references: Sequence[Analysis]) -> tuple[Anal
 # --------------------
 
 
-HIDDEN = 0.2
+MISSED_FAULT = 0.2
 """Probability of something that does not show, where damage of a race would have shown."""
 UNDECIDED = 0.5
 """Share of unknown in what is left over, where nothing tells it from none."""
@@ -334,7 +336,7 @@ def _share_of_unknown(
         return max([UNDECIDED, *impacts])
     if unexpected:
         return max(part.finding.confidence for part in unexpected)
-    return HIDDEN if all(part.is_healthy for part in every) else UNDECIDED
+    return MISSED_FAULT if all(part.is_healthy for part in every) else UNDECIDED
 
 
 def _race(effect: GapEffect, part: UnexpectedFinding | None, rig: Rig, *, scale: float) -> GapCause:

@@ -209,7 +209,7 @@ def labelled_support(log_ratios: FloatArray) -> float:
     return float(np.logaddexp.reduce(weighted_logs)) - log(len(weighted_logs))
 
 
-SAME_SPEED = 1.25
+MAX_SPEED_RATIO = 1.25
 """Ratio of speeds up to which recordings of a label are compared first."""
 
 
@@ -243,7 +243,7 @@ def labelled_evidence(conditions: Sequence[Condition], labelled: Sequence[Labell
         unlabelled = recogniser.probabilities(condition.change, load)
         for label in labels:
             of_label = [change for change in labelled if change.label == label and way in change.changes]
-            near = [change for change in of_label if _speed_ratio(change, condition) <= SAME_SPEED] or of_label
+            near = [change for change in of_label if _speed_ratio(change, condition) <= MAX_SPEED_RATIO] or of_label
             if not near:
                 continue
             rows = np.array([within_reach(recogniser.input_row(change.changes[way], load)) for change in near])

@@ -17,11 +17,11 @@ from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, 
 FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
 """Speeds and torques that are looked at, over those of the first recording, beside the recordings' own."""
 
-OF_A_TRIAL = 0.6
+LENGTH_RATIO = 0.6
 """Length of these runs over that of a trial: only how far two effects lie apart is asked, and a third of a diagnosis's
 time went into it."""
 
-ENOUGH = 1.2
+MIN_DISTANCE_RATIO = 1.2
 """Times the distance that there is now, from which a further point is worth naming."""
 
 PRESENT_SENSORS = ""
@@ -63,7 +63,7 @@ def next_recordings(
         TwinRun(
             measured,
             p,
-            OF_A_TRIAL * conditions[0].trial_s * max(1.0, base.point.speed_rpm / p.speed_rpm),
+            LENGTH_RATIO * conditions[0].trial_s * max(1.0, base.point.speed_rpm / p.speed_rpm),
             base.sampling_rate_hz,
         )
         for p in points
@@ -117,12 +117,12 @@ def _informative_sensors(
 ) -> Iterator[tuple[str, float]]:
     """Yield the rig's own sensors, and the best further one if it shows more than they, where it is worth it."""
     with_present_sensors = distances.get(PRESENT_SENSORS, 0.0)
-    if with_present_sensors >= ENOUGH * now:
+    if with_present_sensors >= MIN_DISTANCE_RATIO * now:
         yield PRESENT_SENSORS, with_present_sensors
     further = {name: d for name, d in distances.items() if name in places}
     best = max(further, key=further.__getitem__, default="")
     usual = max([best_sensor, with_present_sensors, *(d for name, d in distances.items() if name not in places)])
-    if best and further[best] >= ENOUGH * usual:
+    if best and further[best] >= MIN_DISTANCE_RATIO * usual:
         yield best, further[best]
 
 

@@ -336,7 +336,7 @@ def transplanted(
     Parameters
     ----------
     names : sequence of str
-        Of the changes, see `gearsig.gap`; those of patterns last, or none.
+        Of the changes, see `change_once`; those of patterns last, or none.
     change : array, (…, n)
         dB, with the effect less healthy, both simulated. `change.…`: the pattern's own value.
     simulated, real : mapping

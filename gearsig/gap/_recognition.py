@@ -228,8 +228,8 @@ def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArra
 
 
 # --------------------
-# The textbook's rules: effects bring their signs along, in the features of `gearsig.gap`; of several rules for a cause
-# the strongest counts.
+# The textbook's rules: effects bring their signs along, as features of `once` and `change_once`; of several rules for a
+# cause the strongest counts.
 # --------------------
 
 
@@ -336,7 +336,7 @@ class Recogniser:
         change : Features
             Against the reference or against the twin, as the forest was fitted.
         tooth_load_n_per_mm : float
-            See `gearsig.gap`; nan where it is not known.
+            See `tooth_load_n_per_mm`; nan where it is not known.
         effects : iterable of GapEffect
             Whose textbook signs are asked, without a reference.
         """

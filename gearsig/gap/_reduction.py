@@ -153,12 +153,12 @@ def background_orders(rig: Rig) -> tuple[float, ...]:
 
     def is_own(order: float) -> bool:
         offsets = order - steps
-        return bool(np.min(np.abs(offsets - teeth * np.maximum(np.round(offsets / teeth), 1.0))) < CLOSE)
+        return bool(np.min(np.abs(offsets - teeth * np.maximum(np.round(offsets / teeth), 1.0))) < INSEPARABLE_ORDERS)
 
     return tuple(sorted(order for order in line_orders if order > 0.0 and not is_own(order)))
 
 
-CLOSE = 0.03
+INSEPARABLE_ORDERS = 0.03
 """Orders, closer than which to the first pair's mesh harmonics and first sidebands nobody can tell two lines apart in
 a hundred revolutions: such lines stay."""
 

@@ -603,7 +603,7 @@ class GapReport(Result, rows="causes"):
     repeatability : float
         The same in repeatability floors.
     places : tuple of GapPlace
-        See `gearsig.gap`.
+        As `ranked_places` orders them.
     causes : tuple of GapCause
         What the outcome names first, the others by probability; these add up to 1.
     groups : mapping
@@ -729,13 +729,13 @@ def _which(report: GapReport) -> str:
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
         return f"Which: {_kind_and_rivals(report, report.inseparable)}; these recordings cannot tell them apart."
     size = f", {_severity(first, first.severity)}" if first.severity and not first.severity.is_unbounded else ""
-    if report.kind is not None and report.kind.probability - first.probability >= SURER:
+    if report.kind is not None and report.kind.probability - first.probability >= MIN_SURER:
         return f"Which: {_kind(report.kind)}: {first.title}{size} (probability {odds})."
     place = f" at {first.place}" if first.place else ""
     return f"Which: {first.title}{place}{size} (probability {odds})."
 
 
-SURER = 0.01
+MIN_SURER = 0.01
 """By how much the kind of fault is surer than the effect, from which it is told first."""
 
 

@@ -215,9 +215,9 @@ class Bank:
     Parameters
     ----------
     feature_names : tuple of str
-        Of `healthy`; see `gearsig.gap`.
+        Of `healthy`; see `once`.
     change_names : tuple of str
-        Of the changes, the features' names first; see `gearsig.gap`.
+        Of the changes, the features' names first; see `change_once`.
     healthy : array, (n_features,)
     added : tuple of Added
         The candidates that could be simulated.
@@ -664,7 +664,7 @@ def refuse_where_none_ran(tried: dict[str, TriedEffect], names: Sequence[str], t
 # --------------------
 
 
-WORTH_IT = 0.05
+MIN_CLOSED = 0.05
 """Share of the gap that a further effect must take away to be shown."""
 
 MAX_ADDED = 2
@@ -680,7 +680,7 @@ def steps_of(
     added: list[TriedEffect] = []
     for name in names:
         remaining = _remaining_gap(conditions, folds, [*added, tried[name]])
-        if added and remaining.value > (1.0 - WORTH_IT) * steps[-1].remaining.value:
+        if added and remaining.value > (1.0 - MIN_CLOSED) * steps[-1].remaining.value:
             break
         added.append(tried[name])
         title = next(c.title for c in causes if c.name == name)

@@ -57,7 +57,7 @@ LOG_SCALES = np.linspace(-3.0, 3.0, 25)
 SCALE_SCATTER = 0.7
 """Of ln g where the severity is right: mesh lines of deviating flanks, cracks at other angles, wider chips."""
 
-GOOD = 0.6
+MIN_CORRELATION = 0.6
 """Correlation from which a twin is believed to show the profile of a fault."""
 
 _N_TURNS = 128
@@ -300,7 +300,7 @@ class WaveformMatch:
     @property
     def is_good(self) -> bool:
         """Whether the twin shows the profile of the fault well enough to tell which it is, and on which gear."""
-        return self.correlation >= GOOD
+        return self.correlation >= MIN_CORRELATION
 
 
 def waveform_match(

@@ -23,19 +23,25 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import readable
-from gearsig.gap import _report as types
 from gearsig.gap._attribution import Attribution, is_calibrated
 from gearsig.gap._conditions import Stage
-from gearsig.gap._evidence import SMALLEST, evidence_of_feature
+from gearsig.gap._evidence import MIN_SIGN_FLOORS, evidence_of_feature
 from gearsig.gap._features import jackknife_variance
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import (
     NAMING,
+    AngleCurves,
+    ConditionFacts,
+    Evidence,
     GapCause,
     GapOutcome,
     GapPlace,
     GapReport,
+    GapStep,
     Interval,
+    NextRecording,
+    PlaceKind,
+    SpectrumCurves,
     fitted_words,
     in_order,
     most_probable_two,
@@ -180,11 +186,11 @@ def _repeatability_limit(compared: DriveComparison) -> FloatArray:
     return FLOOR_IN_DEVIATIONS * np.maximum(compared.scatter, 0.05)
 
 
-def _facts(compared: DriveComparison) -> types.ConditionFacts:
+def _facts(compared: DriveComparison) -> ConditionFacts:
     m = compared.now.motion
     top_rpm = float(np.quantile(np.abs(m.driver_speed_rad_s), 0.98)) * 30.0 / np.pi
     torque_nm = float("nan") if m.torque_nm is None else compared.drive.twin.point.torque_nm
-    return types.ConditionFacts(
+    return ConditionFacts(
         compared.name,
         OperatingCondition(top_rpm, torque_nm),
         float(np.ptp(m.driver_angle_rad)) / (2.0 * np.pi),
@@ -210,23 +216,27 @@ def _cause(diagnosis: DriveDiagnosis, k: int, name: str, probability: float) -> 
     )
 
 
-def _evidence(fitted: FittedDriveCause, compared: DriveComparison) -> tuple[types.Evidence, ...]:
+def _evidence(fitted: FittedDriveCause, compared: DriveComparison) -> tuple[Evidence, ...]:
     """Return what it predicts and what was observed: its own changes, and those that it leaves unexplained."""
     floor, change, predicted = compared.floor(), compared.change, fitted.predicted
     limit, observed = floor.limit, np.nan_to_num(change - floor.centre)
     free = np.isin(NAMES, TRIED[fitted.name].may_move)
     size = np.maximum(np.abs(predicted) / limit, np.where(free, 0.0, np.abs(observed) / limit))
     known = [i for i in np.argsort(-size) if np.isfinite(change[i])]
-    kept = [i for i in known if abs(predicted[i]) > SMALLEST * limit[i] or size[i] > 1.0][:6]
+    kept = [i for i in known if abs(predicted[i]) > MIN_SIGN_FLOORS * limit[i] or size[i] > 1.0][:6]
     return tuple(
         evidence_of_feature(
-            FEATURES[NAMES[i]].words, float(predicted[i]), float(observed[i]), float(limit[i]), min_floors=SMALLEST
+            FEATURES[NAMES[i]].words,
+            float(predicted[i]),
+            float(observed[i]),
+            float(limit[i]),
+            min_floors=MIN_SIGN_FLOORS,
         )
         for i in kept
     )
 
 
-def _steps(compared: DriveComparison, evidence: DriveEvidence, cause: GapCause) -> tuple[types.GapStep, ...]:
+def _steps(compared: DriveComparison, evidence: DriveEvidence, cause: GapCause) -> tuple[GapStep, ...]:
     """Return what is left of the whole gap: before, and with an effect, fitted to the other half of the cycles."""
     floor, predicted = compared.floor(of_half=True), evidence.predicted[cause.name]
     fitted = [fit(predicted, fold.fitted_to, floor).predicted for fold in evidence.folds]
@@ -235,9 +245,7 @@ def _steps(compared: DriveComparison, evidence: DriveEvidence, cause: GapCause) 
         pairs = list(zip(evidence.folds, predictions, strict=True))
         return floor.size_interval([fold.held_out - t for fold, t in pairs], [fold.without - t for fold, t in pairs])
 
-    return types.GapStep("before", remaining([0.0 * change for change in fitted])), types.GapStep(
-        cause.title, remaining(fitted)
-    )
+    return GapStep("before", remaining([0.0 * change for change in fitted])), GapStep(cause.title, remaining(fitted))
 
 
 def _messages(diagnosis: DriveDiagnosis, clearest: DriveComparison, evidence: DriveEvidence) -> Iterator[str]:
@@ -363,12 +371,12 @@ def _phases(compared: DriveComparison) -> list[GapPlace]:
                 f"{UNITS[quantity]} off its prediction, {readable(usual, 2)} ordinarily"
             )
             channel = "" if quantity == COMPRESSION else quantity
-            kind = types.PlaceKind.SPEED
+            kind = PlaceKind.SPEED
             places.append(GapPlace(kind, title, change_db, channel=channel, follows=True))
     return sorted(places, key=lambda place: -place.change_db)[:3]
 
 
-def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[types.SpectrumCurves, ...]:
+def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[SpectrumCurves, ...]:
     """Return the torque by order of the pinion while running; none without torque."""
     cycles, now, baseline = compared.now, compared.features.ripple, compared.baseline.ripple
     if cycles.motion.torque_nm is None or not np.all(np.isfinite(now)) or not np.all(np.isfinite(baseline)):
@@ -384,7 +392,7 @@ def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[typ
     limit = float(compared.floor().limit[NAMES.index("ripple")])
     part = 2.0 * compared.spot.ripple_step * float(np.sinh(limit * np.log(10.0) / 20.0))
     return (
-        types.SpectrumCurves(
+        SpectrumCurves(
             "torque while running, over the pinion's revolution",
             "N m",
             cycles.orders.astype(np.float64),
@@ -399,7 +407,7 @@ def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[typ
 
 def _tooth_curves(
     compared: DriveComparison, fitted: Added | None, fits: Mapping[str, FittedDriveCause]
-) -> tuple[types.AngleCurves, ...]:
+) -> tuple[AngleCurves, ...]:
     """Return what each tooth of the pinion yields beyond the median one, 1 + (extra/floor)²: healthy ones are 1."""
     now, baseline, spot = compared.features.teeth_um, compared.baseline.teeth_um, compared.spot
     n = len(now)
@@ -418,7 +426,7 @@ def _tooth_curves(
             teeth[spot.tooth] += 2.0 * spot.tooth_step_um * np.sinh(over)
         after = energy(teeth)
     angle = 360.0 * (np.arange(n) + 0.5) / n
-    return (types.AngleCurves("pinion", "µm²", n, True, angle, energy(now), energy(baseline), after),)
+    return (AngleCurves("pinion", "µm²", n, True, angle, energy(now), energy(baseline), after),)
 
 
 def _next_recordings(
@@ -427,7 +435,7 @@ def _next_recordings(
     fits: Mapping[str, FittedDriveCause],
     pair: tuple[str, str],
     effects: Mapping[str, GapEffect],
-) -> tuple[types.NextRecording, ...]:
+) -> tuple[NextRecording, ...]:
     """Return starts and stops at other torques that put the predictions of two causes further apart, best first."""
     limit = compared.floor().limit
     healthy_friction_nm = compared.drive.healthy.friction_nm
@@ -460,7 +468,7 @@ def _next_recordings(
                 f"starts and stops at {drive.twin.point.torque_nm:.3g} N·m; {titles} are then "
                 f"{distance:.2g} structural floors apart instead of {now:.2g}."
             )
-            recordings.append(types.NextRecording(drive.twin.point, pair, distance, now, text))
+            recordings.append(NextRecording(drive.twin.point, pair, distance, now, text))
     return tuple(sorted(recordings, key=lambda recording: -recording.standard_deviations))
 
 
