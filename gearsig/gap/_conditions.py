@@ -232,12 +232,15 @@ def facts_of(prepared: PreparedRecording, now: ReducedRecording, twin: Twin) -> 
 
 @dataclass(frozen=True)
 class HealthyReference:
-    """A healthy machine's recording, reduced, with its rig and its name; whole, where it may have to be cut."""
+    """A healthy machine's recording, and what it is reduced to: with those channels that are compared."""
 
     reduced: ReducedRecording
-    rig: Rig
-    name: str
-    whole: PreparedRecording | None = field(default=None, compare=False, repr=False)
+    recording: PreparedRecording = field(compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """Of the recording."""
+        return self.recording.recording.name
 
 
 def matching_reference(
@@ -251,11 +254,10 @@ def matching_reference(
     change = now.speed_hz / reference.speed_hz - 1.0
     if abs(change) > LARGEST_SPEED_DIFFERENCE:
         return None, f"no reference within {percent(LARGEST_SPEED_DIFFERENCE)} of its speed"
-    if _torque_difference(rig, nearest.rig) > LARGEST_TORQUE_DIFFERENCE:
-        torque_nm, reference_nm = _torque_nm(rig), _torque_nm(nearest.rig)
+    if _torque_difference(rig, nearest.recording.rig) > LARGEST_TORQUE_DIFFERENCE:
+        torque_nm, reference_nm = _torque_nm(rig), _torque_nm(nearest.recording.rig)
         return None, f"the reference at its speed has {reference_nm:.3g} N m, the recording {torque_nm:.3g} N m"
-    if nearest.whole is not None:
-        reference = as_long_as(nearest.whole, reference, now)
+    reference = as_long_as(nearest.recording, reference, now)
     named = _with_names_of(reference, now)
     if named is None:
         return None, f"the reference has the channels {', '.join(reference.channels)}"
@@ -291,7 +293,7 @@ def _with_names_of(reference: ReducedRecording, now: ReducedRecording) -> Reduce
 
 def _distance(now: ReducedRecording, rig: Rig, reference: HealthyReference) -> float:
     speed = abs(now.speed_hz / reference.reduced.speed_hz - 1.0)
-    return 10.0 * speed + _torque_difference(rig, reference.rig)
+    return 10.0 * speed + _torque_difference(rig, reference.recording.rig)
 
 
 def _torque_difference(rig: Rig, reference: Rig) -> float:
@@ -620,8 +622,8 @@ def readable(
 
 def read_healthy(recording: PreparedRecording) -> tuple[HealthyReference, list[str]]:
     """Return a healthy recording reduced, and what is worth a remark."""
-    name, (reduced, messages) = recording.recording.name, _reduced(recording)
-    return HealthyReference(reduced, recording.rig, name, recording), [*messages, *strange_teeth(reduced, name)]
+    reduced, messages = _reduced(recording)
+    return HealthyReference(reduced, recording), [*messages, *strange_teeth(reduced, recording.recording.name)]
 
 
 def _condition(

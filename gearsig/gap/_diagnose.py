@@ -42,7 +42,7 @@ from gearsig.gap._report import (
     within_the_floor,
 )
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
-from gearsig.gap._tooth_error import ToothErrorEvidence, mean_log_likelihoods, tooth_error_evidence
+from gearsig.gap._tooth_error import ToothErrorEvidence, has_encoders, mean_log_likelihoods, tooth_error_evidence
 from gearsig.gap._trials import (
     PROCESSES,
     TriedEffect,
@@ -287,7 +287,7 @@ def diagnose_gap(
             causes,
             [condition.facts.point for condition in conditions],
             has_reference=all(condition.reference is not None for condition in conditions),
-            has_encoders=sum(channel.quantity == "angle" for channel in recording.recording.channels) > 1,
+            has_encoders=has_encoders(recording.recording),
             is_labelled=labels is not None,
         ),
     )

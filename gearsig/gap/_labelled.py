@@ -156,7 +156,7 @@ def _key(
     twin: Twin,
 ) -> str:
     digest = sha256(repr((ways, tuple(channels), features_digest(), twin.key if False in ways else "")).encode())
-    healthy = [labelled.reference] if labelled.reference is not None else [s.whole.recording for s in shared if s.whole]
+    healthy = [labelled.reference] if labelled.reference is not None else [s.recording.recording for s in shared]
     for recording in (labelled.recording, *healthy):
         digest.update(np.ascontiguousarray(recording.samples).tobytes())
         digest.update(repr((recording.sampling_rate_hz, recording.channels, recording.rig)).encode())

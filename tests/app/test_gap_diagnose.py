@@ -139,7 +139,7 @@ def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
     now, notes = reduce_recording(run(noise=1), rig()), list[str]()
     first, *others = now.channels
     reference = now.with_channels({first: now.channels[first]})
-    healthy = [HealthyReference(reference, rig(), "healthy.h5")]
+    healthy = [HealthyReference(reference, PreparedRecording(run(noise=1)))]
     assert list(with_common_channels(now, reference, healthy, "now", notes).channels) == [first]
     assert notes == [f"now: {', '.join(others)} is left out, for the reference has no such channel."]
 

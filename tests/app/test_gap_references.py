@@ -25,7 +25,7 @@ def run(seed: int) -> ReducedRecording:
 
 
 def healthy(gathered: ReducedRecording) -> list[HealthyReference]:
-    return [HealthyReference(gathered, RIG, "healthy.h5")]
+    return [HealthyReference(gathered, PreparedRecording(record(seed=1)))]
 
 
 def named(seed: int, *names: str) -> ReducedRecording:
@@ -33,14 +33,13 @@ def named(seed: int, *names: str) -> ReducedRecording:
 
 
 def test_equal_names_are_compared_as_they_are() -> None:
-    assert matching_reference(run(0), RIG, healthy(run(1))) == (HealthyReference(run(1), RIG, "healthy.h5"), "")
+    assert matching_reference(run(0), RIG, healthy(run(1))) == (healthy(run(1))[0], "")
 
 
 @pytest.mark.slow
 def test_few_revolutions_are_compared_with_as_many_of_a_longer_reference() -> None:
-    whole = PreparedRecording(record(seed=1))
     short = reduce_recording(record(seed=0).between(1.0, 1.65), RIG)
-    found, _ = matching_reference(short, RIG, [HealthyReference(run(1), RIG, "healthy.h5", whole)])
+    found, _ = matching_reference(short, RIG, healthy(run(1)))
     assert found is not None
     assert found.reduced.n_revolutions == pytest.approx(short.n_revolutions, abs=2.0)
     floor = load_learned().floor(with_reference=True)
