@@ -16,7 +16,7 @@ from gearsig.formatting import counted
 from gearsig.gap._labelled import LabelledRecording
 from gearsig.gap._report import NONE, UNKNOWN
 from gearsig.recording import Recording
-from gearsig.rig import Bearing, ConstantSpeed, Rig, read_rig, rig_file_beside
+from gearsig.rig import ConstantSpeed, Rig, read_rig, rig_file_beside
 
 
 @dataclass(frozen=True)
@@ -372,18 +372,13 @@ def is_gearless(rig: Rig) -> bool:
             "nothing to look for",
             remedy=f"describe the gear pair (teeth, module) or the bearings (geometry or orders); {EXAMPLE}",
         )
-    if not known_bearings(rig):
+    if not any(bearing.orders() and rig.ratio(bearing.shaft) is not None for bearing in rig.bearings):
         names = ", ".join(repr(bearing.name) for bearing in rig.bearings)
         raise RefusalError(
             f"the rig has no gear pair, and of no bearing ({names}) the orders and the speed of its shaft are known",
             remedy="give the bearings' geometry or orders, on the shaft whose speed is known",
         )
     return True
-
-
-def known_bearings(rig: Rig) -> tuple[Bearing, ...]:
-    """Return the bearings whose orders per revolution of the reference shaft are known."""
-    return tuple(b for b in rig.bearings if b.orders() and rig.ratio(b.shaft) is not None)
 
 
 def _check_teeth(rig: Rig) -> None:

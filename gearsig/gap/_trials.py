@@ -787,16 +787,12 @@ def cause_place(
     if tried is not None and tried.match is not None and tried.is_shown:
         options["gear"] = tried.match.added.options["gear"]
     if options or name not in SIGNS:
-        added = tried.added if tried is not None else Added(name, 0.0, _with_a_tooth(name, options))
-        return place_of(added, frame, places)
+        a_tooth = {"tooth": 1.0} if name in SINGLE_TOOTH_FAULTS else {}
+        return place_of(Added(name, 0.0, {**options, **a_tooth}) if tried is None else tried.added, frame, places)
     if tried is not None and _is_clear(tried, conditions):
         return place_of(tried.fit.added, frame, places)
     either = " or ".join(shaft_words(frame, side) for side in range(len(SIDES)))
     return f"{either} (which cannot be told)"
-
-
-def _with_a_tooth(name: str, options: dict[str, float | str]) -> dict[str, float | str]:
-    return {**options, "tooth": 1.0} if name in SINGLE_TOOTH_FAULTS else options
 
 
 def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:
