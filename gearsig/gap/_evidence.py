@@ -303,7 +303,7 @@ _ALIKE = {
     for suffix, said in (("less", "the former over the latter"), ("apart", "apart"), ("together", "changed alike"))
 }
 _BURST_WAYS = {"plain": "as it is", "even": "magnitudes made even"}
-_BURST = (
+_BURST_WORDS = (
     {f"course.{i}": f"share of quarter pitch {i}" for i in range(N_QUARTERS)}
     | {f"echo.{i}": f"autocorrelation at lag {lag:.2f} pitches" for i, lag in enumerate(ECHO_LAGS_PITCHES)}
     | {"elsewhere": "share further away"}
@@ -317,7 +317,7 @@ _OTHER = {
     **{
         f"burst.{way}.{key}": f"burst of a tooth, {said}: {words}"
         for way, said in _BURST_WAYS.items()
-        for key, words in _BURST.items()
+        for key, words in _BURST_WORDS.items()
     },
     "floor.total": "floor, all bands",
     "floor.to_signal": "floor over the whole signal",
