@@ -49,7 +49,7 @@ MESH, REPEATED, NOISE = range(3)
 _PARTS = ("mesh", "repeated", "noise")
 _PAIRS = ((MESH, REPEATED), (REPEATED, NOISE), (MESH, NOISE))
 
-CLEAR = (4.0, 0.5)
+MIN_OVER_NOISE = (4.0, 0.5)
 """Power of a harmonic over the noise on its line, and of all repeated lines over the noise on them, to be compared."""
 
 MAX_DB = 30.0
@@ -117,7 +117,7 @@ def _segments(reduced: ReducedRecording, channel: str) -> FloatArray:
             if side == DRIVER:
                 power[k - 1, MESH], floor[k - 1, 0] = max(square[k * teeth] - noise[k * teeth], 0.0), noise[k * teeth]
                 power[k - 1, NOISE] = float(noise_power.sum()) * average.n_revolutions
-    is_clear = np.column_stack([power[:, :2] > np.array(CLEAR) * floor, power[:, NOISE] > 0.0])
+    is_clear = np.column_stack([power[:, :2] > np.array(MIN_OVER_NOISE) * floor, power[:, NOISE] > 0.0])
     levels: FloatArray = 10.0 * np.log10(np.where(is_clear, power, np.nan))
     return levels
 

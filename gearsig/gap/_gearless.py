@@ -50,7 +50,7 @@ from gearsig.spectra import noise_floor
 # --------------------
 
 
-RACES = {"bearing-outer-race": "bearing_outer_race", "bearing-inner-race": "bearing_inner_race"}
+RACE_EFFECTS = {"bearing-outer-race": "bearing_outer_race", "bearing-inner-race": "bearing_inner_race"}
 """Code of a finding → the effect of the catalogue that it means."""
 
 IMPACTS = ("non-synchronous-impacts", "bearing-rolling-element", "bearing-cage")
@@ -159,7 +159,7 @@ def examined(analysis: Analysis, references: Sequence[Analysis]) -> ExaminedReco
     reference, messages = _reference(analysis, references)
     unexpected = []
     for finding in analysis.findings:
-        if finding.code not in (*RACES, *IMPACTS, LINE):
+        if finding.code not in (*RACE_EFFECTS, *IMPACTS, LINE):
             continue
         earlier = None if reference is None else in_reference(finding, reference)
         rise_db = None if earlier is None else _rise_db(finding, earlier)
@@ -266,14 +266,16 @@ def causes_of(
     effects : mapping
         Those that may be named.
     """
-    races = {name: part for part in reversed(unexpected) if (name := RACES.get(part.finding.code, "")) in effects}
+    races = {
+        name: part for part in reversed(unexpected) if (name := RACE_EFFECTS.get(part.finding.code, "")) in effects
+    }
     outcome, why = _outcome(unexpected, races, every, rig)
     total = sum(part.finding.confidence for part in races.values())
     remainder = 1.0 - min(total, 1.0)
     unknown = remainder * _share_of_unknown(unexpected, races, every)
     causes = [
         _race(effects[name], races.get(name), rig, scale=1.0 / max(total, 1.0))
-        for name in RACES.values()
+        for name in RACE_EFFECTS.values()
         if name in effects
     ]
     strange = [part.finding for part in unexpected if part not in races.values()]
@@ -289,7 +291,7 @@ def causes_of(
         GapCause(NONE, NONE, why if outcome is GapOutcome.NO_GAP else "no damage", "", remainder - unknown),
     ]
     firsts = {GapOutcome.UNKNOWN: UNKNOWN, GapOutcome.NO_GAP: NONE}
-    first = firsts.get(outcome) or RACES[_significant_races(races)[0].finding.code]
+    first = firsts.get(outcome) or RACE_EFFECTS[_significant_races(races)[0].finding.code]
     return tuple(sorted(causes, key=lambda cause: (cause.name != first, -cause.probability))), outcome
 
 
@@ -316,7 +318,7 @@ def _outcome(
 
 def _why_unknown(part: UnexpectedFinding, races: Races, rig: Rig) -> str:
     code = part.finding.code
-    if code in RACES:
+    if code in RACE_EFFECTS:
         is_known = part in races.values()
         return (
             "the lines of the race are not clear enough" if is_known else "the race is not among the effects asked for"
@@ -528,7 +530,7 @@ def _limits(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRec
     """Say where several races, or several recordings, do not agree on one answer."""
     faults = [part for part in unexpected if part.finding.kind is Kind.FAULT]
     texts = []
-    if len({part.finding.code for part in faults if part.finding.code in RACES}) > 1:
+    if len({part.finding.code for part in faults if part.finding.code in RACE_EFFECTS}) > 1:
         texts.append("Both races stand out and may both be damaged: the probabilities, of one cause each, are shared.")
     for fault in faults:
         key = (fault.finding.code, fault.finding.where.bearing)
@@ -590,7 +592,7 @@ def _spectra(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRe
 # --------------------
 
 
-HIGHEST_HARMONIC, SAME_ORDER = 40, 1e-3
+HIGHEST_HARMONIC, HARMONIC_TOLERANCE = 40, 1e-3
 """Of a family of impacts, at which a line still belongs to it; relative."""
 
 
@@ -635,7 +637,7 @@ def with_unexpected(outcome: GapOutcome, unexpected: Sequence[UnexpectedFinding]
     """
     if not unexpected or outcome not in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
         return outcome, []
-    races = [part for part in unexpected if part.finding.code in RACES]
+    races = [part for part in unexpected if part.finding.code in RACE_EFFECTS]
     if len(races) < len(unexpected):
         return GapOutcome.UNKNOWN, []
     return GapOutcome.UNDECIDED, [
@@ -651,7 +653,7 @@ def _is_harmonic(line: UnexpectedFinding, family: UnexpectedFinding) -> bool:
     if not (order and base and line.finding.where.shaft == family.finding.where.shaft):
         return False
     n = round(order / base)
-    return 1 <= n <= HIGHEST_HARMONIC and abs(order / (n * base) - 1.0) < SAME_ORDER
+    return 1 <= n <= HIGHEST_HARMONIC and abs(order / (n * base) - 1.0) < HARMONIC_TOLERANCE
 
 
 def _odds(part: UnexpectedFinding) -> str:

@@ -16,12 +16,12 @@ from gearsig.gap._change import (
 )
 from gearsig.gap._evidence import against_floors, feature_words
 from gearsig.gap._features import (
+    BEARING_FAMILIES,
     LOWEST_STRANGE,
     MAX_SHAFT_ORDERS,
     N_FAMILY,
     N_SHAFT_FAMILY,
     N_SIDEBAND_HARMONICS,
-    RACES,
     SLIP,
     Feature,
     Features,
@@ -353,7 +353,7 @@ def _best_race(comparison: ComparedPair, levels: LineLevels) -> _StrongestRise:
     races = [_StrongestRise("", 0.0, (), 0)]
     now, baseline = _widened(levels.now), levels.baseline
     for bearing in comparison.now.frame.bearings:
-        for kind, (attribute, factor) in RACES.items():
+        for kind, (attribute, factor) in BEARING_FAMILIES.items():
             order = getattr(bearing, attribute) * factor
             if np.isfinite(order):
                 rise, row, slipped = _family_rise(now - baseline, order, levels)
@@ -425,7 +425,7 @@ def _order_words(comparison: ComparedPair, order: float) -> str:
         if abs(order - max(round(order / turns), 1) * turns) <= min(step, 0.1 * turns):
             return f"at order {order:.4g}, a multiple of {shaft_words(frame, side)}"
     for bearing in comparison.now.frame.bearings:
-        for kind, (attribute, factor) in RACES.items():
+        for kind, (attribute, factor) in BEARING_FAMILIES.items():
             if -SLIP < order / (getattr(bearing, attribute) * factor) - 1.0 < UPWARDS:
                 return f"at order {order:.4g}, that of the {RACE_WORDS[kind]} of {_bearing(bearing.name)}"
     nor = "and no bearing" if comparison.now.frame.bearings else "(the rig names no bearing)"

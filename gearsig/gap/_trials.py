@@ -730,7 +730,7 @@ def _size(condition: Condition, scored: ObservedChange, explained: FloatArray, n
 # --------------------
 
 
-RACES = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}
+RACE_ORDERS = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}
 """Effect → the order of its bearing that it shows at, see `BearingFrame`."""
 
 
@@ -760,7 +760,7 @@ def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
 
 def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlace]) -> list[str]:
     """Return the bearings whose race stands out of the recording, or else those that look like the fitted one."""
-    race = RACES.get(name)
+    race = RACE_ORDERS.get(name)
     if race is None:
         return [fitted]
     orders = {bearing.name: float(getattr(bearing, race)) for bearing in frame.bearings}

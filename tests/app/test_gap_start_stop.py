@@ -101,7 +101,7 @@ def test_what_is_left_is_told_on_cycles_that_the_severity_was_not_fitted_to(wide
     assert after.remaining.value < 0.3 * before.remaining.value
     # Where the half that is fitted to shows twice as much, twice as much is taken off the other half.
     evidence = wider.evidence[0]
-    double = replace(evidence, folds=tuple(replace(fold, fitted_to=2.0 * fold.fitted_to) for fold in evidence.folds))
+    double = replace(evidence, folds=tuple(replace(fold, fitted=2.0 * fold.fitted) for fold in evidence.folds))
     same, too_much = drive_report(replace(wider, evidence=(double,))).steps
     assert same == before
     assert too_much.remaining.value == pytest.approx(before.remaining.value, rel=0.3)

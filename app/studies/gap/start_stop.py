@@ -69,7 +69,7 @@ def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
     whole = DriveFloor.of_healthy(
         np.array([evidence.whole for evidence in healthy]), np.array([evidence.scatter for evidence in healthy])
     )
-    halves = [(fold.fitted_to, HALF * evidence.scatter) for evidence in healthy for fold in evidence.folds]
+    halves = [(fold.fitted, HALF * evidence.scatter) for evidence in healthy for fold in evidence.folds]
     half = DriveFloor.of_healthy(np.array([change for change, _ in halves]), np.array([error for _, error in halves]))
     attributions = [
         (truth_of(label), attribute_drive([evidence], with_reference=label["with_reference"], floors=(whole, half)))

@@ -297,23 +297,23 @@ def shrink(
 
 @dataclass(frozen=True)
 class CycleFold:
-    """One half of the cycles to fit to, and the other to check on.
+    """One half of the cycles to fit to, and the other to score on; as `Fold` is of recordings at constant speed.
 
     Parameters
     ----------
-    fitted_to : array
+    fitted : array
         Change of one half, where it is largest.
-    held_out : array
+    scored : array
         Change of the other half, at the same tooth and order.
-    without : array, (n_blocks, n)
-        The same without each of its cycles.
+    again : array, (n_blocks, n)
+        `scored` without each of its cycles.
     elsewhere : mapping
         Placed cause → changes of the other half at other places, (k, n).
     """
 
-    fitted_to: FloatArray
-    held_out: FloatArray
-    without: FloatArray
+    fitted: FloatArray
+    scored: FloatArray
+    again: FloatArray
     elsewhere: Mapping[str, FloatArray]
 
 
@@ -384,10 +384,10 @@ def _shrinkage(name: str, folds: Sequence[tuple[Mapping[str, PredictedCause], Dr
     """Fit to one half, check on the other, and the other way round; the mean of both."""
     values, placebos, variances = [], [], []
     for predicted, floor, fold in folds:
-        guess = fit(predicted[name], fold.fitted_to, floor).predicted
-        features = own_features(guess, fold.held_out, floor)
-        values.append(shrink(fold.held_out, guess, floor, features))
-        rows = np.array([shrink(row, guess, floor, features)[:3] for row in fold.without])
+        guess = fit(predicted[name], fold.fitted, floor).predicted
+        features = own_features(guess, fold.scored, floor)
+        values.append(shrink(fold.scored, guess, floor, features))
+        rows = np.array([shrink(row, guess, floor, features)[:3] for row in fold.again])
         variances.append([_jackknife_variance(column, of_one_block=0.25) for column in rows.T])
         placebos.append(
             max((shrink(row, guess, floor, features)[2] for row in fold.elsewhere.get(name, ())), default=0.0)

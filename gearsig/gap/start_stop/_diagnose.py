@@ -239,11 +239,11 @@ def _evidence(fitted: FittedDriveCause, compared: DriveComparison) -> tuple[Evid
 def _steps(compared: DriveComparison, evidence: DriveEvidence, cause: GapCause) -> tuple[GapStep, ...]:
     """Return what is left of the whole gap: before, and with an effect, fitted to the other half of the cycles."""
     floor, predicted = compared.floor(of_half=True), evidence.predicted[cause.name]
-    fitted = [fit(predicted, fold.fitted_to, floor).predicted for fold in evidence.folds]
+    fitted = [fit(predicted, fold.fitted, floor).predicted for fold in evidence.folds]
 
     def remaining(predictions: Sequence[FloatArray]) -> Interval:
         pairs = list(zip(evidence.folds, predictions, strict=True))
-        return floor.size_interval([fold.held_out - t for fold, t in pairs], [fold.without - t for fold, t in pairs])
+        return floor.size_interval([fold.scored - t for fold, t in pairs], [fold.again - t for fold, t in pairs])
 
     return GapStep("before", remaining([0.0 * change for change in fitted])), GapStep(cause.title, remaining(fitted))
 
