@@ -16,7 +16,7 @@ from gearsig.formatting import odds_text
 from gearsig.gap._attribution import Attribution, attribute, is_calibrated
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
-from gearsig.gap._evidence import evidence_of
+from gearsig.gap._evidence import CRACK, evidence_of
 from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpected_findings, with_unexpected
 from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
@@ -545,9 +545,6 @@ def _with_crack_depth(
     changed = replace(crack, severity=depth, fitted=fitted)
     message = OF_THE_DEPTH.format(depth=depth.value, low=depth.low, high=depth.high)
     return [changed if cause is crack else cause for cause in causes], [message]
-
-
-CRACK = "root_crack"
 
 
 def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) -> str:

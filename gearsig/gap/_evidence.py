@@ -99,14 +99,13 @@ def evidence_of_feature(
 # --------------------
 
 
-SINGLE_TOOTH_FAULTS = ("root_crack", "tooth_spall", "chipped_tooth")
+CRACK = "root_crack"
+SINGLE_TOOTH_FAULTS = (CRACK, "tooth_spall", "chipped_tooth")
 """Causes on a single tooth."""
 
-DISPLACED = "pitch_error"
-"""What may be of one tooth as well."""
-
-TOOTH_FAULTS = (*SINGLE_TOOTH_FAULTS, DISPLACED)
-"""Causes that change one engagement each, with a profile of its own: waveforms and encoders tell them apart."""
+TOOTH_FAULTS = (*SINGLE_TOOTH_FAULTS, "pitch_error")
+"""Causes that change one engagement each, with a profile of its own: waveforms and encoders tell them apart. A pitch
+error may be of one tooth or of all."""
 
 _BURST = ("change.{}.peak", "change.{}.prominence", "tooth.{}.peak", "tooth.{}.prominence", "tooth.{}.kurtosis")
 _ALL_ROUND = ("change.{}.level", "change.{}.elsewhere", "tooth.{}.level", "tooth.{}.elsewhere", "shaft.{}.low")

@@ -398,7 +398,7 @@ def _bearing_orders(frame: GearFrame) -> list[Known]:
 # --------------------
 
 
-MIN_SHARE = 1e-6
+MIN_NEAR_SHARE = 1e-6
 """Below one sample of any record."""
 
 
@@ -416,7 +416,7 @@ def broadband_features(reduced: ReducedRecording, channels: Sequence[ChannelSums
     yield "raw.level", float(10.0 * np.log10(raw[:, 0]).mean())
     yield "raw.kurtosis", float((10.0 * np.log10(raw[:, 1] / raw[:, 0] ** 2)).min())
     # Without the block that holds the extreme, the share may be 0.
-    yield "raw.near_the_extreme", decibel(max(float(raw[:, 2].max()), MIN_SHARE))
+    yield "raw.near_the_extreme", decibel(max(float(raw[:, 2].max()), MIN_NEAR_SHARE))
 
 
 def speed_features(reduced: ReducedRecording) -> Iterator[NamedValue]:

@@ -404,7 +404,7 @@ def _part_text(part: UnexpectedFinding, rig: Rig) -> str:
     return f"envelope lines of impacts that {enumerated(parts)}{known}{unknown}"
 
 
-NOT_SIMULATED = (
+NO_GEAR_PAIR = (
     "The rig has no gear pair, so that no simulator could be set to it: nothing was simulated, and no effect of gears "
     "is weighed. How large the gap is, how severe its cause and how far it shrinks cannot be told; there is no twin. "
     "Damaged races of the bearings were looked for; unbalance, misalignment, clearance, drive and load were not."
@@ -480,7 +480,7 @@ def diagnose_gearless(
         causes=causes,
         spectra=_spectra(unexpected, every),
         notes=(
-            NOT_SIMULATED,
+            NO_GEAR_PAIR,
             HOW_SURE,
             *hint,
             *left_out,

@@ -10,7 +10,7 @@ from gearsig.checks import FloatArray
 from gearsig.gap._conditions import Condition
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._floors import family_members
-from gearsig.gap._report import SLOW_RPM, STEPS, GapCause, GapOutcome, NextRecording, NextStep
+from gearsig.gap._report import NEXT_STEPS, SLOW_RPM, GapCause, GapOutcome, NextRecording, NextStep
 from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin, point_text, same_condition
 from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared
 
@@ -192,4 +192,4 @@ def next_steps(
         "run_up": passed_on and max(speeds) < WIDE * min(speeds),
         "label": not is_labelled and outcome is not GapOutcome.EFFECT,
     }
-    return tuple(NextStep(code, STEPS[code]) for code, worth in is_worth.items() if worth)
+    return tuple(NextStep(code, NEXT_STEPS[code]) for code, worth in is_worth.items() if worth)

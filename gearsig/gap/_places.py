@@ -36,7 +36,7 @@ from gearsig.gap._floors import (
     family_size,
     kinds_of,
 )
-from gearsig.gap._reduction import DRIVER, N_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording, shaft_words
+from gearsig.gap._reduction import DRIVER, N_MAINS_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording, shaft_words
 from gearsig.gap._report import UNKNOWN, GapPlace, PlaceKind, likeliest_first
 from gearsig.gap._simulator import GapEffect
 from gearsig.prepared import MAINS_TOLERANCE
@@ -444,7 +444,7 @@ def _fundamental(level: FloatArray, line: int) -> int:
 
 def _is_mains_order(comparison: ComparedPair, order: float) -> bool:
     speed_hz = comparison.now.speed_hz
-    lines = np.array([k * supply for supply in MAINS_HZ for k in range(1, N_HARMONICS + 1)])
+    lines = np.array([k * supply for supply in MAINS_HZ for k in range(1, N_MAINS_HARMONICS + 1)])
     # Twice what a supply wanders: the order was found on a grid of lines, at a mean speed.
     width = np.maximum(2.0 * MAINS_TOLERANCE * lines, comparison.now.order_step * speed_hz)
     return bool((np.abs(order * speed_hz - lines) < width).any())
@@ -454,7 +454,7 @@ def _hum(comparison: ComparedPair) -> GapPlace:
     now = comparison.now
     supply = MAINS_HZ[int(np.argmax(now.hum))]
     change = comparison.change_db["hum"]
-    orders = tuple(k * supply / now.speed_hz for k in range(1, N_HARMONICS + 1))
+    orders = tuple(k * supply / now.speed_hz for k in range(1, N_MAINS_HARMONICS + 1))
     return GapPlace(
         PlaceKind.LINE, f"mains hum at {supply:g} Hz and multiples, {by_decibels(change)}", change, orders=orders
     )
@@ -808,7 +808,7 @@ def locate_all_round(comparison: ComparedPair, side: int, shaft: str, channel: s
 
 MIN_SHARE = 0.01
 
-REPEATED = ("floor.to_signal", "floor.total", "raw.level")
+REPEATING = ("floor.to_signal", "floor.total", "raw.level")
 """Features that only repeat what others say of a place."""
 
 
@@ -877,7 +877,7 @@ def _merged(places: list[GapPlace]) -> list[GapPlace]:
 
 
 def _located_rows(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
-    kept = [row for row in rows if names[row] not in REPEATED and not names[row].startswith(("apart.", "burst."))]
+    kept = [row for row in rows if names[row] not in REPEATING and not names[row].startswith(("apart.", "burst."))]
     return np.array(kept, dtype=np.intp)
 
 

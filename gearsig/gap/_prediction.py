@@ -17,7 +17,7 @@ from gearsig.gap._report import MIN_PREDICTED, Interval, Shrinkage
 from gearsig.gap._simulator import Added
 from gearsig.rig import SIDES
 
-STEPS = 41
+N_SEVERITIES = 41
 """Severities that are tried, over the whole range and again about the best."""
 
 MIN_TRIED = 0.3
@@ -108,7 +108,7 @@ class EffectPath:
 
     def tried(self) -> FloatArray:
         """Return the severities that a fit looks at."""
-        return np.geomspace(MIN_TRIED * self.severities[0], self.severities[-1], STEPS)
+        return np.geomspace(MIN_TRIED * self.severities[0], self.severities[-1], N_SEVERITIES)
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def fit_path(path: EffectPath, observed: Sequence[ObservedChange]) -> Fit:
     largest severity that was simulated fits as well it has no upper end, and where the least does, it begins at 0.
     """
     coarse = path.tried()
-    tried = np.geomspace(*_bracket(coarse, _is_near_best(path, _costs(path, coarse, observed)[0])), STEPS)
+    tried = np.geomspace(*_bracket(coarse, _is_near_best(path, _costs(path, coarse, observed)[0])), N_SEVERITIES)
     costs, ways = _costs(path, tried, observed)
     near = _is_near_best(path, costs)
     low, high = _bracket(tried, near)
@@ -456,7 +456,7 @@ def _pattern(
 # --------------------
 
 
-ALIKE = 0.8
+SAME_PREDICTION = 0.8
 """Cosine of the angle between two predictions, in floors, from which they say the same."""
 
 MIN_OWN_FEATURE = 1.5
@@ -660,7 +660,7 @@ def _is_alike(first: Fit, second: Fit, scored: ObservedChange) -> bool:
     """Whether two places predict the same: bearings of one type on one shaft do, and are no placebos of each other."""
     a, b = (fitted.at(scored.condition) / scored.floors for fitted in (first, second))
     product = float(np.sqrt((a @ a) * (b @ b)))
-    return product > 0.0 and float(a @ b) > ALIKE * product
+    return product > 0.0 and float(a @ b) > SAME_PREDICTION * product
 
 
 def _before_and_after(fit: Fit, scored: ObservedChange, used: FloatArray) -> tuple[float, float, float]:

@@ -419,7 +419,7 @@ class ReducedRecording:
 # --------------------
 
 
-N_HARMONICS = 3
+N_MAINS_HARMONICS = 3
 _NEIGHBOURHOOD_HZ = 8.0
 _N_SHAFT_HARMONICS = 8
 _APART = 20.0
@@ -443,7 +443,7 @@ def _excess(values: FloatArray, recording: Recording, supply_hz: float, speed_hz
     power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(n))) ** 2
     step = recording.sampling_rate_hz / n
     excesses_db = []
-    for k in range(1, N_HARMONICS + 1):
+    for k in range(1, N_MAINS_HARMONICS + 1):
         frequency = k * supply_hz
         width = max(2.0 * step, MAINS_TOLERANCE * frequency)
         if frequency + _NEIGHBOURHOOD_HZ > recording.sampling_rate_hz / 2 or _on_a_gear_line(

@@ -878,7 +878,7 @@ SLOW_RPM = 300.0
 to 3000 rpm 55."""
 
 HEALTHY_MACHINE = "the same machine when it was healthy"
-STEPS = {
+NEXT_STEPS = {
     "healthy": f"{HEALTHY_MACHINE}, at the same speed and load; then only what has changed since counts",
     "encoders": "encoders on both shafts: no path distorts their transmission error, whose profile over one engagement "
     "tells a damaged tooth from a displaced one",
@@ -890,7 +890,7 @@ STEPS = {
 
 def _next(report: GapReport) -> str:
     best = report.next_recordings[0].text if report.next_recordings else ""
-    steps = [step.text for step in report.next_steps] or ([] if report.references else [STEPS["healthy"]])
+    steps = [step.text for step in report.next_steps] or ([] if report.references else [NEXT_STEPS["healthy"]])
     if steps:
         return f"Next: {steps[0]}. Or {best}" if best else f"Next: {steps[0]}."
     if best:

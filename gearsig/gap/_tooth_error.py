@@ -51,7 +51,7 @@ MIN_OVER_NOISE = 1.25
 """Of the event's rms over the standard error of one value: the loudest window of noise alone, of which the band keeps
 half, reaches 0.9."""
 
-ALIKE = 0.9
+BOTH_GEARS = 0.9
 """Of the larger change, from which the other gear shows it as well."""
 
 FAR = 4.3
@@ -103,7 +103,7 @@ def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> l
         rms = sqrt(float(_window_energy(_banded(pattern, LOWEST_ORDER)).max()) / WINDOW)
         changes.append(ToothErrorChange(side, pattern, _resampled(healthy.mesh_um[None])[0], rms, hypot(*errors)))
     largest_um = max(change.rms_um for change in changes)
-    return [change for change in changes if change.rms_um >= ALIKE * largest_um]
+    return [change for change in changes if change.rms_um >= BOTH_GEARS * largest_um]
 
 
 def _resampled(rows: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap._attribution import Attribution, GapCalibration, calibration_values
+from gearsig.gap._evidence import CRACK
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import NONE, UNKNOWN, Interval, Shrinkage, shares_of
 from gearsig.gap.start_stop._cycles import FEATURES, NAMES
@@ -20,8 +21,8 @@ from gearsig.gap.start_stop._cycles import FEATURES, NAMES
 FLOORS_FILE = Path(__file__).with_name("floors.json")
 HALF = float(np.sqrt(2.0))
 """By which half of the cycles scatter more."""
-CRACK, RIPPLE = "root_crack", "torque_ripple"
-"""Causes that sit somewhere: a placebo is the same cause elsewhere."""
+RIPPLE = "torque_ripple"
+"""Sits at an order, as a crack does at a tooth: a placebo is the same cause elsewhere."""
 N_PLACEBOS = 4
 NORMAL_90 = 1.645
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
+from gearsig.gap._evidence import CRACK
 from gearsig.gap._features import jackknife_variance
 from gearsig.gap._simulator import Added, DriveFacts, DriveSimulator, DriveTwin, GapEffect
 from gearsig.gap.start_stop._attribution import (
-    CRACK,
     HALF,
     N_PLACEBOS,
     RIPPLE,

@@ -25,7 +25,7 @@ from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import readable
 from gearsig.gap._attribution import Attribution, is_calibrated
 from gearsig.gap._conditions import Stage
-from gearsig.gap._evidence import MIN_SIGN_FLOORS, evidence_of_feature
+from gearsig.gap._evidence import CRACK, MIN_SIGN_FLOORS, evidence_of_feature
 from gearsig.gap._features import jackknife_variance
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import (
@@ -50,7 +50,6 @@ from gearsig.gap._report import (
 )
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
 from gearsig.gap.start_stop._attribution import (
-    CRACK,
     FLOORS_FILE,
     RIPPLE,
     DriveEvidence,
