@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 class GearsigError(Exception):
@@ -58,6 +61,18 @@ class RefusalError(GearsigError):
     def __init__(self, reason: str, *, remedy: str = "", looked_at: object = None) -> None:
         self.reason, self.remedy, self.looked_at = reason, remedy, looked_at
         super().__init__(_one_line(f"{reason}; {remedy}" if remedy else reason))
+
+
+def answer_or_none(ask: Callable[[], T], name: str, refusals: list[str]) -> T | None:
+    """Return what `ask` returns; where it raises a `GearsigError`, None, with "name: error" added to the refusals.
+
+    For results of several parts, of which one that the data do not allow is no reason to withhold the others.
+    """
+    try:
+        return ask()
+    except GearsigError as error:
+        refusals.append(f"{name}: {error}")
+        return None
 
 
 @contextmanager

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from gearsig.errors import RefusalError
+from gearsig.errors import answer_or_none
 from gearsig.indicators import Indicator
 from gearsig.motion._backlash import BacklashEstimate, TorqueTwist, estimate_backlash, torque_twist
 from gearsig.motion._force import find_datum
@@ -66,30 +67,25 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
     check_turns(motion)
     segments = motion_segments(motion.driver_angle_rad, motion.sampling_rate_hz)
     refusals: list[str] = []
-    backlash: BacklashEstimate | None = None
-    try:
-        backlash = estimate_backlash(motion)
-    except RefusalError as refusal:
-        refusals.append(f"backlash: {refusal}")
-    datum = _datum(motion, backlash, refusals)
+    backlash = answer_or_none(lambda: estimate_backlash(motion), "backlash", refusals)
+    datum = answer_or_none(
+        lambda: find_datum(motion).compression_m if backlash is None else backlash.datum_m,
+        "impacts and phase plane",
+        refusals,
+    )
     impacts: tuple[Impact, ...] = ()
     loop: TorqueTwist | None = None
     portrait: PhasePortrait | None = None
     if datum is not None:
         portrait = phase_plane_of_teeth(motion, datum)
         half = None if backlash is None else 0.5e-6 * backlash.backlash_um
-        try:
-            impacts = find_impacts(motion, datum, half_backlash_m=half)
-        except RefusalError as refusal:
-            refusals.append(f"impacts: {refusal}")
+        find = partial(find_impacts, motion, datum, half_backlash_m=half)
+        impacts = answer_or_none(find, "impacts", refusals) or ()
         if motion.torque_nm is not None:
             loop = torque_twist(motion, segments, datum)
     teeth: YieldingTeeth | None = None
     if motion.torque_nm is not None:
-        try:
-            teeth = tooth_compliance(motion)
-        except RefusalError as refusal:
-            refusals.append(f"stiffness of single teeth: {refusal}")
+        teeth = answer_or_none(lambda: tooth_compliance(motion), "stiffness of single teeth", refusals)
     indicators = start_stop_indicators(motion, segments, backlash, impacts, loop)
     return StartStop(
         motion,
@@ -185,13 +181,3 @@ def _notes(impacts: tuple[Impact, ...], rate_hz: float) -> tuple[str, ...]:
         f"large or samples at {rate_hz:g} Hz are too few for their flights{remedy}."
     )
     return (text,)
-
-
-def _datum(motion: PairMotion, backlash: BacklashEstimate | None, refusals: list[str]) -> float | None:
-    if backlash is not None:
-        return backlash.datum_m
-    try:
-        return find_datum(motion).compression_m
-    except RefusalError as refusal:
-        refusals.append(f"impacts and phase plane: {refusal}")
-        return None

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 
 from gearsig.checks import FloatArray, count, not_negative
-from gearsig.errors import GearsigError, InputError
+from gearsig.errors import InputError, answer_or_none
 from gearsig.formatting import counted
 from gearsig.phase._embedding import chosen_delay, delay_embedding, embedding_dimension
 from gearsig.phase._lyapunov import largest_lyapunov_exponent
@@ -190,7 +189,6 @@ def _verdict(k: float, oversampled: bool, step: int) -> tuple[ChaosVerdict, str]
     return ("irregular", "") if k > IRREGULAR else ("undecided", f"K lies between {REGULAR:g} and {IRREGULAR:g}")
 
 
-T = TypeVar("T")
 Kind = Literal["periodic", "subharmonic", "quasi-periodic", "chaotic", "stochastic", "undecided"]
 
 
@@ -258,7 +256,9 @@ def kind_of_motion(
         shown_by = f"{after}, within {tolerance:g} of the path's size"
         return MotionKind("periodic" if period == 1 else "subharmonic", period, (shown_by,), section)
     evidence = [f"the section of {section.n_points} points does not repeat within 16 cycles of the {lock.name}"]
-    test = _answer(lambda: zero_one_test_of_section(section, damping=0.0 if noise_free else 1.0), "0–1 test", evidence)
+    test = answer_or_none(
+        lambda: zero_one_test_of_section(section, damping=0.0 if noise_free else 1.0), "0–1 test", evidence
+    )
     if test is not None:
         why = f" ({test.reason})" if test.reason else ""
         evidence.append(f"0–1 test of the section: K = {test.k:.2f}, {test.verdict}{why}")
@@ -271,7 +271,7 @@ def kind_of_motion(
 def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExponent | None, bool]:
     """Return the exponent, and whether no dimension unfolds the path; say either in the evidence."""
     x, rate = np.ascontiguousarray(portrait.points[:, 0]), portrait.sampling_rate_hz
-    dimension = _answer(lambda: _dimension(x, rate), "embedding dimension", evidence)
+    dimension = answer_or_none(lambda: _dimension(x, rate), "embedding dimension", evidence)
     if dimension is None:
         return None, False
     if dimension.dimension == 0:
@@ -281,7 +281,7 @@ def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExp
         )
         return None, True
     path = delay_embedding(x, rate, delay_samples=dimension.delay_samples, dimension=dimension.dimension)
-    exponent = _answer(lambda: largest_lyapunov_exponent(path), "Lyapunov exponent", evidence)
+    exponent = answer_or_none(lambda: largest_lyapunov_exponent(path), "Lyapunov exponent", evidence)
     if exponent is not None:
         size = f"{exponent.exponent_per_s:.3g} ± {exponent.uncertainty_per_s:.2g} 1/s"
         evidence.append(f"largest Lyapunov exponent {size} in {dimension.dimension} dimensions: {exponent.verdict}")
@@ -315,12 +315,3 @@ def _decide(test: ChaosTest | None, exponent: LyapunovExponent | None, stochasti
     if exponent.verdict == "not diverging" and test.verdict == "regular":
         return "quasi-periodic"
     return "undecided"
-
-
-def _answer(ask: Callable[[], T], name: str, evidence: list[str]) -> T | None:
-    """Return the answer, or None with the refusal in the evidence."""
-    try:
-        return ask()
-    except GearsigError as error:
-        evidence.append(f"{name}: {error}")
-        return None
