@@ -246,18 +246,6 @@ def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> Force
     )
 
 
-def inverse_force_n(
-    acceleration_mps2: FloatArray, contact_force_n: FloatArray, mass_kg: float, ratio: float
-) -> FloatArray:
-    """Return m2 q̈ + γ f, the source's inverse formula; for two free bodies with γ = m2/m1 it is −f.
-
-    q̈ = −f/m1 − f/m2 of free bodies gives m2 q̈ + (m2/m1) f = −f: an identity of the motion, to recover the force from a
-    measured acceleration. As a law of motion it would count the inertia twice.
-    """
-    result: FloatArray = mass_kg * acceleration_mps2 + ratio * contact_force_n
-    return result
-
-
 def compare(model: str, force_n: FloatArray, reference: str, reference_n: FloatArray) -> ForceError:
     """Return the error of a force against a reference."""
     error = force_n - reference_n

@@ -22,13 +22,6 @@ from gearsig.plot._fe_gear import (
     gear_stress_figure,
     stress_maps_figure,
 )
-from gearsig.plot._flexible import (
-    contact_spreading_figure,
-    frequency_curves_figure,
-    mesh_maps_figure,
-    speed_spectra_figure,
-    speed_sweep_figure,
-)
 from gearsig.plot._gap import (
     INNER,
     OUTER,
@@ -43,14 +36,18 @@ from gearsig.plot._gap import (
     gap_waterfall_figure,
     gap_waterfall_panel,
 )
-from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_figure, time_frequency_figure
-from gearsig.plot._mesh import (
+from gearsig.plot._gear_pair import (
     backlash_figure,
+    contact_spreading_figure,
+    frequency_curves_figure,
     friction_figure,
     load_sharing_figure,
+    mesh_maps_figure,
     mesh_stiffness_figure,
-    tooth_figure,
+    speed_spectra_figure,
+    speed_sweep_figure,
 )
+from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_figure, time_frequency_figure
 from gearsig.plot._methods import (
     amplitude_spectrum,
     cepstrum,
@@ -266,7 +263,6 @@ __all__ = [
     "thin",
     "time_figure",
     "time_frequency_figure",
-    "tooth_figure",
     "track_orders",
     "tracked_panel",
     "value_limits",

@@ -97,11 +97,6 @@ class Kurtogram(Result):
             raise InputError("the arrays of a kurtogram differ in length")
 
     @property
-    def centre_hz(self) -> FloatArray:
-        """Middle of each band."""
-        return (self.low_hz + self.high_hz) / 2
-
-    @property
     def bandwidth_hz(self) -> FloatArray:
         """Width of each band."""
         return self.high_hz - self.low_hz

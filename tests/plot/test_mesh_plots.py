@@ -8,7 +8,7 @@ import pytest
 from matplotlib.text import Text
 
 from gearsig.errors import InputError
-from gearsig.plot import load_sharing_figure, mesh_stiffness_figure, panels_of, tooth_figure
+from gearsig.plot import load_sharing_figure, mesh_stiffness_figure, panels_of
 
 CYCLES = np.linspace(0.0, 2.0, 401)
 STIFFNESS = {
@@ -95,27 +95,3 @@ def test_pairs_keep_their_names_beside_cases_of_the_same_colours():
 def test_load_sharing_refuses_wrong_lengths():
     with pytest.raises(InputError, match="transmission_error_m"):
         load_sharing_figure(CYCLES, {"pair 0": np.ones(401)}, {"healthy": np.ones(400)})
-
-
-def test_tooth_is_mirrored_to_scale_with_its_crack():
-    x, y = np.linspace(50.0, 54.0, 30), np.linspace(2.0, 0.8, 30)
-    crack = (np.array([50.5, 49.0]), np.array([1.9, 0.4]))
-    figure = tooth_figure(x, y, cracks_mm={"2 mm": crack}, title="Tooth")
-    (axes,) = figure.axes
-    figure.canvas.draw()
-    assert axes.get_aspect() == 1.0
-    outline = max(axes.lines, key=lambda line: len(line.get_xdata()))
-    across, along = np.asarray(outline.get_xdata()), np.asarray(outline.get_ydata())
-    np.testing.assert_allclose(across, -across[::-1])
-    assert set(x) <= set(along)
-    assert any(np.array_equal(line.get_xdata(), crack[1]) for line in axes.lines)
-    assert {"2 mm", "Tooth", "across the tooth (mm)", "from the gear's centre (mm)"} <= set(_texts(figure))
-
-
-def test_tooth_without_cracks_and_with_wrong_ones():
-    x, y = np.linspace(50.0, 54.0, 30), np.linspace(2.0, 0.8, 30)
-    assert _texts(tooth_figure(x, y))
-    with pytest.raises(InputError, match="y_mm has 29 points"):
-        tooth_figure(x, y[1:])
-    with pytest.raises(InputError, match="y of '2 mm'"):
-        tooth_figure(x, y, cracks_mm={"2 mm": (np.ones(2), np.ones(3))})
