@@ -1,9 +1,8 @@
 """Signals taken apart: variational modes, wavelet denoising."""
 
-from gearsig.decompose._long_signals import modes_by_block, vmd
 from gearsig.decompose._suggestion import ModeSuggestion, ModeTrial, noise_width, suggest_modes
 from gearsig.decompose._types import ModeAxis, Modes, StartName, VmdEngine, VmdSettings
-from gearsig.decompose._vmd import mode_spectra, peak_centres
+from gearsig.decompose._vmd import mode_spectra, modes_by_block, peak_centres, vmd
 from gearsig.decompose._wavelet_denoising import (
     Denoised,
     DenoiseSettings,

@@ -11,7 +11,7 @@ from gearsig.checks import FloatArray, count, positive
 from gearsig.decompose._types import SAMPLES_PER_MODE, ModeAxis, Modes, VmdSettings, check_supported, half_gain_distance
 from gearsig.decompose._vmd import modes_of_whole
 from gearsig.errors import InputError, RefusalError
-from gearsig.formatting import counted
+from gearsig.formatting import axis_unit, counted
 from gearsig.results import Result
 from gearsig.timefreq import Source, UniformSignal, uniform
 
@@ -246,7 +246,7 @@ def _commonest(trials: Sequence[ModeTrial]) -> str:
 
 
 def _reasons(chosen: ModeTrial, trials: Sequence[ModeTrial], fs: float, axis: ModeAxis) -> tuple[str, ...]:
-    unit = "Hz" if axis == "frequency" else "orders"
+    unit = axis_unit(axis)
     same = {t.n_modes: t for t in trials if t.penalty == chosen.penalty}
     reasons = [
         f"{counted(chosen.n_modes, 'mode')} at penalty {chosen.penalty:g}: all narrower than noise, none shares lines.",

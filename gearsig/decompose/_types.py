@@ -10,6 +10,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, freeze, not_negative, one_of, positive, within
 from gearsig.errors import InputError
+from gearsig.formatting import axis_unit
 from gearsig.results import Result
 from gearsig.timefreq import UniformSignal
 
@@ -245,7 +246,7 @@ def mode_notes(
         )
     reach = half_gain_distance(settings.penalty, sampling_rate)
     order = np.argsort(centres, kind="stable")
-    unit = "Hz" if axis == "frequency" else "orders"
+    unit = axis_unit(axis)
     for i, j in pairwise(order):
         gap = float(centres[j] - centres[i])
         if gap < reach:
