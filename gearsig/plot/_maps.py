@@ -281,8 +281,7 @@ def coherence_figure(
         style.put_text(above, 0.995, 0.93, where, colour=style.INK, transform=above.transAxes, ha="right", va="top")
     draw(above, placed)
     draw(below, [(cursor, None) for cursor, _ in placed])
-    for axes in (above, below):
-        style.no_offset(axes)
+    style.no_offset(above, below)
     below.plot([1.004, 1.004], mean.band_hz, transform=below.get_yaxis_transform(), color=style.MEASURED, clip_on=False)
     style.label_axes(below, coherence.alpha_label, "carrier (Hz)")
     style.label_axes(above, "", "mean γ²")

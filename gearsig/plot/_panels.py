@@ -314,11 +314,10 @@ def line_colour(colour: int | str) -> str:
 
 def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> None:
     colour = line_colour(line.colour)
-    ascending = len(line.x) > series.N_POINTS and bool(np.all(np.diff(line.x) > 0.0))
-    if line.peaks and ascending:
+    if line.peaks and _has_many_ascending(line.x):
         x, _, y = series.envelope(line.x, line.y, series.N_POINTS // 2)
     else:
-        x, y = series.thin(line.x, line.y) if thinned and ascending else (line.x, line.y)
+        x, y = _thinned(line.x, line.y) if thinned else (line.x, line.y)
     if line.band is not None:
         axes.fill_between(line.x, *line.band, color=colour, alpha=0.2, linewidth=0)
     axes.plot(x, y, color=colour, lw=1.0, ls=":" if line.dotted else "-", label=line.name)
@@ -397,9 +396,9 @@ def _names_of_looks(figure: Figure, axes: Axes) -> dict[tuple[str, bool], str]:
     }
 
 
-def _own_name(drawn: Line2D | Collection) -> str:
+def _own_name(drawn: Any) -> str:
     """Return what the drawing calls a line; matplotlib's own names begin with an underscore."""
-    name = str(drawn.get_label())
+    name = str(drawn.get_label() or "")
     return "" if name.startswith("_") else name
 
 
@@ -564,21 +563,17 @@ def _drawn_series(axes: Axes) -> Iterator[_Series]:
     """Yield name, places and levels of everything that is drawn in data's coordinates."""
     from matplotlib.collections import PathCollection, QuadMesh
 
-    def named(artist: Any, kind: str) -> str:
-        label = str(artist.get_label() or "")
-        return kind if not label or label.startswith("_") else label
-
     def row(name: str, x: Any, y: Any, level: Any = np.nan) -> _Series:
         at = np.ravel(np.asarray(x, dtype=np.float64))
         return name, at, np.ravel(np.asarray(y, dtype=np.float64)), np.broadcast_to(np.ravel(level), at.shape)
 
     for i, line in enumerate(axes.lines, 1):
         if line.get_transform() == axes.transData:
-            yield row(named(line, f"line {i}"), line.get_xdata(orig=False), line.get_ydata(orig=False))
+            yield row(_own_name(line) or f"line {i}", line.get_xdata(orig=False), line.get_ydata(orig=False))
     for bars in axes.containers:
         patches = [bar for bar in bars if hasattr(bar, "get_width")]
         ends = [bar.get_y() + bar.get_height() for bar in patches]
-        yield row(named(bars, "bars"), [bar.get_x() + bar.get_width() / 2.0 for bar in patches], ends)
+        yield row(_own_name(bars) or "bars", [bar.get_x() + bar.get_width() / 2.0 for bar in patches], ends)
     for i, image in enumerate(axes.images, 1):
         values = np.ma.filled(np.ma.asarray(image.get_array(), dtype=np.float64), np.nan)
         if values.ndim == 2:  # not a photograph
@@ -590,7 +585,7 @@ def _drawn_series(axes: Axes) -> Iterator[_Series]:
     drawn: list[Collection] = list(axes.collections)
     for i, collection in enumerate(drawn, 1):
         levels = collection.get_array()
-        name = named(collection, f"area {i}")
+        name = _own_name(collection) or f"area {i}"
         if isinstance(collection, QuadMesh):
             edges = np.asarray(collection.get_coordinates(), dtype=np.float64)
             middles = (edges[:-1, :-1] + edges[1:, :-1] + edges[:-1, 1:] + edges[1:, 1:]) / 4.0
@@ -726,4 +721,8 @@ def curves_figure(
 
 def _thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fewer points where x ascends; what runs to and fro is drawn whole."""
-    return series.thin(x, y) if len(x) > series.N_POINTS and bool((x[1:] > x[:-1]).all()) else (x, y)
+    return series.thin(x, y) if _has_many_ascending(x) else (x, y)
+
+
+def _has_many_ascending(x: FloatArray) -> bool:
+    return len(x) > series.N_POINTS and bool((x[1:] > x[:-1]).all())

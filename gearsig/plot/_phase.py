@@ -215,8 +215,7 @@ def chaos_test_figure(test: ChaosTest, walk: FloatArray, c_rad: float, *, title:
     right.set_aspect("equal", adjustable="datalim")
     style.label_axes(right, "p", "q")
     style.note(right, f"walk at c = {c_rad:.3f} rad")
-    for panel in (left, right):
-        style.no_offset(panel)
+    style.no_offset(left, right)
     return figure
 
 
@@ -315,8 +314,7 @@ def bifurcation_figure(
             lines.append(Line2D([], [], color=style.FLOOR, alpha=0.3, linewidth=9.0, label="shaded: two motions"))
         series.legend_row(figure, lines, heading=diagram.parameter_name)
     series.headline(figure, title or f"{diagram.axis_name} once per {diagram.section}, over {diagram.parameter_name}")
-    for panel in panels:
-        style.no_offset(panel)
+    style.no_offset(*panels)
     return figure
 
 

@@ -17,14 +17,12 @@ from gearsig.plot._cursors import Cursor
 from gearsig.plot._panels import ChartLine, LinePanel, panels_figure
 from gearsig.plot._phase import divergence_figure
 from gearsig.plot._series import thin
+from gearsig.plot._style import MICRO, MILLI
 from gearsig.severity import ToothSearch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-MICRO, MILLI = 1e6, 1e3
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray, one_of
 from gearsig.decompose import Modes, mode_spectra
 from gearsig.errors import InputError
-from gearsig.formatting import unit_text
+from gearsig.formatting import axis_unit, unit_text
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
@@ -315,7 +315,7 @@ def modes_figure(
 def _mode_title(modes: Modes, k: int) -> str:
     if k == modes.n_modes:
         return f"residual, {100 * modes.reconstruction_error:.2g} % of the rms"
-    unit = "Hz" if modes.axis == "frequency" else "orders"
+    unit = axis_unit(modes.axis)
     text = f"mode {k + 1}: {_digits(modes.centres[k], 4)} ± {_digits(modes.bandwidths[k], 2)} {unit}"
     return f"{text}, {plain(modes.source, 40)}" if modes.source else text
 

@@ -13,6 +13,7 @@ from gearsig.errors import InputError
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._series import thin
+from gearsig.plot._style import KILO, MICRO, MILLI
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +36,6 @@ MODELS = {
     motions.KELVIN_VOIGT: (style.MESH, "-."),
 }
 """Colour and line of each model: the source's figures have solid, dashed and dotted lines."""
-MICRO, KILO = 1e6, 1e-3
 
 Drawn = Sequence[tuple[motions.StartStop, str]]
 """Motions with their colours."""
@@ -120,8 +120,7 @@ def _panels_below_a_wide_one(heights_in: Sequence[float], *, right_in: float = 0
     place = axes[0].get_subplotspec()
     assert place is not None  # noqa: S101 - it is in a grid
     axes[0].set_subplotspec(place.get_gridspec()[0, :])
-    for panel in axes:
-        style.no_offset(panel)
+    style.no_offset(*axes)
     return figure, axes
 
 
@@ -171,7 +170,7 @@ def _draw_planes(axes: Axes, drawn: Drawn) -> None:
         if examined.portrait is None:
             series.write(axes, 0.5, 0.5, "the middle of the play is not known")
             return
-        _draw_path(axes, examined.portrait.points * (MICRO, 1e3), colour)
+        _draw_path(axes, examined.portrait.points * (MICRO, MILLI), colour)
     plays = [f"{examined.backlash.backlash_um:.4g}" for examined, _ in drawn if examined.backlash is not None]
     if len(plays) == len(drawn):
         style.note(axes, f"play {' and '.join(plays)} µm")
@@ -183,7 +182,7 @@ def _draw_loops(axes: Axes, drawn: Drawn) -> None:
         if examined.loop is None:
             series.write(axes, 0.5, 0.5, "no torque was measured")
             return
-        _draw_path(axes, np.stack([examined.loop.twist_rad * 1e3, examined.loop.torque_nm], axis=1), colour)
+        _draw_path(axes, np.stack([examined.loop.twist_rad * MILLI, examined.loop.torque_nm], axis=1), colour)
 
 
 def _draw_path(axes: Axes, points: FloatArray, colour: str) -> None:

@@ -127,6 +127,9 @@ RULE = "#D9DDE2"
 CURSOR_COLOURS = {"mesh": MESH, "sideband": MESH, "shaft": SHAFT, "bearing": BEARING, "hunting": QUIET}
 """Colour of each kind of order line."""
 
+MICRO, MILLI, KILO = 1e6, 1e3, 1e-3
+"""Factors from SI units to µm, mm (also ms, mrad) and kN that axes count in."""
+
 DOTS_PER_INCH = 100
 WIDTH_IN = 9.0
 TEXT_PT = 9.5
@@ -300,11 +303,11 @@ def label_axes(axes: Axes, x: str = "", y: str = "", title: str = "") -> None:
         axes.set_title(plain(title, 110), loc="left", color=INK, fontsize=TEXT_PT, fontweight="bold", parse_math=False)
 
 
-def no_offset(axes: Axes) -> None:
+def no_offset(*panels: Axes) -> None:
     """Write the labels of linear axes in full: "1999.8", not "-0.2 + 2e3"; "8e−05", not "8" and a factor elsewhere."""
     from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
-    for axis in (axes.xaxis, axes.yaxis):
+    for axis in (axis for axes in panels for axis in (axes.xaxis, axes.yaxis)):
         if isinstance(axis.get_major_formatter(), ScalarFormatter):
             axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.8g}".replace("-", "−")))
 
