@@ -246,6 +246,17 @@ def unit_text(unit: str) -> str:
     return text
 
 
+def axis_unit(axis: str) -> str:
+    """Return the unit in which an axis of frequencies, orders or quefrencies counts.
+
+    Examples
+    --------
+    >>> axis_unit("frequency"), axis_unit("order"), axis_unit("quefrency")
+    ('Hz', 'orders', 's')
+    """
+    return {"frequency": "Hz", "order": "orders", "quefrency": "s"}[axis]
+
+
 def axis_label(axis: str, shaft: str) -> str:
     """Name an axis of frequencies, of orders, that is cycles per revolution of a shaft, or of quefrencies."""
     return {"order": f"order (of {shaft or 'the shaft'})", "quefrency": "quefrency (s)"}.get(axis, "frequency (Hz)")

@@ -204,8 +204,7 @@ def _order_spectra(halves: Sequence[tuple[AngleSignal, AngleSignal]], highest: f
     n = int(highest * block) + 1
 
     def spectrum(half: AngleSignal, name: str) -> Spectrum:
-        full = order_spectrum(half, name, scaling="power", revolutions_per_block=block)
-        return replace(full, values=full.values[:n], positions=full.positions[:n])
+        return order_spectrum(half, name, scaling="power", revolutions_per_block=block).head(n)
 
     return [
         {name: (spectrum(first, name), spectrum(second, name)) for name in first.channel_names}

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from gearsig.checks import closest_match_hint, positive
+from gearsig.checks import known_name, positive
 from gearsig.diagnosis import MEMORY_BYTES, RecordBlocks, record_blocks
 from gearsig.errors import InputError
 from gearsig.formatting import file_label
@@ -66,11 +66,7 @@ def apply_method(
 
 def _method(name: str, options: Mapping[str, Any]) -> tuple[Method, dict[str, Any]]:
     """Return a method and all its options, checked."""
-    if name not in METHODS:
-        raise InputError(
-            f"there is no method {name!r}", allowed=", ".join(METHODS), remedy=closest_match_hint(name, list(METHODS))
-        )
-    method = METHODS[name]
+    method = METHODS[known_name(name, METHODS, f"there is no method {name!r}")]
     defined = {option.name: option for option in method.options}
     for key, value in options.items():
         if key not in defined:

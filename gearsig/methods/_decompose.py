@@ -12,7 +12,7 @@ from gearsig import plot
 from gearsig.checks import FloatArray
 from gearsig.decompose import DenoiseSettings, Modes, VmdEngine, VmdSettings, denoise, mode_spectra, suggest_modes, vmd
 from gearsig.errors import InputError
-from gearsig.formatting import readable, unit_text
+from gearsig.formatting import axis_unit, readable, unit_text
 from gearsig.indicators import kurtosis
 from gearsig.methods._table import (
     LINES,
@@ -79,7 +79,7 @@ def _modes(
     chosen = int(np.argmax(impulses)) if mode is None else mode - 1
     if not 0 <= chosen < modes.n_modes:
         raise InputError(f"mode is {mode}", allowed=f"1 to {modes.n_modes}, by rising centre")
-    unit = "Hz" if modes.axis == "frequency" else "orders"
+    unit = axis_unit(modes.axis)
     numbers = {
         "centres": list(modes.centres),
         "bandwidths": list(modes.bandwidths),

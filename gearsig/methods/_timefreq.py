@@ -10,7 +10,7 @@ import numpy as np
 from gearsig import plot, timefreq
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.formatting import axis_label, unit_text
+from gearsig.formatting import axis_label, axis_unit, unit_text
 from gearsig.methods._spectra import cursors_of
 from gearsig.methods._table import LINES, OVER_ANGLE, SHAFT, Method, MethodAnswer, MethodOption, signal_of, waveforms_of
 from gearsig.orders import order_spectrum
@@ -91,7 +91,7 @@ def levels_answer(
     channel: str, levels: TimeFrequencyMap, numbers: Mapping[str, Any], ridges: Sequence[Ridge] = ()
 ) -> MethodAnswer:
     """Return a map as an answer."""
-    unit = "Hz" if levels.axis == "frequency" else "orders"
+    unit = axis_unit(levels.axis)
     caption = f"{levels.axis_label} over {levels.at_label}, {levels.method}"
     table: dict[str, Any] = {levels.at_label: levels.at}
     table |= {f"{p:.7g} {unit}": levels.values[:, i] for i, p in enumerate(levels.positions)}
@@ -180,7 +180,7 @@ def _ridges(
     step = f"components along {len(ridges)} ridges, {wavelet.name}"
     answer = levels_answer(channel, levels, {"n_ridges": len(ridges)}, ridges)
     at, peak = timefreq.at_label(first.axis, first.shaft), with_unit("amplitude peak", first.unit)
-    unit, table = "Hz" if first.axis == "frequency" else "orders", {at: first.at}
+    unit, table = axis_unit(first.axis), {at: first.at}
     for number, ridge in enumerate(ridges, start=1):
         table |= {f"ridge {number} ({unit})": ridge.positions, f"ridge {number} {peak}": ridge.amplitude}
     names = [f"ridge {number}" for number in range(1, len(ridges) + 1)]
@@ -257,7 +257,7 @@ def _packets(
     columns = {"signal": signal.values, name: values, "residual": signal.values - values}
     answer = levels_answer(channel, levels, {"nodes": chosen})
     table = _energies(packets)
-    unit = "Hz" if packets.axis == "frequency" else "orders"
+    unit = axis_unit(packets.axis)
     low, shares = table[f"from ({unit})"], table["share of the energy (%)"]
     edges = np.append(low, packets.limits_of(packets.n_bands - 1)[1])
     steps = ChartLine(np.repeat(edges, 2)[1:-1], np.repeat(shares, 2), "share")
@@ -292,7 +292,7 @@ def _packets(
 
 
 def _energies(packets: WaveletPackets) -> dict[str, Any]:
-    bands, unit = range(packets.n_bands), "Hz" if packets.axis == "frequency" else "orders"
+    bands, unit = range(packets.n_bands), axis_unit(packets.axis)
     return {
         "node": np.array([timefreq.node_path(band, packets.level) for band in bands], dtype=object),
         f"from ({unit})": np.array([packets.limits_of(band)[0] for band in bands]),

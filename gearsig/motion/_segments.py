@@ -180,8 +180,7 @@ def _starts_at_once(first: MotionSegment, angle_rad: FloatArray, rate_hz: float)
 def _absorb(directions: np.ndarray, shortest: int) -> None:
     """Give runs that are too short the direction of the run before them, the shortest first; in place."""
     while True:
-        edges = np.flatnonzero(np.diff(directions)) + 1
-        bounds = np.concatenate([[0], edges, [len(directions)]])
+        bounds = _bounds(directions)
         lengths = np.diff(bounds)
         if len(lengths) < 2 or lengths.min() >= shortest:
             return
@@ -193,11 +192,15 @@ def _absorb(directions: np.ndarray, shortest: int) -> None:
 def _cut(
     directions: np.ndarray, angle_rad: FloatArray, speed_rad_s: FloatArray, rate_hz: float
 ) -> tuple[MotionSegment, ...]:
-    edges = np.flatnonzero(np.diff(directions)) + 1
-    bounds = np.concatenate([[0], edges, [len(directions)]])
     return tuple(
-        _segment(int(directions[a]), int(a), int(b), angle_rad, speed_rad_s, rate_hz) for a, b in pairwise(bounds)
+        _segment(int(directions[a]), int(a), int(b), angle_rad, speed_rad_s, rate_hz)
+        for a, b in pairwise(_bounds(directions))
     )
+
+
+def _bounds(directions: np.ndarray) -> NDArray[np.intp]:
+    """Return where runs of one direction begin, and where the last one ends."""
+    return np.concatenate([[0], np.flatnonzero(np.diff(directions)) + 1, [len(directions)]])
 
 
 def _segment(

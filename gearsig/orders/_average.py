@@ -359,22 +359,18 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int], *, n_p
                 for j, mean in enumerate(means):
                     if j != k and mean is not None:
                         separated[k][row] -= _at(_without_mesh(mean, teeth[j]), _places(signal) * teeth[k] / teeth[j])
-                means[k] = whole_revolutions(_with_samples(signal, separated[k]), name).mean(axis=0)
+                means[k] = whole_revolutions(replace(signal, samples=separated[k]), name).mean(axis=0)
         for j, mean in enumerate(means):
             assert mean is not None  # noqa: S101 - there is at least one pass
             periodic = mean if j == 0 else _without_mesh(mean, teeth[j])
             residual[row] -= _at(periodic, _places(signals[0]) * teeth[0] / teeth[j])
-    shaft_signals = tuple(_with_samples(signal, samples) for signal, samples in zip(signals, separated, strict=True))
-    return SeparatedShafts(shaft_signals, _with_samples(signals[0], residual))
+    shaft_signals = tuple(replace(signal, samples=samples) for signal, samples in zip(signals, separated, strict=True))
+    return SeparatedShafts(shaft_signals, replace(signals[0], samples=residual))
 
 
 def _check_angle_signals(signals: Sequence[AngleSignal], name: str) -> tuple[AngleSignal, ...]:
     remedy = "gearsig.resample_to_angle(recording, shaft_angle) makes one"
     return listed(signals, name, AngleSignal, remedy=remedy)
-
-
-def _with_samples(signal: AngleSignal, samples: FloatArray) -> AngleSignal:
-    return replace(signal, samples=samples)
 
 
 def _without_mesh(revolution: FloatArray, teeth: int) -> FloatArray:

@@ -167,10 +167,7 @@ class AverageLines(Result):
     scaling: LineScaling
 
     def __post_init__(self) -> None:
-        for name in ("parts", "n_revolutions"):
-            array = np.array(getattr(self, name))
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        freeze(self, "parts", "n_revolutions", ndim=None)
         if self.parts.shape[:2] != (len(self.n_revolutions), len(self.channels)):
             raise InputError(
                 f"parts of shape {self.parts.shape} for {len(self.n_revolutions)} parts, {len(self.channels)} channels"

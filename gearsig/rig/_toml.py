@@ -11,7 +11,7 @@ from types import NoneType, UnionType
 from typing import Any, get_args, get_type_hints
 
 from gearsig.cache import write_whole
-from gearsig.checks import closest_match_hint, known_name, short
+from gearsig.checks import known_name, short
 from gearsig.errors import InputError
 from gearsig.rig._contact import ToothContact
 from gearsig.rig._types import (
@@ -195,13 +195,7 @@ def _speed(table: Any, where: str, nominal: OperatingPoint | None) -> SpeedSourc
             where=where,
             remedy="give them with --tach-times FILE",
         )
-    if source not in _SPEED_SOURCES:
-        raise InputError(
-            f"source is {source!r}",
-            where=where,
-            allowed=", ".join((*_SPEED_SOURCES, "none")),
-            remedy=closest_match_hint(source, _SPEED_SOURCES),
-        )
+    known_name(source, (*_SPEED_SOURCES, "none"), f"source is {source!r}", where=where)
     if _SPEED_SOURCES[source] is ConstantSpeed and "speed_rpm" not in values and nominal and nominal.speed_rpm:
         shaft = f' and shaft = "{nominal.shaft}"' if nominal.shaft else ""
         raise InputError(

@@ -194,7 +194,7 @@ def _window_energies(shaft: ShaftLines) -> tuple[FloatArray, FloatArray, int]:
 
 
 def _over_bands(energy: FloatArray, median: FloatArray) -> FloatArray:
-    """Return the energy of each window relative to its band's median, mean over bands and channels."""
+    """Return the energy at each angle relative to its band's median, mean over bands and channels."""
     relative = np.divide(energy, median[..., None], out=np.ones_like(energy), where=median[..., None] > 0)
     mean: FloatArray = relative.mean(axis=(0, 1))
     return mean
@@ -595,8 +595,7 @@ def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
 def _relative_energy(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     """Return the energy in windows of one pitch over the median one, the event in the middle."""
     envelopes = band_envelopes(searched)
-    median = np.median(envelopes, axis=-1, keepdims=True)
-    relative = np.divide(envelopes, median, out=np.ones_like(envelopes), where=median > 0).mean(axis=(0, 1))
+    relative = _over_bands(envelopes, np.median(envelopes, axis=-1))
     width = round(len(relative) / searched.teeth)
     energy = sliding_mean(relative, width)
     shift = len(energy) // 2 - round(event.centre_rev * len(energy)) + width // 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -503,7 +503,6 @@ def _half_lobe(window: str) -> float:
 # --------------------
 
 Preparation = Literal["none", "tones removed", "whitened"]
-PREPARATIONS = ("none", "tones removed", "whitened")
 
 
 def prepared_signal(values: FloatArray, sampling_rate_hz: float, preparation: Preparation) -> FloatArray:
@@ -537,7 +536,7 @@ def prepared_signal(values: FloatArray, sampling_rate_hz: float, preparation: Pr
 
     x = checked_signal(values, minimum=64)
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    if one_of(preparation, "preparation", PREPARATIONS) == "none":
+    if one_of(preparation, "preparation", get_args(Preparation)) == "none":
         return x
     return np.asarray(irfft(prepared_lines(rfft(x.astype(np.float64)), preparation), len(x), overwrite_x=True))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -178,7 +178,7 @@ def _choice(
 def _clarity(spectrum: Spectrum, alpha: float, n: int, slip: float, *, power: bool) -> tuple[float, float]:
     """Return the mean height of the harmonics over the floor in dB, and the rhythm at which it is largest."""
     values = np.sqrt(spectrum.values) if power else spectrum.values
-    amplitudes = Spectrum(**{**spectrum.__dict__, "values": values, "scaling": "amplitude peak"})
+    amplitudes = replace(spectrum, values=values, scaling="amplitude peak")
     floor = np.maximum(noise_floor(amplitudes).values, 1e-300)
     db = 20 * np.log10(np.maximum(values, 1e-300) / floor)
     step = spectrum.resolution / (2 * n * alpha)

@@ -179,8 +179,8 @@ def envelope_spectrum(
     )
     if highest_hz is None:
         return spectrum
-    keep = spectrum.positions <= positive(highest_hz, "highest_hz", "Hz")
-    return replace(spectrum, values=spectrum.values[keep], positions=spectrum.positions[keep])
+    n_lines = np.searchsorted(spectrum.positions, positive(highest_hz, "highest_hz", "Hz"), side="right")
+    return spectrum.head(int(n_lines))
 
 
 def envelope_recording(

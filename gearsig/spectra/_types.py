@@ -24,7 +24,7 @@ from gearsig.checks import (
     within,
 )
 from gearsig.errors import InputError
-from gearsig.formatting import axis_label, counted
+from gearsig.formatting import axis_label, axis_unit, counted
 from gearsig.recording import Recording, check_recording
 from gearsig.results import Result
 
@@ -80,7 +80,7 @@ class Spectrum(Result, columns=("positions", "values")):
     @property
     def axis_unit(self) -> str:
         """Unit of positions and of the resolution."""
-        return {"frequency": "Hz", "order": "orders", "quefrency": "s"}[self.axis]
+        return axis_unit(self.axis)
 
     @property
     def axis_label(self) -> str:

@@ -362,7 +362,7 @@ def _length(x: UniformSignal, window_length: float | None) -> int:
         n = min(max(x.n_samples // 64, 16), 8192)
     else:
         n = round(positive(window_length, "window_length") * x.rate)
-    unit = "s" if x.axis == "frequency" else "revolutions"
+    unit = x.length_unit
     if n < 4:
         raise InputError(
             f"the window of {window_length:g} {unit} holds {n} samples",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gearsig.angle import AngleSignal
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive, short
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import axis_unit
 from gearsig.recording import Recording
 from gearsig.spectra import Scaling, array_rate_hz, check_signal, scaled_unit
 from gearsig.timefreq._types import Axis, Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap
@@ -89,7 +90,12 @@ class UniformSignal:
     @property
     def position_unit(self) -> str:
         """Unit of frequencies or orders, for messages."""
-        return "Hz" if self.axis == "frequency" else "orders"
+        return axis_unit(self.axis)
+
+    @property
+    def length_unit(self) -> str:
+        """Unit of time or angle, for messages."""
+        return "s" if self.axis == "frequency" else "revolutions"
 
     def instants(self, step: int) -> FloatArray:
         """Return the instant of every `step`-th sample."""

@@ -202,10 +202,9 @@ def lines_of(
     if low > top:
         raise InputError(f"lowest is {low:g}, highest is {top:g} {unit}", allowed="lowest < highest")
     if low < fits * (1 - 1e-9):
-        length = "s" if x.axis == "frequency" else "revolutions"
         raise RefusalError(
-            f"the signal of {x.length:.4g} {length} is shorter than the wavelet at {low:.4g} {unit}, which lasts "
-            f"{footprint_periods(wavelet) / low:.4g} {length}",
+            f"the signal of {x.length:.4g} {x.length_unit} is shorter than the wavelet at {low:.4g} {unit}, which "
+            f"lasts {footprint_periods(wavelet) / low:.4g} {x.length_unit}",
             remedy=f"set lowest to {fits:.4g} {unit} or more, take a shorter wavelet, or record longer",
         )
     if positions is not None:
