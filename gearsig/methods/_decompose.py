@@ -24,6 +24,7 @@ from gearsig.methods._table import (
     signal_of,
     top_hz,
     unit_of,
+    verbatim,
     waveforms_of,
 )
 from gearsig.methods._timefreq import NAMES, levels_answer, levels_of
@@ -294,10 +295,6 @@ def _samples_of_modes(options: Mapping[str, Any]) -> int:
     return 2**13 if options["engine"] == "vmdpy" else 2**21  # vmdpy keeps all iterations, 16 kB per sample and mode
 
 
-def _same(*names: Any) -> dict[Any, str]:
-    return {name: str(name) for name in names}
-
-
 PARTS = {
     "modes": Method(
         "Modes",
@@ -306,16 +303,16 @@ PARTS = {
         _modes,
         (
             MethodOption(
-                "n_modes", "Modes K", "count", None, "", "as the signal suggests", _same(*range(1, 11)), maximum=40,
+                "n_modes", "Modes K", "count", None, "", "as the signal suggests", verbatim(*range(1, 11)), maximum=40,
             ),
             MethodOption(
                 "penalty", "Penalty α", "number", None,
                 "Weight of the modes' bandwidth: large for narrow modes. 2000 is usual.", "as the signal suggests",
-                _same(*PENALTIES), minimum=1e-9,
+                verbatim(*PENALTIES), minimum=1e-9,
             ),
             MethodOption(
                 "mode", "Chosen mode", "count", None, "From 1 by rising centre.", "the most impulsive one",
-                _same(*range(1, 11)),
+                verbatim(*range(1, 11)),
             ),
             MethodOption(
                 "then", "The chosen mode goes on to", "choice", "",
@@ -331,13 +328,13 @@ PARTS = {
             MethodOption(
                 "start", "Start", "choice", "automatic",
                 "First centre frequencies: evenly spread, at the peaks of the spectrum, or all at zero.",
-                choices=_same("automatic", "uniform", "peaks", "zero"), more=True,
+                choices=verbatim("automatic", "uniform", "peaks", "zero"), more=True,
             ),
             MethodOption(
                 "zero_mode", "Mode at zero", "switch", False,
                 "Keep the first mode's centre at zero, so that it takes mean and drift.", more=True,
             ),
-            MethodOption("iterations", "Iterations", "count", 499, "", "", _same(499, 1000, 2000, 5000), more=True),
+            MethodOption("iterations", "Iterations", "count", 499, "", "", verbatim(499, 1000, 2000, 5000), more=True),
             MethodOption(
                 "dual_step", "Dual step τ", "number", 0.0,
                 "Above 0 the modes must sum to the signal, noise included; 0 leaves noise in the residual.",
@@ -346,7 +343,7 @@ PARTS = {
             MethodOption(
                 "engine", "Engine", "choice", "gearsig",
                 "vmdpy: the reference program, for comparison; slow, and short parts only.",
-                choices=_same(*get_args(VmdEngine)), more=True,
+                choices=verbatim(*get_args(VmdEngine)), more=True,
             ),
             SHAFT,
         ),
@@ -369,7 +366,7 @@ PARTS = {
             MethodOption(
                 "rule", "Rule", "choice", "soft",
                 "What is above the threshold is shrunk by it (soft), kept as it is (hard), or in between (garrote).",
-                choices=_same("soft", "hard", "garrote"),
+                choices=verbatim("soft", "hard", "garrote"),
             ),
             MethodOption(
                 "noise", "Noise", "choice", "quietest level",
@@ -377,17 +374,17 @@ PARTS = {
                 choices={"quietest level": "White", "finest level": "White, finest level", "each level": "Coloured"},
             ),
             MethodOption(
-                "wavelet", "Wavelet", "choice", "sym8", choices=_same("sym8", "sym4", "db4", "db8", "coif3", "haar"),
+                "wavelet", "Wavelet", "choice", "sym8", choices=verbatim("sym8", "sym4", "db4", "db8", "coif3", "haar"),
             ),
             MethodOption(
                 "shifts", "Shifts", "count", 8,
                 "Cycle spinning: the mean over shifts of the signal against the wavelet's grid. 1 is none.",
-                choices=_same(1, 2, 4, 8, 16), maximum=64,
+                choices=verbatim(1, 2, 4, 8, 16), maximum=64,
             ),
             MethodOption(
                 "levels", "Levels", "count", None,
                 "How often the signal is halved in frequency; what lies below the coarsest level is kept as it is.",
-                "automatic", _same(*range(1, 15)),
+                "automatic", verbatim(*range(1, 15)),
             ),
         ),
         "Modes",

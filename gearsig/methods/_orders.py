@@ -12,7 +12,17 @@ from gearsig.diagnosis import RecordBlocks
 from gearsig.errors import GearsigError
 from gearsig.formatting import counted, power_of_ten, readable, unit_text
 from gearsig.methods._spectra import cursors_of, highest_order
-from gearsig.methods._table import HIGHEST, SHAFT, Method, MethodAnswer, MethodOption, signal_of, unit_of, waveforms_of
+from gearsig.methods._table import (
+    HIGHEST,
+    SHAFT,
+    Method,
+    MethodAnswer,
+    MethodOption,
+    signal_of,
+    unit_of,
+    verbatim,
+    waveforms_of,
+)
 from gearsig.orders import OrderMap, TrackedOrder, frequency_map, order_map, track_orders, track_vold_kalman
 from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibel_text, decibels, with_unit
 from gearsig.prepared import PreparedRecording
@@ -270,7 +280,7 @@ ALONG = {
             MethodOption(
                 "poles", "Poles", "count", 2,
                 "More poles: steeper skirts, longer settling. The first generation has two.",
-                choices={n: str(n) for n in (1, 2, 3)}, more=True,
+                choices=verbatim(1, 2, 3), more=True,
             ),
             MethodOption(
                 "generation", "Generation", "choice", "second",

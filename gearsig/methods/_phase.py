@@ -11,7 +11,7 @@ from gearsig import phase, plot
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted, percent
-from gearsig.methods._table import SHAFT, Method, MethodAnswer, MethodOption, angle_or_none, unit_of
+from gearsig.methods._table import SHAFT, Method, MethodAnswer, MethodOption, angle_or_none, unit_of, verbatim
 from gearsig.plot import with_unit
 from gearsig.prepared import PreparedRecording
 
@@ -406,7 +406,7 @@ HIGH = MethodOption(
 QUANTITY = MethodOption(
     "quantity", "An unnamed quantity is", "choice", "acceleration",
     "Where the recording does not say what the channel measures.",
-    choices={name: name for name in ("acceleration", "velocity", "displacement")}, more=True,
+    choices=verbatim("acceleration", "velocity", "displacement"), more=True,
 )  # fmt: skip
 PLACE = MethodOption(
     "place", "Place in the cycle (0 to 1)", "number", 0.0,
@@ -420,7 +420,7 @@ PLANE = (
     SHAFT,
     MethodOption(
         "revolutions", "Path drawn (revolutions)", "count", 2, "The points are of the whole part.",
-        choices={n: str(n) for n in (1, 2, 5, 10, 20, 50, 100)},
+        choices=verbatim(1, 2, 5, 10, 20, 50, 100),
     ),
     QUANTITY,
     PLACE,
@@ -475,7 +475,7 @@ IN_PHASE = {
             "method", "Method", "choice", "rosenstein",
             ("rosenstein: nearest neighbours; transverse: their distance across the path, for coarsely sampled "
             "signals; kantz: ten neighbours each, for noisy signals with many points"),
-            choices={name: name for name in ("rosenstein", "transverse", "kantz")},
+            choices=verbatim("rosenstein", "transverse", "kantz"),
         ),
         MethodOption("theiler", "Theiler window (samples)", "count", None, "", "one mean period"),
         MethodOption("steps", "Steps followed", "count", None, "", "30 mean periods"),
@@ -497,7 +497,7 @@ IN_PHASE = {
             choices={float(n): str(n) for n in range(1, 31)}, minimum=0.01, maximum=50.0,
         ),
         MethodOption(
-            "n_points", "Points drawn", "count", 1000, choices={n: str(n) for n in (200, 500, 1000, 2000, 3000)},
+            "n_points", "Points drawn", "count", 1000, choices=verbatim(200, 500, 1000, 2000, 3000),
         ),
         MethodOption("every", "Take every n-th sample", "count", None, "", "16 per mean period"),
         MethodOption("shortest", "Shortest line (points)", "count", 2, minimum=2),

@@ -25,6 +25,7 @@ from gearsig.methods._table import (
     signal_of,
     top_hz,
     unit_of,
+    verbatim,
     waveforms_of,
 )
 from gearsig.orders import OrderMap, SynchronousAverage, order_spectrum
@@ -730,13 +731,13 @@ RHYTHMS = {
             MethodOption(
                 "n_bands", "Carrier bands", "count", 64,
                 "Fewer bands average more and find weaker modulation; more show better where its carrier is.",
-                choices={n: str(n) for n in (8, 16, 32, 64, 128, 256)},
+                choices=verbatim(8, 16, 32, 64, 128, 256),
             ),
             replace(BAND, label="Carriers averaged (Hz)", about="", empty="all"),
             MethodOption(
                 "odds", "Noise passes the level in 1 line of", "count", 100,
                 "How often noise alone passes the dashed line.",
-                choices={n: str(n) for n in (20, 100, 1000, 10_000)}, minimum=2, more=True,
+                choices=verbatim(20, 100, 1000, 10_000), minimum=2, more=True,
             ),
         ),
         "Envelope",

@@ -311,6 +311,11 @@ def waveforms_of(
     )  # fmt: skip
 
 
+def verbatim(*values: Any) -> dict[Any, str]:
+    """Return choices that are shown as they are written."""
+    return {value: str(value) for value in values}
+
+
 OVER_ANGLE = MethodOption(
     "over_angle", "Over", "switch", False,
     "Over the shaft's angle lines are orders: a change of speed does not smear.",

@@ -12,7 +12,17 @@ from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.formatting import axis_label, axis_unit, unit_text
 from gearsig.methods._spectra import cursors_of
-from gearsig.methods._table import LINES, OVER_ANGLE, SHAFT, Method, MethodAnswer, MethodOption, signal_of, waveforms_of
+from gearsig.methods._table import (
+    LINES,
+    OVER_ANGLE,
+    SHAFT,
+    Method,
+    MethodAnswer,
+    MethodOption,
+    signal_of,
+    verbatim,
+    waveforms_of,
+)
 from gearsig.orders import order_spectrum
 from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibel_text, decibels, with_unit
 from gearsig.prepared import PreparedRecording
@@ -51,7 +61,7 @@ MAP_OPTIONS = (
     MethodOption(
         "engine", "Engine of squeezed transforms", "choice", "gearsig",
         "ssqueezepy: another program, for comparison; single precision, and short parts only.", more=True,
-        choices={name: name for name in get_args(timefreq.SqueezeEngine)},
+        choices=verbatim(*get_args(timefreq.SqueezeEngine)),
     ),
     SHAFT,
 )  # fmt: skip
@@ -319,7 +329,7 @@ MAPS = {
         _ridges,
         (
             MethodOption("transform", "Transform", "choice", "squeezed-cwt", choices=NAMES),
-            MethodOption("n_ridges", "Ridges", "count", 2, choices={n: str(n) for n in range(1, 7)}, maximum=12),
+            MethodOption("n_ridges", "Ridges", "count", 2, choices=verbatim(*range(1, 7)), maximum=12),
             MethodOption(
                 "bends", "Penalty on bends", "number", 1.0,
                 "Price of changes of slope: raise it for sweeps in noise, lower it for fast modulation.",
@@ -355,12 +365,12 @@ MAPS = {
             MethodOption(
                 "wavelet", "Wavelet", "choice", "sym12",
                 "Long wavelets separate bands better; nearly symmetric ones (sym, dmey) show an event when it was.",
-                choices={name: name for name in PACKET_WAVELETS},
+                choices=verbatim(*PACKET_WAVELETS),
             ),
             MethodOption(
                 "level", "Level", "count", 4,
                 "The signal is split so often into halves: 2 to the power of it nodes of equal width.",
-                choices={n: str(n) for n in range(1, 9)}, maximum=12,
+                choices=verbatim(*range(1, 9)), maximum=12,
             ),
             MethodOption(
                 "nodes", "Waveform of the nodes", "numbers", (),
