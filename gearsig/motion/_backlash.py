@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.motion._segments import MotionSegments
-from gearsig.motion._types import PairMotion
+from gearsig.motion._types import PairMotion, median_deviation
 from gearsig.results import Result
 
 MIN_SAMPLES = 12
@@ -84,7 +84,7 @@ def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -
     for _ in range(20):
         x, *_ = np.linalg.lstsq(design[keep], q[keep], rcond=None)
         residual = q - design @ x
-        scatter = 1.4826 * float(np.median(np.abs(residual[keep]))) or float(np.finfo(float).tiny)
+        scatter = median_deviation(residual[keep]) or float(np.finfo(float).tiny)
         # What is four standard deviations off is left out: the middle of a blow, a slipped count.
         again = loaded & (np.abs(residual) < 4.0 * scatter)
         _check_sides(int(np.sum(again & (design[:, 1] > 0))), int(np.sum(again & (design[:, 1] < 0))))
@@ -139,7 +139,7 @@ def _lost_motion(motion: PairMotion) -> BacklashEstimate:
     near = 0.2 * (high - low)
     drive, back = q[turning & (q > high - near)], q[turning & (q < low + near)]
     _check_sides(len(drive), len(back))
-    scatter = 1.4826 * float(np.median(np.abs(drive - np.median(drive))))
+    scatter = median_deviation(drive - np.median(drive))
     drawn = 2e-6 * motion.contact.half_backlash_um
     # Less than half of the rig's play is the deflection of one flank and not the way to the other.
     if high - low < max(6.0 * scatter, 0.5 * drawn):

@@ -10,7 +10,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, frozen_array, number
 from gearsig.errors import InputError, RefusalError
 from gearsig.motion._measure import find_roles, measure_motion, role_values
-from gearsig.motion._types import Datum, ForceError, ForceEstimate, PairMotion, check_motion
+from gearsig.motion._types import Datum, ForceError, ForceEstimate, PairMotion, check_motion, median_deviation
 from gearsig.recording import Recording
 from gearsig.rig import Rig, ToothContact, contact_pair, path_of_contact
 
@@ -151,7 +151,7 @@ def _from_torque(motion: PairMotion) -> Datum:
     normal = force / friction_share(motion, force)
     zero = (motion.compression_m - np.sign(force) * a - elastic_depth(motion, normal))[loaded]
     middle = float(np.median(zero))
-    spread = 1.4826 * float(np.median(np.abs(zero - middle)))
+    spread = median_deviation(zero - middle)
     return Datum(middle, 1.25 * spread / np.sqrt(len(zero)), f"from the torque, {len(zero)} loaded samples")
 
 

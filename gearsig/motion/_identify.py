@@ -13,7 +13,7 @@ from gearsig.errors import RefusalError
 from gearsig.motion._backlash import MIN_SAMPLES, dependence, estimate_backlash
 from gearsig.motion._force import find_datum, friction_share
 from gearsig.motion._impacts import meeting_speeds
-from gearsig.motion._types import PairMotion
+from gearsig.motion._types import PairMotion, median_deviation
 from gearsig.results import Result
 from gearsig.rig import damping_ratio_s_per_m
 
@@ -104,7 +104,7 @@ def robust_fit(
         _check_samples(keep, len(names))
         x, jacobian = _solve(residuals, x, scale, keep)
         residual = residuals(x * scale)
-        scatter = 1.4826 * float(np.median(np.abs(residual[keep])))
+        scatter = median_deviation(residual[keep])
         # What is five standard deviations off is left out: flanks that just part, counts that slipped.
         again = usable & (np.abs(residual) <= 5.0 * max(scatter, min_scatter))
         if np.array_equal(again, keep):
@@ -658,11 +658,11 @@ def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
     for j in np.flatnonzero(counts >= MIN_SAMPLES_PER_TOOTH):
         of_tooth = residual[single & (tooth == j)]
         middle[j] = np.median(of_tooth)
-        spread[j] = 1.4826 * np.median(np.abs(of_tooth - middle[j]))
+        spread[j] = median_deviation(of_tooth - middle[j])
     extra = middle - np.nanmedian(middle)
     # Neighbouring samples are alike; the teeth's own differences say by how much a median can be off.
     alone = 1.25 * np.nanmedian(spread) / np.sqrt(np.maximum(counts, 1))
-    among = 1.4826 * float(np.nanmedian(np.abs(extra)))
+    among = median_deviation(extra[~np.isnan(extra)])
     uncertainty = np.where(np.isnan(extra), np.nan, np.maximum(alone, among))
     known = float(np.log(motion.contact.stiffness_n_per_m_lambda))  # one flank hardly tells it from the angles' zero
     deflection = _deflection(equation, fit.value("log stiffness") if equation.has_both_flanks else known, single)

@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import RefusalError
 from gearsig.motion._force import depth
-from gearsig.motion._types import PairMotion
+from gearsig.motion._types import PairMotion, median_deviation
 
 MAX_SAMPLES = 60
 
@@ -221,7 +221,7 @@ def scatter_of(values: FloatArray) -> float:
     """Standard deviation of what changes from sample to sample: by the median of second differences, deaf to blows."""
     moving = np.diff(values, 2)
     moving = moving[moving != 0.0]
-    return 1.4826 * float(np.median(np.abs(moving))) / np.sqrt(6.0) if len(moving) else 0.0
+    return median_deviation(moving) / np.sqrt(6.0) if len(moving) else 0.0
 
 
 Run = tuple[int, int, int]

@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, instance_of, known_name, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
-from gearsig.motion._types import PairMotion, stands
+from gearsig.motion._types import PairMotion, median_deviation, stands
 from gearsig.recording import Channel, Recording, check_recording
 from gearsig.rig import SIDES, EncoderChannel, GearPair, PathOfContact, Rig, check_rig, contact_pair, path_of_contact
 
@@ -222,7 +222,7 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where
     quantum = float(moving.min()) if len(moving) else 0.0
     # A thousandth of a revolution: no gear with its load gets there and stays within one sample; fifty times the
     # ordinary change of the increments, of which an impact reaches a tenth; four steps of a coarse encoder.
-    limit = max(2e-3 * pi, 50.0 * 1.4826 * float(np.median(beyond)), 4.0 * quantum)
+    limit = max(2e-3 * pi, 50.0 * median_deviation(beyond), 4.0 * quantum)
     jumps = np.flatnonzero(beyond > limit)
     if len(jumps):
         i = int(jumps[0])

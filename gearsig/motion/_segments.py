@@ -13,6 +13,7 @@ from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
 from gearsig.motion._measure import local_polynomial
+from gearsig.motion._types import median_deviation
 from gearsig.results import Result
 from gearsig.spectra import Spectrum, amplitude_spectrum
 
@@ -144,7 +145,7 @@ def motion_segments(
         speed_rad_s = shaft_speed_rad_s(angle_rad, sampling_rate_hz)
     if len(angle_rad) != len(speed_rad_s) or len(speed_rad_s) < 8:
         raise InputError(f"{len(angle_rad)} angles for {len(speed_rad_s)} speeds", allowed="as many, at least 8")
-    scatter = 1.4826 * float(np.median(np.abs(np.diff(speed_rad_s, 2)))) / np.sqrt(6.0)
+    scatter = median_deviation(np.diff(speed_rad_s, 2)) / np.sqrt(6.0)
     threshold = max(0.02 * float(np.quantile(np.abs(speed_rad_s), 0.95)), 5.0 * scatter, 1e-12)
     directions = np.where(np.abs(speed_rad_s) < threshold, 0, np.sign(speed_rad_s)).astype(np.int64)
     # A shorter rest is the turning point of a swing, a shorter motion a tremor.

@@ -191,6 +191,11 @@ class ForceEstimate(Result):
         return next(e for e in self.errors if (e.model, e.reference) == (model, reference))
 
 
+def median_deviation(values: FloatArray) -> float:
+    """Return the standard deviation of Gaussian values about 0 by their median magnitude: outliers do not count."""
+    return 1.4826 * float(np.median(np.abs(values)))
+
+
 def stands(driver_angle_rad: FloatArray, path: PathOfContact, contact: ToothContact) -> bool:
     """Say whether the driver turns by less than its play and a quarter of a tooth pitch."""
     # A machine that turns by less than that stands, though a blow may rattle it.

@@ -12,6 +12,7 @@ from gearsig.errors import InputError, answer_or_none
 from gearsig.formatting import counted
 from gearsig.phase._embedding import chosen_delay, delay_embedding, embedding_dimension
 from gearsig.phase._lyapunov import largest_lyapunov_exponent
+from gearsig.phase._neighbours import GOLDEN
 from gearsig.phase._section import CycleLock, check_lock, poincare_section, section_period
 from gearsig.phase._types import (
     ChaosTest,
@@ -83,9 +84,7 @@ def zero_one_test(
             allowed=f"at least {MIN_VALUES}",
             remedy="record longer",
         )
-    c = LOWEST_C + (HIGHEST_C - LOWEST_C) * (
-        (np.arange(n_frequencies) + 0.5) * 0.6180339887498949 % 1.0
-    )  # the golden ratio
+    c = LOWEST_C + (HIGHEST_C - LOWEST_C) * ((np.arange(n_frequencies) + 0.5) * GOLDEN % 1.0)  # the golden ratio
     scale = float(phi.std())
     k_of_c = np.array([_k(phi / scale, float(frequency), alpha) for frequency in c])
     k = float(np.median(k_of_c))

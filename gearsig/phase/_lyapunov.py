@@ -11,7 +11,7 @@ from numba import njit
 from gearsig.checks import FloatArray, count, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
-from gearsig.phase._neighbours import IndexArray, nearest_apart, spaced
+from gearsig.phase._neighbours import GOLDEN, IndexArray, nearest_apart, spaced
 from gearsig.phase._types import LyapunovExponent, PhasePortrait, check_portrait, checked_series, mean_period_samples
 
 N_LIBRARY, N_REFERENCES, N_BLOCKS = 100_000, 4_000, 12
@@ -97,7 +97,7 @@ def _unrelated_log_distance(points: FloatArray, theiler: int, *, last_axis: bool
     """Mean logarithm of the distance of points far apart in time: pairs by the golden ratio, spread over all delays."""
     n = len(points)
     firsts = spaced(n, N_UNRELATED)
-    seconds = (firsts + 1 + theiler + ((np.arange(len(firsts)) * 0.6180339887498949) % 1.0 * (n - 2 * theiler - 2))) % n
+    seconds = (firsts + 1 + theiler + ((np.arange(len(firsts)) * GOLDEN) % 1.0 * (n - 2 * theiler - 2))) % n
     difference = points[firsts] - points[seconds.astype(np.intp)]
     distance = np.abs(difference[:, -1]) if last_axis else np.linalg.norm(difference, axis=1)
     return float(np.log(distance[distance > 0.0]).mean())

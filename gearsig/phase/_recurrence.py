@@ -7,10 +7,10 @@ from numba import njit
 
 from gearsig.checks import FloatArray, count, positive, within
 from gearsig.errors import InputError, RefusalError
+from gearsig.phase._neighbours import GOLDEN
 from gearsig.phase._types import PhasePortrait, RecurrenceMeasures, RecurrencePlot, check_portrait, mean_period_samples
 
 N_PAIRS = 200_000
-GOLDEN = 0.6180339887498949
 MAX_PLOT_POINTS, MAX_MEASURE_POINTS = 3_000, 20_000
 
 
