@@ -149,7 +149,7 @@ def gear_mesh_figure(outlines_mm: FloatArray, quality: FloatArray, *, near_mm: W
     style.label_axes(whole, "x (mm)", "y (mm)")
     style.label_axes(close, "x (mm)", "")
     style.colour_bar(close, faces, "scaled Jacobian (1: undistorted)")
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 
@@ -193,7 +193,7 @@ def gear_modes_figure(
     style.colour_bar(panels[COLUMNS - 1], drawn, "axial motion over largest motion")
     for axes in panels[len(shapes) :]:
         axes.remove()
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 
@@ -252,7 +252,7 @@ def gear_stress_figure(
         style.put_text(axes, 0.0, 1.0 + 0.09 / TALL_IN, note, transform=axes.transAxes, va="center")
     beyond = top < float(shown.max())
     style.colour_bar(axes, drawn, "von Mises stress (MPa)", extend="max" if beyond else "neither")
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 
@@ -307,7 +307,7 @@ def stress_maps_figure(
         style.colour_bar(axes, drawn, "MPa", extend="both" if signed else "max")
     for axes in panels[len(stress_pa) :]:
         axes.remove()
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 

@@ -392,7 +392,7 @@ def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Fig
     axes.set_xlim(panel.limits)
     style.label_axes(axes, panel.x)
     style.no_offset(axes)
-    series.headline(figure, title)
+    series.head(figure, title)
     series.legend_row(figure, keys, left_in=3.6)
     return figure
 
@@ -538,7 +538,7 @@ def confusion_figure(true: Sequence[str], answers: Sequence[str], counts: np.nda
     axes.tick_params(length=0)
     axes.grid(visible=False)
     style.label_axes(axes, "said")
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 
@@ -568,7 +568,7 @@ def calibration_figure(
     style.label_axes(axes, "probability of the likeliest cause (%)", "right (%)")
     if curves:
         axes.legend(loc="upper left", frameon=False, fontsize=style.SMALL_PT)
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 

@@ -121,7 +121,7 @@ def load_sharing_figure(
     style.label_axes(upper, "", "force of a pair (N)")
     style.label_axes(lower, series.CYCLES, "transmission error (µm)")
     series.legend_row(figure, cases, top_in=2.46)
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 
@@ -306,7 +306,7 @@ def mesh_maps_figure(
             bar.set_yticks([float(f"{level:.3g}") for level in levels])
         style.put_text(axes, 0.0, 1.03, name, colour=style.INK, fontsize=style.TEXT_PT, transform=axes.transAxes)
         style.label_axes(axes, series.CYCLES if n < 3 else "mesh cycles", "torque (N·m)" if axes is panels[0] else "")
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 
@@ -397,7 +397,7 @@ def speed_spectra_figure(
             axes.axvline(natural_hz, color=style.FAULT, linewidth=0.9, linestyle=(0, (3, 2)), zorder=1)
         style.put_text(axes, 0.995, 0.93, name, colour=style.INK, transform=axes.transAxes, ha="right", va="top")
         style.label_axes(axes, "frequency (Hz)" if axes is panels[-1] else "", "transmission error (µm)")
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 

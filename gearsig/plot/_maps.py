@@ -65,7 +65,7 @@ def order_map_figure(
     draw(axes, place(cursors, limits, style.size_in(axes)[0]), through=False)
     style.label_axes(axes, order_map.axis_label)
     style.label_axes(speed, "speed (rpm)", "time (s)")
-    series.headline(figure, order_map.source)
+    series.head(figure, order_map.source)
     style.no_offset(speed)
     return figure
 
@@ -285,7 +285,7 @@ def coherence_figure(
     below.plot([1.004, 1.004], mean.band_hz, transform=below.get_yaxis_transform(), color=style.MEASURED, clip_on=False)
     style.label_axes(below, coherence.alpha_label, "carrier (Hz)")
     style.label_axes(above, "", "mean γ²")
-    series.headline(figure, f"spectral coherence of {coherence.source}")
+    series.head(figure, f"spectral coherence of {coherence.source}")
     noise = f"noise: 1 line in {1 / mean.probability:.4g} above the dashed line"
     right, top = 1.0 - right_in / style.WIDTH_IN, 1.0 - 0.08 / figure.get_size_inches()[1]
     style.put_text(figure, right, top, noise, ha="right", va="top")

@@ -298,7 +298,7 @@ def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") 
                     borderaxespad=0.0,
                 )
         style.label_axes(place, panel.x, panel.y)
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 

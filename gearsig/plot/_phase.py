@@ -313,7 +313,7 @@ def bifurcation_figure(
             style.note(panels[-1], f"two motions at the values tried, {step}{more}")
             lines.append(Line2D([], [], color=style.FLOOR, alpha=0.3, linewidth=9.0, label="shaded: two motions"))
         series.legend_row(figure, lines, heading=diagram.parameter_name)
-    series.headline(figure, title or f"{diagram.axis_name} once per {diagram.section}, over {diagram.parameter_name}")
+    series.head(figure, title or f"{diagram.axis_name} once per {diagram.section}, over {diagram.parameter_name}")
     style.no_offset(*panels)
     return figure
 

@@ -149,7 +149,7 @@ def response_figure(
             series.write(spectrum, harmonic * mesh_hz, 1.02, name, colour=style.MESH)
     for axes, name in ((phase, "once per period"), (section, "these, enlarged")):
         axes.set_title(name, loc="right", color=style.FAULT, fontsize=style.SMALL_PT)
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 
@@ -284,7 +284,7 @@ def crack_comparison_figure(
     ):
         axes.set_xlabel(label, color=style.INK, fontsize=style.TEXT_PT)
     series.write(panels[0], marked[len(marked) // 2], 1.02, "cracked tooth enters", colour=style.FAULT)
-    series.headline(figure, title)
+    series.head(figure, title)
     return figure
 
 

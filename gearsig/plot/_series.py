@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -103,7 +103,10 @@ def plot_curves(axes: Axes, x: FloatArray, curves: Mapping[str, FloatArray], wid
 
 def head(figure: Figure, title: str, lines: Sequence[Line2D] = (), heading: str = "") -> None:
     """Write the title and, below it, the row of names."""
-    headline(figure, title)
+    if title:
+        width, height = figure.get_size_inches()
+        looks: dict[str, Any] = {"colour": style.INK, "fontsize": style.TEXT_PT, "fontweight": "bold"}
+        style.put_text(figure, 0.85 / width, 1.0 - 0.08 / height, title, n_max=110, va="top", **looks)
     if lines:
         legend_row(figure, lines, heading=heading)
 
@@ -172,23 +175,6 @@ def checked_limits(limits: tuple[float, float], name: str) -> tuple[float, float
     if not low < high:
         raise InputError(f"{name} is {low:g} to {high:g}", allowed="ascending")
     return float(low), float(high)
-
-
-def headline(figure: Figure, title: str) -> None:
-    """Write the title above the row of names."""
-    if title:
-        width, height = figure.get_size_inches()
-        style.put_text(
-            figure,
-            0.85 / width,
-            1.0 - 0.08 / height,
-            title,
-            colour=style.INK,
-            fontsize=style.TEXT_PT,
-            n_max=110,
-            fontweight="bold",
-            va="top",
-        )
 
 
 def thin(x: FloatArray, y: FloatArray, n_points: int = N_POINTS) -> tuple[FloatArray, FloatArray]:

@@ -79,7 +79,7 @@ def spectrum_figure(
     _draw_lines(axes, spectrum, floor, (low, high), scale, marked)
     draw(axes, placed)
     style.label_axes(axes, spectrum.axis_label, _value_label(spectrum, scale))
-    series.headline(figure, title or spectrum.source)
+    series.head(figure, title or spectrum.source)
     return figure
 
 
