@@ -262,7 +262,6 @@ def stress_maps_figure(
     stress_pa: Mapping[str, FloatArray],
     *,
     near_mm: Window,
-    part: float = 0.995,
     title: str = "",
 ) -> Figure:
     """Draw several stresses on the end face side by side, those that change sign with white at 0.
@@ -275,8 +274,6 @@ def stress_maps_figure(
         Name → (n,).
     near_mm : tuple
         Low and high x, low and high y.
-    part : float
-        Part of the points shown that the colours hold; the peak at the force goes beyond.
     title : str
 
     Returns
@@ -300,7 +297,7 @@ def stress_maps_figure(
         stress = series.checked_values(values, len(points), name) * 1e-6
         shown = stress[inside]
         signed = bool(shown.min() < -0.05 * shown.max())
-        top = max(float(np.quantile(np.abs(shown), part)), 1e-12)
+        top = max(float(np.quantile(np.abs(shown), 0.995)), 1e-12)  # the peak at the force goes beyond
         low, colours = (-top, "RdBu_r") if signed else (0.0, "viridis")
         drawn = _draw_stress(axes, points, triangles, stress, near_mm, (low, top), colours)
         style.label_axes(axes, "x (mm)", "y (mm)", name)

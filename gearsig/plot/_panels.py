@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -619,10 +619,6 @@ class CurvePanel:
     curves : mapping
         Name → array, (n,); one to eight.
     x_label, y_label, title : str
-    marks : sequence of float
-        Places on the x axis with a thin upright line.
-    looks : str
-        "line", "dots", or "both".
     log_y : bool
     """
 
@@ -631,8 +627,6 @@ class CurvePanel:
     x_label: str = ""
     y_label: str = ""
     title: str = ""
-    marks: Sequence[float] = ()
-    looks: Literal["line", "dots", "both"] = "line"
     log_y: bool = False
 
 
@@ -700,14 +694,9 @@ def curves_figure(
             colour = colours[name] if some else own
             if len(values) != len(panel.x):
                 raise InputError(f"{name} has {len(values)} points, its axis {len(panel.x)}", allowed="equal lengths")
-            line = {"line": "-", "dots": "", "both": "-"}[panel.looks]
-            marker = {"line": "", "dots": ".", "both": "o"}[panel.looks]
-            x, y = (panel.x, values) if panel.looks != "line" else _thinned(panel.x, values)
-            drawn = place.plot(x, y, line, marker=marker, ms=3.0, color=colour, lw=1.3, label=name)
-            drawn[0].set_zorder(3 - 0.01 * k)
-            lines += drawn
-        for mark in panel.marks:
-            place.axvline(mark, color=style.QUIET, lw=0.7, ls=":", zorder=1)
+            lines += place.plot(
+                *_thinned(panel.x, values), ms=3.0, color=colour, lw=1.3, label=name, zorder=3 - 0.01 * k
+            )
         if panel.log_y:
             place.set_yscale("log")
         style.label_axes(place, panel.x_label, panel.y_label, panel.title)
