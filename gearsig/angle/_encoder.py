@@ -79,6 +79,8 @@ def encoder_angle(
 
     Raises
     ------
+    InputError
+        On fewer than 8 samples, or values that are not finite.
     RefusalError
         If the shaft stands still, or turns one way and then the other.
     """
@@ -169,6 +171,8 @@ def speed_channel_angle(values: FloatArray, sampling_rate_hz: float, rpm_per_uni
 
     Raises
     ------
+    InputError
+        On fewer than 8 samples, or values that are not finite.
     RefusalError
         If the channel says that the machine is at rest, or that it reverses.
     """

@@ -71,6 +71,8 @@ def find_pulse_edges(
 
     Raises
     ------
+    InputError
+        On another `edge`, a hysteresis below 0, or values that are not finite.
     RefusalError
         If the levels are to be found and the channel has no two levels: constant, or noise.
 

@@ -136,6 +136,11 @@ def healthy_records(variances: Sequence[float], *, z: float = 2.33, n_first: int
     -------
     tuple of bool
 
+    Raises
+    ------
+    InputError
+        If `n_first` is below 2: one record has no scatter.
+
     Notes
     -----
     The test is on the single record; Decker et al. (1994) fix the reference by a test of the same kind.

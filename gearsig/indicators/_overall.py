@@ -145,6 +145,11 @@ def vibration_zone(velocity_mm_per_s: float, group: int, mounting: str) -> str:
     mounting : str
         "rigid" or "flexible".
 
+    Raises
+    ------
+    InputError
+        On a group or mounting that the standard does not have.
+
     Examples
     --------
     >>> vibration_zone(2.0, 2, "rigid"), vibration_zone(7.2, 1, "rigid")

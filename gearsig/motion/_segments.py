@@ -125,7 +125,7 @@ def motion_segments(
     """Cut a shaft's motion into segments forwards, backwards and at rest.
 
     At rest is a speed below 2 % of its 95 % quantile, or within five standard deviations of its scatter from sample to
-    sample, for at least 30 ms.
+    sample, for at least 30 ms. A segment that turns by less than 2 % of the longest one is rest as well.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def find_phases(segments: MotionSegments, speed_rad_s: FloatArray, sampling_rate
     ----------
     segments : MotionSegments
     speed_rad_s : array, (n,)
-        The smoothed one that the segments was found from: ringing would pass for running.
+        The smoothed one that the segments were found from: ringing would pass for running.
     sampling_rate_hz : float
 
     Returns
@@ -271,8 +271,8 @@ class AngleProfile:
     Parameters
     ----------
     n_teeth : int
-    rms : mapping-like arrays, forwards and backwards, (n_teeth,)
-        nan where a tooth was never passed that way.
+    rms_forwards, rms_backwards : arrays, (n_teeth,)
+        In the signal's unit; nan where a tooth was never passed that way.
     passes_forwards, passes_backwards : array of int, (n_teeth,)
     """
 
@@ -362,6 +362,8 @@ def segment_order_spectrum(
 
     Raises
     ------
+    InputError
+        On another direction, or if values and angles differ in number.
     RefusalError
         If no segment of that direction is long enough.
 
@@ -458,13 +460,13 @@ class Burst:
 def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...]:
     """Find where a vibration rises at once, far over its quiet level.
 
-    Those below a third of the hardest are left out. The level is the root mean square over 2 ms; quiet is its 20 %
+    Those below 35 % of the hardest are left out. The level is the root mean square over 2 ms; quiet is its 20 %
     quantile, which a machine that stands now and then has.
 
     Raises
     ------
     InputError
-        If the rate is below 2 kHz: a blow would be a single sample.
+        If the rate is below 2 kHz, where a blow would be a single sample, or the record is shorter than 40 ms.
     """
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     if sampling_rate_hz < 2000.0:

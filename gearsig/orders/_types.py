@@ -73,6 +73,8 @@ class TrackedOrder(Result, columns=("time_s", "speed_rpm", "amplitude", "phase_r
         Of the cosine against the shaft angle, -π to π.
     bandwidth_orders : float
         Width over which the order's energy was collected.
+    unit, source, shaft : str
+        Of the amplitude; the channel; the shaft that the order counts on.
     """
 
     order: float

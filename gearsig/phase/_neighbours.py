@@ -50,6 +50,8 @@ def nearest_apart(
         Samples.
     norm : float
         2: Euclidean, inf: largest coordinate.
+    equal_counts : bool
+        Whether a point at distance 0 is a neighbour.
 
     Returns
     -------

@@ -122,6 +122,11 @@ def gear_mesh_figure(outlines_mm: FloatArray, quality: FloatArray, *, near_mm: W
     Returns
     -------
     Figure
+
+    Raises
+    ------
+    InputError
+        On outlines of another shape, or a quality for other faces.
     """
     from matplotlib.collections import PolyCollection
 
@@ -170,6 +175,11 @@ def gear_modes_figure(
     Returns
     -------
     Figure
+
+    Raises
+    ------
+    InputError
+        Without shapes, or if one has not three numbers for each point.
     """
     points = np.asarray(points_mm, dtype=np.float64)
     if not shapes:

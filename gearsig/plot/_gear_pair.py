@@ -162,6 +162,11 @@ def friction_figure(
     Returns
     -------
     Figure
+
+    Raises
+    ------
+    InputError
+        If a case holds no number, or lengths differ.
     """
     x = series.checked_axis(mesh_cycles, "mesh_cycles")
     curves = series.checked_curves(coefficients, len(x), "coefficients", gaps=True)
@@ -221,6 +226,11 @@ def backlash_figure(
     Returns
     -------
     Figure
+
+    Raises
+    ------
+    InputError
+        On names that differ, or frequencies that begin at 0.
     """
     t = series.checked_axis(time_s, "time_s")
     f = series.checked_axis(frequency_hz, "frequency_hz")
@@ -414,6 +424,11 @@ def frequency_curves_figure(
     uncoupled_hz : array, (m,), or None
         Of the two sides without contact: they do not depend on the angle; drawn dashed.
     title : str
+
+    Raises
+    ------
+    InputError
+        If the rows are not as many as mesh angles.
     """
     x = series.checked_axis(mesh_cycles, "mesh_cycles")
     curves = frozen_array(frequencies_hz, "frequencies_hz", ndim=2)

@@ -39,6 +39,8 @@ def order_map_figure(
         In the map's axis.
     highest : float or None
         Highest order or frequency shown; None: all.
+    height_in : float
+        Of the figure, in inches.
 
     Returns
     -------

@@ -233,6 +233,11 @@ def envelope(x: FloatArray, y: FloatArray, n_columns: int = N_POINTS // 4) -> tu
         Where the largest value of each column lies: a peak keeps its position.
     low, high : array
         Short lines come back unchanged, low and high being `y`.
+
+    Raises
+    ------
+    InputError
+        If the lengths differ or a value is not finite.
     """
     x, y = frozen_array(x, "x", ndim=1), frozen_array(y, "y", ndim=1)
     count(n_columns, "n_columns", minimum=1)

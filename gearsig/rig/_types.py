@@ -126,6 +126,8 @@ class PulseTimes:
     times_s : array, (n_pulses,)
         Checked where they are turned into speed, so that a bad train is reported with its pulses.
     pulses_per_revolution : int
+    shaft : str
+        Whose angle it is; empty: the reference shaft's.
     """
 
     times_s: FloatArray
@@ -152,6 +154,8 @@ class TachometerChannel:
         Full width in the channel's unit; None: a quarter of the step from low to high.
     edge : str
         "rising" or "falling".
+    shaft : str
+        Whose angle it is; empty: the reference shaft's.
     """
 
     channel: str
@@ -180,6 +184,8 @@ class EncoderChannel:
         360 for degrees, 2π for radians, 1 for revolutions, the line count for counts.
     wraps : bool
         Whether the angle starts again after each revolution.
+    shaft : str
+        Whose angle it is; empty: the reference shaft's.
     """
 
     channel: str

@@ -441,7 +441,8 @@ def kurtogram_envelope(
     Raises
     ------
     InputError
-        As `kurtogram`; also if `band_hz` lies outside of the spectrum.
+        As `kurtogram`; also if `band_hz` lies outside of the spectrum, or `highest_modulation_hz` outside of 8 over
+        the length to a sixth of the sampling rate.
     RefusalError
         As `kurtogram`; also if no band is allowed.
     """

@@ -67,6 +67,8 @@ def cwt(
         Lines in Hz or orders; None: `lowest` to `highest` at `n_per_octave` per octave.
     lowest, highest : float or None
         In Hz or orders; None: ten octaves, or twice the lowest possible, to what the wavelet's response allows.
+    n_per_octave : int
+        Lines per octave, where `positions` does not give them.
     step : int
         Samples between columns; the columns are exact, not averaged.
     edges : str

@@ -165,6 +165,11 @@ def packet_inverse(packets: WaveletPackets, bands: list[int] | None = None) -> F
     Returns
     -------
     array, (n_samples,)
+
+    Raises
+    ------
+    InputError
+        If a band is not there.
     """
     import pywt
 

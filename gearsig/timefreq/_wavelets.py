@@ -319,6 +319,9 @@ def plan_groups(
     ----------
     cycles : array, (n_lines,)
         Line frequencies in cycles per sample, increasing.
+    wavelet : Morse or Morlet
+    n_samples : int
+        Of the signal.
     step : int
         Samples between coefficients; a power of two.
     follow_band : bool
