@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -266,7 +266,7 @@ def average_lines(
     """
     count(n_parts, "n_parts")
     one_of(weighting, "weighting", ("equal", "hann"))
-    one_of(scaling, "scaling", ("amplitude peak", "amplitude rms"))
+    one_of(scaling, "scaling", get_args(LineScaling))
     _check_angle_signals([signal], "signal")
     names = listed(channels, "channels", str) if channels is not None else signal.channel_names
     per_rev = signal.samples_per_revolution

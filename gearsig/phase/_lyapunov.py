@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numba import njit
@@ -179,7 +179,7 @@ def largest_lyapunov_exponent(
     Source: M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993); H. Kantz, Physics Letters A 185 (1994).
     """
     check_portrait(portrait)
-    one_of(method, "method", ("rosenstein", "transverse", "kantz"))
+    one_of(method, "method", get_args(Method))
     x = checked_series(np.ascontiguousarray(portrait.points[:, 0]), minimum=100, name="the portrait's first axis")
     period = mean_period_samples(x)
     memory = (portrait.n_axes - 1) * portrait.delay_samples

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def spectrum_figure(
     InputError
         If the floor's length is not the spectrum's, or the limits are not ascending.
     """
-    one_of(scale, "scale", ("log", "decibel", "linear"))
+    one_of(scale, "scale", get_args(Scale))
     if floor is not None and len(floor) != len(spectrum.values):
         raise InputError(f"floor has {len(floor)} values, the spectrum {len(spectrum.values)}")
     low, high = limits or (float(spectrum.positions[0]), float(spectrum.positions[-1]))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +107,7 @@ def band_envelope(
     R. B. Randall and J. Antoni, "Rolling element bearing diagnostics – a tutorial", 2011.
     """
     x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=8)
-    one_of(kind, "kind", ("magnitude", "squared"))
+    one_of(kind, "kind", get_args(EnvelopeKind))
     within(edge_fraction, "edge_fraction", 0.0, 0.5)
     first, last = _band_lines(band_hz, fs, len(x))
     blocks = None

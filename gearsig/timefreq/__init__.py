@@ -6,8 +6,7 @@ from gearsig.timefreq._packets import WaveletPackets, node_path, packet_inverse,
 from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, tops_of_parted_paths, untangled
 from gearsig.timefreq._squeezing import SqueezeEngine, squeeze_lines
 from gearsig.timefreq._stft import squeezed_stft, squeezed_stft_map, stft, stft_map
-from gearsig.timefreq._types import Axis, Reduction, Ridge, TimeFrequencyMap, at_label
-from gearsig.timefreq._uniform import Source, UniformSignal, uniform
+from gearsig.timefreq._types import Axis, Reduction, Ridge, Source, TimeFrequencyMap, UniformSignal, at_label, uniform
 from gearsig.timefreq._wavelets import (
     Morlet,
     Morse,

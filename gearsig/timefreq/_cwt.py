@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,20 @@ from gearsig.timefreq._squeezing import (
     ssqueezepy,
     unit_rms,
 )
-from gearsig.timefreq._types import Coefficients, ComplexArray, Reduction, Spacing, TimeFrequencyMap
-from gearsig.timefreq._uniform import EDGES, Edges, LinePlan, Piece, Source, UniformSignal, plan_columns, uniform
+from gearsig.timefreq._types import (
+    Coefficients,
+    ComplexArray,
+    Edges,
+    LinePlan,
+    Piece,
+    Reduction,
+    Source,
+    Spacing,
+    TimeFrequencyMap,
+    UniformSignal,
+    plan_columns,
+    uniform,
+)
 from gearsig.timefreq._wavelets import (
     DEFAULT,
     Wavelet,
@@ -273,7 +286,7 @@ def _transform(
     engine: SqueezeEngine | None = None,
 ) -> LinePlan:
     """Check the edges and the engine (None: not squeezed); return the lines with the reach of ends and components."""
-    one_of(edges, "edges", EDGES)
+    one_of(edges, "edges", get_args(Edges))
     by = " by ssqueezepy" if engine is not None and is_ssqueezepy(engine) else ""
     method = f"CWT, {wavelet.name}" if engine is None else f"synchrosqueezed CWT{by}, {wavelet.name}"
     edge = half_support(wavelet) / 2 / lines  # half of the support carries all but a thousandth

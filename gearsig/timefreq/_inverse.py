@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 
@@ -11,8 +12,7 @@ from gearsig.errors import InputError
 from gearsig.results import Result
 from gearsig.timefreq._cwt import analysis
 from gearsig.timefreq._squeezing import gather_lines, gather_near
-from gearsig.timefreq._types import Coefficients, ComplexArray, Ridge
-from gearsig.timefreq._uniform import EDGES, Edges, Source, uniform
+from gearsig.timefreq._types import Coefficients, ComplexArray, Edges, Ridge, Source, uniform
 from gearsig.timefreq._wavelets import DEFAULT, Wavelet, admissibility, lowest_possible, pieces, plan_groups
 
 
@@ -153,7 +153,7 @@ def component(
     Source: I. Daubechies, J. Lu, H.-T. Wu (2011), see `squeezed_cwt`, theorem 3.3.
     """
     x = uniform(signal, channel)
-    one_of(edges, "edges", EDGES)
+    one_of(edges, "edges", get_args(Edges))
     if ridge.axis != x.axis:
         raise InputError(
             f"the ridge is over {ridge.axis}, the signal is not",

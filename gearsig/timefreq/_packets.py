@@ -9,8 +9,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, freeze, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
-from gearsig.timefreq._types import Axis, Reduction, TimeFrequencyMap
-from gearsig.timefreq._uniform import Columns, LinePlan, Source, plan_columns, uniform
+from gearsig.timefreq._types import Axis, Columns, LinePlan, Reduction, Source, TimeFrequencyMap, plan_columns, uniform
 
 _MODE = "periodization"  # as many coefficients as samples: the only one that keeps the energy
 

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, one_of
 from gearsig.engines import engine_module
 from gearsig.errors import InputError
-from gearsig.timefreq._types import Spacing
-from gearsig.timefreq._uniform import UniformSignal
+from gearsig.timefreq._types import Spacing, UniformSignal
 
 MIN_SHARE = 1e-6
 """Coefficients below this share of the signal's rms are rounding: they have no frequency."""

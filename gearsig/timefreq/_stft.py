@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,19 @@ from gearsig.timefreq._squeezing import (
     ssqueezepy,
     unit_rms,
 )
-from gearsig.timefreq._types import Coefficients, ComplexArray, Reduction, TimeFrequencyMap
-from gearsig.timefreq._uniform import EDGES, Edges, LinePlan, Source, UniformSignal, plan_columns, segment_of, uniform
+from gearsig.timefreq._types import (
+    Coefficients,
+    ComplexArray,
+    Edges,
+    LinePlan,
+    Reduction,
+    Source,
+    TimeFrequencyMap,
+    UniformSignal,
+    plan_columns,
+    segment_of,
+    uniform,
+)
 
 
 def stft(
@@ -333,7 +345,7 @@ def _frames(
         is_ssqueezepy(engine)
     x = uniform(signal, channel)
     one_of(window, "window", ("hann", "gaussian"))
-    one_of(edges, "edges", EDGES)
+    one_of(edges, "edges", get_args(Edges))
     n = _length(x, window_length)
     n_fft = int(next_fast_len(n * count(zero_padding, "zero_padding"), real=True))
     n_fft += n_fft % 2

@@ -13,8 +13,7 @@ from scipy.fft import ifft, rfft
 
 from gearsig.checks import FloatArray, count, frozen_array, positive, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq._types import ComplexArray, Spacing
-from gearsig.timefreq._uniform import Edges, UniformSignal, segment_of
+from gearsig.timefreq._types import ComplexArray, Edges, Spacing, UniformSignal, segment_of
 
 TAIL = 1e-6
 """Share of the peak below which a wavelet is taken for zero, in time and in frequency."""

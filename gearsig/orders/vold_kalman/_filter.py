@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -147,7 +147,7 @@ def _separated(
     source: str,
 ) -> OrderSeparation:
     """Return the orders and the residual; widths (n_orders, n) or (n_orders, 1) in the unit of the tracks."""
-    one_of(generation, "generation", ("first", "second"))
+    one_of(generation, "generation", get_args(Generation))
     if generation == "second" and count(n_poles, "n_poles") > 3:
         raise InputError(f"n_poles is {n_poles}", allowed="1, 2 or 3")
     if len(y) < 16:
