@@ -22,6 +22,28 @@ from gearsig.plot._fe_gear import (
     gear_stress_figure,
     stress_maps_figure,
 )
+from gearsig.plot._figure_of import (
+    amplitude_spectrum,
+    cepstrum,
+    cwt,
+    delay_embedding,
+    envelope_spectrum,
+    figure_of,
+    figure_of_refusal,
+    kurtogram,
+    order_map,
+    order_spectrum,
+    phase_plane,
+    power_density,
+    search_panels,
+    spectral_coherence,
+    squeezed_cwt,
+    squeezed_stft,
+    stft,
+    synchronous_average,
+    track_orders,
+    vmd,
+)
 from gearsig.plot._gap import (
     INNER,
     OUTER,
@@ -48,26 +70,6 @@ from gearsig.plot._gear_pair import (
     speed_sweep_figure,
 )
 from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_figure, time_frequency_figure
-from gearsig.plot._methods import (
-    amplitude_spectrum,
-    cepstrum,
-    cwt,
-    delay_embedding,
-    envelope_spectrum,
-    figure_of,
-    kurtogram,
-    order_map,
-    order_spectrum,
-    phase_plane,
-    power_density,
-    spectral_coherence,
-    squeezed_cwt,
-    squeezed_stft,
-    stft,
-    synchronous_average,
-    track_orders,
-    vmd,
-)
 from gearsig.plot._panels import (
     ChartLine,
     ChartRow,
@@ -95,9 +97,7 @@ from gearsig.plot._pictures import Captioned, Picture, embed, figure_svg, fleet_
 from gearsig.plot._response import (
     ResponseCase,
     crack_comparison_figure,
-    figure_of_refusal,
     response_figure,
-    search_panels,
 )
 from gearsig.plot._series import envelope, series_colours, thin
 from gearsig.plot._spectrum import (

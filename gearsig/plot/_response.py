@@ -9,16 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearsig.checks import FloatArray, count, frozen_array, positive
-from gearsig.errors import InputError, RefusalError
-from gearsig.phase import LyapunovExponent
+from gearsig.errors import InputError
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
-from gearsig.plot._cursors import Cursor
-from gearsig.plot._panels import ChartLine, LinePanel, panels_figure
-from gearsig.plot._phase import divergence_figure
 from gearsig.plot._series import thin
 from gearsig.plot._style import MICRO, MILLI
-from gearsig.severity import ToothSearch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -286,50 +281,3 @@ def crack_comparison_figure(
     series.write(panels[0], marked[len(marked) // 2], 1.02, "cracked tooth enters", colour=style.FAULT)
     series.head(figure, title)
     return figure
-
-
-# --------------------
-# What was looked at where nothing was seen.
-# --------------------
-
-
-def search_panels(searched: Sequence[ToothSearch]) -> tuple[LinePanel, ...]:
-    """Return how far each place of a gear stands out, a panel a gear, with the level from which a crack is seen.
-
-    Parameters
-    ----------
-    searched : sequence of ToothSearch
-    """
-    panels = []
-    for search in searched:
-        highest = int(np.argmax(search.level_db))
-        threshold = ChartLine(
-            np.array([0.0, 360.0]), np.full(2, search.threshold_db), "seen as a crack", 1, dotted=True
-        )
-        what = "change since the reference" if search.with_reference else "average"
-        line = ChartLine(search.angle_deg, search.level_db, what)
-        at = float(search.angle_deg[highest])
-        top = max(float(search.level_db[highest]), search.threshold_db)
-        bottom = float(search.level_db.min())
-        panels.append(
-            LinePanel(
-                [line, threshold],
-                f"angle of {search.shaft} (deg)",
-                "over the median tooth (dB)",
-                (bottom - 0.08 * (top - bottom), top + 0.12 * (top - bottom)),
-                cursors=[Cursor(at, "finding", f"clearest, {at:.0f}°", 0)],
-                x_limits=(0.0, 360.0),
-                title=f"{search.gear}, {search.teeth} teeth",
-            )
-        )
-    return tuple(panels)
-
-
-def figure_of_refusal(refusal: RefusalError) -> Figure | None:
-    """Draw what was looked at before an answer was refused; None where there is nothing to see."""
-    looked_at = refusal.looked_at
-    if isinstance(looked_at, LyapunovExponent):
-        return divergence_figure(looked_at)
-    if isinstance(looked_at, tuple) and looked_at and all(isinstance(search, ToothSearch) for search in looked_at):
-        return panels_figure(search_panels(looked_at))
-    return None

@@ -1,20 +1,23 @@
-"""A figure in one call: of a result, or of a method and its signal."""
+"""A figure in one call: of a result, of what a refusal looked at, or of a method and its signal."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import singledispatch, wraps
 from typing import ParamSpec
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from gearsig import angle, decompose, orders, phase, recording, spectra, timefreq
-from gearsig.errors import InputError
+from gearsig.errors import InputError, RefusalError
 from gearsig.plot._average import average_figure
+from gearsig.plot._cursors import Cursor
 from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_figure, time_frequency_figure
-from gearsig.plot._panels import curves_figure, tracked_panel
+from gearsig.plot._panels import ChartLine, LinePanel, curves_figure, panels_figure, tracked_panel
 from gearsig.plot._phase import bifurcation_figure, divergence_figure, phase_portrait_figure, recurrence_figure
 from gearsig.plot._spectrum import modes_figure, spectrum_figure, speed_figure, time_figure
+from gearsig.severity import ToothSearch
 
 OptionsP = ParamSpec("OptionsP")
 
@@ -61,6 +64,58 @@ figure_of.register(phase.PhasePortrait, phase_portrait_figure)
 figure_of.register(phase.BifurcationDiagram, bifurcation_figure)
 figure_of.register(phase.LyapunovExponent, divergence_figure)
 figure_of.register(phase.RecurrencePlot, recurrence_figure)
+
+
+# --------------------
+# What was looked at where nothing was seen.
+# --------------------
+
+
+def search_panels(searched: Sequence[ToothSearch]) -> tuple[LinePanel, ...]:
+    """Return how far each place of a gear stands out, a panel a gear, with the level from which a crack is seen.
+
+    Parameters
+    ----------
+    searched : sequence of ToothSearch
+    """
+    panels = []
+    for search in searched:
+        highest = int(np.argmax(search.level_db))
+        threshold = ChartLine(
+            np.array([0.0, 360.0]), np.full(2, search.threshold_db), "seen as a crack", 1, dotted=True
+        )
+        what = "change since the reference" if search.with_reference else "average"
+        line = ChartLine(search.angle_deg, search.level_db, what)
+        at = float(search.angle_deg[highest])
+        top = max(float(search.level_db[highest]), search.threshold_db)
+        bottom = float(search.level_db.min())
+        panels.append(
+            LinePanel(
+                [line, threshold],
+                f"angle of {search.shaft} (deg)",
+                "over the median tooth (dB)",
+                (bottom - 0.08 * (top - bottom), top + 0.12 * (top - bottom)),
+                cursors=[Cursor(at, "finding", f"clearest, {at:.0f}°", 0)],
+                x_limits=(0.0, 360.0),
+                title=f"{search.gear}, {search.teeth} teeth",
+            )
+        )
+    return tuple(panels)
+
+
+def figure_of_refusal(refusal: RefusalError) -> Figure | None:
+    """Draw what was looked at before an answer was refused; None where there is nothing to see."""
+    looked_at = refusal.looked_at
+    if isinstance(looked_at, phase.LyapunovExponent):
+        return divergence_figure(looked_at)
+    if isinstance(looked_at, tuple) and looked_at and all(isinstance(search, ToothSearch) for search in looked_at):
+        return panels_figure(search_panels(looked_at))
+    return None
+
+
+# --------------------
+# Methods followed by the figure of their result.
+# --------------------
 
 
 def _drawn(method: Callable[OptionsP, object]) -> Callable[OptionsP, Figure]:
