@@ -108,11 +108,20 @@ def _several(values: Iterable[T], name: str, allowed: str, of: type | UnionType,
     raise InputError(f"{name} is {short(values)}", allowed=allowed, remedy=remedy)
 
 
-def count(value: int, name: str, *, minimum: int = 1, remedy: str = "") -> int:
-    """Return `value` as int if it is a whole number of at least `minimum`."""
+def count(value: int, name: str, *, minimum: int = 1, maximum: int | None = None, remedy: str = "") -> int:
+    """Return `value` as int if it is a whole number from `minimum` to `maximum`, None: without end.
+
+    Examples
+    --------
+    >>> count(13, "level", maximum=12)
+    Traceback (most recent call last):
+    ...
+    gearsig.errors.InputError: level is 13 (allowed: a whole number from 1 to 12)
+    """
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not whole or value < minimum:
-        raise InputError(f"{name} is {short(value)}", allowed=f"a whole number of at least {minimum}", remedy=remedy)
+    if not whole or value < minimum or (maximum is not None and value > maximum):
+        limits = f"of at least {minimum}" if maximum is None else f"from {minimum} to {maximum}"
+        raise InputError(f"{name} is {short(value)}", allowed=f"a whole number {limits}", remedy=remedy)
     return int(value)
 
 

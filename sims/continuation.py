@@ -7,7 +7,7 @@ from math import pi
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, count, one_of, within
+from gearsig.checks import FloatArray, closest_match_hint, count, one_of
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from sims.cracked import (
@@ -111,7 +111,7 @@ class Branch:
 
     def __post_init__(self) -> None:
         one_of(self.section, "section", SECTIONS)
-        within(count(self.n_cycles, "n_cycles", minimum=4), "n_cycles", 4, 100_000)
+        count(self.n_cycles, "n_cycles", minimum=4, maximum=100_000)
         if self.sweep.model != NAME:
             raise InputError(f"model {self.sweep.model} cannot go on from a state", allowed=NAME)
         if len(self.sweep.axes) != 1:

@@ -62,9 +62,7 @@ def delay_embedding(
     values, rate, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=1)
     x = checked_series(values, minimum=16)
     tau = chosen_delay(x, rate) if delay_samples is None else count(delay_samples, "delay_samples")
-    d = _chosen_dimension(x, rate, tau) if dimension is None else count(dimension, "dimension")
-    if d > 20:
-        raise InputError(f"dimension is {d}", allowed="1 to 20")
+    d = _chosen_dimension(x, rate, tau) if dimension is None else count(dimension, "dimension", maximum=20)
     return PhasePortrait(
         points=delay_vectors(x, tau, d),
         sampling_rate_hz=rate,
@@ -313,7 +311,7 @@ def embedding_dimension(
     rate = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     x = checked_series(values, minimum=200)
     tau = chosen_delay(x, rate) if delay_samples is None else count(delay_samples, "delay_samples")
-    within(count(largest, "largest", minimum=2), "largest", 2, 15)
+    count(largest, "largest", minimum=2, maximum=15)
     within(threshold, "threshold", 0.0, 0.5)
     window = round(mean_period_samples(x)) if theiler_samples is None else count(theiler_samples, "theiler_samples")
     n = len(x) - largest * tau

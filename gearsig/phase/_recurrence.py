@@ -47,7 +47,7 @@ def recurrence_plot(
     Source: J.-P. Eckmann, S. Oliffson Kamphorst, D. Ruelle, *Recurrence plots of dynamical systems*, Europhysics
     Letters 4 (1987).
     """
-    within(count(n_points, "n_points", minimum=2), "n_points", 2, MAX_PLOT_POINTS)
+    count(n_points, "n_points", minimum=2, maximum=MAX_PLOT_POINTS)
     points, step = _thinned_points(portrait, n_points, stride)
     limit = _radius(points, recurrence_rate, radius, 0)
     matrix = np.empty((len(points), len(points)), dtype=np.bool_)
@@ -104,7 +104,7 @@ def recurrence_measures(
     Source: N. Marwan, M. C. Romano, M. Thiel, J. Kurths, *Recurrence plots for the analysis of complex systems*,
     Physics Reports 438 (2007).
     """
-    within(count(n_points, "n_points", minimum=100), "n_points", 100, MAX_MEASURE_POINTS)
+    count(n_points, "n_points", minimum=100, maximum=MAX_MEASURE_POINTS)
     count(shortest_line, "shortest_line", minimum=2)
     points, stride_taken = _thinned_points(portrait, n_points, stride)
     window = _theiler(portrait, theiler_samples, stride_taken)

@@ -311,9 +311,9 @@ class GearPair:
     def __post_init__(self) -> None:
         _check_names(self, "name", "driver", "driven")
         for label, teeth in (("driver", self.driver_teeth), ("driven", self.driven_teeth)):
-            label_text = f"{label} teeth of pair {self.name!r}"
-            if teeth is not None and count(teeth, label_text, minimum=3, remedy="leave it out if unknown") > MAX_TEETH:
-                raise InputError(f"{label_text} is {teeth}", allowed=f"3 to {MAX_TEETH}")
+            if teeth is not None:
+                remedy = "leave it out if unknown"
+                count(teeth, f"{label} teeth of pair {self.name!r}", minimum=3, maximum=MAX_TEETH, remedy=remedy)
         for label, value in (("module_mm", self.module_mm), ("face_width_mm", self.face_width_mm)):
             if value is not None:
                 positive(value, f"{label} of pair {self.name!r}", "mm")

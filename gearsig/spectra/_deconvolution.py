@@ -222,8 +222,7 @@ def _checked(
     signal: FloatArray | Recording, channel_or_rate_hz: str | float, unit: str, source: str, n_taps: int
 ) -> tuple[FloatArray, float, str, str]:
     x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=64)
-    if count(n_taps, "n_taps", minimum=2) > len(x) // 10:
-        raise InputError(f"n_taps is {n_taps}", allowed=f"2 to {len(x) // 10}, a tenth of the signal")
+    count(n_taps, "n_taps", minimum=2, maximum=len(x) // 10, remedy="a tenth of the signal at most")
     x = x.astype(np.float64) - float(np.mean(x))
     if float(np.abs(x).max()) <= 1e-12 * float(np.abs(signal if isinstance(signal, np.ndarray) else x).max()):
         raise RefusalError("the signal is constant: it has no impacts", remedy="check the channel")

@@ -373,13 +373,8 @@ def _checked_levels(n_samples: int, n_levels: int | None) -> int:
         )
     if n_levels is None:
         return min(7, n_max)
-    if count(n_levels, "n_levels") > n_max:
-        raise InputError(
-            f"n_levels is {n_levels} for {n_samples} samples",
-            allowed=f"1 to {n_max}",
-            remedy=f"record at least {MIN_SAMPLES * 2**n_levels} samples, or take fewer levels",
-        )
-    return n_levels
+    remedy = f"L levels take {MIN_SAMPLES} · 2^L samples, and there are {n_samples}"
+    return count(n_levels, "n_levels", maximum=n_max, remedy=remedy)
 
 
 def _row_of_bands(fs: float, n_bands: int, moments: FloatArray, n: int) -> tuple[FloatArray, ...]:

@@ -135,8 +135,7 @@ def wavelet_packets(
 
     x = uniform(signal, channel)
     filters = _orthogonal(wavelet)
-    if count(level, "level") > 12:
-        raise InputError(f"level is {level}", allowed="1 to 12")
+    count(level, "level", maximum=12)
     shortest = filters.dec_len << level
     if x.n_samples < shortest:
         max_level = int(np.log2(max(x.n_samples / filters.dec_len, 1.0)))

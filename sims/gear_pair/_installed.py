@@ -37,7 +37,7 @@ class SensorSeat:
     position: str = ""
 
     def __post_init__(self) -> None:
-        within(count(self.bearing, "bearing of a sensor"), "bearing of a sensor", 1, N_BEARINGS)
+        count(self.bearing, "bearing of a sensor", maximum=N_BEARINGS)
         one_of(self.direction, "direction of a sensor", DIRECTIONS)
 
 
@@ -79,7 +79,7 @@ class Pickup:
 
     def __post_init__(self) -> None:
         within(self.side, "side of the tachometer", 0, 1)
-        within(count(self.pulses_per_revolution, "pulses_per_revolution"), "pulses_per_revolution", 1, 1024)
+        count(self.pulses_per_revolution, "pulses_per_revolution", maximum=1024)
 
 
 @dataclass(frozen=True)

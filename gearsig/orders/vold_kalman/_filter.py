@@ -148,8 +148,8 @@ def _separated(
 ) -> OrderSeparation:
     """Return the orders and the residual; widths (n_orders, n) or (n_orders, 1) in the unit of the tracks."""
     one_of(generation, "generation", get_args(Generation))
-    if generation == "second" and count(n_poles, "n_poles") > 3:
-        raise InputError(f"n_poles is {n_poles}", allowed="1, 2 or 3")
+    if generation == "second":
+        count(n_poles, "n_poles", maximum=3)
     if len(y) < 16:
         raise InputError(f"the signal has {len(y)} samples", allowed="at least 16")
     # The first generation's structural equation is of second order; on either side of the order it has one pole.
