@@ -694,9 +694,7 @@ def curves_figure(
             colour = colours[name] if some else own
             if len(values) != len(panel.x):
                 raise InputError(f"{name} has {len(values)} points, its axis {len(panel.x)}", allowed="equal lengths")
-            lines += place.plot(
-                *_thinned(panel.x, values), ms=3.0, color=colour, lw=1.3, label=name, zorder=3 - 0.01 * k
-            )
+            lines += place.plot(*_thinned(panel.x, values), color=colour, lw=1.3, label=name, zorder=3 - 0.01 * k)
         if panel.log_y:
             place.set_yscale("log")
         style.label_axes(place, panel.x_label, panel.y_label, panel.title)
