@@ -62,17 +62,17 @@ def simulate(
     >>> recording.truth["effects"][0]["name"], recording.channel_names
     ('root_crack', ('a1', 'a2', 'tacho'))
     """
-    from dataclasses import replace
+    from sims.registry import Simulation
+    from sims.simulator import as_profile, effect_settings
 
-    import numpy as np
-
-    from gearsig.checks import count
-    from sims.registry import simulator
-    from sims.simulator import SimulationSetup, effect_settings, operation_of
-
-    simulates = simulator(model)
-    operation = operation_of(model, preset, speed_rpm, torque_nm)
-    setup = SimulationSetup(preset, parameters or {}, effect_settings(effects), operation)
-    rng = np.random.default_rng(count(seed, "seed", minimum=0))
-    recording = simulates.simulate(setup, rng, sampling_rate_hz=sampling_rate_hz, duration_s=duration_s)
-    return replace(recording, truth={**(recording.truth or {}), "seed": seed})
+    return Simulation(
+        model,
+        preset=preset,
+        parameters=parameters or {},
+        effects=effect_settings(effects),
+        speed_rpm=as_profile(speed_rpm, "speed_rpm"),
+        torque_nm=as_profile(torque_nm, "torque_nm"),
+        duration_s=duration_s,
+        sampling_rate_hz=sampling_rate_hz,
+        seed=seed,
+    ).run()

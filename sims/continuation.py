@@ -23,7 +23,6 @@ from sims.cracked import (
 )
 from sims.gear_pair import COORDINATES, MIN_MOTION_HZ, MeasuredRun, ReadyPair
 from sims.machine import Machine, Operation, Profile
-from sims.simulator import SimulationSetup, operation_of
 from sims.sweep import Sweep
 
 SECTIONS = ("mesh", "shaft")
@@ -168,9 +167,7 @@ class Branch:
     def _prepared(self, value: float, rng: np.random.Generator) -> ReadyPair:
         point = self.sweep.points()[self.sweep.axes[0].values.index(value)]
         settings = self.sweep.at(point)
-        operation = operation_of(settings.model, settings.preset, settings.speed_rpm, settings.torque_nm)
-        setup = SimulationSetup(settings.preset, settings.parameters, settings.effects, operation)
-        return CrackedPair().prepare(setup, rng, sampling_rate_hz=settings.sampling_rate_hz)
+        return CrackedPair().prepare(settings.setup, rng, sampling_rate_hz=settings.sampling_rate_hz)
 
     def _signals_needed(self) -> tuple[str, ...]:
         signals = [self.signal] if self.signal in SIGNALS else []

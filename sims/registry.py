@@ -1,12 +1,20 @@
-"""All simulators, by name."""
+"""All simulators, by name, and what one of them is to simulate."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cache
 
-from gearsig.checks import known_name
+import numpy as np
+
+from gearsig.checks import count, known_name
 from gearsig.gap import DriveSimulator, GapSimulator
-from sims.simulator import Simulator
+from gearsig.recording import Recording
+from sims.effects import EffectSetting
+from sims.machine import Operation, Profile
+from sims.presets import preset
+from sims.simulator import ParameterValue, SimulationSetup, Simulator
 
 
 @cache
@@ -39,3 +47,60 @@ def gap_simulators() -> dict[str, GapSimulator | DriveSimulator]:
 def gap_simulator(name: str) -> GapSimulator | DriveSimulator:
     """Return the simulator called `name` as the gap diagnosis takes it."""
     return gap_simulators()[known_name(name, gap_simulators(), f"there is no model {name!r} with a gap diagnosis")]
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """All that decides a recording: equal ones give equal recordings.
+
+    Parameters
+    ----------
+    model : str
+    preset : str
+        Its name or its file; empty: the model's first.
+    parameters : mapping
+        Name → value; what is not given is the preset's.
+    effects : tuple of EffectSetting
+        Besides the preset's.
+    speed_rpm, torque_nm : Profile or None
+        Of the input shaft; None: the preset's.
+    duration_s, sampling_rate_hz : float
+    seed : int
+        Of all that is drawn.
+    """
+
+    model: str
+    _: KW_ONLY
+    preset: str = ""
+    parameters: Mapping[str, ParameterValue] = field(default_factory=dict)
+    effects: tuple[EffectSetting, ...] = ()
+    speed_rpm: Profile | None = None
+    torque_nm: Profile | None = None
+    duration_s: float = 5.0
+    sampling_rate_hz: float = 20480.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", tuple(self.effects))
+        count(self.seed, "seed", minimum=0)
+
+    @property
+    def setup(self) -> SimulationSetup:
+        """What the model is set to; of speed and torque, where only one is given, the other is the preset's."""
+        speed, torque, operation = self.speed_rpm, self.torque_nm, None
+        if speed is not None or torque is not None:
+            of_preset = preset(self.model, self.preset).operation
+            operation = Operation(
+                of_preset.speed_rpm if speed is None else speed, of_preset.torque_nm if torque is None else torque
+            )
+        return SimulationSetup(self.preset, self.parameters, self.effects, operation)
+
+    def run(self) -> Recording:
+        """Make the recording; see `sims.simulate`."""
+        recording = simulator(self.model).simulate(
+            self.setup,
+            np.random.default_rng(self.seed),
+            sampling_rate_hz=self.sampling_rate_hz,
+            duration_s=self.duration_s,
+        )
+        return replace(recording, truth={**(recording.truth or {}), "seed": self.seed})

@@ -264,21 +264,9 @@ def effect_settings(effects: Mapping[str, float] | Sequence[EffectSetting] | Non
     return tuple(effects)
 
 
-def operation_of(
-    model: str, preset_name: str, speed_rpm: ProfileLike | None, torque_nm: ProfileLike | None
-) -> Operation | None:
-    """Return the wanted operation, the preset's own where only one of the two is given, None where neither is."""
-    if speed_rpm is None and torque_nm is None:
-        return None
-    of_preset = preset(model, preset_name).operation
-    return Operation(
-        of_preset.speed_rpm if speed_rpm is None else _profile(speed_rpm, "speed_rpm"),
-        of_preset.torque_nm if torque_nm is None else _profile(torque_nm, "torque_nm"),
-    )
-
-
-def _profile(profile: ProfileLike, name: str) -> Profile:
-    if isinstance(profile, Profile):
+def as_profile(profile: ProfileLike | None, name: str) -> Profile | None:
+    """Return a profile, given as such, as a number or as (time in s, value) points; None stays."""
+    if profile is None or isinstance(profile, Profile):
         return profile
     try:
         if isinstance(profile, Sequence):

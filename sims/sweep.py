@@ -6,7 +6,7 @@ import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, fields
 from io import StringIO
 from itertools import product
 from math import isfinite, prod
@@ -14,15 +14,16 @@ from pathlib import Path
 from typing import Any
 
 from gearsig.cache import remove_parts, write_text
-from gearsig.checks import count, one_of, positive, within
+from gearsig.checks import count, one_of, positive
 from gearsig.errors import GearsigError, InputError
 from gearsig.processes import killed_text, n_processors, run_jobs
-from gearsig.recording import WRITERS, Recording
+from gearsig.recording import WRITERS
 from sims.effects import EffectSetting, OptionValue, effect
 from sims.effects import effects as all_effects
 from sims.files import file_set, write_set
 from sims.machine import Operation, Profile
-from sims.simulator import ParameterValue, checked_value, parameter
+from sims.registry import Simulation, simulator
+from sims.simulator import checked_value, parameter
 
 MAX_POINTS = 100_000
 """Each a file of its own: more is a mistyped number."""
@@ -76,19 +77,12 @@ class SweepPoint:
 
 
 @dataclass(frozen=True)
-class Sweep:
-    """A grid of simulations.
+class Sweep(Simulation):
+    """A grid of simulations: what a simulation has, the same at every point but for what an axis varies.
 
     Parameters
     ----------
-    model, preset : str
     axes : tuple of Axis
-    parameters, effects : mapping and tuple of EffectSetting
-        The same at every point.
-    speed_rpm, torque_nm : Profile or None
-        Where no axis varies them; None: the preset's.
-    duration_s, sampling_rate_hz : float
-    seed : int
     common_seed : bool
         False: every point draws its own noise, roughness and tolerances, from the seed and its place in the grid. Such
         points are independent: for statistics and for training. True: all draw the same (common random numbers), so
@@ -97,25 +91,16 @@ class Sweep:
         Format of the recordings.
     """
 
-    model: str
     axes: tuple[Axis, ...]
-    preset: str = ""
-    parameters: Mapping[str, ParameterValue] = field(default_factory=dict)
-    effects: tuple[EffectSetting, ...] = ()
-    speed_rpm: Profile | None = None
-    torque_nm: Profile | None = None
-    duration_s: float = 5.0
-    sampling_rate_hz: float = 20480.0
-    seed: int = 0
+    _: KW_ONLY
     common_seed: bool = False
     extension: str = ".h5"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "axes", tuple(self.axes))
-        object.__setattr__(self, "effects", tuple(self.effects))
         one_of(self.extension, "extension of the recordings", WRITERS)
         positive(self.duration_s, "duration_s", "s")
-        count(self.seed, "seed", minimum=0)
         names = [axis.name for axis in self.axes]
         if not names or len(set(names)) < len(names):
             raise InputError(f"axes are {', '.join(names) or 'none'}", allowed="at least one, none twice")
@@ -132,23 +117,6 @@ class Sweep:
         """All points, the last axis running fastest."""
         grid = product(*(axis.values for axis in self.axes))
         return tuple(SweepPoint(i, values, self._seed(i)) for i, values in enumerate(grid))
-
-    def simulate(self, point: SweepPoint) -> Recording:
-        """Run one point."""
-        import sims
-
-        settings = self.at(point)
-        return sims.simulate(
-            settings.model,
-            preset=settings.preset,
-            parameters=settings.parameters,
-            effects=settings.effects,
-            speed_rpm=settings.speed_rpm,
-            torque_nm=settings.torque_nm,
-            duration_s=settings.duration_s,
-            sampling_rate_hz=settings.sampling_rate_hz,
-            seed=point.seed,
-        )
 
     def definition(self) -> dict[str, Any]:
         """What decides the results, as plain values."""
@@ -174,35 +142,29 @@ class Sweep:
             return self.seed
         return int(np.random.SeedSequence([self.seed, index]).generate_state(1, np.uint32)[0])
 
-    def at(self, point: SweepPoint) -> Sweep:
-        """Return the same with a point's values in place."""
-        parameters, settings = dict(self.parameters), list(self.effects)
-        speed, torque = self.speed_rpm, self.torque_nm
+    def at(self, point: SweepPoint) -> Simulation:
+        """Return the simulation of a point."""
+        one = {f.name: getattr(self, f.name) for f in fields(Simulation)} | {"seed": point.seed}
         for axis, value in zip(self.axes, point.values, strict=True):
-            if axis.name == "speed_rpm":
-                speed = Profile.constant(value)
-            elif axis.name == "torque_nm":
-                torque = Profile.constant(value)
+            if axis.name in OPERATION_AXES:
+                one[axis.name] = Profile.constant(value)
             elif axis.name in all_effects():
-                settings.append(EffectSetting(axis.name, value, axis.options))
+                one["effects"] = (*one["effects"], EffectSetting(axis.name, value, axis.options))
             else:
-                parameters[axis.name] = value
-        return replace(self, parameters=parameters, effects=tuple(settings), speed_rpm=speed, torque_nm=torque)
+                one["parameters"] = {**one["parameters"], axis.name: value}
+        return Simulation(**one)
 
     def _check_axes(self) -> None:
         """Refuse names that do not exist and values out of their ranges; what the machine allows, each point tells."""
-        from sims.registry import simulator
-
         model = simulator(self.model)
         for axis in self.axes:
             if axis.name in OPERATION_AXES:
                 for value in axis.values:
                     Operation(Profile.constant(value), Profile.constant(value))
             elif axis.name in model.effects:
-                s = effect(axis.name).severity
                 effect(axis.name).complete(axis.options)
                 for value in axis.values:
-                    within(value, f"{s.name} of {axis.name}", s.low, s.high, s.unit)
+                    effect(axis.name).check_severity(value)
             else:
                 for value in axis.values:
                     checked_value(parameter(model.parameters, axis.name), value)
@@ -370,7 +332,7 @@ def _run_one(job: SweepJob) -> SweepOutcome:
     sweep, point, folder = job
     try:
         names = file_set(recording_path(sweep, folder, point), replace=True)
-        write_set(sweep.simulate(point), names)
+        write_set(sweep.at(point).run(), names)
     except GearsigError as error:
         return SweepOutcome(point, None, str(error))
     except Exception as error:  # noqa: BLE001 - one point must not stop the others; the reason is passed on

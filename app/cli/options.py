@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from gearsig.recording import Recording
     from gearsig.rig import Rig, SpeedSource
     from sims.effects import Effect, EffectSetting
-    from sims.machine import Profile
+    from sims.registry import Simulation
     from sims.simulator import ParameterValue, Simulator
 
 
@@ -229,21 +228,6 @@ FreshOption = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class SimulationChoices:
-    """What is to be simulated."""
-
-    model: str
-    preset: str
-    parameters: dict[str, ParameterValue]
-    effects: tuple[EffectSetting, ...]
-    speed_rpm: Profile | None
-    torque_nm: Profile | None
-    duration_s: float
-    sampling_rate_hz: float
-    seed: int
-
-
 def read_request(
     model: str | None,
     preset: str,
@@ -254,27 +238,27 @@ def read_request(
     duration: str,
     fs: str,
     seed: int,
-) -> SimulationChoices:
+) -> Simulation:
     """Return what the options ask for; names and units are checked here, ranges by the simulator."""
     from app.cli.quantities import read_profile
     from sims.presets import is_file
     from sims.presets import preset as preset_named
-    from sims.registry import simulator, simulators
+    from sims.registry import Simulation, simulator, simulators
 
     if model is None:
         raise InputError("no model is named", allowed=", ".join(simulators()), remedy="gearsig simulate --list")
     chosen = simulator(model)
     duration_s = quantity(duration, "s", "--duration")
-    return SimulationChoices(
+    return Simulation(
         model,
-        preset if is_file(preset) else preset_named(model, preset).name,
-        dict(read_parameter(chosen, text) for text in settings or ()),
-        tuple(read_effect(text) for text in effects or ()),
-        None if speed is None else read_profile(speed, "speed_rpm", "rpm", duration_s),
-        None if torque is None else read_profile(torque, "torque_nm", "N m", duration_s),
-        duration_s,
-        quantity(fs, "Hz", "--fs") if fs else chosen.usual_sampling_rate_hz,
-        seed,
+        preset=preset if is_file(preset) else preset_named(model, preset).name,
+        parameters=dict(read_parameter(chosen, text) for text in settings or ()),
+        effects=tuple(read_effect(text) for text in effects or ()),
+        speed_rpm=None if speed is None else read_profile(speed, "speed_rpm", "rpm", duration_s),
+        torque_nm=None if torque is None else read_profile(torque, "torque_nm", "N m", duration_s),
+        duration_s=duration_s,
+        sampling_rate_hz=quantity(fs, "Hz", "--fs") if fs else chosen.usual_sampling_rate_hz,
+        seed=seed,
     )
 
 

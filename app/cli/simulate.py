@@ -17,6 +17,7 @@ from gearsig.errors import InputError
 if TYPE_CHECKING:
     from sims.effects import Effect, Option
     from sims.presets import Preset
+    from sims.registry import Simulation
     from sims.simulator import Parameter, Simulator
 
 
@@ -75,12 +76,11 @@ def simulate(
         return
     from rich.console import Console
 
-    import sims
     from sims.files import file_set, write_set
 
     names = file_set(output, replace=force)
     with Console(stderr=True).status(f"simulating {request.duration_s:g} s"):
-        recording = sims.simulate(**vars(request))
+        recording = request.run()
         write_set(recording, names)
     typer.echo(f"{names.recording}: {recording.duration_s:g} s at {recording.sampling_rate_hz:g} Hz, ", nl=False)
     typer.echo(f"channels {', '.join(recording.channel_names)}")
@@ -92,15 +92,12 @@ def simulate(
         typer.echo("It holds the motion of both gears: gearsig start-stop, force and identify read it as well.")
 
 
-def _convergence(request: options.SimulationChoices) -> str:
+def _convergence(request: Simulation) -> str:
     import numpy as np
 
     from sims.registry import simulator
-    from sims.simulator import SimulationSetup, operation_of
 
-    operation = operation_of(request.model, request.preset, request.speed_rpm, request.torque_nm)
-    setup = SimulationSetup(request.preset, request.parameters, request.effects, operation)
-    return simulator(request.model).check_convergence(setup, np.random.default_rng(request.seed)).text
+    return simulator(request.model).check_convergence(request.setup, np.random.default_rng(request.seed)).text
 
 
 def preset_text(preset: Preset) -> str:

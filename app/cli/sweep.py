@@ -17,6 +17,7 @@ from gearsig.formatting import percent
 
 if TYPE_CHECKING:
     from app.bifurcation import BifurcationRequest, Values
+    from sims.registry import Simulation
     from sims.simulator import Simulator
     from sims.sweep import Axis, Sweep
 
@@ -194,7 +195,7 @@ def _print_bifurcation(request: BifurcationRequest, values: Values, output: Path
     typer.echo(f"{paths[0]} (figure), {paths[1].name} (points), {paths[2].name} (values).")
 
 
-def sweep_of(request: options.SimulationChoices, vary: Sequence[str], common_seed: bool, extension: str) -> Sweep:
+def sweep_of(request: Simulation, vary: Sequence[str], common_seed: bool, extension: str) -> Sweep:
     """Return the sweep that the options ask for."""
     from sims.registry import simulator
     from sims.sweep import Sweep

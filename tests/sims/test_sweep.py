@@ -29,15 +29,19 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> list[SweepPoint]:
     """Replace the simulation by noise of the point's seed; points that are asked for are collected."""
     asked: list[SweepPoint] = []
 
-    def simulate(_sweep: Sweep, point: SweepPoint) -> Recording:
-        asked.append(point)
-        if point.values[0] == 666.0:
-            raise InputError("the crack goes past the tooth")
-        samples = np.random.default_rng(point.seed).normal(size=(1, 16))
-        truth = {"seed": point.seed, "values": np.array(point.values)}
-        return Recording(samples, 1000.0, (Channel("a1", "acceleration", "m/s^2"),), rig=Rig(name="x"), truth=truth)
+    class Noise:
+        def __init__(self, point: SweepPoint) -> None:
+            self.point = point
 
-    monkeypatch.setattr(Sweep, "simulate", simulate)
+        def run(self) -> Recording:
+            asked.append(self.point)
+            if self.point.values[0] == 666.0:
+                raise InputError("the crack goes past the tooth")
+            samples = np.random.default_rng(self.point.seed).normal(size=(1, 16))
+            truth = {"seed": self.point.seed, "values": np.array(self.point.values)}
+            return Recording(samples, 1000.0, (Channel("a1", "acceleration", "m/s^2"),), rig=Rig(name="x"), truth=truth)
+
+    monkeypatch.setattr(Sweep, "at", lambda _sweep, point: Noise(point))
     return asked
 
 
@@ -60,11 +64,7 @@ def test_the_grid_holds_every_combination_once(sizes: list[int], seed: int) -> N
     assert {p.seed for p in Sweep("cracked", axes, seed=seed, common_seed=True).points()} == {seed}
 
 
-def test_a_point_puts_its_values_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    import sims
-
-    seen: dict[str, object] = {}
-    monkeypatch.setattr(sims, "simulate", lambda model, **given: seen.update(given, model=model))
+def test_a_point_puts_its_values_in_place() -> None:
     axes = (
         Axis("torque_nm", (20.0,)),
         Axis("root_crack", (1.0,), {"gear": "driven"}),
@@ -74,14 +74,17 @@ def test_a_point_puts_its_values_in_place(monkeypatch: pytest.MonkeyPatch) -> No
     sweep = Sweep(
         "cracked", axes, parameters={"friction": "off"}, effects=(EffectSetting("mains_hum", 1.0),), speed_rpm=ramp
     )
-    sweep.simulate(sweep.points()[0])
-    assert seen["parameters"] == {"friction": "off", "half_backlash_um": 60.0}
-    assert [(s.name, s.severity, dict(s.options)) for s in seen["effects"]] == [  # type: ignore[attr-defined]  # a tuple
+    point = sweep.points()[0]
+    simulation = sweep.at(point)
+    assert simulation.seed == point.seed
+    assert simulation.parameters == {"friction": "off", "half_backlash_um": 60.0}
+    assert [(s.name, s.severity, dict(s.options)) for s in simulation.effects] == [
         ("mains_hum", 1.0, {}),
         ("root_crack", 1.0, {"gear": "driven"}),
     ]
-    assert seen["speed_rpm"] is ramp
-    assert seen["torque_nm"].values.tolist() == [20.0]  # type: ignore[attr-defined]  # a Profile
+    assert simulation.speed_rpm is ramp
+    assert simulation.torque_nm is not None
+    assert simulation.torque_nm.values.tolist() == [20.0]
 
 
 def test_every_point_stands_in_the_folder_with_rig_and_truth(quick: list[SweepPoint], tmp_path: Path) -> None:
@@ -194,7 +197,7 @@ def test_processes_give_what_one_process_gives(tmp_path: Path) -> None:
     )
     run_sweep(sweep, tmp_path / "two", n_processes=2)
     healthy, cracked = (read_recording(tmp_path / "two" / f"point_{i}.h5") for i in (0, 1))
-    alone = sweep.simulate(sweep.points()[1])
+    alone = sweep.at(sweep.points()[1]).run()
     assert np.array_equal(alone.samples, cracked.samples)
     assert not np.array_equal(healthy.samples, cracked.samples)
     assert cracked.truth is not None
