@@ -15,7 +15,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint, one_of, within
 from gearsig.errors import InputError
 from gearsig.recording import Recording
-from sims.effects import EffectSetting, effect, user_files
+from sims.effects import EffectSetting, completed, effect, user_files
 from sims.machine import Operation, Profile
 from sims.presets import Preset, preset, presets
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from sims import ProfileLike
 
 ParameterValue = float | str
+Values = dict[str, ParameterValue | None]
+"""Every parameter of a simulator by name; None where it is derived from the others."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,66 @@ class SimulationSetup:
     def preset_of(self, model: str) -> Preset:
         """Return the preset of that model."""
         return self.preset if isinstance(self.preset, Preset) else preset(model, self.preset)
+
+
+@dataclass(frozen=True)
+class SimulationRequest:
+    """What a model is to simulate, complete: a preset's values and effects, and those of a setup.
+
+    Parameters
+    ----------
+    model, preset : str
+    operation : Operation
+    values : mapping
+        Every parameter; None where it follows from the others.
+    effects : tuple of EffectSetting
+        With every option.
+    """
+
+    model: str
+    preset: str
+    operation: Operation
+    values: Values
+    effects: tuple[EffectSetting, ...]
+
+    @classmethod
+    def of(cls, model: str, known: Sequence[Parameter], setup: SimulationSetup) -> SimulationRequest:
+        """Complete a preset's values and effects by those of the setup.
+
+        Raises
+        ------
+        InputError
+            If a name does not exist, or a value is out of its range.
+        """
+        chosen = setup.preset_of(model)
+        return cls(
+            model,
+            chosen.name,
+            setup.operation or chosen.operation,
+            complete_values(known, chosen.parameters, setup.parameters),
+            completed((*chosen.effects, *setup.effects)),
+        )
+
+    def truth(self) -> dict[str, Any]:
+        """What is put in, as plain values, for `Recording.truth`."""
+        return {
+            "model": self.model,
+            "preset": self.preset,
+            "parameters": dict(self.values),
+            "effects": [
+                {
+                    "name": s.name,
+                    "severity": s.severity,
+                    "unit": effect(s.name).severity.unit,
+                    "options": dict(s.options),
+                }
+                for s in self.effects
+            ],
+            "operation": {
+                "speed_rpm": self.operation.speed_rpm.as_dict(),
+                "torque_nm": self.operation.torque_nm.as_dict(),
+            },
+        }
 
 
 class HasText(Protocol):
@@ -152,9 +214,6 @@ class Simulator(ABC):
 
 
 # Values of a simulator's parameters: from defaults, preset and user, checked.
-
-Values = dict[str, ParameterValue | None]
-"""Every parameter of a simulator by name; None where it is derived from the others."""
 
 
 def complete_values(parameters: Sequence[Parameter], *layers: Mapping[str, ParameterValue]) -> Values:
@@ -277,25 +336,6 @@ def as_profile(profile: ProfileLike | None, name: str) -> Profile | None:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{name} is {profile!r}", allowed="a number, or (time in s, value) points") from None
-
-
-# What was put into a simulation, as plain values.
-
-
-def truth_of(
-    model: str, preset_name: str, values: Values, settings: Sequence[EffectSetting], operation: Operation
-) -> dict[str, Any]:
-    """Return what was put into a simulation as plain values, for `Recording.truth`."""
-    return {
-        "model": model,
-        "preset": preset_name,
-        "parameters": dict(values),
-        "effects": [
-            {"name": s.name, "severity": s.severity, "unit": effect(s.name).severity.unit, "options": dict(s.options)}
-            for s in settings
-        ],
-        "operation": {"speed_rpm": operation.speed_rpm.as_dict(), "torque_nm": operation.torque_nm.as_dict()},
-    }
 
 
 # Which state of the simulators' code made a result.

@@ -21,13 +21,13 @@ from sims.cracked._respond import (
 from sims.effects import effects, with_effects
 from sims.gear_pair import (
     PARAMETERS,
+    Installed,
     MeasuredRun,
     Measurement,
     PairGapSimulator,
     PairModel,
     PairTwin,
     ReadyPair,
-    SimulationRequest,
     StepConvergence,
     build_machine,
     check_load,
@@ -36,7 +36,7 @@ from sims.machine import Machine, Operation
 from sims.measure import plain
 from sims.mesh import friction_over_mesh
 from sims.presets import Preset
-from sims.simulator import Parameter
+from sims.simulator import Parameter, SimulationRequest
 
 NAME = "cracked"
 
@@ -50,10 +50,16 @@ class CrackedPair(PairModel[ReadyPair]):
     parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
     effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
 
-    def _built(self, request: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> ReadyPair:
-        healthy = build_machine(request.values, sampling_rate_hz=sampling_rate_hz, installed=request.installed)
+    def _built(
+        self,
+        request: SimulationRequest,
+        installed: Installed | None,
+        rng: np.random.Generator,
+        sampling_rate_hz: float,
+    ) -> ReadyPair:
+        healthy = build_machine(request.values, sampling_rate_hz=sampling_rate_hz, installed=installed)
         check_load(healthy, request.operation)
-        return ReadyPair(request, with_effects(healthy, request.effects, rng))
+        return ReadyPair(**vars(request), machine=with_effects(healthy, request.effects, rng))
 
     def _run(self, ready: ReadyPair, run: MeasuredRun[PairState]) -> Recording:
         return simulate_with_motion(ready.machine, ready.operation, run)[0]

@@ -14,7 +14,7 @@ from gearsig.errors import InputError
 from gearsig.gap import Added, DriveFacts, GapEffect, OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import standard_path
-from sims.effects import EffectSetting, completed, effect, effects
+from sims.effects import EffectSetting, effect, effects
 from sims.forging._drive import (
     MESH_RAMP_RANGE,
     PARAMETERS,
@@ -34,12 +34,12 @@ from sims.simulator import (
     Parameter,
     ParameterValue,
     ParameterValues,
+    SimulationRequest,
     SimulationSetup,
     Simulator,
     Values,
     complete_values,
     parameter,
-    truth_of,
 )
 
 if TYPE_CHECKING:
@@ -97,29 +97,21 @@ TORQUE_RANGE_NM = (0.0, 1e6)
 
 
 @dataclass(frozen=True)
-class PreparedDrive:
-    """A drive with its cycle, ready to run.
+class PreparedDrive(SimulationRequest):
+    """A drive with its cycle, ready to run; its `values` are the healthy drive's.
 
     Parameters
     ----------
     drive : ForgingDrive
         With its effects.
     cycle : Cycle
-    operation : Operation
-    preset : str
-    values, healthy_values : mapping
-        Every parameter, with the effects and without.
-    effects : tuple of EffectSetting
-        With every option.
+    changed : mapping
+        Every parameter, with the effects.
     """
 
     drive: ForgingDrive
     cycle: Cycle
-    operation: Operation
-    preset: str
-    values: Values
-    healthy_values: Values
-    effects: tuple[EffectSetting, ...] = ()
+    changed: Values
 
     def profiles(self, duration_s: float) -> Schedule:
         """Torque, brake and press over a run."""
@@ -128,7 +120,7 @@ class PreparedDrive:
     def truth(self) -> dict[str, Any]:
         """What was put in, as plain values."""
         return {
-            **truth_of(NAME, self.preset, self.healthy_values, self.effects, self.operation),
+            **super().truth(),
             "backlash_um": 2.0 * self.drive.contact.half_backlash_um,
             "stiffness_n_per_m_lambda": self.drive.contact.stiffness_n_per_m_lambda,
             "reduced_mass_kg": self.drive.reduced_mass_kg,
@@ -147,15 +139,12 @@ class ForgingManipulator(Simulator):
 
     def prepare(self, setup: SimulationSetup) -> PreparedDrive:
         """Build the drive and its cycle, with its effects."""
-        chosen = setup.preset_of(NAME)
-        healthy = complete_values(PARAMETERS, chosen.parameters, setup.parameters)
-        effects = (*chosen.effects, *setup.effects)
-        values, weak = with_effects(healthy, effects)
-        run = setup.operation or chosen.operation
-        within(run.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
-        read = ParameterValues(values)
-        drive = build_drive(read, _constant(run.speed_rpm), weak)
-        return PreparedDrive(drive, build_cycle(read), run, chosen.name, values, healthy, completed(effects))
+        request = SimulationRequest.of(NAME, PARAMETERS, setup)
+        changed, weak = with_effects(request.values, request.effects)
+        within(request.operation.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
+        values = ParameterValues(changed)
+        drive = build_drive(values, _constant(request.operation.speed_rpm), weak)
+        return PreparedDrive(**vars(request), drive=drive, cycle=build_cycle(values), changed=changed)
 
     def simulate(
         self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
@@ -174,7 +163,7 @@ class ForgingManipulator(Simulator):
         ready = self.prepare(setup)
         rig = build_rig(
             ready.drive,
-            ParameterValues(ready.healthy_values),
+            ParameterValues(ready.values),
             ready.operation,
             sensors(sampling_rate_hz),
             name=self.rig_name(ready.preset),
@@ -184,7 +173,7 @@ class ForgingManipulator(Simulator):
         return record(
             ready.drive,
             ready.profiles(duration_s + 1.0),
-            ParameterValues(ready.values),
+            ParameterValues(ready.changed),
             rig=rig,
             rng=rng,
             sampling_rate_hz=sampling_rate_hz,

@@ -36,7 +36,6 @@ from sims.gear_pair._simulator import (
     PairModel,
     PairTwin,
     ReadyPair,
-    SimulationRequest,
     body_gain,
     check_load,
 )
@@ -60,7 +59,6 @@ __all__ = [
     "PairTwin",
     "ReadyPair",
     "RunPlan",
-    "SimulationRequest",
     "StepConvergence",
     "bearing_fields",
     "bearing_loads_n",

@@ -18,7 +18,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.gap import Added, GapEffect, OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import OperatingPoint, Rig, rig_to_dict
-from sims.effects import GEARS, EffectSetting, MachineFacts, Options, as_gap_effect, completed, effect, effects
+from sims.effects import GEARS, EffectSetting, MachineFacts, Options, as_gap_effect, effect, effects
 from sims.gear_pair._build import build_rig
 from sims.gear_pair._installed import (
     HousingMode,
@@ -45,14 +45,11 @@ from sims.mesh import PairGeometry
 from sims.presets import Preset, preset_text
 from sims.simulator import (
     HasText,
-    Parameter,
     ParameterValue,
+    SimulationRequest,
     SimulationSetup,
     Simulator,
-    Values,
-    complete_values,
     sources_digest,
-    truth_of,
 )
 
 # What a simulated gear pair can be asked for: speeds, loads, sampling rates, durations.
@@ -81,88 +78,16 @@ def check_load(machine: Machine, operation: Operation) -> None:
 
 
 @dataclass(frozen=True)
-class SimulationRequest:
-    """What a model is to simulate, complete.
-
-    Parameters
-    ----------
-    model, preset : str
-    operation : Operation
-    values : mapping
-        Every parameter; None where it follows from the others.
-    effects : tuple of EffectSetting
-        With every option.
-    installed : Installed or None
-    """
-
-    model: str
-    preset: str
-    operation: Operation
-    values: Values
-    effects: tuple[EffectSetting, ...]
-    installed: Installed | None = None
-
-    @classmethod
-    def of(
-        cls, model: str, known: tuple[Parameter, ...], setup: SimulationSetup, sampling_rate_hz: float
-    ) -> SimulationRequest:
-        """Complete a preset's values and effects by those of the setup.
-
-        Raises
-        ------
-        InputError
-            If a name does not exist, or a value, speed or sampling rate is out of its range.
-        """
-        chosen = setup.preset_of(model)
-        operation = setup.operation or chosen.operation
-        check_run(operation, sampling_rate_hz)
-        return cls(
-            chosen.model,
-            chosen.name,
-            operation,
-            complete_values(known, chosen.parameters, setup.parameters),
-            completed((*chosen.effects, *setup.effects)),
-            installed_of(chosen.installed) if chosen.installed else None,
-        )
-
-
-@dataclass(frozen=True)
-class ReadyPair:
+class ReadyPair(SimulationRequest):
     """A pair with its effects switched on, ready to run.
 
     Parameters
     ----------
-    request : SimulationRequest
     machine : Machine
         Effects included.
     """
 
-    request: SimulationRequest
     machine: Machine
-
-    @property
-    def operation(self) -> Operation:
-        """Speed and torque."""
-        return self.request.operation
-
-    @property
-    def preset(self) -> str:
-        """Name of the preset."""
-        return self.request.preset
-
-    @property
-    def values(self) -> Values:
-        """Every parameter; None where it follows from the others."""
-        return self.request.values
-
-    @property
-    def effects(self) -> tuple[EffectSetting, ...]:
-        """With every option."""
-        return self.request.effects
-
-    def truth(self) -> dict[str, Any]:
-        """What was put in, as plain values."""
-        return truth_of(self.request.model, self.preset, self.values, self.effects, self.operation)
 
 
 Ready = TypeVar("Ready", bound=ReadyPair)
@@ -174,8 +99,10 @@ class PairModel(Simulator, Generic[Ready]):
 
     def prepare(self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float = 20480.0) -> Ready:
         """Build the pair and switch its effects on; one number is drawn from `rng`, with and without effects."""
-        request = SimulationRequest.of(self.name, self.parameters, setup, sampling_rate_hz)
-        return self._built(request, rng, sampling_rate_hz)
+        request = SimulationRequest.of(self.name, self.parameters, setup)
+        check_run(request.operation, sampling_rate_hz)
+        installed = setup.preset_of(self.name).installed
+        return self._built(request, installed_of(installed) if installed else None, rng, sampling_rate_hz)
 
     def simulate(
         self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
@@ -192,7 +119,13 @@ class PairModel(Simulator, Generic[Ready]):
         return self.record(ready, MeasuredRun(rng, sampling_rate_hz, duration_s, rig))
 
     @abstractmethod
-    def _built(self, request: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> Ready:
+    def _built(
+        self,
+        request: SimulationRequest,
+        installed: Installed | None,
+        rng: np.random.Generator,
+        sampling_rate_hz: float,
+    ) -> Ready:
         """Build what is asked for."""
 
     @abstractmethod

@@ -26,7 +26,6 @@ from sims.gear_pair import (
     PairModel,
     PairTwin,
     ReadyPair,
-    SimulationRequest,
     StepConvergence,
     build_machine,
     check_load,
@@ -41,7 +40,7 @@ from sims.reduced_fe._contact import MARGIN
 from sims.reduced_fe._eigenfrequencies import eigenfrequencies_hz
 from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, torsional_mode
 from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, check_convergence, followed_step_s, respond
-from sims.simulator import Parameter, ParameterValue, ParameterValues, Values
+from sims.simulator import Parameter, ParameterValue, ParameterValues, SimulationRequest, Values
 
 # The parameters of the flexible pair: those it shares with the 16-DOF pair, and those of its gear bodies.
 
@@ -133,8 +132,6 @@ class PreparedPair(ReadyPair):
 
     Parameters
     ----------
-    request, machine
-        As in `ReadyPair`.
     pair : FlexiblePair
     """
 
@@ -163,9 +160,15 @@ class ReducedPair(PairModel[PreparedPair]):
         "surface_roughness with locked_to=time: flanks are shapes here, which return with their teeth.",
     )
 
-    def _built(self, request: SimulationRequest, rng: np.random.Generator, sampling_rate_hz: float) -> PreparedPair:
+    def _built(
+        self,
+        request: SimulationRequest,
+        installed: Installed | None,
+        rng: np.random.Generator,
+        sampling_rate_hz: float,
+    ) -> PreparedPair:
         gears = reduced_gears(request.values)
-        healthy = healthy_machine(request.values, gears, sampling_rate_hz=sampling_rate_hz, installed=request.installed)
+        healthy = healthy_machine(request.values, gears, sampling_rate_hz=sampling_rate_hz, installed=installed)
         check_load(healthy, request.operation)
         machine = with_effects(healthy, request.effects, rng)
         if machine.roughness.locked_to == "time" and machine.roughness.rms_um > 0.0:
@@ -174,7 +177,8 @@ class ReducedPair(PairModel[PreparedPair]):
                 where="locked_to of surface_roughness",
                 allowed="'flank'",
             )
-        return PreparedPair(request, machine, flexible_pair(request.values, machine, gears))
+        pair = flexible_pair(request.values, machine, gears)
+        return PreparedPair(**vars(request), machine=machine, pair=pair)
 
     def _run(self, ready: PreparedPair, run: MeasuredRun[FlexState]) -> Recording:
         stepped = run if run.step_s is not None else replace(run, step_s=ready.step_s)

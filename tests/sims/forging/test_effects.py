@@ -37,7 +37,7 @@ def test_effects_change_their_parameter_and_not_the_rig_file() -> None:
 
 
 def test_wear_is_of_the_gear_that_is_named() -> None:
-    values = made(EffectSetting("tooth_wear", 100.0, {"gear": "driven"})).values
+    values = made(EffectSetting("tooth_wear", 100.0, {"gear": "driven"})).changed
     assert (values["sliding_wear_driver_um"], values["sliding_wear_driven_um"]) == (0.0, 100.0)
 
 
