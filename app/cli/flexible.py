@@ -13,7 +13,7 @@ import typer
 
 from app.cli import options
 from app.cli.console import progress_bar
-from app.cli.quantities import quantity
+from app.cli.quantities import quantity, span
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ def flexible(
     from sims.simulator import SimulationSetup
 
     request = options.read_request(MODEL, preset, settings, effects, None, None, "1s", "20480Hz", seed)
-    first, last = _range(speeds)
-    torques_nm = tuple(quantity(f"{t.strip().removesuffix('Nm')}Nm", "N m", "--torques") for t in torques.split(","))
+    first, last = span(speeds, "rpm", "--speeds")
+    torques_nm = tuple(quantity(text, "N m", "--torques") for text in torques.split(","))
     if fresh:
         options.clear_other_versions(MODEL)
     setup = SimulationSetup(request.preset, request.parameters, request.effects)
@@ -86,13 +86,6 @@ def flexible(
         typer.echo(
             f"{torque:g} N·m: torsional mode {natural:.0f} Hz; sweep up: {sweep_texts[0]}; sweep down: {sweep_texts[1]}"
         )
-
-
-def _range(text: str) -> tuple[float, float]:
-    first, dots, last = text.partition("..")
-    if not dots:
-        raise InputError(f"--speeds is {text!r}", allowed="900..4100rpm")
-    return quantity(f"{first.removesuffix('rpm')}rpm", "rpm", "--speeds"), quantity(last, "rpm", "--speeds")
 
 
 SPRINGS = {"radial": "2e8N/m", "axial": "1e8N/m", "tilt": "1e5Nm/rad", "twist": "4e4Nm/rad"}
@@ -239,12 +232,10 @@ def growth(
     request = options.read_request(CRACKED, preset, settings, None, None, None, "1s", "20480Hz", seed)
     chosen = preset_named(CRACKED, request.preset)
     setup = SimulationSetup(request.preset, {**request.parameters, "crack_depth_mm": 0.0})
-    low, dots, high = depth.partition("..")
-    last = quantity(high or low, "mm", "--depth")
     study = growth_study(
         CrackedPair().prepare(setup, np.random.default_rng(seed)).machine.mesh,
         1 if gear == "driver" else 2,
-        first_mm=(quantity(low, "mm", "--depth") if dots else last, last),
+        first_mm=span(depth if ".." in depth else f"{depth}..{depth}", "mm", "--depth"),
         angle_deg=angle,
         torque_nm=quantity(torque, "N m", "--torque") if torque else chosen.torque_nm,
         speed_rpm=quantity(speed, "rpm", "--speed") if speed else chosen.speed_rpm,

@@ -173,7 +173,7 @@ def _value(option: MethodOption, given: Any) -> Any:
     if given is None:
         return option.default
     if option.kind == "span":
-        return _range(given, option.unit, flag(option))
+        return span(given, option.unit, flag(option))
     if option.kind == "number" and isinstance(given, str):
         return quantity(given, option.unit, flag(option))
     return given
@@ -234,12 +234,6 @@ def _print_methods() -> None:
         if method.options:
             typer.echo(f"{'':<{width}}  {', '.join(flag(option) for option in method.options)}")
     typer.echo("Each takes --channel, --from and --to besides; gearsig show METHOD --help says what they mean.")
-
-
-def _range(text: str, unit: str, name: str) -> tuple[float, float]:
-    if ".." not in text:
-        raise InputError(f"{name} is {text!r}", allowed="FROM..TO", remedy=f"write for example 2..4{unit}")
-    return span(text, unit, name)
 
 
 def _numbers(text: str, name: str) -> tuple[float, ...]:

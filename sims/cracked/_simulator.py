@@ -18,10 +18,9 @@ from sims.cracked._respond import (
     mesh_force_n,
     respond,
 )
-from sims.effects import effects, with_effects
+from sims.effects import effects
 from sims.gear_pair import (
     PARAMETERS,
-    Installed,
     MeasuredRun,
     Measurement,
     PairGapSimulator,
@@ -29,8 +28,6 @@ from sims.gear_pair import (
     PairTwin,
     ReadyPair,
     StepConvergence,
-    build_machine,
-    check_load,
 )
 from sims.machine import Machine, Operation
 from sims.measure import plain
@@ -50,16 +47,8 @@ class CrackedPair(PairModel[ReadyPair]):
     parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
     effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
 
-    def _built(
-        self,
-        request: SimulationRequest,
-        installed: Installed | None,
-        rng: np.random.Generator,
-        sampling_rate_hz: float,
-    ) -> ReadyPair:
-        healthy = build_machine(request.values, sampling_rate_hz=sampling_rate_hz, installed=installed)
-        check_load(healthy, request.operation)
-        return ReadyPair(**vars(request), machine=with_effects(healthy, request.effects, rng))
+    def _ready(self, request: SimulationRequest, machine: Machine) -> ReadyPair:
+        return ReadyPair(**vars(request), machine=machine)
 
     def _run(self, ready: ReadyPair, run: MeasuredRun[PairState]) -> Recording:
         return simulate_with_motion(ready.machine, ready.operation, run)[0]

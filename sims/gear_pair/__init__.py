@@ -37,7 +37,6 @@ from sims.gear_pair._simulator import (
     PairTwin,
     ReadyPair,
     body_gain,
-    check_load,
 )
 
 __all__ = [
@@ -66,7 +65,6 @@ __all__ = [
     "build_machine",
     "build_rig",
     "carried_part",
-    "check_load",
     "completed_bearing",
     "contact_n_per_m15",
     "draw_roughness",

@@ -18,8 +18,8 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.gap import Added, GapEffect, OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import OperatingPoint, Rig, rig_to_dict
-from sims.effects import GEARS, EffectSetting, MachineFacts, Options, as_gap_effect, effect, effects
-from sims.gear_pair._build import build_rig
+from sims.effects import GEARS, EffectSetting, MachineFacts, Options, as_gap_effect, effect, effects, with_effects
+from sims.gear_pair._build import build_machine, build_rig
 from sims.gear_pair._installed import (
     HousingMode,
     Installed,
@@ -49,6 +49,7 @@ from sims.simulator import (
     SimulationRequest,
     SimulationSetup,
     Simulator,
+    Values,
     sources_digest,
 )
 
@@ -102,7 +103,9 @@ class PairModel(Simulator, Generic[Ready]):
         request = SimulationRequest.of(self.name, self.parameters, setup)
         check_run(request.operation, sampling_rate_hz)
         installed = setup.preset_of(self.name).installed
-        return self._built(request, installed_of(installed) if installed else None, rng, sampling_rate_hz)
+        healthy = self._healthy(request.values, sampling_rate_hz, installed_of(installed) if installed else None)
+        check_load(healthy, request.operation)
+        return self._ready(request, with_effects(healthy, request.effects, rng))
 
     def simulate(
         self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
@@ -118,15 +121,13 @@ class PairModel(Simulator, Generic[Ready]):
         )
         return self.record(ready, MeasuredRun(rng, sampling_rate_hz, duration_s, rig))
 
+    def _healthy(self, values: Values, sampling_rate_hz: float, installed: Installed | None) -> Machine:
+        """Build the machine without effects."""
+        return build_machine(values, sampling_rate_hz=sampling_rate_hz, installed=installed)
+
     @abstractmethod
-    def _built(
-        self,
-        request: SimulationRequest,
-        installed: Installed | None,
-        rng: np.random.Generator,
-        sampling_rate_hz: float,
-    ) -> Ready:
-        """Build what is asked for."""
+    def _ready(self, request: SimulationRequest, machine: Machine) -> Ready:
+        """Complete what is asked for by its machine."""
 
     @abstractmethod
     def _run(self, ready: Ready, run: MeasuredRun[Any]) -> Recording:

@@ -9,20 +9,17 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from gearsig.checks import closest_match_hint, not_negative, short
+from gearsig.checks import closest_match_hint, known_name, not_negative
 from gearsig.errors import InputError
-from gearsig.rig import read_toml
+from gearsig.rig import from_table, read_toml
 from sims.effects import EffectSetting
 from sims.machine import Operation
 
 if TYPE_CHECKING:
     from sims.simulator import ParameterValue
 
-_TABLES = ("about", "parameters", "operation")
-_ABOUT = ("model", "title", "sources", "assumed", "does_not_represent")
-_OPERATION = ("speed_rpm", "torque_nm")
-_OPTIONAL = ("effects", "installed")
-_EFFECT = ("name", "severity", "options")
+_TABLES = ("about", "parameters", "operation", "effects", "installed")
+_OPTIONAL = _TABLES[3:]
 
 
 @dataclass(frozen=True)
@@ -66,6 +63,29 @@ class Preset:
         return Operation.steady(self.speed_rpm, self.torque_nm)
 
 
+@dataclass(frozen=True)
+class _About:
+    """The table [about] of a preset's file."""
+
+    model: str
+    title: str
+    sources: tuple[str, ...]
+    assumed: tuple[str, ...]
+    does_not_represent: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """The table [operation]."""
+
+    speed_rpm: float
+    torque_nm: float
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            not_negative(value, name)
+
+
 @cache
 def presets(model: str) -> dict[str, Preset]:
     """Return the presets of a model by name, in alphabetical order."""
@@ -104,21 +124,16 @@ def read_preset(path: Path) -> Preset:
         effects and of what is installed are checked by their simulator.
     """
     data, where = read_toml(path), path.name
-    _check_keys(data, _TABLES, where, _OPTIONAL)
-    about, operation = (_table(data[name], f"{where}: [{name}]") for name in ("about", "operation"))
-    _check_keys(about, _ABOUT, f"{where}: [about]")
-    _check_keys(operation, _OPERATION, f"{where}: [operation]")
-    sources, assumed, lacking = (_texts(about[name], f"{where}: {name} of [about]") for name in _ABOUT[2:])
-    speed, torque = (not_negative(_number(operation[name], f"{where}: {name}"), name) for name in _OPERATION)
+    for name in data:
+        known_name(name, _TABLES, f"there is no key {name!r}", where=where)
+    if missing := [name for name in _TABLES if name not in (*data, *_OPTIONAL)]:
+        raise InputError(f"{', '.join(missing)} must be given", where=where)
+    about: _About = from_table(_About, data["about"], f"{where}: [about]")
+    operation: _Point = from_table(_Point, data["operation"], f"{where}: [operation]")
     return Preset(
-        name=path.stem,
-        model=_text(about["model"], f"{where}: model of [about]"),
-        title=_text(about["title"], f"{where}: title of [about]"),
-        sources=sources,
-        assumed=assumed,
-        does_not_represent=lacking,
-        speed_rpm=speed,
-        torque_nm=torque,
+        path.stem,
+        **vars(about),
+        **vars(operation),
         parameters=MappingProxyType(_values(data["parameters"], f"{where}: [parameters]")),
         effects=_effects(data.get("effects", []), f"{where}: [[effects]]"),
         installed=MappingProxyType(_table(data.get("installed", {}), f"{where}: [installed]")),
@@ -138,10 +153,9 @@ def _effects(rows: object, where: str) -> tuple[EffectSetting, ...]:
         raise InputError("is not a list of tables", where=where, allowed="[[effects]] with name, severity, options")
     settings = []
     for row in rows:
-        table = _table(row, where)
-        _check_keys(table, _EFFECT[:2], where, _EFFECT[2:])
-        options = _values(table.get("options", {}), f"{where}: options")
-        settings.append(EffectSetting(_text(table["name"], where), _number(table["severity"], where), options))
+        stated = dict(_table(row, where))
+        options = _values(stated.pop("options", {}), f"{where}: options")
+        settings.append(from_table(EffectSetting, stated, where, options=options))
     return tuple(settings)
 
 
@@ -157,35 +171,6 @@ def _table(value: object, where: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InputError("is not a table", where=where, allowed="key = value lines")
     return value
-
-
-def _texts(value: object, where: str) -> tuple[str, ...]:
-    if not isinstance(value, list):
-        raise InputError(f"is {value!r}", where=where, allowed="a list of texts")
-    return tuple(_text(item, where) for item in value)
-
-
-def _text(value: object, where: str) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"is {value!r}", where=where, allowed="a text in quotes")
-    return value
-
-
-def _number(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or abs(value) > 1e300:
-        raise InputError(f"is {short(value)}", where=where, allowed="a number")
-    return float(value)
-
-
-def _check_keys(table: Mapping[str, Any], keys: tuple[str, ...], where: str, optional: tuple[str, ...] = ()) -> None:
-    missing, unknown = [k for k in keys if k not in table], [k for k in table if k not in (*keys, *optional)]
-    if unknown:
-        hint = closest_match_hint(unknown[0], (*keys, *optional))
-        raise InputError(
-            f"there is no key {unknown[0]!r}", where=where, allowed=", ".join((*keys, *optional)), remedy=hint
-        )
-    if missing:
-        raise InputError(f"{', '.join(missing)} must be given", where=where)
 
 
 # Writes a preset as a file that `read_preset` reads back to the same machine.

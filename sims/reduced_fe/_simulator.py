@@ -13,7 +13,7 @@ from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from gearsig.rig import SIDES
-from sims.effects import effects, with_effects
+from sims.effects import effects
 from sims.fe_gear import READY, GearBlank, ReducedGear, cached_gear, plan_for, ready_gear
 from sims.gear_pair import (
     PARAMETERS as SHARED,
@@ -28,7 +28,6 @@ from sims.gear_pair import (
     ReadyPair,
     StepConvergence,
     build_machine,
-    check_load,
     draw_roughness,
     gear_geometry,
 )
@@ -160,24 +159,17 @@ class ReducedPair(PairModel[PreparedPair]):
         "surface_roughness with locked_to=time: flanks are shapes here, which return with their teeth.",
     )
 
-    def _built(
-        self,
-        request: SimulationRequest,
-        installed: Installed | None,
-        rng: np.random.Generator,
-        sampling_rate_hz: float,
-    ) -> PreparedPair:
-        gears = reduced_gears(request.values)
-        healthy = healthy_machine(request.values, gears, sampling_rate_hz=sampling_rate_hz, installed=installed)
-        check_load(healthy, request.operation)
-        machine = with_effects(healthy, request.effects, rng)
+    def _healthy(self, values: Values, sampling_rate_hz: float, installed: Installed | None) -> Machine:
+        return healthy_machine(values, reduced_gears(values), sampling_rate_hz=sampling_rate_hz, installed=installed)
+
+    def _ready(self, request: SimulationRequest, machine: Machine) -> PreparedPair:
         if machine.roughness.locked_to == "time" and machine.roughness.rms_um > 0.0:
             raise InputError(
                 "a roughness locked to time has no meaning here: flanks are shapes that return with their teeth",
                 where="locked_to of surface_roughness",
                 allowed="'flank'",
             )
-        pair = flexible_pair(request.values, machine, gears)
+        pair = flexible_pair(request.values, machine, reduced_gears(request.values))
         return PreparedPair(**vars(request), machine=machine, pair=pair)
 
     def _run(self, ready: PreparedPair, run: MeasuredRun[FlexState]) -> Recording:

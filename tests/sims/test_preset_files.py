@@ -77,7 +77,7 @@ def test_it_is_written_as_it_was_read(tmp_path: Path) -> None:
     [
         ("[operation]", "[operations]", "did you mean operation"),
         ("title =", "titel =", "did you mean title"),
-        ('title = "t"', "title = 3", "a text in quotes"),
+        ('title = "t"', "title = 3", "text in quotes"),
         ('assumed = ["a"]', 'assumed = "a"', "a list of texts"),
         ("speed_rpm = 1000", "speed_rpm = true", "a number"),
         ("speed_rpm = 1000", "speed_rpm = -5", "speed_rpm"),
