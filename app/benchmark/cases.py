@@ -164,7 +164,8 @@ class Plan:
             label = labels(case, made)
         if folder is not None:
             write_visible(made, folder)
-        return _truth(label, made)
+        twins = zip(made.conditions, made.twins, strict=True) if label["effects"] else ()
+        return Truth(label, tuple(_difference(now, twin) for now, twin in twins))
 
 
 def _shuffled(plan: Plan, rng: np.random.Generator) -> list[PlannedCase]:
@@ -208,24 +209,10 @@ class Truth:
         See `sims.blind`.
     fault_changes : tuple of mappings
         For each condition: feature → dB between the case and its twin, the same run without the fault.
-    healthy : mapping
-        Of a case with nothing wrong, its first condition: feature → value; else empty.
-    healthy_change : mapping
-        The same against the reference; empty without one.
     """
 
     labels: Mapping[str, Any]
     fault_changes: tuple[Mapping[str, float], ...]
-    healthy: Mapping[str, float]
-    healthy_change: Mapping[str, float]
-
-
-def _truth(label: Mapping[str, Any], made: CaseRecordings) -> Truth:
-    if label["effects"]:
-        changes = tuple(_difference(case, twin) for case, twin in zip(made.conditions, made.twins, strict=True))
-        return Truth(label, changes, {}, {})
-    change = _difference(made.conditions[0], made.references[0]) if made.references else {}
-    return Truth(label, (), _features(made.conditions[0]), change)
 
 
 def _difference(now: Recording, before: Recording) -> dict[str, float]:

@@ -11,12 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from app.benchmark.answer import Answer, AnsweredShrinkage
+from app.benchmark.answer import Answer
 from app.benchmark.cases import BLIND, Plan, PlannedCase, Truth, counts_of
 from app.benchmark.diagnosers import START_STOP
 from app.benchmark.run import BenchmarkRequest, Done
 from app.benchmark.scoring.judged import Located, Row, row_of
+from app.benchmark.scoring.scores import PARTS as ALL_PARTS
 from app.benchmark.scoring.scores import (
+    WITH,
+    WITHOUT,
     BenchmarkResult,
     Figure,
     Measure,
@@ -30,7 +33,7 @@ from app.benchmark.scoring.scores import (
     score_parts,
     shrink_of,
 )
-from gearsig.gap import NAMING, NONE, UNKNOWN, GapOutcome
+from gearsig.gap import NAMING, NONE, UNKNOWN, GapOutcome, Shrinkage
 from gearsig.recording import Recording
 from sims.blind_drive import CATALOGUE, OUTSIDE, DriveCase, draw_case, label_of, record_case
 
@@ -79,7 +82,7 @@ class DrivePlan(Plan):
                 if recording is not None and recording.rig is not None:
                     write_recording(recording, folder / f"{stem}.h5")
                     write_rig(recording.rig, folder / f"{stem}.toml")
-        return Truth(_labels(case), (), {}, {})
+        return Truth(_labels(case), ())
 
 
 def _labels(case: DriveCase) -> dict[str, Any]:
@@ -125,27 +128,20 @@ def needs_reference(effect: str) -> bool:
 
 STRONG_LEVEL = 0.5
 """Level from which on an effect is in the upper half of its span."""
-PARTS: dict[str, Callable[[Row], bool]] = {
-    "all": lambda _: True,
-    "with reference": lambda row: row.has_reference,
-    "without reference": lambda row: not row.has_reference,
-}
+PARTS = {name: ALL_PARTS[name] for name in ("all", WITH, WITHOUT)}
 
 
 def judge_drives(request: BenchmarkRequest, cases: Sequence[Done]) -> BenchmarkResult:
     """Score all answers."""
     rows = {START_STOP: [drive_row(done) for done in cases]}
-    return BenchmarkResult(
-        request, rows, score_parts(request, rows, PARTS, FIGURES, (False,)), nan, strengths_known=False, figures=FIGURES
-    )
+    return BenchmarkResult(request, rows, score_parts(request, rows, PARTS, FIGURES, (False,)), nan, FIGURES)
 
 
 def drive_row(done: Done) -> Row:
     """Return a case with its answer as the scores count it; tooth or order are placed right if the setting says so."""
 
     def located(place: Mapping[str, Any], effect: str, answer: Answer) -> Located:
-        cause = answer.cause(effect)
-        return Located(**{key: cause is not None and cause.options.get(key) == at for key, at in place.items()})
+        return Located(**{key: answer.options(effect).get(key) == at for key, at in place.items()})
 
     return row_of(done, done.answers[START_STOP], nan, located)
 
@@ -177,10 +173,10 @@ def _is(kind: str) -> Callable[[Row], bool]:
 _is_single = _is("single")
 
 
-def _shrinkages(rows: Rows) -> list[AnsweredShrinkage]:
+def _shrinkages(rows: Rows) -> list[Shrinkage]:
     """Return the shrinkages by the true effects."""
-    causes = [row.answer.cause(row.truths[0]) for row in rows if _is_single(row)]
-    return [cause.shrinkage for cause in causes if cause is not None and cause.shrinkage is not None]
+    shrinkages = [row.answer.shrinkage(row.truths[0]) for row in rows if _is_single(row)]
+    return [shrinkage for shrinkage in shrinkages if shrinkage is not None]
 
 
 def _wrong_shrinks(rows: Rows) -> list[float]:
@@ -234,7 +230,7 @@ FIGURES = (
     Figure(
         "shrink_true",
         "held-out shrink by the true effect, median",
-        _medians(lambda rows: [s.shrink for s in _shrinkages(rows)]),
+        _medians(lambda rows: [s.shrink.value for s in _shrinkages(rows)]),
         is_share=False,
     ),
     Figure(

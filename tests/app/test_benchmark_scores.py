@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.benchmark.answer import Answer, AnsweredCause, AnsweredPlace, AnsweredShrinkage
+from app.benchmark.answer import Answer
 from app.benchmark.cases import Truth
 from app.benchmark.diagnosers import bare_report
-from app.benchmark.scoring.judged import Located, Row, batch_floors, group_of, located, strength
+from app.benchmark.scoring.judged import Located, Row, group_of, located, strength
 from app.benchmark.scoring.scores import (
     Z,
     bins_of,
@@ -24,15 +24,16 @@ from app.benchmark.scoring.scores import (
     strong_only,
 )
 from gearsig.errors import InputError
-from gearsig.gap import GapOutcome
+from gearsig.gap import GapOutcome, GapPlace, PlaceKind, StructuralFloor
 from gearsig.plot import calibration_figure, confusion_figure
+from tests.app.answers import cause
 
 PAIR = {"z1": 20, "z2": 40, "module_mm": 2.0}
 
 
 def answer(outcome, **probabilities):
     ranked = sorted(probabilities.items(), key=lambda item: -item[1])
-    return Answer(outcome, tuple(AnsweredCause(name, p) for name, p in ranked))
+    return Answer(outcome, tuple(cause(name, p) for name, p in ranked))
 
 
 def row(kind, effects, said, strength_floors=5.0, with_reference=True, where=None):
@@ -98,7 +99,7 @@ def test_two_that_cannot_be_separated_name_the_mechanical_one():
 
 def test_the_likeliest_is_so_by_probability_whatever_the_outcome_puts_first():
     # As the diagnosis orders it: both effects are named, though none is the likeliest single cause.
-    named_first = AnsweredCause("root_crack", 0.36), AnsweredCause("none", 0.39), AnsweredCause("tooth_spall", 0.25)
+    named_first = cause("root_crack", 0.36), cause("none", 0.39), cause("tooth_spall", 0.25)
     said = Answer("cannot separate", named_first, ("root_crack", "tooth_spall"))
     found = row("single", ["root_crack"], said)
     assert found.ranked == ("none", "root_crack", "tooth_spall")
@@ -110,7 +111,7 @@ def test_the_likeliest_is_so_by_probability_whatever_the_outcome_puts_first():
 
 
 def test_of_two_as_likely_the_first_stays_first():
-    alike = Answer("undecided", tuple(AnsweredCause(name, 0.5) for name in ("tooth_spall", "root_crack")))
+    alike = Answer("undecided", tuple(cause(name, 0.5) for name in ("tooth_spall", "root_crack")))
     assert row("none", [], alike).ranked == ("tooth_spall", "root_crack")
 
 
@@ -127,12 +128,9 @@ def test_weak_faults_are_left_out_and_healthy_cases_are_not():
 
 
 def test_regret_counts_what_the_named_effect_shrinks_less():
-    def cause(name, p, shrink):
-        return AnsweredCause(name, p, shrinkage=AnsweredShrinkage(shrink, 1.0, 0.0, "other revolutions", 1))
-
-    wrong = Answer("effect", (cause("tooth_spall", 0.6, 0.3), cause("root_crack", 0.4, 0.8)))
-    right = Answer("effect", (cause("root_crack", 0.6, 0.7), cause("tooth_spall", 0.4, 0.9)))
-    untried = Answer("effect", (cause("tooth_spall", 0.6, 0.3), AnsweredCause("root_crack", 0.4)))
+    wrong = Answer("effect", (cause("tooth_spall", 0.6, shrink=0.3), cause("root_crack", 0.4, shrink=0.8)))
+    right = Answer("effect", (cause("root_crack", 0.6, shrink=0.7), cause("tooth_spall", 0.4, shrink=0.9)))
+    untried = Answer("effect", (cause("tooth_spall", 0.6, shrink=0.3), cause("root_crack", 0.4)))
     found = scores([row("single", ["root_crack"], said) for said in (wrong, right, untried)], 1)
     assert found["regret"].value == pytest.approx((0.5 + 0.0) / 2)
     assert found["regret"].n == 2
@@ -141,19 +139,18 @@ def test_regret_counts_what_the_named_effect_shrinks_less():
 
 
 def test_what_the_true_effect_closes_counts_beyond_the_best_wrong_one():
-    def cause(name, share):
-        return AnsweredCause(name, 0.3, shrinkage=AnsweredShrinkage(0.9, 1.0, 0.0, "other revolutions", 1, share))
+    def tried(name, of_all):
+        return cause(name, 0.3, shrink=0.9, of_all=of_all)
 
-    both = Answer("effect", (cause("tooth_spall", 0.25), cause("root_crack", 0.6), cause("unbalance", -0.2)))
-    alone = Answer("effect", (cause("root_crack", 0.6), AnsweredCause("tooth_spall", 0.2)))
+    both = Answer("effect", (tried("tooth_spall", 0.25), tried("root_crack", 0.6), tried("unbalance", -0.2)))
+    alone = Answer("effect", (tried("root_crack", 0.6), cause("tooth_spall", 0.2)))
     found = scores([row("single", ["root_crack"], said) for said in (both, alone)], 1)["closed"]
     assert (found.value, found.n) == (pytest.approx(0.35), 1)
 
 
 def test_an_effect_without_placebos_has_none_that_shrinks_by_nothing():
     def said(placebo, n_placebos):
-        shrinkage = AnsweredShrinkage(0.8, 1.0, placebo, "other revolutions", n_placebos)
-        return Answer("effect", (AnsweredCause("root_crack", 1.0, shrinkage=shrinkage),))
+        return Answer("effect", (cause("root_crack", 1.0, shrink=0.8, placebo=placebo, n_placebos=n_placebos),))
 
     rows = [row("single", ["root_crack"], said(*one)) for one in ((0.0, 0), (0.0, 0), (0.2, 3), (0.0, 3))]
     assert scores(rows, 1)["placebo"].n == 2
@@ -226,40 +223,47 @@ def test_targets_are_met_missed_or_open():
     assert judgement(share(0, 0), 0.05, is_least=False) == ""
 
 
+def place(kind, **where):
+    return GapPlace(kind, "", 0.0, 1.0, 1.0, 1.0, **where)
+
+
 def test_places():
     def said(options=None, places=()):
-        return Answer("effect", (AnsweredCause("root_crack", 1.0, options or {}),), places=tuple(places))
+        return Answer("effect", (cause("root_crack", 1.0, options),), places=tuple(places))
+
+    def tooth(angle_deg, number):
+        return place(PlaceKind.TOOTH, shaft="input", angle_deg=angle_deg, tooth=number)
 
     label = {"gear": "pinion", "shaft": "input", "tooth": 3, "angle_deg": 66.0}  # a pitch is 18 degrees
-    at = AnsweredPlace("angle of rotation", "input", (), 90.0, 5)
+    at = tooth(90.0, 5)
     assert located(label, "root_crack", said(places=[at]), PAIR) == Located(tooth=True, shaft=True)
-    far = AnsweredPlace("angle of rotation", "input", (), 95.0, 6)
+    far = tooth(95.0, 6)
     assert located(label, "root_crack", said({"gear": "driven"}, [far]), PAIR) == Located(tooth=False, shaft=False)
     assert located(label, "root_crack", said({"gear": "driver", "tooth": 4.0}), PAIR).tooth
     assert located(label, "root_crack", said(), PAIR) == Located(tooth=False, shaft=False)
     around = {"shaft": "input", "angle_deg": 359.0}
-    assert located(around, "root_crack", said(places=[AnsweredPlace(at.kind, "input", (), 2.0, 1)]), PAIR).tooth
+    assert located(around, "root_crack", said(places=[tooth(2.0, 1)]), PAIR).tooth
 
 
 def test_orders_are_counted_on_the_input_shaft_and_bearings_of_a_shaft_are_alike():
     label = {"shaft": "output", "bearing": "bearing 3", "order": 3.0}  # 1.5 of the input shaft
-    cause = AnsweredCause("bearing_outer_race", 1.0, {"bearing": "bearing 4"})
-    line = AnsweredPlace("envelope orders", "", (1.51, 3.02), None, None)
-    found = located(label, "bearing_outer_race", Answer("effect", (cause,), places=(line,)), PAIR)
+    race = cause("bearing_outer_race", 1.0, {"bearing": "bearing 4"})
+    line = place(PlaceKind.ENVELOPE, orders=(1.51, 3.02))
+    found = located(label, "bearing_outer_race", Answer("effect", (race,), places=(line,)), PAIR)
     assert found == Located(shaft=True, bearing=True, order=True)
-    ripple = Answer("effect", (AnsweredCause("torque_ripple", 1.0, {"order": 3.0}),))
+    ripple = Answer("effect", (cause("torque_ripple", 1.0, {"order": 3.0}),))
     assert located({"shaft": "output", "order": 3.0}, "torque_ripple", ripple, PAIR).order is False
 
 
-def truth(changes, healthy=None, against=None):
-    return Truth({"has_reference": True, "effects": []}, tuple(changes), healthy or {}, against or {})
+def truth(changes):
+    return Truth({"has_reference": True, "effects": []}, tuple(changes))
 
 
-def test_strength_is_that_of_the_gap_size_in_the_batchs_own_floor():
+def test_strength_is_that_of_the_gap_size_in_a_floor():
     rng = np.random.default_rng(5)
     names = ("mesh.total", "hum", "shaft.driver.1")
     rows = [{name: float(rng.normal()) for name in names} for _ in range(40)]
-    floors = batch_floors([truth([], row, row) for row in rows])
+    floors = {True: StructuralFloor.of_healthy(names, np.array([[*row.values()] for row in rows]))}
     change = dict.fromkeys(names, 10.0)
     size = strength(truth([change]), floors)
     assert strength(truth([dict.fromkeys(names, 30.0)]), floors) == pytest.approx(3.0 * size)
@@ -267,7 +271,7 @@ def test_strength_is_that_of_the_gap_size_in_the_batchs_own_floor():
     # One healthy machine in twenty exceeds a floor.
     own = [strength(truth([row]), floors) for row in rows]
     assert 0 <= sum(s > 1.0 for s in own) <= 4
-    assert np.isnan(strength(truth([change]), batch_floors([truth([], rows[0])])))
+    assert np.isnan(strength(truth([]), floors))
 
 
 def test_groups():

@@ -6,7 +6,7 @@ from math import isnan
 
 import pytest
 
-from app.benchmark.answer import Answer, AnsweredCause, AnsweredShrinkage
+from app.benchmark.answer import Answer
 from app.benchmark.cases import BLIND, PlannedCase, Truth
 from app.benchmark.diagnosers import START_STOP
 from app.benchmark.run import BenchmarkRequest, Done
@@ -25,6 +25,7 @@ from app.studies.gap.start_stop import numbers_of
 from gearsig.recording import read_recording
 from gearsig.rig import read_rig
 from sims.blind_drive import CATALOGUE
+from tests.app.answers import cause
 
 
 def run(arguments: list[str]) -> int:
@@ -65,9 +66,10 @@ def done(
     placebo: float = 0.1,
     inseparable: tuple[str, ...] = (),
 ) -> Done:
-    shrinkage = AnsweredShrinkage(shrink, 1.0, placebo, "starts and stops", 4 if effect == "root_crack" else 0)
+    n_placebos = 4 if effect == "root_crack" else 0
     answered = [
-        AnsweredCause(name, p, {"tooth": 3.0} if name == "root_crack" else {}, shrinkage) for name, p in causes.items()
+        cause(name, p, {"tooth": 3.0} if name == "root_crack" else {}, shrink, placebo=placebo, n_placebos=n_placebos)
+        for name, p in causes.items()
     ]
     answer = Answer(outcome, tuple(answered), inseparable, seconds=5.0, cpu_seconds=4.0)
     place = {"tooth": 3} if effect == "root_crack" else {}
@@ -79,7 +81,7 @@ def done(
         "pair": {"z1": 20, "z2": 100},
     }
     case = PlannedCase(number, BLIND, kind, effect, 0.7, with_reference=number % 2 == 0, n_conditions=1)
-    return Done(case, Truth(labels, (), {}, {}), {START_STOP: answer})
+    return Done(case, Truth(labels, ()), {START_STOP: answer})
 
 
 def figures(cases: list[Done]):

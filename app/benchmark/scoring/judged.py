@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from app.benchmark.answer import Answer, AnsweredPlace
+from app.benchmark.answer import Answer
 from app.benchmark.cases import Truth
 from app.benchmark.run import Done
-from gearsig.errors import InputError
-from gearsig.gap import NONE, UNKNOWN, GapOutcome, PlaceKind, StructuralFloor, soft_size
+from gearsig.gap import NONE, UNKNOWN, GapOutcome, GapPlace, PlaceKind, StructuralFloor, load_learned, soft_size
 from sims.blind import CATALOGUE, MECHANICAL
 
 # --------------------
@@ -63,8 +62,7 @@ def located(place: Mapping[str, Any], effect: str, answer: Answer, pair: Mapping
     pair : mapping
         Teeth: z1 on the input shaft, z2 on the output shaft.
     """
-    cause = answer.cause(effect)
-    options, places = (cause.options if cause is not None else {}), answer.places
+    options, places = answer.options(effect), answer.places
     shaft = str(place.get("shaft", ""))
     per_input = pair["z1"] / pair["z2"] if shaft == "output" else 1.0
     return Located(
@@ -75,9 +73,9 @@ def located(place: Mapping[str, Any], effect: str, answer: Answer, pair: Mapping
     )
 
 
-def _tooth(angle_deg: float, options: Mapping[str, Any], places: tuple[AnsweredPlace, ...], n_teeth: int) -> bool:
+def _tooth(angle_deg: float, options: Mapping[str, Any], places: tuple[GapPlace, ...], n_teeth: int) -> bool:
     pitch = 360.0 / n_teeth
-    angles = [p.angle_deg for p in places if p.kind == PlaceKind.TOOTH.value and p.shaft == "input"]
+    angles = [p.angle_deg for p in places if p.kind is PlaceKind.TOOTH and p.shaft == "input"]
     answered_deg = next((a for a in angles if a is not None), None)
     if answered_deg is None and options.get("gear") == "driver" and "tooth" in options:
         answered_deg = (float(options["tooth"]) - 0.5) * pitch
@@ -87,7 +85,7 @@ def _tooth(angle_deg: float, options: Mapping[str, Any], places: tuple[AnsweredP
     return apart <= 1.5 * pitch
 
 
-def _shaft(options: Mapping[str, Any], places: tuple[AnsweredPlace, ...]) -> str:
+def _shaft(options: Mapping[str, Any], places: tuple[GapPlace, ...]) -> str:
     for name in ("gear", "shaft"):
         if name in options:
             return SHAFT_OF.get(str(options[name]), str(options[name]))
@@ -100,7 +98,7 @@ def _bearing_shaft(options: Mapping[str, Any]) -> str:
     return ("input" if int(number) <= 2 else "output") if number.isdigit() else ""
 
 
-def _order(order: float, options: Mapping[str, Any], places: tuple[AnsweredPlace, ...]) -> bool:
+def _order(order: float, options: Mapping[str, Any], places: tuple[GapPlace, ...]) -> bool:
     """Orders of the input shaft: of the setting, or of the first place."""
     stated_orders = [float(options["order"])] if "order" in options else [o for p in places[:1] for o in p.orders]
     return any(abs(value - order) <= ORDER_TOLERANCE * order for value in stated_orders)
@@ -114,40 +112,14 @@ def _order(order: float, options: Mapping[str, Any], places: tuple[AnsweredPlace
 STRONG = 3.0
 """Structural floors from which on a fault should be found."""
 
-MIN_HEALTHY = 8
-"""Healthy cases of which a floor can be made."""
-
-Floors = Mapping[bool, StructuralFloor | None]
-"""With a reference (True) and without (False); None: not known."""
+Floors = Mapping[bool, StructuralFloor]
+"""With a reference (True) and without (False)."""
 
 
-def known_floors(truths: Sequence[Truth]) -> Floors:
-    """Return the floors that the diagnosis itself uses, or the batch's own where none come with this version."""
-    from gearsig.gap import load_learned
-
-    try:
-        learned = load_learned()
-        return {with_reference: learned.floor(with_reference=with_reference) for with_reference in (False, True)}
-    except InputError:
-        return batch_floors(truths)
-
-
-def batch_floors(truths: Sequence[Truth]) -> dict[bool, StructuralFloor | None]:
-    """Return floors from how the batch's own healthy cases scatter.
-
-    Without a reference that is the scatter among machines, which is more than between a machine and its simulation:
-    the strengths come out low.
-    """
-    alone = [t.healthy for t in truths if t.healthy]
-    changes = [t.healthy_change for t in truths if t.healthy_change]
-    return {False: _floor(alone), True: _floor(changes)}
-
-
-def _floor(rows: Sequence[Mapping[str, float]]) -> StructuralFloor | None:
-    if len(rows) < MIN_HEALTHY:
-        return None
-    names = tuple(rows[0])
-    return StructuralFloor.of_healthy(names, np.array([[row[name] for name in names] for row in rows]))
+def known_floors() -> Floors:
+    """Return the floors that the diagnosis itself uses."""
+    learned = load_learned()
+    return {with_reference: learned.floor(with_reference=with_reference) for with_reference in (False, True)}
 
 
 def strength(truth: Truth, floors: Floors) -> float:
@@ -156,8 +128,6 @@ def strength(truth: Truth, floors: Floors) -> float:
     It is measured like the whole gap, see `gearsig.gap.gap_size`; of two conditions the larger counts.
     """
     floor = floors[bool(truth.labels["has_reference"])]
-    if floor is None:
-        return float("nan")
     known = [name for name in floor.names if all(name in change for change in truth.fault_changes)]
     floors_of_known = floor.of(known)
     sizes = [

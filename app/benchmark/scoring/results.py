@@ -79,7 +79,7 @@ def main_table(result: BenchmarkResult) -> Table:
         if any(scores[figure.key].n for scores in parts.values()):
             rows.append(tuple(row))
     header = ("", WITHOUT, "target", WITH, "target")
-    return Table("Against the targets", _basis(result), header, tuple(rows))
+    return Table("Against the targets", _BASIS, header, tuple(rows))
 
 
 def same_table(result: BenchmarkResult) -> Table | None:
@@ -160,16 +160,10 @@ def _drop(figure: Figure, same: Score, blind: Score) -> str:
     return with_minus(text)
 
 
-def _basis(result: BenchmarkResult) -> str:
-    if result.strengths_known:
-        return (
-            f"Faults of at least {STRONG:g} structural floors, and all healthy cases; value (90 % interval) of "
-            "so many cases; open: the interval holds the target."
-        )
-    return (
-        "Faults of every strength, as there are too few healthy cases for a floor; value (90 % interval) of so many "
-        "cases."
-    )
+_BASIS = (
+    f"Faults of at least {STRONG:g} structural floors, and all healthy cases; value (90 % interval) of so many cases; "
+    "open: the interval holds the target."
+)
 
 
 def markdown(result: BenchmarkResult, command: str, date: datetime) -> str:

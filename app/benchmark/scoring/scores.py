@@ -10,12 +10,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from app.benchmark.answer import AnsweredShrinkage
 from app.benchmark.cases import BLIND, SAME
 from app.benchmark.run import BenchmarkRequest, Done
 from app.benchmark.scoring.judged import STRONG, Row, group_of, known_floors, rows_of
 from gearsig.checks import FloatArray
-from gearsig.gap import GapOutcome
+from gearsig.gap import GapOutcome, Shrinkage
 from sims.blind import MECHANICAL
 
 # --------------------
@@ -268,8 +267,8 @@ def brier_of(row: Row) -> float:
 
 def shrink_of(row: Row, name: str) -> float:
     """Return the held-out shrink of a cause; nan where it was not tried."""
-    cause = row.answer.cause(name)
-    return cause.shrinkage.shrink if cause is not None and cause.shrinkage is not None else float("nan")
+    shrinkage = row.answer.shrinkage(name)
+    return float("nan") if shrinkage is None else shrinkage.shrink.value
 
 
 def _shrink_true(row: Row) -> float:
@@ -304,9 +303,8 @@ def _slope(row: Row) -> float:
     return shrinkage.slope if shrinkage is not None else float("nan")
 
 
-def _of_true(row: Row) -> AnsweredShrinkage | None:
-    cause = row.answer.cause(row.effects[0]) if row.is_mechanical else None
-    return cause.shrinkage if cause is not None else None
+def _of_true(row: Row) -> Shrinkage | None:
+    return row.answer.shrinkage(row.effects[0]) if row.is_mechanical else None
 
 
 def _regret(row: Row) -> float:
@@ -503,8 +501,6 @@ class BenchmarkResult:
     parts : tuple of Part
     chance_error : float
         Calibration error that true probabilities would show with so many cases.
-    strengths_known : bool
-        Whether there is a floor to measure strength in; if not, figures are of all faults.
     figures : tuple of Figure
     """
 
@@ -512,13 +508,17 @@ class BenchmarkResult:
     rows: Mapping[str, Sequence[Row]]
     parts: tuple[Part, ...]
     chance_error: float
-    strengths_known: bool
     figures: Sequence[Figure] = FIGURES
 
     @property
     def judged(self) -> str:
         """The diagnoser under judgement."""
         return self.request.diagnosers[0]
+
+    @property
+    def strengths_known(self) -> bool:
+        """Whether faults have a strength in floors; if not, figures are of all faults."""
+        return any(isfinite(row.strength) for row in self.rows[self.judged])
 
     def part(self, name: str, *, diagnoser: str = "", source: str = BLIND, strong: bool | None = None) -> Part:
         """Return a part; `strong` None: strong faults only, where strength is known."""
@@ -533,18 +533,13 @@ class BenchmarkResult:
 
 def judge(request: BenchmarkRequest, cases: Sequence[Done]) -> BenchmarkResult:
     """Score all answers."""
-    floors = known_floors([done.truth for done in cases if done.planned.source == BLIND])
+    floors = known_floors()
     rows = {name: rows_of(cases, name, floors) for name in request.diagnosers}
     first = rows[request.diagnosers[0]]
     parts = score_parts(request, rows, PARTS, FIGURES, (True, False))
     confidence = [r.confidence for r in first if r.source == BLIND and is_one_answer(r)]
-    return BenchmarkResult(
-        request,
-        rows,
-        parts,
-        error_by_chance(confidence, np.random.default_rng(request.plan.seed)),
-        any(isfinite(row.strength) for row in first),
-    )
+    chance_error = error_by_chance(confidence, np.random.default_rng(request.plan.seed))
+    return BenchmarkResult(request, rows, parts, chance_error)
 
 
 def score_parts(
