@@ -262,15 +262,6 @@ class LoadSharing(Result):
     stiffness_n_per_m: FloatArray
     slice_forces_n: FloatArray
 
-    @property
-    def face_load_factor(self) -> float:
-        """Greatest over mean force of the slices at the angle where it is greatest, K_Hβ of ISO 6336-1 for spur gears.
-
-        Of what all pairs together carry at a place of the face.
-        """
-        along = self.slice_forces_n.sum(axis=1)
-        return float(np.max(along.max(axis=1) / along.mean(axis=1)))
-
 
 def one_mesh_cycle(n_points: int = 200) -> FloatArray:
     """Middles of `n_points` equal parts of the first mesh cycle: their mean is the mean over the cycle."""

@@ -109,18 +109,6 @@ class PairGeometry:
         """Width on which the teeth touch: the narrower gear's."""
         return min(self.driver.face_width_mm, self.driven.face_width_mm)
 
-    @property
-    def backlash_mm(self) -> float:
-        """Normal backlash along the line of action, between the two flanks; 2b of a model with half backlash b."""
-        # A wider centre distance opens both flanks: j_n = 2 (r_b1 + r_b2)(inv α_w − inv α_tight).
-        change = float(involute(self.working_pressure_angle_rad)) - float(involute(self._tight_angle_rad))
-        return 2.0 * (self.driver.base_radius_mm + self.driven.base_radius_mm) * change
-
-    def pairs_in_contact(self, mesh_cycles: float) -> tuple[int, ...]:
-        """Numbers k of the pairs that touch at c, the longest in contact first: k ≤ c ≤ k + ε."""
-        low, high = ceil(mesh_cycles - self.contact_ratio), int(np.floor(mesh_cycles))
-        return tuple(range(low, high + 1))
-
     def contact_radii_mm(self, mesh_cycles: FloatArray | float, pair: int = 0) -> tuple[FloatArray, FloatArray]:
         """ρ1 and ρ2 of pair `pair` at c: distances from the base tangent points, radii of curvature of the flanks."""
         travel = np.asarray(mesh_cycles, dtype=np.float64) - pair

@@ -56,9 +56,7 @@ class FractalSurface:
             )
 
     @classmethod
-    def of_roughness(
-        cls, rms_um: float, dimension: float = 1.5, *, n_first: int = 7, n_last: int = 18, gamma: float = 1.5
-    ) -> FractalSurface:
+    def of_roughness(cls, rms_um: float, dimension: float = 1.5) -> FractalSurface:
         """Return the surface whose rms height is `rms_um` (Rq); solves the rms formula for G.
 
         G = (Rq √2/√Σγ^(-2(2-D)n))^(1/(D-1)).
@@ -68,10 +66,9 @@ class FractalSurface:
         >>> f"{FractalSurface.of_roughness(0.45).scale_m:.3g}"
         '2.32e-12'
         """
-        unit = cls(1.0, dimension, n_first, n_last, gamma)
+        unit = cls(1.0, dimension)
         rms_m = 1e-6 * not_negative(rms_um, "rms_um of the roughness", "um")
-        scale_m = (rms_m / unit.rms_m) ** (1.0 / (dimension - 1.0))
-        return cls(scale_m, dimension, n_first, n_last, gamma)
+        return cls((rms_m / unit.rms_m) ** (1.0 / (dimension - 1.0)), dimension)
 
     @property
     def cycles_per_metre(self) -> FloatArray:
@@ -121,11 +118,9 @@ class TimeLockedRoughness:
         object.__setattr__(self, "phases_rad", _phases(self.phases_rad, 1, len(self.surface.amplitudes_m)))
 
     @classmethod
-    def draw(
-        cls, surface: FractalSurface, rng: np.random.Generator, *, travel_mps: float = LISTED_TRAVEL_MPS
-    ) -> TimeLockedRoughness:
+    def draw(cls, surface: FractalSurface, rng: np.random.Generator) -> TimeLockedRoughness:
         """Draw the phases."""
-        return cls(surface, surface.draw_phases(rng)[0], travel_mps)
+        return cls(surface, surface.draw_phases(rng)[0])
 
     @property
     def frequencies_hz(self) -> FloatArray:
@@ -135,11 +130,6 @@ class TimeLockedRoughness:
     def height_m(self, time_s: ArrayLike) -> FloatArray:
         """Δb at the given times."""
         return _cosines(self.surface.amplitudes_m, 2 * np.pi * self.frequencies_hz, self.phases_rad, time_s)
-
-    def rate_mps(self, time_s: ArrayLike) -> FloatArray:
-        """Derivative of Δb over time."""
-        omega = 2 * np.pi * self.frequencies_hz
-        return _cosines(self.surface.amplitudes_m * omega, omega, self.phases_rad + np.pi / 2, time_s)
 
     def phasors(self, step_s: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """What `roughness_kernel.height_now` and `advance` work on, from time 0.

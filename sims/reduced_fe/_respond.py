@@ -448,8 +448,6 @@ def speed_sweep(
     *,
     n_parts: int = 200,
     step_s: float = STEP_S,
-    method: Method = "exponential",
-    on_progress: Callable[[float], None] | None = None,
 ) -> SpeedSweep:
     """Run a pair through a range of speeds at constant torque.
 
@@ -464,8 +462,6 @@ def speed_sweep(
         Jumps move with the rate of a quick sweep: 100 to 400 rpm/s is slow for a pair of a few kHz.
     n_parts : int
     step_s : float
-    method : str
-    on_progress : callable or None
     """
     positive(duration_s, "duration_s", "s")
     operation = Operation(Profile.of([0.0, duration_s], [first_rpm, last_rpm]), Profile.constant(torque_nm))
@@ -476,9 +472,7 @@ def speed_sweep(
         signals=(TRANSMISSION_ERROR, "mesh_force_n"),
         step_s=step_s,
         stride=STRIDE,
-        method=method,
         ready=constants(pair, operation),
-        on_progress=on_progress,
     )
     n = len(run[TRANSMISSION_ERROR]) // count(n_parts, "n_parts")
     error, force = (run[name][: n * n_parts].reshape(n_parts, n) for name in (TRANSMISSION_ERROR, "mesh_force_n"))

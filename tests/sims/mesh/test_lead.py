@@ -120,6 +120,12 @@ def test_axial_force_is_the_tangential_one_times_the_tangent_of_the_helix() -> N
     assert mesh_stiffness(mirrored, CYCLES).total_n_per_m == pytest.approx(mesh_stiffness(mesh, CYCLES).total_n_per_m)
 
 
+def face_load_factor(shared):
+    """Greatest over mean force of the slices at the angle where it is greatest, K_Hβ of ISO 6336-1 for spur gears."""
+    along = shared.slice_forces_n.sum(axis=1)
+    return float(np.max(along.max(axis=1) / along.mean(axis=1)))
+
+
 @pytest.mark.parametrize("error_um", [5.0, 10.0, 18.0, -10.0])
 def test_misaligned_flanks_carry_as_in_the_standard(error_um: float) -> None:
     """K_Hβ = 1 + F_β c_γ/(2 F_m/b) while all of the face carries; the outermost slice's middle is (1 − 1/n) of that."""
@@ -130,7 +136,7 @@ def test_misaligned_flanks_carry_as_in_the_standard(error_um: float) -> None:
     shared = share_torque(mesh, force * base.pair.driver.base_radius_mm * 1e-3, single)
     slope = abs(error_um) * 1e-6 * mesh_stiffness(base, single).total_n_per_m[0] / force
     assert slope < 2.0
-    assert shared.face_load_factor == pytest.approx(1.0 + 0.5 * slope * (1.0 - 1.0 / n), rel=1e-9)
+    assert face_load_factor(shared) == pytest.approx(1.0 + 0.5 * slope * (1.0 - 1.0 / n), rel=1e-9)
     along = shared.slice_forces_n[0].sum(axis=0)
     assert np.all(np.diff(along) * np.sign(error_um) < 0.0)  # open towards the far end
 
@@ -145,7 +151,7 @@ def test_badly_misaligned_flanks_carry_over_part_of_the_face() -> None:
     ratio = error_um * 1e-6 * mesh_stiffness(base, single).total_n_per_m[0] / force
     carrying = np.count_nonzero(shared.slice_forces_n[0].sum(axis=0)) / n
     assert carrying == pytest.approx(sqrt(2.0 / ratio), abs=1.0 / n)
-    assert shared.face_load_factor == pytest.approx(sqrt(2.0 * ratio), rel=0.03)
+    assert face_load_factor(shared) == pytest.approx(sqrt(2.0 * ratio), rel=0.03)
 
 
 def test_crowned_flanks_carry_as_a_parabola() -> None:
