@@ -10,12 +10,12 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any
 
 import numpy as np
 
 from app.benchmark.start_stop import labelled_recordings, needs_reference, planned
+from app.studies import answers_of
 from gearsig.checks import FloatArray
 from gearsig.gap import NONE, UNKNOWN, Attribution, GapCalibration
 from gearsig.gap.start_stop import (
@@ -44,14 +44,15 @@ MIN_SHARE = 1e-6
 Row = tuple[Mapping[str, Any], DriveEvidence]
 
 
-def collect(role: str, seed: int, number: int, plan: tuple[str, str, float]) -> list[Row]:
-    """Make a case and return what is seen of it with its reference and without."""
-    label, recording, healthy = labelled_recordings(role, seed, number, plan)
+def collect(job: tuple[int, int, tuple[str, str, float]]) -> list[Row]:
+    """Make a case of seed, number and kind, effect, level; return what is seen of it with its reference and without."""
+    seed, number, fault = job
+    label, recording, healthy = labelled_recordings(ROLE, seed, number, fault)
     simulator = forging_gap_simulator()
     rows: list[Row] = []
     now = read_cycles(recording)
     ways = [] if healthy is None else [[read_cycles(healthy)]]
-    for references in ways if needs_reference(plan[1]) else [*ways, []]:
+    for references in ways if needs_reference(fault[1]) else [*ways, []]:
         compared = compare_drive(now, references, simulator)
         evidence = compared.evidence(predict(compared, simulator.gap_effects()))
         rows.append(({**label, "with_reference": bool(references)}, evidence))
@@ -107,19 +108,17 @@ def _calibration(values: FloatArray, named_from: float = MIN_NAMED) -> GapCalibr
 
 def main() -> None:
     """Make the cases, fit, write."""
+    from app.studies.gap.start_stop import collect
+
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=100)
     parser.add_argument("--seed", type=int, default=71)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--numbers", default="", help="of the planned cases, e.g. 0-38,140-177; default: all")
     arguments = parser.parse_args()
-    rows: list[Row] = []
     plan = planned(arguments.cases, arguments.seed)
-    with ProcessPoolExecutor(arguments.processes) as pool:
-        chosen = numbers_of(arguments.numbers, len(plan))
-        futures = [pool.submit(collect, ROLE, arguments.seed, i, plan[i]) for i in chosen]
-        for future in as_completed(futures):
-            rows += future.result()
+    jobs = [(arguments.seed, i, plan[i]) for i in numbers_of(arguments.numbers, len(plan))]
+    rows = [row for _, seen in answers_of(collect, jobs, arguments.processes) for row in seen]
     write_floors(rows, arguments.seed, f"{arguments.numbers or 'all'} of {len(plan)} planned")
 
 

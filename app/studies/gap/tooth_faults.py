@@ -47,7 +47,7 @@ LONGEST_S = 4.0
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedFault:
     """One recording with its healthy reference, and what is wrong; severity nan where units differ."""
 
     name: str
@@ -94,7 +94,7 @@ def drawn_cases(plan: Plan, n_rigs: int) -> Iterator[tuple[int, BlindCase]]:
             yield number, case
 
 
-def simulated(case: BlindCase, source: str, seed: int) -> Iterator[Recorded]:
+def simulated(case: BlindCase, source: str, seed: int) -> Iterator[RecordedFault]:
     """Yield a specimen of a simulator with each fault."""
     rng = np.random.default_rng(seed)
     first, healthy = case.conditions[0], case.references[0]
@@ -122,10 +122,10 @@ def simulated(case: BlindCase, source: str, seed: int) -> Iterator[Recorded]:
             except GearsigError as error:
                 typer.echo(f"left out: {name} {added.severity:.3g}: {error}")
                 continue
-            yield Recorded(name, added.severity, now.with_name(f"{name} {k}"), reference.with_name("healthy"))
+            yield RecordedFault(name, added.severity, now.with_name(f"{name} {k}"), reference.with_name("healthy"))
 
 
-def independent(plan: Plan, number: int) -> Iterator[Recorded]:
+def independent(plan: Plan, number: int) -> Iterator[RecordedFault]:
     """Yield the independent rig with each fault."""
     for name in TOOTH_FAULTS:
         for level in BLIND_LEVELS:
@@ -133,10 +133,10 @@ def independent(plan: Plan, number: int) -> Iterator[Recorded]:
             made = record_case(case)
             severity = float(labels(case, made)["effects"][0]["severity"])
             now, reference = made.conditions[0], made.references[0]
-            yield Recorded(name, severity, now.with_name(f"{name} {level}"), reference.with_name("healthy"))
+            yield RecordedFault(name, severity, now.with_name(f"{name} {level}"), reference.with_name("healthy"))
 
 
-def answered(recorded: Recorded, rig: Rig, cache: Path) -> Answered:
+def answered(recorded: RecordedFault, rig: Rig, cache: Path) -> Answered:
     """Diagnose one recording as far as its likeliest causes."""
     simulator = cracked_gap_simulator()
     known, twin = simulator.gap_effects(), simulator.twin_of(rig)
