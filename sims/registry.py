@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,39 +15,37 @@ from gearsig.recording import Recording
 from sims.effects import EffectSetting
 from sims.machine import Operation, Profile
 from sims.presets import preset
-from sims.simulator import ParameterValue, SimulationSetup, Simulator
+from sims.simulator import ParameterValue, SimulationSetup
+
+if TYPE_CHECKING:
+    from sims.cracked import CrackedPair
+    from sims.forging import ForgingManipulator
+    from sims.reduced_fe import ReducedPair
 
 
 @cache
-def simulators() -> dict[str, Simulator]:
+def simulators() -> dict[str, CrackedPair | ReducedPair | ForgingManipulator]:
     """Return every simulator by its name."""
     from sims.cracked import CrackedPair
     from sims.forging import ForgingManipulator
     from sims.reduced_fe import ReducedPair
 
-    all_simulators: tuple[Simulator, ...] = (CrackedPair(), ReducedPair(), ForgingManipulator())
-    return {simulator.name: simulator for simulator in all_simulators}
+    return {simulator.name: simulator for simulator in (CrackedPair(), ReducedPair(), ForgingManipulator())}
 
 
-def simulator(name: str) -> Simulator:
+def simulator(name: str) -> CrackedPair | ReducedPair | ForgingManipulator:
     """Return the simulator called `name`."""
     return simulators()[known_name(name, simulators(), f"there is no model {name!r}")]
 
 
-@cache
-def gap_simulators() -> dict[str, GapSimulator | DriveSimulator]:
-    """Return every simulator that takes part in the gap diagnosis, by its name."""
-    from sims.cracked import cracked_gap_simulator
-    from sims.forging import forging_gap_simulator
-    from sims.reduced_fe import reduced_gap_simulator
-
-    all_simulators = (cracked_gap_simulator(), reduced_gap_simulator(), forging_gap_simulator())
-    return {simulator.name: simulator for simulator in all_simulators}
+def gap_simulators() -> Mapping[str, GapSimulator | DriveSimulator]:
+    """Return the simulators that take part in the gap diagnosis, by their names: all of them."""
+    return simulators()
 
 
 def gap_simulator(name: str) -> GapSimulator | DriveSimulator:
     """Return the simulator called `name` as the gap diagnosis takes it."""
-    return gap_simulators()[known_name(name, gap_simulators(), f"there is no model {name!r} with a gap diagnosis")]
+    return simulator(name)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from gearsig.gap import Added, OperatingCondition
 from gearsig.recording import Recording
+from gearsig.rig import Rig
 from sims.cracked._respond import (
     PairState,
     Response,
@@ -23,13 +24,12 @@ from sims.gear_pair import (
     PARAMETERS,
     MeasuredRun,
     Measurement,
-    PairGapSimulator,
     PairModel,
     PairTwin,
     ReadyPair,
     StepConvergence,
 )
-from sims.machine import Machine, Operation
+from sims.machine import Machine, Nominal, Operation
 from sims.measure import plain
 from sims.mesh import friction_over_mesh
 from sims.presets import Preset
@@ -55,6 +55,9 @@ class CrackedPair(PairModel[ReadyPair]):
 
     def _converges(self, ready: ReadyPair, rng: np.random.Generator) -> StepConvergence:
         return check_convergence(ready.machine, ready.operation, rng)
+
+    def _twin(self, rig: Rig, nominal: Nominal) -> CrackedTwin:
+        return CrackedTwin(rig, nominal)
 
 
 # From a machine to a recording: run the model, then measure it.
@@ -169,6 +172,6 @@ class CrackedTwin(PairTwin):
         return default_step_s(healthy.machine, healthy.operation, STEP_ANGLE_RAD)
 
 
-def cracked_gap_simulator() -> PairGapSimulator:
+def cracked_gap_simulator() -> CrackedPair:
     """Return the model "cracked" as the gap diagnosis takes it."""
-    return PairGapSimulator(NAME, CrackedTwin)
+    return CrackedPair()

@@ -189,6 +189,64 @@ class ForgingManipulator(Simulator):
         ready = self.prepare(setup)
         return check_convergence(ready.drive, ready.cycle, ready.operation.torque_nm)
 
+    # As the gap diagnosis takes it, see `gearsig.gap.DriveSimulator`.
+
+    def gap_effects(self) -> dict[str, GapEffect]:
+        """Return the effects that have a meaning for this model."""
+        known = [(effect(name), shows_in) for name, shows_in in _SHOWS_IN.items()]
+        return {
+            known_effect.name: GapEffect(
+                known_effect.name,
+                known_effect.group,
+                known_effect.title,
+                known_effect.severity.name,
+                known_effect.severity.unit,
+                shows_in=shows_in,
+            )
+            for known_effect, shows_in in known
+        } | _WRONG_VALUES
+
+    def drive_twin_of(self, facts: DriveFacts) -> ForgingTwin:
+        """Return the drive by the rig's contact; what neither rig nor recording tells is usual for its size."""
+        contact, path = facts.contact, facts.path
+        ratio = path.teeth[1] / path.teeth[0]
+        torque_nm, friction_nm, top_rad_s = facts.motor_torque_nm, facts.load_friction_nm, facts.top_speed_rad_s
+        drag_nm = 0.05 * torque_nm
+        needed = min((drag_nm + friction_nm / ratio) / torque_nm, 0.95)
+        limit_rpm = top_rad_s / (1.0 - SPEED_BAND * needed) * 30.0 / pi
+        parameters: dict[str, ParameterValue] = {
+            "teeth_driver": path.teeth[0],
+            "teeth_driven": path.teeth[1],
+            "module_mm": facts.module_mm,
+            "contact_ratio": min(path.contact_ratio, 1.84),
+            "mesh_phase": contact.mesh_phase,
+            "mesh_ramp": min(max(contact.mesh_ramp, MESH_RAMP_RANGE[0]), MESH_RAMP_RANGE[1]),
+            "stiffness_n_per_m_lambda": contact.stiffness_n_per_m_lambda,
+            "exponent": contact.exponent,
+            "restitution": max(contact.restitution, 0.05),
+            "damping_law": contact.damping_law,
+            "impact_speed_floor_mps": contact.impact_speed_floor_mps,
+            "half_backlash_um": contact.half_backlash_um,
+            "friction_coefficient": contact.friction_coefficient,
+            "motor_inertia_kg_m2": contact.motor_inertia_kg_m2,
+            "pinion_inertia_kg_m2": max(contact.driver_inertia_kg_m2, 1e-4),
+            "wheel_inertia_kg_m2": contact.driven_inertia_kg_m2 or 0.0,
+            "piece_mass_kg": 0.0,
+            "on_s": facts.on_s,
+            "off_s": facts.off_s,
+            "valve_rise_s": 0.02,
+            "brake_nm": facts.brake_torque_nm,
+            "press_nm": 0.0,
+            "motor_speed_band": SPEED_BAND,
+            "drag_nm": drag_nm,
+            **NOISE_FREE,
+            "drag_viscous_nm_s_per_rad": 0.002 * torque_nm,
+            "load_friction_nm": 0.95 * friction_nm,
+            "load_viscous_nm_s_per_rad": 0.1 * friction_nm / (top_rad_s / ratio),
+        }
+        rounded = {k: v if isinstance(v, str) else float(f"{v:.6g}") for k, v in parameters.items()}
+        return ForgingTwin(rounded, OperatingCondition(limit_rpm, torque_nm))
+
 
 def _constant(speed_rpm: Profile) -> float:
     """Return the speed limit: one number, as a valve is set once."""
@@ -351,72 +409,9 @@ class ForgingTwin:
         return preset_text(preset, notes)
 
 
-@dataclass(frozen=True)
-class ForgingGapSimulator:
-    """The forging drive as the gap diagnosis takes it; see `gearsig.gap.DriveSimulator`."""
-
-    name: str = field(default=NAME)
-
-    def gap_effects(self) -> dict[str, GapEffect]:
-        """Return the effects that have a meaning for this model."""
-        known = [(effect(name), shows_in) for name, shows_in in _SHOWS_IN.items()]
-        return {
-            known_effect.name: GapEffect(
-                known_effect.name,
-                known_effect.group,
-                known_effect.title,
-                known_effect.severity.name,
-                known_effect.severity.unit,
-                shows_in=shows_in,
-            )
-            for known_effect, shows_in in known
-        } | _WRONG_VALUES
-
-    def drive_twin_of(self, facts: DriveFacts) -> ForgingTwin:
-        """Return the drive by the rig's contact; what neither rig nor recording tells is usual for its size."""
-        contact, path = facts.contact, facts.path
-        ratio = path.teeth[1] / path.teeth[0]
-        torque_nm, friction_nm, top_rad_s = facts.motor_torque_nm, facts.load_friction_nm, facts.top_speed_rad_s
-        drag_nm = 0.05 * torque_nm
-        needed = min((drag_nm + friction_nm / ratio) / torque_nm, 0.95)
-        limit_rpm = top_rad_s / (1.0 - SPEED_BAND * needed) * 30.0 / pi
-        parameters: dict[str, ParameterValue] = {
-            "teeth_driver": path.teeth[0],
-            "teeth_driven": path.teeth[1],
-            "module_mm": facts.module_mm,
-            "contact_ratio": min(path.contact_ratio, 1.84),
-            "mesh_phase": contact.mesh_phase,
-            "mesh_ramp": min(max(contact.mesh_ramp, MESH_RAMP_RANGE[0]), MESH_RAMP_RANGE[1]),
-            "stiffness_n_per_m_lambda": contact.stiffness_n_per_m_lambda,
-            "exponent": contact.exponent,
-            "restitution": max(contact.restitution, 0.05),
-            "damping_law": contact.damping_law,
-            "impact_speed_floor_mps": contact.impact_speed_floor_mps,
-            "half_backlash_um": contact.half_backlash_um,
-            "friction_coefficient": contact.friction_coefficient,
-            "motor_inertia_kg_m2": contact.motor_inertia_kg_m2,
-            "pinion_inertia_kg_m2": max(contact.driver_inertia_kg_m2, 1e-4),
-            "wheel_inertia_kg_m2": contact.driven_inertia_kg_m2 or 0.0,
-            "piece_mass_kg": 0.0,
-            "on_s": facts.on_s,
-            "off_s": facts.off_s,
-            "valve_rise_s": 0.02,
-            "brake_nm": facts.brake_torque_nm,
-            "press_nm": 0.0,
-            "motor_speed_band": SPEED_BAND,
-            "drag_nm": drag_nm,
-            **NOISE_FREE,
-            "drag_viscous_nm_s_per_rad": 0.002 * torque_nm,
-            "load_friction_nm": 0.95 * friction_nm,
-            "load_viscous_nm_s_per_rad": 0.1 * friction_nm / (top_rad_s / ratio),
-        }
-        rounded = {k: v if isinstance(v, str) else float(f"{v:.6g}") for k, v in parameters.items()}
-        return ForgingTwin(rounded, OperatingCondition(limit_rpm, torque_nm))
-
-
-def forging_gap_simulator() -> ForgingGapSimulator:
+def forging_gap_simulator() -> ForgingManipulator:
     """Return the model as the gap diagnosis takes it."""
-    return ForgingGapSimulator()
+    return ForgingManipulator()
 
 
 def _settings(added: Sequence[Added]) -> tuple[EffectSetting, ...]:

@@ -32,7 +32,6 @@ from sims.gear_pair._run import PairResponse, RunPlan, StepConvergence, profile_
 from sims.gear_pair._simulator import (
     BODY_KG,
     BODY_SHAPES,
-    PairGapSimulator,
     PairModel,
     PairTwin,
     ReadyPair,
@@ -52,7 +51,6 @@ __all__ = [
     "Installed",
     "MeasuredRun",
     "Measurement",
-    "PairGapSimulator",
     "PairModel",
     "PairResponse",
     "PairTwin",

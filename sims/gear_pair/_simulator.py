@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
@@ -144,6 +144,31 @@ class PairModel(Simulator, Generic[Ready]):
     def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> HasText:
         """Tell how far a smaller step of the integrator changes the result of this very machine."""
         return self._converges(self.prepare(setup, rng), rng)
+
+    # As the gap diagnosis takes it, see `gearsig.gap.GapSimulator`.
+
+    def gap_effects(self) -> Mapping[str, GapEffect]:
+        """Return all effects of the catalogue: each has a meaning for a gear pair."""
+        return {name: as_gap_effect(e) for name, e in effects().items()}
+
+    def twin_of(self, rig: Rig) -> PairTwin:
+        """Return a twin of the rig, whose machine has been built to see that it can be.
+
+        Raises
+        ------
+        RefusalError
+            If there is not exactly one pair, its teeth or module are not known, or the model cannot have such gears.
+        """
+        twin = self._twin(rig, nominal_of(rig))
+        try:
+            twin.pair_geometry()
+        except InputError as error:
+            raise RefusalError(f"the model {self.name!r} cannot be set to this rig: {error}") from None
+        return twin
+
+    @abstractmethod
+    def _twin(self, rig: Rig, nominal: Nominal) -> PairTwin:
+        """Return the twin of a rig, of which that is known of its pair."""
 
 
 # --------------------
@@ -505,38 +530,3 @@ class PairTwin:
     def _rig_at(self, point: OperatingCondition) -> Rig:
         operating_point = OperatingPoint(self.rig.pairs[0].driver, point.speed_rpm, torque_nm=point.torque_nm)
         return replace(self.rig, operating_point=operating_point)
-
-
-@dataclass(frozen=True)
-class PairGapSimulator:
-    """A model of a gear pair as the gap diagnosis takes it.
-
-    Parameters
-    ----------
-    name : str
-        As on the command line.
-    make : callable
-        Makes a twin of a rig and of what it says of its pair.
-    """
-
-    name: str
-    make: Callable[[Rig, Nominal], PairTwin]
-
-    def gap_effects(self) -> Mapping[str, GapEffect]:
-        """Return all effects of the catalogue: each has a meaning for a gear pair."""
-        return {name: as_gap_effect(e) for name, e in effects().items()}
-
-    def twin_of(self, rig: Rig) -> PairTwin:
-        """Return a twin of the rig, whose machine has been built to see that it can be.
-
-        Raises
-        ------
-        RefusalError
-            If there is not exactly one pair, its teeth or module are not known, or the model cannot have such gears.
-        """
-        twin = self.make(rig, nominal_of(rig))
-        try:
-            twin.pair_geometry()
-        except InputError as error:
-            raise RefusalError(f"the model {self.name!r} cannot be set to this rig: {error}") from None
-        return twin

@@ -12,7 +12,7 @@ import numpy as np
 from gearsig.checks import positive
 from gearsig.errors import InputError
 from gearsig.recording import Recording
-from gearsig.rig import SIDES
+from gearsig.rig import SIDES, Rig
 from sims.effects import effects
 from sims.fe_gear import READY, GearBlank, ReducedGear, cached_gear, plan_for, ready_gear
 from sims.gear_pair import (
@@ -22,7 +22,6 @@ from sims.gear_pair import (
     Installed,
     MeasuredRun,
     Measurement,
-    PairGapSimulator,
     PairModel,
     PairTwin,
     ReadyPair,
@@ -31,7 +30,7 @@ from sims.gear_pair import (
     draw_roughness,
     gear_geometry,
 )
-from sims.machine import Machine, Operation
+from sims.machine import Machine, Nominal, Operation
 from sims.measure import plain
 from sims.mesh import Material, corner_separation_m
 from sims.presets import Preset
@@ -179,6 +178,9 @@ class ReducedPair(PairModel[PreparedPair]):
     def _converges(self, ready: PreparedPair, rng: np.random.Generator) -> StepConvergence:
         del rng
         return check_convergence(ready.pair, ready.operation, ready.step_s)
+
+    def _twin(self, rig: Rig, nominal: Nominal) -> ReducedTwin:
+        return ReducedTwin(rig, nominal)
 
 
 # From a flexible pair to a recording: run the model, then measure it.
@@ -380,6 +382,6 @@ class ReducedTwin(PairTwin):
         return TWIN_STEP_S
 
 
-def reduced_gap_simulator() -> PairGapSimulator:
+def reduced_gap_simulator() -> ReducedPair:
     """Return the model "reduced-fe" as the gap diagnosis takes it; its twin's gears are reduced, and kept on disk."""
-    return PairGapSimulator(NAME, ReducedTwin)
+    return ReducedPair()
