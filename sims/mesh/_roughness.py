@@ -192,8 +192,12 @@ class FlankRoughness:
         s = np.asarray(position_m, dtype=np.float64)
         row = np.mod(tooth, self.n_teeth)
         total = np.zeros(np.broadcast_shapes(np.shape(row), s.shape))
+        # cos(ks + φ) by the cosines and sines of both: one profile of positions serves all teeth.
         for n, cycles in enumerate(self.surface.cycles_per_metre):
-            total += self.surface.amplitudes_m[n] * np.cos(2 * np.pi * cycles * s + self.phases_rad[row, n])
+            place, phase = 2 * np.pi * cycles * s, self.phases_rad[row, n]
+            a = self.surface.amplitudes_m[n]
+            total += a * np.cos(phase) * np.cos(place)
+            total -= a * np.sin(phase) * np.sin(place)
         return total
 
 
