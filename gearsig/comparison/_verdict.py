@@ -269,7 +269,7 @@ def _elsewhere_text(channel: ChannelComparison, alignments: Sequence[Alignment])
 
 
 def _most_text(channel: ChannelComparison, line: LineLevel, gain_db: float) -> str:
-    beside = next((f"Beside the {_WHERE[main.kind]}, " for main in mesh_lines(channel)), "")
+    beside = next((f"Beside the {_WHERE[main.kind]}, " for main in mesh_lines(channel) if main.kind != line.kind), "")
     off_db, scatter = line.level.difference_db - gain_db, BEYOND * line.level.repeatability_db
     after = f" after a common gain of {signed(-gain_db)} dB" if gain_db else ""
     if words := missing_words(line):

@@ -88,9 +88,9 @@ OF_THE_WAVEFORM = (
 )
 
 OF_THE_DEPTH = (
-    "The crack's depth is that of gearsig crack, {depth:.2g} mm ({low:.2g} to {high:.2g} mm): of the machines that "
-    "it was calibrated on, the interval holds nine in ten. How likely a crack is, is said here from all features and "
-    "from trials on the twin, and there from the shape of one tooth's event alone: the two can differ."
+    "The depth is that of the crack estimate, {depth:.2g} mm, with the interval that held nine in ten of the machines "
+    "it was calibrated on, {low:.2g} to {high:.2g} mm. It rests on the shape of one tooth's event, the probability "
+    "here on all features and on trials on the twin, so that the two can differ."
 )
 
 NOT_NEARER = (
@@ -429,9 +429,9 @@ def _waveform_messages(
     is_decided = any(trial.match is not None and trial.match.is_good for trial in tried.values())
     meant = "the highest is likeliest" if is_decided else "too little to part them: the twin is not like this machine"
     message = (
-        f"As a waveform beside the mesh harmonics, the recorded change correlates with the twin's: {values}; {meant}. "
-        f"The healthy twin's mesh harmonics miss those of the reference by {missed_db:.0f} dB beside each other, and "
-        "as much is allowed to each harmonic of a fault: the more, the less its waveform tells."
+        f"Correlation of the recorded change, without mesh harmonics, with that of the twin: {values}; {meant}. "
+        f"Relative to each other, the mesh harmonics of the healthy twin miss those of the reference by "
+        f"{missed_db:.0f} dB. Each harmonic of a fault is allowed as much, so that its waveform tells less where this is large."
     )
     return [message]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from math import exp, inf, isfinite, isinf, nan
@@ -10,7 +10,7 @@ from math import exp, inf, isfinite, isinf, nan
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.formatting import odds_text, percent
+from gearsig.formatting import odds_text, percent, readable
 from gearsig.gap._simulator import Added, GapEffect, OperatingCondition, same_load, same_speed
 from gearsig.results import Result, verdict_html
 
@@ -226,18 +226,28 @@ class Interval:
         """Whether any size fits about as well."""
         return self.low == 0.0 and isinf(self.high)
 
-    def words(self, write: Callable[[float], str]) -> str:
-        """Return the interval in words, its ends as `write` writes them.
+    @property
+    def text(self) -> str:
+        """The value, in as many digits as `words` gives the ends."""
+        return self._written(self.value)
+
+    def words(self) -> str:
+        """Return the interval in words, in as many digits, two at least, as tell its ends apart.
 
         Examples
         --------
-        >>> ends = ((1.5, 3.0), (1.5, float("inf")), (0.0, float("inf")))
-        >>> [Interval(2.0, *both).words("{:g}".format) for both in ends]
-        ['1.5 to 3', '1.5 or more', 'unbounded']
+        >>> ends = ((1.5, 3.0), (1.98, 2.03), (1.5, float("inf")), (0.0, float("inf")))
+        >>> [Interval(2.0, *both).words() for both in ends]
+        ['1.5 to 3', '1.98 to 2.03', '1.5 or more', 'unbounded']
         """
         if self.is_unbounded:
             return "unbounded"
-        return f"{write(self.low)} or more" if isinf(self.high) else f"{write(self.low)} to {write(self.high)}"
+        low, high = self._written(self.low), self._written(self.high)
+        return f"{low} or more" if isinf(self.high) else f"{low} to {high}"
+
+    def _written(self, number: float) -> str:
+        n = next((n for n in (2, 3) if readable(self.low, n) != readable(self.high, n)), 4)
+        return readable(number, n if self.low < self.high else 2)
 
 
 NOT_KNOWN = Interval(nan, nan, nan)
@@ -575,7 +585,7 @@ def stance_words(evidence: Evidence) -> str:
 
 def fitted_words(cause: GapCause, severity: float, recording: str) -> str:
     """Return what a twin's file says of the effect in it: severity, its fit, what it was fitted to, probability."""
-    within = f"interval of the fit {cause.severity.words('{:.3g}'.format)}; " if cause.severity else ""
+    within = f"interval of the fit {cause.severity.words()}; " if cause.severity else ""
     size = f"{severity:.3g} {cause.unit}".rstrip()
     return f"{cause.title}: {size}, {within}fitted to {recording}, probability {cause.probability:.2f}"
 
@@ -870,7 +880,7 @@ def _shrinkage_text(report: GapReport) -> str:
         shrinks = "does not shrink"
     elif shrinkage.after.high < 1.0:
         shrinks = f"shrinks {sizes}, within what healthy machines show,"
-    return f"How far: with {report.causes[0].title}, the gap on its own features {shrinks} on {shrinkage.held_out}."
+    return f"How far: with the effect added, the gap on the features that it changes {shrinks} on {shrinkage.held_out}."
 
 
 SLOW_RPM = 300.0

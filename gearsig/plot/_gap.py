@@ -426,7 +426,7 @@ def gap_waterfall_panel(steps: Sequence[GapStep], *, held_out: str = "") -> RowP
         share = abs(100.0 * (1.0 - after / before)) if before > 0 else 0.0
         size, part = f"{sign}{abs(after - before):.2g}", f"{sign}{share:.0f} % of the gap"
         ends = (step.remaining.low, step.remaining.high)
-        rows.append(ChartRow(f"with {step.label}", before, after, colour, size, part, colour, ends))
+        rows.append(ChartRow(f"+ {step.label}", before, after, colour, size, part, colour, ends))
     if len(steps) > 1:
         rows.append(_total("what is left", steps[-1].remaining, 0))
     scored = f", on {held_out}" if held_out else ""
@@ -437,8 +437,7 @@ def gap_waterfall_panel(steps: Sequence[GapStep], *, held_out: str = "") -> RowP
 
 def _total(name: str, residual: Interval, colour: int) -> ChartRow:
     ends = (residual.low, residual.high)
-    words = f"{residual.value:.2g}", f"{residual.low:.2g} to {residual.high:.2g}"
-    return ChartRow(name, 0.0, residual.value, colour, *words, interval=ends, is_total=True)
+    return ChartRow(name, 0.0, residual.value, colour, residual.text, residual.words(), interval=ends, is_total=True)
 
 
 def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title: str = "") -> Figure:

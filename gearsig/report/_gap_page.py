@@ -127,8 +127,8 @@ def floors_text(report: GapReport, *, of_pictures: bool = True) -> str:
         known = "Compared with what the simulation of the healthy machine lets expect, as far as it is credible. "
     return (
         f"{known}A structural floor is {structural}; they exceed 1 once in twenty. A repeatability floor is what this "
-        f"machine differs by from itself, from one stretch to the next. A place counts against its own features alone: "
-        f"one may be many floors where the whole is few.{beside}"
+        f"machine differs by from itself, from one segment to the next. A place is measured on its own features alone, "
+        f"and so may be many floors where the gap over all features is few.{beside}"
     )
 
 
@@ -235,14 +235,14 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
         part = _taken(shrinkage.of_all)
         of_all = (f"Of what exceeds the floor on the features of all effects tried, it takes away {part}.",)
     return (
-        f"Gap on its own features: {before} structural floors without it, {after} with it.",
+        f"Gap on the features that it changes: {before} structural floors without it, {after} with it.",
         f"It takes away nothing: with it the gap grows, {checked}."
         if shrink.value < 0.0
         else f"It takes away {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
         *elsewhere,
         *of_all,
         f"In a wrong place (placebo) it {placebo}.",
-        f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 is right.",
+        f"The observed change is {readable(shrinkage.slope, 2)} times the predicted one; 1 would be exact.",
     )
 
 
@@ -278,8 +278,8 @@ def step_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
     return tuple(
         (
             step.label,
-            readable(step.remaining.value, 2),
-            f"{readable(step.remaining.low, 2)} to {readable(step.remaining.high, 2)}",
+            step.remaining.text,
+            step.remaining.words(),
             "" if last is None else signed(step.remaining.value - last.value, n_decimals=2),
         )
         for step, last in zip(report.steps, before, strict=False)
@@ -335,8 +335,7 @@ def references_text(report: GapReport) -> str:
 
 def interval_text(interval: Interval, unit: str = "") -> str:
     """Write a value with its 90 % interval."""
-    value, within = readable(interval.value, 2), interval.words(lambda end: readable(end, 2))
-    return f"{value}{' ' if unit else ''}{unit} ({within})"
+    return f"{interval.text}{' ' if unit else ''}{unit} ({interval.words()})"
 
 
 def _bar(share: float) -> float:
@@ -545,9 +544,9 @@ def _evidence(report: GapReport) -> Iterator[GapFigure]:
             yield GapFigure(
                 "which",
                 plot.gap_evidence_figure(evidence),
-                "Where diamond and bar end together, sign and size are right; further: it moved the predicted way, and "
-                "more. Grey: what a healthy machine may change.",
-                f"Predicted and observed changes of the own features of {cause.title}.",
+                "Where a bar ends at its diamond, the effect explains sign and size; “further” marks one that went the "
+                "predicted way, but beyond. Grey: what a healthy machine may change by.",
+                f"Predicted and observed changes of the features of {cause.title}.",
                 of=cause.name,
                 vector=True,
                 data=plot.gap_evidence_panel(evidence),
