@@ -34,13 +34,8 @@ def dashboard(
     browser: Annotated[bool, typer.Option(help="Open a browser window.")] = True,
 ) -> None:
     """Open the dashboard in a browser. It listens on localhost only and sends nothing anywhere."""
-    from streamlit.runtime.pages_manager import PagesManager
-
     from app.dashboard import compiled
 
-    # main.py lists the pages. Streamlit would take a folder called "pages" for a list of its own until main.py has run
-    # once, and show that instead to who opens a page by its address first.
-    PagesManager.uses_pages_directory = False
     _hide_streamlit_offers()
     with TemporaryDirectory(prefix="gearsig-") as folder:
         _tell_page_its_server(Path(folder))

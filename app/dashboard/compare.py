@@ -22,10 +22,18 @@ from app.dashboard.widgets.charts import (
     show_differences,
     show_lines,
 )
-from app.dashboard.widgets.chooser import FILE, SAMPLE, choose_file, choose_number, choose_sample, simulated_file
+from app.dashboard.widgets.chooser import (
+    FILE,
+    SAMPLE,
+    choose_file,
+    choose_number,
+    choose_recording,
+    choose_sample,
+    simulated_file,
+)
 from app.dashboard.widgets.messages import show_warnings
-from app.dashboard.widgets.spectrum import show_spectrum
-from app.dashboard.widgets.tables import show_table
+from app.dashboard.widgets.spectrum import show_revolutions, show_spectrum
+from app.dashboard.widgets.tables import show_table, show_words
 from app.dashboard.work import kept
 from gearsig.comparison import (
     ALIGN,
@@ -55,6 +63,11 @@ from sims.cracked import cracked_gap_simulator
 from sims.machine import nominal_of
 from sims.presets import presets
 
+WELCOME = """
+Give a **recording** and its rig file, and a **simulation** of the machine: a file of any simulator, or one that is run
+here at the recording's speed. The page lays one over the other by order, band and angle, and says for every difference
+whether the records' own scatter explains it. For the cause of what differs, see the page *Gap*.
+"""
 TWIN = "Set to the rig"
 """Instead of a preset: the rig's own geometry, the rest usual for its size."""
 
@@ -284,9 +297,9 @@ def _choose_run() -> SimulationToCompare:
     )
     if machine != TWIN:
         st.caption(known[machine].title)
-    speed = choose_number("Speed of the driver (rpm)", "simulation speed", "the recording's", minimum=1.0, name="speed")
+    speed = choose_number("Speed of the driver (rpm)", "simulation speed", "as recorded", minimum=1.0, name="speed")
     torque = choose_number(
-        "Torque on the driver (N·m)", "simulation torque", "the rig's or the preset's", minimum=0.0, name="torque"
+        "Torque on the driver (N·m)", "simulation torque", "as in rig or preset", minimum=0.0, name="torque"
     )
     looks = {"key": "simulation length", "name": "length", "first": 5.0}
     length = address.ask_one(st.segmented_control, "Length (s)", (2.0, 5.0, 10.0), format_func="{:g}".format, **looks)
@@ -330,11 +343,7 @@ def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
                 view(comparison, channel)
     with st.expander("Agreement in numbers", icon=":material/table:"):
         rows = channel_rows(channel)
-        st.dataframe(
-            {"agreement": [name for name, _ in rows], "": [text for _, text in rows]},
-            hide_index=True,
-            column_config={"": st.column_config.TextColumn(width="large")},
-        )
+        show_words({"agreement": [name for name, _ in rows], "value": [text for _, text in rows]})
     show_warnings(comparison.notes, quiet=True)
 
 
@@ -383,15 +392,10 @@ def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
         st.markdown(
             as_typed(f"{name}: correlation {shaft.correlation.value:.3f} of {shaft.best_correlation:.3f} possible")
         )
-        lines = []
-        for place, (average, words) in enumerate(zip((shaft.recorded, shaft.simulated), NAMES, strict=True)):
-            angle = np.arange(len(average.values)) * 360.0 / len(average.values)
-            lines.append(ChartLine(angle, average.values, words, place))
+        both = dict(zip(NAMES, (shaft.recorded.values, shaft.simulated.values), strict=True))
         unit = with_unit("acceleration" if channel.quantity == "acceleration" else "value", channel.unit)
-        key = f"average of {name} comparison {channel.name}"
-        whole = (0.0, 360.0)
-        panel = LinePanel(lines, f"angle of {name} (deg)", unit, x_limits=whole)
-        show_lines(panel, key, height_px=260, legend=True)
+        key, whole = f"average of {name} comparison {channel.name}", (0.0, 360.0)
+        show_revolutions(both, name, unit, key)
         if not shaft.tooth_levels:
             continue
         middle = (np.arange(len(shaft.tooth_levels)) + 0.5) * 360.0 / len(shaft.tooth_levels)
@@ -415,28 +419,27 @@ def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
 
 def _show_bands(comparison: Comparison, channel: ChannelComparison) -> None:
     """Show levels of bands, noise included, over order and over frequency."""
-    del comparison
     unit = f"level (dB re 1 {unit_text(channel.unit)}".rstrip() + ")"
-    for bands, name in ((channel.order_bands, "order"), (channel.third_octaves, "frequency of third octaves (Hz)")):
+    over_order = channel.order_bands, axis_label("order", comparison.reference_shaft), False
+    for bands, name, log_x in (over_order, (channel.third_octaves, "frequency of third octaves (Hz)", True)):
         if not bands:
             continue
         edges = np.array([edge for band in bands for edge in (band.low, band.high)])
         sides = [np.repeat([getattr(band.level, f"{side}_db") for band in bands], 2) for side in NAMES]
         lines = [ChartLine(edges, levels, side, i) for i, (levels, side) in enumerate(zip(sides, NAMES, strict=True))]
         panel = LinePanel(lines, name, unit, padded_limits(sides), x_limits=(float(edges[0]), float(edges[-1])))
-        show_lines(
-            panel, f"bands over {name} comparison {channel.name}", height_px=240, legend=True, log_x=name != "order"
-        )
+        key = f"bands over {name} comparison {channel.name}"
+        show_lines(panel, key, height_px=240, legend=True, log_x=log_x)
 
 
 def show_downloads(comparison: Comparison, command: str) -> None:
     """Offer the page, the data and the lines, made when they are asked for."""
     offer_page(
-        "Page (HTML)", lambda: comparison_page(comparison, command=command).encode(), "compare.html", "comparison"
+        "Report (HTML)", lambda: comparison_page(comparison, command=command).encode(), "compare.html", "comparison"
     )
     with st.container(horizontal=True):
-        download("JSON", lambda: comparison_to_json(comparison).encode(), "compare.json", "application/json")
-        download("Lines (CSV)", lambda: orders_csv(comparison).encode(), "orders.csv", "text/csv")
+        download("JSON", lambda: comparison_to_json(comparison).encode(), "compare.json")
+        download("Lines (CSV)", lambda: orders_csv(comparison).encode(), "orders.csv")
     if command:
         with st.expander("The same from the command line", icon=":material/terminal:"):
             st.code(command, language="bash", wrap_lines=True)
@@ -444,20 +447,43 @@ def show_downloads(comparison: Comparison, command: str) -> None:
 
 def _show_lines(comparison: Comparison, channel: ChannelComparison) -> None:
     del comparison
-    unit = f" re 1 {unit_text(channel.unit)}" if channel.unit else ""
     shown = [line for line in (*channel.lines, *channel.other_lines) if line.is_seen]
     show_table(
         {
             "line": [line.label for line in shown],
-            "order": [line.order for line in shown],
-            f"recorded (dB{unit})": [line.level.recorded_db for line in shown],
-            f"simulated (dB{unit})": [line.level.simulated_db for line in shown],
             "difference (dB)": [line.level.difference_db for line in shown],
-            "±": [2 * line.level.repeatability_db for line in shown],
+            "± (dB)": [2 * line.level.repeatability_db for line in shown],
             "remark": [missing_words(line) or ("" if line.level.is_beyond else "within the scatter") for line in shown],
+            "recorded (dB)": [line.level.recorded_db for line in shown],
+            "simulated (dB)": [line.level.simulated_db for line in shown],
+            "order": [line.order for line in shown],
         },
         formats={"order": ".6g"},
         number=".1f",
         width="stretch",
     )
-    st.caption("Levels are rms. ± is twice the standard error that follows from the halves of both records.")
+    reference = f", re 1 {unit_text(channel.unit)}" if channel.unit else ""
+    st.caption(
+        f"Levels are rms{reference}. ± is twice the standard error that follows from the halves of both records."
+    )
+
+
+def show() -> None:
+    """Choose, read or simulate, compare, show."""
+    st.subheader("Comparison of a simulation with a recording", anchor=False)
+    opened = choose_recording(with_reference=False)
+    simulation = choose_simulation()
+    align_by = choose_alignment(simulation[0] if simulation is not None else None)
+    if opened is None or simulation is None:
+        st.markdown(WELCOME)
+        return
+    _, chosen = opened
+    what, content = simulation
+    recording = recorded(chosen.request, chosen.content)
+    simulated = simulated_of(what, chosen.request, content, recording)
+    st.caption(as_typed(f"{simulated.provenance.source or 'simulation of this page'} beside {chosen.request.name}"))
+    pairs = choose_pairs(simulated, recording)
+    comparison = compared(chosen.request, what, pairs, align_by, recording, simulated)
+    command = command_of(chosen.request, what, pairs, align_by)
+    show_comparison(comparison, recording.rig)
+    show_downloads(comparison, command)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import os
-from functools import partial
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -219,7 +218,7 @@ def _show_point(fleet: Fleet, row: Row) -> None:
     else:
         row = _choose_series(series, machine, point)
         over = _choose_over(fleet.recordings(machine, point))
-        (_show_trend if over == "date" else partial(_show_over, over=over))(fleet, row)
+        _show_trend(fleet, row, over)
         with st.expander(f"All {len(series)} indicators, the worst first", icon=":material/table:"):
             show_table(_series_table(series))
     _show_recordings(fleet.recordings(machine, point).iloc[::-1])
@@ -272,30 +271,40 @@ def _choose_over(recordings: DataFrame) -> str:
     )
 
 
-def _show_over(fleet: Fleet, row: Row, over: str) -> None:
-    """Show one indicator over load or speed, in the band that the baseline's dependence on it gives."""
+def _show_trend(fleet: Fleet, row: Row, over: str) -> None:
+    """Show one indicator over time, load or speed, in the band of its limits, with what lies beyond marked."""
     only = {name: row[name] for name in ("point", "channel", "place", "computed_on")}
-    found = fleet.trend_over(over, row["machine"], row["name"], **only)
-    shown = next((one for one in found if one.trend.band == row["band"]), found[0])
-    table, curve, trend = shown.table, shown.curve, shown.trend
-    at, value = table.iloc[:, 0].to_numpy(float), table["adjusted"].to_numpy(float)
-    is_baseline = (table["level"] == "baseline").to_numpy()
+    machine, name, is_dated = row["machine"], row["name"], over == "date"
+    if is_dated:
+        trends = fleet.trend(machine, name, **only)
+        trend = next((one for one in trends if one.band == row["band"]), trends[0])
+        table = limits = trend.table
+        at = along = table["date"].to_numpy("datetime64[s]").astype(float) / 86400.0
+        changed = f" The level changed on {trend.changed:%Y-%m-%d}." if trend.changed is not None else ""
+        x, text, margin = "date", trend.text + changed, 0.5
+    else:
+        related = fleet.trend_over(over, machine, name, **only)
+        shown = next((one for one in related if one.trend.band == row["band"]), related[0])
+        trend, table, limits, text = shown.trend, shown.table, shown.curve, shown.text
+        at, along = table.iloc[:, 0].to_numpy(float), limits.iloc[:, 0].to_numpy(float)
+        x, margin = ("load (N·m)" if over == "load" else "speed (rpm)"), 1e-3 * float(at.max())
+    value = table["value" if is_dated else "adjusted"].to_numpy(float)
+    is_baseline = (table["level"] == "baseline").to_numpy() & (not is_dated)
     lines = [
-        ChartLine(at[chosen], value[chosen], name, colour, dots=True)
-        for chosen, name, colour in ((is_baseline, "baseline", 2), (~is_baseline, trend.name, 0))
+        ChartLine(at[chosen], value[chosen], words, colour, dots=not is_dated)
+        for chosen, words, colour in ((is_baseline, "baseline", 2), (~is_baseline, trend.name, 0))
         if chosen.any()
     ]
-    steps = curve.iloc[:, 0].to_numpy(float)
-    lines, limits = _within_limits(lines, steps, curve, value)
-    beyond = table["level"].isin(["warning", "alarm"]).to_numpy()
-    everywhere = np.concatenate([at, steps])
-    margin = max(0.02 * float(np.ptp(everywhere)), 1e-3 * float(everywhere.max()))
-    span = (float(everywhere.min()) - margin, float(everywhere.max()) + margin)
-    x = "load (N·m)" if over == "load" else "speed (rpm)"
-    panel = LinePanel(lines, x, with_minus(with_unit(trend.name, trend.unit)), limits, x_limits=span)
-    key = f"over {over} of {row['machine']} {row['point']} {_series_words(row)}"
-    show_lines(panel, key, marked=list(zip(at[beyond], value[beyond], strict=True)), legend=True)
-    st.caption(as_typed(shown.text))
+    lines, ends = _within_limits(lines, along, limits, value)
+    beyond = table["level"].isin(["warning", "alarm"]).to_numpy() & np.isfinite(value)
+    low, high = float(min(at.min(), along.min())), float(max(at.max(), along.max()))
+    margin = max(0.02 * (high - low), margin)
+    unit = with_minus(with_unit(trend.name, trend.unit))
+    panel = LinePanel(lines, x, unit, ends, x_limits=(low - margin, high + margin))
+    key = f"{over} of {machine} {row['point']} {_series_words(row)}"
+    marked = list(zip(at[beyond], value[beyond], strict=True))
+    show_lines(panel, key, marked=marked, legend=True, dates=is_dated)
+    st.caption(as_typed(text))
 
 
 def _within_limits(
@@ -313,26 +322,6 @@ def _within_limits(
     return lines, padded_limits([value, *([high] if known.any() else [])])
 
 
-def _show_trend(fleet: Fleet, row: Row) -> None:
-    """Show one indicator over time, in the band of its limits, with what lies beyond marked."""
-    only = {name: row[name] for name in ("point", "channel", "place", "computed_on")}
-    found = fleet.trend(row["machine"], row["name"], **only)
-    trend = next((one for one in found if one.band == row["band"]), found[0])
-    table = trend.table
-    days = table["date"].to_numpy("datetime64[s]").astype(float) / 86400.0
-    value = table["value"].to_numpy(float)
-    lines, limits = _within_limits([ChartLine(days, value, trend.name)], days, table, value)
-    beyond = table["level"].isin(["warning", "alarm"]).to_numpy() & np.isfinite(value)
-    marked = list(zip(days[beyond], value[beyond], strict=True))
-    margin = max(0.02 * float(np.ptp(days)), 0.5)
-    span = (float(days[0]) - margin, float(days[-1]) + margin)
-    panel = LinePanel(lines, "date", with_minus(with_unit(trend.name, trend.unit)), limits, x_limits=span)
-    key = f"trend of {row['machine']} {row['point']} {_series_words(row)}"
-    show_lines(panel, key, marked=marked, legend=True, dates=True)
-    changed = f" The level changed on {trend.changed:%Y-%m-%d}." if trend.changed is not None else ""
-    st.caption(as_typed(trend.text + changed))
-
-
 def _show_recordings(recordings: DataFrame) -> None:
     """Offer the recordings, the latest first; open one in the analysis page."""
     rows = recordings.to_dict("records")
@@ -343,7 +332,7 @@ def _show_recordings(recordings: DataFrame) -> None:
         is_asked = st.button("Open its analysis", icon=":material/troubleshoot:", type="primary")
     if is_asked:
         open_file(_file_of(Path(rows[place or 0]["source"])))
-        st.switch_page(state.ANALYSIS_PAGE)
+        state.go_to("analysis")
 
 
 def _recording_words(row: Row) -> str:

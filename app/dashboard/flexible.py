@@ -1,19 +1,19 @@
-"""Gears of finite elements: one that can be turned, with its modes and stress; a pair with maps and sweeps."""
+"""Gears of finite elements: one that is turned, a pair with maps and sweeps, three publications beside the models."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import streamlit as st
-from pandas import DataFrame
 
 from app import flexible as pair_study
 from app import gear_body
+from app.dashboard import address
 from app.dashboard.components import component_of
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import download, packed, show_figure, show_map
+from app.dashboard.widgets.tables import show_words
 from app.dashboard.work import kept
 from app.gear_body import GearBodyStudy
 from app.papers import PAPERS, Paper, paper
@@ -167,7 +167,7 @@ def show_pair() -> None:
         jumps = ", ".join(f"{way}: {'no jump' if hz is None else f'jump at {hz:.0f} Hz'}" for way, hz in said.items())
         st.caption(f"Torsional mode {row['torsional_mode_hz']:.0f} Hz. Sweep {jumps}. {row['n_steps']:,} steps.")
     st.caption("Short sweeps load the teeth by the rotors' inertia, more on the way up than on the way down.")
-    download("Sweeps as CSV", pair_study.sweeps_csv(study).encode(), "sweeps.csv", "text/csv")
+    download("Sweeps as CSV", pair_study.sweeps_csv(study).encode(), "sweeps.csv")
 
 
 def show_run_up(run_up: OrderMap) -> None:
@@ -200,17 +200,26 @@ def show_publications() -> None:
     for item in found.figures:
         st.subheader(f"{item.answers}: {item.title}")
         show_figure(item.figure, item.title, f"publication {name} {item.answers}")
-        _show_sentences(
-            {"the publication says": c.statement, "the model gives": c.found, "verdict": c.judgement}
-            for c in item.claims
+        show_words(
+            {
+                "the publication says": [claim.statement for claim in item.claims],
+                "the model gives": [claim.found for claim in item.claims],
+                "verdict": [claim.judgement for claim in item.claims],
+            }
         )
     if found.unanswered:
         st.subheader("Figures without an answer")
-        _show_sentences({"figure": figure, "why": why} for figure, why in found.unanswered.items())
+        show_words({"figure": list(found.unanswered), "why": list(found.unanswered.values())})
 
 
-def _show_sentences(rows: Iterable[Mapping[str, str]]) -> None:
-    """Show a table whose cells wrap, each row named by its first cell; nothing where there are no rows."""
-    table = DataFrame([{title: as_typed(text) for title, text in row.items()} for row in rows])
-    if len(table):
-        st.table(table.set_index(table.columns[0]))
+TABS = {"One gear": show_gear, "Pair": show_pair, "Publications": show_publications}
+
+
+def show() -> None:
+    """Choose one gear, a pair or a publication; show it."""
+    st.subheader("Flexible gears", anchor=False)
+    st.caption(
+        "Gears of finite elements: modes and stress of one, jumps and maps of a pair, three publications recomputed."
+    )
+    looks = {"key": "flexible shown", "name": "view", "label_visibility": "collapsed"}
+    TABS[address.ask_one(st.segmented_control, "What is shown", list(TABS), **looks)]()

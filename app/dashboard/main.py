@@ -1,32 +1,48 @@
-"""The dashboard's frame: page settings and navigation. Started by `gearsig dashboard`."""
+"""The frame of the dashboard: page settings, navigation, a page's errors. Started by `gearsig dashboard`."""
 
 from __future__ import annotations
 
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 import streamlit as st
 
-from app.dashboard import address, work
+from app.dashboard import address, state, work
+from app.dashboard.widgets.messages import show_error
+from gearsig.errors import GearsigError
 
-PAGES = Path(__file__).parent / "pages"
+FOLDER = Path(__file__).parent
+# Modules by their names, which are the pages' addresses; each is imported when it is first opened.
+PAGES = {
+    "start": ("Start", "home"),
+    "analysis": ("Analysis", "troubleshoot"),
+    "laboratory": ("Fault laboratory", "experiment"),
+    "flexible": ("Flexible gears", "settings"),
+    "compare": ("Comparison", "stacked_line_chart"),
+    "gap": ("Gap", "compare_arrows"),
+    "fleet": ("Fleet", "factory"),
+}
 
-st.set_page_config(page_title="gearsig", page_icon=str(PAGES.parent / "icon.svg"), layout="wide")
-st.html(PAGES.parent / "page.css")
-SCRIPT = (PAGES.parent / "page.js").read_text("utf-8")
+
+def show(name: str) -> None:
+    """Show a page; what stands against it is said in its place."""
+    try:
+        import_module(f"app.dashboard.{name}").show()
+    except GearsigError as error:
+        show_error(error)
+
+
+st.set_page_config(page_title="gearsig", page_icon=str(FOLDER / "icon.svg"), layout="wide")
+st.html(FOLDER / "page.css")
+SCRIPT = (FOLDER / "page.js").read_text("utf-8")
 st.html(f'<script class="of-page">{SCRIPT}</script>', unsafe_allow_javascript=True)
-st.logo(str(PAGES.parent / "logo.svg"), size="large")
-page = st.navigation(
-    [
-        st.Page(PAGES / "start.py", title="Start", icon=":material/home:", default=True),
-        st.Page(PAGES / "analysis.py", title="Analysis", icon=":material/troubleshoot:"),
-        st.Page(PAGES / "laboratory.py", title="Fault laboratory", icon=":material/experiment:"),
-        st.Page(PAGES / "flexible.py", title="Flexible gears", icon=":material/settings:"),
-        st.Page(PAGES / "compare.py", title="Comparison", icon=":material/stacked_line_chart:"),
-        st.Page(PAGES / "gap.py", title="Gap", icon=":material/compare_arrows:"),
-        st.Page(PAGES / "fleet.py", title="Fleet", icon=":material/factory:"),
-    ],
-    position="top",
-)
+st.logo(str(FOLDER / "logo.svg"), size="large")
+pages = state.pages()
+for name, (title, icon) in PAGES.items():
+    is_first, looks = name == "start", {"title": title, "icon": f":material/{icon}:", "url_path": name}
+    pages[name] = st.Page(partial(show, name), default=is_first, **looks)
+page = st.navigation(list(pages.values()), position="top")
 work.tidy_later()
 with address.of_page(page.url_path):
     page.run()

@@ -5,19 +5,21 @@ from __future__ import annotations
 import secrets
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import streamlit as st
 
 from gearsig.diagnosis import Analysis
 
+if TYPE_CHECKING:
+    from streamlit.navigation.page import StreamlitPage
+
 ORIGIN, SAMPLE, RECORDING_FILE, RIG_FILE = "origin", "sample", "recording file", "recording file rig"
 TAB, CHANNEL, ZOOMS = "tab", "channel", "zooms"
-START_PAGE = Path(__file__).parent / "pages" / "start.py"
-ANALYSIS_PAGE = Path(__file__).parent / "pages" / "analysis.py"
 OF_LABORATORY = "Laboratory"
 """Origin of a recording that the laboratory made."""
 _CHOSEN, _SIMULATED, _FILES, _OPENED, _TOKENS = "chosen", "simulated", "kept files", "opened files", "tokens"
-_GAP_STARTS = "gap starts"
+_GAP_STARTS, _PAGES = "gap starts", "pages"
 Content = Path | memoryview
 """Of a file: on this machine, or in memory."""
 
@@ -85,6 +87,17 @@ class ChosenFile:
     def request(self, *, sampling_rate_hz: float | None = None, speed_rpm: float | None = None) -> AnalysisRequest:
         """Return the request to read it, with what the file does not state."""
         return AnalysisRequest(self.name, self.sha256, self.rig_name, self.rig_text, sampling_rate_hz, speed_rpm)
+
+
+def pages() -> dict[str, StreamlitPage]:
+    """Return the pages of the dashboard by their modules, as this run of `main` lists them."""
+    found: dict[str, StreamlitPage] = st.session_state.setdefault(_PAGES, {})
+    return found
+
+
+def go_to(page: str) -> None:
+    """Show another page, of that module."""
+    st.switch_page(pages()[page])
 
 
 def token_of(kind: str, sha256: str, known: str = "") -> str:

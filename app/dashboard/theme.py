@@ -69,37 +69,24 @@ _REPLACED = re.compile(r"(?<=[:@])(?=\S)|(?<=[-<>~=])(?=[-<>~=])|(?<=www)(?=\.)|
 _JOINER = "\u2060"
 # Marks that turn the direction of the text around them, and invisible ones, may make a name look like another.
 _INVISIBLE = re.compile(r"[\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff]")
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|dB|k?Hz|rpm|[mµ]?m|m/s|N·m|k?N|m?s|J|g|of)(?![\w·]))")
 
 
 def as_typed(text: object) -> str:
-    r"""Return Markdown that shows `text` letter by letter, on one line.
+    r"""Return Markdown that shows `text` letter by letter; where it wraps, numbers stay with their units.
 
     Examples
     --------
-    >>> print(as_typed("*a1*"))
-    \*a1\*
+    >>> as_typed("*a1*: 2.3 mm (34 %) at 1500 rpm, 12 of 29")
+    '\\*a1\\*\\: 2\\.3\xa0mm \\(34\xa0\\%\\) at 1500\xa0rpm\\, 12\xa0of 29'
     """
-    return _MARKUP.sub(r"\\\1", _REPLACED.sub(_JOINER, one_line(text)))
+    return _MARKUP.sub(r"\\\1", _REPLACED.sub(_JOINER, _UNIT.sub("\u00a0", one_line(text))))
 
 
 def one_line(text: object) -> str:
     """Return `text` on one line without control characters."""
     line = "".join(c if c.isprintable() else " " for c in _INVISIBLE.sub(" ", str(text)))
     return " ".join(line.split())
-
-
-_UNIT = re.compile(r"(?<=\d) (?=(?:\\?%|dB|k?Hz|rpm|[mµ]?m|m/s|N·m|k?N|m?s|J|g|of)(?![\w·]))")
-
-
-def unbroken(text: str) -> str:
-    r"""Return a text, also Markdown of `as_typed`, in which numbers stay on one line with their units.
-
-    Examples
-    --------
-    >>> unbroken(as_typed("2.3 mm (34 %) at 1500 rpm, 12 of 29"))
-    '2\\.3\xa0mm \\(34\xa0\\%\\) at 1500\xa0rpm\\, 12\xa0of 29'
-    """
-    return _UNIT.sub("\u00a0", text)
 
 
 def capitalised(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from base64 import b64decode
+from collections.abc import Mapping
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -12,11 +13,12 @@ from typing import Any
 import numpy as np
 from streamlit import config
 from streamlit.testing.v1 import AppTest
+from streamlit.util import calc_hash
 
 import app.dashboard
 from app.dashboard import state
+from app.dashboard.analysis import OF_CHANNEL
 from app.dashboard.state import AnalysisRequest, Chosen
-from app.dashboard.widgets.views import OF_CHANNEL
 from app.samples import samples
 from gearsig.recording import read_recording, sha256_of
 from gearsig.rig import read_rig
@@ -30,28 +32,30 @@ config.set_option("global.disableWidgetStateDuplicationWarning", True)
 config.set_option("browser.gatherUsageStats", False)
 
 
-def opened(sample: str = "damaged_tooth", *, tab: str = "", **values: Any) -> AppTest:
-    """Open the analysis page on a sample and a tab, with values of its session."""
-    page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=120)
-    page.session_state[state.SAMPLE] = SAMPLES[sample]
-    if tab:
-        page.session_state[state.TAB] = tab
+def turned_to(page: AppTest, name: str) -> AppTest:
+    """Turn a session to another page; Streamlit's tests know pages that are files alone."""
+    page._page_hash = calc_hash(name)
+    return page.run()
+
+
+def on(name: str, query: Mapping[str, Any] | None = None, **values: Any) -> AppTest:
+    """Open a page in a session that holds some values."""
+    page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=300)
+    page.query_params.update(query or {})
     for key, value in values.items():
         page.session_state[key] = value
-    return page.switch_page("pages/analysis.py").run()
+    return turned_to(page, name)
 
 
-def at(page: str, query: dict[str, Any], **values: Any) -> AppTest:
-    """Open a page by an address, in a session that knows nothing else.
+def opened(sample: str = "damaged_tooth", *, tab: str = "", **values: Any) -> AppTest:
+    """Open the analysis page on a sample and a tab, with values of its session."""
+    tabs = {state.TAB: tab} if tab else {}
+    return on("analysis", **{state.SAMPLE: SAMPLES[sample]}, **tabs, **values)
 
-    Streamlit's tests pass over a main script that has a folder `pages` beside it; here it runs, as in the dashboard.
-    """
-    script = f"from runpy import run_path\nrun_path({str(FOLDER / 'main.py')!r})"
-    opened = AppTest.from_string(script, default_timeout=300).run()  # which makes its pages known
-    opened.query_params.update(query)
-    for key, value in values.items():
-        opened.session_state[key] = value
-    opened.switch_page(str(FOLDER / "pages" / f"{page}.py")).run()
+
+def at(page: str, query: Mapping[str, Any], **values: Any) -> AppTest:
+    """Open a page by an address, in a session that knows nothing else."""
+    opened = on(page, query, **values)
     assert not opened.exception
     return opened
 

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import address, state
+from app.dashboard.analysis import OF_CHANNEL
 from app.dashboard.fleet import STORE
 from app.dashboard.state import AnalysisRequest, Chosen
-from app.dashboard.widgets.views import OF_CHANNEL
 from gearsig.fleet import open_fleet
 from gearsig.methods import METHODS
-from tests.app.pages import FOLDER, SAMPLES, at, choose, figures, go, key_of, labelled, press, shown_text
+from tests.app.pages import SAMPLES, at, choose, figures, go, key_of, labelled, press, shown_text, turned_to
 from tests.fleet.conftest import make_recordings  # noqa: F401 - a fixture
 from tests.fleet.recordings import PATTERN
 from tests.marks import further
@@ -175,7 +175,7 @@ def opens(page: AppTest, script: str, query: dict[str, Any] | None = None) -> Ap
     """Go to a page of the same session: by a link, whose address is empty, or with the address of Back."""
     page.query_params.clear()
     page.query_params.update(query or {})
-    page.switch_page(str(FOLDER / "pages" / f"{script}.py")).run()
+    turned_to(page, script)
     assert not page.exception
     return page
 

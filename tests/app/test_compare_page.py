@@ -6,17 +6,16 @@ from app.dashboard import state
 from app.dashboard.compare import MACHINE, ORIGIN, TWIN, SimulationToCompare, command_of, teeth_of
 from app.dashboard.state import AnalysisRequest
 from gearsig.rig import GearPair, Rig, Shaft
-from tests.app.pages import FOLDER, SAMPLES, figures, pictures, shown_text
+from tests.app.pages import SAMPLES, figures, pictures, shown_text, turned_to
+from tests.app.pages import opened as opened_analysis
 
 
 def opened(recording: str = "root_crack_3mm", simulation: str = "root_crack_0mm") -> AppTest:
     """Choose a recording on the analysis page's own widgets, then go to the comparison."""
-    page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=300)
-    page.session_state[state.SAMPLE] = SAMPLES[recording]
-    page.switch_page("pages/analysis.py").run()
+    page = opened_analysis(recording)
     page.session_state[ORIGIN] = "Sample"
     page.session_state["simulation sample"] = SAMPLES[simulation]
-    return page.switch_page("pages/compare.py").run()
+    return turned_to(page, "compare")
 
 
 def test_two_samples_are_compared_in_every_view() -> None:

@@ -9,9 +9,9 @@ from streamlit.dataframe_util import convert_arrow_bytes_to_pandas_df
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
+from app.dashboard.analysis import VIEWS
 from app.dashboard.state import ChosenFile
 from app.dashboard.widgets.messages import in_page_words
-from app.dashboard.widgets.views import VIEWS
 from gearsig.recording import write_recording
 from gearsig.rig import write_rig
 from sims import simulate

@@ -13,8 +13,8 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
-from app.dashboard.methods import crack
-from app.dashboard.methods.page import OVER_TIME, table_csv, waveforms_file
+from app.dashboard.widgets import crack
+from app.dashboard.widgets.method import OVER_TIME, table_csv, waveforms_file
 from gearsig.methods import METHODS, TRANSFORMS, Waveforms, by_centre
 from gearsig.recording import read_recording
 from tests.app.pages import (
@@ -57,7 +57,7 @@ def test_every_method_answers_for_samples_of_every_kind_and_offers_what_it_shows
 def test_every_method_of_the_table_has_its_page_and_its_command(capsys: pytest.CaptureFixture[str]) -> None:
     """One row of the table is a page under a view and a command with the same options."""
     from app.cli.main import main
-    from app.dashboard.widgets.views import OF_CHANNEL
+    from app.dashboard.analysis import OF_CHANNEL
 
     pages = {title for methods in OF_CHANNEL.values() for title in methods}
     assert set(PAGES) <= pages

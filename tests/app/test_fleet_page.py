@@ -7,15 +7,13 @@ from streamlit.testing.v1 import AppTest
 
 from app.dashboard.fleet import STORE, example_store
 from gearsig.fleet import TrendSettings, open_fleet
-from tests.app.pages import FOLDER, at, figures, labelled, numbers, press, shown_text
+from tests.app.pages import at, figures, labelled, numbers, on, press, shown_text
 from tests.fleet.conftest import make_recordings  # noqa: F401 - a fixture
 from tests.fleet.recordings import PATTERN
 
 
 def opened(folder: Path) -> AppTest:
-    page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=120)
-    page.session_state[STORE] = str(folder)
-    return page.switch_page("pages/fleet.py").run()
+    return on("fleet", **{STORE: str(folder)})
 
 
 @pytest.mark.slow

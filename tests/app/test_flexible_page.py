@@ -1,12 +1,8 @@
 """The dashboard's page of finite-element gears, run without a browser."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from streamlit.testing.v1 import AppTest
 
-import app.dashboard
 from app.gear_body import in_the_whole_gear
 from sims.fe_gear import (
     GearBlank,
@@ -16,8 +12,7 @@ from sims.fe_gear import (
     sector_mesh,
 )
 from sims.mesh import GearGeometry
-
-MAIN = Path(app.dashboard.__file__).parent / "main.py"
+from tests.app.pages import on
 
 
 @pytest.mark.parametrize("web_mm", [None, 6.0])
@@ -36,16 +31,14 @@ def test_the_surface_that_is_turned_encloses_the_gear(web_mm: float | None, orde
 
 
 def test_publications_are_said_in_the_pages_own_words() -> None:
-    page = AppTest.from_file(str(MAIN), default_timeout=300)
-    page.session_state["flexible shown"] = "Publications"
-    page.switch_page("pages/flexible.py").run()
+    page = on("flexible", {"view": "Publications"})
     assert page.caption[-1].value == "Takes one to two minutes, once."
     assert not any("gearsig" in caption.value for caption in page.caption)
 
 
 @pytest.mark.slow
 def test_a_gear_is_shown_with_its_modes_and_stress() -> None:
-    page = AppTest.from_file(str(MAIN), default_timeout=300).switch_page("pages/flexible.py").run()
+    page = on("flexible")
     assert not page.exception
     assert "Numbers says how coarse" in page.caption[-1].value
     assert not any("gearsig" in caption.value for caption in page.caption)

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from streamlit.testing.v1 import AppTest
 
-import app.dashboard
 from app.dashboard.gap import view
 from app.dashboard.gap.choice import Choice, common_rig, files_of, own_rig
 from app.dashboard.gap.view import _FINISHED, _JOB, Finished
@@ -18,11 +17,10 @@ from app.samples import sample_folder
 from gearsig.errors import InputError
 from gearsig.gap import read_gap_inputs
 from gearsig.report import gap_figures, gap_to_json
-from tests.app.pages import at, labelled, sent_to
+from tests.app.pages import at, labelled, on, sent_to, turned_to
 from tests.gap.example_report import all_reports, effect_report, with_few_curves
 from tests.gap.stub_diagnosis import OUTCOME, SECONDS, environment
 
-MAIN = Path(app.dashboard.__file__).parent / "main.py"
 SAMPLES = sample_folder()
 CRACKED, HEALTHY = SAMPLES / "root_crack_3mm.h5", SAMPLES / "root_crack_0mm.h5"
 RIG = (SAMPLES / "root_crack_3mm.toml").read_text()
@@ -45,7 +43,7 @@ def sample(path: Path) -> ChosenFile:
 
 
 def opened() -> AppTest:
-    return AppTest.from_file(str(MAIN), default_timeout=60).switch_page("pages/gap.py").run()
+    return on("gap")
 
 
 def text_of(page: AppTest) -> str:
@@ -163,9 +161,9 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
 @pytest.mark.slow
 def test_the_start_page_s_example_needs_one_click(stub) -> None:
     stub(**{SECONDS: "1"})
-    page = AppTest.from_file(str(MAIN), default_timeout=60).run()
+    page = on("start")
     page.button(key="try gap").click().run()
-    page.switch_page("pages/gap.py").run()  # AppTest does not follow a switch
+    turned_to(page, "gap")  # AppTest does not follow a switch
     assert [button.label for button in page.button if button.disabled] == ["Diagnose"]
     assert "tooth 21 of the driver (93 %)" in text_of(wait_for_the_end(page))
 

@@ -17,17 +17,14 @@ from sims.presets import Preset, presets
 from sims.reduced_fe import static_table
 from sims.registry import simulator
 from sims.simulator import SimulationSetup
-from tests.app.pages import FOLDER, figures, shown_text
+from tests.app.pages import figures, on, shown_text
 
 CHARTS = {"Gears": 0, "Time": 3, "Spectrum": 1, "Envelope": 1, "Phase portrait": 2, "Bifurcation": 0, "Mesh": 2}
 
 
 def opened(preset: str = "small_30_25") -> AppTest:
     """Open the page with a short signal."""
-    page = AppTest.from_file(str(FOLDER / "pages" / "laboratory.py"), default_timeout=300)
-    page.session_state["machine of the laboratory"] = preset
-    page.session_state["length of the laboratory"] = 0.5
-    return page.run()
+    return on("laboratory", **{"machine of the laboratory": preset, "length of the laboratory": 0.5})
 
 
 def slider(page: AppTest, start: str):  # type: ignore[no-untyped-def]
@@ -94,10 +91,8 @@ def test_two_effects_at_once() -> None:
 
 @pytest.mark.slow
 def test_the_address_keeps_the_machine_and_what_was_pulled() -> None:
-    page = AppTest.from_file(str(FOLDER / "pages" / "laboratory.py"), default_timeout=300)
-    page.query_params.update(machine="small_30_25", root_crack="1.5", effects="mains_hum,nonsense")
-    page.session_state["length of the laboratory"] = 0.5
-    page.run()
+    query = {"machine": "small_30_25", "root_crack": "1.5", "effects": "mains_hum,nonsense"}
+    page = on("laboratory", query, **{"length of the laboratory": 0.5})
     assert not page.exception
     assert (
         page.subheader[0].value.replace("\\", "").replace("\u00a0", " ")
@@ -167,10 +162,7 @@ def test_every_machine_opens(name: str) -> None:
 @pytest.mark.slow
 def test_a_recording_of_the_laboratory_opens_in_the_analysis() -> None:
     setup = Setup("small_30_25", 1800.0, 20.0, effects=(EffectSetting("root_crack", 1.5),), duration_s=2.0)
-    page = AppTest.from_file(str(FOLDER / "main.py"), default_timeout=300)
-    page.session_state["simulated"] = chosen_of(setup)
-    page.session_state[state.ORIGIN] = state.OF_LABORATORY
-    page.switch_page("pages/analysis.py").run()
+    page = on("analysis", **{"simulated": chosen_of(setup), state.ORIGIN: state.OF_LABORATORY})
     assert not page.exception
     assert not page.error
     assert "small_30_25_root_crack_1_5.h5" in shown_text(page)

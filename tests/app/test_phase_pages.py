@@ -4,7 +4,7 @@ import pytest
 
 from app.dashboard.laboratory import bifurcation as bifurcation_view
 from app.dashboard.laboratory.views import TAB
-from app.dashboard.methods.form import two_numbers
+from app.dashboard.widgets.method import two_numbers
 from gearsig.errors import InputError
 from tests.app.pages import figures, opened_at, shown_text
 from tests.app.test_laboratory import opened

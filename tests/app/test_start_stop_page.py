@@ -6,13 +6,11 @@ from streamlit.testing.v1 import AppTest
 from app.dashboard.laboratory.drive import FAULTS, NUMBERS, VIEWS
 from app.dashboard.laboratory.setup import DRIVE_MODEL, Setup
 from sims.effects import EffectSetting
-from tests.app.pages import FOLDER, figures
+from tests.app.pages import figures, on
 
 
 def opened(machine: str = "manipulator_formula") -> AppTest:
-    page = AppTest.from_file(str(FOLDER / "pages" / "laboratory.py"), default_timeout=120)
-    page.session_state["machine of the laboratory"] = machine
-    return page.run()
+    return on("laboratory", **{"machine of the laboratory": machine})
 
 
 def test_every_view_of_the_healthy_drive() -> None:

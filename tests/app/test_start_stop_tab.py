@@ -6,7 +6,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
-from app.dashboard.widgets.views import MOTION, VIEWS
+from app.dashboard.analysis import MOTION, VIEWS
 from sims.files import file_set, write_set
 from tests.app.pages import figures, opened, opened_file, shown_text, tiles
 from tests.motion.recordings import start_stop

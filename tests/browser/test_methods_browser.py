@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.dashboard.widgets.views import OF_CHANNEL
+from app.dashboard.analysis import OF_CHANNEL
 from gearsig.decompose import denoise
 from gearsig.methods import METHODS
 from gearsig.recording import read_recording

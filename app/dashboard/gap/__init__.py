@@ -1,1 +1,5 @@
-"""The parts of the gap page."""
+"""The gap page: from recordings and a simulator to the effect that is missing in it."""
+
+from app.dashboard.gap.view import show
+
+__all__ = ["show"]

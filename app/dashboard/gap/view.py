@@ -11,7 +11,7 @@ from functools import cache, partial
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
@@ -19,7 +19,7 @@ import streamlit as st
 
 import gearsig.gap
 from app.dashboard import address, state
-from app.dashboard.gap.choice import Choice, files_of
+from app.dashboard.gap.choice import Choice, choose, files_of, set_alike, simulator_title
 from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import (
     QUIET,
@@ -33,7 +33,8 @@ from app.dashboard.widgets.charts import (
     show_rows,
 )
 from app.dashboard.widgets.messages import show_warnings
-from app.dashboard.widgets.tables import show_table
+from app.dashboard.widgets.spectrum import show_revolutions
+from app.dashboard.widgets.tables import show_words
 from app.dashboard.widgets.verdict import Colour
 from app.gap_job import JSON, PAGE, TWIN, Job, private_folder
 from gearsig.cache import cache_folder, keep
@@ -71,6 +72,15 @@ from gearsig.report import (
     step_rows,
     verdict_rows,
 )
+
+WELCOME = """
+The page says **where** recordings differ from the simulation of their rig, **which** effect that the simulator lacks
+causes it, **how far** the gap shrinks with it, and what to record next. Sizes are in *structural floors*: one is how
+far even healthy machines differ, so that less means nothing.
+
+Surest with recordings at several speeds and loads, and with one of the same rig when it was healthy. A diagnosis
+takes up to a minute on two free cores; the rig's simulations are kept for the next one.
+"""
 
 # --------------------
 # Run a diagnosis beside the page, with progress and a stop; keep its result for whoever asks the same again.
@@ -252,15 +262,13 @@ def kept_result(choice: Choice) -> Finished | None:
         return None
 
 
-LOOKS: dict[GapOutcome, tuple[Colour, str]] = {
-    GapOutcome.NO_GAP: ("green", ":material/check_circle:"),
-    GapOutcome.EFFECT: ("red", ":material/error:"),
-    GapOutcome.CANNOT_SEPARATE: ("orange", ":material/call_split:"),
-    GapOutcome.UNKNOWN: ("gray", ":material/help:"),
-    GapOutcome.UNDECIDED: ("gray", ":material/balance:"),
+LOOKS: dict[GapOutcome, tuple[str, Colour, str]] = {
+    GapOutcome.NO_GAP: ("no gap", "green", ":material/check_circle:"),
+    GapOutcome.EFFECT: ("cause named", "red", ":material/error:"),
+    GapOutcome.CANNOT_SEPARATE: ("causes not separable", "orange", ":material/call_split:"),
+    GapOutcome.UNKNOWN: ("cause unknown", "gray", ":material/help:"),
+    GapOutcome.UNDECIDED: ("undecided", "gray", ":material/balance:"),
 }
-TWO_LINES, PX_PER_LETTER = 72, 7
-"""Height of a table's row, in pixels, from which its texts are broken; what a letter takes of its width."""
 WITHOUT_FLOORS = (
     "Nothing was simulated, so that a gap has no size and no shares. Levels are those of the strongest line over the "
     "noise beside it, or over the reference where that shows it as well."
@@ -286,16 +294,16 @@ def show_finished(finished: Finished) -> None:
 
 def _show_verdict(report: GapReport) -> None:
     """Say the kind of fault first, which is surer, then the effects of that kind that it may be."""
-    colour, icon = LOOKS[report.outcome]
-    st.badge(report.outcome.value, icon=icon, color=colour)
+    words, colour, icon = LOOKS[report.outcome]
+    st.badge(words, icon=icon, color=colour)
     kind = report.kind
     if kind is None:
         return
     place = f", {kind.place}" if kind.place else ""
     st.markdown(f"### {as_typed(capitalised(kind.title))}{as_typed(place)} :gray[{odds_text(kind.probability)}]")
     likely = [c for c in report.causes if c.group == kind.group and c.probability >= LIKELY]
-    words = (f":{colour}-badge[{as_typed(c.title)} {odds_text(c.probability)}]" for c in likely)
-    st.markdown(f"{'Cause' if len(likely) == 1 else 'Possible causes'}: {' '.join(words)}")
+    badges = (f":{colour}-badge[{as_typed(c.title)} {odds_text(c.probability)}]" for c in likely)
+    st.markdown(f"{'Cause' if len(likely) == 1 else 'Possible causes'}: {' '.join(badges)}")
 
 
 LIKELY = 0.05
@@ -330,7 +338,7 @@ def _show_panels(report: GapReport) -> None:
         "Where": RowPanel(places[:N_BARS], "share of the gap (%)", "share", limits=share),
         "Which": RowPanel(causes[:N_BARS], "probability (%)", "probability", limits=share),
         "How far": RowPanel(
-            steps[:N_BARS], "left of the gap (structural floors)", "left", limits=_reach(steps), span=(0.0, 1.0)
+            steps[:N_BARS], "remaining gap (structural floors)", "remaining gap", limits=_reach(steps), span=(0.0, 1.0)
         ),
     }
     about = {"How far": "One floor, shaded, is how far healthy machines differ from their simulation or reference."}
@@ -372,9 +380,9 @@ def _show_remarks(report: GapReport) -> None:
 def _show_downloads(finished: Finished) -> None:
     offer_page("Report (HTML)", lambda: finished.page, PAGE, "gap")
     with st.container(horizontal=True):
-        download("JSON", finished.json, JSON, "application/json")
+        download("JSON", finished.json, JSON)
         if finished.twin is not None:
-            download("Twin (preset)", finished.twin, TWIN, "application/toml")
+            download("Twin (preset)", finished.twin, TWIN)
 
 
 def _show_where(finished: Finished) -> None:
@@ -389,18 +397,16 @@ def _show_where(finished: Finished) -> None:
         st.caption(WITHOUT_FLOORS)
     if rows and not report.is_simulated:
         sensors = [place.channel for place in report.places]
-        _table({"place": [row.title for row in rows], "level": [row.change for row in rows], "sensor": sensors})
+        show_words({"place": [row.title for row in rows], "level": [row.change for row in rows], "sensor": sensors})
     elif rows:
-        _table(
+        show_words(
             {
-                "share": [place.share if isfinite(place.share) else None for _, place in both],
+                "share": [percent(place.share) for _, place in both],
                 "place": [row.title for row in rows],
                 "change": [row.change for row in rows],
                 "× both floors": [f"{row.structural}, {row.repeatability}" for row in rows],
                 "at": [", ".join(row.where[1:]) for row in rows],  # the title says the kind
-            },
-            written={"share": percent},
-            widths={"place": 380, "at": 230},
+            }
         )
     else:
         st.markdown("No place stands out of the floor.")
@@ -482,13 +488,11 @@ def _show_spectra(curves: SpectrumCurves, beside: str, *, scored: bool) -> None:
 def _show_average(average: AverageCurves) -> None:
     """Show one mean revolution of a recording and of its healthy reference, without what all teeth have in common."""
     st.markdown(
-        as_typed(f"One mean revolution of shaft {average.shaft} at {average.channel}, what tells its teeth apart")
+        as_typed(f"Mean revolution of shaft {average.shaft} at {average.channel}, without what all teeth share")
     )
-    both = (average.measured, "measured", 0), (average.reference, "reference", 1)
-    lines = [ChartLine(average.angle_deg, values, name, colour) for values, name, colour in both if len(values)]
-    unit = with_unit("amplitude", average.unit)
-    panel = LinePanel(lines, f"angle of {average.shaft} (deg)", unit, x_limits=(0.0, 360.0))
-    show_lines(panel, f"gap average {average.shaft} {average.channel}", legend=True, height_px=240)
+    both = {name: values for name in ("measured", "reference") if len(values := getattr(average, name))}
+    key = f"gap average {average.shaft} {average.channel}"
+    show_revolutions(both, average.shaft, with_unit("amplitude", average.unit), key)
 
 
 def _show_which(finished: Finished) -> None:
@@ -498,15 +502,14 @@ def _show_which(finished: Finished) -> None:
         st.warning(as_typed(text), icon=":material/call_split:")
     rows = cause_rows(report)
     severities = {"severity (interval of the fit)": [row.severity for row in rows]} if report.is_simulated else {}
-    _table(
+    show_words(
         {
-            "probability": [row.bar_percent / 100.0 for row in rows],
+            "probability": [row.percent for row in rows],
             "cause": [row.title for row in rows],
             "group": [row.group for row in rows],
             "place": [row.place for row in rows],
             **severities,
-        },
-        written={"probability": odds_text},
+        }
     )
     groups = ", ".join(group_texts(report))
     st.caption(as_typed(f"{others_text(report)} {f'By group: {groups}.' if groups else ''}"))
@@ -522,13 +525,13 @@ def _show_evidence(row: CauseRow, finished: Finished) -> None:
         if one.of == row.name:
             _show_figure(finished, one)
     if row.evidence:
-        _table(
+        show_words(
             {
                 "feature": [one.feature for one in row.evidence],
                 "predicted (dB)": [one.predicted for one in row.evidence],
                 "observed (dB)": [one.observed for one in row.evidence],
                 "floor (dB)": [one.floor for one in row.evidence],
-                "speaks": [f"{one.sign} {one.stance.removeprefix('speaks ')}" for one in row.evidence],
+                "evidence": [f"{one.sign} {one.stance.removeprefix('speaks ')}" for one in row.evidence],
             }
         )
 
@@ -540,12 +543,12 @@ def _show_how_far(finished: Finished) -> None:
         st.markdown(NOT_SIMULATED)
     elif len(rows) > 1:
         st.caption(
-            "What is left of the whole gap as the simulator gets more effects, on data that no severity was fitted to, "
-            "in structural floors."
+            "What remains of the whole gap as effects are added to the simulator, in structural floors, on data that no "
+            "severity was fitted to."
         )
         labels, left, intervals, taken = zip(*rows, strict=True)
         simulators = [label if i == 0 else f"+ {label}" for i, label in enumerate(labels)]
-        _table({"simulator": simulators, "left": left, "90 % interval": intervals, "change": taken})
+        show_words({"simulator": simulators, "remaining gap": left, "90 % interval": intervals, "change": taken})
     else:
         st.markdown("No effect was added to the simulator. The gap stays as it is.")
     _show_figures(finished, "how far")
@@ -556,15 +559,17 @@ def _show_next(finished: Finished) -> None:
     rows = next_rows(report)
     for step in report.next_steps:
         st.markdown(as_typed(f"- {step.text[:1].upper()}{step.text[1:]}."))
+    if not report.next_steps and not rows:
+        st.markdown(as_typed(dict(verdict_rows(report)).get("Next", "")))
     if rows:
         st.markdown("What to record next, to tell the likeliest causes apart. Distances are in structural floors.")
         columns = zip(("at", "tells apart", "distance there", "now"), zip(*rows, strict=True), strict=True)
-        _table({name: list(values) for name, values in columns}, widths={"at": 380, "tells apart": 240})
+        show_words({name: list(values) for name, values in columns})
     names = ("recording", "speed (rpm)", "torque (N·m)", "revolutions", "length (s)", "sampling rate (Hz)")
     facts = condition_rows(report)
-    _table({name: [row[i] for row in facts] for i, name in enumerate(names)})
-    simulator = report.simulator or "none"
-    st.caption(as_typed(f"Rig {report.rig}; simulator {simulator}; healthy references: {references_text(report)}."))
+    show_words({name: [row[i] for row in facts] for i, name in enumerate(names)})
+    simulator = simulator_title(report.simulator) if report.simulator else "none"
+    st.caption(as_typed(f"Rig: {report.rig}. Simulator: {simulator}. Healthy references: {references_text(report)}."))
 
 
 def _show_figures(finished: Finished, question: Question) -> None:
@@ -598,14 +603,26 @@ def ring_of(curves: AngleCurves) -> Ring:
     return Ring(levels, curves.teeth if curves.has_mark else 0, "dB")
 
 
-def _table(
-    columns: Mapping[str, Sequence[Any]],
-    written: Mapping[str, Callable[[float], str]] | None = None,
-    widths: dict[str, int] | None = None,
-) -> None:
-    """Show a table; columns of stated widths, in pixels, are broken into two lines where a text needs them."""
-    config: dict[str, Any] = {name: st.column_config.TextColumn(width=width) for name, width in (widths or {}).items()}
-    config |= {name: st.column_config.Column(width="small") for name in written or {}}
-    is_long = any(PX_PER_LETTER * len(text) > width for name, width in (widths or {}).items() for text in columns[name])
-    looks: dict[str, Any] = {"row_height": TWO_LINES} if is_long else {}
-    show_table(columns, formats=written, width="stretch", column_config=config, **looks)
+def show() -> None:
+    """Choose, run, show."""
+    choice = choose()
+    names = ", ".join(one.name for one in choice.recordings)
+    st.subheader("Gap between simulation and recording", anchor=False)
+    if choice.recordings:
+        against = f", against {', '.join(one.name for one in choice.references)}" if choice.references else ""
+        st.caption(as_typed(f"{names}{against}; simulator of {simulator_title(choice.model)}"))
+    finished = show_running(choice)
+    if finished is None:
+        st.markdown(WELCOME)
+        show_set_alike(choice)
+        return
+    if finished.key != choice.key:
+        st.info("This is the answer to what was chosen before. Diagnose again for what is chosen now.")
+    show_finished(finished)
+
+
+def show_set_alike(choice: Choice) -> None:
+    """Say what the simulator will be set to."""
+    with suppress(GearsigError):  # said when it is started
+        for text in set_alike(choice) if choice.recordings else ():
+            st.markdown(f":green[:material/check:] {as_typed(text)}")

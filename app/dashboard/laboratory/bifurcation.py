@@ -15,7 +15,7 @@ from app.bifurcation import NAMES, BifurcationRequest, KeptValue, figure_of, mea
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import MODEL, WIDEST, Setup, shown_unit
 from app.dashboard.theme import as_typed, capitalised
-from app.dashboard.widgets.charts import show_figure
+from app.dashboard.widgets.charts import download, show_figure
 from app.dashboard.widgets.messages import show_error
 from gearsig.errors import GearsigError, InputError
 from sims.continuation import DECAYS, RAMP_S, SECTIONS, Branch
@@ -250,14 +250,9 @@ def _show(request: BifurcationRequest, branches: Branches, chosen: Range) -> Non
     reasons = [value for kept in branches.values() for value in kept if value.reason]
     if reasons:
         st.warning(f"{len(reasons)} values gave nothing; at {reasons[0].value:.5g}: {as_typed(reasons[0].reason)}")
-    st.download_button(
-        "Points (CSV)",
-        data=points_csv(request.branch, branches),
-        file_name=f"bifurcation_{request.branch.sweep.preset}_{request.branch.sweep.axes[0].name}.csv",
-        mime="text/csv",
-        on_click="ignore",
-        icon=":material/download:",
-    )
+    sweep = request.branch.sweep
+    points = points_csv(request.branch, branches)
+    download("Points (CSV)", points, f"bifurcation_{sweep.preset}_{sweep.axes[0].name}.csv")
 
 
 def _ask(question: str) -> None:

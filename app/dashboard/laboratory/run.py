@@ -5,7 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -18,6 +18,7 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.laboratory.setup import MODEL, Setup, preset_number
 from app.dashboard.state import AnalysisRequest, Chosen
+from app.dashboard.widgets.charts import download
 from app.dashboard.widgets.messages import show_error
 from app.dashboard.work import kept
 from gearsig.checks import FloatArray
@@ -285,20 +286,13 @@ def show_saving(setup: Setup, lengths_s: Sequence[float] = ()) -> None:
                 setup = replace(setup, duration_s=float(length or 5.0))
             ending = st.selectbox("Format", ENDINGS, key="ending of the saved recording", persist_state="session")
             twin = st.toggle("With its healthy twin", key="twin of the saved recording", persist_state="session")
-            st.download_button(
-                "Download",
-                data=lambda: zipped((setup, setup.healthy) if twin else (setup,), ending),
-                file_name=f"{setup.file_stem}.zip",
-                mime="application/zip",
-                icon=":material/download:",
-                on_click="ignore",
-                type="primary",
-            )
+            made = partial(zipped, (setup, setup.healthy) if twin else (setup,), ending)
+            download("Download", made, f"{setup.file_stem}.zip", type="primary")
             st.caption("A zip with the recording, its rig file, and what was put in (truth).")
         if st.button("Open in Analysis", icon=":material/troubleshoot:"):
             with st.spinner("Simulating the recording …"):
                 state.open_simulated(chosen_of(setup))
-            st.switch_page(state.ANALYSIS_PAGE)
+            state.go_to("analysis")
 
 
 def zipped(setups: tuple[Setup, ...], ending: str) -> bytes:

@@ -16,7 +16,7 @@ from app.dashboard.laboratory import run as runs
 from app.dashboard.laboratory.bifurcation import show_bifurcation
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import Setup, effect_text, slider_values
-from app.dashboard.theme import as_typed, capitalised, palette, unbroken
+from app.dashboard.theme import as_typed, capitalised, palette
 from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, packed, padded_limits, show_lines
 from app.dashboard.widgets.spectrum import show_spectrum
 from gearsig.checks import FloatArray
@@ -421,7 +421,7 @@ def show_title(setup: Setup, *, is_shown: bool) -> None:
     """Show what is switched on; `is_shown` if the faulty machine could be simulated."""
     title = " + ".join(effect_text(s) for s in setup.effects if s.severity > 0) if is_shown else ""
     otherwise = "Healthy: nothing is switched on" if setup.is_healthy else "The healthy machine alone"
-    st.subheader(unbroken(as_typed(capitalised(title) or otherwise)), anchor=False)
+    st.subheader(as_typed(capitalised(title) or otherwise), anchor=False)
 
 
 def show_expectation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:

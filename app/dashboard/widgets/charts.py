@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from app.dashboard import address, state
 from app.dashboard.components import component_of
-from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette, unbroken
+from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis
 from gearsig.formatting import csv_text
@@ -100,7 +100,7 @@ def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[f
 def show_panel(panel: LinePanel | LevelPanel, key: str, span_db: float) -> None:
     """Show a panel that a method gives, to be zoomed; of levels that range below the largest has colours."""
     if panel.title:
-        st.caption(unbroken(as_typed(panel.title)))
+        st.caption(as_typed(panel.title))
     if isinstance(panel, LevelPanel):
         show_map(panel, key, dynamic_range_db=span_db)
     else:
@@ -578,15 +578,8 @@ def offer_picture(svg: str, drawn: Callable[[], PictureFigure], key: str) -> Non
     }
     with st.container(horizontal=True, horizontal_alignment="right"):
         for ending, data in files.items():
-            st.download_button(
-                ending.upper(),
-                data,
-                file_name=f"{file_stem(key)}.{ending}",
-                mime={"svg": "image/svg+xml", "csv": "text/csv"}.get(ending, f"image/{ending}"),
-                on_click="ignore",
-                type="tertiary",
-                key=f"{ending} of {key}",
-            )
+            name, looks = f"{file_stem(key)}.{ending}", {"type": "tertiary", "key": f"{ending} of {key}"}
+            download(ending.upper(), data, name, icon=None, **looks)
 
 
 def file_stem(key: str) -> str:
@@ -654,7 +647,7 @@ def choose_range(
     return (low, high) if high > low else (max(start, high - step), min(end, high + step))
 
 
-def download(label: str, data: Any, name: str, mime: str, *, primary: bool = False) -> None:
+def download(label: str, data: Any, name: str, **looks: Any) -> None:
     """Show a download button; the page is not run again for it.
 
     Parameters
@@ -664,19 +657,11 @@ def download(label: str, data: Any, name: str, mime: str, *, primary: bool = Fal
         A callable is called at the click.
     name : str
         Of the file.
-    mime : str
-    primary : bool
-        Whether it is the page's main button.
+    **looks
+        As `streamlit.download_button` takes them.
     """
-    st.download_button(
-        label,
-        data,
-        file_name=name,
-        mime=mime,
-        on_click="ignore",
-        type="primary" if primary else "secondary",
-        icon=":material/download:",
-    )
+    looks = {"icon": ":material/download:"} | looks
+    st.download_button(label, data, file_name=name, on_click="ignore", **looks)
 
 
 _document = component_of("document")
@@ -701,9 +686,9 @@ def offer_page(
         Returns the same to be printed.
     """
     with st.container(horizontal=True, vertical_alignment="center"):
-        download(label, page, name, "text/html", primary=True)
+        download(label, page, name, type="primary")
         if pdf is not None:
-            download("As PDF", pdf, name.removesuffix(".html") + ".pdf", "application/pdf")
+            download("As PDF", pdf, name.removesuffix(".html") + ".pdf")
         is_shown = st.toggle("Preview", key=f"preview of {key}")
     if is_shown:
         with st.spinner("Making the page …"):

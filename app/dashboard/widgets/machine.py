@@ -372,7 +372,7 @@ def _show_text(file: ChosenFile, text: str, *, is_open: bool = False) -> None:
         edited = st.text_area("Text", text, height=320, key=key, label_visibility="collapsed")
         with st.container(horizontal=True):
             st.button("Use this text", on_click=_take, args=(file, edited), disabled=edited == text)
-            download("Rig file", text.encode(), file.rig_name, "application/toml")
+            download("Rig file", text.encode(), file.rig_name)
 
 
 def text_of(name: str, content: bytes) -> str:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import streamlit as st
 
-from app.dashboard.theme import as_typed, unbroken
+from app.dashboard.theme import as_typed
 from gearsig.diagnosis import CannotTell
 from gearsig.errors import GearsigError, InputError
 
@@ -119,7 +118,7 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
     """Show what an answer says about itself, as one warning or quietly as small print; names in it come from files."""
     if not warnings:
         return
-    said = [unbroken(as_typed(in_page_words(text))) for text in warnings]
+    said = [as_typed(in_page_words(text)) for text in warnings]
     text = said[0] if len(said) == 1 else "\n".join(f"- {one}" for one in said)
     if quiet:
         st.caption(text)
@@ -132,10 +131,3 @@ def show_unknown_speed(reason: CannotTell) -> None:
     remedy = f"\n\nWhat would give it: {as_typed(in_page_words(reason.remedy))}" if reason.remedy else ""
     hint = "\n\nA constant speed can be given under *Machine*."
     st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
-
-
-def show_facts(columns: Iterable[Any], facts: Mapping[str, str]) -> None:
-    """Show names with what is known of them, one in each column; texts may come from files."""
-    for column, (name, text) in zip(columns, facts.items(), strict=True):
-        column.caption(name)
-        column.markdown(f"**{as_typed(text)}**")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -19,6 +19,7 @@ from app.dashboard.widgets.charts import (
     show_lines,
     show_svg,
 )
+from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.formatting import readable, unit_text
 from gearsig.orders import SynchronousAverage
@@ -216,6 +217,16 @@ def show_average(analysis: Analysis, channel: ChannelAnalysis) -> None:
     if average.kind != "change":
         words += " Band: ± 2 standard errors of the mean, from the scatter of the revolutions."
     st.caption(f"{words} The same as a ring stands beside the verdict." if is_above else words)
+
+
+def show_revolutions(curves: Mapping[str, FloatArray], shaft: str, y: str, key: str) -> None:
+    """Show mean revolutions of a shaft over each other, by their names; the first lies in front."""
+    lines = [
+        ChartLine(np.arange(len(values)) * 360.0 / len(values), values, name, colour)
+        for colour, (name, values) in enumerate(curves.items())
+    ]
+    panel = LinePanel(lines[::-1], f"angle of {shaft} (deg)", y, x_limits=(0.0, 360.0))
+    show_lines(panel, key, legend=True, height_px=260, front_first=True)
 
 
 def teeth_choice(analysis: Analysis, shaft: str) -> int | None:

@@ -1,14 +1,15 @@
-"""Tables of results that are sorted and searched: numbers with the minus sign that axes and texts have."""
+"""Tables of results that are sorted and searched, tables of words whose cells wrap, and single facts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from math import isnan
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import streamlit as st
 
+from app.dashboard.theme import as_typed
 from gearsig.formatting import with_minus
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ def show_table(
     number: str = ".5g",
     **looks: Any,
 ) -> None:
-    """Show a table; it is sorted by its numbers, however they are written.
+    """Show a table that is sorted by its numbers, however they are written: with the minus sign of axes and texts.
 
     Parameters
     ----------
@@ -53,3 +54,19 @@ def number_text(value: float, form: str) -> str:
     ('−1.5e−07', '+3.0', '')
     """
     return "" if value is None or isnan(value) else with_minus(format(value, form)).replace("e-", "e−")
+
+
+def show_words(columns: Mapping[str, Sequence[Any]], *, border: bool | Literal["horizontal"] = True) -> None:
+    """Show a short table whose cells wrap; nothing where it has no rows. Texts may come from files."""
+    import pandas as pd
+
+    frame = pd.DataFrame({name: [as_typed(text) for text in texts] for name, texts in columns.items()})
+    if len(frame):
+        st.table(frame, border=border, hide_index=True)
+
+
+def show_facts(columns: Iterable[Any], facts: Mapping[str, str]) -> None:
+    """Show names with what is known of them, one in each column; texts may come from files."""
+    for column, (name, text) in zip(columns, facts.items(), strict=True):
+        column.caption(name)
+        column.markdown(f"**{as_typed(text)}**")

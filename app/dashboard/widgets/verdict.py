@@ -9,7 +9,7 @@ from typing import Literal
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.theme import as_typed, one_line, unbroken
+from app.dashboard.theme import as_typed, one_line
 from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.spectrum import offer_ring, show_ring, show_spectrum
@@ -87,15 +87,15 @@ def _show_words(analysis: Analysis) -> None:
         f"**{as_typed(recording.provenance.source)}**",
         as_typed(machine) or ("machine without a name" if is_described else "machine not described"),
         f"{counted(n, 'channel')}",
-        unbroken(f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz"),
+        as_typed(f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz"),
     ]
     with st.container(key="verdict-head"):
         with st.container(horizontal=True, vertical_alignment="center"):
             show_kind(analysis.outcome)
             st.caption(" · ".join(facts), width="content")
-        st.subheader(unbroken(as_typed(in_page_words(headline))), anchor=False)
+        st.subheader(as_typed(in_page_words(headline)), anchor=False)
         if rest:
-            st.caption(unbroken(as_typed(in_page_words(rest))))
+            st.caption(as_typed(in_page_words(rest)))
     with st.container(key="verdict-grounds"):
         _show_grounds(analysis)
 
@@ -209,14 +209,14 @@ def _show_card(finding: Finding) -> None:
                 st.markdown(f"≤ **{card.confidence_percent} %** sure", width="content")
             if card.where:
                 st.caption(_places(card), width="content")
-        st.markdown(f"**{unbroken(as_typed(in_page_words(card.title)))}**")
+        st.markdown(f"**{as_typed(in_page_words(card.title))}**")
         _show_measures(card)
         if card.evidence:
-            st.caption("\n".join(f"- {unbroken(as_typed(in_page_words(sentence)))}" for sentence in card.evidence))
+            st.caption("\n".join(f"- {as_typed(in_page_words(sentence))}" for sentence in card.evidence))
 
 
 def _places(card: FindingCard) -> str:
-    return " · ".join(unbroken(as_typed(text)) for text in card.where)
+    return " · ".join(as_typed(text) for text in card.where)
 
 
 def _show_measures(card: FindingCard) -> None:
@@ -225,8 +225,6 @@ def _show_measures(card: FindingCard) -> None:
         ("how sure", card.confidence_basis),
         ("surer with", card.surer),
     ]
-    text = "  \n".join(
-        f":small[:gray[{name}:] {unbroken(as_typed(in_page_words(value)))}]" for name, value in lines if value
-    )
+    text = "  \n".join(f":small[:gray[{name}:] {as_typed(in_page_words(value))}]" for name, value in lines if value)
     if text:
         st.markdown(text)

@@ -12,10 +12,8 @@ from app.dashboard.cached import kept_file
 from app.dashboard.state import ChosenFile
 from app.dashboard.theme import as_typed
 from app.dashboard.widgets.chooser import choose_with_rig, open_file, open_sample
-from app.dashboard.widgets.messages import show_error
 from app.samples import samples
 from gearsig.checks import FloatArray
-from gearsig.errors import GearsigError
 from gearsig.recording import FORMAT_NAMES
 
 SVG = "http://www.w3.org/2000/svg"
@@ -112,7 +110,7 @@ def show() -> None:
                         open_sample("damaged_tooth")
                     elif page == "gap":
                         state.start_gap()
-                    st.switch_page(state.ANALYSIS_PAGE.with_name(f"{page}.py"))
+                    state.go_to(page)
     show_samples()
 
 
@@ -145,7 +143,7 @@ def show_own() -> None:
 def open_own(file: ChosenFile) -> None:
     """Go on with a file on the analysis page."""
     open_file(file)
-    st.switch_page(state.ANALYSIS_PAGE)
+    state.go_to("analysis")
 
 
 def show_samples() -> None:
@@ -159,10 +157,4 @@ def show_samples() -> None:
                 text.markdown(f":gray[{sample.about}]")
                 if button.button(sample.title, key=f"sample {sample.rig.stem}", width="stretch"):
                     open_sample(sample.rig.stem)
-                    st.switch_page(state.ANALYSIS_PAGE)
-
-
-try:
-    show()
-except GearsigError as error:
-    show_error(error)
+                    state.go_to("analysis")

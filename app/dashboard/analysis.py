@@ -1,4 +1,4 @@
-"""The views of one analysis, of which only the open one is computed."""
+"""From a recording to a diagnosis, and the views of the chain that it rests on; only the open one is computed."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard import address, state
-from app.dashboard.cached import channel_problems, command_of, report_page, safe_file_name
-from app.dashboard.methods.crack import show_crack
-from app.dashboard.methods.form import MethodPage
-from app.dashboard.methods.page import cached, show_method
+from app.dashboard.cached import analysis_of, channel_problems, command_of, report_page, safe_file_name
 from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
 from app.dashboard.theme import as_typed
-from app.dashboard.widgets.charts import offer_page, show_figure, show_lines, show_map, show_panel
+from app.dashboard.widgets.charts import download, offer_page, show_figure, show_lines, show_map, show_panel
+from app.dashboard.widgets.chooser import choose_recording
+from app.dashboard.widgets.crack import show_crack
 from app.dashboard.widgets.machine import show_machine
-from app.dashboard.widgets.messages import in_page_words, show_error, show_facts, show_unknown_speed
+from app.dashboard.widgets.messages import in_page_words, show_error, show_unknown_speed
+from app.dashboard.widgets.method import MethodPage, cached, show_method
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
 from app.dashboard.widgets.strip import choose_view
-from app.dashboard.widgets.tables import show_table
+from app.dashboard.widgets.tables import show_facts, show_table
+from app.dashboard.widgets.verdict import show_verdict
 from gearsig import plot
 from gearsig.angle import resample_to_angle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, IndicatorChange, changes
@@ -218,14 +219,8 @@ def show_indicators(analysis: Analysis) -> None:
     show_table(kept, formats=formats, width="stretch", height=520, column_config=config, placeholder="–")
     below = st.container(horizontal=True, horizontal_alignment="distribute", vertical_alignment="center")
     below.caption(f"{len(kept)} of {len(table)} indicators", width="content")
-    below.download_button(
-        "Download CSV",
-        csv_text(kept),
-        file_name="indicators.csv",
-        mime="text/csv",
-        on_click="ignore",
-        icon=":material/download:",
-    )
+    with below:
+        download("Download CSV", csv_text(kept), "indicators.csv")
 
 
 def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[IndicatorChange | None, ...] = ()) -> DataFrame:
@@ -359,7 +354,7 @@ def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
 def _show_provenance(analysis: Analysis) -> None:
     rows = provenance_rows(analysis, "")
     st.markdown("Where it came from:")
-    # a table of words, whose cells wrap
+    # a list of facts, whose names take little room
     with st.container(key="provenance"):
         st.table({name: as_typed(text) for name, text in rows}, border="horizontal")
 
@@ -433,3 +428,27 @@ def _show_one_of(methods: dict[str, Of], view: str, analysis: Analysis, channel:
         key = f"method of {view}"
         name = page.choose(st, "Method", list(methods), name="show", key=key, named=False, as_written=True)
     methods[name](analysis, channel)
+
+
+def show() -> None:
+    """Choose, analyse, show."""
+    chosen = choose_recording()
+    state.remember(chosen[1] if chosen is not None else None)
+    if chosen is None:
+        st.info("Give a recording on the left, or begin with a sample.", icon=":material/upload_file:")
+        st.page_link(state.pages()["start"], label="Open a recording, or one of the samples", icon=":material/home:")
+        return
+    analysis = analysed(*chosen)
+    if analysis is not None:
+        show_verdict(analysis)
+        show_views(analysis, *chosen)
+
+
+def analysed(file: ChosenFile, chosen: Chosen) -> Analysis | None:
+    """Return the analysis; where the file or the machine stands against it, say so and offer to mend the machine."""
+    try:
+        return analysis_of(chosen.request, chosen.content, chosen.reference)
+    except GearsigError as error:
+        show_error(error)
+        show_machine(file, is_told=True)
+        return None

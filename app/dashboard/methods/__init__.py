@@ -1,1 +1,0 @@
-"""Methods of the analysis page: each under the view of the chain it belongs to."""

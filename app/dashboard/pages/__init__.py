@@ -1,1 +1,0 @@
-"""One file per page; a page arranges widgets and computes nothing."""
