@@ -15,6 +15,9 @@ from gearsig.spectra import Spectrum
 BEYOND = 2.0
 """A difference counts where it exceeds so many times its repeatability."""
 
+BETTER_TURNED = 0.1
+"""Gain of correlation from which marks are doubted: a simulation's need not sit where the rig's does."""
+
 LineKind = Literal["mesh", "sideband", "shaft", "other"]
 AlignmentMethod = Literal["marks", "correlation"]
 
@@ -170,6 +173,11 @@ class Alignment:
     tooth_is_certain: bool | None
     best_shift_deg: float = 0.0
     gain: float = 0.0
+
+    @property
+    def is_doubted(self) -> bool:
+        """Whether what lies at one angle may be different teeth in both records."""
+        return self.gain > BETTER_TURNED if self.method == "marks" else self.tooth_is_certain is False
 
 
 @dataclass(frozen=True)

@@ -13,16 +13,13 @@ import numpy as np
 
 from gearsig.comparison._sides import MIN_REVOLUTIONS, ComparedSide
 from gearsig.comparison._types import BEYOND, Alignment, ChannelComparison, LevelPair, LineLevel, ShaftComparison
-from gearsig.formatting import counted, enumerated, percent, plus_minus, signed, with_minus
+from gearsig.formatting import counted, enumerated, percent, plus_minus, signed
 
 MIN_REPEATED = 0.3
 """Correlation that two averages could reach, below which they say nothing of each other: their halves differ."""
 
 WITHIN_DB = 3.0
 """Levels this close are called agreement: a factor of √2."""
-
-BETTER_TURNED = 0.1
-"""Gain of correlation from which marks are doubted: a simulation's need not sit where the rig's does."""
 
 CHANCE = 0.05
 """That of all lines, or of all teeth, which are looked at any one exceeds its scatter by accident."""
@@ -166,11 +163,7 @@ def _tooth(shaft: ShaftComparison, *, is_marked: bool) -> ToothDifference | None
 
 def comparable_averages(channel: ChannelComparison, alignments: Sequence[Alignment]) -> tuple[ShaftComparison, ...]:
     """Return the averages whose halves repeat and that are aligned to the tooth."""
-    uncertain = {
-        alignment.shaft
-        for alignment in alignments
-        if (alignment.gain > BETTER_TURNED if alignment.method == "marks" else alignment.tooth_is_certain is False)
-    }
+    uncertain = {alignment.shaft for alignment in alignments if alignment.is_doubted}
     return tuple(
         shaft for shaft in channel.shafts if shaft.best_correlation >= MIN_REPEATED and shaft.shaft not in uncertain
     )
@@ -464,16 +457,14 @@ def _speed_words(side: ComparedSide, name: str) -> str:
 def _alignment_texts(alignments: Sequence[Alignment]) -> list[str]:
     texts = []
     for alignment in alignments:
-        if alignment.method == "marks" and alignment.gain > BETTER_TURNED:
-            turned = with_minus(f"{alignment.best_shift_deg:+.4g}°")
+        if alignment.method == "marks" and alignment.is_doubted:
+            turned = f"{signed(alignment.best_shift_deg)}°"
             texts.append(
                 f"The averages{_of([alignment])} are aligned by their marks; with the simulation turned by {turned} "
                 f"they would correlate better by {alignment.gain:.2f}. A simulation's mark need not sit where the "
                 "rig's does: align by correlation then."
             )
-    loose = [
-        alignment for alignment in alignments if alignment.method != "marks" and alignment.tooth_is_certain is False
-    ]
+    loose = [alignment for alignment in alignments if alignment.method != "marks" and alignment.is_doubted]
     if loose:
         texts.append(
             f"Which tooth{_of(loose)} in the simulation is which in the recording cannot be told: none stands out "

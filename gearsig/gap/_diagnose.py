@@ -431,7 +431,8 @@ def _waveform_messages(
     message = (
         f"Correlation of the recorded change, without mesh harmonics, with that of the twin: {values}; {meant}. "
         f"Relative to each other, the mesh harmonics of the healthy twin miss those of the reference by "
-        f"{missed_db:.0f} dB. Each harmonic of a fault is allowed as much, so that its waveform tells less where this is large."
+        f"{missed_db:.0f} dB. Each harmonic of a fault is allowed as much, so that its waveform tells "
+        "less where this is large."
     )
     return [message]
 

@@ -134,11 +134,13 @@ def _teeth_text(comparison: Comparison, shaft: ShaftComparison) -> str:
     """Say what the panel of teeth shows, and when it shows nothing."""
     if not shaft.tooth_levels:
         return ""
-    certain = next(alignment.tooth_is_certain for alignment in comparison.alignments if alignment.shaft == shaft.shaft)
-    unknown = (
-        " Which tooth of the simulation is which of the recording cannot be told here." if certain is False else ""
-    )
-    return f" {LOOK_AT_TEETH}{unknown}"
+    return f" {LOOK_AT_TEETH}{doubt_text(comparison, shaft.shaft)}"
+
+
+def doubt_text(comparison: Comparison, shaft: str) -> str:
+    """Say where teeth of both records may not be the same at an angle; empty where they are."""
+    is_doubted = any(alignment.is_doubted for alignment in comparison.alignments if alignment.shaft == shaft)
+    return " Which tooth of the simulation is which of the recording cannot be told here." if is_doubted else ""
 
 
 def mesh_cursors(comparison: Comparison) -> tuple[Cursor, ...]:
@@ -205,9 +207,9 @@ def alignment_texts(comparison: Comparison) -> list[str]:
             continue
         certain = alignment.tooth_is_certain
         sure = {None: "", True: ", the same tooth in both", False: ", to a whole number of teeth only"}[certain]
-        within = "" if certain is False else f" ± {BEYOND * alignment.repeatability_deg:.2g}°"
-        turned = with_minus(f"{alignment.shift_deg:+.4g}°")
-        texts.append(f"{name}by correlation, simulation turned by {turned}{within}{sure}")
+        scatter_deg = BEYOND * alignment.repeatability_deg
+        turned = signed(alignment.shift_deg) if certain is False else plus_minus(alignment.shift_deg, scatter_deg)
+        texts.append(f"{name}by correlation, simulation turned by {turned}°{sure}")
     return texts
 
 
