@@ -24,7 +24,7 @@ class SampleRecording:
     reference: Path | None = None
 
 
-_CRACK = "Beside the healthy pair the average over a revolution changes at one tooth."
+_CRACK = "Compared with the healthy pair, the average over a revolution changes at one tooth."
 _SHOWN: dict[str, tuple[str, str, str]] = {
     "damaged_tooth": (
         "Damaged tooth",
@@ -38,7 +38,7 @@ _SHOWN: dict[str, tuple[str, str, str]] = {
     ),
     "outer_race": (
         "Bearing, outer race",
-        "A rattle at the rhythm of the balls: the envelope names the race.",
+        "Impacts at the pass rate of the balls: the envelope spectrum names the race.",
         "healthy.h5",
     ),
     "two_stage": ("Two-stage gearbox", "An inner race on the middle shaft, seen by three sensors.", ""),
@@ -46,10 +46,14 @@ _SHOWN: dict[str, tuple[str, str, str]] = {
     "no_tachometer": ("Without tachometer", "The speed is found in the vibration itself.", ""),
     "eccentric_wheel": (
         "Eccentric wheel",
-        "Sidebands a shaft order apart, grown beside the healthy gearbox: a suspicion, as they alone prove no fault.",
+        "Sidebands one shaft order apart have grown: a suspicion only, since sidebands alone prove no fault.",
         "healthy.h5",
     ),
-    "healthy": ("Healthy gearbox", "What a machine in good order looks like, and what cannot be told of it.", ""),
+    "healthy": (
+        "Healthy gearbox",
+        "What a machine in good order looks like, and what its recording cannot rule out.",
+        "",
+    ),
     "root_crack_0mm": ("No crack", "The reference of the four cracks.", ""),
     **{f"root_crack_{k}mm": (f"Root crack, {k} mm", _CRACK, "root_crack_0mm.h5") for k in (1, 3, 4)},
 }

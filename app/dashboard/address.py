@@ -192,7 +192,7 @@ def chosen(key: str, name: str, options: Collection[str], first: str) -> str:
 
 
 def ask(
-    widget: Callable[..., Any], label: str, *values: Any, key: str, name: str, first: Any, read: Read, **looks: Any
+    widget: Callable[..., Any], label: str, *values: Any, name: str, first: Any, read: Read, key: str = "", **looks: Any
 ) -> Any:
     """Return what a widget of Streamlit gives; it stands in the address while it differs from its default.
 
@@ -204,15 +204,16 @@ def ask(
     label : str
     *values, **looks
         As the widget takes them, without its default.
-    key : str
-        Of its state, see `state.view_key`.
     name : str
         In the address: short, and unique among what the page shows at a time.
     first : value
         The default; also where the widget is empty.
     read : callable
         From texts of the address to a value, e.g. `one_of(options)`.
+    key : str
+        Of its state, see `state.view_key`; empty: one for the page, by its name.
     """
+    key = key or f"{name} of {st.session_state.get(_PAGE)}"
     begin(key, name, first, read)
     value = widget(label, *values, key=key, **{"persist_state": "session"} | looks)
     value = first if value is None else value
@@ -226,6 +227,44 @@ def ask_one(
     """Return one of some options as a widget gives it; without a default the first is chosen at first. See `ask`."""
     first = next(iter(options)) if first is None else first
     return ask(widget, label, options, first=first, read=one_of(options), **looks)
+
+
+def ask_number(
+    place: Any,
+    label: str,
+    low: float | None = None,
+    high: float | None = None,
+    *,
+    name: str,
+    first: float | None = None,
+    whole: bool = False,
+    **looks: Any,
+) -> Any:
+    """Return a number that the user types; a field that is emptied stands for its default. See `ask`.
+
+    Parameters
+    ----------
+    place : container
+        Of Streamlit.
+    label : str
+        With the unit.
+    low, high : float or None
+        Limits.
+    name, **looks
+        See `ask`.
+    first : float or None
+        The default; None: what is known elsewhere, and the field is empty.
+    whole : bool
+    """
+    kind: type = int if whole else float
+    low, high, first = (None if limit is None else kind(limit) for limit in (low, high, first))
+    looks = {
+        "value": None if first is None else "min",
+        "step": 1 if whole else None,
+        "format": "%d" if whole else "%g",
+    } | looks
+    read = number(low, high, whole=whole)
+    return ask(place.number_input, label, low, high, name=name, first=first, read=read, **looks)
 
 
 def tabs(names: Sequence[str], *, key: str) -> Sequence[Any]:

@@ -26,7 +26,6 @@ from app.dashboard.widgets.chooser import (
     FILE,
     SAMPLE,
     choose_file,
-    choose_number,
     choose_recording,
     choose_sample,
     simulated_file,
@@ -54,6 +53,7 @@ from gearsig.report import (
     channel_rows,
     comparison_page,
     comparison_to_json,
+    doubt_text,
     mesh_cursors,
     orders_csv,
     shown_orders,
@@ -199,7 +199,8 @@ def command_of(request: AnalysisRequest, simulation: Simulation, pairs: Pairs, a
 
 
 NOW = "Simulate now"
-ORIGIN, MACHINE = "simulation origin", "simulation machine"
+ORIGIN, MACHINE = "simulation of compare", "machine of compare"
+"""Keys of these choices."""
 
 
 def choose_simulation() -> tuple[Simulation, Content | None] | None:
@@ -214,8 +215,7 @@ def choose_simulation() -> tuple[Simulation, Content | None] | None:
         st.divider()
         made = state.simulated()
         origins = (NOW, SAMPLE, FILE) if made is None else (NOW, SAMPLE, FILE, state.OF_LABORATORY)
-        looks = {"horizontal": True, "key": ORIGIN}
-        origin = address.ask_one(st.radio, "Simulation", origins, name="simulation", **looks)
+        origin = address.ask_one(st.radio, "Simulation", origins, name="simulation", horizontal=True)
         if origin == NOW:
             return _choose_run(), None
         if origin == state.OF_LABORATORY and made is not None:
@@ -290,30 +290,19 @@ def _choose_run() -> SimulationToCompare:
         "Machine",
         [TWIN, *known],
         format_func=title,
-        key=MACHINE,
         name="machine",
         help="Set to the rig: its teeth, module and face width, all else usual for its size. A preset keeps its own "
         "geometry but takes the rig's teeth.",
     )
     if machine != TWIN:
         st.caption(known[machine].title)
-    speed = choose_number("Speed of the driver (rpm)", "simulation speed", "as recorded", minimum=1.0, name="speed")
-    torque = choose_number(
-        "Torque on the driver (N·m)", "simulation torque", "as in rig or preset", minimum=0.0, name="torque"
-    )
-    looks = {"key": "simulation length", "name": "length", "first": 5.0}
-    length = address.ask_one(st.segmented_control, "Length (s)", (2.0, 5.0, 10.0), format_func="{:g}".format, **looks)
-    seed = address.ask(
-        st.number_input,
-        "Seed",
-        min_value=0,
-        step=1,
-        key="simulation seed",
-        name="seed",
-        first=0,
-        read=address.number(0, whole=True),
-    )
-    return SimulationToCompare(str(machine), speed, torque, float(length), int(seed))
+    ask, elsewhere = address.ask_number, "as in rig or preset"
+    speed = ask(st, "Speed of the driver (rpm)", 1.0, name="speed", placeholder="as recorded")
+    torque = ask(st, "Torque on the driver (N·m)", 0.0, name="torque", placeholder=elsewhere)
+    looks = {"name": "length", "first": 5.0, "format_func": "{:g}".format}
+    length = address.ask_one(st.segmented_control, "Length (s)", (2.0, 5.0, 10.0), **looks)
+    seed = ask(st, "Seed", 0, name="seed", first=0, whole=True)
+    return SimulationToCompare(str(machine), speed, torque, length, seed)
 
 
 VIEWS = ("Orders", "Angle", "Bands", "Lines")
@@ -333,7 +322,7 @@ def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
     channels = {channel.name: channel for channel in comparison.channels}
     name = next(iter(channels))
     if len(channels) > 1:
-        looks = {"key": "comparison channel", "name": "channel", "label_visibility": "collapsed"}
+        looks = {"name": "channel", "label_visibility": "collapsed"}
         name = address.ask_one(st.segmented_control, "Channel", list(channels), **looks)
     channel = channels.get(name, comparison.channels[0])
     views = dict(zip(VIEWS, (_show_orders, _show_angle, _show_bands, _show_lines), strict=True))
@@ -357,7 +346,7 @@ def show_alike(comparison: Comparison, rig: Rig | None) -> None:
         pairs = (f"{pair.driver_teeth}/{pair.driven_teeth}" for pair in rig.pairs)
         facts.insert(0, (True, f"Teeth: {', '.join(pairs)} in both"))
     aligned = zip(comparison.alignments, alignment_texts(comparison), strict=False)
-    facts += [(one.tooth_is_certain is not False, f"Aligned: {text}") for one, text in aligned]
+    facts += [(not one.is_doubted, f"Aligned: {text}") for one, text in aligned]
     for is_right, text in facts:
         icon, colour = (":material/check:", "green") if is_right else (":material/priority_high:", "orange")
         st.markdown(f":{colour}[{icon}] {as_typed(text)}")
@@ -410,11 +399,7 @@ def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
             looked_at(key, whole),
             "simulated − recorded",
         )
-        certain = next((one.tooth_is_certain for one in comparison.alignments if one.shaft == shaft.shaft), None)
-        unknown = (
-            " Which tooth of the simulation is which of the recording is not known here." if certain is False else ""
-        )
-        st.caption(f"Tooth by tooth, at the middle of each.{unknown}")
+        st.caption(f"Tooth by tooth, at the middle of each.{doubt_text(comparison, shaft.shaft)}")
 
 
 def _show_bands(comparison: Comparison, channel: ChannelComparison) -> None:

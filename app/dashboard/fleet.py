@@ -43,10 +43,9 @@ if TYPE_CHECKING:
 
     from gearsig.checks import FloatArray
 
-STORE, EXAMPLE, SEARCHED, MACHINE, POINT, SERIES = (
+STORE, EXAMPLE, MACHINE, POINT, SERIES = (
     "fleet store",
     "fleet example",
-    "fleet search",
     "fleet machine",
     "fleet point",
     "fleet indicator",
@@ -155,7 +154,7 @@ def _show_counts(status: DataFrame) -> None:
 
 def _choose_point(status: DataFrame) -> tuple[str, str]:
     """Show machines with their measuring points, the worst first; return the one that is looked at."""
-    looks = {"key": SEARCHED, "placeholder": "Part of a name"}
+    looks = {"placeholder": "Part of a name"}
     searched = address.ask(st.text_input, "Machine", name="search", first="", read=address.words, **looks)
     shown = status[status["machine"].str.contains(searched, case=False, regex=False)]
     of_machine = {str(name): rows.to_dict("records") for name, rows in shown.groupby("machine", sort=False)}
@@ -242,7 +241,7 @@ def _series_name(row: Row) -> str:
 
 def _series_words(row: Row) -> str:
     change = change_text(row["change"], in_db=bool(row["in_db"]))
-    return f"{_series_name(row)}: {series_level(row)}{', ' + change if change else ''}"
+    return f"{series_level(row)}{', ' + change if change else ''}: {_series_name(row)}"
 
 
 def _series_table(series: DataFrame) -> dict[str, list[Any]]:
@@ -264,7 +263,7 @@ def _choose_over(recordings: DataFrame) -> str:
     known = [name for name, column in CONDITIONS.items() if recordings[column].max() > recordings[column].min()]
     if not known:
         return "date"
-    looks = {"key": "fleet over", "name": "over", "label_visibility": "collapsed", "required": True}
+    looks = {"name": "over", "label_visibility": "collapsed", "required": True}
     names = {"date": "Over time", "load": "Over load", "speed": "Over speed"}
     return str(
         address.ask_one(st.segmented_control, "Over", ["date", *known], format_func=lambda over: names[over], **looks)
@@ -336,7 +335,8 @@ def _show_recordings(recordings: DataFrame) -> None:
 
 
 def _recording_words(row: Row) -> str:
-    return f"{row['date']:%Y-%m-%d %H:%M}: {row['reason'] or row['verdict'] or row['outcome']}"
+    date = f"{row['date']:%Y-%m-%d %H:%M}".removesuffix(" 00:00")
+    return f"{date}: {row['reason'] or row['verdict'] or row['outcome']}"
 
 
 def _file_of(path: Path) -> ChosenFile:

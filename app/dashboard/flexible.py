@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import streamlit as st
@@ -11,7 +12,7 @@ from app import flexible as pair_study
 from app import gear_body
 from app.dashboard import address
 from app.dashboard.components import component_of
-from app.dashboard.theme import as_typed
+from app.dashboard.theme import as_typed, is_dark
 from app.dashboard.widgets.charts import download, packed, show_figure, show_map
 from app.dashboard.widgets.tables import show_words
 from app.dashboard.work import kept
@@ -30,6 +31,8 @@ from sims.simulator import SimulationSetup
 _solid = component_of("solid")
 DOF = 30_000
 """Of the mesh that is turned: what a browser draws thirty times a second."""
+STRESS = "stress"
+"""Shown instead of a mode."""
 SWING = 0.05
 """Greatest motion of a mode as it is drawn, over the tip radius."""
 
@@ -71,37 +74,39 @@ def studied(blank: GearBlank, held: fe_gear.Held, force_n: float) -> tuple[GearB
 
 def choose_blank() -> tuple[GearBlank, fe_gear.Held, float]:
     """Let the user set teeth, module, width, body, and how it is held."""
-    first, second = st.columns(4), st.columns(4)
-    teeth = int(first[0].number_input("Teeth", 12, 120, 50, key="gear teeth", persist_state="session"))
-    module = first[1].number_input("Module (mm)", 0.5, 20.0, 3.0, 0.5, key="gear module", persist_state="session")
-    face = first[2].number_input("Face width (mm)", 2.0, 200.0, 20.0, key="gear face", persist_state="session")
-    bore = first[3].number_input("Bore radius (mm)", 1.0, 500.0, 20.0, key="gear bore", persist_state="session")
-    web = second[0].number_input("Web (mm), 0: full disc", 0.0, 200.0, 0.0, key="gear web", persist_state="session")
-    shift = second[1].number_input("Profile shift", -1.0, 1.0, 0.0, 0.1, key="gear shift", persist_state="session")
-    force = second[2].number_input("Force on a tooth (N)", 1.0, 1e6, 1000.0, key="gear force", persist_state="session")
-    bored = second[3].selectbox("Held", ("free", "bore"), key="gear held", persist_state="session") == "bore"
+    ask, first, second = address.ask_number, st.columns(4), st.columns(4)
+    teeth = ask(first[0], "Teeth", 12, 120, name="teeth", first=50, whole=True)
+    module = ask(first[1], "Module (mm)", 0.5, 20.0, name="module", first=3.0, step=0.5)
+    face = ask(first[2], "Face width (mm)", 2.0, 200.0, name="width", first=20.0, step=1.0)
+    bore = ask(first[3], "Bore radius (mm)", 1.0, 500.0, name="bore", first=20.0, step=1.0)
+    web = ask(second[0], "Web thickness (mm), 0: solid", 0.0, 200.0, name="web", first=0.0, step=1.0)
+    shift = ask(second[1], "Profile shift", -1.0, 1.0, name="shift", first=0.0, step=0.1)
+    force = ask(second[2], "Force on a tooth (N)", 1.0, 1e6, name="force", first=1000.0, step=100.0)
+    looks = {"name": "held", "format_func": {"free": "Free", "bore": "Fixed at the bore"}.__getitem__}
+    held = address.ask_one(second[3].selectbox, "Boundary", ("free", "bore"), **looks)
     gear = GearGeometry(teeth, module, profile_shift=shift, face_width_mm=face, bore_radius_mm=bore)
-    return GearBlank(gear, web or None), "bore" if bored else "free", force
+    return GearBlank(gear, web or None), held, force
 
 
 def show_gear() -> None:
     """One gear: its modes and the stress of a pushed tooth, to be turned."""
     study, view = studied(*choose_blank())
     names = [gear_body.label(study, k) for k in range(min(gear_body.N_SHOWN, len(study.modes.frequencies_hz)))]
-    stress = "Stress of a pushed tooth"
-    shown = st.selectbox("Show", [*names, *([stress] if study.mesh.size.order > 1 else [])], key="gear shown")
-    if shown == stress:
+    has_stress = study.mesh.size.order > 1
+    shown_names = {str(k): f"Mode {k + 1}: {name}" for k, name in enumerate(names)}
+    shown_names |= {STRESS: "Stress of a pushed tooth"} if has_stress else {}
+    looks = {"name": "shown", "format_func": shown_names.__getitem__, "key": f"shown of a gear {has_stress}"}
+    shown = address.ask_one(st.selectbox, "Show", list(shown_names), **looks)
+    if shown == STRESS:
         field = study.load.displacement_m[:, view.nodes]
         values = np.array([study.load.von_mises_pa(k) for k in range(study.mesh.blank.n_teeth)])[:, view.nodes].ravel()
         top = float(np.quantile(values, 0.9995))
-        legend = (
-            f"von Mises stress, 0 to {top * 1e-6:.3g} MPa, at {study.load.force_n:g} N · drag to turn, wheel to zoom"
-        )
+        legend = ("0", f"{top * 1e-6:.3g} MPa von Mises, at {study.load.force_n:g} N")
     else:
-        field = fe_gear.mode_field(study.gear, study.modes, names.index(shown))[:, view.nodes]
+        field = fe_gear.mode_field(study.gear, study.modes, int(shown))[:, view.nodes]
         values = np.linalg.norm(field, axis=2).ravel()
         top = float(values.max())
-        legend = "coloured by the motion · drag to turn, wheel to zoom, arrow keys turn too"
+        legend = ("at rest", "largest motion")
     motion = gear_body.in_the_whole_gear(study.mesh, field)
     largest = float(np.linalg.norm(motion, axis=1).max())
     _solid(
@@ -111,19 +116,19 @@ def show_gear() -> None:
             "quads": packed(view.quads.ravel().astype(np.float64)),
             "motion": packed((motion / largest).ravel()),
             "values": packed(np.clip(values / top, 0.0, 1.0)),
-            "stretch": SWING * study.mesh.blank.geometry.tip_radius_mm * (shown != stress),
-            "swings": shown != stress,
-            "colours": level_colours()[30:240:26].tolist(),
+            "stretch": SWING * study.mesh.blank.geometry.tip_radius_mm * (shown != STRESS),
+            "swings": shown != STRESS,
+            "colours": level_colours(dark=is_dark())[30:240:26].tolist(),
             "legend": legend,
-            "words": f"Gear of {study.mesh.blank.n_teeth} teeth: {shown}",
+            "help": "Drag or arrow keys turn it, + and − or the wheel zoom.",
+            "words": f"Gear of {study.mesh.blank.n_teeth} teeth: {shown_names[shown]}",
         },
     )
     with st.expander("Numbers", key="gear numbers"):
         st.markdown("  \n".join(as_typed(line) for line in gear_body.lines(study)))
-    st.caption(
-        f"A coarse mesh, so that it turns smoothly{': Numbers says how coarse' if study.discretisation else ''}. "
-        f"{gear_body.PEAKS if shown == stress else 'The motion is drawn much too large.'}"
-    )
+    coarse = "The mesh is coarse, so that the picture turns smoothly"
+    coarse += "; what that costs stands under Numbers." if study.discretisation else "."
+    st.caption(f"{coarse} {gear_body.PEAKS if shown == STRESS else 'The motion is drawn much too large.'}")
 
 
 @kept(4, "Running both sweeps …")
@@ -133,15 +138,15 @@ def pair_studied(preset: str, torque_nm: float, sweep_s: float) -> pair_study.St
     return pair_study.flexible_study(ready.pair, torque_nm, (torque_nm,), sweep_s=sweep_s, step_s=ready.step_s)
 
 
-WORDS = {
-    "sweeps": "Sweeps up and down: where they part, the motion jumps",
-    "stiffness_map": "Mesh stiffness over angle and torque",
-    "transmission_error_map": "Static transmission error over angle and torque",
-    "pair_stiffness_map": "Contact stiffness of one pair",
-    "load_sharing": "Which pair carries how much",
-    "natural_frequencies": "Natural frequencies over the mesh angle",
-    "spectra": "Spectra at five speeds",
-    "run_up": "Orders over a run-up",
+VIEWS = {
+    "sweeps": ("Sweeps", "Speed swept up and down: where both part, the motion jumps"),
+    "stiffness_map": ("Mesh stiffness", "Mesh stiffness over angle and torque"),
+    "transmission_error_map": ("Transmission error", "Static transmission error over angle and torque"),
+    "pair_stiffness_map": ("Contact stiffness", "Contact stiffness of one pair of teeth"),
+    "load_sharing": ("Load sharing", "How much of the load each pair of teeth carries"),
+    "natural_frequencies": ("Natural frequencies", "Natural frequencies over the mesh angle"),
+    "spectra": ("Spectra", "Spectra at five speeds"),
+    "run_up": ("Run-up", "Orders over a run-up"),
 }
 
 
@@ -149,19 +154,20 @@ def show_pair() -> None:
     """A pair: what is looked at, of maps, sweeps with jumps, spectra."""
     names = sorted(presets("reduced-fe"), key=lambda name: "light" not in name)  # first the one whose teeth part
     left, middle, right = st.columns((2, 1, 1))
-    preset = left.selectbox("Pair", names, format_func=lambda n: presets("reduced-fe")[n].title, key="pair preset")
-    torque = middle.number_input("Torque (N·m)", 5.0, 1000.0, 85.0, key="pair torque", persist_state="session")
-    sweep = right.select_slider("Length of a sweep (s)", (2.0, 5.0, 15.0), 15.0, key="pair sweep")
-    study = pair_studied(preset, float(torque), float(sweep))
+    looks: dict[str, Any] = {"name": "pair", "format_func": lambda name: presets("reduced-fe")[name].title}
+    preset = address.ask_one(left.selectbox, "Pair", names, **looks)
+    torque = address.ask_number(middle, "Torque (N·m)", 5.0, 1000.0, name="torque", first=85.0, step=5.0)
+    looks = {"name": "sweep", "first": 15.0, "format_func": "{:g}".format}
+    sweep = address.ask_one(right.select_slider, "Length of a sweep (s)", (2.0, 5.0, 15.0), **looks)
+    study = pair_studied(preset, torque, sweep)
     drawn = pair_study.figures(study, preset)
-    shown = st.segmented_control(
-        "Show", list(WORDS), default="sweeps", format_func=WORDS.__getitem__, key="pair shown", persist_state="session"
-    )
-    name = shown or "sweeps"
+    looks = {"name": "shown", "format_func": lambda view: VIEWS[view][0], "key": "shown of a pair"}
+    name = address.ask_one(st.segmented_control, "Show", list(VIEWS), **looks)
+    st.caption(VIEWS[name][1])
     if name == "run_up":
         show_run_up(study.run_up)
     else:
-        show_figure(drawn[name], WORDS[name], f"pair {name}")
+        show_figure(drawn[name], VIEWS[name][1], f"pair {name}")
     for row in pair_study.summary(study)["sweeps"]:  # type: ignore[attr-defined]  # a list of mappings
         said = {way: row[f"jump_{way}_hz"] for way in ("up", "down")}
         jumps = ", ".join(f"{way}: {'no jump' if hz is None else f'jump at {hz:.0f} Hz'}" for way, hz in said.items())
@@ -191,8 +197,10 @@ def computed(name: str) -> Paper:
 
 def show_publications() -> None:
     """Choose a publication; its figures are computed when asked for."""
-    name = st.selectbox("Publication", list(PAPERS), format_func=PAPERS.__getitem__, key="publication")
-    if not st.toggle("Compute its figures", key=f"publication {name} wanted"):
+    looks: dict[str, Any] = {"name": "publication", "format_func": PAPERS.__getitem__}
+    name = address.ask_one(st.selectbox, "Publication", list(PAPERS), **looks)
+    looks = {"name": "computed", "first": False, "read": address.one_of((False, True)), "key": f"{name} is computed"}
+    if not address.ask(st.toggle, "Compute its figures", **looks):
         st.caption("Takes one to two minutes, once.")
         return
     found = computed(name)
@@ -221,5 +229,5 @@ def show() -> None:
     st.caption(
         "Gears of finite elements: modes and stress of one, jumps and maps of a pair, three publications recomputed."
     )
-    looks = {"key": "flexible shown", "name": "view", "label_visibility": "collapsed"}
+    looks = {"name": "view", "label_visibility": "collapsed"}
     TABS[address.ask_one(st.segmented_control, "What is shown", list(TABS), **looks)]()

@@ -74,7 +74,7 @@ TO_TRY: tuple[tuple[str, str, str, Callable[[], str], str], ...] = (
     ),
     (
         "Dial a crack into a gearbox",
-        "A simulated pair that follows its sliders: pull the crack to 4\u00a0mm, see what a sensor would.",
+        "A simulated pair that follows its sliders: pull the crack to 4\u00a0mm and watch the sensors.",
         "Open the laboratory",
         crack_dial,
         "laboratory",

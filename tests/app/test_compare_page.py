@@ -64,7 +64,7 @@ def test_records_of_other_gears_are_an_error_on_the_page() -> None:
 
 def test_a_simulation_is_run_at_the_recordings_speed() -> None:
     page = opened("healthy")
-    page.session_state["simulation length"] = 2.0
+    page.session_state["length of compare"] = 2.0
     page.sidebar.radio(key=ORIGIN).set_value("Simulate now").run()
     assert not page.exception
     assert not page.error

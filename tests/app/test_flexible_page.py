@@ -40,12 +40,12 @@ def test_publications_are_said_in_the_pages_own_words() -> None:
 def test_a_gear_is_shown_with_its_modes_and_stress() -> None:
     page = on("flexible")
     assert not page.exception
-    assert "Numbers says how coarse" in page.caption[-1].value
+    assert "stands under Numbers" in page.caption[-1].value
     assert not any("gearsig" in caption.value for caption in page.caption)
-    shown = page.selectbox(key="gear shown")
+    shown = page.selectbox(key="shown of a gear True")
     assert len(shown.options) == 7
     assert "2 nodal diameters" in shown.options[0]
     shown.set_value(shown.options[-1]).run()
     assert not page.exception
-    page.number_input(key="gear teeth").set_value(13).run()
+    page.number_input(key="teeth of flexible").set_value(13).run()
     assert page.error  # undercut without profile shift

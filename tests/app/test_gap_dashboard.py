@@ -17,7 +17,7 @@ from app.samples import sample_folder
 from gearsig.errors import InputError
 from gearsig.gap import read_gap_inputs
 from gearsig.report import gap_figures, gap_to_json
-from tests.app.pages import at, labelled, on, sent_to, turned_to
+from tests.app.pages import at, labelled, on, press, sent_to, shown_text, turned_to
 from tests.gap.example_report import all_reports, effect_report, with_few_curves
 from tests.gap.stub_diagnosis import OUTCOME, SECONDS, environment
 
@@ -44,15 +44,6 @@ def sample(path: Path) -> ChosenFile:
 
 def opened() -> AppTest:
     return on("gap")
-
-
-def text_of(page: AppTest) -> str:
-    parts = [*page.markdown, *page.subheader, *page.caption, *page.error, *page.warning, *page.info]
-    return "\n".join(part.value for part in parts).replace("\\", "").replace("\u2060", "")
-
-
-def press(page: AppTest, label: str) -> AppTest:
-    return next(button for button in page.button if button.label == label).click().run()
 
 
 @pytest.fixture
@@ -145,17 +136,17 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
     stub(**{SECONDS: "1"})
     page = press(opened(), "Diagnose")
     assert [button.label for button in page.button if button.disabled] == ["Diagnose"]
-    assert "which** effect that the simulator lacks" in text_of(page)
+    assert "which** effect that the simulator lacks" in shown_text(page)
     page = wait_for_the_end(page)
     assert not page.exception
-    text = text_of(page)
+    text = shown_text(page)
     assert "tooth 21 of the driver (93 %): crack in a tooth root" in text
     assert "10 mm" not in text
     labels = [button.label for button in page.get("download_button")]
     assert labels[:3] == ["Report (HTML)", "JSON", "Twin (preset)"]
     assert labels[3:] == ["PNG", "SVG", "CSV"] * (len(labels[3:]) // 3)  # of pictures that do not zoom
-    page.sidebar.multiselect(key="gap sample references").set_value([]).run()
-    assert "what was chosen before" in text_of(page)
+    page.sidebar.multiselect(key="references of gap").set_value([]).run()
+    assert "what was chosen before" in shown_text(page)
 
 
 @pytest.mark.slow
@@ -165,7 +156,7 @@ def test_the_start_page_s_example_needs_one_click(stub) -> None:
     page.button(key="try gap").click().run()
     turned_to(page, "gap")  # AppTest does not follow a switch
     assert [button.label for button in page.button if button.disabled] == ["Diagnose"]
-    assert "tooth 21 of the driver (93 %)" in text_of(wait_for_the_end(page))
+    assert "tooth 21 of the driver (93 %)" in shown_text(wait_for_the_end(page))
 
 
 @pytest.mark.slow
@@ -173,19 +164,19 @@ def test_a_result_is_shown_again_after_a_reload(stub, tmp_path, monkeypatch) -> 
     stub()
     page = wait_for_the_end(press(opened(), "Diagnose"))
     again = opened()
-    assert "tooth 21 of the driver (93 %)" in text_of(again)
+    assert "tooth 21 of the driver (93 %)" in shown_text(again)
     assert next(button for button in again.get("download_button")).label == "Report (HTML)"
-    again.sidebar.multiselect(key="gap sample references").set_value([]).run()
-    assert "what was chosen before" in text_of(again)
-    again.sidebar.multiselect(key="gap sample references").set_value(page.session_state["gap sample references"]).run()
-    assert "what was chosen before" not in text_of(again)
+    again.sidebar.multiselect(key="references of gap").set_value([]).run()
+    assert "what was chosen before" in shown_text(again)
+    again.sidebar.multiselect(key="references of gap").set_value(page.session_state["references of gap"]).run()
+    assert "what was chosen before" not in shown_text(again)
     (kept,) = (tmp_path / "cache" / "gap-results").iterdir()
     whole = kept.read_bytes()
     kept.write_bytes(whole[: len(whole) // 2])
-    assert "which** effect that the simulator lacks" in text_of(opened())
+    assert "which** effect that the simulator lacks" in shown_text(opened())
     kept.write_bytes(whole)
     monkeypatch.setattr(view, "_code", lambda: "another state of it")
-    assert "which** effect that the simulator lacks" in text_of(opened())
+    assert "which** effect that the simulator lacks" in shown_text(opened())
 
 
 def test_only_so_many_results_are_kept(monkeypatch) -> None:
@@ -206,8 +197,8 @@ def test_own_files_survive_a_reload() -> None:
     page.sidebar.file_uploader(key="gap rigs").upload("rig.toml", RIG.encode())
     page.run()
     again = at("gap", page.query_params)
-    assert "one.h5, against two.h5" in text_of(again)
-    assert "Teeth: 55/75" in text_of(again)
+    assert "one.h5, against two.h5" in shown_text(again)
+    assert "Teeth: 55/75" in shown_text(again)
     assert again.query_params == page.query_params
 
 
@@ -227,10 +218,10 @@ def test_stop_ends_it_and_says_so(stub) -> None:
     page = press(page, "Stop")
     assert not job.is_running
     assert not job.folder.exists()
-    assert "Stopped." in text_of(page)
+    assert "Stopped." in shown_text(page)
     assert not page.exception
     page.run()
-    assert "Stopped." not in text_of(page)
+    assert "Stopped." not in shown_text(page)
 
 
 @pytest.mark.slow
@@ -241,20 +232,20 @@ def test_why_there_is_no_answer_is_said(stub, outcome, said) -> None:
     stub(**{OUTCOME: outcome})
     page = wait_for_the_end(press(opened(), "Diagnose"))
     assert not page.exception
-    assert said in text_of(page)
+    assert said in shown_text(page)
     assert len(page.error) == 1
 
 
 def test_why_nothing_can_be_started_is_said() -> None:
     page = opened()
-    page.sidebar.radio(key="gap origin").set_value("Own files").run()
+    page.sidebar.radio(key="of of gap").set_value("Own files").run()
     page.sidebar.file_uploader(key="gap recordings").upload("a.h5", CRACKED.read_bytes())
     page.sidebar.file_uploader(key="gap rigs").upload("one.toml", RIG.encode()).upload("two.toml", RIG.encode())
     page = press(page.run(), "Diagnose")
     assert not page.exception
     assert _JOB not in page.session_state
     assert len(page.error) == 1
-    assert "2 rig files are named as no recording: one.toml, two.toml" in text_of(page)
+    assert "2 rig files are named as no recording: one.toml, two.toml" in shown_text(page)
     assert not next(button for button in page.button if button.label == "Diagnose").disabled
 
 
@@ -274,7 +265,7 @@ def test_every_outcome_shows_in_every_view(outcome) -> None:
         assert not page.exception, tab
         assert not page.error, tab
     for line in REPORTS[outcome].verdict:
-        assert line.partition(": ")[2][1:] in text_of(page)
+        assert line.partition(": ")[2][1:] in shown_text(page)
 
 
 def test_names_from_files_are_never_markup() -> None:
@@ -290,7 +281,7 @@ def test_names_from_files_are_never_markup() -> None:
 
 def test_without_recordings_nothing_can_be_started() -> None:
     page = opened()
-    page.sidebar.radio(key="gap origin").set_value("Own files").run()
+    page.sidebar.radio(key="of of gap").set_value("Own files").run()
     assert not page.exception
     assert all(button.disabled for button in page.button if button.label in ("Diagnose", "Stop"))
     content = CRACKED.read_bytes()
@@ -298,5 +289,5 @@ def test_without_recordings_nothing_can_be_started() -> None:
     page.sidebar.file_uploader(key="gap rigs").upload("rig.toml", RIG.encode())
     page.run()
     assert not page.exception
-    assert "one.h5" in text_of(page)
+    assert "one.h5" in shown_text(page)
     assert not next(button for button in page.button if button.label == "Diagnose").disabled

@@ -24,7 +24,7 @@ CHARTS = {"Gears": 0, "Time": 3, "Spectrum": 1, "Envelope": 1, "Phase portrait":
 
 def opened(preset: str = "small_30_25") -> AppTest:
     """Open the page with a short signal."""
-    return on("laboratory", **{"machine of the laboratory": preset, "length of the laboratory": 0.5})
+    return on("laboratory", **{"machine of laboratory": preset, "length of laboratory": 0.5})
 
 
 def slider(page: AppTest, start: str):  # type: ignore[no-untyped-def]
@@ -92,7 +92,7 @@ def test_two_effects_at_once() -> None:
 @pytest.mark.slow
 def test_the_address_keeps_the_machine_and_what_was_pulled() -> None:
     query = {"machine": "small_30_25", "root_crack": "1.5", "effects": "mains_hum,nonsense"}
-    page = on("laboratory", query, **{"length of the laboratory": 0.5})
+    page = on("laboratory", query, **{"length of laboratory": 0.5})
     assert not page.exception
     assert (
         page.subheader[0].value.replace("\\", "").replace("\u00a0", " ")

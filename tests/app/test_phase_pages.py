@@ -58,7 +58,7 @@ def test_a_stretch_to_fit_is_taken_or_refused():
 def at_bifurcation():
     page = opened("small_30_25")
     page.session_state[TAB] = "Bifurcation"
-    page.session_state["bifurcation values"] = 3
+    page.session_state["values of laboratory"] = 3
     return page.run()
 
 

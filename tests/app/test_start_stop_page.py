@@ -10,7 +10,7 @@ from tests.app.pages import figures, on
 
 
 def opened(machine: str = "manipulator_formula") -> AppTest:
-    return on("laboratory", **{"machine of the laboratory": machine})
+    return on("laboratory", **{"machine of laboratory": machine})
 
 
 def test_every_view_of_the_healthy_drive() -> None:
@@ -39,7 +39,7 @@ def test_an_effect_shows_beside_the_healthy_drive() -> None:
 
 def test_continuous_rotation_says_what_it_cannot_tell() -> None:
     page = opened()
-    page.session_state["mode of the drive"] = "continuous"
+    page.session_state["mode of laboratory"] = "continuous"
     page.run()
     assert not page.exception
     assert any("Cannot tell the backlash" in caption.value for caption in page.caption)
@@ -68,7 +68,7 @@ def test_a_crack_has_its_tooth_and_a_ripple_its_order() -> None:
 @pytest.mark.slow
 def test_the_laboratory_goes_back_to_pairs_that_run_on() -> None:
     page = opened()
-    page.sidebar.selectbox(key="machine of the laboratory").set_value("published_55_75").run()
+    page.sidebar.selectbox(key="machine of laboratory").set_value("published_55_75").run()
     assert not page.exception
     assert not page.error
     assert "Kurtosis" in [metric.label for metric in page.metric]

@@ -216,7 +216,7 @@ class Figure {
     this.limits = data.map ? data.map.limits : (data.plane && this.across) || data.limits || this.ownLimits();
     const { svg } = this;
     svg.replaceChildren();
-    set(svg, { width: this.width, height, viewBox: `0 0 ${this.width} ${height}`, "font-family": "system-ui, sans-serif", "font-size": 12, "aria-label": data.alternative });
+    set(svg, { width: this.width, height, viewBox: `0 0 ${this.width} ${height}`, "font-family": style.fontFamily, "font-size": 13, "aria-label": data.alternative });
     const clip = `clip${Math.random().toString(36).slice(2)}`;
     const rect = { x: LEFT, y: this.top, width: this.plotWidth, height: this.plotHeight };
     add(add(add(svg, "defs"), "clipPath", { id: clip }), "rect", rect);
@@ -243,11 +243,13 @@ class Figure {
     this.left = isAbove ? 8 : Math.min(0.42 * this.width, 14 + 6.6 * Math.max(...data.rows.map((row) => row.name.length)));
     this.plotWidth = Math.max(this.width - this.left - beside, 60);
     this.top = 6;
-    this.rowHeight = ROW_HEIGHT + (isAbove ? 8 : 0);
+    const room = (isAbove ? this.width - this.left : this.left - 14) / 6.3, names = data.rows.map((row) => wrapped(row.name, room, isAbove ? 2 : 3));
+    const nAbove = isAbove ? Math.max(...names.map((lines) => lines.length)) : 0, above = 14 * nAbove;
+    this.rowHeight = ROW_HEIGHT + (isAbove ? above - 6 : 0);
     this.plotHeight = this.rowHeight * data.rows.length;
     const bottom = this.top + this.plotHeight, right = this.left + this.plotWidth, height = bottom + BOTTOM, quiet = { fill: this.ink, opacity: 0.75 };
     svg.replaceChildren();
-    set(svg, { width: this.width, height, viewBox: `0 0 ${this.width} ${height}`, "font-family": "system-ui, sans-serif", "font-size": 12, "aria-label": data.alternative });
+    set(svg, { width: this.width, height, viewBox: `0 0 ${this.width} ${height}`, "font-family": style.fontFamily, "font-size": 13, "aria-label": data.alternative });
     const clip = `clip${Math.random().toString(36).slice(2)}`;
     add(add(add(svg, "defs"), "clipPath", { id: clip }), "rect", { x: this.left, y: this.top, width: this.plotWidth, height: this.plotHeight });
     const inside = add(svg, "g", { "clip-path": `url(#${clip})` });
@@ -263,13 +265,13 @@ class Figure {
     text(svg, middle, bottom + 37, data.x, { ...quiet, "text-anchor": "middle" });
     add(inside, "line", { x1: this.scale(0), x2: this.scale(0), y1: this.top, y2: bottom, stroke: this.ink, opacity: 0.5 });
     data.rows.forEach((row, i) => {
-      const y = this.top + i * this.rowHeight, tall = isAbove ? 13 : 18, at = y + (isAbove ? 27 : (this.rowHeight - tall) / 2), centre = at + tall / 2;
+      const y = this.top + i * this.rowHeight, tall = isAbove ? 13 : 18, at = y + (isAbove ? 13 + above : (this.rowHeight - tall) / 2), centre = at + tall / 2;
       const bold = row.strong ? { "font-weight": 600 } : {};
-      if (isAbove) text(svg, this.left, y + 19, cut(row.name, (this.width - this.left) / 6.3), { fill: this.ink, ...bold });
-      else {
-        const lines = wrapped(row.name, (this.left - 14) / 6.3);
-        lines.forEach((line, k) => text(svg, this.left - 8, centre + 4 + 14 * (k - (lines.length - 1) / 2), line, { fill: this.ink, "text-anchor": "end", ...bold }));
-      }
+      const lines = names[i], looks = { fill: this.ink, ...bold };
+      lines.forEach((line, k) => {
+        if (isAbove) text(svg, this.left, y + 19 + 14 * (k + nAbove - lines.length), line, looks);
+        else text(svg, this.left - 8, centre + 4 + 13 * (k - (lines.length - 1) / 2), line, { ...looks, "text-anchor": "end" });
+      });
       if (row.band !== null) box(-row.band, row.band, at - 6, tall + 12, { fill: data.quiet, opacity: 0.24 });
       box(row.start, row.end, at, tall, { fill: row.colour, opacity: 0.85, rx: 2 });
       if (row.interval) {
@@ -642,11 +644,11 @@ function text(parent, x, y, words, looks) {
   return made;
 }
 
-// Two lines at most, the second cut where it must be.
-function wrapped(words, n) {
-  if (words.length <= n) return [words];
+// So many lines at most, the last cut where it must be.
+function wrapped(words, n, mostLines) {
+  if (words.length <= n || mostLines < 2) return [cut(words, n)];
   const at = words.lastIndexOf(" ", n), first = at > 0 ? at : Math.floor(n);
-  return [words.slice(0, first), cut(words.slice(first).trim(), n)];
+  return [words.slice(0, first), ...wrapped(words.slice(first).trim(), n, mostLines - 1)];
 }
 
 const cut = (words, n) => (words.length <= n ? words : `${words.slice(0, Math.max(Math.floor(n) - 1, 1))}…`);

@@ -114,7 +114,7 @@ class Gears {
 
   // Words over a drawing, with a rim of paper around the letters.
   write(context, words, x, y) {
-    context.font = "12px system-ui, sans-serif";
+    context.font = `13px ${getComputedStyle(this.root).fontFamily}`;
     context.lineJoin = "round";
     context.lineWidth = 4;
     context.strokeStyle = this.paper;

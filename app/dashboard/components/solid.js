@@ -14,25 +14,22 @@ class Solid {
     this.canvas = Object.assign(document.createElement("canvas"), { tabIndex: 0 });
     this.canvas.setAttribute("role", "img");
     this.button = Object.assign(document.createElement("button"), { type: "button", onclick: () => this.swing(!this.swinging) });
-    this.words = document.createElement("span");
     const bar = document.createElement("div");
-    bar.append(this.button, this.words);
+    [this.low, this.scale, this.high, this.words] = ["span", "i", "span", "small"].map((kind) => document.createElement(kind));
+    bar.append(this.button, this.low, this.scale, this.high, this.words);
     root.append(this.canvas, bar);
     Object.assign(this, { yaw: -1.1, pitch: 0.9, zoom: 1, at: [0, 0], phase: Math.PI / 2 });
     this.canvas.addEventListener("pointerdown", (event) => this.canvas.setPointerCapture(event.pointerId));
     this.canvas.addEventListener("pointermove", (event) => event.buttons && this.turn(event.movementX / 150, event.movementY / 150));
     this.canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
-      // What lies under the pointer stays there.
-      const zoom = Math.min(Math.max(this.zoom * Math.exp(-event.deltaY / 600), 0.5), 20), grows = zoom / this.zoom;
-      const from = [event.offsetX - this.canvas.clientWidth / 2, event.offsetY - this.canvas.clientHeight / 2];
-      this.at = this.at.map((place, axis) => (zoom > 1 ? from[axis] - grows * (from[axis] - place) : 0));
-      this.zoom = zoom;
-      this.draw();
+      this.magnify(Math.exp(-event.deltaY / 600), [event.offsetX - this.canvas.clientWidth / 2, event.offsetY - this.canvas.clientHeight / 2]);
     }, { passive: false });
     this.canvas.addEventListener("keydown", (event) => {
       const step = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
+      const grows = { "+": 1.25, "=": 1.25, "-": 0.8 }[event.key];
       if (step) { event.preventDefault(); this.turn(...step); }
+      if (grows) { event.preventDefault(); this.magnify(grows, [0, 0]); }
     });
     new ResizeObserver(() => this.data && this.draw()).observe(root);
   }
@@ -46,6 +43,9 @@ class Solid {
     this.size = 0;
     for (let i = 0; i < this.points.length; i += 3) this.size = Math.max(this.size, Math.hypot(this.points[i], this.points[i + 1]));
     this.canvas.setAttribute("aria-label", data.words);
+    [this.low.textContent, this.high.textContent] = data.legend;
+    this.scale.style.background = `linear-gradient(to right, ${data.colours.map((colour) => `rgb(${colour})`)})`;
+    this.words.textContent = data.help;
     this.swing(data.swings);
   }
 
@@ -55,9 +55,17 @@ class Solid {
     this.draw();
   }
 
+  // What lies at a place, from the middle in pixels, stays there.
+  magnify(factor, from) {
+    const zoom = Math.min(Math.max(this.zoom * factor, 0.5), 20), grows = zoom / this.zoom;
+    this.at = this.at.map((place, axis) => (zoom > 1 ? from[axis] - grows * (from[axis] - place) : 0));
+    this.zoom = zoom;
+    this.draw();
+  }
+
   swing(on) {
     this.swinging = on;
-    this.button.style.visibility = this.data.swings ? "visible" : "hidden";
+    this.button.style.display = this.data.swings ? "" : "none";
     if (!on) { this.phase = Math.PI / 2; this.draw(); return; }
     if (this.running) return;
     this.running = true;
@@ -78,7 +86,6 @@ class Solid {
     const context = this.canvas.getContext("2d");
     context.setTransform(dense, 0, 0, dense, width * dense / 2, height * dense / 2);
     this.button.textContent = this.swinging ? "Stop" : "Swing";
-    this.words.textContent = this.data.legend;
     const { points, quads, motion, values } = this, n = points.length / 3;
     const scale = (0.46 * Math.min(width, height) * this.zoom) / this.size, share = this.data.stretch * Math.sin(this.phase);
     const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import streamlit as st
 
@@ -15,7 +14,6 @@ from app.dashboard.state import ChosenFile
 from app.dashboard.widgets.chooser import (
     SIMULATED,
     choose_files,
-    choose_number,
     choose_reference_rate,
     sample_file,
     sample_name,
@@ -196,36 +194,30 @@ def choose() -> Choice:
     from sims.registry import gap_simulators
 
     with st.sidebar:
-        looks: dict[str, Any] = {"horizontal": True, "key": "gap origin", "name": "of"}
-        origin = address.ask_one(st.radio, "Recordings", (SAMPLES, FILES), **looks)
+        origin = address.ask_one(st.radio, "Recordings", (SAMPLES, FILES), name="of", horizontal=True)
         recordings, references, rigs = _choose_samples() if origin == SAMPLES else _choose_files()
         names = tuple(gap_simulators())
-        looks = {"key": "gap simulator", "name": "simulator", "format_func": simulator_title}
-        model = address.ask_one(st.selectbox, "Simulator", names, **looks)
+        model = address.ask_one(st.selectbox, "Simulator", names, name="simulator", format_func=simulator_title)
         with st.expander("Not in the files?", icon=":material/tune:"):
-            about = "Of the input shaft, for all recordings."
-            torque = choose_number(
-                "Torque (N·m)", "gap torque", "from the rig", about=about, minimum=0.0, name="torque"
-            )
-            rate = choose_number(
-                "Sampling rate (Hz)", "gap rate", "from the files or the rig", minimum=0.0, name="rate"
-            )
+            looks = {"placeholder": "from the rig", "help": "Of the input shaft, for all recordings."}
+            torque = address.ask_number(st, "Torque (N·m)", 0.0, name="torque", **looks)
+            looks = {"placeholder": "from the files or the rig"}
+            rate = address.ask_number(st, "Sampling rate (Hz)", 0.0, name="rate", **looks)
             of_files = bool(references) and origin == FILES
-            reference_rate = choose_reference_rate("gap reference rate", of_several=True) if of_files else None
+            reference_rate = choose_reference_rate(of_several=True) if of_files else None
     return Choice(recordings, references, rigs, model, torque or None, rate or None, reference_rate)
 
 
 def _choose_samples() -> ChosenFiles:
     known = {sample.rig.stem: sample for sample in samples()}
 
-    def choose(label: str, key: str, without: list[str], first: str, about: str, name: str) -> list[str]:
+    def choose(label: str, without: list[str], first: str, about: str, name: str) -> list[str]:
         names = [stem for stem in known if stem not in without]
         chosen: list[str] = address.ask(
             st.multiselect,
             label,
             names,
             format_func=lambda stem: sample_name(known[stem]),
-            key=key,
             name=name,
             first=[first] if first in names else [],
             read=address.some_of(names),
@@ -234,9 +226,9 @@ def _choose_samples() -> ChosenFiles:
         return chosen
 
     about = "Several operating conditions (speeds, loads) of one rig tell more than one."
-    recordings = choose("Recordings of one rig", "gap samples", [], FIRST_SAMPLE, about, "recordings")
+    recordings = choose("Recordings of one rig", [], FIRST_SAMPLE, about, "recordings")
     about = "The same rig when it was healthy. The answer becomes much surer."
-    references = choose("Healthy references", "gap sample references", recordings, FIRST_REFERENCE, about, "references")
+    references = choose("Healthy references", recordings, FIRST_REFERENCE, about, "references")
     st.caption(SIMULATED)
     chosen, healthy = (tuple(sample_file(known[name]) for name in names) for names in (recordings, references))
     return chosen, healthy, ()

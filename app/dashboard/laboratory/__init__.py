@@ -111,7 +111,6 @@ def choose_channel(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> str:
             "Sensor",
             channels,
             format_func="Sensor {}".format,
-            key="sensor of the laboratory",
             name="sensor",
             label_visibility="collapsed",
         )

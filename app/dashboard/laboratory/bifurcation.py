@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import streamlit as st
 from streamlit.errors import StreamlitAPIException
 
 from app.bifurcation import NAMES, BifurcationRequest, KeptValue, figure_of, measured_of, points_csv, run_value
+from app.dashboard import address
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import MODEL, WIDEST, Setup, shown_unit
 from app.dashboard.theme import as_typed, capitalised
@@ -66,12 +67,12 @@ def choose_range(run: LaboratoryRun, name: str, places: Sequence[DeltaGenerator]
     low, high = _suggested(run, name)
     start, stop, number = places
     key = f"bifurcation {run.setup.preset} {name}"
-    from_value = start.number_input("From", value=low, format="%g", key=f"{key} from", persist_state="session")
-    to_value = stop.number_input("To", value=high, format="%g", key=f"{key} to", persist_state="session")
-    n = number.number_input("Values", 3, 80, 25, step=1, key="bifurcation values", persist_state="session")
-    if from_value is None or to_value is None or not from_value < to_value:
-        raise InputError(f"the range goes from {from_value} to {to_value}", allowed="ascending")
-    values = tuple(float(f"{v:.8g}") for v in np.linspace(float(from_value), float(to_value), int(n)))
+    first = address.ask_number(start, "From", name="from", first=low, key=f"{key} from")
+    last = address.ask_number(stop, "To", name="to", first=high, key=f"{key} to")
+    n = address.ask_number(number, "Values", 3, 80, name="values", first=25, whole=True)
+    if not first < last:
+        raise InputError(f"the range goes from {first:g} to {last:g}", allowed="ascending")
+    values = tuple(float(f"{v:.8g}") for v in np.linspace(first, last, n))
     return Range(name, parameters_of(run.setup)[name], values)
 
 
@@ -155,30 +156,22 @@ def _choose_and_show(run: LaboratoryRun) -> None:
         return
     names = parameters_of(run.setup)
     first, *numbers = st.columns((3, 2, 2, 2))
-    name = first.selectbox("Varied", list(names), format_func=names.__getitem__, key="bifurcation varied")
+    looks: dict[str, Any] = {"name": "varied", "format_func": names.__getitem__}
+    name = address.ask_one(first.selectbox, "Varied", list(names), **looks)
     chosen = choose_range(run, name, numbers)
     left, middle, right = st.columns((2, 3, 2))
-    section = left.segmented_control(
-        "A point once per",
-        SECTIONS,
-        default="mesh",
-        format_func=SECTION_WORDS.__getitem__,
-        key="bifurcation section",
-        required=True,
+    looks = {"name": "once", "first": "mesh", "format_func": SECTION_WORDS.__getitem__, "required": True}
+    section = address.ask_one(left.segmented_control, "A point once per", SECTIONS, **looks)
+    about = (
+        "Up and down: each value goes on from where the last one ended. Where both differ, two motions are possible, "
+        "and it is the past that decides."
     )
-    direction = middle.segmented_control(
-        "Direction",
-        list(DIRECTIONS),
-        default="both",
-        format_func=DIRECTIONS.__getitem__,
-        key="bifurcation direction",
-        required=True,
-        help="Up and down: each value goes on from where the last one ended. Where both differ, two motions are "
-        "possible, and it is the past that decides.",
-    )
+    looks = {"name": "direction", "format_func": DIRECTIONS.__getitem__, "required": True, "help": about}
+    direction = address.ask_one(middle.segmented_control, "Direction", list(DIRECTIONS), **looks)
     signals = ("transmission_error_m", "driver y", "driven y", "mesh_force_n", *run.vibration_channels)
-    signal = right.selectbox("Signal", signals, format_func=_signal_title, key="bifurcation signal")
-    request = BifurcationRequest(branch_of(run, chosen, signal=signal, section=section or "mesh"), direction or "both")
+    looks = {"name": "followed", "format_func": _signal_title}
+    signal = address.ask_one(right.selectbox, "Signal", signals, **looks)
+    request = BifurcationRequest(branch_of(run, chosen, signal=signal, section=section), direction)
     _run_and_show(run, request, chosen)
 
 

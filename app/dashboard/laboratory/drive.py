@@ -105,8 +105,7 @@ def choose_drive(preset: Preset) -> Setup:
 
 def _choose_running(preset: Preset) -> tuple[str, float, float]:
     """Return the mode, the torque of the motor and the speed that the flow of oil allows."""
-    looks = {"key": "mode of the drive", "name": "mode"}
-    mode = address.ask_one(st.segmented_control, "Mode", MODES, **looks)
+    mode = address.ask_one(st.segmented_control, "Mode", MODES, name="mode")
     torque_nm = choose_number("Torque of the motor (N·m)", "torque of the drive", preset.torque_nm, 300.0)
     label, key = "Speed that the flow allows (rpm)", "speed of the drive"
     return mode, torque_nm, choose_number(label, key, preset.speed_rpm, 300.0, low=10.0)
@@ -167,17 +166,8 @@ def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
     if not fault.option or severity == 0.0:
         return EffectSetting(name, severity)
     default = next(int(float(o.default or 1)) for o in chosen_effect.options if o.name == fault.option)
-    place = address.ask(
-        st.number_input,
-        fault.label,
-        1,
-        last,
-        step=1,
-        key=f"{fault.option} of {name} of the drive",
-        name=f"{name}-{fault.option}",
-        first=min(default, last),
-        read=address.number(1, last, whole=True),
-    )
+    looks = {"name": f"{name}-{fault.option}", "key": f"{fault.option} of {name} of the drive"}
+    place = address.ask_number(st, fault.label, 1, last, first=min(default, last), whole=True, **looks)
     return EffectSetting(name, severity, {fault.option: float(place)})
 
 
@@ -254,7 +244,7 @@ def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
         )
         which = "Faulty"
         if faulty is not None and view != TOGETHER:
-            looks = {"key": "side of the drive", "name": "side", "label_visibility": "collapsed"}
+            looks = {"name": "side", "label_visibility": "collapsed"}
             which = address.ask_one(st.segmented_control, "Drive", ("Faulty", "Healthy"), **looks)
     run = healthy if faulty is None or which == "Healthy" else faulty
     if view == TOGETHER and faulty is not None:

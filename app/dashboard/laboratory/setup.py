@@ -386,13 +386,9 @@ def _choose_option(of: Effect, option: Option) -> float | str | None:
         choices = option.choices or tuple(f"bearing {i + 1}" for i in range(4))
         first = option.default if option.default in choices else choices[0]
         return str(address.ask_one(st.selectbox, label, choices, first=first, **looks))
-    if option.whole:
-        low, first_count = int(option.low or 0), None if option.default is None else int(option.default)
-        looks |= {"first": first_count, "read": address.number(low, whole=True), "step": 1, "min_value": low}
-    else:
-        looks |= {"first": option.default, "read": address.number(), "format": "%g"}
-    placeholder = "drawn" if option.default is None else address.text_of(option.default)
-    number = address.ask(st.number_input, label, value=None, placeholder=placeholder, **looks)
+    low = (option.low or 0) if option.whole else None
+    looks |= {"placeholder": "drawn" if option.default is None else address.text_of(option.default)}
+    number = address.ask_number(st, label, low, first=option.default, whole=option.whole, **looks)
     return None if number is None else float(number)
 
 
@@ -436,9 +432,9 @@ def choose_preset() -> Preset:
     """Return the machine: pairs that run at a steady speed, and the drive that starts and stops."""
     known = {name: preset for model in (*MODELS, DRIVE_MODEL) for name, preset in presets(model).items()}
     names = list(known)
-    looks = {"format_func": shown_name, "key": "machine of the laboratory"}
+    looks = {"name": "machine", "first": FIRST, "format_func": shown_name}
     with st.sidebar:
-        name = address.ask_one(st.selectbox, "Machine", names, name="machine", first=FIRST, **looks)
+        name = address.ask_one(st.selectbox, "Machine", names, **looks)
         st.caption(known[name].title)
     return known[name]
 
@@ -472,37 +468,19 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
         st.segmented_control,
         "Length shown (s)",
         (AUTOMATIC, *DURATIONS_S),
-        key="length of the laboratory",
         name="length",
         help="A longer signal has a finer spectrum and takes longer to follow the sliders. Auto: eight revolutions of "
         "the slower shaft, at most a second.",
     )
-    rate = address.ask_one(
-        st.selectbox,
-        "Sampling rate (Hz)",
-        (10240.0, 20480.0, 40960.0),
-        first=20480.0,
-        format_func="{:g}".format,
-        key="rate of the laboratory",
-        name="rate",
-    )
+    looks: dict[str, Any] = {"name": "rate", "first": 20480.0, "format_func": "{:g}".format}
+    rate = address.ask_one(st.selectbox, "Sampling rate (Hz)", (10240.0, 20480.0, 40960.0), **looks)
     loudest = max(2.0, 4.0 * preset_number(preset, "noise_mps2"))
     noise = choose_parameter(preset, "noise_mps2", "Background noise, rms (m/s²)", loudest)
-    seed = address.ask(
-        st.number_input,
-        "Seed",
-        min_value=0,
-        max_value=MOST_SEEDS,
-        step=1,
-        key="seed of the laboratory",
-        name="seed",
-        first=0,
-        read=address.number(0, MOST_SEEDS, whole=True),
-        help="Another one draws other roughness, other noise, other angles. Healthy and faulty always share it.",
-    )
+    about = "Another one draws other roughness, other noise, other angles. Healthy and faulty always share it."
+    seed = address.ask_number(st, "Seed", 0, MOST_SEEDS, name="seed", first=0, whole=True, help=about)
     limit = choose_parameter(preset, "sensor_range_mps2", "Range of the sensors (m/s²)", 5e3)
     length = float(duration) if isinstance(duration, float) else automatic_s(preset, speed)
-    return (noise, limit), length, float(rate), int(seed)
+    return (noise, limit), length, float(rate), seed
 
 
 def automatic_s(preset: Preset, speed_rpm: float) -> float:

@@ -43,10 +43,10 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show a signal of both machines, and the difference."""
     row = st.container(horizontal=True, vertical_alignment="bottom")  # which wraps where it is narrow
     names = (*healthy.vibration_channels, *MOTION)
-    looks = {"format_func": _shown, "key": "signal of the laboratory", "width": 320}
+    looks = {"format_func": _shown, "width": 320}
     name = address.ask_one(row.selectbox, "Signal", names, name="signal", **looks)
-    looks = {"first": "3 revolutions", "key": "segment of the laboratory"}
-    shown = address.ask_one(row.segmented_control, "Shown, of the input shaft", list(SEGMENTS), name="shown", **looks)
+    looks = {"first": "3 revolutions", "name": "shown"}
+    shown = address.ask_one(row.segmented_control, "Shown, of the input shaft", list(SEGMENTS), **looks)
     end = _end_s(healthy, SEGMENTS[shown])
     healthy_line, label = signal_of(healthy, name, end)
     if faulty is None:
@@ -275,10 +275,8 @@ Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     """Show the portraits of one gear along the line of action."""
     row = st.container(horizontal=True)  # which wraps where it is narrow
-    looks = {"key": "gear of the laboratory"}
-    gear = address.ask_one(row.segmented_control, "Gear", list(GEARS), name="gear", **looks)
-    looks = {"key": "strobe of the laboratory"}
-    strobe = address.ask_one(row.segmented_control, "A point once per", list(STROBES), name="strobe", **looks)
+    gear = address.ask_one(row.segmented_control, "Gear", list(GEARS), name="gear")
+    strobe = address.ask_one(row.segmented_control, "A point once per", list(STROBES), name="strobe")
     n = STROBES[strobe] or healthy.machine.mesh.pair.driver.teeth
     both = [healthy] if faulty is None else [healthy, faulty]
     portraits = [portrait(run, GEARS[gear], n) for run in both]

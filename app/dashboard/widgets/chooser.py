@@ -189,31 +189,12 @@ def _chosen_file(file: UploadedFile, *, is_rig: bool) -> ChosenFile:
     )
 
 
-def choose_number(
-    label: str, key: str, placeholder: str, *, name: str, about: str = "", minimum: float | None = None
-) -> float | None:
-    """Return a number that files may not state, None where the field is empty; `name` is its own in the address."""
-    number: float | None = address.ask(
-        st.number_input,
-        label,
-        min_value=minimum,
-        value=None,
-        placeholder=placeholder,
-        key=key,
-        name=name,
-        first=None,
-        read=address.number(minimum),
-        help=about or None,
-    )
-    return number
-
-
-def choose_reference_rate(key: str, *, of_several: bool = False, name: str = "reference_rate") -> float | None:
+def choose_reference_rate(key: str = "", *, of_several: bool = False, name: str = "reference_rate") -> float | None:
     """Return the sampling rate in Hz that the user states of healthy references, None where the field is empty."""
     label = "Sampling rate of the references (Hz)" if of_several else "Its sampling rate (Hz)"
     about = "Of files that do not state it, where it is another one than the recording's."
-    rate_hz = choose_number(label, key, "as the recording's", minimum=0.0, name=name, about=about)
-    return rate_hz or None
+    looks = {"placeholder": "as the recording's", "help": about, "key": key}
+    return address.ask_number(st, label, 0.0, name=name, **looks) or None
 
 
 # --------------------
@@ -331,14 +312,15 @@ def _described(file: ChosenFile, with_reference: bool) -> Chosen:
     if not with_reference:
         return Chosen(request, file.content)
     reference, rate_hz = _choose_reference(file)
-    torque_nm = choose_number(
+    torque_nm = address.ask_number(
+        st,
         "Torque (N·m)",
-        state.source_key("torque", file.sha256),
-        "from the machine",
-        about="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else "
-        "of the reference shaft.",
-        minimum=0.0,
+        0.0,
         name="torque",
+        key=state.source_key("torque", file.sha256),
+        placeholder="from the machine",
+        help="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else "
+        "of the reference shaft.",
     )
     request = replace(request, torque_nm=torque_nm or None)
     if reference is None:

@@ -14,6 +14,7 @@ from app.dashboard.state import ChosenFile
 from app.dashboard.theme import one_line, palette
 from app.dashboard.widgets.charts import download
 from app.dashboard.widgets.messages import FORM_LABELS, FORM_TABLES, show_error
+from app.dashboard.widgets.tables import show_table
 from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import unit_text
 from gearsig.rig import QUANTITIES, Rig, bearing_catalogue, order_lines, parse_toml, rig_from_dict
@@ -303,15 +304,16 @@ def _show_consequences(table: Table, *, told: Rig | str | None) -> None:
         st.caption(":material/account_tree: Name a shaft: its orders follow, and with teeth those of the mesh.")
         return
     place = st.container(key="panels of the train")
-    drawing, orders = place.columns((1, 1), vertical_alignment="center")
+    drawing, orders = place.columns((3, 4), vertical_alignment="center")
     drawing.image(train_svg(rig, palette().quiet), width="stretch", alt="Drawing of the gear train")
     lines = [line for line in order_lines(rig, rig.reference_shaft, n_sidebands=0) if line.kind != "sideband"]
     turns = (rig.nominal_speed_rpm() or 0.0) / 60.0
-    table = {"line": [line.label for line in lines], f"order of {rig.reference_shaft}": [line.order for line in lines]}
+    of = f"order of {rig.reference_shaft}"
+    table = {"line": [line.label for line in lines], of: [line.order for line in lines]}
     if turns:
         table["Hz"] = [line.order * turns for line in lines]
-    number = st.column_config.NumberColumn(format="%.5g")
-    orders.dataframe(table, hide_index=True, height=300, column_config=dict.fromkeys(list(table)[1:], number))
+    with orders:
+        show_table(table, width="stretch", height=300, column_config={of: st.column_config.Column("order", help=of)})
 
 
 def train_svg(rig: Rig, ink: str) -> str:

@@ -245,17 +245,13 @@ def _asked_of_several(page: MethodPage, option: MethodOption) -> Any:
 
 
 def _asked_number(page: MethodPage, option: MethodOption, known: Any) -> Any:
-    whole = option.kind == "count"
-    number = int if whole else float
-    low, high, first = (None if x is None else number(x) for x in (option.minimum, option.maximum, option.default))
+    whole, low, first = option.kind == "count", option.minimum, option.default
     low = 1 if low is None and whole else low
     placeholder = (known if isinstance(known, str) else option.empty) or address.text_of(first)
-    # None: a field that is emptied stays empty, and stands for the default
-    return page.ask(
-        st.number_input, option.label, low, high, None, 1 if whole else None, "%d" if whole else "%g",
-        name=option.name, first=first, read=address.number(low or 0, high, whole=whole), about=option.about,
-        placeholder=placeholder or None, key=f"{option.label} {placeholder}",
-        width=width_px(option.label, placeholder, buttons_px=110),
+    return address.ask_number(
+        st, option.label, low, option.maximum, name=option.name, first=first, whole=whole, help=option.about or None,
+        placeholder=placeholder or None, key=page.key(f"{option.label} {placeholder}"),
+        value=None, width=width_px(option.label, placeholder, buttons_px=110),
     )  # fmt: skip
 
 

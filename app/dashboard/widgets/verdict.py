@@ -160,7 +160,10 @@ def show_verdict_picture(analysis: Analysis) -> None:
         cursors = bearing_cursors(analysis, spectrum) if spectrum is not None else ()
         code = picture.finding.code if picture.finding is not None else ""
         named = next((part for part, (words, _) in BEARING_PARTS.items() if words.replace(" ", "-") in code), "")
-        cursors = tuple(cursor for cursor in cursors if named in cursor.label)
+        of = f" {picture.finding.where.bearing}" if picture.finding is not None else ""  # the verdict says it
+        cursors = tuple(
+            replace(cursor, label=cursor.label.removesuffix(of)) for cursor in cursors if named in cursor.label
+        )
     else:
         spectrum = channel.order_spectrum or channel.spectrum
         cursors = line_cursors(analysis, spectrum, n_sidebands=1)
