@@ -192,7 +192,15 @@ def chosen(key: str, name: str, options: Collection[str], first: str) -> str:
 
 
 def ask(
-    widget: Callable[..., Any], label: str, *values: Any, name: str, first: Any, read: Read, key: str = "", **looks: Any
+    widget: Callable[..., Any],
+    label: str,
+    *values: Any,
+    name: str,
+    first: Any,
+    read: Read,
+    written: Callable[[Any], Any] | None = None,
+    key: str = "",
+    **looks: Any,
 ) -> Any:
     """Return what a widget of Streamlit gives; it stands in the address while it differs from its default.
 
@@ -210,6 +218,8 @@ def ask(
         The default; also where the widget is empty.
     read : callable
         From texts of the address to a value, e.g. `one_of(options)`.
+    written : callable or None
+        From a value to what the address says of it, where that is another one.
     key : str
         Of its state, see `state.view_key`; empty: one for the page, by its name.
     """
@@ -217,7 +227,7 @@ def ask(
     begin(key, name, first, read)
     value = widget(label, *values, key=key, **{"persist_state": "session"} | looks)
     value = first if value is None else value
-    keep(name, value, first)
+    keep(name, *((value, first) if written is None else (written(value), written(first))))
     return value
 
 

@@ -108,11 +108,6 @@ def _constant(speed_rpm: float | None) -> ConstantSpeed | None:
     return None if speed_rpm is None else ConstantSpeed(speed_rpm)
 
 
-def _read(request: AnalysisRequest, name: str, content: Content, rig: Rig | None) -> Recording:
-    rate_hz, speed_rpm = request.sampling_rate_hz, request.speed_rpm
-    return read_content(content, name, rig=rig, sampling_rate_hz=rate_hz, speed_rpm=speed_rpm)
-
-
 @kept(6, "Reading …", key=lambda request, _, rig=None: (request, repr(rig)))
 def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None) -> Recording:
     """Return a recording as requested; `rig` is for files without a rig file of their own.
@@ -123,7 +118,8 @@ def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None)
         If the rig or the recording cannot be read.
     """
     own_rig = read_rig_text(request.rig_text, request.rig_name)
-    return _read(request, request.name, content, own_rig if own_rig is not None else rig)
+    rig, rate_hz = own_rig if own_rig is not None else rig, request.sampling_rate_hz
+    return read_content(content, request.name, rig=rig, sampling_rate_hz=rate_hz, speed_rpm=request.speed_rpm)
 
 
 def analysis_of(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:

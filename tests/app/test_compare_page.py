@@ -27,7 +27,7 @@ def test_two_samples_are_compared_in_every_view() -> None:
     assert "do not differ by more than the records' own scatter" in text
     (headline,) = (text.value for text in page.markdown if text.value.startswith("#### "))
     assert headline.count(".") - headline.count("\\.") == 1  # one sentence; the others stand below it
-    assert [button.label for button in page.get("download_button")] == ["Page (HTML)", "JSON", "Lines (CSV)"]
+    assert [button.label for button in page.get("download_button")] == ["Report (HTML)", "JSON", "Lines (CSV)"]
     drawn = {}
     for tab in ("Orders", "Angle", "Bands", "Lines"):
         page.session_state["comparison tab"] = tab

@@ -29,6 +29,6 @@ def test_two_samples_are_compared_and_the_page_is_downloaded(page: playwright.Pa
         settle(page)
         playwright.expect(page.locator(".figure")).to_have_count(n_figures, timeout=60_000)
     with page.expect_download() as download:
-        page.get_by_role("button", name="Page (HTML)").click()
+        page.get_by_role("button", name="Report (HTML)").click()
     assert download.value.suggested_filename == "compare.html"
     assert "damaged_tooth.csv.gz" in Path(download.value.path()).read_text(encoding="utf-8")

@@ -16,7 +16,6 @@ from app.dashboard.widgets.chooser import (
     choose_files,
     choose_reference_rate,
     sample_file,
-    sample_name,
 )
 from app.samples import samples
 from gearsig.errors import InputError
@@ -217,7 +216,7 @@ def _choose_samples() -> ChosenFiles:
             st.multiselect,
             label,
             names,
-            format_func=lambda stem: sample_name(known[stem]),
+            format_func=lambda stem: known[stem].title,
             name=name,
             first=[first] if first in names else [],
             read=address.some_of(names),

@@ -72,6 +72,7 @@ from gearsig.report import (
     step_rows,
     verdict_rows,
 )
+from sims.simulator import sources_digest
 
 WELCOME = """
 The page says **where** recordings differ from the simulation of their rig, **which** effect that the simulator lacks
@@ -224,7 +225,8 @@ def _place_of(choice: Choice) -> Path:
     Whoever asks has the files themselves: their hashes are in the name.
     """
     rigs = [file.rig_text for file in (*choice.recordings, *choice.references)]
-    asked = sha256(f"{gearsig.__version__} {_code()} {choice.key} {rigs!r}".encode()).hexdigest()
+    code = f"{gearsig.__version__} {_code()} {sources_digest()}"
+    asked = sha256(f"{code} {choice.key} {rigs!r}".encode()).hexdigest()
     return cache_folder("gap-results") / f"{asked}.zip"
 
 

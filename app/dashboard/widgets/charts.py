@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 import numpy as np
@@ -22,7 +22,6 @@ from app.dashboard import address, state
 from app.dashboard.components import component_of
 from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
-from gearsig.diagnosis import Analysis
 from gearsig.formatting import csv_text
 from gearsig.plot import (
     LONGEST,
@@ -604,47 +603,6 @@ def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:
         image = Image.fromarray((255 * turned_over(np.asarray(image, dtype=np.float32) / 255)).astype(np.uint8))
     image.save(buffer, format="png", compress_level=1)
     return buffer.getvalue()
-
-
-def choose_range(
-    label: str,
-    source: Analysis | str,
-    end: float,
-    *,
-    start: float = 0.0,
-    shown: tuple[float, float] | None = None,
-    name: str = "",
-    in_address: str,
-    width: int | Literal["stretch"] = "stretch",
-) -> tuple[float, float]:
-    """Return the chosen segment between `start` and `end`; never an empty one.
-
-    Parameters
-    ----------
-    label : str
-        Not from a file.
-    source : Analysis or str
-        What the view is of, see `state.view_key`.
-    start, end : float
-        Of the axis.
-    shown : (float, float) or None
-        Chosen at first; None: all of it.
-    name : str
-        Of the view, where the same label occurs in several.
-    in_address : str
-        Its name there.
-    width : int or "stretch"
-        Pixels, or as much as there is.
-    """
-    step = (end - start) / 1000
-    first = shown if shown is not None else (start, end)
-    value = (max(start, first[0]), min(end, first[1]))
-    key = state.view_key(f"{name} {label} {start!r} to {end!r}", source)
-    looks: dict[str, Any] = {"step": step, "format": "%.5g", "key": key, "width": width}
-    low, high = address.ask(
-        st.slider, label, start, end, name=in_address, first=value, read=address.span(start, end), **looks
-    )
-    return (low, high) if high > low else (max(start, high - step), min(end, high + step))
 
 
 def download(label: str, data: Any, name: str, **looks: Any) -> None:

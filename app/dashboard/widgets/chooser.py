@@ -28,11 +28,6 @@ SIMULATED = "Simulated, not measured: what is in them is known."
 # --------------------
 
 
-def sample_name(sample: SampleRecording) -> str:
-    """Return a sample's name for people."""
-    return sample.title
-
-
 def sample_file(sample: SampleRecording) -> ChosenFile:
     """Return a sample with its rig."""
     path, rig = sample.recording, sample.rig
@@ -58,7 +53,9 @@ def choose_sample(label: str, key: str, *, first: str = "", without: str = "", n
     if name:
         address.begin(key, name, at_first, address.one_of({sample.rig.stem: sample for sample in offered}))
     state.carry_over(key, at_first)
-    sample: SampleRecording = st.selectbox(label, offered, format_func=sample_name, key=key, persist_state="session")
+    sample: SampleRecording = st.selectbox(
+        label, offered, format_func=lambda sample: sample.title, key=key, persist_state="session"
+    )
     if name:
         address.keep(name, sample.rig.stem, at_first.rig.stem)
     return sample_file(sample)
@@ -334,7 +331,7 @@ def _described(file: ChosenFile, with_reference: bool) -> Chosen:
 def _choose_reference(file: ChosenFile) -> tuple[ChosenFile | None, float | None]:
     """Return the same machine when it was healthy, and the sampling rate in Hz that is stated of an own file of it."""
     source = file.sha256
-    offered = {sample_name(s): s for s in samples() if s.recording.name != file.name}
+    offered = {s.title: s for s in samples() if s.recording.name != file.name}
     own = next((s.reference for s in samples() if s.recording == file.content), None)
     first = next((name for name, s in offered.items() if s.recording == own), NO_REFERENCE)
     names = [NO_REFERENCE, FILE, *offered]

@@ -114,21 +114,13 @@ class MethodPage:
             Show the options as they are, without a capital first letter.
         """
         values = options if isinstance(options, Mapping) else {option: option for option in options}
-        first, key = default or next(iter(values)), self.key(key or label)
-        address.begin(key, name, first, address.one_of({address.text_of(values[option]): option for option in values}))
-        chosen = place.segmented_control(
-            label,
-            list(values),
-            key=key,
-            help=about or None,
-            persist_state="session",
-            format_func=str if as_written else capitalised,
-            label_visibility="visible" if named else "collapsed",
-            required=True,
-        )
-        value = values[chosen or first]
-        address.keep(name, value, values[first])
-        return value
+        read = address.one_of({address.text_of(value): option for option, value in values.items()})
+        chosen = self.ask(
+            place.segmented_control, label, list(values), key=key, name=name, first=default or next(iter(values)),
+            read=read, written=values.__getitem__, about=about, format_func=str if as_written else capitalised,
+            label_visibility="visible" if named else "collapsed", required=True,
+        )  # fmt: skip
+        return values[chosen]
 
     def range(
         self,
@@ -140,10 +132,28 @@ class MethodPage:
         name: str,
         width: int | Literal["stretch"] = "stretch",
     ) -> tuple[float, float]:
-        """Return a range of an axis that the user chooses, `name` in the address; see `charts.choose_range`."""
-        return charts.choose_range(
-            label, self.analysis, end, start=start, shown=shown, name=self.name, in_address=name, width=width
-        )
+        """Return the chosen segment between `start` and `end` of an axis, never an empty one.
+
+        Parameters
+        ----------
+        label : str
+            Not from a file.
+        start, end : float
+            Of the axis.
+        shown : (float, float) or None
+            Chosen at first; None: all of it.
+        name : str
+            In the address.
+        width : int or "stretch"
+            Pixels, or as much as there is.
+        """
+        step, (low, high) = (end - start) / 1000, shown or (start, end)
+        looks: dict[str, Any] = {"step": step, "format": "%.5g", "width": width}
+        low, high = self.ask(
+            st.slider, label, start, end, key=f"{label} {start!r} to {end!r}", name=name,
+            first=(max(start, low), min(end, high)), read=address.span(start, end), **looks,
+        )  # fmt: skip
+        return (low, high) if high > low else (max(start, high - step), min(end, high + step))
 
     def segment(self, *, n_first: int) -> tuple[int, int]:
         """Let the user choose what is analysed; return its first sample and the one after its last.
