@@ -30,7 +30,7 @@ from app.dashboard.widgets.chooser import (
     choose_sample,
     simulated_file,
 )
-from app.dashboard.widgets.messages import show_warnings
+from app.dashboard.widgets.messages import show_checks, show_warnings
 from app.dashboard.widgets.spectrum import show_revolutions, show_spectrum
 from app.dashboard.widgets.tables import show_table, show_words
 from app.dashboard.work import kept
@@ -315,8 +315,7 @@ def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
     st.markdown(f"#### {as_typed(headline.rstrip(';.'))}.")
     if more:
         st.markdown(as_typed(capitalised(more[0])))
-    with st.container(gap=None):
-        show_alike(comparison, rig)
+    show_alike(comparison, rig)
     if comparison.findings:
         st.markdown("\n".join(f"- {as_typed(text)}" for text in comparison.findings))
     channels = {channel.name: channel for channel in comparison.channels}
@@ -337,7 +336,7 @@ def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
 
 
 def show_alike(comparison: Comparison, rig: Rig | None) -> None:
-    """Say on one line what both records have in common: teeth, speed, how their angles are aligned."""
+    """Say what both records have in common: teeth, speed, how their angles are aligned."""
     recorded, simulated = comparison.recorded, comparison.simulated
     ratio = simulated.mean_speed_rpm / recorded.mean_speed_rpm
     speeds = f"{recorded.mean_speed_rpm:.6g} rpm recorded, {simulated.mean_speed_rpm:.6g} rpm simulated"
@@ -347,9 +346,7 @@ def show_alike(comparison: Comparison, rig: Rig | None) -> None:
         facts.insert(0, (True, f"Teeth: {', '.join(pairs)} in both"))
     aligned = zip(comparison.alignments, alignment_texts(comparison), strict=False)
     facts += [(not one.is_doubted, f"Aligned: {text}") for one, text in aligned]
-    for is_right, text in facts:
-        icon, colour = (":material/check:", "green") if is_right else (":material/priority_high:", "orange")
-        st.markdown(f":{colour}[{icon}] {as_typed(text)}")
+    show_checks(facts)
     lengths = ", ".join(
         f"{name} {side.duration_s:.4g} s, {side.n_revolutions:.4g} revolutions"
         for name, side in (("recording", recorded), ("simulation", simulated))
@@ -370,7 +367,7 @@ def _show_orders(comparison: Comparison, channel: ChannelComparison) -> None:
     name = axis_label("order", comparison.reference_shaft)
     show_differences(at, off, beyond, name, f"lines of {source}", shown, "simulated − recorded")
     st.caption(
-        "Simulated less recorded, line by line; grey is within the records' own scatter. Zooming above zooms here."
+        "Simulated less recorded, line by line; the floor is the records' own scatter. Zooming above zooms here."
     )
 
 

@@ -32,7 +32,7 @@ from app.dashboard.widgets.charts import (
     show_picture,
     show_rows,
 )
-from app.dashboard.widgets.messages import show_warnings
+from app.dashboard.widgets.messages import show_checks, show_warnings
 from app.dashboard.widgets.spectrum import show_revolutions
 from app.dashboard.widgets.tables import show_words
 from app.dashboard.widgets.verdict import Colour
@@ -76,10 +76,10 @@ from sims.simulator import sources_digest
 
 WELCOME = """
 The page says **where** recordings differ from the simulation of their rig, **which** effect that the simulator lacks
-causes it, **how far** the gap shrinks with it, and what to record next. Sizes are in *structural floors*: one is how
-far even healthy machines differ, so that less means nothing.
+causes it, **how far** the gap shrinks with it, and what to record next. Sizes are in *structural floors*: one floor is
+how far even healthy machines differ, so that a gap below one means nothing.
 
-Surest with recordings at several speeds and loads, and with one of the same rig when it was healthy. A diagnosis
+The answer is surest with recordings at several speeds and loads, and with one of the same rig when it was healthy. It
 takes up to a minute on two free cores; the rig's simulations are kept for the next one.
 """
 
@@ -616,15 +616,9 @@ def show() -> None:
     finished = show_running(choice)
     if finished is None:
         st.markdown(WELCOME)
-        show_set_alike(choice)
+        with suppress(GearsigError):  # said when it is started
+            show_checks((True, text) for text in (set_alike(choice) if choice.recordings else ()))
         return
     if finished.key != choice.key:
         st.info("This is the answer to what was chosen before. Diagnose again for what is chosen now.")
     show_finished(finished)
-
-
-def show_set_alike(choice: Choice) -> None:
-    """Say what the simulator will be set to."""
-    with suppress(GearsigError):  # said when it is started
-        for text in set_alike(choice) if choice.recordings else ():
-            st.markdown(f":green[:material/check:] {as_typed(text)}")

@@ -72,7 +72,7 @@ def show_differences(
         return
     lines = [
         stems(at[chosen], off[chosen], said, colour)
-        for chosen, said, colour in ((~beyond, "within the floor", QUIET), (beyond, "beyond it", FAULT))
+        for chosen, said, colour in ((~beyond, "within the floor", QUIET), (beyond, "beyond the floor", FAULT))
         if chosen.any()
     ]
     panel = LinePanel(lines, name, f"{words} (dB)", padded_limits([off, np.zeros(1)]), x_limits=shown)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import streamlit as st
 
@@ -124,6 +124,14 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
         st.caption(text)
     else:
         st.warning(text, icon=":material/warning:")
+
+
+def show_checks(checks: Iterable[tuple[bool, str]]) -> None:
+    """Show what holds, and what does not, line by line; texts may come from files."""
+    with st.container(gap=None):
+        for holds, text in checks:
+            mark = ":green[:material/check:]" if holds else ":orange[:material/priority_high:]"
+            st.markdown(f"{mark} {as_typed(text)}")
 
 
 def show_unknown_speed(reason: CannotTell) -> None:
