@@ -184,7 +184,7 @@ def papers(
 ) -> None:
     """Draw the figures of a publication that the model can answer, and judge each statement of its text by numbers.
 
-    Every statement comes with "agrees", "agrees in part" or "does not, because …". index.html shows all of it.
+    Every statement comes with "agrees", "agrees in part" or "does not agree, because …". index.html shows all of it.
 
     Example: gearsig papers cracked -o cracked
     """

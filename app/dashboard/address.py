@@ -272,9 +272,9 @@ def ask_number(
         "value": None if first is None else "min",
         "step": 1 if whole else None,
         "format": "%d" if whole else "%g",
+        "read": number(low, high, whole=whole),
     } | looks
-    read = number(low, high, whole=whole)
-    return ask(place.number_input, label, low, high, name=name, first=first, read=read, **looks)
+    return ask(place.number_input, label, low, high, name=name, first=first, **looks)
 
 
 def tabs(names: Sequence[str], *, key: str) -> Sequence[Any]:

@@ -154,7 +154,7 @@ def _show_counts(status: DataFrame) -> None:
 
 def _choose_point(status: DataFrame) -> tuple[str, str]:
     """Show machines with their measuring points, the worst first; return the one that is looked at."""
-    looks = {"placeholder": "Part of a name"}
+    looks: dict[str, Any] = {"placeholder": "Part of a name"}
     searched = address.ask(st.text_input, "Machine", name="search", first="", read=address.words, **looks)
     shown = status[status["machine"].str.contains(searched, case=False, regex=False)]
     of_machine = {str(name): rows.to_dict("records") for name, rows in shown.groupby("machine", sort=False)}
@@ -220,7 +220,7 @@ def _show_point(fleet: Fleet, row: Row) -> None:
         _show_trend(fleet, row, over)
         with st.expander(f"All {len(series)} indicators, the worst first", icon=":material/table:"):
             show_table(_series_table(series))
-    _show_recordings(fleet.recordings(machine, point).iloc[::-1])
+    _show_recordings(fleet.recordings(machine, point).iloc[::-1], f"{machine!r} {point!r}")
 
 
 def _choose_series(series: DataFrame, machine: str, point: str) -> Row:
@@ -321,16 +321,18 @@ def _within_limits(
     return lines, padded_limits([value, *([high] if known.any() else [])])
 
 
-def _show_recordings(recordings: DataFrame) -> None:
-    """Offer the recordings, the latest first; open one in the analysis page."""
+def _show_recordings(recordings: DataFrame, of: str) -> None:
+    """Offer the recordings of a measuring point, the latest first; open one in the analysis page."""
     rows = recordings.to_dict("records")
+    dates = [f"{row['date']:%Y-%m-%dT%H:%M}" for row in rows]
+    looks: dict[str, Any] = {"name": "recording", "first": 0, "key": state.source_key("fleet recording", of)}
+    looks |= {"read": address.one_of({date: i for i, date in enumerate(dates)}), "written": dates.__getitem__}
+    looks |= {"format_func": lambda i: _recording_words(rows[i])}
     with st.container(horizontal=True, vertical_alignment="bottom"):
-        place = st.selectbox(
-            "Recording", range(len(rows)), format_func=lambda i: _recording_words(rows[i]), key="fleet recording"
-        )
+        place = address.ask(st.selectbox, "Recording", range(len(rows)), **looks)
         is_asked = st.button("Open its analysis", icon=":material/troubleshoot:", type="primary")
     if is_asked:
-        open_file(_file_of(Path(rows[place or 0]["source"])))
+        open_file(_file_of(Path(rows[place]["source"])))
         state.go_to("analysis")
 
 

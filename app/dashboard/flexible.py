@@ -92,11 +92,13 @@ def show_gear() -> None:
     """One gear: its modes and the stress of a pushed tooth, to be turned."""
     study, view = studied(*choose_blank())
     names = [gear_body.label(study, k) for k in range(min(gear_body.N_SHOWN, len(study.modes.frequencies_hz)))]
-    has_stress = study.mesh.size.order > 1
-    shown_names = {str(k): f"Mode {k + 1}: {name}" for k, name in enumerate(names)}
-    shown_names |= {STRESS: "Stress of a pushed tooth"} if has_stress else {}
-    looks = {"name": "shown", "format_func": shown_names.__getitem__, "key": f"shown of a gear {has_stress}"}
-    shown = address.ask_one(st.selectbox, "Show", list(shown_names), **looks)
+    labels = {str(k): f"Mode {k + 1}: {name}" for k, name in enumerate(names)}
+    labels |= {STRESS: "Stress of a pushed tooth"} if study.mesh.size.order > 1 else {}
+    key = f"shown of a gear {list(labels.values())}"  # a browser goes on showing the words of another gear
+    so_far = address.now("shown")
+    st.session_state.setdefault(key, so_far if so_far in labels else "0")
+    looks = {"name": "shown", "format_func": labels.__getitem__, "key": key}
+    shown = address.ask_one(st.selectbox, "Show", list(labels), **looks)
     if shown == STRESS:
         field = study.load.displacement_m[:, view.nodes]
         values = np.array([study.load.von_mises_pa(k) for k in range(study.mesh.blank.n_teeth)])[:, view.nodes].ravel()
@@ -121,7 +123,7 @@ def show_gear() -> None:
             "colours": level_colours(dark=is_dark())[30:240:26].tolist(),
             "legend": legend,
             "help": "Drag or arrow keys turn it, + and − or the wheel zoom.",
-            "words": f"Gear of {study.mesh.blank.n_teeth} teeth: {shown_names[shown]}",
+            "words": f"Gear of {study.mesh.blank.n_teeth} teeth: {labels[shown]}",
         },
     )
     with st.expander("Numbers", key="gear numbers"):

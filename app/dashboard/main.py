@@ -40,8 +40,8 @@ st.html(f'<script class="of-page">{SCRIPT}</script>', unsafe_allow_javascript=Tr
 st.logo(str(FOLDER / "logo.svg"), size="large")
 pages = state.pages()
 for name, (title, icon) in PAGES.items():
-    is_first, looks = name == "start", {"title": title, "icon": f":material/{icon}:", "url_path": name}
-    pages[name] = st.Page(partial(show, name), default=is_first, **looks)
+    mark, is_first = f":material/{icon}:", name == "start"
+    pages[name] = st.Page(partial(show, name), title=title, icon=mark, url_path=name, default=is_first)
 page = st.navigation(list(pages.values()), position="top")
 work.tidy_later()
 with address.of_page(page.url_path):

@@ -52,11 +52,10 @@ class Claim:
     @property
     def judgement(self) -> str:
         """The verdict with its sign and its reason."""
-        verdict_text, joint = (
-            f"{SIGNS[self.verdict]} {self.verdict}",
-            ", because " if self.verdict == "does not" else ": ",
-        )
-        return f"{verdict_text}{joint}{self.because}" if self.because and self.verdict != "agrees" else verdict_text
+        fails = self.verdict == "does not"
+        text = f"{SIGNS[self.verdict]} {self.verdict}{' agree' if fails else ''}"
+        joint = ", because " if fails else ": "
+        return f"{text}{joint}{self.because}" if self.because and self.verdict != "agrees" else text
 
 
 def judged(statement: str, found: str, *, agrees: bool, partly: bool = False, because: str = "") -> Claim:

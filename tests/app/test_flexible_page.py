@@ -12,7 +12,7 @@ from sims.fe_gear import (
     sector_mesh,
 )
 from sims.mesh import GearGeometry
-from tests.app.pages import on
+from tests.app.pages import labelled, on
 
 
 @pytest.mark.parametrize("web_mm", [None, 6.0])
@@ -42,7 +42,7 @@ def test_a_gear_is_shown_with_its_modes_and_stress() -> None:
     assert not page.exception
     assert "stands under Numbers" in page.caption[-1].value
     assert not any("gearsig" in caption.value for caption in page.caption)
-    shown = page.selectbox(key="shown of a gear True")
+    shown = labelled(page, "selectbox", "Show")
     assert len(shown.options) == 7
     assert "2 nodal diameters" in shown.options[0]
     shown.select_index(6).run()

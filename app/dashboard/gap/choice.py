@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import streamlit as st
 
@@ -198,7 +199,7 @@ def choose() -> Choice:
         names = tuple(gap_simulators())
         model = address.ask_one(st.selectbox, "Simulator", names, name="simulator", format_func=simulator_title)
         with st.expander("Not in the files?", icon=":material/tune:"):
-            looks = {"placeholder": "from the rig", "help": "Of the input shaft, for all recordings."}
+            looks: dict[str, Any] = {"placeholder": "from the rig", "help": "Of the input shaft, for all recordings."}
             torque = address.ask_number(st, "Torque (N·m)", 0.0, name="torque", **looks)
             looks = {"placeholder": "from the files or the rig"}
             rate = address.ask_number(st, "Sampling rate (Hz)", 0.0, name="rate", **looks)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import streamlit as st
 
@@ -190,7 +190,7 @@ def choose_reference_rate(key: str = "", *, of_several: bool = False, name: str 
     """Return the sampling rate in Hz that the user states of healthy references, None where the field is empty."""
     label = "Sampling rate of the references (Hz)" if of_several else "Its sampling rate (Hz)"
     about = "Of files that do not state it, where it is another one than the recording's."
-    looks = {"placeholder": "as the recording's", "help": about, "key": key}
+    looks: dict[str, Any] = {"placeholder": "as the recording's", "help": about, "key": key}
     return address.ask_number(st, label, 0.0, name=name, **looks) or None
 
 

@@ -261,7 +261,8 @@ def _asked_number(page: MethodPage, option: MethodOption, known: Any) -> Any:
     return address.ask_number(
         st, option.label, low, option.maximum, name=option.name, first=first, whole=whole, help=option.about or None,
         placeholder=placeholder or None, key=page.key(f"{option.label} {placeholder}"),
-        value=None, width=width_px(option.label, placeholder, buttons_px=110),
+        value=None, read=address.number(low or 0, option.maximum, whole=whole),
+        width=width_px(option.label, placeholder, buttons_px=110),
     )  # fmt: skip
 
 
