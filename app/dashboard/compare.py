@@ -312,7 +312,7 @@ NAMES = ("recorded", "simulated")
 def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
     """Show what was set alike, verdict, findings, then one channel in figures that zoom together, and in numbers."""
     headline, *more = re.split(r"(?<=[;.]) ", comparison.verdict, maxsplit=1)
-    st.markdown(f"#### {as_typed(headline.rstrip(';.'))}.")
+    st.subheader(f"{as_typed(headline.rstrip(';.'))}.", anchor=False)
     if more:
         st.markdown(as_typed(capitalised(more[0])))
     show_alike(comparison, rig)

@@ -202,7 +202,7 @@ def _show_point(fleet: Fleet, row: Row) -> None:
     """Show one measuring point: state, an indicator over time, all indicators, recordings."""
     machine, point = row["machine"], row["point"]
     name = " · ".join(part for part in (machine, point) if part)
-    st.markdown(f"#### {as_typed(name)} :{BADGES[row['level']]}-badge[{row['level']}]")
+    st.subheader(f"{as_typed(name)} :{BADGES[row['level']]}-badge[{row['level']}]", anchor=False)
     outcome = str(row["outcome"] or "")
     if outcome:
         colour = COLOURS[Outcome(outcome)]

@@ -25,7 +25,7 @@ def test_two_samples_are_compared_in_every_view() -> None:
     text = shown_text(page)
     assert "root_crack_0mm.h5 beside root_crack_3mm.h5" in text  # what the analysis page had open stays open
     assert "do not differ by more than the records' own scatter" in text
-    (headline,) = (text.value for text in page.markdown if text.value.startswith("#### "))
+    _, headline = (text.value for text in page.subheader)
     assert headline.count(".") - headline.count("\\.") == 1  # one sentence; the others stand below it
     assert [button.label for button in page.get("download_button")] == ["Report (HTML)", "JSON", "Lines (CSV)"]
     drawn = {}
@@ -35,8 +35,8 @@ def test_two_samples_are_compared_in_every_view() -> None:
         assert not page.exception
         assert not page.get("image")
         assert not pictures(page)
-        drawn[tab] = (len(figures(page)), len(page.dataframe))
-    assert drawn == {"Orders": (2, 1), "Angle": (4, 1), "Bands": (2, 1), "Lines": (0, 2)}
+        drawn[tab] = (len(figures(page)), len(page.dataframe), len(page.table))
+    assert drawn == {"Orders": (2, 0, 1), "Angle": (4, 0, 1), "Bands": (2, 0, 1), "Lines": (0, 1, 1)}
     assert "gearsig compare root_crack_0mm.h5 root_crack_3mm.h5" in page.code[0].value
 
 

@@ -302,7 +302,8 @@ def _show_verdict(report: GapReport) -> None:
     if kind is None:
         return
     place = f", {kind.place}" if kind.place else ""
-    st.markdown(f"### {as_typed(capitalised(kind.title))}{as_typed(place)} :gray[{odds_text(kind.probability)}]")
+    title = as_typed(f"{capitalised(kind.title)}{place}")
+    st.subheader(f"{title} :gray[{odds_text(kind.probability)}]", anchor=False)
     likely = [c for c in report.causes if c.group == kind.group and c.probability >= LIKELY]
     badges = (f":{colour}-badge[{as_typed(c.title)} {odds_text(c.probability)}]" for c in likely)
     st.markdown(f"{'Cause' if len(likely) == 1 else 'Possible causes'}: {' '.join(badges)}")
