@@ -12,7 +12,7 @@ from app import flexible as pair_study
 from app import gear_body
 from app.dashboard import address
 from app.dashboard.components import component_of
-from app.dashboard.theme import as_typed, is_dark
+from app.dashboard.theme import as_typed, capitalised, is_dark
 from app.dashboard.widgets.charts import download, packed, show_figure, show_map
 from app.dashboard.widgets.tables import show_words
 from app.dashboard.work import kept
@@ -120,7 +120,7 @@ def show_gear() -> None:
             "values": packed(np.clip(values / top, 0.0, 1.0)),
             "stretch": SWING * study.mesh.blank.geometry.tip_radius_mm * (shown != STRESS),
             "swings": shown != STRESS,
-            "colours": level_colours(dark=is_dark())[30:240:26].tolist(),
+            "colours": level_colours(dark=is_dark())[50:240:24].tolist(),
             "legend": legend,
             "help": "Drag or arrow keys turn it, + and − or the wheel zoom.",
             "words": f"Gear of {study.mesh.blank.n_teeth} teeth: {labels[shown]}",
@@ -208,7 +208,7 @@ def show_publications() -> None:
     found = computed(name)
     st.markdown(f"**{found.summary}** {as_typed(found.source)}")
     for item in found.figures:
-        st.subheader(f"{item.answers}: {item.title}")
+        st.subheader(as_typed(capitalised(f"{item.answers}: {item.title}")), anchor=False)
         show_figure(item.figure, item.title, f"publication {name} {item.answers}")
         show_words(
             {
@@ -218,7 +218,7 @@ def show_publications() -> None:
             }
         )
     if found.unanswered:
-        st.subheader("Figures without an answer")
+        st.subheader("Figures without an answer", anchor=False)
         show_words({"figure": list(found.unanswered), "why": list(found.unanswered.values())})
 
 

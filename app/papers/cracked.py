@@ -122,7 +122,7 @@ def friction_roughness() -> Figure:
         pitch_point=(pair.pitch_point_radius_mm - pair.start_radius_mm) / pair.base_pitch_mm,
         single_pair=(pair.contact_ratio - 1.0, 1.0),
         heading="roughness Rq",
-        title=f"Friction coefficient of a tooth pair, {RPM:g} rpm, {TORQUE_NM:g} N m (shaded: it carries alone)",
+        title=f"Friction coefficient of a tooth pair, {RPM:g} rpm, {TORQUE_NM:g} N·m (shaded: it carries alone)",
     )
 
 
@@ -418,7 +418,7 @@ def response_roughness(cases: list[ResponseCase] | None = None) -> Figure:
         cases or [response_case(roughness) for roughness in ROUGHNESS_UM],
         mesh_frequency_hz=mesh_frequency_hz(),
         lines_hz=lines.tolist(),
-        title=f"Pinion along the line of action, {RPM:g} rpm, {TORQUE_NM:g} N m, by flank roughness (▾: its lines)",
+        title=f"Pinion along the line of action, {RPM:g} rpm, {TORQUE_NM:g} N·m, by flank roughness (▾: its lines)",
     )
 
 
@@ -556,7 +556,7 @@ def crack_comparison() -> Figure:
         change_mps2={name: a - values[named(0)] for name, a in values.items() if name != named(0)},
         reach_cycles=reach,
         zoom_cycles=(-2.0, 8.0),
-        title=f"Acceleration of the pinion along the line of action, {RPM:g} rpm, {TORQUE_NM:g} N m, Rq 0.45 µm",
+        title=f"Acceleration of the pinion along the line of action, {RPM:g} rpm, {TORQUE_NM:g} N·m, Rq 0.45 µm",
     )
 
 

@@ -1,6 +1,6 @@
 """The forging drive: interaction force and its errors, starts and stops and continuous rotation.
 
-Machine: preset "manipulator_formula", with the study's 95 N m, 290 kg, 1 ms; sensors without noise unless said.
+Machine: preset "manipulator_formula", with the study's 95 N·m, 290 kg, 1 ms; sensors without noise unless said.
 """
 
 from __future__ import annotations

@@ -61,7 +61,10 @@ class Claim:
 def judged(statement: str, found: str, *, agrees: bool, partly: bool = False, because: str = "") -> Claim:
     """Return a claim with the verdict that two comparisons of numbers give."""
     return Claim(
-        statement, with_minus(found), "agrees" if agrees else "agrees in part" if partly else "does not", because
+        statement,
+        with_minus(found),
+        "agrees" if agrees else "agrees in part" if partly else "does not",
+        with_minus(because),
     )
 
 

@@ -55,13 +55,14 @@ def _maps(study: Study, drawn: dict[str, Figure]) -> list[PaperFigure]:
     claims = (
         judged(
             "the stiffness falls where one pair carries and never to zero",
-            f"from {stiffness[:, at].max():.3g} to {stiffness[:, at].min():.3g} N/m at {maps.torque_nm[at]:g} N m",
+            f"from {1e-8 * stiffness[:, at].max():.3g} to {1e-8 * stiffness[:, at].min():.3g} × 10⁸ N/m at "
+            f"{maps.torque_nm[at]:g} N·m",
             agrees=0.5 < stiffness[:, at].min() / stiffness[:, at].max() < 0.95,
         ),
         judged(
             "it grows with the torque",
-            f"mean {stiffness[:, 0].mean():.3g} at {maps.torque_nm[0]:g}, {stiffness[:, -1].mean():.3g} N/m at "
-            f"{maps.torque_nm[-1]:g} N m",
+            f"mean {1e-8 * stiffness[:, 0].mean():.3g} × 10⁸ N/m at {maps.torque_nm[0]:g}, "
+            f"{1e-8 * stiffness[:, -1].mean():.3g} × 10⁸ N/m at {maps.torque_nm[-1]:g} N·m",
             agrees=float(stiffness[:, -1].mean()) > float(stiffness[:, 0].mean()),
         ),
     )
@@ -80,7 +81,7 @@ def _maps(study: Study, drawn: dict[str, Figure]) -> list[PaperFigure]:
         ),
         judged(
             "it grows with the torque",
-            f"{1e6 * peaks[0]:.3g} µm at {maps.torque_nm[0]:g}, {1e6 * peaks[-1]:.3g} µm at {maps.torque_nm[-1]:g} N m",
+            f"{1e6 * peaks[0]:.3g} µm at {maps.torque_nm[0]:g}, {1e6 * peaks[-1]:.3g} µm at {maps.torque_nm[-1]:g} N·m",
             agrees=bool(np.all(np.diff(peaks) > 0.0)),
         ),
     )
@@ -131,11 +132,11 @@ def _frequencies(study: Study, drawn: dict[str, Figure]) -> PaperFigure:
     natural = [study.natural_hz[t] for t in TORQUES_NM]
     claims: tuple[Claim, ...] = (
         within_part(
-            "a torsional resonance of about 2650 Hz", 2650.0, study.natural_hz[170.0], "Hz at 170 N m", part=0.02
+            "a torsional resonance of about 2650 Hz", 2650.0, study.natural_hz[170.0], "Hz at 170 N·m", part=0.02
         ),
         judged(
             "2650 to 2700 Hz",
-            f"{', '.join(f'{f:.0f}' for f in natural)} Hz at {', '.join(f'{t:g}' for t in TORQUES_NM)} N m",
+            f"{', '.join(f'{f:.0f}' for f in natural)} Hz at {', '.join(f'{t:g}' for t in TORQUES_NM)} N·m",
             agrees=all(2640.0 < f < 2710.0 for f in natural),
             partly=any(2640.0 < f < 2710.0 for f in natural),
             because="contact is softer under less load; the hub inertia was chosen for these frequencies",
@@ -169,7 +170,7 @@ def _relieved_jumps(study: Study) -> tuple[str, bool]:
         for ends in ((900.0, 4100.0), (4100.0, 900.0))
     ]
     jump_text = " and ".join("no jump" if jump is None else f"{jump:.0f} Hz" for jump in jumps)
-    return f"{jump_text} at {study.torque_nm:g} N m ({RELIEF_UM:g} µm over {RELIEF_MM:g} mm)", any(
+    return f"{jump_text} at {study.torque_nm:g} N·m ({RELIEF_UM:g} µm over {RELIEF_MM:g} mm)", any(
         jump is not None for jump in jumps
     )
 
@@ -187,13 +188,13 @@ def _sweeps(study: Study, drawn: dict[str, Figure]) -> PaperFigure:
                 "the primary resonance lies at 2700 Hz",
                 2700.0,
                 peak,
-                f"Hz at {torque:g} N m",
+                f"Hz at {torque:g} N·m",
                 part=0.04,
                 because="contact is softer under less load",
             ),
             judged(
                 "hysteretic jumps in sweeps up and down",
-                f"{torque:g} N m, up and down: {jump_text}",
+                f"{torque:g} N·m, up and down: {jump_text}",
                 agrees=any(jump is not None for jump in jumps),
                 partly=jumps_relieved,
                 because=f"flawless flanks hardly part at 8 % of damping; with tip relief, up and down: {relieved}",
@@ -239,7 +240,7 @@ def _kinematics(pair: FlexiblePair, torque_nm: float, step_s: float) -> PaperFig
         CurvePanel(time, {"acceleration": acceleration[shown]}, "time (s)", "acceleration (m/s²)"),
     ]
     figure = curves_figure(
-        panels, title=f"Transmission error and its derivatives, 2000 rpm, {torque_nm:g} N m", height_in=1.4
+        panels, title=f"Transmission error and its derivatives, 2000 rpm, {torque_nm:g} N·m", height_in=1.4
     )
     n = round(60.0 / 2000.0 / 50 / run.interval_s)
     last, before = x[-n:] - x[-n:].mean(), x[-2 * n : -n] - x[-2 * n : -n].mean()
@@ -341,7 +342,7 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
         view.triangles,
         moving,
         near_mm=near,
-        title=f"Von Mises stress of the driver as its contacts move, {torque_nm:g} N m",
+        title=f"Von Mises stress of the driver as its contacts move, {torque_nm:g} N·m",
     )
     # The study's statements, each judged by one of these numbers.
     far = view.values(np.array([np.full(mesh.n_nodes, float(abs(k) == 2)) for k in NEIGHBOURS])) > 0.5

@@ -217,7 +217,7 @@ def cell_limits(positions: FloatArray, *, logarithmic: bool = False) -> tuple[fl
 def pooled_levels(
     levels: FloatArray, positions: FloatArray, n_columns: int, n_rows: int, *, logarithmic: bool = False
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the largest level of each pixel, and a row of `levels` that is in each row of pixels.
+    """Return the largest known level of each pixel, and a row of `levels` that is in each row of pixels.
 
     Rows of pixels share out the span of `cell_limits` equally. One that holds no position shows the nearest: speeds of
     a run-up are not equally far apart, and the next one up would lie beside the orders that are drawn over them.
@@ -234,7 +234,7 @@ def pooled_levels(
     n_columns = min(levels.shape[1], n_columns)
     columns = np.linspace(0, levels.shape[1], n_columns + 1).astype(int)[:-1]
     if len(positions) < 2:
-        return np.maximum.reduceat(levels, columns, axis=1), np.zeros(len(positions), dtype=np.intp)
+        return np.fmax.reduceat(levels, columns, axis=1), np.zeros(len(positions), dtype=np.intp)
     ends, at = cell_limits(positions, logarithmic=logarithmic), np.asarray(positions, dtype=np.float64)
     if logarithmic:
         ends, at = (float(np.log(ends[0])), float(np.log(ends[1]))), np.log(at)
@@ -247,9 +247,9 @@ def pooled_levels(
     nearest = np.searchsorted((at[:-1] + at[1:]) / 2.0, (edges[:-1] + edges[1:]) / 2.0)
     rows = np.where(is_empty, nearest, first)
     # a row more than there are, for empty rows of pixels past the last position
-    largest = np.maximum.reduceat(np.vstack([levels, levels[-1:]]), first, axis=0)
+    largest = np.fmax.reduceat(np.vstack([levels, levels[-1:]]), first, axis=0)
     pooled = np.where(is_empty[:, None], levels[nearest], largest)
-    return np.maximum.reduceat(pooled, columns, axis=1), rows
+    return np.fmax.reduceat(pooled, columns, axis=1), rows
 
 
 def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") -> Figure:
@@ -445,6 +445,12 @@ def _x_label(axes: Axes) -> str:
     return next(filter(None, names), "")
 
 
+def _y_label(axes: Axes) -> str:
+    """Return the name of the y axis; of panels beside each other that share it only the first shows it."""
+    shared = axes.get_shared_y_axes().get_siblings(axes)
+    return next(filter(None, (panel_axes.get_ylabel() for panel_axes in (axes, *shared))), "")
+
+
 def _level_panel(axes: Axes) -> LevelPanel:
     from matplotlib.collections import QuadMesh
 
@@ -454,14 +460,16 @@ def _level_panel(axes: Axes) -> LevelPanel:
         unit = mesh.colorbar.ax.get_ylabel() if mesh.colorbar is not None else ""
         low, high = (float(np.max(limit)) for limit in mesh.get_clim())
         is_logarithmic, words = axes.get_yscale() == "log", _words_of(axes)
-        names = (_x_label(axes), axes.get_ylabel(), unit)
+        names = (_x_label(axes), _y_label(axes), unit)
         return LevelPanel(levels, *_axes_of_mesh(mesh), *names, is_logarithmic, span=high - low or 1.0, title=words)
     image = axes.images[0]
     left, right, low, high = image.get_extent()
-    values = np.asarray(image.get_array(), dtype=np.float64)
+    values, unit = np.ma.asarray(image.get_array()).astype(np.float64).filled(np.nan), ""
+    if image.colorbar is not None:
+        unit, values = image.colorbar.ax.get_ylabel(), np.clip(values, *image.get_clim())
     at, positions = (np.linspace(a, b, n) for a, b, n in ((left, right, values.shape[1]), (low, high, values.shape[0])))
-    span = float(np.ptp(values)) or 1.0
-    names = (axes.get_xlabel(), axes.get_ylabel(), "")
+    span = float(np.nanmax(values) - np.nanmin(values)) or 1.0
+    names = (axes.get_xlabel(), axes.get_ylabel(), unit)
     return LevelPanel(
         values, at, positions, *names, span=span, title=_words_of(axes), square=axes.get_aspect() in ("equal", 1.0)
     )

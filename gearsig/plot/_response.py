@@ -129,7 +129,8 @@ def response_figure(
 
         path = (case.displacement_m * MICRO, case.velocity_mps * MILLI)
         phase.plot(*path, color=style.MEASURED, linewidth=0.5, alpha=0.35)
-        style.label_axes(phase, "", "velocity (mm/s)")
+        for axes in (phase, section):
+            style.label_axes(axes, "", "velocity (mm/s)")
         dots = (case.poincare_displacement_m * MICRO, case.poincare_velocity_mps * MILLI)
         for axes, size in ((phase, 2.4), (section, 2.0)):
             axes.plot(*dots, "o", color=style.FAULT, markersize=size, markeredgewidth=0.0, zorder=3)

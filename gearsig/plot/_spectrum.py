@@ -16,7 +16,7 @@ from gearsig.formatting import axis_unit, unit_text
 from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
-from gearsig.plot._panels import ChartLine, LinePanel
+from gearsig.plot._panels import UNDER_A_LINE, ChartLine, LinePanel
 from gearsig.plot._series import N_POINTS, envelope, thin
 from gearsig.plot._style import Scale, above_zero, decibel_text, decibels, plain, with_unit
 from gearsig.recording import Recording
@@ -108,7 +108,8 @@ def _draw_lines(
         axes.plot(*thin(x, displayed(floor[start:stop]), N_POINTS // 2), color=style.FLOOR, linewidth=1.2, zorder=2.5)
     at, low, high = envelope(x, displayed(y), N_POINTS // 4)
     if len(at) < len(x):
-        axes.fill_between(at, low, high, color=style.MEASURED, alpha=0.22, linewidth=0, zorder=1.8)
+        colour, name = style.MEASURED, UNDER_A_LINE
+        axes.fill_between(at, low, high, color=colour, alpha=0.22, linewidth=0, zorder=1.8, label=name)
     axes.plot(at, high, color=style.MEASURED, linewidth=0.9, zorder=2)
     for position in marked:
         if limits[0] <= position <= limits[1]:

@@ -45,6 +45,7 @@ class Figure {
     this.data = data;
     this.lines = data.lines.map((line) => ({ ...line, x: numbers(line.x), y: numbers(line.y), low: numbers(line.low), high: numbers(line.high) }));
     this.levels = data.map && bytes(data.map.levels);
+    this.hasScale = data.map && (!data.square || data.map.unit); // points of a recurrence are there or not
     this.whole = data.whole;
     // An answer to an earlier question does not undo a zoom that is under way.
     if (!asked || same(asked, [...data.shown, ...(data.across ?? [])])) {
@@ -205,7 +206,7 @@ class Figure {
     this.width = root.clientWidth;
     if (!this.width) return;
     if (data.rows) return this.drawRows(style);
-    this.plotWidth = Math.max(this.width - LEFT - (data.map && !data.square ? SCALE : RIGHT), 60);
+    this.plotWidth = Math.max(this.width - LEFT - (this.hasScale ? SCALE : RIGHT), 60);
     if (data.square) this.plotWidth = Math.min(this.plotWidth, MOST_SQUARE);
     this.plotHeight = data.square ? this.plotWidth : data.height;
     const named = this.placed();
@@ -230,7 +231,7 @@ class Figure {
       add(inside, "circle", { cx: this.scale(x), cy: this.rise(y), r: 7, fill: "none", stroke: data.fault, "stroke-width": 2 });
     this.drawCursors(inside, named);
     this.drawOwn(inside);
-    if (data.map && !data.square) this.drawScale();
+    if (this.hasScale) this.drawScale();
     this.selection = add(inside, "rect", { y: this.top, height: this.plotHeight, width: 0, fill: this.ink, opacity: 0.12 });
     this.drawPeaks();
   }
@@ -410,7 +411,7 @@ class Figure {
     for (let i = 0; i < this.levels.length; i++) {
       const row = map.rows - 1 - Math.floor(i / map.columns), at = 4 * (row * map.columns + (i % map.columns));
       image.data.set(lut.subarray(3 * this.levels[i], 3 * this.levels[i] + 3), at);
-      image.data[at + 3] = 255;
+      image.data[at + 3] = map.blank && !this.levels[i] ? 0 : 255;
     }
     context.putImageData(image, 0, 0);
     const [low, high] = map.span;
@@ -485,10 +486,10 @@ class Figure {
     const column = Math.floor(((x - low) / (high - low)) * map.columns);
     const share = 1 - (py - this.top) / this.plotHeight, row = Math.min(map.rows - 1, Math.floor(share * map.rows));
     if (column < 0 || column >= map.columns) return "";
-    const level = map.low + (this.levels[row * map.columns + column] / 255) * (map.high - map.low);
-    const y = this.ofShare(share);
+    const step = this.levels[row * map.columns + column], level = map.low + (step / 255) * (map.high - map.low);
+    const y = this.ofShare(share), isBlank = map.blank && !step;
     const also = map.also ? `, ${figure(map.also[row])} ${map.also_unit}` : "";
-    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}${this.data.square ? "" : `: ${withMinus(level.toFixed(digits(map)))} ${map.unit}`}`;
+    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}${this.hasScale && !isBlank ? `: ${withMinus(level.toFixed(digits(map)))} ${map.unit}` : ""}`;
   }
 
   showTip(lines, event) {
@@ -556,7 +557,8 @@ class Figure {
       entry.append(key, name);
       left.append(entry);
     }
-    if (this.data.has_tools) {
+    const isNarrow = this.root.clientWidth > 0 && this.root.clientWidth < 330; // one of several beside each other
+    if (this.data.has_tools && !isNarrow) {
       for (const [tool, label] of Object.entries(TOOLS).slice(0, this.data.dates ? 1 : 3)) // no harmonics of a date
         right.append(button(label, () => this.choose(tool), `${label}: drag it along, or use the arrow keys${tool === "sidebands" ? ", with Shift for their distance" : ""}`, this.tool === tool));
       if (this.lines.length)
@@ -600,6 +602,7 @@ class Figure {
     if (data.map) {
       const { map } = data, [low, high] = map.span, rows = [[data.x, data.y, map.unit].map(quoted)];
       for (let i = 0; i < this.levels.length; i++) {
+        if (map.blank && !this.levels[i]) continue;
         const x = low + ((i % map.columns) + 0.5) / map.columns * (high - low);
         const y = this.ofShare((Math.floor(i / map.columns) + 0.5) / map.rows);
         rows.push([exact(x), exact(y), (map.low + this.levels[i] / 255 * (map.high - map.low)).toFixed(digits(map) + 1)]);

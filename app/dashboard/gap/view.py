@@ -332,7 +332,7 @@ def _show_panels(report: GapReport) -> None:
     steps = [
         ChartRow(
             f"+ {step.label}" if i else step.label, 0.0, step.remaining.value,
-            beside=f"{step.remaining.value:.2g}", interval=(step.remaining.low, step.remaining.high),
+            beside=step.remaining.text, interval=(step.remaining.low, step.remaining.high),
         )
         for i, step in enumerate(report.steps)
     ]  # fmt: skip

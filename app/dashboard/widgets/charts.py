@@ -285,9 +285,11 @@ def show_map(
     part = values[:, start:stop]
     # rows of the picture lie at equal steps of y, those of the map need not
     pooled, at = pooled_levels(part, y, MAP_COLUMNS, MAP_ROWS, logarithmic=panel.logarithmic)
-    high = float(values.max())
+    high = float(np.nanmax(values))
     low = high - (dynamic_range_db if panel.span is None else panel.span)
-    levels = np.clip(255 * (pooled - low) / (high - low), 0, 255).astype(np.uint8)
+    is_blank = np.isnan(pooled)  # which are sent as 0, where there are such
+    shades = np.clip(255 * (pooled - low) / (high - low), float(is_blank.any()), 255)
+    levels = np.where(is_blank, 0, shades).astype(np.uint8)
     first, last = float(x[start] - half), float(x[min(stop, len(x)) - 1] + half)
     data = _described(panel, key, span, ends, height_px) | {
         "lines": [_sent(line, span) for line in panel.lines],
@@ -302,6 +304,7 @@ def show_map(
             "limits": list(cell_limits(y, logarithmic=panel.logarithmic)),
             "low": low,
             "high": high,
+            "blank": bool(is_blank.any()),
             "unit": panel.unit,
             "colours": b64encode(level_colours(dark=is_dark()).tobytes()).decode("ascii"),
             "also": None if also is None else [float(also[0][i]) for i in at],
