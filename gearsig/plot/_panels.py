@@ -436,19 +436,23 @@ def _names_of_upright_lines(axes: Axes) -> dict[float, str]:
 
 def _x_label(axes: Axes) -> str:
     """Return the name of the x axis; of panels below each other over the same range only the last shows it."""
-    left, limits = round(axes.get_position().x0, 2), axes.get_xlim()
-    figure = axes.get_figure(root=True)
-    alike = [
-        panel_axes for panel_axes in (figure.axes if figure is not None else ()) if panel_axes.get_xlim() == limits
-    ]
-    names = [panel_axes.get_xlabel() for panel_axes in (axes, *alike) if round(panel_axes.get_position().x0, 2) == left]
+    left = round(axes.get_position().x0, 2)
+    alike = [other for other in _panels_beside(axes) if other.get_xlim() == axes.get_xlim()]
+    names = [other.get_xlabel() for other in (axes, *alike) if round(other.get_position().x0, 2) == left]
     return next(filter(None, names), "")
 
 
 def _y_label(axes: Axes) -> str:
-    """Return the name of the y axis; of panels beside each other that share it only the first shows it."""
-    shared = axes.get_shared_y_axes().get_siblings(axes)
-    return next(filter(None, (panel_axes.get_ylabel() for panel_axes in (axes, *shared))), "")
+    """Return the name of the y axis; of panels beside each other over the same range only the first shows it."""
+    top = round(axes.get_position().y1, 2)
+    alike = [other for other in _panels_beside(axes) if other.get_ylim() == axes.get_ylim()]
+    names = [other.get_ylabel() for other in (axes, *alike) if round(other.get_position().y1, 2) == top]
+    return next(filter(None, names), "")
+
+
+def _panels_beside(axes: Axes) -> list[Axes]:
+    figure = axes.get_figure(root=True)
+    return [other for other in (figure.axes if figure is not None else ()) if other.get_label() != "<colorbar>"]
 
 
 def _level_panel(axes: Axes) -> LevelPanel:

@@ -8,7 +8,7 @@ from matplotlib.text import Text
 from scipy.spatial import Delaunay
 
 from gearsig.errors import InputError
-from gearsig.plot import draw_shaded, gear_mesh_figure, gear_modes_figure, gear_stress_figure, new_figure
+from gearsig.plot import draw_shaded, gear_mesh_figure, gear_modes_figure, gear_stress_figure, new_figure, panels_of
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -58,6 +58,10 @@ def test_stress_is_drawn_in_mpa_with_its_force():
     assert {"von Mises stress (MPa)", "500 N"} <= _texts(figure)
     free = gear_stress_figure(SQUARE, TRIANGLES, stress, near_mm=NEAR)
     assert free.axes[0].images[0].get_clim() == (0.0, 50.0)
+    (((panel,),),) = panels_of(free)
+    assert panel.unit == "von Mises stress (MPa)"
+    assert np.isnan(panel.levels).any()  # where there is no gear
+    assert panel.levels[np.isfinite(panel.levels)].max() == pytest.approx(50.0, rel=0.01)
 
 
 def test_long_thin_triangles_are_shaded_without_streaks_or_holes():

@@ -56,6 +56,7 @@ def test_maps_of_equal_steps_are_zoomed() -> None:
     np.testing.assert_allclose(first.at, cycles)
     np.testing.assert_allclose(first.positions, TORQUE)
     assert (first.title, second.title) == ("stiffness (N/m)", "error (µm)")
+    assert first.y == second.y == "torque (N·m)"
     assert first.span == pytest.approx(np.ptp(values))
     uneven = np.sort(np.random.default_rng(1).uniform(0.0, 1.0, 41))
     assert panels_of(mesh_maps_figure(uneven, TORQUE, {"stiffness (N/m)": values})) == []
