@@ -95,6 +95,9 @@ def take(page: Page, clock: Clock) -> None:
     page.get_by_role("button", name="Diagnose").click()
     page.get_by_role("tab", name="How far").wait_for(timeout=600_000)
     clock.tell("gap of two samples, nothing kept of the rig")
+    page.set_viewport_size({"width": 1280, "height": 1060})
+    settle(page)
+    page.screenshot(path=PICTURES / "gap.png")
     with TemporaryDirectory() as folder:
         long_recording(page, clock, Path(folder))
 
@@ -110,7 +113,7 @@ def flexible_and_fleet(page: Page, clock: Clock) -> None:
     page.locator(".figure svg").first.wait_for()
     clock.tell("flexible pair: both sweeps and all maps")
     clock.start()
-    page.get_by_text("Mesh stiffness over angle and torque").click()
+    page.get_by_text("Mesh stiffness", exact=True).click()
     clock.tell("its view *Mesh stiffness*")
     clock.start()
     page.get_by_role("link", name="Fleet").click()

@@ -48,7 +48,7 @@ def test_the_page_and_the_table_hold_every_statement(tmp_path) -> None:
     assert names == {"one.png", "one.svg", "claims.json", "index.html"}
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "<b>it grows" not in page  # escaped
-    assert "does not, because it grows" in page
+    assert "does not agree, because it grows" in page
     rows = json.loads((tmp_path / "claims.json").read_text(encoding="utf-8"))["claims"]
     assert [row["verdict"] for row in rows] == ["agrees", "does not"]
 

@@ -244,7 +244,7 @@ class Figure {
     this.left = isAbove ? 8 : Math.min(0.42 * this.width, 14 + 6.6 * Math.max(...data.rows.map((row) => row.name.length)));
     this.plotWidth = Math.max(this.width - this.left - beside, 60);
     this.top = 6;
-    const room = (isAbove ? this.width - this.left : this.left - 14) / 6.3, names = data.rows.map((row) => wrapped(row.name, room, isAbove ? 2 : 3));
+    const room = (isAbove ? this.width - this.left : this.left - 14) / 6.3, names = data.rows.map((row) => wrapped(row.name, room, 3));
     const nAbove = isAbove ? Math.max(...names.map((lines) => lines.length)) : 0, above = 14 * nAbove;
     this.rowHeight = ROW_HEIGHT + (isAbove ? above - 6 : 0);
     this.plotHeight = this.rowHeight * data.rows.length;
