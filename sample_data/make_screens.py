@@ -95,7 +95,7 @@ def take(page: Page, clock: Clock) -> None:
     page.get_by_role("button", name="Diagnose").click()
     page.get_by_role("tab", name="How far").wait_for(timeout=600_000)
     clock.tell("gap of two samples, nothing kept of the rig")
-    page.set_viewport_size({"width": 1280, "height": 1060})
+    page.set_viewport_size({"width": 1280, "height": 1040})
     settle(page)
     page.screenshot(path=PICTURES / "gap.png")
     with TemporaryDirectory() as folder:
