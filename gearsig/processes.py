@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
@@ -99,6 +100,14 @@ def _jobs_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
 def call_apart(function: Callable[..., Result], *arguments: object, longest_s: float) -> Result:
     """Call a function in a process that may die of it, as compiled readers do of damaged files; it is kept for more.
 
+    Parameters
+    ----------
+    function : callable
+    *arguments
+    longest_s : float
+        Of processor time, which a busy machine does not use up; twenty times as much may pass. Where the system
+        cannot count it, of time that passes.
+
     Raises
     ------
     BrokenProcessPool
@@ -110,12 +119,13 @@ def call_apart(function: Callable[..., Result], *arguments: object, longest_s: f
             _APART = ProcessPoolExecutor(1, mp_context=_Context(), initializer=_start_worker)
         try:
             _APART.submit(_nothing).result()  # it has started: the time that follows is the function's own
-            return _APART.submit(function, *arguments).result(longest_s)
+            longest_wait_s = 20.0 * longest_s if hasattr(signal, "setitimer") else longest_s
+            return _APART.submit(_counted, function, arguments, longest_s).result(longest_wait_s)
         except TimeoutError:
             for process in list(_APART._processes.values()):
                 process.kill()
             _APART = None
-            raise BrokenProcessPool(f"no answer for {longest_s:g} s") from None
+            raise BrokenProcessPool(f"no answer for {longest_wait_s:g} s") from None
         except BrokenProcessPool:
             _APART = None
             raise
@@ -123,6 +133,18 @@ def call_apart(function: Callable[..., Result], *arguments: object, longest_s: f
 
 def _nothing() -> None:
     """Answer."""
+
+
+def _counted(function: Callable[..., Result], arguments: tuple[object, ...], longest_s: float) -> Result:
+    """Call a function; the system ends this process after so much processor time, also within compiled code."""
+    if not hasattr(signal, "setitimer"):
+        return function(*arguments)
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)
+    signal.setitimer(signal.ITIMER_PROF, longest_s)
+    try:
+        return function(*arguments)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def n_processors() -> int:
@@ -185,8 +207,6 @@ def _script_out_of_sight() -> Iterator[None]:
 
 def _start_worker() -> None:
     """Let Ctrl-C end a worker at once and without a traceback; the parent tidies up. It ends with its parent."""
-    import signal
-
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = parent_process()
     if parent is not None and hasattr(signal, "SIGIO"):
