@@ -2,8 +2,9 @@
 
     python fuzz_reader.py KIND N_FILES SEED FOLDER
 
-It prints a line for each file that ends in anything but a result or an error of gearsig, takes over 5 s, or more than
-twice its decoded size and 200 MB; the file stays in the folder. A hang of 60 s or a crash ends the process.
+It prints a line for each file that ends in anything but a result or an error of gearsig, takes over 5 s of processor
+time, or more than twice its decoded size and 200 MB; the file stays in the folder. A hang of 60 s or a crash ends the
+process.
 """
 
 import faulthandler
@@ -278,15 +279,23 @@ def mutated(data, rng):
     return bytes(data)
 
 
-def peak_bytes():
-    status = Path("/proc/self/status").read_text()
-    return 1024 * int(status.partition("VmHWM:")[2].split()[0])
+def memory_bytes(process, what):
+    """Return VmRSS or VmHWM (the most there was since the last reset) of a process; 0 where it is gone."""
+    try:
+        status = Path(f"/proc/{process}/status").read_text()
+    except OSError:
+        return 0
+    return 1024 * int([*status.partition(f"{what}:")[2].split(), "0"][0])
 
 
-def reset_peak():
-    Path("/proc/self/clear_refs").write_text("5")
-    status = Path("/proc/self/status").read_text()
-    return 1024 * int(status.partition("VmRSS:")[2].split()[0])
+def reset_peaks():
+    """Begin anew for this process and those in which it lets others' readers run; return what each takes now."""
+    children = [path.read_text().split() for path in Path("/proc/self/task").glob("*/children")]
+    processes = {process: memory_bytes(process, "VmRSS") for some in (["self"], *children) for process in some}
+    running = {process: n_bytes for process, n_bytes in processes.items() if n_bytes}
+    for process in running:
+        Path(f"/proc/{process}/clear_refs").write_text("5")
+    return running
 
 
 def decoded_bytes(path, result):
@@ -318,7 +327,7 @@ def main(kind, n_files, seed, folder):
         inside = kind == "gzip" and i % 8
         path.write_bytes(gzip.compress(mutated(gzip.decompress(data), rng)) if inside else mutated(data, rng))
         faulthandler.dump_traceback_later(60, exit=True)
-        before, begin, wrong, result = reset_peak(), time.perf_counter(), "", None
+        before, begin, wrong, result = reset_peaks(), time.process_time(), "", None
         try:
             result = read(path)
             n_read += 1
@@ -327,7 +336,8 @@ def main(kind, n_files, seed, folder):
                 wrong = "the error has several lines"
         except BaseException:
             wrong = traceback.format_exc()
-        taken, grown = time.perf_counter() - begin, peak_bytes() - before
+        taken = time.process_time() - begin
+        grown = sum(max(0, memory_bytes(process, "VmHWM") - now) for process, now in before.items())
         slowest, most = max(slowest, taken), max(most, grown)
         if taken > LONGEST_S:
             wrong += f"{taken:.1f} s"
