@@ -514,9 +514,9 @@ class Fleet:
         """
         one_of(table, "table", TABLES)
         target = Path(path)
-        # Dictionaries of texts that hardly repeat, and filters over them, cost time and save no room; small groups of
-        # rows stay in the processor's cache.
-        parquet = "parquet, COMPRESSION snappy, DICTIONARY_SIZE_LIMIT 1000, WRITE_BLOOM_FILTER false, "
+        # Dictionaries of texts that hardly repeat, and filters over them, cost time and save no room: beyond 16
+        # different texts in a group of rows none is begun. Small groups stay in the processor's cache.
+        parquet = "parquet, COMPRESSION snappy, DICTIONARY_SIZE_LIMIT 16, WRITE_BLOOM_FILTER false, "
         forms = {".csv": "csv, HEADER", ".parquet": f"{parquet} ROW_GROUP_SIZE 20480", ".jsonl": "json"}
         form = forms[one_of(target.suffix.lower(), f"ending of {target.name}", forms)]
         if not target.parent.is_dir():
