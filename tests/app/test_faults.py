@@ -37,6 +37,7 @@ LONGEST_TIDYING_S = 30.0
 COMMANDS = {
     "report": "report data -j 2 -o out",
     "fleet": "fleet add data --store out -j 2",
+    "watch": "fleet watch data --once --interval 0.2 --settle 0 --store out -j 2",
     "sweep": "sweep cracked --vary speed=300..900rpm:4 --duration 0.3s -j 2 -o out",
     "bifurcation": "bifurcation cracked --preset symmetric_50_50 --torque 20Nm --vary speed=1600..2400rpm:2 "
     "--points 10 -j 2 -o out",
@@ -128,7 +129,7 @@ class Place:
 
     def results(self) -> dict[str, object]:
         out = self.folder / "out"
-        if self.name == "fleet":
+        if self.name in ("fleet", "watch"):
             table = open_fleet(out).indicators()
             columns = [name for name in ("machine", "point", "date", "name", "value") if name in table]
             ordered = table[columns].astype(str).sort_values(columns)
