@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import exp, gcd
+from math import exp, gcd, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._lines import magnetic_pull_at
 from gearsig.diagnosis._signals import MINIMUM_LINES, SEEN_THERE, AnalysisSignals, BandEnvelope
-from gearsig.prepared import Comb, LinesOverFloor, best_comb, comb_at
+from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at
 from gearsig.rig import Bearing
 from gearsig.spectra import Spectrum
+
+SEEN_DB = 6.0
+"""Height over the floor from which a line between those of a family counts as seen."""
 
 AS_STRONG_DB = 9.0
 """Scatter of a train's lines about a smooth course: a line of two resonances' beats is weakened by so much."""
@@ -27,7 +30,7 @@ def underlying_impulse_train(excess: LinesOverFloor, comb: Comb, shafts: tuple[f
     that of the largest sum of log ratios less a cost per line: a train that is too slow pays for lines of noise, one
     that is too fast leaves lines to others. It counts if at least half of its lines beside the family's are seen, and
     beside the sidebands of the family: a race that turns through the load has them a shaft's order apart. And they
-    must be as strong as the family's, within `AS_STRONG_DB`: nothing makes every q-th line of a train stronger than the
+    must be as strong as the family's, within `AS_STRONG_DB`, over the range where weaker ones could be seen: nothing makes every q-th line of a train stronger than the
     others, whereas lines of a strong family's second-order sidebands, or of its foot, lie everywhere.
 
     Parameters
@@ -98,12 +101,17 @@ def _is_seen_between(
     sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in (1, 2, 3) for side in (-1, 1))]
     explained = np.any([_is_of_family(excess, places, family, sideband) for sideband in sidebands], axis=0)
     further = excess.free_lines_at(places[~explained])
-    seen = excess.log_ratio[further] >= np.log(4.0)
+    seen = excess.log_ratio[further] >= SEEN_DB * np.log(10) / 10
     if len(further) < 3 or float(np.mean(seen)) < 0.5:
         return False
     multiples = excess.free_lines_at(np.arange(1, int(reach / family) + 1) * family)
     own_db, between_db = (excess.over_floor_db(lines) for lines in (multiples, further[seen]))
-    return bool(np.median(between_db) >= np.median(own_db) - AS_STRONG_DB)
+    # What is seen is over 6 dB, so that lines weaker than 6 dB and the scatter have none between that are too weak.
+    telling = own_db >= SEEN_DB + AS_STRONG_DB
+    if telling.any():
+        between_db = between_db[further[seen] <= multiples[telling].max()]
+        own_db = own_db[telling]
+    return len(between_db) > 0 and bool(np.median(between_db) >= np.median(own_db) - AS_STRONG_DB)
 
 
 def _is_of_family(excess: LinesOverFloor, places: FloatArray, family: float, sideband: float) -> NDArray[np.bool_]:
@@ -134,8 +142,9 @@ def part_text(name: str, bearing: str) -> str:
 SAME_BEARING_ORDER = 1e-3
 """Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
 
-N_MULTIPLES = 6
-"""Of a family's fundamental that are looked at."""
+N_MULTIPLES, N_FIRST = 6, 3
+"""Of a family's fundamental that are looked at; and those that are left where the others are smeared: elements that
+come unevenly, and a spall as wide as a part of their distance, make the first multiples alone."""
 
 
 ALTERNATING_DB = 6.0
@@ -213,8 +222,15 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
     on it.
     """
     trains: list[Candidate] = []
+    pulls: list[Candidate] = []
     for _ in range(3):
-        candidates = _distinct(_significant(signals, envelopes))
+        candidates = _significant(signals, envelopes)
+        if of_pull := [c for c in candidates if mains_beside(signals, c)]:
+            pulls += of_pull
+            for hidden in of_pull:
+                envelopes = [replace(e, excess=e.excess.without_multiples(hidden.comb.fundamental)) for e in envelopes]
+            candidates = _significant(signals, envelopes)
+        candidates = _distinct(candidates)
         named: list[Candidate] = []
         train = None
         for candidate in candidates:
@@ -229,6 +245,8 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
             break
         trains.append(train)
         envelopes = [replace(e, excess=e.excess.without_multiples(train.comb.fundamental)) for e in envelopes]
+    if not named and not trains:
+        named = _distinct(pulls)
     trains = [t for t in trains if not any(t.strength_db < c.strength_db - SECOND_DB for c in named)]
     named = [c for c in named if not any(c.strength_db < t.strength_db - SECOND_DB for t in trains)]
     clear = [c for c in named if _stands_out(signals, c)]
@@ -350,8 +368,17 @@ def _where_it_is_strongest(envelopes: list[BandEnvelope], family: Candidate) -> 
 
 def _families(envelopes: list[BandEnvelope], low: float, high: float) -> list[Candidate]:
     """Return each envelope's best family with a fundamental between `low` and `high`, where it has one."""
-    combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
+    combs = [(_best_of(envelope.excess, low, high), envelope) for envelope in envelopes]
     return [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
+
+
+def _best_of(excess: LinesOverFloor, low: float, high: float) -> Comb | None:
+    """Return the family that chance explains least of those of six and of three multiples, its lines of all six."""
+    combs = [best_comb(excess, low, high, np.arange(1, n + 1)) for n in (N_MULTIPLES, N_FIRST)]
+    six, three = (comb if comb is not None and len(comb.positions) >= MINIMUM_LINES else None for comb in combs)
+    if three is None or (six is not None and six.p_value <= three.p_value):
+        return six if six is None else replace(six, p_value=min(1.0, 2 * six.p_value))
+    return comb_at(excess, three.fundamental, np.arange(1, N_MULTIPLES + 1), min(1.0, 2 * three.p_value))
 
 
 def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:
@@ -371,10 +398,12 @@ def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> lis
     expected = expected_parts(signals)
     candidates = []
     for bearing, name, order in expected:
-        best = clearest_family(envelopes, order * (1 - slip), order * (1 + slip))
+        low, high = order * (1 - slip), order * (1 + slip)
+        best = clearest_family(envelopes, low, high)
         if best is None:
             continue
-        p_value = min(1.0, best.p_value * len(expected))
+        chance = _chance_among_others(signals, best, bearing, low, high)
+        p_value = min(1.0, chance * len(envelopes) * len(expected))
         # Once it is fitted to the lines, the fundamental must still be near the order.
         near = slip * order + best.envelope.excess.spectrum.resolution / 6
         is_near = abs(best.comb.fundamental - order) <= near
@@ -386,6 +415,34 @@ def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> lis
         if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
             kept.append(_with_rivals(signals, candidate))
     return sorted(kept, key=lambda c: c.p_value)
+
+
+def _chance_among_others(
+    signals: AnalysisSignals, family: Candidate, bearing: Bearing, low: float, high: float
+) -> float:
+    """Return a family's chance in its own envelope, its sidebands left out of the lines that chance draws from.
+
+    A race that turns through the load fills the spectrum with lines a shaft's order apart, elements that differ with
+    such a cage's turn apart: they would make the family they belong to look like chance.
+    """
+    excess, own = family.envelope.excess, family.comb.fundamental
+    shaft = signals.rig.ratio(bearing.shaft) or 0.0
+    steps = [step for step in (shaft, shaft * bearing.orders().get("FTF", 0.0)) if step > 0]
+    sides = np.array([side * k * step for step in steps for k in (1, 2, 3) for side in (-1, 1)])
+    carriers = own * np.arange(N_MULTIPLES + 1)
+    masked = excess.masked.copy()
+    masked[_widened(excess, (carriers[:, None] + sides).ravel(), 1)] = True
+    of_family = _widened(excess, carriers[1:], 2)
+    masked[of_family] = excess.masked[of_family]
+    comb = _best_of(replace(excess, masked=masked), low, high)
+    is_same = comb is not None and abs(comb.fundamental / own - 1) <= SAME_FAMILY
+    return min(family.comb.p_value, comb.p_value) if comb is not None and is_same else family.comb.p_value
+
+
+def _widened(excess: LinesOverFloor, places: FloatArray, reach: int) -> NDArray[np.int64]:
+    """Return the numbers of the lines at some places and of those beside them."""
+    lines = excess.lines_at(places)[:, None] + np.arange(-reach, reach + 1)
+    return np.unique(np.clip(lines, 0, len(excess.masked) - 1))
 
 
 def _has_own_lines(comb: Comb) -> bool:
@@ -428,8 +485,11 @@ def _weight(signals: AnalysisSignals, name: str, slip: float) -> float:
     Slip scatters by 0.7 %, with the speed's own error by 2 %. Rolling elements and cages are damaged far more rarely
     than races.
     """
-    typical = 0.02 if speed_is_only_stated(signals) else 0.007
-    return exp(-0.5 * (slip / typical) ** 2) * (0.3 if name in ("BSF", "FTF") else 1.0)
+    return exp(-0.5 * (slip / _typical_slip(signals)) ** 2) * (0.3 if name in ("BSF", "FTF") else 1.0)
+
+
+def _typical_slip(signals: AnalysisSignals) -> float:
+    return 0.02 if speed_is_only_stated(signals) else 0.007
 
 
 def _own_weight(signals: AnalysisSignals, candidate: Candidate) -> float:
@@ -462,10 +522,11 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         if abs(slip) <= slip_of(signals):
             others += _weight(signals, name, slip) * (1.0 if near in (None, bearing) else 0.5)
             rivals.append(f"the {part_text(name, bearing.name)}")
-    beside = _shaft_beside(signals, candidate) or _half_beside(signals, candidate) or mains_beside(signals, candidate)
-    if beside:
-        others += 1.0
-        rivals.append(beside)
+    beside = _shaft_beside(signals, candidate) or _half_beside(signals, candidate)
+    pull = "" if beside else mains_beside(signals, candidate)
+    if beside or pull:
+        others += _weight_of_pull(signals, candidate) if pull else 1.0
+        rivals.append(beside or pull)
     if candidate.name == "BPFO":
         shallow = min(1.0, (SHALLOW / max(candidate.modulation, 1e-9)) ** 2)
         differ = _elements_differ(signals, candidate)
@@ -475,6 +536,15 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         elif shallow > 0.5:
             rivals.append("elements that differ, passing the load of a sound race,")
     return replace(candidate, rivals=tuple(rivals), of_same_order=tuple(of_same_order), share=own / (own + others))
+
+
+def _weight_of_pull(signals: AnalysisSignals, candidate: Candidate) -> float:
+    """Return how likely a supply is on whose magnetic pull a family lies, beside a part at its kinematic order.
+
+    A supply puts it there within its wander, or as far as the record tells; a part anywhere within its slip.
+    """
+    resolution = candidate.envelope.excess.spectrum.resolution / candidate.comb.fundamental
+    return max(1.0, sqrt(2 * pi) * _typical_slip(signals) / (2 * max(MAINS_TOLERANCE, resolution / 2)))
 
 
 SHALLOW = 0.15

@@ -403,6 +403,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     def has_stranger(highest: float, enough: float) -> bool:
         return _of_a_stranger(strong_to(highest)) <= enough
 
+    ones = [*races, *((2 * part, by) for part, by in parts if by and (part, by) not in races)]
     usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
     candidates = [*usual, *common]
     factors = _apart(candidates)
@@ -454,8 +455,11 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         return None
     stated = evidence(1.0, ranges[factor])
     explained, highest = sums[factor], ranges[factor]
-    if (factor > 1 or not races) and (
-        stated < SHARE_OF_STATED * explained or evidence(1.0, highest, CLOSE_TOLERANCE, ()) <= explained
+    # So does one race or element, which strikes twice a spin: the stated rate asks for no mistake.
+    by_one_part = min((evidence(1.0, highest, CLOSE_TOLERANCE, at=[part]) for part in ones), default=0.0)
+    if by_one_part <= AS_GOOD * explained or (
+        (factor > 1 or not races)
+        and (stated < SHARE_OF_STATED * explained or evidence(1.0, highest, CLOSE_TOLERANCE, ()) <= explained)
     ):
         return None
     close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
