@@ -30,8 +30,9 @@ def underlying_impulse_train(excess: LinesOverFloor, comb: Comb, shafts: tuple[f
     that of the largest sum of log ratios less a cost per line: a train that is too slow pays for lines of noise, one
     that is too fast leaves lines to others. It counts if at least half of its lines beside the family's are seen, and
     beside the sidebands of the family: a race that turns through the load has them a shaft's order apart. And they
-    must be as strong as the family's, within `AS_STRONG_DB`, over the range where weaker ones could be seen: nothing makes every q-th line of a train stronger than the
-    others, whereas lines of a strong family's second-order sidebands, or of its foot, lie everywhere.
+    must be as strong as the family's, within `AS_STRONG_DB`, up to where weaker ones could still be seen: nothing makes
+    every q-th line of a train stronger than the others, whereas lines of a strong family's second-order sidebands, or
+    of its foot, lie everywhere.
 
     Parameters
     ----------
@@ -142,9 +143,8 @@ def part_text(name: str, bearing: str) -> str:
 SAME_BEARING_ORDER = 1e-3
 """Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
 
-N_MULTIPLES, N_FIRST = 6, 3
-"""Of a family's fundamental that are looked at; and those that are left where the others are smeared: elements that
-come unevenly, and a spall as wide as a part of their distance, make the first multiples alone."""
+N_MULTIPLES = 6
+"""Of a family's fundamental that are looked at."""
 
 
 ALTERNATING_DB = 6.0
@@ -368,17 +368,8 @@ def _where_it_is_strongest(envelopes: list[BandEnvelope], family: Candidate) -> 
 
 def _families(envelopes: list[BandEnvelope], low: float, high: float) -> list[Candidate]:
     """Return each envelope's best family with a fundamental between `low` and `high`, where it has one."""
-    combs = [(_best_of(envelope.excess, low, high), envelope) for envelope in envelopes]
+    combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
     return [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
-
-
-def _best_of(excess: LinesOverFloor, low: float, high: float) -> Comb | None:
-    """Return the family that chance explains least of those of six and of three multiples, its lines of all six."""
-    combs = [best_comb(excess, low, high, np.arange(1, n + 1)) for n in (N_MULTIPLES, N_FIRST)]
-    six, three = (comb if comb is not None and len(comb.positions) >= MINIMUM_LINES else None for comb in combs)
-    if three is None or (six is not None and six.p_value <= three.p_value):
-        return six if six is None else replace(six, p_value=min(1.0, 2 * six.p_value))
-    return comb_at(excess, three.fundamental, np.arange(1, N_MULTIPLES + 1), min(1.0, 2 * three.p_value))
 
 
 def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:
@@ -434,7 +425,7 @@ def _chance_among_others(
     masked[_widened(excess, (carriers[:, None] + sides).ravel(), 1)] = True
     of_family = _widened(excess, carriers[1:], 2)
     masked[of_family] = excess.masked[of_family]
-    comb = _best_of(replace(excess, masked=masked), low, high)
+    comb = best_comb(replace(excess, masked=masked), low, high)
     is_same = comb is not None and abs(comb.fundamental / own - 1) <= SAME_FAMILY
     return min(family.comb.p_value, comb.p_value) if comb is not None and is_same else family.comb.p_value
 
@@ -489,6 +480,7 @@ def _weight(signals: AnalysisSignals, name: str, slip: float) -> float:
 
 
 def _typical_slip(signals: AnalysisSignals) -> float:
+    """Return the scatter of a part's order about its kinematic one, with the error of a speed that is only stated."""
     return 0.02 if speed_is_only_stated(signals) else 0.007
 
 
