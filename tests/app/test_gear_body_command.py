@@ -114,4 +114,4 @@ def test_a_coarse_gear_on_springs_says_how_coarse_it_is(tmp_path):
 def test_more_modes_than_bodies_have_are_refused_before_the_search(tmp_path):
     found = _run("-o", str(tmp_path / "out"), *SMALL, "--modes", "2000")
     assert isinstance(found.exception, InputError)
-    assert "n_modes is 2000 (allowed: 1 to 300)" in str(found.exception)
+    assert "n_modes is 2000 (allowed: a whole number from 1 to 300)" in str(found.exception)

@@ -41,7 +41,7 @@ def test_the_speed_source_of_the_recording_is_used():
         ({"bandwidth_hz": None}, "either bandwidth_hz or bandwidth_orders"),
         ({"bandwidth_orders": 1.0}, "either bandwidth_hz or bandwidth_orders"),
         ({"bandwidth_hz": None, "bandwidth_orders": 4.0}, "reaches down to order zero"),
-        ({"n_poles": 4}, "1, 2 or 3"),
+        ({"n_poles": 4}, "n_poles is 4 .allowed: a whole number from 1 to 3"),
         ({"n_poles": 0}, "n_poles is 0"),
         ({"generation": "third"}, "generation is 'third'"),
     ],
