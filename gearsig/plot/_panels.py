@@ -468,7 +468,7 @@ def _level_panel(axes: Axes) -> LevelPanel:
         return LevelPanel(levels, *_axes_of_mesh(mesh), *names, is_logarithmic, span=high - low or 1.0, title=words)
     image = axes.images[0]
     left, right, low, high = image.get_extent()
-    values, unit = np.ma.asarray(image.get_array()).astype(np.float64).filled(np.nan), ""
+    values, unit = np.asarray(np.ma.filled(np.ma.asarray(image.get_array(), dtype=np.float64), np.nan)), ""
     if image.colorbar is not None:
         unit, values = image.colorbar.ax.get_ylabel(), np.clip(values, *image.get_clim())
     at, positions = (np.linspace(a, b, n) for a, b, n in ((left, right, values.shape[1]), (low, high, values.shape[0])))

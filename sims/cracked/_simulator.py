@@ -160,7 +160,9 @@ class CrackedTwin(PairTwin):
             healthy, of_healthy = self._planned(point, (), seed, sampling_rate_hz)
             lead_in = Measurement.of(healthy.machine, of_healthy, of_healthy.step_s or 0.0).lead_in
             rng = of_healthy.streams()[0]
-            _LEAD_INS[key] = lead_in and respond(healthy.machine, healthy.operation, rng=rng, **lead_in)
+            _LEAD_INS[key] = (
+                None if lead_in is None else respond(healthy.machine, healthy.operation, rng=rng, **lead_in)
+            )
         return ready, replace(run, before=_LEAD_INS[key])
 
     def _step_s(self, preset: Preset) -> float:
