@@ -18,12 +18,51 @@ Single methods take a recording and a channel's name, or a plain array and its s
 Everything else is imported from its room, e.g. `from gearsig.orders import separate_shafts`.
 """
 
+import os
+import sys
+from pathlib import Path
+
 import lazy_loader
 
 # `__init__.pyi` is the one table of names, for type checkers and at run time: a room is loaded when a name of it is
 # first used, so that `import gearsig` stays light.
 __getattr__, _names, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __version__ = "0.1.0"
+
+
+def _compiled_code_folder() -> None:
+    """Name a folder for Numba's compiled code where none of those that it would choose can be written.
+
+    Without one it refuses to compile: an installation of the administrator's, run by a user without a home folder, or
+    in a container that may only be read, would end with its error. The code is then compiled in each process anew, and
+    removed when that ends; its workers share it. A folder that outlives it and has a name that others can guess would
+    let them run code here.
+    """
+    if sys.platform == "win32":
+        return
+    caches = "~/Library/Caches" if sys.platform == "darwin" else "~/.cache"
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser(caches)  # noqa: PTH111 - Path's raises without one
+    chosen = [os.environ.get("NUMBA_CACHE_DIR"), Path(__file__).parent, home]
+    if any(_can_be_written(Path(folder)) for folder in chosen if folder):
+        return
+    import atexit
+    import shutil
+    import tempfile
+
+    folder = tempfile.mkdtemp(prefix="gearsig-compiled-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    os.environ["NUMBA_CACHE_DIR"] = folder
+    if "numba" in sys.modules:
+        sys.modules["numba"].config.CACHE_DIR = folder
+
+
+def _can_be_written(folder: Path) -> bool:
+    """Whether files can be made in a folder, which may have to be made first."""
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
+
+
+_compiled_code_folder()
 
 
 def __dir__() -> list[str]:

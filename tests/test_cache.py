@@ -65,3 +65,13 @@ def test_only_what_a_dead_process_left_is_removed(tmp_path: Path) -> None:
     (left / "a.h5").touch()
     remove_parts(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {running.name, elsewhere.name, "a[1].html"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="every user of Windows has such a folder")
+def test_where_nothing_can_be_kept_compiled_code_has_a_folder_until_the_end() -> None:
+    words = "import os; os.access = lambda *_: False; import gearsig; x = os.environ['NUMBA_CACHE_DIR']; "
+    code = f"{words}print(x if os.path.isdir(x) else '')"
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert "gearsig-compiled-" in done.stdout
+    assert not Path(done.stdout.strip()).exists()
