@@ -51,7 +51,9 @@ def cache_folder(room: str) -> Path:
 
 def part_beside(path: Path) -> Path:
     """Return a hidden name beside a file's place for what is not complete; it says which process of which machine."""
-    return path.with_name(f".{path.name[:60]}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.part")
+    # Names have 255 bytes, and a letter up to four.
+    begin = os.fsencode(path.name)[:120].decode("utf-8", "ignore")
+    return path.with_name(f".{begin}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.part")
 
 
 def remove_parts(folder: Path) -> None:

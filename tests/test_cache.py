@@ -56,6 +56,7 @@ def test_a_place_that_cannot_be_written_costs_no_result(tmp_path: Path) -> None:
 def test_only_what_a_dead_process_left_is_removed(tmp_path: Path) -> None:
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
+    part_beside(tmp_path / ("🜨" * 60)).touch()  # 240 bytes; this process' own
     own = part_beside(tmp_path / "a[1].html")
     left, running = (own.with_name(own.name.replace(f"-{os.getpid()}-", f"-{n}-")) for n in (ended.pid, os.getppid()))
     elsewhere = own.with_name(f".a.h5.00000000-{ended.pid}-0f.part")
