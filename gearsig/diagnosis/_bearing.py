@@ -300,8 +300,9 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
         if (times := factor_left_open(signals)) > 1:
             why = _other_speed_text(times)
         return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
+    rival = next((r for c in families.named for r in c.rivals), "")
     for seen, but in (
-        (families.named, "something else explains them as well"),
+        (families.named, f"{rival} would show there as well" if rival else "something else explains them as well"),
         (families.unclear, "families beside it are as clear"),
     ):
         if seen:
