@@ -699,7 +699,7 @@ def _of_bearing(change: LevelChange) -> Finding:
 def _of_noise(risen: Sequence[LevelChange], *, has_bearings: bool) -> Finding:
     confirm = "Lubricant and temperature; flow, suction and leaks; the sensor's mounting; a look for rubbing parts."
     causes = "poor lubrication, a rub, turbulence or cavitation"
-    if has_bearings:  # a rolling element that turns out of its track, and wear all around, give no steady rhythm
+    if has_bearings:  # a rolling element that turns out of its track, and wear all around, repeat at no steady rate
         causes = "a worn bearing or a damaged rolling element, " + causes
     title = f"Perhaps {causes}: noise has risen, and no line."
     return Finding("noise-risen", Kind.SUSPICION, title, risen[0].where, None, 0.4, _FIT, _told(risen), confirm)

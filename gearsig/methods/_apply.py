@@ -14,14 +14,14 @@ from gearsig.formatting import file_label
 from gearsig.methods._decompose import PARTS
 from gearsig.methods._orders import ALONG
 from gearsig.methods._phase import IN_PHASE
-from gearsig.methods._spectra import RHYTHMS, WHOLE
+from gearsig.methods._spectra import MODULATIONS, WHOLE
 from gearsig.methods._table import Method, MethodAnswer, part_of, usual_channel
 from gearsig.methods._timefreq import MAPS
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
 from gearsig.rig import Rig, SpeedSource
 
-METHODS: dict[str, Method] = {**WHOLE, **ALONG, **RHYTHMS, **MAPS, **PARTS, **IN_PHASE}
+METHODS: dict[str, Method] = {**WHOLE, **ALONG, **MODULATIONS, **MAPS, **PARTS, **IN_PHASE}
 """The methods by the names that command line and reports know them by."""
 
 

@@ -276,8 +276,8 @@ def _denoising(
         ),
         notes=(
             (
-                "Look at what was removed: a rhythm in it is signal that should not have gone. Steady tones are better "
-                "extracted by a spectrum or a synchronous average."
+                "Look at what was removed: a modulation in it is signal that should not have gone. Steady tones are "
+                "better extracted by a spectrum or a synchronous average."
             ),
         ),
         warnings=warnings,

@@ -45,7 +45,7 @@ def _lowest_hz(prepared: PreparedRecording, channel: str = "") -> tuple[float, s
     return float(f"{low:.3g}"), why
 
 
-def _rhythm_text(prepared: PreparedRecording, channel: str) -> str:
+def _modulation_text(prepared: PreparedRecording, channel: str) -> str:
     low, why = _lowest_hz(prepared, channel)
     return f"{low:.3g}, {why}"
 
@@ -396,7 +396,7 @@ def _kind(
 LOW = MethodOption(
     "lowest_hz", "Lowest frequency (Hz)", "number", None,
     "Integration magnifies whatever is slow. Too low, noise turns into drift; too high, slow motion is bent.",
-    unit="Hz", minimum=0.0, known=_rhythm_text,
+    unit="Hz", minimum=0.0, known=_modulation_text,
 )  # fmt: skip
 HIGH = MethodOption(
     "highest_hz", "Highest frequency (Hz)", "number", None,

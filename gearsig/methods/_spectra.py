@@ -29,7 +29,16 @@ from gearsig.methods._table import (
     waveforms_of,
 )
 from gearsig.orders import OrderMap, SynchronousAverage, order_spectrum
-from gearsig.plot import ChartLine, Cursor, LevelPanel, LinePanel, order_cursors, rhythm_cursors, rig_cursors, with_unit
+from gearsig.plot import (
+    ChartLine,
+    Cursor,
+    LevelPanel,
+    LinePanel,
+    modulation_cursors,
+    order_cursors,
+    rig_cursors,
+    with_unit,
+)
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Channel, Recording
 from gearsig.rig import order_lines
@@ -47,9 +56,9 @@ def cursors_of(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> tuple
     return rig_cursors(prepared.rig, angle, shown, n_sidebands=1)
 
 
-def rhythms_of(prepared: PreparedRecording, shown: Spectrum) -> tuple[Cursor, ...]:
+def modulations_of(prepared: PreparedRecording, shown: Spectrum) -> tuple[Cursor, ...]:
     """Return the lines of shafts and bearings that the spectrum of an envelope, or a coherence, may show."""
-    return rhythm_cursors(cursors_of(prepared, shown))
+    return modulation_cursors(cursors_of(prepared, shown))
 
 
 def periods_of(prepared: PreparedRecording) -> tuple[Cursor, ...]:
@@ -171,7 +180,7 @@ def _order_spectrum(
     return _spectrum_answer(prepared, channel, spectrum, "order spectrum", lowest, top)
 
 
-# Rhythms in noise: envelope, kurtogram, cyclic coherence.
+# Modulations in noise: envelope, kurtogram, cyclic coherence.
 
 BAND = MethodOption(
     "band_hz", "Band (Hz)", "span", None, "Whose envelope it is.", "the most impulsive one", unit="Hz", known=top_hz,
@@ -197,7 +206,7 @@ def _usual_modulation_hz(prepared: PreparedRecording, channel: str = "") -> floa
 
 HIGHEST_MODULATION = MethodOption(
     "highest_modulation_hz", "Highest modulation (Hz)", "number", None,
-    "The fastest rhythm sought. Bands must be three times as wide, and the envelope's spectrum ends there.",
+    "The highest frequency sought. Bands must be three times as wide, and the envelope's spectrum ends there.",
     unit="Hz", known=lambda prepared, channel: f"{_usual_modulation_hz(prepared, channel):.3g}",
 )  # fmt: skip
 
@@ -208,8 +217,8 @@ def _over_orders(prepared: PreparedRecording, over: str) -> bool:
     return over == "order" or (over == "automatic" and angle is not None and not angle.is_steady())
 
 
-_RHYTHM_OVER = MethodOption(
-    "over", "Rhythm over", "choice", "automatic",
+_MODULATION_OVER = MethodOption(
+    "over", "Modulation over", "choice", "automatic",
     "Over orders, a change of speed does not smear the lines that follow it.",
     choices={"automatic": "Automatic", "frequency": "Frequency", "order": "Order"},
 )  # fmt: skip
@@ -229,7 +238,7 @@ def _envelope(
     low, high = banded.envelope.band_hz
     text = f"spectrum of the envelope of {readable(low)} to {readable(high)} Hz"
     top = min(float(banded.spectrum.positions[-1]), (high - low) / 2, usual_hz) if highest is None else highest
-    answer = _marked_spectrum(channel, banded.spectrum, text, rhythms_of(prepared, banded.spectrum), lowest, top)
+    answer = _marked_spectrum(channel, banded.spectrum, text, modulations_of(prepared, banded.spectrum), lowest, top)
     numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}
     facts = (*answer.facts, *([f"Band: {banded.reason}"] if banded.reason else []))
     return replace(answer, numbers={**answer.numbers, **numbers}, facts=facts, warnings=banded.warnings)
@@ -252,7 +261,7 @@ def _envelope_in_blocks(
     spectrum = blocks.envelope_density(channel, band_hz)
     text = f"power density of the squared envelope of {readable(band_hz[0])} to {readable(band_hz[1])} Hz"
     top = highest if highest is not None else min(float(spectrum.positions[-1]), (band_hz[1] - band_hz[0]) / 2)
-    answer = _marked_spectrum(channel, spectrum, text, rhythms_of(prepared, spectrum), lowest, top)
+    answer = _marked_spectrum(channel, spectrum, text, modulations_of(prepared, spectrum), lowest, top)
     return replace(answer, numbers={**answer.numbers, "band_hz": list(band_hz)})
 
 
@@ -265,7 +274,7 @@ def _kurtogram(
     band_hz: tuple[float, float] | None,
     over: str,
 ) -> MethodAnswer:
-    # The band must be wide enough for the fastest rhythm looked for, and its envelope long enough for a kurtosis.
+    # The band must be wide enough for the highest modulation looked for, and its envelope long enough for a kurtosis.
     recording = prepared.recording
     usual = highest_modulation_hz or _usual_modulation_hz(prepared)
     max_levels = max(1, int(np.log2(max(recording.n_samples / 512.0, 2.0))))
@@ -278,7 +287,7 @@ def _kurtogram(
         ),
     )
     grid, band, envelope, spectrum = chosen.kurtogram, chosen.band, chosen.envelope, chosen.spectrum
-    # Where the speed changes, a rhythm's lines stay sharp over orders only.
+    # Where the speed changes, a modulation's lines stay sharp over orders only.
     if _over_orders(prepared, over):
         spectrum = _envelope_orders(prepared, chosen, usual)
     # All bands as a table, with the limit that the kurtosis of noise reaches: without it a large number says little.
@@ -297,7 +306,7 @@ def _kurtogram(
     if angle is not None and not angle.is_steady():
         warnings.append(
             "the speed changes: mesh harmonics that pass resonances raise the kurtosis too, without any impact. Trust "
-            "a rhythm of the envelope over order, or choose a part of even speed"
+            "a modulation of the envelope over order, or choose a part of even speed"
         )
     # The envelope itself, at its own lower rate, for other methods.
     signal = replace(signal_of(prepared, channel), values=envelope.values, rate=envelope.sampling_rate_hz)
@@ -311,7 +320,7 @@ def _kurtogram(
         numbers={"band_hz": [band.low_hz, band.high_hz], "kurtosis": band.kurtosis, "reason": chosen.reason},
         panels=(
             _kurtosis_panel(grid, band, recording.sampling_rate_hz),
-            _panel(spectrum, rhythms_of(prepared, spectrum), linear=True),
+            _panel(spectrum, modulations_of(prepared, spectrum), linear=True),
         ),
         facts=(
             (
@@ -386,7 +395,7 @@ def _coherence(
     band_hz: tuple[float, float] | None,
     odds: int,
 ) -> MethodAnswer:
-    # How large the result is follows from the highest rhythm: refused before it is computed.
+    # How large the result is follows from the highest modulation frequency: refused before it is computed.
     recording = prepared.recording
     over_orders = _over_orders(prepared, over)
     usual_hz = _usual_modulation_hz(prepared)
@@ -396,7 +405,7 @@ def _coherence(
         raise InputError(
             f"highest is {top:g} at {n_bands} bands: {n:.3g} cells",
             allowed=f"at most {MAX_CELLS} cells",
-            remedy="lower the highest rhythm, take fewer bands or a shorter part",
+            remedy="lower the highest modulation frequency, take fewer bands or a shorter part",
         )
 
     def compute() -> spectra.SpectralCoherence:
@@ -410,7 +419,7 @@ def _coherence(
     # Only lines above what noise reaches are marked on the map; its colours begin at the level of one cell in 1000.
     mean = spectra.enhanced_envelope(coherence, band_hz, probability=1.0 / odds)
     spectrum = mean.spectrum
-    cursors = rhythms_of(prepared, spectrum)
+    cursors = modulations_of(prepared, spectrum)
     peaks = _above_noise(mean, cursors)
     where = list(peaks)
     level = ChartLine(spectrum.positions[[0, -1]], np.full(2, mean.level), "noise", -1, dotted=True)
@@ -425,7 +434,7 @@ def _coherence(
     )  # fmt: skip
     return MethodAnswer(
         channel,
-        "spectral coherence: which carriers are modulated at which rhythm",
+        "spectral coherence: which carriers are modulated at which frequency",
         lambda: plot.coherence_figure(coherence, mean, cursors=where),
         columns_of(spectrum),
         matrices={"squared coherence": coherence.coherence_squared},
@@ -486,7 +495,7 @@ def _deconvolution(
 ) -> MethodAnswer:
     recording = prepared.recording
     x, fs = recording.values(channel), recording.sampling_rate_hz
-    warnings, rhythm = list[str](), ""
+    warnings, modulation = list[str](), ""
     notes: tuple[str, ...] = (
         "It makes something impulsive of any noise: other rates must be less alike. Levels are not kept.",
     )
@@ -494,11 +503,11 @@ def _deconvolution(
         if rate_hz is None:
             analysis = prepared.keep(("methods", "analysis"), lambda: analyze(prepared))
             suggested_hz = suggested_rate_hz(analysis)
-            rate_hz, rhythm = suggested_hz or ASSUMED_RATE_HZ, "as found in the recording" if suggested_hz else ""
+            rate_hz, modulation = suggested_hz or ASSUMED_RATE_HZ, "as found in the recording" if suggested_hz else ""
         if not rate_hz:
             raise RefusalError("no rate of the impacts is given", remedy="give how often they come, above 0 Hz")
-        rhythm = rhythm_at(prepared, rate_hz) or rhythm
-        if not rhythm and rate_hz == ASSUMED_RATE_HZ:
+        modulation = modulation_at(prepared, rate_hz) or modulation
+        if not modulation and rate_hz == ASSUMED_RATE_HZ:
             warnings.append(
                 f"{rate_hz:g} impacts per second are assumed: nothing is suspected, and no bearing or shaft is "
                 "described whose rate could be taken. Give the rate that you seek"
@@ -508,7 +517,8 @@ def _deconvolution(
             warnings.append("the speed changes, and the rate of impacts with it: choose a part of even speed")
         result = spectra.multipoint_deconvolution(x, fs, 1.0 / rate_hz, n_taps=taps)
         facts: tuple[str, ...] = (_train_fact(f"{rate_hz:.5g} Hz", result.score, taps, len(x)),)
-        notes = (f"{rate_hz:.5g} Hz: {rhythm}.", *notes) if rhythm else notes  # a shaft's name has no place in a fact
+        if modulation:  # a shaft's name has no place in a fact
+            notes = (f"{rate_hz:.5g} Hz: {modulation}.", *notes)
     else:
         result = spectra.minimum_entropy_deconvolution(x, fs, n_taps=taps)
         facts = (
@@ -588,7 +598,7 @@ def suggested_rate_hz(analysis: Analysis) -> float | None:
     return turns_hz * next(races, 1.0)
 
 
-def rhythm_at(prepared: PreparedRecording, rate_hz: float) -> str:
+def modulation_at(prepared: PreparedRecording, rate_hz: float) -> str:
     """Name the bearing line or the shaft that a rate is of, bearings within their slip; empty where there is none."""
     angle = angle_or_none(prepared)
     if angle is None or angle.mean_speed_rpm <= 0:
@@ -688,14 +698,14 @@ WHOLE = {
     ),
     "indicators": Method("Indicators", "Every condition indicator of the channel.", _indicators),
 }  # fmt: skip
-RHYTHMS = {
+MODULATIONS = {
     "envelope": Method(
-        "Envelope spectrum", "The rhythm of impacts in a band.", _envelope, (BAND, *LINES),
+        "Envelope spectrum", "How often impacts repeat in a band.", _envelope, (BAND, *LINES),
         in_blocks=_envelope_in_blocks,
     ),
     "kurtogram": Method(
         "Kurtogram",
-        "Finds the band that carries impacts, and what rhythm they have: the spectrum of its envelope.",
+        "Finds the band that carries impacts, and how often they repeat: the spectrum of its envelope.",
         _kurtogram,
         (
             PREPARATION,
@@ -706,7 +716,7 @@ RHYTHMS = {
                 "The spectrum is cut into up to 2 to the power of it bands, and into thirds of these.", "up to 7",
                 more=True,
             ),
-            _RHYTHM_OVER,
+            _MODULATION_OVER,
         ),
         "Envelope",
         1_000_000,
@@ -714,18 +724,18 @@ RHYTHMS = {
     ),
     "coherence": Method(
         "Cyclic coherence",
-        "Finds rhythms in noise and in which band they are, also where no band stands out: for bearings and wear.",
+        "Finds modulations in noise and in which band they are, also where no band stands out: for bearings and wear.",
         _coherence,
         (
-            _RHYTHM_OVER,
+            _MODULATION_OVER,
             replace(
                 PREPARATION,
                 default="tones removed",
                 about="Steady tones are coherent with each other: remove them, or mesh harmonics fill the picture.",
             ),
             MethodOption(
-                "highest", "Highest rhythm (Hz or order)", "number", None,
-                "The fastest rhythm sought. Carriers below half of it are left out.",
+                "highest", "Highest modulation frequency (Hz or order)", "number", None,
+                "The highest modulation frequency sought. Carriers below half of it are left out.",
                 "three harmonics of the fastest bearing line",
             ),
             MethodOption(

@@ -9,10 +9,10 @@ from gearsig.plot._cursors import (
     Cursor,
     importance,
     marks_of,
+    modulation_cursors,
     n_rows,
     order_cursors,
     place,
-    rhythm_cursors,
     rig_cursors,
 )
 from gearsig.plot._fe_gear import (
@@ -221,6 +221,7 @@ __all__ = [
     "mesh_maps_figure",
     "mesh_stiffness_figure",
     "modes_figure",
+    "modulation_cursors",
     "motion_profile_figure",
     "n_rows",
     "new_figure",
@@ -241,7 +242,6 @@ __all__ = [
     "power_density",
     "recurrence_figure",
     "response_figure",
-    "rhythm_cursors",
     "rig_cursors",
     "search_panels",
     "series_colours",

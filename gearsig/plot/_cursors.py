@@ -123,7 +123,7 @@ def rig_cursors(
     return order_cursors(order_lines(rig, base, n_sidebands=n_sidebands), scale)
 
 
-def rhythm_cursors(cursors: Iterable[Cursor]) -> tuple[Cursor, ...]:
+def modulation_cursors(cursors: Iterable[Cursor]) -> tuple[Cursor, ...]:
     """Return what an envelope may show: shaft lines, and three harmonics of each bearing line."""
     result: list[Cursor] = []
     for cursor in cursors:

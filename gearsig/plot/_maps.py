@@ -236,7 +236,7 @@ def coherence_figure(
     mean : EnhancedEnvelope or None
         The upper panel; None takes the mean over all carriers. The range of its carriers is drawn beside the map.
     cursors : sequence of Cursor
-        Lines of shafts and bearings, in cyclic frequencies or orders; see `rhythm_cursors`.
+        Lines of shafts and bearings, in cyclic frequencies or orders; see `modulation_cursors`.
     limits : (float, float) or None
         Cyclic frequencies or orders that are drawn; None: all.
 

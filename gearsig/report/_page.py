@@ -58,17 +58,17 @@ def line_cursors(analysis: Analysis, spectrum: Spectrum | OrderMap, *, n_sideban
 
 
 def bearing_cursors(analysis: Analysis, spectrum: Spectrum) -> tuple[Cursor, ...]:
-    """Return shaft lines, three harmonics of each bearing line, and of each rhythm that no described part explains."""
+    """Return shaft lines, three harmonics of each bearing line, and of each modulation that no known part explains."""
     cursors = list(line_cursors(analysis, spectrum, n_sidebands=0))
     for finding in analysis.findings:
         position = _position(analysis, spectrum, finding.where) if is_of_envelope(finding.where) else None
         if position is not None and not finding.where.bearing:
             cursors.append(Cursor(position, "bearing", "impacts", 1))
-    return plot.rhythm_cursors(cursors)
+    return plot.modulation_cursors(cursors)
 
 
 def is_of_envelope(where: Where) -> bool:
-    """Whether a place is a rhythm in a band's envelope: a bearing's, or impacts that no described part explains."""
+    """Whether a place is a modulation in a band's envelope: a bearing's, or impacts that no described part explains."""
     return bool(where.bearing) or (where.band_hz is not None and (where.order or where.frequency_hz) is not None)
 
 

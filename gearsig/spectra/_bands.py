@@ -1,4 +1,4 @@
-"""Which band's envelope shows a rhythm best: kurtogram, spectral coherence and plain envelopes compared."""
+"""Which band's envelope shows a modulation best: kurtogram, spectral coherence and plain envelopes compared."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from gearsig.spectra._kurtogram import kurtogram
 from gearsig.spectra._types import Spectrum, named_signal
 
 LARGEST_SLIP = 0.02
-"""Relative distance at which a rhythm's lines are sought: bearings turn that far from their kinematic orders."""
+"""Relative distance at which a modulation's lines are sought: bearings turn that far from their kinematic orders."""
 
 
 @dataclass(frozen=True)
 class BandChoice:
-    """A way to look at a rhythm, and how clearly it shows there.
+    """A way to look at a modulation, and how clearly it shows there.
 
     Parameters
     ----------
     method : str
         "plain": the envelope of all above the lowest carrier; "kurtogram": of its band; "coherence band": of the band
-        in which the coherence at the rhythm stands out; "enhanced": the mean squared coherence over all carriers.
+        in which the coherence at the modulation stands out; "enhanced": the mean squared coherence over all carriers.
     band_hz : (float, float)
     clarity_db : float
         Mean over the harmonics of the line's height over the floor around it.
     modulation_hz : float
-        The rhythm as it was found, within the slip.
+        The modulation frequency as it was found, within the slip.
     spectrum : Spectrum
         Over modulation frequency.
     """
@@ -45,8 +45,8 @@ class BandChoice:
 
     def __repr__(self) -> str:
         low, high = self.band_hz
-        rhythm = f"{self.clarity_db:.1f} dB at {self.modulation_hz:.5g} Hz"
-        return f"BandChoice({self.method}: {low:.5g} to {high:.5g} Hz, {rhythm})"
+        modulation = f"{self.clarity_db:.1f} dB at {self.modulation_hz:.5g} Hz"
+        return f"BandChoice({self.method}: {low:.5g} to {high:.5g} Hz, {modulation})"
 
 
 def compare_bands(
@@ -58,7 +58,7 @@ def compare_bands(
     slip: float = LARGEST_SLIP,
     preparation: Preparation = "tones removed",
 ) -> tuple[BandChoice, ...]:
-    r"""Return the ways to look at a rhythm of known frequency, the clearest first.
+    r"""Return the ways to look at a modulation of known frequency, the clearest first.
 
     Clarity is :math:`\frac{1}{K} \sum_k 20 \lg (A(k\alpha)/F(k\alpha))` over the first K harmonics, A the line and F
     the floor of the same spectrum; of the squared coherence, a power, 10 lg.
@@ -69,7 +69,7 @@ def compare_bands(
     channel_or_rate_hz : str or float
         The channel of a recording; of an array its sampling rate in Hz.
     modulation_hz : float
-        The rhythm, e.g. how often elements pass a race.
+        The modulation frequency, e.g. how often elements pass a race.
     n_harmonics : int
     slip : float
         Relative range about it.
@@ -87,14 +87,14 @@ def compare_bands(
 
     Notes
     -----
-    The band is chosen for the rhythm that is looked for, so that some of its clarity is chance: noise alone reaches
-    some 6 dB. The kurtogram knows nothing of the rhythm, and takes the band of a few strong shocks where there are.
+    The band is chosen for the modulation that is looked for, so that some of its clarity is chance: noise alone reaches
+    some 6 dB. The kurtogram knows nothing of the modulation, and takes the band of a few strong shocks where there are.
 
     References
     ----------
     J. Antoni, "Fast computation of the kurtogram for the detection of transient faults", 2007. A. Mauricio, W. A.
     Smith, R. B. Randall, J. Antoni and K. Gryllias, "Improved Envelope Spectrum via Feature Optimisation-gram
-    (IESFOgram)", 2020 (band by the coherence at the rhythm).
+    (IESFOgram)", 2020 (band by the coherence at the modulation frequency).
     """
     x, fs, _, _ = named_signal(signal, channel_or_rate_hz, "", "", minimum=64)
     alpha, n = positive(modulation_hz, "modulation_hz", "Hz"), count(n_harmonics, "n_harmonics")
@@ -108,7 +108,7 @@ def compare_bands(
     try:
         band = kurtogram(x, fs).best_band(narrowest_hz=3 * highest)
     except RefusalError:
-        pass  # no band is wide enough for the rhythm's harmonics
+        pass  # no band is wide enough for the modulation's harmonics
     else:
         choices.append(_choice("kurtogram", band.band_hz, x, fs, alpha, n, slip))
     enhanced = enhanced_envelope(coherence)
@@ -120,7 +120,7 @@ def compare_bands(
 def coherence_band(
     coherence: SpectralCoherence, modulation_hz: float, *, n_harmonics: int = 3, slip: float = LARGEST_SLIP
 ) -> tuple[float, float]:
-    r"""Return the band of carriers in which the coherence at a rhythm's harmonics stands out most.
+    r"""Return the band of carriers in which the coherence at a modulation frequency's harmonics stands out most.
 
     .. math:: \max_{a, b} \; \frac{1}{\sqrt{b - a}} \sum_{i=a}^{b} \Big( \sum_k \gamma^2(k\alpha, f_i) - K/M \Big)
 
@@ -176,7 +176,7 @@ def _choice(
 
 
 def _clarity(spectrum: Spectrum, alpha: float, n: int, slip: float, *, power: bool) -> tuple[float, float]:
-    """Return the mean height of the harmonics over the floor in dB, and the rhythm at which it is largest."""
+    """Return the mean height of the harmonics over the floor in dB, and the frequency at which it is largest."""
     values = np.sqrt(spectrum.values) if power else spectrum.values
     amplitudes = replace(spectrum, values=values, scaling="amplitude peak")
     floor = np.maximum(noise_floor(amplitudes).values, 1e-300)

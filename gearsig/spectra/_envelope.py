@@ -483,7 +483,9 @@ def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_mod
         text += ", three times the highest modulation" if of_modulation else ""
     narrower = grid.kurtosis[grid.bandwidth_hz < narrowest_hz * (1.0 - 1e-9)]
     if narrower.size and float(narrower.max()) > band.kurtosis:
-        text += f". Narrower ones reach {narrower.max():.3g}, but their envelopes are too slow to show so fast a rhythm"
+        text += (
+            f". Narrower ones reach {narrower.max():.3g}, but their envelopes are too slow to show so fast a modulation"
+        )
     whole = float(grid.kurtosis[grid.level == 0].max(initial=-np.inf))
     if whole > band.kurtosis:
         text += f". The whole spectrum reaches {whole:.3g}, but is no band: impacts may ring all over it"

@@ -363,7 +363,7 @@ def test_the_kurtogram_shows_the_bearing_in_its_own_band(preparation: str) -> No
     at, values = measured_line(page)
     fault = float(at[at > 5][np.argmax(values[at > 5])])
     assert min(fault % OUTER_RACE_HZ, -fault % OUTER_RACE_HZ) < 1.0  # the race or a harmonic of it
-    choose(page, "Rhythm over", "Order")
+    choose(page, "Modulation over", "Order")
     assert not page.error
 
 
@@ -407,9 +407,9 @@ def test_coherence_names_the_lines_that_stand_out() -> None:
     named = shown_text(page).split("for their slip: ")[1].split("Bearing lines whose peak")[0]
     assert "BPFO bearing" in named
     assert "not that there is damage" in shown_text(page)
-    choose(page, "Rhythm over", "Order")
+    choose(page, "Modulation over", "Order")
     assert not page.error
-    labelled(page, "number_input", "Highest rhythm").set_value(1e9).run()
+    labelled(page, "number_input", "Highest modulation frequency").set_value(1e9).run()
     assert len(page.error) == 1
     assert not page.exception
 
