@@ -112,7 +112,7 @@ def test_the_machine_can_be_changed_as_text_and_a_wrong_one_is_mended() -> None:
     press(page, "Use this text")
     assert len(page.error) >= 1
     assert "driver teeth of pair 'stage 1'" in shown_text(page)
-    assert "at least 3" in shown_text(page)
+    assert "a whole number from 3" in shown_text(page)
     page.text_area[0].set_value(before.replace("driver_teeth = 29", "driver_teeth = 31")).run()
     press(page, "Use this text")
     assert not page.error
