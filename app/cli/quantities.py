@@ -74,7 +74,8 @@ def span(text: str, unit: str, name: str) -> tuple[float, float]:
     """Return both ends of "300..1500rpm"; a unit after the second number holds for both."""
     first, dots, second = text.partition("..")
     if not dots:
-        raise InputError(f"{name} is {text!r}", allowed="FROM..TO", remedy=f"write for example 2..4{unit}")
+        example = "900..4100" if unit == "rpm" else "2..4"
+        raise InputError(f"{name} is {text!r}", allowed="FROM..TO", remedy=f"write for example {example}{unit}")
     if not first.strip() or not second.strip():
         raise InputError(
             f"{name} is {text!r}", allowed=f"two numbers, as in {f'1..2 {unit}'.strip()}", remedy="give both ends"
