@@ -27,7 +27,7 @@ from sims.blind import (
     record_case,
     write_visible,
 )
-from sims.cracked import cracked_gap_simulator
+from sims.cracked import CrackedPair
 from sims.effects import effect
 from sims.gear_pair import PairTwin
 
@@ -248,7 +248,7 @@ def record_same(plan: Plan, planned: PlannedCase, case: BlindCase) -> tuple[Case
     """Record a case on a specimen of the simulator; return it with its labels, laid out like the blind rig's."""
     rng = plan.rng_of_run(planned)
     first = case.conditions[0]
-    twin = cracked_gap_simulator().twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
+    twin = CrackedPair().twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
     added = [_added(twin, fault.name, planned.level, rng) for fault in case.faults]
     seed = int(rng.integers(1, 2**31))
 

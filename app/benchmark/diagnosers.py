@@ -207,9 +207,9 @@ def _cause(name: str, probability: float, options: Mapping[str, str]) -> GapCaus
 def diagnose_forest(case: VisibleCase) -> GapReport:
     """Return the calibrated probabilities of the forests, what may be said of them, and the shaft that shows it."""
     from gearsig.gap import attribute, conditions_of, determined_options
-    from sims.cracked import cracked_gap_simulator
+    from sims.cracked import CrackedPair
 
-    simulator = cracked_gap_simulator()
+    simulator = CrackedPair()
     twin = simulator.twin_of(case.rig)
     recordings, references = (
         [PreparedRecording(r) for r in given_recordings] for given_recordings in (case.recordings, case.references)

@@ -54,7 +54,7 @@ def flexible(
     from sims.simulator import SimulationSetup
 
     request = options.read_request(MODEL, preset, settings, effects, None, None, "1s", "20480Hz", seed)
-    first, last = span(speeds, "rpm", "--speeds")
+    first, last = span(speeds, "rpm", "--speeds", example="900..4100")
     torques_nm = tuple(quantity(text, "N m", "--torques") for text in torques.split(","))
     if fresh:
         options.clear_other_versions(MODEL)

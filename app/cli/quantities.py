@@ -70,11 +70,10 @@ def quantity(text: str, unit: str, name: str) -> float:
     return value if not stated else value * _scale_of_unit(stated, unit, text, name)
 
 
-def span(text: str, unit: str, name: str) -> tuple[float, float]:
+def span(text: str, unit: str, name: str, *, example: str = "2..4") -> tuple[float, float]:
     """Return both ends of "300..1500rpm"; a unit after the second number holds for both."""
     first, dots, second = text.partition("..")
     if not dots:
-        example = "900..4100" if unit == "rpm" else "2..4"
         raise InputError(f"{name} is {text!r}", allowed="FROM..TO", remedy=f"write for example {example}{unit}")
     if not first.strip() or not second.strip():
         raise InputError(

@@ -59,7 +59,7 @@ from gearsig.report import (
     shown_orders,
 )
 from gearsig.rig import Rig
-from sims.cracked import cracked_gap_simulator
+from sims.cracked import CrackedPair
 from sims.machine import nominal_of
 from sims.presets import presets
 
@@ -131,7 +131,7 @@ def _simulated(run: SimulationToCompare, request: AnalysisRequest, recording: Re
             )
         torque_nm = run.torque_nm if run.torque_nm is not None else nominal_of(rig).torque_nm
         point = OperatingCondition(speed_rpm, torque_nm)
-        twin = cracked_gap_simulator().twin_of(rig)
+        twin = CrackedPair().twin_of(rig)
         return twin.run(point, seed=run.seed, duration_s=run.duration_s, sampling_rate_hz=rate_hz)
     setup = Setup(
         run.machine,

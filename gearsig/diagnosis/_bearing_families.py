@@ -213,6 +213,13 @@ class Families:
     unclear: tuple[Candidate, ...] = ()
 
 
+def _without(envelopes: Sequence[BandEnvelope], families: Sequence[Candidate]) -> list[BandEnvelope]:
+    """Return the envelopes with all multiples of these families left out."""
+    for family in families:
+        envelopes = [replace(e, excess=e.excess.without_multiples(family.comb.fundamental)) for e in envelopes]
+    return list(envelopes)
+
+
 def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Families:
     """Return the families of the envelopes, each put down to a part of a bearing only if nothing else explains it.
 
@@ -227,8 +234,7 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
         candidates = _significant(signals, envelopes)
         if of_pull := [c for c in candidates if mains_beside(signals, c)]:
             pulls += of_pull
-            for hidden in of_pull:
-                envelopes = [replace(e, excess=e.excess.without_multiples(hidden.comb.fundamental)) for e in envelopes]
+            envelopes = _without(envelopes, of_pull)
             candidates = _significant(signals, envelopes)
         candidates = _distinct(candidates)
         named: list[Candidate] = []
@@ -244,7 +250,7 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
         if train is None:
             break
         trains.append(train)
-        envelopes = [replace(e, excess=e.excess.without_multiples(train.comb.fundamental)) for e in envelopes]
+        envelopes = _without(envelopes, [train])
     if not named and not trains:
         named = _distinct(pulls)
     trains = [t for t in trains if not any(t.strength_db < c.strength_db - SECOND_DB for c in named)]
@@ -426,8 +432,9 @@ def _chance_among_others(
     of_family = _widened(excess, carriers[1:], 2)
     masked[of_family] = excess.masked[of_family]
     comb = best_comb(replace(excess, masked=masked), low, high)
-    is_same = comb is not None and abs(comb.fundamental / own - 1) <= SAME_FAMILY
-    return min(family.comb.p_value, comb.p_value) if comb is not None and is_same else family.comb.p_value
+    if comb is None or abs(comb.fundamental / own - 1) > SAME_FAMILY:
+        return family.comb.p_value
+    return min(family.comb.p_value, comb.p_value)
 
 
 def _widened(excess: LinesOverFloor, places: FloatArray, reach: int) -> NDArray[np.int64]:
@@ -514,11 +521,12 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         if abs(slip) <= slip_of(signals):
             others += _weight(signals, name, slip) * (1.0 if near in (None, bearing) else 0.5)
             rivals.append(f"the {part_text(name, bearing.name)}")
-    beside = _shaft_beside(signals, candidate) or _half_beside(signals, candidate)
-    pull = "" if beside else mains_beside(signals, candidate)
-    if beside or pull:
-        others += _weight_of_pull(signals, candidate) if pull else 1.0
-        rivals.append(beside or pull)
+    if beside := _shaft_beside(signals, candidate) or _half_beside(signals, candidate):
+        others += 1.0
+        rivals.append(beside)
+    elif pull := mains_beside(signals, candidate):
+        others += _weight_of_pull(signals, candidate)
+        rivals.append(pull)
     if candidate.name == "BPFO":
         shallow = min(1.0, (SHALLOW / max(candidate.modulation, 1e-9)) ** 2)
         differ = _elements_differ(signals, candidate)

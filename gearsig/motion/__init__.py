@@ -54,7 +54,7 @@ from gearsig.motion._segments import (
 )
 from gearsig.motion._start_stop import StartStop, examine_start_stop
 from gearsig.motion._transmission_error import AngleSource, TransmissionError, transmission_error
-from gearsig.motion._types import ForceEstimate, PairMotion, check_turns, refuse_standing
+from gearsig.motion._types import ForceEstimate, PairMotion, check_turns, median_deviation, refuse_standing
 
 __all__ = [
     "AS_PRINTED",
@@ -104,6 +104,7 @@ __all__ = [
     "latched_damping",
     "local_polynomial",
     "measure_motion",
+    "median_deviation",
     "motion_segments",
     "noise_study",
     "pair_force",

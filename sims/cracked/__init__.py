@@ -21,7 +21,6 @@ from sims.cracked._simulator import (
     STEP_ANGLE_RAD,
     CrackedPair,
     CrackedTwin,
-    cracked_gap_simulator,
     simulate_with_motion,
 )
 
@@ -36,7 +35,6 @@ __all__ = [
     "Response",
     "check_convergence",
     "contact_forces",
-    "cracked_gap_simulator",
     "default_step_s",
     "derivative",
     "eigenfrequencies_hz",

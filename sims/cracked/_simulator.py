@@ -172,8 +172,3 @@ class CrackedTwin(PairTwin):
         """
         healthy = self._prepared(replace(preset, effects=()), np.random.default_rng(0))
         return default_step_s(healthy.machine, healthy.operation, STEP_ANGLE_RAD)
-
-
-def cracked_gap_simulator() -> CrackedPair:
-    """Return the model "cracked" as the gap diagnosis takes it."""
-    return CrackedPair()

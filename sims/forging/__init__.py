@@ -22,7 +22,6 @@ from sims.forging._simulator import (
     ForgingManipulator,
     ForgingTwin,
     PreparedDrive,
-    forging_gap_simulator,
     with_effects,
 )
 
@@ -47,7 +46,6 @@ __all__ = [
     "build_rig",
     "check_convergence",
     "drive_numbers",
-    "forging_gap_simulator",
     "position",
     "reach",
     "record",

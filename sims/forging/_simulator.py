@@ -409,11 +409,6 @@ class ForgingTwin:
         return preset_text(preset, notes)
 
 
-def forging_gap_simulator() -> ForgingManipulator:
-    """Return the model as the gap diagnosis takes it."""
-    return ForgingManipulator()
-
-
 def _settings(added: Sequence[Added]) -> tuple[EffectSetting, ...]:
     """Return the catalogue's settings; none of what is a parameter's wrong value."""
     return tuple(

@@ -246,7 +246,7 @@ def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
     return max(chain.lead_in_s, SETTLING * recovery, 0.1)
 
 
-def motion_rate_hz(chain: MeasurementChain, min_motion_hz: float = MIN_MOTION_HZ) -> float:
+def motion_rate_hz(chain: MeasurementChain, min_motion_hz: float) -> float:
     """Points per second that the chain needs of the motion at least."""
     modes = [mode.frequency_hz for channel in chain.channels for mode in channel.path.modes]
     sensors = [channel.accelerometer.resonance_hz or 0.0 for channel in chain.channels]

@@ -340,6 +340,7 @@ def _blank(values: ParameterValues, side: int) -> GearBlank:
 
 
 @lru_cache(maxsize=8)
+@lru_cache(maxsize=4)  # a healthy machine and the flexible pair that is made of it ask for both
 def reduced_gear(blank: GearBlank, n_dof: int) -> ReducedGear:
     """Return a gear: ready-made where one fits, else from the cache, else reduced now with about `n_dof`."""
     for name, ready in READY.items():
@@ -380,8 +381,3 @@ class ReducedTwin(PairTwin):
     def _step_s(self, preset: Preset) -> float:
         del preset
         return TWIN_STEP_S
-
-
-def reduced_gap_simulator() -> ReducedPair:
-    """Return the model "reduced-fe" as the gap diagnosis takes it; its twin's gears are reduced, and kept on disk."""
-    return ReducedPair()

@@ -18,10 +18,10 @@ from gearsig.recording import write_recording
 from gearsig.report import gap_schema, read_gap_json
 from gearsig.rig import write_rig
 from sims import simulate
-from sims.forging import forging_gap_simulator
+from sims.forging import ForgingManipulator
 from sims.registry import gap_simulator, gap_simulators
 
-SIMULATOR = forging_gap_simulator()
+SIMULATOR = ForgingManipulator()
 
 
 def run(arguments: list[str]) -> int:

@@ -40,7 +40,7 @@ from gearsig.gap import (
     load_population,
     without_machines_of,
 )
-from sims.cracked import cracked_gap_simulator
+from sims.cracked import CrackedPair
 
 # --------------------
 # From cases with known causes to the numbers that make the gap's probabilities right on the average.
@@ -158,7 +158,7 @@ def _named_from(fitted: GapCalibration, cases: Sequence[AttributedCase]) -> floa
 @cache
 def known_effects() -> Mapping[str, GapEffect]:
     """Return the effects that a gear pair's twin can try."""
-    return cracked_gap_simulator().gap_effects()
+    return CrackedPair().gap_effects()
 
 
 # --------------------
@@ -232,7 +232,7 @@ def attributed_case(
     recogniser : Recogniser
     simulator : str
     """
-    effects = cracked_gap_simulator().gap_effects().values()
+    effects = CrackedPair().gap_effects().values()
     by_condition = [recogniser.probabilities(c, load, effects) for c, load in zip(changes, loads, strict=True)]
     forest = joint_probabilities(by_condition, list(loads), recogniser.causes)
     size = max(gap_size(change, recogniser.floor).structural.value for change in changes)

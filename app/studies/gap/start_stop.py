@@ -29,7 +29,7 @@ from gearsig.gap.start_stop import (
     predict,
     read_cycles,
 )
-from sims.forging import forging_gap_simulator
+from sims.forging import ForgingManipulator
 
 ROLE = "calibration"
 NEUTRAL_SHRINK = 0.3
@@ -48,7 +48,7 @@ def collect(job: tuple[int, int, tuple[str, str, float]]) -> list[Row]:
     """Make a case of seed, number and kind, effect, level; return what is seen of it with its reference and without."""
     seed, number, fault = job
     label, recording, healthy = labelled_recordings(ROLE, seed, number, fault)
-    simulator = forging_gap_simulator()
+    simulator = ForgingManipulator()
     rows: list[Row] = []
     now = read_cycles(recording)
     ways = [] if healthy is None else [[read_cycles(healthy)]]

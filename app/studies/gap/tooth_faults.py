@@ -35,8 +35,8 @@ from gearsig.recording import Recording
 from gearsig.rig import Rig
 from gearsig.severity import CrackEstimate, estimate_crack
 from sims.blind import BlindCase, labels, record_case
-from sims.cracked import cracked_gap_simulator
-from sims.reduced_fe import reduced_gap_simulator
+from sims.cracked import CrackedPair
+from sims.reduced_fe import ReducedPair
 
 LEVELS = (0.25, 0.6)
 """Shares of the plausible severities, in logarithms, above which each fault is drawn."""
@@ -98,7 +98,7 @@ def simulated(case: BlindCase, source: str, seed: int) -> Iterator[RecordedFault
     """Yield a specimen of a simulator with each fault."""
     rng = np.random.default_rng(seed)
     first, healthy = case.conditions[0], case.references[0]
-    simulator = cracked_gap_simulator() if source == "same" else reduced_gap_simulator()
+    simulator = CrackedPair() if source == "same" else ReducedPair()
     twin = simulator.twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
     specimen = int(rng.integers(1, 2**31))
 
@@ -138,7 +138,7 @@ def independent(plan: Plan, number: int) -> Iterator[RecordedFault]:
 
 def answered(recorded: RecordedFault, rig: Rig, cache: Path) -> Answered:
     """Diagnose one recording as far as its likeliest causes."""
-    simulator = cracked_gap_simulator()
+    simulator = CrackedPair()
     known, twin = simulator.gap_effects(), simulator.twin_of(rig)
     now, reference = PreparedRecording(recorded.now.with_rig(rig)), PreparedRecording(recorded.reference.with_rig(rig))
     conditions, _ = conditions_of([now], [reference], twin)

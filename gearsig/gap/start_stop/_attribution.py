@@ -17,6 +17,7 @@ from gearsig.gap._evidence import CRACK
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import NONE, UNKNOWN, Interval, Shrinkage, shares_of
 from gearsig.gap.start_stop._cycles import FEATURES, NAMES
+from gearsig.motion import median_deviation
 
 FLOORS_FILE = Path(__file__).with_name("floors.json")
 HALF = float(np.sqrt(2.0))
@@ -126,7 +127,7 @@ class DriveFloor:
 def _centre(values: FloatArray, errors: FloatArray) -> float:
     """Return the median, precise values counting more."""
     order = np.argsort(values)
-    spread = 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    spread = median_deviation(values - np.median(values))
     weights = np.cumsum(1.0 / (spread**2 + errors[order] ** 2 + 1e-6))
     return float(values[order][np.searchsorted(weights, 0.5 * weights[-1])])
 

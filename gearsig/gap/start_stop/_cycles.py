@@ -199,7 +199,7 @@ class PreparedCycles:
             torque, window, x = m.torque_nm[rows], np.hanning(len(rows)), np.linspace(-1.0, 1.0, len(rows))
             degree = int(np.clip(len(rows) / m.sampling_rate_hz / 0.25, 3, 6))
             ripple = torque - Legendre.fit(x, torque, degree, w=np.sqrt(window))(x)
-            limit = 6.0 * 1.4826 * float(np.median(np.abs(ripple)))  # of a blow no more counts
+            limit = 6.0 * motions.median_deviation(ripple)  # of a blow no more counts
             total += np.exp(-1j * self.orders[:, None] * m.driver_angle_rad[rows]) @ (
                 window * np.clip(ripple, -limit, limit)
             )
@@ -306,7 +306,7 @@ def robust_least_squares(
 
 
 def _spread(residual: FloatArray) -> float:
-    return 1.4826 * float(np.median(residual)) if len(residual) else 0.0
+    return motions.median_deviation(residual) if len(residual) else 0.0
 
 
 # --------------------
