@@ -495,7 +495,14 @@ def whole_record_variance(names: Sequence[str]) -> FloatArray:
 
 
 def once(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
-    """Return names and values of the features, without their scatter."""
+    """Return names and values of the features, without their scatter; computed once."""
+    if "whole" not in reduced.kept:
+        reduced.kept["whole"] = _read_once(reduced)
+    features: tuple[tuple[str, ...], FloatArray] = reduced.kept["whole"]
+    return features
+
+
+def _read_once(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     channels = list(reduced.channels.values())
     per_channel = [dict(line_features(reduced, channel)) for channel in reduced.channels]
     features = {name: float(np.mean([of_channel[name] for of_channel in per_channel])) for name in per_channel[0]}

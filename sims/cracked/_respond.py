@@ -409,11 +409,17 @@ class PreparedRun:
     roughness: TimeLockedRoughness
 
 
-def prepare(machine: Machine, operation: Operation, rng: np.random.Generator, start_s: float = 0.0) -> PreparedRun:
-    """Draw what is random, tabulate the machine, find the first state."""
+def prepare(
+    machine: Machine,
+    operation: Operation,
+    rng: np.random.Generator,
+    start_s: float = 0.0,
+    first: PairState | None = None,
+) -> PreparedRun:
+    """Draw what is random, tabulate the machine, find the first state where none is given."""
     rough_rng, bearing_rng = rng.spawn(2)  # each keeps what it draws, whatever the other does
     machine, roughness = draw_roughness(machine, rough_rng)
-    q, v = start_state(machine, operation, start_s)
+    q, v = start_state(machine, operation, start_s) if first is None else _checked(first)
     return PreparedRun(
         constants(machine, operation, bearing_rng),
         q,
@@ -479,8 +485,9 @@ def respond(
     """
     step = default_step_s(machine, operation) if step_s is None else step_s
     plan = RunPlan(start_s, duration_s, step, stride, steps_per_call)
-    ready = prepare(machine, operation, rng, start_s)
-    q, v, set_angle = _first_state(ready, first)
+    ready = prepare(machine, operation, rng, start_s, first)
+    q, v = ready.q.copy(), ready.v.copy()  # the kernel overwrites them
+    set_angle = q[:1].copy() if first is None else np.array([first.set_angle_rad])
     select = np.array([_place(name) for name in signals], dtype=np.int64)
     phasors = ready.roughness.phasors(step / 2.0)
 
@@ -515,15 +522,13 @@ def respond(
     return Response(start_s, step * stride, kept, step, energies, last)
 
 
-def _first_state(ready: PreparedRun, state: PairState | None) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return copies, which the kernel overwrites, of coordinates, velocities and the set angle."""
-    if state is None:
-        return ready.q, ready.v, ready.q[:1].copy()
-    if state.q.shape != ready.q.shape or state.v.shape != ready.v.shape:
+def _checked(state: PairState) -> tuple[FloatArray, FloatArray]:
+    """Return the coordinates and velocities of another run's last state."""
+    if state.q.shape != (N_COORDINATES,) or state.v.shape != (N_COORDINATES,):
         raise InputError(
-            f"a state of {state.q.size} coordinates", where="first", allowed=f"{ready.q.size}: another run's last"
+            f"a state of {state.q.size} coordinates", where="first", allowed=f"{N_COORDINATES}: another run's last"
         )
-    return state.q.copy(), state.v.copy(), np.array([state.set_angle_rad])
+    return state.q, state.v
 
 
 def _place(name: str) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,7 +33,6 @@ from sims.gear_pair import (
 from sims.machine import Machine, Nominal, Operation
 from sims.measure import plain
 from sims.mesh import friction_over_mesh
-from sims.presets import Preset
 from sims.simulator import Parameter, SimulationRequest
 
 NAME = "cracked"
@@ -127,11 +127,6 @@ STEP_ANGLE_RAD = 0.9
 """Step times the greatest angular eigenfrequency: three times that of a single simulation, see `_step_s`."""
 
 
-_LEAD_INS: dict[tuple[str, OperatingCondition, int, float], Response | None] = {}
-MAX_LEAD_INS = 4
-"""Kept in a process, some 5 MB each: specimens and operating points of the last diagnosis."""
-
-
 @dataclass(frozen=True)
 class CrackedTwin(PairTwin):
     """A rig's twin with 16 degrees of freedom; see `sims.gear_pair.PairTwin`."""
@@ -153,22 +148,28 @@ class CrackedTwin(PairTwin):
         run = replace(run, min_motion_hz=0.0)
         if not added or not all("tooth" in a.options for a in added):
             return ready, run
-        key = self.key, point, seed, sampling_rate_hz
-        if key not in _LEAD_INS:
-            if len(_LEAD_INS) >= MAX_LEAD_INS:
-                _LEAD_INS.clear()
-            healthy, of_healthy = self._planned(point, (), seed, sampling_rate_hz)
-            lead_in = Measurement.of(healthy.machine, of_healthy, of_healthy.step_s or 0.0).lead_in
-            rng = of_healthy.streams()[0]
-            _LEAD_INS[key] = (
-                None if lead_in is None else respond(healthy.machine, healthy.operation, rng=rng, **lead_in)
-            )
-        return ready, replace(run, before=_LEAD_INS[key])
+        return ready, replace(run, before=_lead_in(self, point, seed, sampling_rate_hz))
 
-    def _step_s(self, preset: Preset) -> float:
+    def _step_s(self, point: OperatingCondition, seed: int) -> float:
         """Step of the integrator: that of the healthy machine, so that effects leave the drawn noise as it is.
 
         It is longer than that of a single simulation; the accelerations miss 2 to 4 parts in a thousand.
         """
-        healthy = self._prepared(replace(preset, effects=()), np.random.default_rng(0))
-        return default_step_s(healthy.machine, healthy.operation, STEP_ANGLE_RAD)
+        return _healthy_step_s(self, point, seed)
+
+
+# Of the specimens and operating points of the last diagnosis, whose trials ask for them again and again.
+
+
+@lru_cache(maxsize=4)
+def _healthy_step_s(twin: CrackedTwin, point: OperatingCondition, seed: int) -> float:
+    healthy = twin._prepared(twin.preset(point, seed=seed), np.random.default_rng(0))
+    return default_step_s(healthy.machine, healthy.operation, STEP_ANGLE_RAD)
+
+
+@lru_cache(maxsize=4)
+def _lead_in(twin: CrackedTwin, point: OperatingCondition, seed: int, sampling_rate_hz: float) -> Response | None:
+    """Return how a healthy specimen comes to its recording's start, some 5 MB; None where it has no lead-in."""
+    healthy, run = twin._planned(point, (), seed, sampling_rate_hz)
+    lead_in = Measurement.of(healthy.machine, run, run.step_s or 0.0).lead_in
+    return None if lead_in is None else respond(healthy.machine, healthy.operation, rng=run.streams()[0], **lead_in)

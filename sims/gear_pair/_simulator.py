@@ -394,10 +394,9 @@ class PairTwin:
         self, point: OperatingCondition, added: Sequence[Added], seed: int, sampling_rate_hz: float
     ) -> tuple[ReadyPair, MeasuredRun[Any]]:
         """Return a specimen with its effects, and a run of it that lasts one sample."""
-        preset_at_point = self.preset(point, added, seed=seed)
         rng = np.random.default_rng(seed)
-        ready = self._prepared(preset_at_point, rng, sampling_rate_hz)
-        step_s = self._step_s(preset_at_point)
+        ready = self._prepared(self.preset(point, added, seed=seed), rng, sampling_rate_hz)
+        step_s = self._step_s(point, seed)
         return ready, MeasuredRun(rng, sampling_rate_hz, 1.0 / sampling_rate_hz, self._rig_at(point), step_s=step_s)
 
     def quiet(self) -> Self:
@@ -519,8 +518,8 @@ class PairTwin:
         ready: ReadyPair = self.pair_model.prepare(SimulationSetup(preset), rng, sampling_rate_hz=sampling_rate_hz)
         return ready
 
-    def _step_s(self, preset: Preset) -> float:
-        """Longest step of the integrator."""
+    def _step_s(self, point: OperatingCondition, seed: int) -> float:
+        """Longest step of the integrator for a specimen, with effects or without."""
         raise NotImplementedError
 
     def _model_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:

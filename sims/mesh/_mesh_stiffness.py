@@ -353,7 +353,8 @@ def back_stiffness_n_per_m(mesh: GearMesh) -> float:
     off a tip would be missing on both flanks; a constant for the whole gear leaves it out, as it does roughness and
     wear.
     """
-    return mesh_stiffness(replace(mesh.healthy, contact_law="linear")).mean_n_per_m
+    smooth = replace(mesh.healthy, contact_law="linear", roughness_1=None, roughness_2=None)
+    return mesh_stiffness(smooth).mean_n_per_m
 
 
 def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

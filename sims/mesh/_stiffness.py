@@ -204,11 +204,12 @@ def cracked_tooth_compliance(
 
 def _sections(gear: GearGeometry, tau: FloatArray, crack: tuple[float, float] | None, law: str) -> _Sections:
     node, weight = _gauss(N_NODES)
-    pieces = []
+    pieces: list[tuple[FloatArray, ...]] = []
     cuts = _fillet_cuts(gear, crack)
     for low, high in pairwise(cuts):
-        fillet = fillet_outline(gear, np.broadcast_to(low + (high - low) * node, (len(tau), N_NODES)))
-        pieces.append((fillet.x_mm, fillet.y_mm, fillet.dx_mm * weight * (high - low)))
+        fillet = fillet_outline(gear, low + (high - low) * node)  # below every contact: the same for all of them
+        rows = fillet.x_mm, fillet.y_mm, fillet.dx_mm * weight * (high - low)
+        pieces.append(tuple(np.broadcast_to(row, (len(tau), N_NODES)) for row in rows))
     span = (tau - gear.form_roll_rad)[:, None]
     flank = involute_outline(gear, gear.form_roll_rad + span * node)
     pieces.append((flank.x_mm, flank.y_mm, flank.dx_mm * weight * span))

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.checks import positive
 from gearsig.errors import InputError
+from gearsig.gap import OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import SIDES, Rig
 from sims.effects import effects
@@ -33,7 +34,6 @@ from sims.gear_pair import (
 from sims.machine import Machine, Nominal, Operation
 from sims.measure import plain
 from sims.mesh import Material, corner_separation_m
-from sims.presets import Preset
 from sims.reduced_fe._contact import MARGIN
 from sims.reduced_fe._eigenfrequencies import eigenfrequencies_hz
 from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, torsional_mode
@@ -378,6 +378,6 @@ class ReducedTwin(PairTwin):
     def _model_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
         return twin_parameters(values, self.nominal.teeth)
 
-    def _step_s(self, preset: Preset) -> float:
-        del preset
+    def _step_s(self, point: OperatingCondition, seed: int) -> float:
+        del point, seed
         return TWIN_STEP_S
