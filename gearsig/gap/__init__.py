@@ -205,7 +205,13 @@ from gearsig.gap._trials import (
     try_effects,
 )
 from gearsig.gap._waveform import OFFSETS as SIDEBAND_OFFSETS
-from gearsig.gap._waveform import SimulatedWaveform, WaveformMatch, compare_waveform, waveform_match
+from gearsig.gap._waveform import (
+    SimulatedWaveform,
+    WaveformMatch,
+    compare_waveform,
+    waveform_match,
+    with_profiles_between,
+)
 from gearsig.rig import SIDES
 
 __all__ = [
@@ -397,6 +403,7 @@ __all__ = [
     "with_common_channels",
     "with_labelled",
     "with_likelihoods",
+    "with_profiles_between",
     "with_stage",
     "with_unexpected",
     "with_unknown_shared",

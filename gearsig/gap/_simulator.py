@@ -32,6 +32,9 @@ class GapEffect:
         By how much, either way, its place within a tooth's engagement moves between the severities of its candidates.
     is_on_every_tooth : bool
         Whether it sits on all teeth of a gear, on each by itself.
+    profile_varies_with : str
+        Name of its severity or of an option with which the course of its change over a tooth's engagement varies
+        steadily, so that it can be interpolated; empty: it varies with nothing.
     """
 
     name: str
@@ -45,6 +48,7 @@ class GapEffect:
     signs: tuple[tuple[str, int], ...] = ()
     moves_pitches: float = 0.0
     is_on_every_tooth: bool = False
+    profile_varies_with: str = ""
 
 
 @dataclass(frozen=True)

@@ -40,8 +40,10 @@ from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording, re
 from gearsig.gap._report import ConditionFacts, GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
 from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, HasFurtherSettings, OperatingCondition, Twin
 from gearsig.gap._waveform import (
+    BETWEEN,
     N_HARMONICS,
     OFFSETS,
+    PROFILE_SCATTER,
     WaveformMatch,
     compare_waveform,
     gain_scatter,
@@ -49,6 +51,7 @@ from gearsig.gap._waveform import (
     mesh_sidebands,
     sideband_noise,
     waveform_match,
+    with_profiles_between,
 )
 from gearsig.processes import active_cluster, can_be_sent, killed_text, run_jobs, start_early
 from gearsig.rig import SIDES
@@ -95,14 +98,16 @@ class Task:
     run: TwinRun
     added: Added | None
     further: tuple[str, ...] = ()
+    by_waveform: bool = False
+    """Whether its sidebands are all that is asked for."""
 
 
 @dataclass(frozen=True)
 class Reduced:
     """One simulation's features, of a healthy one only, and its change against the healthy run.
 
-    `sidebands` are the change's, see `mesh_sidebands`. `alone` has each channel's own change where there are further
-    channels; they have no part in `change`.
+    `sidebands` are the change's, see `mesh_sidebands`; by waveform there are no others. `alone` has each channel's own
+    change where there are further channels; they have no part in `change`.
     """
 
     names: tuple[str, ...]
@@ -180,6 +185,8 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
             now, healthy = now.of_channels(of_the_rig), healthy.of_channels(of_the_rig)
         names, values = once(healthy) if task.added is None else ((), np.empty(0))
         sidebands = mesh_sidebands(now, healthy, is_turned=False)
+        if task.by_waveform:
+            return Reduced((), np.empty(0), (), np.empty(0), sidebands)
         return Reduced(names, values, *change_once(now, healthy), sidebands, alone)
     except GearsigError as error:
         return str(error)
@@ -222,7 +229,7 @@ class Bank:
     added : tuple of Added
         The candidates that could be simulated.
     changes : array, (n_added, n_changes)
-        Each candidate's run against the healthy run.
+        Each candidate's run against the healthy run; not a number where only its waveform is looked at.
     sidebands : complex array, (n_added, n_channels, 2, n_harmonics, n_offsets)
         The same beside the mesh harmonics, see `mesh_sidebands`.
     """
@@ -239,6 +246,7 @@ def banks_of(
     runs: Sequence[TwinRun],
     candidates: Mapping[str, Sequence[Added]],
     *,
+    by_waveform: Mapping[str, Sequence[Added]] | None = None,
     folder: Path | None,
     processes: int = 2,
     fresh: bool = False,
@@ -252,6 +260,8 @@ def banks_of(
         Twin, point, length of what is simulated; the point is rounded to `POINT_DIGITS` digits.
     candidates : mapping
         Effect → its settings that are simulated; each effect has a file of its own.
+    by_waveform : mapping or None
+        Effect → further ones, of which only the waveform is looked at.
     folder : Path or None
         Where they are kept; None: nowhere.
     processes : int
@@ -269,23 +279,26 @@ def banks_of(
         If the healthy machine cannot be simulated or its recording is too short for the features.
     """
     folder = None if folder is None else made_folder(folder, "choose another with --cache")
-    requests: dict[str, tuple[TwinRun, Sequence[Added]]] = {}
+    further = by_waveform or {}
+    requests: dict[str, tuple[TwinRun, list[Task]]] = {}
     keys = []
     for run in runs:
         positive(run.duration_s, "duration_s", "s")
         at = replace(run, point=rounded(run.point))
-        for added in candidates.values():
-            keys.append(bank_key(at, added))
-            requests[keys[-1]] = at, added
+        for name, added in candidates.items():
+            keys.append(bank_key(at, added, further.get(name, ())))
+            tasks = [Task(at, setting) for setting in added]
+            tasks += [Task(at, setting, by_waveform=True) for setting in further.get(name, ())]
+            requests[keys[-1]] = at, tasks
     banks = {key: None if folder is None or fresh else read_bank(_bank_path(folder, key), key) for key in requests}
     missing = {key: requests[key] for key, bank in banks.items() if bank is None}
     healthy = {run.key: run for run, _ in missing.values()}
-    tasks = [Task(run, None) for run in healthy.values()]
-    tasks += [Task(run, setting) for run, added in missing.values() for setting in added]
-    rows = iter(finished_runs(tasks, processes, on_progress) if tasks else ())
+    every = [*(Task(run, None) for run in healthy.values()), *(task for _, tasks in missing.values() for task in tasks)]
+    rows = iter(finished_runs(every, processes, on_progress) if every else ())
     healthy_rows = {key: next(rows) for key in healthy}
-    for key, (run, added) in missing.items():
-        banks[key] = bank = _assembled(added, healthy_rows[run.key], list(islice(rows, len(added))))
+    for key, (run, tasks) in missing.items():
+        settings = [task.added for task in tasks if task.added is not None]
+        banks[key] = bank = _assembled(settings, healthy_rows[run.key], list(islice(rows, len(tasks))))
         if folder is not None:
             write_bank(_bank_path(folder, key), key, bank)
     in_order = iter(banks[key] for key in keys)
@@ -297,9 +310,10 @@ def rounded(point: OperatingCondition) -> OperatingCondition:
     return OperatingCondition(*(float(f"{v:.{POINT_DIGITS}g}") for v in (point.speed_rpm, point.torque_nm)))
 
 
-def bank_key(run: TwinRun, candidates: Sequence[Added]) -> str:
+def bank_key(run: TwinRun, candidates: Sequence[Added], by_waveform: Sequence[Added] = ()) -> str:
     """Return all that a bank's numbers depend on, as text."""
-    settings, lengths = [_plain(added) for added in candidates], [run.duration_s, run.sampling_rate_hz]
+    settings = [[_plain(added) for added in some] for some in (candidates, by_waveform)]
+    lengths = [run.duration_s, run.sampling_rate_hz]
     known = [run.twin.key, features_digest(), [run.point.speed_rpm, run.point.torque_nm], settings, lengths]
     return json.dumps(known, sort_keys=True)
 
@@ -312,9 +326,10 @@ def _assembled(candidates: Sequence[Added], healthy: Reduced | str, rows: Sequen
     kept = [
         (added, row)
         for added, row in zip(candidates, rows, strict=True)
-        if isinstance(row, Reduced) and row.change_names == names
+        if isinstance(row, Reduced) and row.change_names in (names, ())
     ]
-    changes = np.array([row.change for _, row in kept]).reshape(len(kept), len(names))
+    unknown = np.full(len(names), np.nan)
+    changes = np.array([row.change if row.change_names else unknown for _, row in kept]).reshape(len(kept), len(names))
     sidebands = np.array([row.sidebands for _, row in kept], dtype=np.complex128)
     return Bank(
         healthy.names,
@@ -463,7 +478,8 @@ def try_effects(
         }
     banks = banks_of(
         [trial_run(twin, condition.facts, condition.now) for condition in conditions],
-        {name: [*candidates[name], *further_settings.get(name, ())] for name in determined},
+        candidates,
+        by_waveform=further_settings,
         folder=cache,
         processes=PROCESSES,
         fresh=fresh,
@@ -518,36 +534,41 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
         compared = [
             compare_waveform(
                 setting,
-                sidebands[channels, side],
+                sidebands[channels],
                 observed[:, side],
                 noise[:, side],
-                moves_pitches=effect.moves_pitches,
-                n_teeth=condition.now.frame.teeth[side] if on_all else 0,
+                moves_pitches=effect.moves_pitches / (BETWEEN + 1 if effect.profile_varies_with else 1),
+                n_teeth=n_teeth,
                 gain_scatter=scatter,
             )
-            for setting, sidebands, on_all in _settings(bank, effect)
-            if (side := _side(setting)) is not None
+            for setting, side, sidebands, n_teeth in _settings(bank, effect, condition.now.frame.teeth)
         ]
         waveforms.append([waveform for waveform in compared if waveform is not None])
     severities = [added.severity for bank in banks for added in bank.added]
-    return waveform_match(joined_waveforms(waveforms), min(severities), max(severities)) if severities else None
+    if not severities:
+        return None
+    scatter = PROFILE_SCATTER if effect.profile_varies_with == effect.severity_name else 0.0
+    joined = joined_waveforms(waveforms)
+    return waveform_match(joined, min(severities), max(severities), severity_scatter=scatter)
 
 
-def _settings(bank: Bank, effect: GapEffect) -> Iterator[tuple[Added, ComplexArray, bool]]:
-    """Yield the settings that waveforms are compared with, the sidebands simulated for them, and if all teeth have it.
+def _settings(bank: Bank, effect: GapEffect, teeth: Sequence[int]) -> Iterator[tuple[Added, int, ComplexArray, int]]:
+    """Yield what waveforms are compared with: a setting, its gear, sidebands of that, and how many teeth have it.
 
     An effect that may sit on every tooth, each by itself, was simulated on one: that stands for itself and, the first
-    of each gear, for all.
+    of each gear, for all. 0 teeth: it sits on one.
     """
-    gears: set[object] = set()
-    for added, sidebands in zip(bank.added, bank.sidebands, strict=True):
-        if not effect.is_on_every_tooth:
-            yield added, sidebands, False
-        elif "tooth" in added.options:
-            yield added, sidebands, False
-            if (gear := added.options.get("gear")) not in gears:
-                gears.add(gear)
-                yield Added(added.name, added.severity, {"gear": str(gear)}), sidebands, True
+    for side in range(len(SIDES)):
+        simulated = [
+            (added, sidebands[:, side])
+            for added, sidebands in zip(bank.added, bank.sidebands, strict=True)
+            if _side(added) == side and (not effect.is_on_every_tooth or "tooth" in added.options)
+        ]
+        for added, sidebands in with_profiles_between(simulated, effect, teeth[side]):
+            yield added, side, sidebands, 0
+        if effect.is_on_every_tooth and simulated:
+            first, sidebands = simulated[0]
+            yield Added(first.name, first.severity, {"gear": SIDES[side]}), side, sidebands, teeth[side]
 
 
 def _side(added: Added) -> int | None:

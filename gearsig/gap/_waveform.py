@@ -24,15 +24,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import inf, pi
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from gearsig.checks import FloatArray
 from gearsig.gap._change import lines_of_shaft, turned_difference
 from gearsig.gap._reduction import ComplexArray, ReducedRecording
 from gearsig.gap._report import Interval
-from gearsig.gap._simulator import Added
+from gearsig.gap._simulator import Added, GapEffect
 from gearsig.rig import SIDES
 
 N_HARMONICS = 8
@@ -57,8 +59,17 @@ LOG_SCALES = np.linspace(-3.0, 3.0, 25)
 SCALE_SCATTER = 0.7
 """Of ln g where the severity is right: mesh lines of deviating flanks, cracks at other angles, wider chips."""
 
+PROFILE_SCATTER = 0.07
+"""Of ln s where the profile varies with the severity: flanks of another specimen meet, and part, some 0.03 pitches
+elsewhere. A chip's edge moves by a pitch for each module of its height, of which up to 0.9 are plausible."""
+
 MIN_CORRELATION = 0.6
 """Correlation from which a twin is believed to show the profile of a fault."""
+
+BETWEEN = 3
+"""Settings that are put between two that were simulated: from one to the next a spall's profile correlates by 0.95."""
+
+_SHIFT_STEP_PITCHES = 0.01
 
 _N_TURNS = 128
 _SHIFT_PITCHES = 0.04
@@ -272,6 +283,66 @@ def _log_mean(values: FloatArray, axis: int | None = None) -> FloatArray:
 
 
 # --------------------
+# Profiles between those that were simulated.
+#
+# Where a spall ends, or a chip's edge lies, says which orders its two steps add up or cancel at: at the seventh mesh
+# harmonic a spall longer by a fiftieth of a pitch has another course. So fine no simulations lie.
+# --------------------
+
+
+def with_profiles_between(
+    simulated: Sequence[tuple[Added, ComplexArray]], effect: GapEffect, n_teeth: int
+) -> Iterator[tuple[Added, ComplexArray]]:
+    """Yield the settings of one gear, and `BETWEEN` more between neighbours in what the effect's profile varies with.
+
+    At the part s of the way, u = (1 − s) u₁ exp(2πj s δ o/z) + s u₂ exp(−2πj (1 − s) δ o/z) at order o: a mixture where
+    the profile stays in its place, which it may leave by δ pitches from one to the other where the effect moves.
+
+    Parameters
+    ----------
+    simulated : sequence of (Added, complex array), (n_channels, n_harmonics, n_offsets)
+        Sidebands, see `mesh_sidebands`.
+    effect : GapEffect
+    n_teeth : int
+        z of the gear.
+    """
+    yield from simulated
+    option = effect.profile_varies_with
+    if not option:
+        return
+    chains: dict[tuple[object, ...], list[tuple[float, Added, ComplexArray]]] = {}
+    for added, sidebands in simulated:
+        if option == effect.severity_name:
+            chains.setdefault(added.place, []).append((added.severity, added, sidebands))
+        elif option in added.options:
+            others = tuple(item for item in added.place if item[0] != option)
+            chains.setdefault((added.severity, *others), []).append((float(added.options[option]), added, sidebands))
+    for chain in chains.values():
+        for (low, first, before), (high, _, after) in pairwise(sorted(chain, key=lambda item: item[0])):
+            turn_rad = _turn_between_rad(before, after, 2.0 * effect.moves_pitches, n_teeth)
+            for share in np.arange(1, BETWEEN + 1) / (BETWEEN + 1.0):
+                value = float(f"{low + share * (high - low):.4g}")
+                turned = before * np.exp(1j * share * turn_rad), after * np.exp(1j * (share - 1.0) * turn_rad)
+                mixed: ComplexArray = (1.0 - share) * turned[0] + share * turned[1]
+                if option == effect.severity_name:
+                    yield Added(first.name, value, first.options), mixed
+                else:
+                    yield Added(first.name, first.severity, {**first.options, option: value}), mixed
+
+
+def _turn_between_rad(before: ComplexArray, after: ComplexArray, most_pitches: float, n_teeth: int) -> FloatArray:
+    """Return 2π δ o/z, (n_harmonics, n_offsets), with the δ by which the second is the first moved."""
+    orders = np.arange(1, before.shape[-2] + 1)[:, None] + OFFSETS / n_teeth
+    n = round(most_pitches / _SHIFT_STEP_PITCHES)
+    turns_rad = 2.0 * pi * _SHIFT_STEP_PITCHES * np.arange(-n, n + 1)[:, None, None] * orders
+    power = np.sqrt([np.mean(np.abs(u) ** 2, axis=-1, keepdims=True) for u in (before, after)]).prod(axis=0)
+    products = np.sum(np.conj(before) * after / np.where(power > 0.0, power, np.inf), axis=0)
+    alike = np.real(np.sum(products * np.exp(-1j * turns_rad), axis=(1, 2)))
+    best: FloatArray = turns_rad[int(np.argmax(alike))]
+    return best
+
+
+# --------------------
 # All settings of one effect together: how likely it is, how severe, on which gear.
 # --------------------
 
@@ -304,7 +375,7 @@ class WaveformMatch:
 
 
 def waveform_match(
-    waveforms: Sequence[SimulatedWaveform], min_severity: float, max_severity: float
+    waveforms: Sequence[SimulatedWaveform], min_severity: float, max_severity: float, *, severity_scatter: float = 0.0
 ) -> WaveformMatch | None:
     """Return what all settings of an effect say together; None where there are none.
 
@@ -317,6 +388,8 @@ def waveform_match(
     waveforms : sequence of SimulatedWaveform
     min_severity, max_severity : float
         Severities that are plausible.
+    severity_scatter : float
+        Standard deviation of ln s with which a profile tells it.
     """
     groups: dict[tuple[tuple[str, float | str], ...], list[SimulatedWaveform]] = {}
     for waveform in sorted(waveforms, key=lambda waveform: waveform.added.severity):
@@ -328,6 +401,9 @@ def waveform_match(
     rows = np.array([_over_severity(group, fullest, log_severity) for group in groups.values()])
     level = float(_log_mean(rows))
     density = np.exp(rows - rows.max()).sum(axis=0)
+    if severity_scatter:
+        step = float(log_severity[1] - log_severity[0])
+        density = gaussian_filter1d(density, severity_scatter / step, mode="nearest")
     interval = _interval(np.exp(log_severity), density)
     best_group = list(groups.values())[int(np.argmax(_log_mean(rows, axis=1)))]
     best = max(best_group, key=lambda waveform: float(waveform.levels.max()))

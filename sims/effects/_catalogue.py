@@ -182,6 +182,7 @@ def as_gap_effect(shown: Effect) -> GapEffect:
         shown.textbook.signs if shown.textbook else (),
         shown.moves_pitches,
         shown.is_on_every_tooth,
+        shown.profile_varies_with,
     )
 
 

@@ -247,6 +247,9 @@ class Effect:
         stays where it is.
     is_on_every_tooth : bool
         Whether it sits on all teeth of a gear, on each by itself.
+    profile_varies_with : str
+        Name of its severity or of an option with which the course of its change over a tooth's engagement varies
+        steadily; empty: it varies with nothing.
     """
 
     name: str
@@ -263,9 +266,15 @@ class Effect:
     textbook: Textbook | None = None
     moves_pitches: float = 0.0
     is_on_every_tooth: bool = False
+    profile_varies_with: str = ""
 
     def __post_init__(self) -> None:
         one_of(self.group, f"group of {self.name}", GROUPS)
+        one_of(
+            self.profile_varies_with,
+            f"profile_varies_with of {self.name}",
+            ("", self.severity.name, *(option.name for option in self.options)),
+        )
         for shown in self.shows_in:
             one_of(shown, f"shows_in of {self.name}", SHOWS_IN)
 

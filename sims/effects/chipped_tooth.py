@@ -30,7 +30,7 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
     )
 
 
-EVERY_HALF = (0.0, 0.5, 1.0, 1.5, 2.0)
+EVERY_HALF, EVERY_THIRD = (0.0, 0.5, 1.0, 1.5, 2.0), (0.0, 1 / 3, 2 / 3, 1.0, 4 / 3, 5 / 3, 2.0)
 """Severities, counted from the least."""
 
 EFFECT = Effect(
@@ -47,6 +47,7 @@ EFFECT = Effect(
     shows_in=("tooth_window", "envelope_orders", "mesh_sidebands", "resonances"),
     # The pair lets go a pitch earlier for each module: half of what lies between the largest two that are tried.
     moves_pitches=0.16,
+    profile_varies_with="height_mm",
     change=change,
     options=(
         GEAR_OPTION,
@@ -64,10 +65,11 @@ EFFECT = Effect(
             "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0))),
         },
         # Without its whole tip a tooth carries nothing there; with most of it left, nearly as much as ever. The height
-        # says where in the engagement that is, so that heights are tried twice as close as other severities.
+        # says where in the engagement that is, so that heights are tried twice as close as other severities, and closer
+        # where the whole profile moves with the edge.
         further_settings=lambda machine: [
             (options, places)
-            for percent, places in ((35.0, EVERY_HALF), (85.0, (0.5, 1.5)), (100.0, EVERY_HALF))
+            for percent, places in ((35.0, EVERY_HALF), (85.0, (0.5, 1.5)), (100.0, EVERY_THIRD))
             for options in shared.first_teeth(machine, width_percent=percent)
         ],
     ),

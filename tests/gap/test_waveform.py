@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from gearsig.gap import SIDEBAND_OFFSETS as OFFSETS
-from gearsig.gap import Added, SimulatedWaveform, compare_waveform, waveform_match, with_likelihoods
+from gearsig.gap import (
+    Added,
+    GapEffect,
+    SimulatedWaveform,
+    compare_waveform,
+    waveform_match,
+    with_likelihoods,
+    with_profiles_between,
+)
 
 N_CHANNELS, N_HARMONICS = 2, 8
 HARMONICS = np.arange(1, N_HARMONICS + 1)[:, None]
@@ -153,6 +161,56 @@ def test_a_pitch_error_of_one_tooth_tells_behind_from_ahead_and_one_tooth_from_a
         assert compared is not None
         levels[name] = float(compared.levels.max())
     assert levels["ahead"] > max(levels["behind"], levels["all"]) + 3.0
+
+
+def two_steps(length_pitches: float, n_teeth: int = 20) -> np.ndarray:
+    """What a spall's ends do, each the other's opposite, half a length before and behind the pitch point."""
+    orders = HARMONICS + OFFSETS / n_teeth
+    return np.stack([2j * np.sin(np.pi * orders * length_pitches)] * N_CHANNELS)
+
+
+def alike(first: np.ndarray, second: np.ndarray) -> float:
+    return float(np.real(np.vdot(first, second)) / np.linalg.norm(first) / np.linalg.norm(second))
+
+
+def effect(**how: object) -> GapEffect:
+    return GapEffect("spall", "tooth-local", "a spall", "width", "%", **how)  # type: ignore[arg-type]
+
+
+def test_between_two_lengths_of_a_spall_lie_its_profiles_and_none_between_widths() -> None:
+    def spall(length: float, width: float) -> tuple[Added, np.ndarray]:
+        return Added("spall", width, {"gear": "driver", "length": length}), width * two_steps(length)
+
+    trials = [spall(0.26, 10.0), spall(0.2, 10.0), spall(0.2, 20.0)]
+    found = list(with_profiles_between(trials, effect(profile_varies_with="length"), 20))
+    assert [(a.severity, a.options["length"]) for a, _ in found[3:]] == [(10.0, 0.215), (10.0, 0.23), (10.0, 0.245)]
+    for added, sidebands in found:
+        assert alike(sidebands, two_steps(float(added.options["length"]))) > 0.98
+    assert alike(two_steps(0.2), two_steps(0.23)) < 0.95
+    assert len(list(with_profiles_between(trials, effect(), 20))) == len(trials)
+
+
+def test_a_profile_that_moves_with_the_severity_is_between_where_it_has_moved_half_way() -> None:
+    chips = [
+        (Added("chip", height, {"gear": "driver"}), height * course(0.0, 0.05, later_pitches=-0.2 * height))
+        for height in (1.0, 2.0)
+    ]
+    for moves, low, high in ((0.1, 0.99, 1.0), (0.0, -1.0, 0.9)):
+        moving = effect(profile_varies_with="width", moves_pitches=moves)
+        middle = list(with_profiles_between(chips, moving, 10**6))[3]
+        assert middle[0].severity == 1.5
+        assert low < alike(middle[1], course(0.0, 0.05, later_pitches=-0.3)) <= high + 1e-12
+
+
+def test_a_severity_that_a_profile_tells_is_as_uncertain_as_its_place() -> None:
+    trials = [
+        compared(course(0.4, 0.05), course(0.0, width), s) for s, width in ((1.0, 0.09), (1.5, 0.05), (2.2, 0.02))
+    ]
+    sharp, blurred = (waveform_match(trials, 1.0, 2.2, severity_scatter=scatter) for scatter in (0.0, 0.1))
+    assert sharp is not None
+    assert blurred is not None
+    assert blurred.severity.high / blurred.severity.low > sharp.severity.high / sharp.severity.low
+    assert blurred.log_likelihood == sharp.log_likelihood
 
 
 def test_waveforms_part_what_faults_of_a_tooth_have_together() -> None:
