@@ -19,6 +19,7 @@ import numpy as np
 import typer
 
 from app.benchmark.cases import Plan, PlannedCase
+from app.studies.gap.calibrate import STRONG
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.gap import (
     TOOTH_FAULTS,
@@ -69,6 +70,8 @@ class Answered:
         Fault of a tooth → probability among them, without and with waveforms.
     correlation : float
         Of the true fault's waveform.
+    size : float
+        Of the gap, in structural floors.
     stated : Interval or None
         The severity that is stated of the true fault.
     """
@@ -78,6 +81,7 @@ class Answered:
     forests: dict[str, float]
     with_waveforms: dict[str, float]
     correlation: float
+    size: float
     stated: Interval | None
 
 
@@ -155,6 +159,7 @@ def answered(recorded: RecordedFault, rig: Rig, cache: Path) -> Answered:
         _among(before),
         _among(after),
         0.0 if match is None else match.correlation,
+        attribution.size,
         severity,
     )
 
@@ -172,9 +177,10 @@ def _among(probabilities: dict[str, float]) -> dict[str, float]:
 
 
 def report_lines(rows: Sequence[Answered]) -> Iterator[str]:
-    """Yield the table: by fault and all, forests alone and with waveforms."""
-    for name in (*TOOTH_FAULTS, "all"):
-        of_effect = [row for row in rows if name in (row.name, "all")]
+    """Yield the table: by fault, all, and the strong ones; forests alone and with waveforms."""
+    groups = {name: [row for row in rows if row.name == name] for name in TOOTH_FAULTS}
+    groups |= {"all": [*rows], f"{STRONG:g} floors": [row for row in rows if row.size >= STRONG]}
+    for name, of_effect in groups.items():
         if not of_effect:
             continue
         parts = []
@@ -218,7 +224,7 @@ def main() -> None:
                 )
                 p = ", ".join(f"{name} {value:.2f}" for name, value in row.with_waveforms.items())
                 true = f"{number:3} {row.name:14}{row.severity:8.3g}"
-                typer.echo(f"{true}  {interval:28} ρ {row.correlation:.2f}  {p}")
+                typer.echo(f"{true}  {interval:28} {row.size:4.1f} floors  ρ {row.correlation:.2f}  {p}")
     for line in report_lines(rows):
         typer.echo(line)
 
