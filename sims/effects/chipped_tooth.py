@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import log
+
 import numpy as np
 
 from sims.effects import _shared as shared
@@ -30,8 +32,10 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
     )
 
 
-EVERY_HALF, EVERY_THIRD = (0.0, 0.5, 1.0, 1.5, 2.0), (0.0, 1 / 3, 2 / 3, 1.0, 4 / 3, 5 / 3, 2.0)
-"""Severities, counted from the least."""
+LOW, HIGH = 0.2, 0.9
+"""Of the module, heights that are plausible."""
+EVEN_HEIGHTS = tuple((2.0 * np.log(np.linspace(LOW, HIGH, 8) / LOW) / log(HIGH / LOW)).tolist())
+"""Eight heights, by how many severities each lies above the least, see `PlausibleRange`."""
 
 EFFECT = Effect(
     name="chipped_tooth",
@@ -55,8 +59,8 @@ EFFECT = Effect(
         Option("width_percent", 50.0, "part of the loaded face, up to 90, or 100", "%", 1.0, 100.0),
     ),
     plausible=PlausibleRange(
-        0.2,
-        0.9,
+        LOW,
+        HIGH,
         "of the module: a broken corner to half of the tooth's height; smaller chips lie in double contact",
         shared.module_mm,
         lambda machine: shared.first_teeth(machine, width_percent=85.0),
@@ -65,11 +69,15 @@ EFFECT = Effect(
             "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0))),
         },
         # Without its whole tip a tooth carries nothing there; with most of it left, nearly as much as ever. The height
-        # says where in the engagement that is, so that heights are tried twice as close as other severities, and closer
-        # where the whole profile moves with the edge.
+        # says where in the engagement that is: by steps of a tenth of the module profiles between two of them are their
+        # mixture, correlated by 0.98 and more. One of the eight is next to a candidate.
         further_settings=lambda machine: [
             (options, places)
-            for percent, places in ((35.0, EVERY_HALF), (85.0, (0.5, 1.5)), (100.0, EVERY_THIRD))
+            for percent, places in (
+                (35.0, EVEN_HEIGHTS),
+                (85.0, (EVEN_HEIGHTS[1], *EVEN_HEIGHTS[3:-1])),
+                (100.0, EVEN_HEIGHTS),
+            )
             for options in shared.first_teeth(machine, width_percent=percent)
         ],
     ),

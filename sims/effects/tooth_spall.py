@@ -57,11 +57,11 @@ EFFECT = Effect(
         85.0,
         "percent of the face; a pit of a tenth is lost in ordinary flanks, 90 is the model's limit",
         choices=lambda machine: first_teeth(machine, length_mm=0.45 * machine.nominal.module_mm),
-        # The ends of a spall are two steps: how far they lie apart decides which orders they add up or cancel at. From
-        # one of these lengths to the next, 0.45 among them, profiles interpolated halfway correlate by 0.95 and more.
+        # The ends of a spall are two steps: how far they lie apart decides which orders they add up or cancel at. In
+        # steps of a tenth of the module, 0.45 among them, profiles between two are their mixture, correlated by 0.95.
         further_settings=lambda machine: [
             (options, (2,))
-            for length in (0.2, 0.245, 0.3, 0.367, 0.55, 0.67, 0.82, 1.0)
+            for length in (0.2, 0.28, 0.365, 0.55, 0.66, 0.77, 0.88, 1.0)
             for options in first_teeth(machine, length_mm=length * machine.nominal.module_mm)
         ],
         drawn=lambda machine, rng: {
