@@ -26,7 +26,7 @@ OPTIONS = (
     "client.showErrorLinks=false",
     "runner.postScriptGC=false",  # the pages ask for it themselves, when nobody waits: see `work.tidy_later`
 )
-"""Flags win over the configuration files of the user and of the folder the command is started in."""
+"""Flags win over what the user's environment says in variables; files are not read, see `_read_no_configuration`."""
 
 
 def dashboard(
@@ -36,6 +36,7 @@ def dashboard(
     """Open the dashboard in a browser. It listens on localhost only and sends nothing anywhere."""
     from app.dashboard import compiled
 
+    _read_no_configuration()
     _hide_streamlit_offers()
     with TemporaryDirectory(prefix="gearsig-") as folder:
         _tell_page_its_server(Path(folder))
@@ -62,6 +63,17 @@ def _run(port: int, *, browser: bool) -> NoReturn:
         *(f"--{option}" for option in (*OPTIONS, *THEME_OPTIONS, *server_options)),
     ]
     sys.exit(streamlit_cli.main())
+
+
+def _read_no_configuration() -> None:
+    """Keep Streamlit from reading `.streamlit` in the folder the command starts in: it may have come with recordings.
+
+    Its base theme may be an address elsewhere, its path moves the pages, a file that is no text ends the start, and its
+    secrets become variables of the environment, of which one names Python files that are executed.
+    """
+    from streamlit import config
+
+    config.get_config_files = lambda _: []
 
 
 def _hide_streamlit_offers() -> None:

@@ -30,7 +30,10 @@ FLAGS = [
 
 
 OPEN = """
+[theme]
+base = "http://127.0.0.1:9/theme.toml"
 [server]
+baseUrlPath = "elsewhere"
 address = "0.0.0.0"
 enableCORS = false
 enableXsrfProtection = false
@@ -49,8 +52,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Start a dashboard, one for all tests of a process: imports and analyses of samples are made once."""
-    with dashboard(tmp_path_factory.mktemp("home")) as address:
+    folder = tmp_path_factory.mktemp("home")
+    with dashboard(folder) as address:
         yield address
+    assert not list(folder.glob("*.ran")), "the start folder's secrets became variables"
 
 
 @contextmanager
@@ -61,6 +66,8 @@ def dashboard(folder: Path) -> Iterator[str]:
         port = probe.getsockname()[1]
     (folder / ".streamlit").mkdir()
     (folder / ".streamlit" / "config.toml").write_text(OPEN)
+    (folder / "effect.py").write_text("from pathlib import Path; Path(__file__).with_suffix('.ran').touch()")
+    (folder / ".streamlit" / "secrets.toml").write_text(f"GEARSIG_EFFECTS = {str(folder / 'effect.py')!r}")
     command = [sys.executable, "-m", "app.cli.main", "dashboard", "--port", str(port), "--no-browser"]
     log = (folder / "log.txt").open("w+")
     server = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log)
