@@ -304,7 +304,7 @@ def test_no_long_signal_goes_to_the_browser_whole() -> None:
 
 def test_names_from_files_are_shown_as_typed() -> None:
     """Markup in channel, shaft and file names stays text, in every view."""
-    names = ("<script>alert(1)</script>", "**x** $y$ :material/delete: :smile: a->b")
+    names = ("<script>alert(1)</script>", "**x** $y$ :material/delete: :smile: a->b __")
     rows = "\n".join(f"{i / 1000};{(i * 37) % 101};{(i * 53) % 97}" for i in range(3000))
     rig = '[[shaft]]\nname = "<img src=x onerror=alert(1)>"\n[speed]\nsource = "constant"\nspeed_rpm = 1200\n'
     page = opened_file("[a](http://x.y) **b**.csv", f"time (s);{names[0]};{names[1]}\n{rows}\n".encode(), rig)

@@ -5,17 +5,31 @@ They share `numbers.js`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from streamlit.components.v2 import component
 
-if TYPE_CHECKING:
-    from streamlit.components.v2.types import ComponentRenderer
 
-
-def component_of(name: str) -> ComponentRenderer:
-    """Return the component of `name`.js and `name`.css, which draws into an element of that class."""
+def component_of(name: str) -> Callable[..., object]:
+    """Return the component of `name`.js and `name`.css, which draws into an element of that class, given a key."""
     folder = Path(__file__).parent
     css, numbers, js = ((folder / file).read_text("utf-8") for file in (f"{name}.css", "numbers.js", f"{name}.js"))
-    return component(f"gearsig.{name}", html=f'<div class="{name}"></div>', css=css, js=numbers + js)
+    shown = component(f"gearsig.{name}", html=f'<div class="{name}"></div>', css=css, js=numbers + js)
+
+    def show(*, key: str, **looks: Any) -> object:
+        return shown(key=element_key(key), **looks)
+
+    return show
+
+
+def element_key(key: str) -> str:
+    """Return the key that Streamlit knows a component by: two underscores on end, as names from files have, it refuses.
+
+    Examples
+    --------
+    >>> element_key("order spectrum of run__1")
+    'order spectrum of run_-_-1'
+    """
+    return key.replace("_", "_-")

@@ -19,7 +19,7 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from app.dashboard import address, state
-from app.dashboard.components import component_of
+from app.dashboard.components import component_of, element_key
 from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
 from gearsig.checks import FloatArray
 from gearsig.formatting import csv_text
@@ -177,7 +177,7 @@ def _ends(values: object) -> list[float]:
 
 def _take_zoom(key: str) -> None:
     """Keep what the user zoomed a figure to."""
-    ends = _ends(st.session_state[key]["range"])
+    ends = _ends(st.session_state[element_key(key)]["range"])
     if ends:
         state.zooms()[key] = ends
 
