@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
 from numba.core.options import DefaultOptions
+
+from gearsig.compiled import njit
 
 UNCOUNTED: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 """Options of `numba.njit` without the counting of references to arrays, an atomic operation wherever one is passed on,

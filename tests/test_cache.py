@@ -1,6 +1,7 @@
 """Kept files: what comes back is what was written, or nothing, whatever became of the bytes."""
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from gearsig.cache import keep, part_beside, read_arrays, remove_parts
+from gearsig.compiled import njit
 
 ARRAYS = {"about": np.array('{"key": 1}'), "values": np.random.default_rng(0).normal(size=(12, 9))}
 ENOUGH = 1_000_000
@@ -51,6 +53,33 @@ def test_a_place_that_cannot_be_written_costs_no_result(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert not keep(tmp_path / "file" / "kept.npz", lambda file: file.write(b"x"))
     assert keep(tmp_path / "kept.npz", lambda file: file.write(b"x"))
+
+
+def seven() -> int:
+    return 7
+
+
+def test_damaged_code_is_compiled_anew_and_a_full_disk_keeps_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "kept"))
+
+    def n_kept() -> int:
+        compiled = njit(cache=True)(seven)
+        assert compiled() == 7
+        return sum(compiled.stats.cache_hits.values())
+
+    assert (n_kept(), n_kept()) == (0, 1)
+    index, code = sorted((tmp_path / "kept").rglob("*.nb[ci]"), reverse=True)
+    for path in (index, code):
+        whole = path.read_bytes()
+        for damaged in (whole[:-9], bytes(len(whole)), b""):
+            path.write_bytes(damaged)
+            assert (n_kept(), n_kept()) == (0, 1)
+    compiled = njit(cache=True)(seven)
+    shutil.rmtree(index.parent)
+    index.parent.touch()  # so that no folder can be made there any more
+    assert compiled() == 7
 
 
 def test_only_what_a_dead_process_left_is_removed(tmp_path: Path) -> None:

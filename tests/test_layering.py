@@ -103,6 +103,7 @@ def test_simulators_use_only_rig_recording_and_the_protocol_of_the_gap_diagnosis
         "gearsig.results",
         "gearsig.errors",
         "gearsig.cache",
+        "gearsig.compiled",
         "gearsig.processes",
         "gearsig.formatting",
     )

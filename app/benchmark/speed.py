@@ -19,10 +19,10 @@ from math import pi, sqrt
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.compiled import njit
 from sims.cracked import derivative
 
 Run = Callable[[], Any]

@@ -9,11 +9,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.angle._types import ShaftAngle
 from gearsig.checks import FloatArray, listed, positive
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording, check_recording
 from gearsig.rig import Rig, check_rig, shaft_ratios

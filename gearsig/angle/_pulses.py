@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.angle._types import ShaftAngle, monotone_slopes
 from gearsig.checks import FloatArray, count, frozen_array, one_of, positive
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted, percent
 

@@ -9,10 +9,11 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numba import config, njit
+from numba import config
 
 from gearsig.angle._types import AngleSignal, ShaftAngle, check_shaft_angle
 from gearsig.checks import FloatArray, count, listed, positive, read_only
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
 from gearsig.recording import Recording, check_recording

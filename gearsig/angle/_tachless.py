@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.angle._comb import (
@@ -27,6 +26,7 @@ from gearsig.angle._comb import (
 from gearsig.angle._resample import resample_to_angle, times_of_revolutions
 from gearsig.angle._types import AngleSignal, ShaftAngle, monotone_slopes
 from gearsig.checks import FloatArray, positive
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.rig import Rig

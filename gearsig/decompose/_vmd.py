@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, within
+from gearsig.compiled import njit
 from gearsig.decompose._types import Modes, VmdEngine, VmdSettings, check_supported, mode_notes
 from gearsig.engines import engine_module
 from gearsig.errors import InputError, RefusalError

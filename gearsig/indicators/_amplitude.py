@@ -13,9 +13,9 @@ from functools import cached_property
 from math import sqrt
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray, frozen_array, read_only
+from gearsig.compiled import njit
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from gearsig.results import Result

@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import ceil
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray, count, positive, within
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent, seconds_text
 from gearsig.phase._neighbours import nearest_apart, spaced

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray, count, one_of
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.phase._neighbours import GOLDEN, IndexArray, nearest_apart, spaced

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.compiled import njit
 from gearsig.errors import RefusalError
 from gearsig.formatting import percent
 

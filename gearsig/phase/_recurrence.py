@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray, count, positive, within
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.phase._neighbours import GOLDEN
 from gearsig.phase._types import PhasePortrait, RecurrenceMeasures, RecurrencePlot, check_portrait, mean_period_samples

@@ -13,12 +13,12 @@ from functools import cached_property
 from math import log
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.optimize import minimize_scalar
 
 from gearsig.checks import FloatArray
+from gearsig.compiled import njit
 from gearsig.spectra import ComplexArray, Spectrum, noise_floor
 
 LOG_RATIO_LIMIT = 6.0

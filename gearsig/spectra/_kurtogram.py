@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray, count, freeze, not_negative
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.recording import Recording

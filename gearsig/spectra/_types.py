@@ -9,7 +9,6 @@ from types import UnionType
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import (
@@ -23,6 +22,7 @@ from gearsig.checks import (
     read_only,
     within,
 )
+from gearsig.compiled import njit
 from gearsig.errors import InputError
 from gearsig.formatting import axis_label, axis_unit, counted
 from gearsig.recording import Recording, check_recording

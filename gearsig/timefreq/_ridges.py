@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, not_negative, positive
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._types import Coefficients, Ridge, TimeFrequencyMap
 

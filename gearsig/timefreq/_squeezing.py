@@ -9,10 +9,10 @@ from types import ModuleType
 from typing import Literal, get_args
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, one_of
+from gearsig.compiled import njit
 from gearsig.engines import engine_module
 from gearsig.errors import InputError
 from gearsig.timefreq._types import Spacing, UniformSignal

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.fft import ifft, rfft
 
 from gearsig.checks import FloatArray, count, frozen_array, positive, within
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._types import ComplexArray, Edges, Spacing, UniformSignal, segment_of
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 from math import cos, sin
 
 import numpy as np
-from numba import njit
 
+from gearsig.compiled import njit
 from sims.compiled import copy
 from sims.gear_pair import carried_part, element_forces, foot
 from sims.machine import profile_value, set_speed, torque_ripple

@@ -7,9 +7,9 @@ from __future__ import annotations
 from math import cos, exp, floor, sin
 
 import numpy as np
-from numba import njit
 from scipy.integrate import RK45
 
+from gearsig.compiled import njit
 from sims.compiled import copy
 
 # Compiled: which tooth pairs carry, where worn ones touch, and the force of the flanks that do.

@@ -20,9 +20,9 @@ from math import cos, exp, floor, log1p, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray
+from gearsig.compiled import njit
 from gearsig.errors import InputError
 from sims.gear_pair._rolling import balanced, contact_n_per_m15, stiffness_under_load_n_per_m
 from sims.machine import RACE_EDGE_MM, BearingSupport, Machine

@@ -16,9 +16,9 @@ from __future__ import annotations
 from math import cos, pi, radians, sin, sqrt
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray
+from gearsig.compiled import njit
 from gearsig.errors import RefusalError
 from gearsig.rig import Bearing
 from sims.machine import BearingSupport

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from math import cos, sin
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray, frozen_array
+from gearsig.compiled import njit
 from gearsig.errors import InputError
 from sims.compiled import UNCOUNTED
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray, known_name, not_negative, positive, within
+from gearsig.compiled import njit
 from gearsig.errors import InputError
 
 # Linear systems on a solver's grid, exact for an input that runs straight from step to step.

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from math import exp, log, pi, sqrt
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from gearsig.checks import FloatArray, positive
+from gearsig.compiled import njit
 from gearsig.errors import InputError
 from gearsig.results import Result
 from sims.mesh._geometry import Material

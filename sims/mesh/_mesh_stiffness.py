@@ -7,10 +7,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, frozen_array, positive
+from gearsig.compiled import njit
 from gearsig.errors import InputError
 from gearsig.results import Result
 from sims.mesh._deviation import flank_separation_m, pitch_separation_m, wear_profile

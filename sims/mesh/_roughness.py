@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from gearsig.checks import FloatArray, count, frozen_array, not_negative, positive, within
+from gearsig.compiled import njit
 from gearsig.errors import InputError
 
 LISTED_TRAVEL_MPS = 1.0312

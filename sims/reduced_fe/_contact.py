@@ -10,10 +10,10 @@ from math import ceil, floor
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, frozen_array
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from sims.compiled import UNCOUNTED
 from sims.fe_gear import ReducedGear, crack_added_m_per_n

@@ -23,9 +23,9 @@ from math import cos, sin
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 
 from gearsig.checks import FloatArray, one_of, positive
+from gearsig.compiled import njit
 from sims.compiled import UNCOUNTED
 from sims.gear_pair import foot
 from sims.machine import profile_value, set_speed, torque_ripple

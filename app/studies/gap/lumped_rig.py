@@ -19,10 +19,10 @@ from math import cos, pi, radians, sin, tan
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy import signal
 
 from gearsig.checks import FloatArray
+from gearsig.compiled import njit
 from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft, TachometerChannel
 

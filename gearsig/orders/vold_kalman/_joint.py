@@ -9,10 +9,10 @@ from math import comb, factorial
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.compiled import njit
 from gearsig.errors import RefusalError
 from gearsig.orders.vold_kalman._kernels import (
     HALF_POWER,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.compiled import njit
 
 HALF_POWER = np.sqrt(np.sqrt(2.0) - 1.0)
 """r·|D| at the -3 dB points, for there 1/(1 + r²|D|²) = 1/√2."""

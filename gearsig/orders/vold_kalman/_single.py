@@ -26,11 +26,12 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.compiled import njit
 from gearsig.errors import RefusalError
 from gearsig.orders.vold_kalman._kernels import HALF_POWER, cosine_and_sine
 
