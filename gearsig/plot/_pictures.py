@@ -246,7 +246,7 @@ def _svg_levels(panel: LevelPanel, width: int, height: int) -> str:
     ends = ((top + 9, high), (top + height, high - span))
     parts += [f'<text x="{left + 13}" y="{y}">{_number(float(f"{level:.3g}"))}</text>' for y, level in ends]
     middle = f"translate({left + 24} {top + height / 2}) rotate(-90)"
-    parts.append(f'<text transform="{middle}" text-anchor="middle">{escape(panel.unit)}</text>')
+    parts.append(f'<text transform="{middle}" text-anchor="middle">{escape(style.cut(panel.unit, 40))}</text>')
     return _svg(width, top + height + BOTTOM, parts)
 
 
@@ -315,7 +315,7 @@ def svg_ring(
     ]
     for i, mark in enumerate(marks):
         looks = f'font-size="15" font-weight="700" fill="{style.FAULT}"'
-        parts.append(f'<text x="198" y="{195 - 17 * i}" text-anchor="end" {looks}>{escape(mark.label)}</text>')
+        parts.append(f'<text x="198" y="{195 - 17 * i}" text-anchor="end" {looks}>{escape(style.cut(mark.label, 50))}</text>')
     moved = f'<g transform="translate({size / 2} {size / 2})">{"".join(parts)}</g>'
     return _svg(size, size, [moved], ink=ink)
 
@@ -376,8 +376,8 @@ class _Panel:
         middle = self.top + self.height / 2
         return (
             f'<path d="M{self.left} {bottom}H{right}" stroke="currentColor" stroke-opacity="0.5"/>{"".join(parts)}'
-            f'<text x="{(self.left + right) / 2}" y="{bottom + 32}" text-anchor="middle">{escape(x)}</text>'
-            f'<text transform="translate(11 {middle}) rotate(-90)" text-anchor="middle">{escape(y)}</text>'
+            f'<text x="{(self.left + right) / 2}" y="{bottom + 32}" text-anchor="middle">{escape(style.cut(x, 90))}</text>'
+            f'<text transform="translate(11 {middle}) rotate(-90)" text-anchor="middle">{escape(style.cut(y, 40))}</text>'
         )
 
     def cursors(self, cursors: Sequence[Cursor], labels: Sequence[tuple[Cursor, int]], *, through: bool = True) -> str:
@@ -427,12 +427,12 @@ def _placed(cursors: Sequence[Cursor], limits: tuple[float, float], width: int) 
 def _names(lines: Sequence[ChartLine]) -> list[str]:
     parts, x = [], float(LEFT)
     for line in lines:
-        if line.name:
+        if name := style.cut(line.name, 40):
             parts.append(
                 f'<path d="M{x} 10h16" stroke="{line_colour(line.colour)}" stroke-width="3"/>'
-                f'<text x="{x + 21}" y="14">{escape(line.name)}</text>'
+                f'<text x="{x + 21}" y="14">{escape(name)}</text>'
             )
-            x += 21 + LETTER * len(line.name) + 18
+            x += 21 + LETTER * len(name) + 18
     return parts
 
 

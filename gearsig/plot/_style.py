@@ -94,11 +94,15 @@ def with_unit(name: str, unit: str) -> str:
 def plain(text: str, n_max: int = 60) -> str:
     """Return one line that the figures' font can draw, cut in its middle to `n_max` characters.
 
-    Names come from files: control characters become spaces, and signs the font lacks become "?".
+    Names come from files: signs the font lacks become "?".
     """
     drawable = _drawable_code_points()
+    return "".join(c if ord(c) in drawable else "?" for c in cut(text, n_max))
+
+
+def cut(text: str, n_max: int = 60) -> str:
+    """Return a text from a file on one line, control characters as spaces, cut in its middle to `n_max` characters."""
     line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
-    line = "".join(c if ord(c) in drawable else "?" for c in line)
     if len(line) <= n_max:
         return line
     tail = n_max // 3

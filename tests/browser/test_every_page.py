@@ -182,8 +182,8 @@ def test_an_index_of_recordings_with_dates_fits_a_narrow_window(browser: playwri
     indicators = tuple(Indicator(name, 3.21, unit, "a1") for name, unit in kinds.items())
     names = ("gearbox_north_2026-11-28.csv.gz", "gearbox_south_2026-11-27.csv.gz")
     entries = [Entry(name, "a.html", Outcome.FAULT, "", "A verdict of a few words.", 0.93, 41.2) for name in names]
-    machine = "Workshop gearbox, outer-race defect"
-    filled = [replace(entry, indicators=indicators, machine=machine) for entry in entries]
+    machines = ("Workshop gearbox, outer-race defect", 200 * "W")
+    filled = [replace(e, indicators=indicators, machine=m) for e, m in zip(entries, machines, strict=True)]
     write_index(filled, path=tmp_path / "index.html")
     assert "2026-11-28</td>" in (tmp_path / "index.html").read_text("utf-8")
     view = browser.new_page(viewport={"width": 800, "height": 900})

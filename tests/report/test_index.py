@@ -102,7 +102,7 @@ def test_the_index_as_pdf(write, tmp_path):
 
 def test_a_dozen_long_verdicts_fit_a_printed_page(write, tmp_path):
     pytest.importorskip("typst")
-    long = replace(_entry("a", Outcome.CANNOT_TELL), conclusion="Nothing shows, but noise would hide it. " * 20)
+    long = replace(_entry(45 * "w", Outcome.CANNOT_TELL), conclusion="Nothing shows, but noise would hide it. " * 20)
     write([long] * 12, pdf=True)
     assert re.findall(rb"/Count (\d+)", (tmp_path / "index.pdf").read_bytes()) == [b"1"]
 
