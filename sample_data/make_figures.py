@@ -33,8 +33,10 @@ COMMANDS = {
     "bifurcation": (
         1440,
         "bifurcation.png",
-        "bifurcation cracked --preset symmetric_50_50 --vary speed=1400..2600rpm:49 --torque 20Nm "
-        + "--set roughness_um=0 --set friction=off -o {folder}",
+        (
+            "bifurcation cracked --preset symmetric_50_50 --torque 20Nm --set roughness_um=0 --set friction=off "
+            "--vary speed=1400..2600rpm:49 -o {folder}"
+        ),
     ),
     "flexible_sweeps": (1000, "sweeps.png", "flexible --preset light_damping_50_50 -o {folder}"),
     "start_stop": (
@@ -52,7 +54,10 @@ def run_command(name: str) -> None:
     width_px, figure, *commands = COMMANDS[name]
     with TemporaryDirectory() as folder:
         for command in commands:
-            run([sys.executable, "-m", "app.cli.main", *command.format(folder=folder).split()], check=True)
+            run(
+                [sys.executable, "-m", "app.cli.main", *command.format(folder=folder).split()],
+                check=True,
+            )
         save_pixels(Path(folder) / figure, PICTURES / f"{name}.png", width_px=width_px)
 
 
