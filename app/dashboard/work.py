@@ -14,6 +14,7 @@ from threading import Event, Lock, Thread, Timer
 from time import monotonic
 from types import FrameType
 from typing import Any, Generic, ParamSpec, TypeVar, cast
+from weakref import ref
 
 import streamlit as st
 from streamlit.runtime.scriptrunner import get_script_run_ctx
@@ -241,15 +242,17 @@ class Kept(Generic[P, R]):
                         key=f"cancel {name}",
                         icon=":material/close:",
                         on_click=_cancel,
-                        args=(name, work),
+                        args=(name, ref(work)),
                     )
                     is_offered = True
         place.empty()
 
 
-def _cancel(name: str, work: Work[Any]) -> None:
+def _cancel(name: str, work: ref[Work[Any]]) -> None:
+    """Cancel what the button was shown for; Streamlit keeps what a button passes on until the session ends."""
     st.session_state[_CANCELLED] = name
-    work.cancel()
+    if (known := work()) is not None:
+        known.cancel()
 
 
 def _cancel_unwatched(work: Work[Any], grace_s: float) -> None:

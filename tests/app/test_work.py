@@ -1,5 +1,6 @@
 """Work beside a page: computed once for equal requests, cancelled where nobody waits for it."""
 
+import gc
 import sys
 from pathlib import Path
 from threading import Event
@@ -71,6 +72,27 @@ def _page() -> None:
         st.session_state["begun"] = True
         st.session_state[_CANCELLED] = f"{tripled.__qualname__} {hash(repr(((2,), {}))):x}"
     st.title(str(tripled(2)))
+
+
+def _slow_page() -> None:
+    from time import sleep
+
+    from app.dashboard.work import kept
+
+    slow = kept(1, "…")(lambda x: sleep(0.1) or f"answer {x}")
+    for x in range(3):
+        slow(x)
+
+
+def test_a_button_that_cancels_keeps_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A session remembers what each of its buttons passes on."""
+    monkeypatch.setattr(beside, "SPINNER_AFTER_S", 0.0)
+    monkeypatch.setattr(beside, "CANCEL_AFTER_S", 0.0)
+    page = AppTest.from_function(_slow_page).run()
+    assert not page.exception
+    gc.collect()
+    works = [work for work in gc.get_objects() if type(work) is Work and work.wait(0.0)]
+    assert sum("answer" in str(vars(work)["_result"]) for work in works) <= 1
 
 
 def test_what_was_cancelled_waits_until_it_is_started_again() -> None:
