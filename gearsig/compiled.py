@@ -43,4 +43,4 @@ def _cache_of(function: Callable[..., Any]) -> Any:
         return NullCache()
 
 
-dispatcher.FunctionCache = _cache_of
+dispatcher.FunctionCache = _cache_of  # type: ignore[attr-defined,unused-ignore]

@@ -148,7 +148,7 @@ def _force_figure(estimate: ForceEstimate, mode: str) -> Figure:
     panels = [
         CurvePanel(time[shown], {k: 1e-3 * v for k, v in curves.items()}, "time (s)", f"{label} (kN)", title)
         for curves, label, title in (
-            (forces, "force", "total interaction force"),
+            (forces, "force", "total interaction force; the piecewise one lies beneath the first"),
             (errors, "error", "force errors"),
         )
     ]

@@ -71,7 +71,8 @@ def judged(statement: str, found: str, *, agrees: bool, partly: bool = False, be
 def within_part(statement: str, published: float, value: float, unit: str, *, part: float, because: str = "") -> Claim:
     """Return a claim that agrees within a part of the published number, and in part within three times that."""
     away = abs(value / published - 1.0)
-    text = f"{value:.4g} {unit} ({100.0 * (value / published - 1.0):+.2g} %)"
+    more_percent = 100.0 * (value / published - 1.0)
+    text = f"{value:.4g} {unit} ({more_percent:{'+.2g' if abs(more_percent) < 99.5 else '+.0f'}} %)"
     return judged(statement, text, agrees=away <= part, partly=away <= 3.0 * part, because=because)
 
 

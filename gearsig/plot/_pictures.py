@@ -315,7 +315,9 @@ def svg_ring(
     ]
     for i, mark in enumerate(marks):
         looks = f'font-size="15" font-weight="700" fill="{style.FAULT}"'
-        parts.append(f'<text x="198" y="{195 - 17 * i}" text-anchor="end" {looks}>{escape(style.cut(mark.label, 50))}</text>')
+        parts.append(
+            f'<text x="198" y="{195 - 17 * i}" text-anchor="end" {looks}>{escape(style.cut(mark.label, 50))}</text>'
+        )
     moved = f'<g transform="translate({size / 2} {size / 2})">{"".join(parts)}</g>'
     return _svg(size, size, [moved], ink=ink)
 
