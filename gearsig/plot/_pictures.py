@@ -375,11 +375,11 @@ class _Panel:
                 f'<path d="M{at:.1f} {bottom}v4" stroke="currentColor" stroke-opacity="0.5"/>'
                 f'<text x="{at:.1f}" y="{bottom + 15}" text-anchor="middle">{_number(value)}</text>'
             )
-        middle = self.top + self.height / 2
+        middle, x, y = self.top + self.height / 2, escape(style.cut(x, 90)), escape(style.cut(y, 40))
         return (
             f'<path d="M{self.left} {bottom}H{right}" stroke="currentColor" stroke-opacity="0.5"/>{"".join(parts)}'
-            f'<text x="{(self.left + right) / 2}" y="{bottom + 32}" text-anchor="middle">{escape(style.cut(x, 90))}</text>'
-            f'<text transform="translate(11 {middle}) rotate(-90)" text-anchor="middle">{escape(style.cut(y, 40))}</text>'
+            f'<text x="{(self.left + right) / 2}" y="{bottom + 32}" text-anchor="middle">{x}</text>'
+            f'<text transform="translate(11 {middle}) rotate(-90)" text-anchor="middle">{y}</text>'
         )
 
     def cursors(self, cursors: Sequence[Cursor], labels: Sequence[tuple[Cursor, int]], *, through: bool = True) -> str:
