@@ -110,7 +110,7 @@ def flexible_and_fleet(page: Page, clock: Clock) -> None:
     clock.tell("flexible gear: mesh, modes and stress")
     clock.start()
     page.get_by_text("Pair", exact=True).click()
-    page.locator(".figure svg").first.wait_for()
+    page.locator(".figure svg").first.wait_for(timeout=600_000)
     clock.tell("flexible pair: both sweeps and all maps")
     clock.start()
     page.get_by_text("Mesh stiffness", exact=True).click()

@@ -73,7 +73,11 @@ def _read_no_configuration() -> None:
     """
     from streamlit import config
 
-    config.get_config_files = lambda _: []
+    def none_of(file_name: str) -> list[str]:
+        del file_name
+        return []
+
+    config.get_config_files = none_of
 
 
 def _hide_streamlit_offers() -> None:
