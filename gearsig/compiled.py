@@ -9,11 +9,32 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from numba import njit
-from numba.core import dispatcher
-from numba.core.caching import FunctionCache, NullCache
+import numba
+from numba.core.caching import FunctionCache
 
 __all__ = ["njit"]
+
+
+def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return `numba.njit` with these options.
+
+    Parameters
+    ----------
+    cache : bool
+        Whether compiled code is kept on disk.
+    **options
+        Numba's.
+    """
+    compiled = numba.njit(**options)
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        dispatcher = compiled(function)
+        if cache:
+            with suppress(RuntimeError):  # there is no room for so much as a folder
+                dispatcher._cache = _KeptCode(function)
+        return dispatcher
+
+    return decorate
 
 
 class _KeptCode(FunctionCache):  # type: ignore[misc,unused-ignore]
@@ -34,13 +55,3 @@ class _KeptCode(FunctionCache):  # type: ignore[misc,unused-ignore]
             except Exception:  # noqa: BLE001 - the index is damaged: begin another
                 self.flush()
                 super().save_overload(signature, code)
-
-
-def _cache_of(function: Callable[..., Any]) -> Any:
-    try:
-        return _KeptCode(function)
-    except RuntimeError:  # there is no room for so much as a folder
-        return NullCache()
-
-
-dispatcher.FunctionCache = _cache_of  # type: ignore[attr-defined,unused-ignore]

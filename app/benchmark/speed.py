@@ -503,7 +503,7 @@ def _motion(n: int) -> TimedCase:
     )
 
 
-@njit
+@njit()
 def _slopes(n, k, curves, rows, pitch, state, speed, torque, first, rough, rate):  # type: ignore[no-untyped-def]
     for i in range(n):
         derivative(k, curves, rows, pitch, 1e-6 * i, state, speed, torque, first, rough, rate)
