@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import inf
-from statistics import median, median_high
+from math import ceil, inf
+from statistics import median_high
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from gearsig.diagnosis._bearing_families import (
     Candidate,
     Families,
     clearest_family,
+    doubtful_races,
     expected_parts,
     find_families,
     mains_beside,
@@ -309,8 +310,12 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
             parts = ", ".join(part_text(c.name, c.bearing.name) for c in seen if c.bearing)
             why = f"lines stand at the order of the {parts}, but {but}"
             return [_undecided(why, "A longer recording, or another sensor.", where)]
-    for k, races in parts_on_shaft(signals, envelopes).items():
-        why = f"impacts come {k} times a turn, which is the order of the {' or '.join(races)} within its slip"
+    if doubtful := doubtful_races(signals, list(envelopes)):
+        races = ", ".join(dict.fromkeys(part_text(c.name, c.bearing.name) for c in doubtful if c.bearing))
+        why = f"lines stand at the order of the {races}, and the chance of so many is {p_text(doubtful[0].p_value)}"
+        return [_undecided(why, "A longer recording, or another sensor.", where)]
+    for k, on_shaft in parts_on_shaft(signals, envelopes).items():
+        why = f"impacts come {k} times a turn, which is the order of the {' or '.join(on_shaft)} within its slip"
         return [_undecided(why, "A recording at another load: slip parts a bearing from the shaft.", where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
     expected = expected_parts(signals)
@@ -334,7 +339,7 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
         Kind.INFORMATION,
         f"No damage shows in the bearings ({', '.join(examined)}).",
         where,
-        confidence=0.8,
+        confidence=WOULD_SHOW,
         confidence_basis="early damage may be hidden below the gears",
         evidence=(
             f"No family at their orders in {len(envelopes)} envelope spectra (channels × bands).",
@@ -383,14 +388,21 @@ def _undecided(why: str, surer: str, where: Where) -> Finding:
     return cannot_tell("bearings-undecided", title, where, surer=surer)
 
 
+SLIPS = (-0.45, -0.3, -0.18, -0.09, 0.0, 0.09, 0.18, 0.3, 0.45)
+"""Nine likely slips, over the range that is searched: tenths of their distribution, the range being 2.8 deviations."""
+
+WOULD_SHOW = 0.8
+"""Share of the slips at which a damage would have shown where none is said to show: as sure as that is said to be."""
+
+
 def smallest_depth(envelopes: Sequence[BandEnvelope], order: float, slip: float, probability: float) -> float:
     """Return the depth of modulation at which six equal harmonics near `order` would have shown in half of the bands.
 
     Each line needs the log ratio score/n over its floor, where `score` is what chance reaches with `probability` and n
     the number of harmonics that no shaft hides. The depth is the amplitude of such a line over the mean envelope. The
     band in which a damage rings is not known beforehand: the best one of all says little, so that it is the median
-    over the bands, each with its best channel. Slip takes a part's lines to and from those of the shafts: here a
-    median over the range counts, too.
+    over the bands, each with its best channel. Slip takes a part's lines to and from those of the shafts: the depth is
+    the one that is enough at four of five slips.
 
     Parameters
     ----------
@@ -409,12 +421,13 @@ def smallest_depth(envelopes: Sequence[BandEnvelope], order: float, slip: float,
     """
     best: dict[tuple[float, float], float] = {}
     for envelope in envelopes:
-        depth = median(_depth_in(envelope, order * (1 + part * slip), slip, probability) for part in (-0.5, 0.0, 0.5))
-        best[envelope.band_hz] = min(depth, best.get(envelope.band_hz, inf))
+        score = score_needed(envelope.excess, 6, order * (1 - slip), order * (1 + slip), probability)
+        depths = sorted(_depth_in(envelope, order * (1 + part * slip), score) for part in SLIPS)
+        best[envelope.band_hz] = min(depths[ceil(WOULD_SHOW * len(SLIPS)) - 1], best.get(envelope.band_hz, inf))
     return median_high(best.values()) if best else inf
 
 
-def _depth_in(envelope: BandEnvelope, order: float, slip: float, probability: float) -> float:
+def _depth_in(envelope: BandEnvelope, order: float, score: float) -> float:
     excess = envelope.excess
     places = order * np.arange(1, 7)
     places = places[places <= excess.spectrum.positions[-1]]
@@ -422,7 +435,7 @@ def _depth_in(envelope: BandEnvelope, order: float, slip: float, probability: fl
     free = index[~excess.masked[index]] if len(index) else index
     if len(free) < 3 or envelope.mean <= 0:  # harmonics beside those of the shafts that a family must have to be seen
         return inf
-    needed = score_needed(excess, 6, order * (1 - slip), order * (1 + slip), probability) / len(free)
+    needed = score / len(free)
     if needed > LOG_RATIO_LIMIT:
         return inf
     floor = float(np.exp(np.mean(np.log(np.maximum(excess.floor[free], 1e-300)))))

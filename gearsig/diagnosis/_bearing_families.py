@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import exp, gcd, pi, sqrt
+from itertools import pairwise
+from math import exp, gcd, log, log10, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._lines import magnetic_pull_at
-from gearsig.diagnosis._signals import MINIMUM_LINES, SEEN_THERE, AnalysisSignals, BandEnvelope
+from gearsig.diagnosis._signals import MINIMUM_LINES, SEEN_THERE, AnalysisSignals, BandEnvelope, is_of_tones
 from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at
 from gearsig.rig import Bearing
 from gearsig.spectra import Spectrum
@@ -157,6 +158,7 @@ class Candidate:
 
     `of_same_order` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is
     the part's, these included, among all that would show at that order. `loudest` is the channel with the largest line.
+    `of_tones` says that it is gone with the steady tones.
     """
 
     comb: Comb
@@ -170,6 +172,7 @@ class Candidate:
     share: float = 1.0
     in_train: bool = False
     loudest: str = ""
+    of_tones: bool = False
 
     @property
     def strength_db(self) -> float:
@@ -224,19 +227,19 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
     """Return the families of the envelopes, each put down to a part of a bearing only if nothing else explains it.
 
     A family at a part's order that belongs to a slower train of impacts is the train's; the train is then hidden and
-    the search begins anew, so that a damaged part beside it is found, as it does behind the clicks of a supply. A train
-    whose lines are those of a stronger family explains nothing: sums and differences of that family and the shaft lie
-    on it.
+    the search begins anew, so that a damaged part beside it is found, as it does behind the clicks of a supply and
+    behind beats of steady tones. A train whose lines are those of a stronger family explains nothing: sums and
+    differences of that family and the shaft lie on it.
     """
     trains: list[Candidate] = []
     pulls: list[Candidate] = []
     for _ in range(3):
         candidates = _significant(signals, envelopes)
-        if of_pull := [c for c in candidates if mains_beside(signals, c)]:
+        if of_pull := [c for c in candidates if c.of_tones or mains_beside(signals, c)]:
             pulls += of_pull
             envelopes = _without(envelopes, of_pull)
             candidates = _significant(signals, envelopes)
-        candidates = _distinct(candidates)
+        candidates = _distinct(signals, [c for c in candidates if not c.of_tones])
         named: list[Candidate] = []
         train = None
         for candidate in candidates:
@@ -252,7 +255,7 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
         trains.append(train)
         envelopes = _without(envelopes, [train])
     if not named and not trains:
-        named = _distinct(pulls)
+        named = _distinct(signals, pulls)
     trains = [t for t in trains if not any(t.strength_db < c.strength_db - SECOND_DB for c in named)]
     named = [c for c in named if not any(c.strength_db < t.strength_db - SECOND_DB for t in trains)]
     clear = [c for c in named if _stands_out(signals, c)]
@@ -277,14 +280,25 @@ SECOND_DB = 12.0
 differences with the shaft and the cage, and the other bearing's sensor."""
 
 
-def _distinct(candidates: list[Candidate]) -> list[Candidate]:
+def _distinct(signals: AnalysisSignals, candidates: list[Candidate]) -> list[Candidate]:
     """Return the candidates, strongest first, without those that are by-products of a stronger one."""
     kept: list[Candidate] = []
     for candidate in sorted(candidates, key=lambda c: -c.strength_db):
         beside = (max(s.strength_db, _strength_in(candidate.envelope, s.comb.fundamental)) for s in kept)
-        if all(candidate.strength_db >= level - SECOND_DB for level in beside):
+        is_clear = all(candidate.strength_db >= level - SECOND_DB for level in beside)
+        if is_clear and not any(_is_sideband(signals, candidate, stronger) for stronger in kept):
             kept.append(candidate)
     return kept
+
+
+def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candidate) -> bool:
+    """Whether a family is a stronger one's sidebands: k (f - n s) is the sideband number k n of multiple k."""
+    shaft = signals.rig.ratio(carrier.bearing.shaft) if carrier.bearing is not None else None
+    if not shaft:
+        return False
+    distance = abs(candidate.comb.fundamental - carrier.comb.fundamental)
+    n = round(distance / shaft)
+    return 1 <= n <= 3 and abs(distance - n * shaft) <= 2 * candidate.envelope.excess.spectrum.resolution
 
 
 def _strength_in(envelope: BandEnvelope, fundamental: float) -> float:
@@ -354,7 +368,22 @@ def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> C
     best = min(families, key=lambda family: (max(family.p_value, 1e-9), -family.strength_db), default=None)
     if best is None:
         return None
-    return replace(best, p_value=min(1.0, best.p_value * len(envelopes)), loudest=_loudest(envelopes, best))
+    chance = _chance_over(envelopes, best, [family.p_value for family in families])
+    return replace(best, p_value=chance, loudest=_loudest(envelopes, best))
+
+
+def _chance_over(envelopes: Sequence[BandEnvelope], best: Candidate, p_values: Sequence[float]) -> float:
+    """Return the chance of the best family over all envelopes, from its chances in those that have one.
+
+    Bands overlap and channels hear the same source: where a line is higher than noise makes any of a spectrum, envelopes
+    that show it are no independent trials, and the harmonic mean of the chances holds for dependent ones as well
+    (Wilson 2019, doi:10.1073/pnas.1814092116). One accident of noise may be in all bands, too, so that without such a
+    line each envelope counts as a trial.
+    """
+    n, of_noise_db = len(envelopes), 10 * log10(log(len(best.envelope.excess.log_ratio)))
+    if max(best.comb.ratios_db) <= of_noise_db:
+        return min(1.0, n * min(p_values))
+    return min(1.0, n / (sum(1.0 / max(p, 1e-300) for p in p_values) + n - len(p_values)))
 
 
 def _where_it_is_strongest(envelopes: list[BandEnvelope], family: Candidate) -> Candidate:
@@ -391,50 +420,77 @@ def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:
 
 def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> list[Candidate]:
     """Return the significant bearing parts, surest first; one that shares its lines with a surer one is left out."""
+    allowed = signals.settings.false_alarm_probability
+    candidates = [c for c in _at_parts(signals, envelopes) if c.p_value <= allowed and _has_own_lines(c.comb)]
+    candidates.sort(key=lambda c: -_own_weight(signals, c))
+    kept: list[Candidate] = []
+    for candidate in candidates:
+        if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
+            of_tones = is_of_tones(signals, candidate.envelope, candidate.comb.fundamental)
+            kept.append(_with_rivals(signals, replace(candidate, of_tones=of_tones)))
+    return sorted(kept, key=lambda c: c.p_value)
+
+
+def _at_parts(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Iterator[Candidate]:
+    """Yield the clearest family at each part's order, with its chance over all envelopes and parts."""
     slip = slip_of(signals)
     expected = expected_parts(signals)
-    candidates = []
+    orders = sorted(order for _, _, order in expected)  # the same part of like bearings is one trial
+    n_orders = sum(high / low - 1 >= SAME_BEARING_ORDER for low, high in pairwise(orders)) + 1
     for bearing, name, order in expected:
         low, high = order * (1 - slip), order * (1 + slip)
         best = clearest_family(envelopes, low, high)
         if best is None:
             continue
-        chance = _chance_among_others(signals, best, bearing, low, high)
-        p_value = min(1.0, chance * len(envelopes) * len(expected))
+        p_value = min(1.0, _chance_among_others(signals, envelopes, best, bearing, low, high) * n_orders)
         # Once it is fitted to the lines, the fundamental must still be near the order.
         near = slip * order + best.envelope.excess.spectrum.resolution / 6
-        is_near = abs(best.comb.fundamental - order) <= near
-        if is_near and p_value <= signals.settings.false_alarm_probability and _has_own_lines(best.comb):
-            candidates.append(replace(best, p_value=p_value, bearing=bearing, name=name, expected=order))
-    candidates.sort(key=lambda c: -_own_weight(signals, c))
-    kept: list[Candidate] = []
-    for candidate in candidates:
-        if not any(_shares_lines(candidate.comb, other.comb) for other in kept):
-            kept.append(_with_rivals(signals, candidate))
-    return sorted(kept, key=lambda c: c.p_value)
+        if abs(best.comb.fundamental - order) <= near:
+            yield replace(best, p_value=p_value, bearing=bearing, name=name, expected=order)
+
+
+DOUBTFUL = 0.05
+"""Chance of a race's family up to which "no damage shows" is not said: the level that statistics is used to."""
+
+
+def doubtful_races(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> list[Candidate]:
+    """Return families at races' orders that chance hardly explains, and which were no finding all the same."""
+    found = _at_parts(signals, envelopes)
+    return [c for c in found if c.name in ("BPFO", "BPFI") and c.p_value <= DOUBTFUL]
 
 
 def _chance_among_others(
-    signals: AnalysisSignals, family: Candidate, bearing: Bearing, low: float, high: float
+    signals: AnalysisSignals,
+    envelopes: list[BandEnvelope],
+    family: Candidate,
+    bearing: Bearing,
+    low: float,
+    high: float,
 ) -> float:
-    """Return a family's chance in its own envelope, its sidebands left out of the lines that chance draws from.
+    """Return a family's chance over all envelopes, its sidebands left out of the lines that chance draws from.
 
     A race that turns through the load fills the spectrum with lines a shaft's order apart, elements that differ with
     such a cage's turn apart: they would make the family they belong to look like chance.
     """
-    excess, own = family.envelope.excess, family.comb.fundamental
+    own = family.comb.fundamental
     shaft = signals.rig.ratio(bearing.shaft) or 0.0
     steps = [step for step in (shaft, shaft * bearing.orders().get("FTF", 0.0)) if step > 0]
     sides = np.array([side * k * step for step in steps for k in (1, 2, 3) for side in (-1, 1)])
     carriers = own * np.arange(N_MULTIPLES + 1)
-    masked = excess.masked.copy()
-    masked[_widened(excess, (carriers[:, None] + sides).ravel(), 1)] = True
-    of_family = _widened(excess, carriers[1:], 2)
-    masked[of_family] = excess.masked[of_family]
-    comb = best_comb(replace(excess, masked=masked), low, high)
-    if comb is None or abs(comb.fundamental / own - 1) > SAME_FAMILY:
-        return family.comb.p_value
-    return min(family.comb.p_value, comb.p_value)
+    chances = []
+    for there in _families(envelopes, low, high):
+        chances.append(there.p_value)
+        if there.p_value > SEEN_THERE or abs(there.comb.fundamental / own - 1) > SAME_FAMILY:
+            continue
+        excess = there.envelope.excess
+        masked = excess.masked.copy()
+        masked[_widened(excess, (carriers[:, None] + sides).ravel(), 1)] = True
+        of_family = _widened(excess, carriers[1:], 2)
+        masked[of_family] = excess.masked[of_family]
+        comb = best_comb(replace(excess, masked=masked), low, high)
+        if comb is not None and abs(comb.fundamental / own - 1) <= SAME_FAMILY:
+            chances[-1] = min(there.p_value, comb.p_value)
+    return _chance_over(envelopes, family, chances)
 
 
 def _widened(excess: LinesOverFloor, places: FloatArray, reach: int) -> NDArray[np.int64]:
@@ -535,7 +591,14 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
             rivals.append("a damaged element or cage, whose lines a cage's turn apart are there as strong,")
         elif shallow > 0.5:
             rivals.append("elements that differ, passing the load of a sound race,")
+    if candidate.of_tones:
+        others += own * AS_BEATS
+        rivals.append("beats of steady tones, without which nothing shows there,")
     return replace(candidate, rivals=tuple(rivals), of_same_order=tuple(of_same_order), share=own / (own + others))
+
+
+AS_BEATS = 10.0
+"""How much likelier beats of tones are than impacts, where a family is gone with the tones."""
 
 
 def _weight_of_pull(signals: AnalysisSignals, candidate: Candidate) -> float:
@@ -556,13 +619,23 @@ BESIDE_SHAFT = 0.015
 
 
 def _shaft_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
-    """Name the multiple of a shaft that lies beside the family's fundamental and is half as strong, or stronger."""
+    """Name the multiple of a shaft that lies beside the family and is half as strong, or stronger.
+
+    It explains the family where that holds for half of the lines that the family shows, and not for the first alone: a
+    line that a wandering speed spreads is spread about each of its multiples.
+    """
     spectrum, own = candidate.envelope.excess.spectrum, candidate.comb.fundamental
-    amplitude = spectrum.largest_near(own, 2 * spectrum.resolution)[1]
+    seen = [round(position / own) for position in candidate.comb.positions]
     for shaft, order in signals.known_shaft_orders.items():
         k = round(own / order)
-        is_beside = k >= 1 and 0 < abs(own / (k * order) - 1) <= BESIDE_SHAFT
-        if is_beside and _amplitude_beside(spectrum, k * order, own) >= 0.5 * amplitude:
+        if k < 1 or not 0 < abs(own / (k * order) - 1) <= BESIDE_SHAFT:
+            continue
+        as_strong = [
+            _amplitude_beside(spectrum, m * k * order, m * own)
+            >= 0.5 * spectrum.largest_near(m * own, 2 * spectrum.resolution)[1]
+            for m in sorted({1, *seen})
+        ]
+        if as_strong[0] and 2 * sum(as_strong) >= len(as_strong):
             return f"the {k}-fold order of shaft {shaft or 'of reference'}"
     return ""
 

@@ -401,7 +401,12 @@ SEEN_THERE = 0.01
 
 def witness(band: KurtogramBand, order: float) -> Comb | None:
     """Return the family at an order found elsewhere, if the own band shows it too."""
-    comb = best_comb(band.envelope.excess, order * (1 - 3e-3), order * (1 + 3e-3))  # a bearing slips alike in all bands
+    return seen_in(band.envelope.excess, order)
+
+
+def seen_in(excess: LinesOverFloor, order: float) -> Comb | None:
+    """Return the family at an order found elsewhere, if another envelope shows it too."""
+    comb = best_comb(excess, order * (1 - 3e-3), order * (1 + 3e-3))  # a bearing slips alike in all bands
     is_seen = comb is not None and comb.p_value <= SEEN_THERE and len(comb.positions) >= MINIMUM_LINES
     return comb if is_seen else None
 
@@ -424,24 +429,57 @@ def witness_text(
 
 
 def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float) -> KurtogramBand | None:
+    from gearsig.spectra import kurtogram
+
+    left = _without_tones(signals, channel)
+    if left is None:
+        return None
+    recording, lines = left
+    try:
+        grid = kurtogram(
+            recording.values(channel),
+            recording.sampling_rate_hz,
+            narrowest_hz=narrowest_hz,
+            source=f"{channel}, tones removed",
+        )
+        band = grid.best_band(narrowest_hz=narrowest_hz)
+    except RefusalError:  # the record is too short, or the races too fast for the sampling rate
+        return None
+    envelope = next(envelopes_in(signals, recording, band.band_hz, {channel: lines}), None)
+    return None if envelope is None else KurtogramBand(grid, band, envelope)
+
+
+def _without_tones(signals: AnalysisSignals, channel: str) -> tuple[Recording, NDArray[np.complexfloating]] | None:
+    """Return a channel without its steady tones, and its `rfft`; None where they are all there is."""
     from scipy.fft import irfft
 
-    from gearsig.spectra import kurtogram, prepared_lines
+    from gearsig.spectra import prepared_lines
 
-    fs = signals.recording.sampling_rate_hz
     recorded = signals.recording.values(channel)
     lines = prepared_lines(signals.prepared.transform(channel), "tones removed")
     x = np.asarray(irfft(lines, len(recorded)))
     if np.std(x) < 1e-9 * np.std(recorded):
-        return None  # a model's tones are all there is: what is left of them are the rounding errors of their removal
-    try:
-        grid = kurtogram(x, fs, narrowest_hz=narrowest_hz, source=f"{channel}, tones removed")
-        band = grid.best_band(narrowest_hz=narrowest_hz)
-    except RefusalError:  # the record is too short, or the races too fast for the sampling rate
-        return None
-    without_tones = replace(signals.recording.select([channel]), samples=x[None, :])
-    envelope = next(envelopes_in(signals, without_tones, band.band_hz, {channel: lines}), None)
-    return None if envelope is None else KurtogramBand(grid, band, envelope)
+        return None  # of a model: what is left are the rounding errors of the tones' removal
+    return replace(signals.recording.select([channel]), samples=x[None, :]), lines
+
+
+def is_of_tones(signals: AnalysisSignals, envelope: BandEnvelope, order: float) -> bool:
+    """Whether a family of an envelope is gone once the steady tones are: their beats modulate as impacts do.
+
+    Tones of a supply and of slots are that steady. Impacts of a bearing that slips ring in tones no longer than some
+    turns of its cage, or shake all of a band, so that removing single lines leaves them.
+    """
+    left = _without_tones(signals, envelope.channel)
+    if left is None:
+        return False
+    recording, lines = left
+    without = next(envelopes_in(signals, recording, envelope.band_hz, {envelope.channel: lines}), None)
+    if without is None:
+        return False
+    excess = without.excess
+    for shaft_order in signals.known_shaft_orders.values():
+        excess = excess.without_multiples(shaft_order)
+    return seen_in(excess, order) is None
 
 
 def channel_analysis(
