@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.diagnosis._bearing_families import (
     BEARING_PARTS,
+    RACES,
     Candidate,
     Families,
     clearest_family,
@@ -56,6 +57,14 @@ shafts' lines are those of a whole multiple of it as well, and it is the part's 
 
 WORTH_A_SUSPICION = 0.3
 """Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
+
+
+SLIPS = (-0.45, -0.3, -0.18, -0.09, 0.0, 0.09, 0.18, 0.3, 0.45)
+"""Nine likely slips, over the range that is searched: tenths of their distribution, the range being 2.8 deviations."""
+
+WOULD_SHOW = 0.8
+"""Share of the slips at which a damaged race would have shown where none is said to show: as sure as that is said to
+be. Of elements and cages, which seldom break first, half of them."""
 
 
 def detect_bearings(
@@ -321,7 +330,9 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
     expected = expected_parts(signals)
     probability = signals.settings.false_alarm_probability / max(1, len(expected) * len(envelopes))
     depths = {
-        (bearing.name, name): smallest_depth(envelopes, order, slip_of(signals), probability)
+        (bearing.name, name): smallest_depth(
+            envelopes, order, slip_of(signals), probability, WOULD_SHOW if name in RACES else 0.5
+        )
         for bearing, name, order in expected
     }
     examined = _examined(signals, depths)
@@ -356,7 +367,7 @@ def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float])
     examined = []
     for bearing in signals.rig.bearings:
         parts = {name: depth for (owner, name), depth in depths.items() if owner == bearing.name}
-        decisive = [depth for name, depth in parts.items() if name in ("BPFO", "BPFI")] or list(parts.values())
+        decisive = [depth for name, depth in parts.items() if name in RACES] or list(parts.values())
         if decisive and max(decisive) <= CLEAR_MODULATION:
             examined.append(bearing.name)
     return examined
@@ -388,21 +399,16 @@ def _undecided(why: str, surer: str, where: Where) -> Finding:
     return cannot_tell("bearings-undecided", title, where, surer=surer)
 
 
-SLIPS = (-0.45, -0.3, -0.18, -0.09, 0.0, 0.09, 0.18, 0.3, 0.45)
-"""Nine likely slips, over the range that is searched: tenths of their distribution, the range being 2.8 deviations."""
-
-WOULD_SHOW = 0.8
-"""Share of the slips at which a damage would have shown where none is said to show: as sure as that is said to be."""
-
-
-def smallest_depth(envelopes: Sequence[BandEnvelope], order: float, slip: float, probability: float) -> float:
+def smallest_depth(
+    envelopes: Sequence[BandEnvelope], order: float, slip: float, probability: float, share: float = WOULD_SHOW
+) -> float:
     """Return the depth of modulation at which six equal harmonics near `order` would have shown in half of the bands.
 
     Each line needs the log ratio score/n over its floor, where `score` is what chance reaches with `probability` and n
     the number of harmonics that no shaft hides. The depth is the amplitude of such a line over the mean envelope. The
     band in which a damage rings is not known beforehand: the best one of all says little, so that it is the median
     over the bands, each with its best channel. Slip takes a part's lines to and from those of the shafts: the depth is
-    the one that is enough at four of five slips.
+    the one that is enough at a share of the slips.
 
     Parameters
     ----------
@@ -413,6 +419,8 @@ def smallest_depth(envelopes: Sequence[BandEnvelope], order: float, slip: float,
         Relative range searched to either side.
     probability : float
         Of a false alarm in one envelope.
+    share : float
+        Of the slips that are likely, 0 to 1.
 
     Returns
     -------
@@ -423,7 +431,7 @@ def smallest_depth(envelopes: Sequence[BandEnvelope], order: float, slip: float,
     for envelope in envelopes:
         score = score_needed(envelope.excess, 6, order * (1 - slip), order * (1 + slip), probability)
         depths = sorted(_depth_in(envelope, order * (1 + part * slip), score) for part in SLIPS)
-        best[envelope.band_hz] = min(depths[ceil(WOULD_SHOW * len(SLIPS)) - 1], best.get(envelope.band_hz, inf))
+        best[envelope.band_hz] = min(depths[max(ceil(share * len(SLIPS)), 1) - 1], best.get(envelope.band_hz, inf))
     return median_high(best.values()) if best else inf
 
 

@@ -135,6 +135,9 @@ BEARING_PARTS = {
 }
 """Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
 
+RACES = ("BPFO", "BPFI")
+"""Where nearly all damage begins."""
+
 
 def part_text(name: str, bearing: str) -> str:
     """Name a part by its order's name, e.g. "outer race of bearing 1"."""
@@ -281,20 +284,25 @@ differences with the shaft and the cage, and the other bearing's sensor."""
 
 
 def _distinct(signals: AnalysisSignals, candidates: list[Candidate]) -> list[Candidate]:
-    """Return the candidates, strongest first, without those that are by-products of a stronger one."""
+    """Return the candidates, strongest first, without those that are by-products of another one."""
     kept: list[Candidate] = []
     for candidate in sorted(candidates, key=lambda c: -c.strength_db):
         beside = (max(s.strength_db, _strength_in(candidate.envelope, s.comb.fundamental)) for s in kept)
-        is_clear = all(candidate.strength_db >= level - SECOND_DB for level in beside)
-        if is_clear and not any(_is_sideband(signals, candidate, stronger) for stronger in kept):
+        if all(candidate.strength_db >= level - SECOND_DB for level in beside):
             kept.append(candidate)
-    return kept
+    return [c for c in kept if not any(_is_sideband(signals, c, carrier) for carrier in kept)]
 
 
 def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candidate) -> bool:
-    """Whether a family is a stronger one's sidebands: k (f - n s) is the sideband number k n of multiple k."""
+    """Whether a family is the sidebands of a race's: k (f - n s) is the sideband number k n of multiple k.
+
+    An inner race turns through the load, so that it has them a shaft's order apart; an outer race where the load turns,
+    weaker than its own lines. Elements and cages have them a cage's order apart.
+    """
     shaft = signals.rig.ratio(carrier.bearing.shaft) if carrier.bearing is not None else None
-    if not shaft:
+    turns = carrier.name == "BPFI" and candidate.name != "BPFI"
+    is_stronger = carrier.name in RACES and carrier.strength_db > candidate.strength_db
+    if not shaft or not (turns or is_stronger):
         return False
     distance = abs(candidate.comb.fundamental - carrier.comb.fundamental)
     n = round(distance / shaft)
@@ -375,7 +383,7 @@ def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> C
 def _chance_over(envelopes: Sequence[BandEnvelope], best: Candidate, p_values: Sequence[float]) -> float:
     """Return the chance of the best family over all envelopes, from its chances in those that have one.
 
-    Bands overlap and channels hear the same source: where a line is higher than noise makes any of a spectrum, envelopes
+    Bands overlap and channels hear the same source: where a line is higher than noise makes any of a spectrum, those
     that show it are no independent trials, and the harmonic mean of the chances holds for dependent ones as well
     (Wilson 2019, doi:10.1073/pnas.1814092116). One accident of noise may be in all bands, too, so that without such a
     line each envelope counts as a trial.
@@ -456,7 +464,7 @@ DOUBTFUL = 0.05
 def doubtful_races(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> list[Candidate]:
     """Return families at races' orders that chance hardly explains, and which were no finding all the same."""
     found = _at_parts(signals, envelopes)
-    return [c for c in found if c.name in ("BPFO", "BPFI") and c.p_value <= DOUBTFUL]
+    return [c for c in found if c.name in RACES and c.p_value <= DOUBTFUL]
 
 
 def _chance_among_others(
@@ -662,7 +670,7 @@ def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) 
     for bearing, name, order in expected_parts(signals):
         shaft = signals.rig.ratio(bearing.shaft)
         k = round(order / shaft) if shaft else 0
-        if k < 2 or not shaft or name not in ("BPFO", "BPFI") or abs(order / (k * shaft) - 1) > slip_of(signals):
+        if k < 2 or not shaft or name not in RACES or abs(order / (k * shaft) - 1) > slip_of(signals):
             continue
         multiples = np.arange(2, 3 * k + 2)
         own = multiples % k == 0

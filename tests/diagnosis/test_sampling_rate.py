@@ -50,6 +50,22 @@ def test_a_race_that_nobody_described_is_no_wrong_rate(seed: int) -> None:
     assert CODE not in codes(analyze(recording))
 
 
+def test_one_element_at_the_stated_rate_asks_for_no_mistake() -> None:
+    """In 1.3 s its lines are near those of shafts and races at a rate 2.56 times as high."""
+    rng, d, pitch = np.random.default_rng(0), 5.969, 31.623
+    t = np.arange(15_360) / MOTOR_RATE_HZ
+    x = rng.standard_normal(len(t))
+    for k in range(1, 5):
+        x += rng.uniform(0.1, 0.5) * np.cos(2 * np.pi * k * MOTOR_HZ * t + rng.uniform(0, 6))
+    rate_hz = 0.996 * MOTOR_HZ * (pitch / d - d / pitch)
+    hits = np.cumsum((1 + 0.003 * rng.standard_normal(int(rate_hz * t[-1]) - 10)) / rate_hz)
+    impacts = np.zeros_like(t)
+    impacts[np.searchsorted(t, hits)] = 8 * np.clip(np.cos(np.pi * (1 - d / pitch) * MOTOR_HZ * hits), 0.1, None)
+    x += np.convolve(impacts, np.exp(-900 * t[:400]) * np.sin(2 * np.pi * 2800 * t[:400]))[: len(t)]
+    rig = replace(MOTOR, bearings=(Bearing("test bearing", "motor", 8, d, pitch),))
+    assert CODE not in codes(analyze(replace(motor("", 1), samples=x[None, :], rig=rig)))
+
+
 def test_a_wrong_speed_is_as_likely_as_a_wrong_rate_but_for_the_mains() -> None:
     recording = replace(motor("BPFI", 1), sampling_rate_hz=1.1 * MOTOR_RATE_HZ)  # 33 Hz: no multiple is near 50 Hz
     t = np.arange(recording.n_samples) / recording.sampling_rate_hz
