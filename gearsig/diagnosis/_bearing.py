@@ -26,7 +26,7 @@ from gearsig.diagnosis._bearing_families import (
     underlying_impulse_train,
 )
 from gearsig.diagnosis._lines import factor_left_open, speed_is_confirmed
-from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, witness_text
+from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, without_shafts, witness_text
 from gearsig.diagnosis._types import (
     WITH_ASSUMED_DATA,
     Finding,
@@ -74,12 +74,10 @@ def detect_bearings(
 
     The bands that the kurtograms choose are searched like the others, and say what they show of a race found.
     """
-    cleaned = []
-    for envelope in (*envelopes, *(own.envelope for own in kurtogram_bands)):
-        excess = envelope.excess
-        for order in signals.known_shaft_orders.values():  # their multiples are gears' and shafts', not bearings'
-            excess = excess.without_multiples(order)
-        cleaned.append(replace(envelope, excess=excess))
+    cleaned = [
+        replace(envelope, excess=without_shafts(signals, envelope.excess))
+        for envelope in (*envelopes, *(own.envelope for own in kurtogram_bands))
+    ]
     if signals.angle is None:
         return list(_over_frequency(signals, cleaned))
     if signals.angle.n_revolutions < signals.settings.minimum_revolutions:

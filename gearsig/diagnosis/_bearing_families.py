@@ -268,8 +268,7 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
         if free is not None and free.bearing is not None:
             return Families((free,), (), tuple(unclear))
         if free is not None and mains_beside(signals, free):  # clicks of a supply hide what is slower and weaker
-            behind = [replace(e, excess=e.excess.without_multiples(free.comb.fundamental)) for e in envelopes]
-            further = find_families(signals, behind)
+            further = find_families(signals, _without(envelopes, [free]))
             return replace(further, trains=(free, *further.trains))
         trains = [] if free is None else [free]
     return Families(tuple(clear), tuple(trains), tuple(unclear))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log10
 
@@ -85,6 +85,8 @@ class AnalysisSignals:
         Whether a recording of the healthy machine was given: then none is asked for.
     over_angle : AngleSignal or None
         The channels over the reference shaft's angle; None where `order_excess` is empty.
+    without_tones : dict
+        Channel and band → lines of its envelope without steady tones, once they were asked for, see `is_of_tones`.
     """
 
     prepared: PreparedRecording
@@ -98,6 +100,9 @@ class AnalysisSignals:
     order_maps: Mapping[str, OrderMap]
     has_reference: bool = False
     over_angle: AngleSignal | None = None
+    without_tones: dict[tuple[str, tuple[float, float]], LinesOverFloor | None] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @property
     def known_shaft_orders(self) -> dict[str, float]:
@@ -469,17 +474,28 @@ def is_of_tones(signals: AnalysisSignals, envelope: BandEnvelope, order: float) 
     Tones of a supply and of slots are that steady. Impacts of a bearing that slips ring in tones no longer than some
     turns of its cage, or shake all of a band, so that removing single lines leaves them.
     """
-    left = _without_tones(signals, envelope.channel)
+    key = envelope.channel, envelope.band_hz
+    if key not in signals.without_tones:
+        signals.without_tones[key] = _lines_without_tones(signals, *key)
+    excess = signals.without_tones[key]
+    return excess is not None and seen_in(excess, order) is None
+
+
+def _lines_without_tones(signals: AnalysisSignals, channel: str, band_hz: tuple[float, float]) -> LinesOverFloor | None:
+    """Return the lines of a band's envelope beside shafts' without the steady tones; None where nothing is left."""
+    left = _without_tones(signals, channel)
     if left is None:
-        return False
+        return None
     recording, lines = left
-    without = next(envelopes_in(signals, recording, envelope.band_hz, {envelope.channel: lines}), None)
-    if without is None:
-        return False
-    excess = without.excess
-    for shaft_order in signals.known_shaft_orders.values():
-        excess = excess.without_multiples(shaft_order)
-    return seen_in(excess, order) is None
+    envelope = next(envelopes_in(signals, recording, band_hz, {channel: lines}), None)
+    return None if envelope is None else without_shafts(signals, envelope.excess)
+
+
+def without_shafts(signals: AnalysisSignals, excess: LinesOverFloor) -> LinesOverFloor:
+    """Return lines without multiples of the shafts' orders, which are gears' and shafts', not bearings'."""
+    for order in signals.known_shaft_orders.values():
+        excess = excess.without_multiples(order)
+    return excess
 
 
 def channel_analysis(

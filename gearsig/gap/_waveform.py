@@ -310,24 +310,22 @@ def with_profiles_between(
     option = effect.profile_varies_with
     if not option:
         return
-    chains: dict[tuple[object, ...], list[tuple[float, Added, ComplexArray]]] = {}
+    chains: dict[tuple[tuple[str, float | str], ...], list[tuple[float, ComplexArray]]] = {}
     for added, sidebands in simulated:
-        if option == effect.severity_name:
-            chains.setdefault(added.place, []).append((added.severity, added, sidebands))
-        elif option in added.options:
-            others = tuple(item for item in added.place if item[0] != option)
-            chains.setdefault((added.severity, *others), []).append((float(added.options[option]), added, sidebands))
-    for chain in chains.values():
-        for (low, first, before), (high, _, after) in pairwise(sorted(chain, key=lambda item: item[0])):
+        setting = {**added.options, effect.severity_name: added.severity}
+        if option in setting:
+            value = float(setting.pop(option))
+            chains.setdefault(tuple(sorted(setting.items())), []).append((value, sidebands))
+    for others, chain in chains.items():
+        for (low, before), (high, after) in pairwise(sorted(chain, key=lambda item: item[0])):
             turn_rad = _turn_between_rad(before, after, 2.0 * effect.moves_pitches, n_teeth)
             for share in np.arange(1, BETWEEN + 1) / (BETWEEN + 1.0):
                 value = float(f"{low + share * (high - low):.4g}")
                 turned = before * np.exp(1j * share * turn_rad), after * np.exp(1j * (share - 1.0) * turn_rad)
                 mixed: ComplexArray = (1.0 - share) * turned[0] + share * turned[1]
-                if option == effect.severity_name:
-                    yield Added(first.name, value, first.options), mixed
-                else:
-                    yield Added(first.name, first.severity, {**first.options, option: value}), mixed
+                options = {**dict(others), option: value}
+                severity = float(options.pop(effect.severity_name))
+                yield Added(effect.name, severity, options), mixed
 
 
 def _turn_between_rad(before: ComplexArray, after: ComplexArray, most_pitches: float, n_teeth: int) -> FloatArray:

@@ -339,8 +339,7 @@ def _blank(values: ParameterValues, side: int) -> GearBlank:
     )
 
 
-@lru_cache(maxsize=8)
-@lru_cache(maxsize=4)  # a healthy machine and the flexible pair that is made of it ask for both
+@lru_cache(maxsize=8)  # a healthy machine and the flexible pair that is made of it ask for both
 def reduced_gear(blank: GearBlank, n_dof: int) -> ReducedGear:
     """Return a gear: ready-made where one fits, else from the cache, else reduced now with about `n_dof`."""
     for name, ready in READY.items():
