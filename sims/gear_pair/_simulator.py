@@ -335,7 +335,7 @@ class PairTwin:
     further : tuple of SensorSeat
         Sensors beside the rig's own.
     is_quiet : bool
-        On soft mounts, without the vibration of the surroundings, its gears nearly even.
+        On soft mounts, rigid, without the vibration of the surroundings, its gears nearly even.
     """
 
     rig: Rig
@@ -403,7 +403,8 @@ class PairTwin:
         """Return the machine on soft mounts where nothing else vibrates and its own gears hardly do.
 
         What an effect adds is neither lost in noise nor, as a second unbalance would, weighed up against what the
-        specimen happens to have there.
+        specimen happens to have there. Its housing is rigid: resonances that were drawn are those of another machine,
+        and bend the profile of a tooth's fault as the real ones do not.
         """
         return replace(self, is_quiet=True)
 
@@ -462,7 +463,7 @@ class PairTwin:
         housing = usual_housing(drawn)
         if self.is_quiet:
             values |= dict.fromkeys(_NOISES, 0.0) | {name: EVEN * float(values[name]) for name in _UNEVEN}
-            housing = (*body_on_mounts(self.nominal), *housing)
+            housing = body_on_mounts(self.nominal)
         used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
         installed = installed_of_rig(self.rig, self.nominal.size, housing, used)
         installed = replace(installed, sensors=(*installed.sensors, *self.further))
