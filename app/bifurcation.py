@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
-from io import StringIO
 from itertools import groupby
 from math import isfinite, pi
 from pathlib import Path
@@ -19,6 +17,7 @@ from gearsig import phase
 from gearsig.cache import read_arrays, remove_parts, write_text, write_whole
 from gearsig.checks import FloatArray, count, one_of, within
 from gearsig.errors import GearsigError, RefusalError
+from gearsig.formatting import csv_rows
 from gearsig.processes import active_cluster, killed_text, n_processors, run_jobs
 from sims.continuation import DECAYS, TRANSMISSION_ERROR, Branch, End, SteadyRun
 from sims.cracked import SIGNALS, PairState
@@ -418,16 +417,15 @@ def figure_of(branch: Branch, values: Values) -> Figure:
 
 def points_csv(branch: Branch, values: Values) -> str:
     """Return every point: branch, value of what is varied, coordinates of the path in SI units."""
-    text = StringIO()
-    table = csv.writer(text, lineterminator="\n")
     first = next(value for kept in values.values() for value in measured_of(kept))
     axes = zip(first.section.axis_names, first.section.units, strict=True)
-    table.writerow(["branch", branch.sweep.axes[0].name, *(f"{name} ({unit})" for name, unit in axes)])
-    for name, kept in values.items():
-        for value in measured_of(kept):
-            for point in value.section.points:
-                table.writerow([name, f"{value.value:.12g}", *(f"{x:.9g}" for x in point)])
-    return text.getvalue()
+    rows = (
+        [name, f"{value.value:.12g}", *(f"{x:.9g}" for x in point)]
+        for name, kept in values.items()
+        for value in measured_of(kept)
+        for point in value.section.points
+    )
+    return csv_rows(["branch", branch.sweep.axes[0].name, *(f"{name} ({unit})" for name, unit in axes)], rows)
 
 
 def summary(request: BifurcationRequest, values: Values) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from gearsig import plot
 from gearsig.angle import find_shaft_angle, resample_to_angle
 from gearsig.cache import write_text
 from gearsig.checks import FloatArray, positive
+from gearsig.formatting import csv_rows
 from gearsig.orders import OrderMap, order_map
 from sims import reduced_fe
 from sims.gear_pair import MeasuredRun, build_rig
@@ -256,14 +257,13 @@ def figures(study: Study, title: str) -> dict[str, Figure]:
 
 def sweeps_csv(study: Study) -> str:
     """Return every part of every sweep as a line."""
-    lines = ["torque_nm,direction,speed_rpm,mesh_hz,rms_um,least_force_n,lost_part"]
+    header = ["torque_nm", "direction", "speed_rpm", "mesh_hz", "rms_um", "least_force_n", "lost_part"]
+    rows: list[list[str]] = []
     for torque, pair in study.sweeps.items():
         for direction, sweep in zip(("up", "down"), pair, strict=True):
             columns = (sweep.speed_rpm, sweep.mesh_hz, sweep.rms_m * 1e6, sweep.minimum_force_n, sweep.lost_part)
-            lines += [
-                f"{torque:g},{direction}," + ",".join(f"{v:.6g}" for v in row) for row in zip(*columns, strict=True)
-            ]
-    return "\n".join(lines) + "\n"
+            rows += [[f"{torque:g}", direction, *(f"{v:.6g}" for v in row)] for row in zip(*columns, strict=True)]
+    return csv_rows(header, rows)
 
 
 def maps_csv(maps: MeshMaps) -> str:
@@ -277,7 +277,7 @@ def maps_csv(maps: MeshMaps) -> str:
         pair = (maps.pair_forces_n, maps.load_sharing, maps.contact_tangent_n_per_m, maps.contact_secant_n_per_m)
         columns += [values[:, :, j] for values in pair]
     rows = np.column_stack([values.T.ravel() for values in columns])
-    return "\n".join([",".join(names), *(",".join(f"{v:.6g}" for v in row) for row in rows)]) + "\n"
+    return csv_rows(names, ([f"{v:.6g}" for v in row] for row in rows))
 
 
 def summary(study: Study) -> dict[str, object]:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from dataclasses import dataclass
-from io import StringIO
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +13,7 @@ import numpy as np
 from gearsig.cache import made_folder, write_text
 from gearsig.checks import positive
 from gearsig.errors import InputError
+from gearsig.formatting import csv_rows
 from gearsig.plot import CurvePanel, curves_figure
 from sims.fe_gear import GearBlank, ReducedGear, crack_size, deepest_followed_mm
 from sims.mesh import GearMesh
@@ -164,11 +163,9 @@ def write_growth(study: GrowthStudy, folder: Path) -> list[Path]:
     paths, figure = [folder / "growth.png", folder / "growth.svg"], growth_figure(study)
     for path in paths:
         figure.savefig(path, dpi=160)
-    out = StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(["depth_mm", "k_mpa_sqrt_m", "turns_5", "turns_50", "turns_95"])
+    columns = ["depth_mm", "k_mpa_sqrt_m", "turns_5", "turns_50", "turns_95"]
     rows = zip(study.growth.depth_mm, study.growth.k_mpa_sqrt_m, *study.growth.turns, strict=True)
-    table.writerows([f"{value:.6g}" for value in row] for row in rows)
+    table = csv_rows(columns, ([f"{value:.6g}" for value in row] for row in rows))
     found = {
         "verdict": study.verdict,
         "remaining_turns": [t if isfinite(t) else None for t in study.growth.remaining_turns],
@@ -182,6 +179,6 @@ def write_growth(study: GrowthStudy, folder: Path) -> list[Path]:
         "law": study.law.source,
         "assumptions": list(ASSUMPTIONS),
     }
-    write_text(folder / "growth.csv", out.getvalue())
+    write_text(folder / "growth.csv", table)
     write_text(folder / "growth.json", json.dumps(found, indent=1, ensure_ascii=False) + "\n")
     return [*paths, folder / "growth.csv", folder / "growth.json"]

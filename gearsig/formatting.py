@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from io import StringIO
 from math import floor, isfinite, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -39,6 +41,27 @@ def spreadsheet_cell(value: Cell) -> Cell | str:
     """
     is_formula = isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r"))
     return f"'{value}" if is_formula else value
+
+
+def csv_rows(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
+    """Return a table as CSV, cells as they are."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows([header, *rows])
+    return text.getvalue()
+
+
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table in Markdown, a line a row.
+
+    Examples
+    --------
+    >>> print(markdown_table(["n", "time"], [["1", "2 s"]]), end="")
+    | n | time |
+    |---|---|
+    | 1 | 2 s |
+    """
+    lines = ["|" + "---|" * len(header), *(f"| {' | '.join(row)} |" for row in rows)]
+    return "\n".join([f"| {' | '.join(header)} |", *lines, ""])
 
 
 def csv_text(table: DataFrame) -> str:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import KW_ONLY, dataclass, field, fields
-from io import StringIO
 from itertools import product
 from math import isfinite, prod
 from pathlib import Path
@@ -16,6 +14,7 @@ from typing import Any
 from gearsig.cache import remove_parts, write_text
 from gearsig.checks import count, one_of, positive
 from gearsig.errors import GearsigError, InputError
+from gearsig.formatting import csv_rows
 from gearsig.processes import killed_text, n_processors, run_jobs
 from gearsig.recording import WRITERS
 from sims.effects import EffectSetting, OptionValue, effect
@@ -342,14 +341,12 @@ def _run_one(job: SweepJob) -> SweepOutcome:
 
 
 def _write_index(sweep: Sweep, folder: Path, points: Sequence[SweepPoint], done: dict[int, SweepOutcome]) -> Path:
-    text = StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["index", *(axis.name for axis in sweep.axes), "seed", "file", "reason"])
+    rows = []
     for point in points:
         path = recording_path(sweep, folder, point)
         outcome = done.get(point.index)
         reason = "" if path.exists() else (outcome.reason if outcome else "not yet simulated")
-        table.writerow(
-            [point.index, *(f"{v:.12g}" for v in point.values), point.seed, path.name if path.exists() else "", reason]
-        )
-    return write_text(folder / INDEX, text.getvalue())
+        file = path.name if path.exists() else ""
+        rows.append([point.index, *(f"{v:.12g}" for v in point.values), point.seed, file, reason])
+    header = ["index", *(axis.name for axis in sweep.axes), "seed", "file", "reason"]
+    return write_text(folder / INDEX, csv_rows(header, rows))

@@ -1,11 +1,22 @@
-"""What is kept of a gap report for scoring."""
+"""The diagnosing process and what it leaves: ``python -m app.benchmark.answer DIAGNOSER…`` in a case's folder.
+
+It is started fresh for each case. All it is given is the folder it stands in, which has a random name and holds
+recordings and rig files; it leaves answers.json there. It imports nothing that makes cases.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
+from app.benchmark.diagnosers import VisibleCase, diagnoser, read_visible
+from gearsig.cache import write_text
+from gearsig.errors import GearsigError
 from gearsig.gap import GapCause, GapPlace, GapReport, Shrinkage
 from gearsig.report import from_plain
 
@@ -57,17 +68,9 @@ class Answer:
         return next((c.shrinkage for c in self.causes if c.name == name), None)
 
 
-def answer_of(report: GapReport, seconds: float, cpu_seconds: float) -> Answer:
+def answer_of(report: GapReport) -> Answer:
     """Reduce a report to what is scored."""
-    return Answer(
-        report.outcome.value,
-        report.causes,
-        report.inseparable or (),
-        report.places,
-        report.size.value,
-        seconds,
-        cpu_seconds,
-    )
+    return Answer(report.outcome.value, report.causes, report.inseparable or (), report.places, report.size.value)
 
 
 def to_text(answers: Mapping[str, Answer]) -> str:
@@ -79,3 +82,36 @@ def to_text(answers: Mapping[str, Answer]) -> str:
 def from_text(text: str) -> dict[str, Answer]:
     """Read what `to_text` wrote."""
     return {name: from_plain(Answer, data, name) for name, data in json.loads(text).items()}
+
+
+ANSWERS = "answers.json"
+
+
+def answered(name: str, case: VisibleCase) -> Answer:
+    """Return one diagnoser's answer; every error becomes a reason."""
+    started, cpu = time.perf_counter(), _cpu_s()
+    try:
+        answer = answer_of(diagnoser(name)(case))
+    except GearsigError as error:
+        answer = Answer("", error=str(error))
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - one case must not stop the others; the reason is passed on
+        text = f"unexpected error: {type(error).__name__}: {' '.join(str(error).split())}"
+        answer = Answer("", error=text)
+    return replace(answer, seconds=time.perf_counter() - started, cpu_seconds=_cpu_s() - cpu)
+
+
+def main(names: Sequence[str]) -> None:
+    """Answer with each diagnoser in turn and write the answers, whole or not at all."""
+    case = read_visible(Path.cwd())
+    answers = {name: answered(name, case) for name in names}
+    write_text(Path(ANSWERS), to_text(answers))
+
+
+def _cpu_s() -> float:
+    """Processor time of this process and of those it has waited for."""
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -15,9 +15,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import app
-from app.benchmark.answer import Answer, from_text, to_text
+from app.benchmark.answer import ANSWERS, Answer, from_text, to_text
 from app.benchmark.cases import Plan, PlannedCase, Truth
-from app.benchmark.diagnose_one import ANSWERS
 from app.benchmark.diagnosers import diagnoser, folders_of
 from app.stopping import Running, stop
 from gearsig import __version__
@@ -40,8 +39,8 @@ DEFINITION, ANSWERS_FOLDER = "benchmark.json", "answers"
 MAX_S = 900.0
 """A diagnosis that takes longer has no answer."""
 
-_SHOWS_ONLY = {"plot", "report", "scoring"}
-"""Rooms that neither make a case nor answer one: they may change between an answer and its score."""
+_SHOWS_ONLY = ("gearsig/plot/", "gearsig/report/", "app/benchmark/scores.py", "app/benchmark/results.py")
+"""What neither makes a case nor answers one: it may change between an answer and its score."""
 
 _PASSED_ON = ("PATH", "LANG", "LC_ALL", "HOME", "SYSTEMROOT", "VIRTUAL_ENV", "NUMBA_CACHE_DIR", *FOLDERS)
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -166,7 +165,7 @@ def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None
     """
     runs = running or Running()
     process = runs.start(
-        [sys.executable, "-P", "-m", "app.benchmark.diagnose_one", *names],
+        [sys.executable, "-P", "-m", "app.benchmark.answer", *names],
         cwd=folder,
         env=environment(folder, names),
         stdout=subprocess.DEVNULL,
@@ -204,7 +203,7 @@ def state_of_code() -> str:
     digest = hashlib.sha256()
     for room in ("gearsig", "sims", "app/benchmark"):
         for path in sorted((_ROOT / room).rglob("*")):
-            relative_path = path.relative_to(_ROOT)
-            if path.suffix in (".py", ".json", ".toml", ".npz") and not _SHOWS_ONLY & set(relative_path.parts):
-                digest.update(relative_path.as_posix().encode() + b"\0" + path.read_bytes())
+            name = path.relative_to(_ROOT).as_posix()
+            if path.suffix in (".py", ".json", ".toml", ".npz") and not name.startswith(_SHOWS_ONLY):
+                digest.update(name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.compiled import njit
+from gearsig.formatting import markdown_table
 from sims.cracked import derivative
 
 Run = Callable[[], Any]
@@ -565,26 +566,18 @@ def table(results: Sequence[TimedMethodResult], date: datetime | None = None) ->
     day = f"{(date or datetime.now().astimezone()):%d %B %Y}"
     names = ("method", "samples N", "gearsig", "instead", "takes", "times as long", "results differ by")
     header = (*names, "grows as N to the power of; instead", "gearsig over its limit")
-    lines = [
-        f"{day}; {machine()}; {programs()}. One thread, best of interleaved runs, processor time.",
-        "",
-        f"| {' | '.join(header)} |",
-        "|---" * len(header) + "|",
-    ]
+    lines = []
     for row in rows(results):
         n = int(row["n"])
-        took = (
-            f"{_ms(row['instead_s'])} | {row['ratio']:.3g} | {_or_dash(row['difference'], '.1e')}"
-            if not row["reason"]
-            else f"{row['reason']} | – | –"
-        )
+        took = [_ms(row["instead_s"]), f"{row['ratio']:.3g}", _or_dash(row["difference"], ".1e")]
+        if row["reason"]:
+            took = [str(row["reason"]), "–", "–"]
         growth = f"{row['exponent']:.2f}; {_or_dash(row['instead_exponent'], '.2f')}"
         length = f"2^{n.bit_length() - 1}" if n == 1 << (n.bit_length() - 1) else str(n)
-        lines.append(
-            f"| {row['method']} | {length} | {_ms(row['gearsig_s'])} | {row['instead']} | {took} | {growth} | "
-            f"{row['over_limit']:.2g} × {row['limit']} |"
-        )
-    return "\n".join(lines) + "\n"
+        limit = f"{row['over_limit']:.2g} × {row['limit']}"
+        lines.append([str(row["method"]), length, _ms(row["gearsig_s"]), str(row["instead"]), *took, growth, limit])
+    head = f"{day}; {machine()}; {programs()}. One thread, best of interleaved runs, processor time."
+    return f"{head}\n\n{markdown_table(header, lines)}"
 
 
 def machine() -> str:

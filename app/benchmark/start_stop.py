@@ -15,21 +15,26 @@ from app.benchmark.answer import Answer
 from app.benchmark.cases import BLIND, Plan, PlannedCase, Truth, counts_of
 from app.benchmark.diagnosers import START_STOP
 from app.benchmark.run import BenchmarkRequest, Done
-from app.benchmark.scoring.judged import Located, Row, row_of
-from app.benchmark.scoring.scores import PARTS as ALL_PARTS
-from app.benchmark.scoring.scores import (
+from app.benchmark.scores import PARTS as ALL_PARTS
+from app.benchmark.scores import (
     WITH,
     WITHOUT,
     BenchmarkResult,
     Figure,
+    Located,
     Measure,
+    Row,
     Rows,
     Score,
     brier_of,
     calibration_error,
+    confidence_of,
     counted,
+    is_kind,
     mean_of,
     median_of,
+    row_of,
+    says_unknown,
     score_parts,
     shrink_of,
 )
@@ -166,11 +171,7 @@ def _is_right(row: Row) -> bool:
     return effects_ranked(row)[:1] == list(row.truths)
 
 
-def _is(kind: str) -> Callable[[Row], bool]:
-    return lambda row: row.kind == kind
-
-
-_is_single = _is("single")
+_is_single = is_kind("single")
 
 
 def _shrinkages(rows: Rows) -> list[Shrinkage]:
@@ -217,16 +218,12 @@ FIGURES = (
         "tooth or order right, of effects that were",
         counted(
             lambda r: _is_single(r) and r.located != Located() and _is_right(r),
-            lambda r: bool(r.located.tooth or r.located.order),
+            lambda r: r.located.tooth or r.located.order,
         ),
     ),
-    Figure("named_on_none", "effect named on a healthy machine", counted(_is("none"), _names_effect)),
-    Figure("named_on_unknown", "effect named on an unknown", counted(_is("unknown"), _names_effect)),
-    Figure(
-        "unknown_recognised",
-        "unknown recognised",
-        counted(_is("unknown"), lambda r: r.answer.outcome == GapOutcome.UNKNOWN.value),
-    ),
+    Figure("named_on_none", "effect named on a healthy machine", counted(is_kind("none"), _names_effect)),
+    Figure("named_on_unknown", "effect named on an unknown", counted(is_kind("unknown"), _names_effect)),
+    Figure("unknown_recognised", "unknown recognised", counted(is_kind("unknown"), says_unknown)),
     Figure(
         "shrink_true",
         "held-out shrink by the true effect, median",
@@ -243,7 +240,7 @@ FIGURES = (
     Figure(
         "ece",
         "calibration error, 5 equal bins",
-        _plain(lambda rows: calibration_error([r.confidence for r in rows], [r.first in r.truths for r in rows], 5)),
+        _plain(lambda rows: calibration_error(*confidence_of(rows), 5)),
         is_share=False,
     ),
     Figure("brier", "Brier score (0 to 2)", mean_of(brier_of), is_share=False),
@@ -265,12 +262,12 @@ FIGURES = (
 
 def write_drive_results(result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str) -> Path:
     """Write table, scores, cases and labels beside the answers, each whole or not at all; return the table's path."""
-    from app.benchmark.scoring.results import TABLE, Table, figures_table, markdown_table, write_files
+    from app.benchmark.results import TABLE, Table, figures_table, titled_table, write_files
 
     parts = {name: result.part(name) for name in PARTS}
     tables = (figures_table(result, "Blind start–stop cases", "", parts), Table(*_by_effect(result)))
-    lines = [line for table in tables for line in (*markdown_table(table), "")]
-    write_files(result, cases, folder, command, "\n".join([*lines, f"`{command}`"]) + "\n")
+    text = "\n".join([*(titled_table(table) for table in tables), f"`{command}`\n"])
+    write_files(result, cases, folder, command, text)
     return folder / TABLE
 
 

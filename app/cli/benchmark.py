@@ -83,9 +83,9 @@ def gap(
         return
     from app.benchmark.cases import Plan
     from app.benchmark.diagnosers import BASELINES, GAP
+    from app.benchmark.results import TABLE, write_results
     from app.benchmark.run import BenchmarkRequest
-    from app.benchmark.scoring.results import TABLE, write_results
-    from app.benchmark.scoring.scores import judge
+    from app.benchmark.scores import judge
 
     names = tuple(dict.fromkeys([*(diagnosers or [GAP]), *BASELINES]))
     request = BenchmarkRequest(Plan(cases, seed, role, wished, same_simulator, longest, least_level), names)
@@ -114,11 +114,9 @@ def speed(
 
     Example: gearsig benchmark speed --only wavelet
     """
-    import csv
-    from io import StringIO
-
     from app.benchmark.speed import METHODS, measure, rows, table
     from gearsig.cache import write_text
+    from gearsig.formatting import csv_rows
 
     chosen = [m for m in METHODS if not only or any(word.lower() in m.name.lower() for word in only)]
     if not chosen:
@@ -130,11 +128,9 @@ def speed(
     text = table(results)
     typer.echo(text)
     if output is not None:
-        records, file = list(rows(results)), StringIO()
-        writer = csv.DictWriter(file, list(records[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(records)
-        paths = write_text(output / "speed.md", text), write_text(output / "speed.csv", file.getvalue())
+        records = list(rows(results))
+        numbers = csv_rows(records[0], (record.values() for record in records))
+        paths = write_text(output / "speed.md", text), write_text(output / "speed.csv", numbers)
         typer.echo(f"{paths[0]} (table), {paths[1].name} (its numbers).")
 
 

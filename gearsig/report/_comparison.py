@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from io import StringIO
 from textwrap import fill
 
 from gearsig import __version__
@@ -27,6 +25,7 @@ from gearsig.comparison import (
     missing_words,
 )
 from gearsig.formatting import (
+    csv_rows,
     decimals_for,
     plus_minus,
     readable,
@@ -215,13 +214,14 @@ def alignment_texts(comparison: Comparison) -> list[str]:
 
 def orders_csv(comparison: Comparison) -> str:
     """Return all order lines of all channels as CSV with a heading."""
-    buffer = StringIO()
-    table = csv.writer(buffer, lineterminator="\n")
-    table.writerow(ORDER_COLUMNS)
-    for channel in comparison.channels:
-        for line in (*channel.lines, *channel.other_lines):
-            table.writerow([spreadsheet_cell(channel.name), *_row(line)])
-    return buffer.getvalue()
+    return csv_rows(
+        ORDER_COLUMNS,
+        (
+            [spreadsheet_cell(channel.name), *_row(line)]
+            for channel in comparison.channels
+            for line in (*channel.lines, *channel.other_lines)
+        ),
+    )
 
 
 def _row(line: LineLevel) -> list[object]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from io import StringIO
 from math import inf, isfinite
 from pathlib import Path
 from textwrap import shorten
@@ -19,7 +17,7 @@ from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.diagnosis import Analysis, Kind, Outcome
 from gearsig.fleet import date_in_name
-from gearsig.formatting import percent, readable, spreadsheet_cell, unit_text
+from gearsig.formatting import csv_rows, percent, readable, spreadsheet_cell, unit_text
 from gearsig.indicators import Indicator
 from gearsig.plot import with_unit
 from gearsig.report._files import date_text, render
@@ -302,12 +300,9 @@ def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ())
     write_text(
         folder / "batch.json", json.dumps({"schema": "gearsig.batch", "version": 1, "recordings": records}, indent=1)
     )
-    text = StringIO()
     columns = list(records[0]) if index.rows else ["recording", "outcome", "reason"]
-    table = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
-    table.writeheader()
-    table.writerows({name: spreadsheet_cell(value) for name, value in record.items()} for record in records)
-    write_text(folder / "batch.csv", text.getvalue())
+    cells = ([spreadsheet_cell(record.get(name, "")) for name in columns] for record in records)
+    write_text(folder / "batch.csv", csv_rows(columns, cells))
 
 
 LONGEST_IN_PRINT = 170

@@ -8,19 +8,23 @@ from hypothesis import strategies as st
 from app.benchmark.answer import Answer
 from app.benchmark.cases import Truth
 from app.benchmark.diagnosers import bare_report
-from app.benchmark.scoring.judged import Located, Row, group_of, located, strength
-from app.benchmark.scoring.scores import (
+from app.benchmark.scores import (
+    Located,
+    Row,
     Z,
     bins_of,
     brier,
     calibration_error,
     error_by_chance,
+    group_of,
     judgement,
+    located,
     macro_f1,
     median_of,
     resampled,
     scores,
     share,
+    strength,
     strong_only,
 )
 from gearsig.errors import InputError

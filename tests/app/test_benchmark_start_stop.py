@@ -10,7 +10,7 @@ from app.benchmark.answer import Answer
 from app.benchmark.cases import BLIND, PlannedCase, Truth
 from app.benchmark.diagnosers import START_STOP
 from app.benchmark.run import BenchmarkRequest, Done
-from app.benchmark.scoring.scores import scores
+from app.benchmark.scores import scores
 from app.benchmark.start_stop import (
     FIGURES,
     DrivePlan,

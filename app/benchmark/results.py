@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
-from io import StringIO
 from math import isfinite
 from pathlib import Path
 
@@ -18,16 +16,18 @@ from app.benchmark.answer import Answer
 from app.benchmark.cases import BLIND, SAME
 from app.benchmark.diagnosers import BASELINES, SHARES
 from app.benchmark.run import Done, state_of_code
-from app.benchmark.scoring.judged import STRONG, Row
-from app.benchmark.scoring.scores import (
+from app.benchmark.scores import (
     FIGURES,
+    STRONG,
     WITH,
     WITHOUT,
     BenchmarkResult,
     Figure,
     Part,
+    Row,
     Score,
     bins_of,
+    confidence_of,
     is_one_answer,
     judgement,
     share,
@@ -35,7 +35,7 @@ from app.benchmark.scoring.scores import (
 )
 from gearsig import __version__
 from gearsig.cache import write_text
-from gearsig.formatting import percent, rounded, with_minus
+from gearsig.formatting import csv_rows, markdown_table, percent, rounded, with_minus
 from gearsig.gap import NONE, UNKNOWN
 from gearsig.plot import Picture, embed
 from gearsig.report import Section, benchmark_html
@@ -169,28 +169,18 @@ _BASIS = (
 def markdown(result: BenchmarkResult, command: str, date: datetime) -> str:
     """Return the tables for a README, with date, version and command."""
     plan = result.request.plan
+    same = same_table(result)
     text = [
         f"{plan.n_cases} blind cases, {plan.role}; gearsig {__version__}, {date:%d %B %Y}; `{command}`.",
-        "",
-        *markdown_table(main_table(result)),
-        "",
-        *(markdown_table(same) if (same := same_table(result)) is not None else ()),
-        "",
-        *markdown_table(alternatives_table(result)),
-        "",
-        *cost_lines(result),
+        titled_table(main_table(result)) + ("" if same is None else f"\n{titled_table(same)}"),
+        titled_table(alternatives_table(result)) + "\n".join(["", *cost_lines(result), ""]),
     ]
-    return "\n".join(text) + "\n"
+    return "\n\n".join(text)
 
 
-def markdown_table(table: Table) -> Iterator[str]:
-    """Yield a table's lines, its title and note above."""
-    yield f"**{table.title}.** {table.note}"
-    yield ""
-    yield "| " + " | ".join(table.header) + " |"
-    yield "|" + "---|" * len(table.header)
-    for row in table.rows:
-        yield "| " + " | ".join(row) + " |"
+def titled_table(table: Table) -> str:
+    """Return a table in Markdown, its title and note above."""
+    return f"**{table.title}.** {table.note}\n\n{markdown_table(table.header, table.rows)}"
 
 
 def cost_lines(result: BenchmarkResult) -> list[str]:
@@ -246,7 +236,7 @@ def _effect_row(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
     if not rows:
         return ()
     strong = [r for r in rows if r.strength >= STRONG]
-    wrong = Counter(r.first or "no answer" for r in rows if r.first not in r.truths).most_common(1)
+    wrong = Counter(r.first or "no answer" for r in rows if not r.is_right).most_common(1)
     known = [r.strength for r in rows if np.isfinite(r.strength)]
     return (
         name,
@@ -259,7 +249,7 @@ def _effect_row(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
 
 
 def _right(rows: Sequence[Row]) -> str:
-    return f"{sum(r.first in r.truths for r in rows)} of {len(rows)}" if rows else "–"
+    return f"{sum(r.is_right for r in rows)} of {len(rows)}" if rows else "–"
 
 
 def confusions_table(result: BenchmarkResult) -> Table:
@@ -267,7 +257,7 @@ def confusions_table(result: BenchmarkResult) -> Table:
     confusions = Counter(
         (r.truths[0] if r.kind != "unknown" else r.effects[0], r.first)
         for r in _with_one_answer(result)
-        if r.first not in r.truths
+        if not r.is_right
     )
     table = [
         (true, answer or "no answer", str(n), _common(true, answer)) for (true, answer), n in confusions.most_common()
@@ -372,13 +362,11 @@ def _plain(score: Score) -> dict[str, float | int | None]:
 
 def cases_csv(result: BenchmarkResult, cases: Sequence[Done]) -> str:
     """Return one line per case and diagnoser."""
-    text = StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(COLUMNS)
+    table: list[list[object]] = []
     for name, rows in result.rows.items():
         for done, row in zip(cases, rows, strict=True):
             effects, pair = done.truth.labels["effects"], done.truth.labels["pair"]
-            table.writerow(
+            table.append(
                 [
                     row.number,
                     row.source,
@@ -393,7 +381,7 @@ def cases_csv(result: BenchmarkResult, cases: Sequence[Done]) -> str:
                     *(f"{row.answer.seconds:.2f}", f"{row.answer.cpu_seconds:.2f}", row.answer.error),
                 ]
             )
-    return text.getvalue()
+    return csv_rows(COLUMNS, table)
 
 
 def _answer_cells(row: Row) -> tuple[str, ...]:
@@ -401,7 +389,7 @@ def _answer_cells(row: Row) -> tuple[str, ...]:
     first = f"{row.confidence:.4f}" if answer.causes else ""
     second = row.ranked[1] if len(row.ranked) > 1 else ""
     true = f"{sum(answer.probability(name) for name in row.truths):.4f}"
-    return first, second, true, row.named, str(int(row.first in row.truths))
+    return first, second, true, row.named, str(int(row.is_right))
 
 
 def _number(value: float) -> str:
@@ -477,7 +465,7 @@ def _calibration(result: BenchmarkResult) -> tuple[Picture, ...]:
     curves = {}
     for name in (result.judged, *(b for b in BASELINES if b in result.rows and b != result.judged)):
         rows = [r for r in result.rows[name] if r.source == BLIND and is_one_answer(r)]
-        bins = bins_of([r.confidence for r in rows], [r.first in r.truths for r in rows])
+        bins = bins_of(*confidence_of(rows))
         ends = [share(round(b.accuracy * b.n), b.n) for b in bins]
         if bins:
             curves[name] = (

@@ -1,21 +1,274 @@
-"""The benchmark's figures, each from a list of judged cases, with a 90 % interval."""
+"""How a benchmark is scored: answer and truth side by side, and the figures of many cases, with 90 % intervals."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite, sqrt
-from typing import TypeVar
+from operator import attrgetter
+from typing import Any, TypeVar
 
 import numpy as np
 
-from app.benchmark.cases import BLIND, SAME
+from app.benchmark.answer import Answer
+from app.benchmark.cases import BLIND, SAME, Truth
 from app.benchmark.run import BenchmarkRequest, Done
-from app.benchmark.scoring.judged import STRONG, Row, group_of, known_floors, rows_of
 from gearsig.checks import FloatArray
-from gearsig.gap import GapOutcome, Shrinkage
-from sims.blind import MECHANICAL
+from gearsig.gap import (
+    NONE,
+    UNKNOWN,
+    GapOutcome,
+    GapPlace,
+    PlaceKind,
+    Shrinkage,
+    StructuralFloor,
+    load_learned,
+    soft_size,
+)
+from sims.blind import CATALOGUE, MECHANICAL
+
+# --------------------
+# Whether the fault was put where it is: tooth, shaft, bearing, order.
+# --------------------
+
+
+SHAFT_OF = {"pinion": "input", "wheel": "output", "driver": "input", "driven": "output"}
+"""Shaft of a gear, in the labels' words and in the answers'."""
+
+ORDER_TOLERANCE = 0.02
+"""Relative: slipping bearings stay within it."""
+
+
+@dataclass(frozen=True)
+class Located:
+    """True, false, or None where the case has no such place.
+
+    Parameters
+    ----------
+    tooth : bool or None
+        Within one tooth; only teeth of a shaft with a mark have an angle that can be known.
+    shaft : bool or None
+    bearing : bool or None
+        The two bearings of a shaft are alike on the blind rig: either counts.
+    order : bool or None
+    """
+
+    tooth: bool | None = None
+    shaft: bool | None = None
+    bearing: bool | None = None
+    order: bool | None = None
+
+
+def located(place: Mapping[str, Any], effect: str, answer: Answer, pair: Mapping[str, float]) -> Located:
+    """Compare a label's place with what was answered.
+
+    The fitted setting of the true effect counts, if it was tried; what it does not say is sought in the places of the
+    gap, the one of largest share first. What is said nowhere is wrong.
+
+    Parameters
+    ----------
+    place : mapping
+        Of the label.
+    effect : str
+    answer : Answer
+    pair : mapping
+        Teeth: z1 on the input shaft, z2 on the output shaft.
+    """
+    options, places = answer.options(effect), answer.places
+    shaft = str(place.get("shaft", ""))
+    per_input = pair["z1"] / pair["z2"] if shaft == "output" else 1.0
+    return Located(
+        tooth=_tooth(float(place["angle_deg"]), options, places, int(pair["z1"])) if "angle_deg" in place else None,
+        shaft=_shaft(options, places) == shaft if shaft else None,
+        bearing=_bearing_shaft(options) == shaft if "bearing" in place else None,
+        order=_order(float(place["order"]) * per_input, options, places) if "order" in place else None,
+    )
+
+
+def _tooth(angle_deg: float, options: Mapping[str, Any], places: tuple[GapPlace, ...], n_teeth: int) -> bool:
+    pitch = 360.0 / n_teeth
+    angles = [p.angle_deg for p in places if p.kind is PlaceKind.TOOTH and p.shaft == "input"]
+    answered_deg = next((a for a in angles if a is not None), None)
+    if answered_deg is None and options.get("gear") == "driver" and "tooth" in options:
+        answered_deg = (float(options["tooth"]) - 0.5) * pitch
+    if answered_deg is None:
+        return False
+    apart = abs((answered_deg - angle_deg + 180.0) % 360.0 - 180.0)
+    return apart <= 1.5 * pitch
+
+
+def _shaft(options: Mapping[str, Any], places: tuple[GapPlace, ...]) -> str:
+    for name in ("gear", "shaft"):
+        if name in options:
+            return SHAFT_OF.get(str(options[name]), str(options[name]))
+    return _bearing_shaft(options) or next((p.shaft for p in places if p.shaft), "")
+
+
+def _bearing_shaft(options: Mapping[str, Any]) -> str:
+    """Shaft of the bearing that is named: the blind rig has 1 and 2 on its input shaft, 3 and 4 on the other."""
+    number = str(options.get("bearing", "")).rpartition(" ")[2]
+    return ("input" if int(number) <= 2 else "output") if number.isdigit() else ""
+
+
+def _order(order: float, options: Mapping[str, Any], places: tuple[GapPlace, ...]) -> bool:
+    """Orders of the input shaft: of the setting, or of the first place."""
+    stated_orders = [float(options["order"])] if "order" in options else [o for p in places[:1] for o in p.orders]
+    return any(abs(value - order) <= ORDER_TOLERANCE * order for value in stated_orders)
+
+
+# --------------------
+# How strong a case's fault is, measured by its twin: the same run from the same seeds without the fault.
+# --------------------
+
+
+STRONG = 3.0
+"""Structural floors from which on a fault should be found."""
+
+Floors = Mapping[bool, StructuralFloor]
+"""With a reference (True) and without (False)."""
+
+
+def known_floors() -> Floors:
+    """Return the floors that the diagnosis itself uses."""
+    learned = load_learned()
+    return {with_reference: learned.floor(with_reference=with_reference) for with_reference in (False, True)}
+
+
+def strength(truth: Truth, floors: Floors) -> float:
+    """Return the size of the change that the fault alone makes, in structural floors; nan where it cannot be said.
+
+    It is measured like the whole gap, see `gearsig.gap.gap_size`; of two conditions the larger counts.
+    """
+    floor = floors[bool(truth.labels["has_reference"])]
+    known = [name for name in floor.names if all(name in change for change in truth.fault_changes)]
+    floors_of_known = floor.of(known)
+    sizes = [
+        soft_size(known, np.array([change[name] for name in known]) / floors_of_known) / floor.whole_of(known)
+        for change in truth.fault_changes
+        if change
+    ]
+    return max(sizes, default=float("nan"))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One case with one diagnoser's answer.
+
+    Parameters
+    ----------
+    number : int
+    source, kind : str
+    effects : tuple of str
+        What was wrong.
+    truths : tuple of str
+        Causes that are right: the effects; "none"; "unknown".
+    level, strength : float
+        Of the fault: 0 to 1 in its span; structural floors.
+    has_reference : bool
+    n_conditions : int
+    answer : Answer
+    located : Located
+    """
+
+    number: int
+    source: str
+    kind: str
+    effects: tuple[str, ...]
+    truths: tuple[str, ...]
+    level: float
+    strength: float
+    has_reference: bool
+    n_conditions: int
+    answer: Answer
+    located: Located
+
+    @cached_property
+    def ranked(self) -> tuple[str, ...]:
+        """Causes, likeliest first."""
+        return tuple(c.name for c in self.answer.ranked)
+
+    @property
+    def first(self) -> str:
+        """The likeliest cause; empty where there is no answer."""
+        return self.ranked[0] if self.ranked else ""
+
+    @property
+    def confidence(self) -> float:
+        """Probability of the likeliest cause; nan where there is no answer."""
+        return self.answer.probability(self.first) if self.ranked else float("nan")
+
+    @property
+    def first_mechanical(self) -> str:
+        """The likeliest of the mechanical effects."""
+        return next((name for name in self.ranked if name in MECHANICAL), "")
+
+    @property
+    def named(self) -> str:
+        """The mechanical effect that the verdict names: as the cause, or as one of those that cannot be separated."""
+        first = tuple(c.name for c in self.answer.causes[:1])
+        several = self.answer.inseparable or first
+        named = {GapOutcome.EFFECT.value: first, GapOutcome.CANNOT_SEPARATE.value: several}
+        return next((name for name in named.get(self.answer.outcome, ()) if name in MECHANICAL), "")
+
+    @property
+    def is_right(self) -> bool:
+        """Whether the likeliest cause is one of those that are right."""
+        return self.first in self.truths
+
+    @property
+    def says_unknown(self) -> bool:
+        """Whether the verdict is that a cause outside the catalogue is at work."""
+        return self.answer.outcome == GapOutcome.UNKNOWN.value
+
+    @property
+    def is_mechanical(self) -> bool:
+        """Whether exactly one mechanical effect was wrong."""
+        return self.kind == "single" and self.effects[0] in MECHANICAL
+
+    @property
+    def is_nuisance(self) -> bool:
+        """Whether nothing but the measurement chain was wrong."""
+        return self.kind == "single" and not self.is_mechanical
+
+
+def rows_of(cases: Sequence[Done], diagnoser: str, floors: Floors) -> list[Row]:
+    """Return one row per case."""
+
+    def on_gears(done: Done) -> Callable[[Mapping[str, Any], str, Answer], Located]:
+        return lambda place, effect, answer: located(place, effect, answer, done.truth.labels["pair"])
+
+    return [row_of(done, done.answers[diagnoser], strength(done.truth, floors), on_gears(done)) for done in cases]
+
+
+def row_of(
+    done: Done, answer: Answer, strength_floors: float, placed: Callable[[Mapping[str, Any], str, Answer], Located]
+) -> Row:
+    """Return a case with an answer; `placed` says of the label's place, the effect and the answer what was right."""
+    labels = done.truth.labels
+    effects = tuple(e["name"] for e in labels["effects"])
+    truths = {"none": (NONE,), "unknown": (UNKNOWN,)}.get(labels["kind"], effects)
+    place = labels["effects"][0]["place"] if len(effects) == 1 else {}
+    return Row(
+        number=done.planned.number,
+        source=done.planned.source,
+        kind=labels["kind"],
+        effects=effects,
+        truths=truths,
+        level=labels["effects"][0]["level"] if effects else float("nan"),
+        strength=strength_floors,
+        has_reference=labels["has_reference"],
+        n_conditions=len(labels["conditions"]),
+        answer=answer,
+        located=placed(place, effects[0] if effects else "", answer),
+    )
+
+
+def group_of(cause: str) -> str:
+    """Group of an effect; "none" and "unknown" are their own."""
+    return CATALOGUE[cause].group if cause in CATALOGUE else cause
+
 
 # --------------------
 # 90 % intervals of shares and of anything that is computed from a list of cases.
@@ -194,12 +447,12 @@ class Figure:
     is_least: bool = True
 
 
-def counted(of: Callable[[Row], bool], hit: Callable[[Row], bool]) -> Measure:
+def counted(of: Callable[[Row], bool], hit: Callable[[Row], object]) -> Measure:
     """Return the measure that counts hits among the rows it applies to."""
 
     def measure(rows: Rows, rng: np.random.Generator) -> Score:  # noqa: ARG001 - all measures have one form
         applicable = [row for row in rows if of(row)]
-        return share(sum(hit(row) for row in applicable), len(applicable))
+        return share(sum(bool(hit(row)) for row in applicable), len(applicable))
 
     return measure
 
@@ -227,12 +480,8 @@ def _median(value: Callable[[Row], float]) -> Measure:
 
 def _of_place(part: str) -> Measure:
     """Return the share of faults whose place of this kind was found."""
-
-    def at(row: Row) -> bool | None:
-        is_right: bool | None = getattr(row.located, part)
-        return is_right
-
-    return counted(lambda r: r.is_mechanical and at(r) is not None, lambda r: bool(at(r)))
+    at = attrgetter(f"located.{part}")
+    return counted(lambda r: r.is_mechanical and at(r) is not None, at)
 
 
 def is_one_answer(row: Row) -> bool:
@@ -248,14 +497,19 @@ def macro_f1(rows: Rows) -> float:
     """
     true = Counter(name for row in rows for name in row.truths)
     answered = Counter(row.first for row in rows)
-    hits = Counter(row.first for row in rows if row.first in row.truths)
+    hits = Counter(row.first for row in rows if row.is_right)
     f1_scores = [2.0 * hits[name] / (true[name] + answered[name]) for name in MECHANICAL if true[name]]
     return sum(f1_scores) / len(f1_scores) if f1_scores else float("nan")
 
 
+def confidence_of(rows: Rows) -> tuple[list[float], list[bool]]:
+    """Return the probability of each likeliest cause, and whether it was right."""
+    return [row.confidence for row in rows], [row.is_right for row in rows]
+
+
 def ece(rows: Rows) -> float:
     """Return the calibration error of the likeliest causes."""
-    return calibration_error([r.confidence for r in rows], [r.first in r.truths for r in rows])
+    return calibration_error(*confidence_of(rows))
 
 
 def brier_of(row: Row) -> float:
@@ -269,6 +523,10 @@ def shrink_of(row: Row, name: str) -> float:
     """Return the held-out shrink of a cause; nan where it was not tried."""
     shrinkage = row.answer.shrinkage(name)
     return float("nan") if shrinkage is None else shrinkage.shrink.value
+
+
+def _of_true(row: Row) -> Shrinkage | None:
+    return row.answer.shrinkage(row.effects[0]) if row.is_mechanical else None
 
 
 def _shrink_true(row: Row) -> float:
@@ -303,85 +561,70 @@ def _slope(row: Row) -> float:
     return shrinkage.slope if shrinkage is not None else float("nan")
 
 
-def _of_true(row: Row) -> Shrinkage | None:
-    return row.answer.shrinkage(row.effects[0]) if row.is_mechanical else None
-
-
 def _regret(row: Row) -> float:
     """Return by how much the named effect shrinks the gap less than the true one; 0 where it does no worse."""
     return float(np.maximum(0.0, _shrink_true(row) - _shrink_named(row)))  # nan stays nan
+
+
+def is_kind(kind: str) -> Callable[[Row], bool]:
+    """Return the test whether a case is of this kind."""
+    return lambda row: row.kind == kind
+
+
+is_right, says_unknown = attrgetter("is_right"), attrgetter("says_unknown")
+_is_mechanical, _is_nuisance, _is_named = (attrgetter(name) for name in ("is_mechanical", "is_nuisance", "named"))
 
 
 FIGURES: tuple[Figure, ...] = (
     Figure(
         "top_1",
         "likeliest cause right (16 mechanical effects)",
-        counted(lambda r: r.is_mechanical, lambda r: r.first in r.truths),
+        counted(_is_mechanical, is_right),
         targets=(0.80, 0.90),
     ),
     Figure(
         "top_2",
         "among the two likeliest",
-        counted(lambda r: r.is_mechanical, lambda r: r.truths[0] in r.ranked[:2]),
+        counted(_is_mechanical, lambda r: r.truths[0] in r.ranked[:2]),
         targets=(0.92, 0.97),
     ),
     Figure(
         "group",
         "right group",
-        counted(lambda r: r.is_mechanical, lambda r: group_of(r.first) == group_of(r.truths[0])),
+        counted(_is_mechanical, lambda r: group_of(r.first) == group_of(r.truths[0])),
         targets=(0.90, 0.96),
     ),
     Figure(
         "top_1_of_16",
         "likeliest right if only the 16 could be",
-        counted(lambda r: r.is_mechanical, lambda r: r.first_mechanical in r.truths),
+        counted(_is_mechanical, lambda r: r.first_mechanical in r.truths),
     ),
-    Figure(
-        "named",
-        "mechanical effect there: one is named",
-        counted(lambda r: r.is_mechanical, lambda r: bool(r.named)),
-    ),
+    Figure("named", "mechanical effect there: one is named", counted(_is_mechanical, _is_named)),
     Figure(
         "macro_f1", "macro-F1 of the 16 (no pairs)", _resampled(lambda r: r.kind != "pair", macro_f1), is_share=False
     ),
     Figure(
         "named_on_none",
         "healthy: an effect is named",
-        counted(lambda r: r.kind == "none", lambda r: bool(r.named)),
+        counted(is_kind("none"), _is_named),
         targets=(0.05, 0.05),
         is_least=False,
     ),
     Figure(
         "named_on_unknown",
         "unknown: an effect is named all the same",
-        counted(lambda r: r.kind == "unknown", lambda r: bool(r.named)),
+        counted(is_kind("unknown"), _is_named),
         targets=(0.20, 0.15),
         is_least=False,
     ),
-    Figure(
-        "unknown_recognised",
-        "unknown: recognised",
-        counted(lambda r: r.kind == "unknown", lambda r: r.answer.outcome == GapOutcome.UNKNOWN.value),
-    ),
-    Figure(
-        "named_on_chain",
-        "measurement chain only: a mechanical effect is named",
-        counted(lambda r: r.is_nuisance, lambda r: bool(r.named)),
-    ),
-    Figure(
-        "chain_right",
-        "measurement chain only: likeliest cause right",
-        counted(lambda r: r.is_nuisance, lambda r: r.first in r.truths),
-    ),
-    Figure(
-        "pair_top_1",
-        "two effects: likeliest is one of them",
-        counted(lambda r: r.kind == "pair", lambda r: r.first in r.truths),
-    ),
+    Figure("unknown_recognised", "unknown: recognised", counted(is_kind("unknown"), says_unknown)),
+    Figure("named_on_chain", "measurement chain only: a mechanical effect is named", counted(_is_nuisance, _is_named)),
+    Figure("chain_right", "measurement chain only: likeliest cause right", counted(_is_nuisance, is_right)),
+    Figure("pair_top_1", "two effects: likeliest is one of them", counted(is_kind("pair"), is_right)),
     Figure(
         "pair_top_2",
         "two effects: both are the two likeliest",
-        counted(lambda r: r.kind == "pair", lambda r: set(r.ranked[:2]) == set(r.truths)),
+        counted(is_kind("pair"), lambda r: set(r.ranked[:2]) == set(r.truths)),
     ),
     Figure(
         "ece",
@@ -412,14 +655,7 @@ FIGURES: tuple[Figure, ...] = (
         targets=(0.10, 0.10),
         is_least=False,
     ),
-    Figure(
-        "regret",
-        "regret of shrink, mean",
-        mean_of(_regret),
-        is_share=False,
-        targets=(0.08, 0.05),
-        is_least=False,
-    ),
+    Figure("regret", "regret of shrink, mean", mean_of(_regret), is_share=False, targets=(0.08, 0.05), is_least=False),
     Figure(
         "closed",
         "share closed on all tried features, held out: true less best wrong effect, median",
@@ -428,7 +664,7 @@ FIGURES: tuple[Figure, ...] = (
         targets=(0.20, 0.20),
     ),
     Figure("slope", "observed over predicted change, median", _median(_slope), is_share=False),
-    Figure("answered", "answered at all", counted(lambda _: True, lambda r: bool(r.answer.outcome))),
+    Figure("answered", "answered at all", counted(lambda _: True, lambda r: r.answer.outcome)),
 )
 
 
