@@ -23,10 +23,10 @@ from tempfile import mkdtemp
 from threading import Thread
 from time import monotonic
 
-from app.stopping import stop
 from gearsig.cache import write_text
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.gap import GapReport, GapRequest, read_gap_inputs
+from gearsig.processes import stop
 from gearsig.report import check_writable, from_plain, plain, read_gap_json, write_gap_json, write_gap_page
 
 Stage = Callable[[str, float], None]

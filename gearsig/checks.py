@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import suppress
+from functools import cache
 from os import PathLike
 from pathlib import PurePath
 from types import UnionType
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -249,6 +250,12 @@ def freeze(result: object, *names: str, ndim: int | None = 1) -> None:
         value = getattr(result, name)
         array = read_only(np.asarray(value)) if ndim is None else frozen_array(value, name, ndim=ndim)
         object.__setattr__(result, name, array)
+
+
+@cache
+def type_hints_of(kind: type) -> dict[str, Any]:
+    """Return the types of a dataclass's fields by name: of those that a file's values are checked against."""
+    return get_type_hints(kind)
 
 
 def _is_finite(array: FloatArray) -> bool:

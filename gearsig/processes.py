@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from itertools import islice
 from multiprocessing import connection, parent_process
@@ -440,3 +441,69 @@ def gearsig_version() -> str:
     from gearsig import __version__
 
     return __version__
+
+
+# --------------------
+# Processes that run other programs, in a session of their own: ended with all that they started.
+# --------------------
+
+
+PATIENCE_S = 3.0
+"""A process that was told to stop is ended by force after this."""
+
+
+def stop(process: subprocess.Popen[Any]) -> None:
+    """End a process and what it started; nothing happens if it has ended."""
+    if process.poll() is not None:
+        return
+    _signal(process, force=False)
+    try:
+        process.wait(PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        _signal(process, force=True)
+        process.wait()
+
+
+class Running:
+    """Processes that run at the moment, to be stopped together; none starts after that."""
+
+    def __init__(self) -> None:
+        self._lock, self._processes, self._stopped = Lock(), set[subprocess.Popen[Any]](), False
+
+    def start(self, arguments: list[str], **settings: Any) -> subprocess.Popen[Any]:
+        """Start a process in a session of its own.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If they have been stopped.
+        """
+        with self._lock:
+            if self._stopped:
+                raise KeyboardInterrupt
+            process = subprocess.Popen(arguments, start_new_session=True, **settings)
+            self._processes.add(process)
+        return process
+
+    def ended(self, process: subprocess.Popen[Any]) -> bool:
+        """Forget a process; whether it ended by itself and was not stopped."""
+        with self._lock:
+            self._processes.discard(process)
+            return not self._stopped
+
+    def stop(self) -> None:
+        """Stop all of them."""
+        with self._lock:
+            self._stopped, processes = True, list(self._processes)
+        for process in processes:
+            stop(process)
+
+
+def _signal(process: subprocess.Popen[Any], *, force: bool) -> None:
+    with suppress(ProcessLookupError):
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL if force else signal.SIGTERM)
+        elif force:
+            process.kill()
+        else:
+            process.terminate()

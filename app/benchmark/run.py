@@ -18,11 +18,10 @@ import app
 from app.benchmark.answer import ANSWERS, Answer, from_text, to_text
 from app.benchmark.cases import Plan, PlannedCase, Truth
 from app.benchmark.diagnosers import diagnoser, folders_of
-from app.stopping import Running, stop
 from gearsig import __version__
 from gearsig.cache import FOLDERS, write_text
 from gearsig.checks import count
-from gearsig.processes import process_pool
+from gearsig.processes import Running, process_pool, stop
 from sims.sweep import claimed
 
 # --------------------

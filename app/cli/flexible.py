@@ -220,7 +220,7 @@ def growth(
     """
     import numpy as np
 
-    from app.growth import ASSUMPTIONS, growth_study, write_growth
+    from app.gear_body import ASSUMPTIONS, growth_study, write_growth
     from gearsig.checks import one_of
     from gearsig.report import check_writable
     from sims.cracked import CrackedPair

@@ -1,6 +1,5 @@
 """Results as JSON and self-contained HTML."""
 
-from gearsig.report._analysis_json import analysis_to_dict, analysis_to_json, long_analysis_to_json, write_json
 from gearsig.report._comparison import (
     alignment_texts,
     channel_rows,
@@ -14,7 +13,6 @@ from gearsig.report._comparison import (
 )
 from gearsig.report._files import Section, benchmark_html, check_writable, page_names, recording_mark
 from gearsig.report._fleet import fleet_page_html, fleet_page_pdf, write_fleet_page
-from gearsig.report._gap_json import gap_from_dict, gap_schema, gap_to_dict, gap_to_json, read_gap_json, write_gap_json
 from gearsig.report._gap_page import (
     CHECK_FIRST,
     CauseRow,
@@ -40,7 +38,20 @@ from gearsig.report._gap_page import (
     write_gap_page,
 )
 from gearsig.report._index import Entry, Failure, entry_of, write_index
-from gearsig.report._json import from_plain, plain
+from gearsig.report._json import (
+    analysis_to_dict,
+    analysis_to_json,
+    from_plain,
+    gap_from_dict,
+    gap_schema,
+    gap_to_dict,
+    gap_to_json,
+    long_analysis_to_json,
+    plain,
+    read_gap_json,
+    write_gap_json,
+    write_json,
+)
 from gearsig.report._methods import answer_json, fitting_methods, named_method, write_answer
 from gearsig.report._motion_text import (
     force_csv,

@@ -1,25 +1,49 @@
-"""The codec between dataclasses and JSON: members by field names or a layout's, values by type hints.
+"""Results as JSON: the codec between dataclasses and JSON, analyses and gap reports in schemas that stay.
 
-Numbers carry nine significant digits; nan and infinity, which JSON does not know, are null and read as nan.
+Names end in their unit, or a value stands beside its "unit". Numbers carry nine significant digits; nan and infinity,
+which JSON does not know, are null and read as nan. Within a version members may be added, never renamed or removed.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from enum import Enum
-from functools import cache
+from math import inf, isnan
 from pathlib import Path
 from reprlib import repr as shortened
 from types import NoneType, UnionType
-from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
+from typing import Any, NoReturn, Union, get_args, get_origin
 
 import numpy as np
 
 from gearsig import __version__
+from gearsig.angle import ShaftAngle
+from gearsig.cache import write_text
+from gearsig.checks import type_hints_of
+from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, LongAnalysis, changes
 from gearsig.errors import InputError
 from gearsig.formatting import rounded
+from gearsig.gap import (
+    Added,
+    AngleCurves,
+    AverageCurves,
+    ConditionFacts,
+    GapCause,
+    GapPlace,
+    GapReport,
+    NextRecording,
+    Shrinkage,
+    SpectrumCurves,
+)
+from gearsig.recording import Recording
+from gearsig.severity import CrackEstimate, NoCrackSeen
+
+# --------------------
+# The codec: members by field names or a layout's, values by type hints.
+# --------------------
+
 
 Json = dict[str, Any]
 
@@ -173,27 +197,20 @@ def from_plain(hint: Any, value: Any, where: str, layouts: Layouts | None = None
 
 def _dataclass_from_plain(kind: type, value: Json, where: str, layouts: Layouts | None) -> Any:
     layout = (layouts or {}).get(kind, _AS_FIELDS)
-    hints = _hints(kind)
+    hints = type_hints_of(kind)
     result = {}
     for item in fields(kind):
         name = layout.names.get(item.name, item.name)
         if item.name in layout.inline:
             result[item.name] = from_plain(hints[item.name], value, where, layouts)
         elif name not in value:
-            if not _has_default(item):
+            if item.default is MISSING and item.default_factory is MISSING:
                 _fail(f"{where} has no member {name!r}")
         elif value[name] is None and item.name in layout.null_if_empty:
             result[item.name] = "" if hints[item.name] is str else np.zeros(0)
         else:
             result[item.name] = from_plain(hints[item.name], value[name], f"{where}.{name}", layouts)
     return kind(**result)
-
-
-def _has_default(item: Field[Any]) -> bool:
-    return item.default is not MISSING or item.default_factory is not MISSING
-
-
-_hints = cache(get_type_hints)
 
 
 def _number(value: Any, where: str) -> float:
@@ -218,3 +235,304 @@ def _typed(value: Any, kind: type, where: str, or_null: str = "") -> Any:
 
 def _fail(what: str) -> NoReturn:
     raise InputError(what, remedy="make the file anew")
+
+
+# --------------------
+# An analysis.
+# --------------------
+
+
+def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
+    """Return an analysis as plain dictionaries, lists, texts and numbers.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    arrays : bool
+        Whether spectra, maps and averages come with their numbers; a long recording then makes a large object.
+
+    Returns
+    -------
+    dict
+        `json.dumps(..., allow_nan=False)` takes it.
+
+    Notes
+    -----
+    What is not known or not defined is null. The members:
+
+    - ``schema``: "gearsig.analysis", ``schema_version``: 1, ``gearsig_version``
+    - ``outcome``: "fault", "suspicion", "cannot tell" or "no fault"
+    - ``verdict``: one sentence
+    - ``findings``: most important first; each with ``code``, ``kind`` ("fault", "suspicion", "data problem", "cannot
+      tell", "notice", "information"), ``title``, ``where``, ``strength`` (or null), ``confidence``,
+      ``confidence_basis``, ``evidence``, ``surer``
+    - ``speed``: ``known``; if true ``shaft``, ``method``, ``mean_rpm``, ``lowest_rpm``, ``highest_rpm``,
+      ``relative_uncertainty``, ``quality``, ``n_revolutions``, ``notes``; if false ``question``, ``reason``, ``remedy``
+    - ``indicators``: each with ``name``, ``value``, ``unit``, ``channel``, ``computed_on``, ``shaft``, ``gear``,
+      ``band``, ``note``; ``reference_value`` and ``change_db``, null where there is no reference or it lacks the
+      indicator
+    - ``recording``: ``source``, ``sha256``, ``reader``, ``history``, ``warnings``, ``sampling_rate_hz``, ``n_samples``,
+      ``duration_s``, ``channels``, ``speed_source``
+    - ``rig``: what is known of the machine, or null
+    - ``channels``: per analysed channel the description of its spectra and averages; arrays as their
+      ``{"shape": […]}``, or as lists where they were asked for; ``order_levels`` always with their
+      numbers, and ``largest``, ``largest_at_rpm``, ``largest_at_hz``
+    - ``settings``: the parameters that were in force
+    - ``crack``: null where nobody asked and none is clear; else ``answer`` ("crack", "none seen", "cannot tell") with
+      ``text``, ``shaft``, ``gear``, ``tooth``, ``angle_deg``, ``depth_mm``, ``interval_mm`` and the like; with
+      ``below_mm``; or with ``reason`` and ``remedy``
+    - ``reference``: null, or ``source``, ``sha256``, ``outcome``, ``verdict`` of the recording that was compared with
+    - ``level_changes``: against it, levels of lines, sidebands, bearing parts and noise by channel: ``label``,
+      ``kind``, ``where``, ``harmonic``, ``unit``, ``level_db`` and ``reference_db`` (rms, dB re one unit),
+      ``change_db``, ``repeatability_db`` (half against half), ``p_value``, ``is_change``, ``stands_out``; empty
+      without a reference
+    """
+    return head("gearsig.analysis") | {
+        "outcome": analysis.outcome.value,
+        "verdict": analysis.verdict,
+        "findings": [plain(finding, arrays=False) for finding in analysis.findings],
+        "speed": _speed(analysis.shaft_angle, arrays=arrays),
+        "indicators": _indicators(analysis),
+        "recording": _recording_facts(analysis.recording),
+        "rig": plain(analysis.rig, arrays=False),
+        "channels": [_channel(channel, arrays=arrays) for channel in analysis.channels],
+        "settings": plain(analysis.settings, arrays=False),
+        "crack": _crack(analysis.crack),
+        "reference": _reference(analysis.reference),
+        "level_changes": [plain(c, arrays=False) | {"change_db": rounded(c.change_db)} for c in analysis.level_changes],
+    }
+
+
+def analysis_to_json(analysis: Analysis, *, arrays: bool = False) -> str:
+    """Return an analysis as JSON text, see `analysis_to_dict`."""
+    indent = None if arrays else 2
+    return json.dumps(analysis_to_dict(analysis, arrays=arrays), indent=indent, ensure_ascii=False, allow_nan=False)
+
+
+def write_json(analysis: Analysis, path: str | Path, *, arrays: bool = False) -> Path:
+    """Write an analysis as JSON; the file appears only when it is complete."""
+    return write_text(Path(path), analysis_to_json(analysis, arrays=arrays) + "\n")
+
+
+def _recording_facts(recording: Recording) -> Json:
+    origin, speed = recording.provenance, recording.speed_source
+    return {
+        **members(origin, "source", "sha256", "reader"),
+        "history": list(origin.history),
+        "warnings": list(recording.warnings),
+        "sampling_rate_hz": recording.sampling_rate_hz,
+        "n_samples": recording.n_samples,
+        "duration_s": rounded(recording.duration_s),
+        "channels": [plain(channel, arrays=False) for channel in recording.channels],
+        "speed_source": None if speed is None else {"kind": type(speed).__name__, **plain(speed, arrays=False)},
+    }
+
+
+def _speed(angle: ShaftAngle | CannotTell, *, arrays: bool) -> Json:
+    if isinstance(angle, CannotTell):
+        return {"known": False, **plain(angle, arrays=False)}
+    lowest, highest = angle.speed_range_rpm
+    result = {
+        "known": True,
+        **members(angle, "shaft", "method"),
+        "mean_rpm": rounded(angle.mean_speed_rpm),
+        "lowest_rpm": rounded(lowest),
+        "highest_rpm": rounded(highest),
+        "relative_uncertainty": rounded(angle.relative_speed_uncertainty),
+        **members(angle, "quality", "n_revolutions", "notes"),
+    }
+    return result | (members(angle, "time_s", "revolutions") if arrays else {})
+
+
+def _indicators(analysis: Analysis) -> list[Json]:
+    nothing: Json = {"reference_value": None, "change_db": None}
+    return [
+        plain(indicator, arrays=False) | (nothing if change is None else plain(change, arrays=False))
+        for indicator, change in zip(analysis.indicators, changes(analysis), strict=True)
+    ]
+
+
+def _crack(answer: CrackEstimate | NoCrackSeen | CannotTell | None) -> Json | None:
+    if answer is None:
+        return None
+    if isinstance(answer, CannotTell):
+        return {"answer": "cannot tell", **plain(answer, arrays=False)}
+    kind, told = "crack" if isinstance(answer, CrackEstimate) else "none seen", plain(answer, arrays=False)
+    told.pop("searched", None)  # of the figure
+    return {"answer": kind, "text": answer.text, **told}
+
+
+def _reference(reference: Analysis | None) -> Json | None:
+    if reference is None:
+        return None
+    return members(reference.recording.provenance, "source", "sha256") | members(reference, "outcome", "verdict")
+
+
+def _channel(channel: ChannelAnalysis, *, arrays: bool) -> Json:
+    result: Json = plain(channel, arrays=arrays)
+    result["averages"] = [plain(average, arrays=arrays) for average in channel.averages.values()]
+    result["order_levels"] = [
+        plain(level, arrays=True)
+        | dict(zip(("largest", "largest_at_rpm", "largest_at_hz"), map(rounded, level.largest), strict=True))
+        for level in channel.order_levels
+    ]
+    return result
+
+
+def long_analysis_to_json(analysis: LongAnalysis) -> str:
+    """Return a long analysis as JSON text; each part as `analysis_to_dict` gives it."""
+    levels = ("channel_names", "units", "time_s", "rms", "peak", "crest_factor", "kurtosis")
+    parts = [
+        {"start_s": p.start_s, "end_s": p.end_s, "reason": p.reason, "analysis": analysis_to_dict(p.analysis)}
+        for p in analysis.parts
+    ]
+    content = {
+        "outcome": analysis.outcome.value,
+        "verdict": analysis.verdict,
+        "duration_s": analysis.duration_s,
+        "overview": members(analysis.overview, *levels),
+        "parts": parts,
+    }
+    return json.dumps(content, ensure_ascii=False, allow_nan=False)
+
+
+# --------------------
+# A gap report; `gap.schema.json`, beside this file, describes every member.
+# --------------------
+
+
+GAP_SCHEMA, GAP_VERSION = "gearsig.gap", 3
+FLOORS = "structural floors"
+
+
+GAP_LAYOUTS = {
+    GapReport: Layout({"repeatability": "size_in_repeatability_floors"}, null_if_empty=("twin_toml",)),
+    ConditionFacts: Layout(inline=("point",)),
+    GapPlace: Layout({"repeatability": "change_in_repeatability_floors", "structural": "change_in_structural_floors"}),
+    Added: Layout({"name": "effect"}),
+    Shrinkage: Layout({"placebo": "placebo_shrink", "elsewhere": "shrink_elsewhere"}),
+    NextRecording: Layout(
+        {"standard_deviations": "distance_in_structural_floors", "now": "distance_now_in_structural_floors"},
+        inline=("point",),
+    ),
+    SpectrumCurves: Layout(
+        {"structural_db": "structural_floor_db", "reference_structural_db": "reference_structural_floor_db"},
+        null_if_empty=("after", "structural_db", "reference", "reference_floor", "reference_structural_db"),
+    ),
+    AngleCurves: Layout({"unit": "of", "teeth": "n_teeth"}, null_if_empty=("after",)),
+    AverageCurves: Layout({"teeth": "n_teeth"}),
+}
+"""Where members are called otherwise than the fields, or are null."""
+
+
+def gap_to_dict(report: GapReport) -> Json:
+    """Return a gap report as plain dictionaries, lists, texts and numbers.
+
+    Parameters
+    ----------
+    report : GapReport
+
+    Returns
+    -------
+    dict
+        `json.dumps(..., allow_nan=False)` takes it, and `gap.schema.json` holds for it.
+    """
+    result = head(GAP_SCHEMA, GAP_VERSION) | {
+        "outcome": report.outcome.value,
+        "verdict": dict(zip(("where", "which", "how_far", "next"), report.verdict, strict=True)),
+        "kind": None if report.kind is None else plain(report.kind, layouts=GAP_LAYOUTS),
+        **plain(report, layouts=GAP_LAYOUTS),
+    }
+    _state_units(result)
+    return result
+
+
+def _state_units(result: Json) -> None:
+    """Put the unit beside each value, which in the report stands elsewhere or is always the same."""
+    for interval in (result["size"], *(step["remaining"] for step in result["steps"])):
+        interval["unit"] = FLOORS
+    for curves in result["angles"]:
+        curves["unit"] = "1"
+    for cause in result["causes"]:
+        for value in (cause["severity"], cause["fitted"]):
+            if value is not None:
+                value["unit"] = cause["unit"]
+        if (shrinkage := cause["shrinkage"]) is not None:
+            shrinkage["before"]["unit"] = shrinkage["after"]["unit"] = FLOORS
+            shrinkage["shrink"]["unit"] = "1"
+
+
+def gap_to_json(report: GapReport) -> str:
+    """Return a gap report as JSON text, see `gap_to_dict`."""
+    return json.dumps(gap_to_dict(report), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_gap_json(report: GapReport, path: str | Path) -> Path:
+    """Write a gap report as JSON; the file appears only when it is complete."""
+    return write_text(Path(path), gap_to_json(report))
+
+
+def gap_schema() -> Json:
+    """Return the JSON Schema (2020-12) that holds for every report of this version."""
+    schema: Json = json.loads(Path(__file__).with_name("gap.schema.json").read_text(encoding="utf-8"))
+    return schema
+
+
+OLD_NAMES = {"doubts": "warnings", "foretold": "predicted", "notices": "notes", "remarks": "notes", "left": "remaining"}
+"""Member of version 1 or 2 → what it is called now."""
+
+
+def _renamed(members: Json) -> Json:
+    return {OLD_NAMES.get(name, name): value for name, value in members.items()}
+
+
+def read_gap_json(path: str | Path) -> GapReport:
+    """Read a report that `write_gap_json` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    GapReport
+        With nine significant digits; what was null is nan.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is no gap report of this version or an earlier one.
+    """
+    where = Path(path).name
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"), object_hook=_renamed)
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
+    except (ValueError, RecursionError):  # some text, or brackets without end
+        raise InputError("is not JSON", where=where, remedy="`gearsig gap` writes gap.json") from None
+    stated = (content.get("schema"), content.get("schema_version")) if isinstance(content, dict) else (None, None)
+    if stated not in [(GAP_SCHEMA, version) for version in range(1, GAP_VERSION + 1)]:
+        raise InputError("is no gap report", where=where, allowed=f"schema {GAP_SCHEMA}, versions 1 to {GAP_VERSION}")
+    try:
+        return gap_from_dict(content)
+    except InputError as error:
+        raise InputError(f"is damaged or not complete ({error.what})", where=where, remedy="make it anew") from None
+
+
+def gap_from_dict(content: Json) -> GapReport:
+    """Return the report that `gap_to_dict` made `content` of.
+
+    Raises
+    ------
+    InputError
+        If a member is missing or of another type.
+    """
+    report: GapReport = from_plain(GapReport, content, "report", GAP_LAYOUTS)
+    return replace(report, causes=tuple(map(_unbounded, report.causes)))
+
+
+def _unbounded(cause: GapCause) -> GapCause:
+    """JSON knows no infinity: nothing bounds a severity that has no upper end."""
+    if cause.severity is None or not isnan(cause.severity.high):
+        return cause
+    return replace(cause, severity=replace(cause.severity, high=inf))

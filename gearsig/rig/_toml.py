@@ -6,13 +6,12 @@ import re
 import tomllib
 from contextlib import suppress
 from dataclasses import MISSING, fields
-from functools import cache
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_args
 
 from gearsig.cache import write_whole
-from gearsig.checks import known_name, short
+from gearsig.checks import known_name, short, type_hints_of
 from gearsig.errors import InputError
 from gearsig.rig._contact import ToothContact
 from gearsig.rig._types import (
@@ -213,7 +212,7 @@ def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
     if not isinstance(table, dict):
         raise InputError("is not a table", where=where, allowed="key = value lines")
     known = {f.name: f for f in fields(kind)}
-    hints = _hints(kind)
+    hints = type_hints_of(kind)
     values = {}
     for key, value in table.items():
         known_name(key, known, f"there is no key {key!r}", where=where)
@@ -228,9 +227,6 @@ def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
     except InputError as error:
         place = f"{where}: {error.where}" if error.where and error.where != "rig" else where
         raise InputError(error.what, where=place, allowed=error.allowed, remedy=error.remedy) from None
-
-
-_hints = cache(get_type_hints)
 
 
 def _typed(value: Any, hint: Any, where: str) -> Any:
