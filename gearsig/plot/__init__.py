@@ -59,13 +59,16 @@ from gearsig.plot._gap import (
     gap_waterfall_panel,
 )
 from gearsig.plot._gear_pair import (
+    ResponseCase,
     backlash_figure,
     contact_spreading_figure,
+    crack_comparison_figure,
     frequency_curves_figure,
     friction_figure,
     load_sharing_figure,
     mesh_maps_figure,
     mesh_stiffness_figure,
+    response_figure,
     speed_spectra_figure,
     speed_sweep_figure,
 )
@@ -94,12 +97,6 @@ from gearsig.plot._phase import (
     recurrence_figure,
 )
 from gearsig.plot._pictures import Captioned, Picture, embed, figure_svg, fleet_trend_picture, svg_panel, svg_ring
-from gearsig.plot._response import (
-    ResponseCase,
-    crack_comparison_figure,
-    response_figure,
-)
-from gearsig.plot._series import envelope, series_colours, thin
 from gearsig.plot._spectrum import (
     METHODS,
     displayed_values,
@@ -129,12 +126,15 @@ from gearsig.plot._style import (
     above_zero,
     decibel_text,
     decibels,
+    envelope,
     font_folder,
     is_sound,
     level_colours,
     level_name,
     new_figure,
     plain,
+    series_colours,
+    thin,
     with_unit,
 )
 

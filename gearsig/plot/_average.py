@@ -13,8 +13,7 @@ from gearsig.formatting import unit_text
 from gearsig.orders import SynchronousAverage, check_average
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import AngleMark
-from gearsig.plot._series import thin
-from gearsig.plot._style import plain, with_unit
+from gearsig.plot._style import plain, thin, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,11 +12,9 @@ from gearsig.comparison import BEYOND, BandLevel, LevelPair, LineLevel
 from gearsig.errors import InputError
 from gearsig.formatting import unit_text
 from gearsig.orders import SynchronousAverage
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
-from gearsig.plot._series import envelope, thin
-from gearsig.plot._style import above_zero, plain, with_unit
+from gearsig.plot._style import above_zero, envelope, plain, thin, with_unit
 from gearsig.spectra import Spectrum
 
 if TYPE_CHECKING:
@@ -82,7 +80,7 @@ def order_overlay_figure(
         style.label_axes(panels[1], "", "sim. − rec. (dB)")
     style.label_axes(panels[-1], recorded.axis_label, panels[-1].get_ylabel())
     panels[0].set_xlim(low, high)
-    series.head(figure, title, curves)
+    style.head(figure, title, curves)
     return figure
 
 
@@ -194,7 +192,7 @@ def average_overlay_figure(
         difference_bars(panels[2], np.arange(1.0, len(tooth_levels) + 1), tooth_levels, 0.75)
         panels[2].set_xlim(0.3, len(tooth_levels) + 0.7)
         style.label_axes(panels[2], "tooth, from angle 0", "sim. − rec. (dB)")
-    series.head(figure, title, curves)
+    style.head(figure, title, curves)
     return figure
 
 
@@ -255,7 +253,7 @@ def band_levels_figure(bands: Sequence[BandLevel], unit: str = "", *, title: str
         axes.set_xlim(-0.6, len(bands) - 0.4)
         axes.set_xticks(x, [plain(band.label, 22) for band in bands], rotation=45, ha="right", parse_math=False)
         axes.tick_params(labelbottom=axes is panels[-1])
-    series.head(figure, title, curves)
+    style.head(figure, title, curves)
     return figure
 
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ def draw_shaded(
     triangles: IntArray,
     values: FloatArray,
     *,
-    window: tuple[float, float, float, float],
+    window: Window,
     limits: tuple[float, float],
     cmap: str,
 ) -> AxesImage:
@@ -133,7 +132,7 @@ def gear_mesh_figure(outlines_mm: FloatArray, quality: FloatArray, *, near_mm: W
     outlines = np.asarray(outlines_mm, dtype=np.float64)
     if outlines.ndim != 3 or outlines.shape[2] != 2:
         raise InputError(f"outlines_mm has shape {outlines.shape}", allowed="(n_faces, n_edge_points, 2)")
-    values = series.checked_values(quality, len(outlines), "quality")
+    values = style.checked_values(quality, len(outlines), "quality")
     wide_in, close_in = TALL_IN, 2.95
     figure, panels = style.panels(
         (TALL_IN,), (wide_in, close_in), left_in=0.7, right_in=1.05, top_in=0.4, column_gap_in=0.35
@@ -154,7 +153,7 @@ def gear_mesh_figure(outlines_mm: FloatArray, quality: FloatArray, *, near_mm: W
     style.label_axes(whole, "x (mm)", "y (mm)")
     style.label_axes(close, "x (mm)", "")
     style.colour_bar(close, faces, "scaled Jacobian (1: undistorted)")
-    series.head(figure, title)
+    style.head(figure, title)
     return figure
 
 
@@ -199,11 +198,11 @@ def gear_modes_figure(
         if motion.shape != (len(points), 3):
             raise InputError(f"shape of {name!r} is {motion.shape}", allowed=f"({len(points)}, 3)")
         drawn = _draw_shape(axes, points, triangles, motion / np.abs(motion).max())
-        series.write(axes, 0.0, 1.0, name, colour=style.INK)
+        style.write(axes, 0.0, 1.0, name, colour=style.INK)
     style.colour_bar(panels[COLUMNS - 1], drawn, "axial motion over largest motion")
     for axes in panels[len(shapes) :]:
         axes.remove()
-    series.head(figure, title)
+    style.head(figure, title)
     return figure
 
 
@@ -241,7 +240,7 @@ def gear_stress_figure(
     Figure
     """
     points = np.asarray(points_mm, dtype=np.float64)
-    stress = series.checked_values(stress_pa, len(points), "stress_pa") * 1e-6
+    stress = style.checked_values(stress_pa, len(points), "stress_pa") * 1e-6
     wide_in = min(6.8, TALL_IN * (near_mm[1] - near_mm[0]) / (near_mm[3] - near_mm[2]))
     width_in = max(5.0, 1.9 + wide_in)
     figure, (axes,) = style.panels(
@@ -262,7 +261,7 @@ def gear_stress_figure(
         style.put_text(axes, 0.0, 1.0 + 0.09 / TALL_IN, note, transform=axes.transAxes, va="center")
     beyond = top < float(shown.max())
     style.colour_bar(axes, drawn, "von Mises stress (MPa)", extend="max" if beyond else "neither")
-    series.head(figure, title)
+    style.head(figure, title)
     return figure
 
 
@@ -304,7 +303,7 @@ def stress_maps_figure(
     )
     inside = _inside(points, near_mm)
     for axes, (name, values) in zip(panels, stress_pa.items(), strict=False):
-        stress = series.checked_values(values, len(points), name) * 1e-6
+        stress = style.checked_values(values, len(points), name) * 1e-6
         shown = stress[inside]
         signed = bool(shown.min() < -0.05 * shown.max())
         top = max(float(np.quantile(np.abs(shown), 0.995)), 1e-12)  # the peak at the force goes beyond
@@ -314,7 +313,7 @@ def stress_maps_figure(
         style.colour_bar(axes, drawn, "MPa", extend="both" if signed else "max")
     for axes in panels[len(stress_pa) :]:
         axes.remove()
-    series.head(figure, title)
+    style.head(figure, title)
     return figure
 
 

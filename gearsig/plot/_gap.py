@@ -13,13 +13,11 @@ from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.formatting import with_minus
 from gearsig.gap import AngleCurves, AverageCurves, Evidence, GapStep, Interval, SpectrumCurves, gap_by_order, is_beyond
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._average import ROOT, draw_degrees, draw_gear, draw_mark, write_corner
 from gearsig.plot._cursors import AngleMark
 from gearsig.plot._panels import ChartRow, RowPanel, line_colour
-from gearsig.plot._series import thin
-from gearsig.plot._style import plain, with_unit
+from gearsig.plot._style import plain, thin, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,10 +53,10 @@ def gap_orders_figure(
     InputError
         If the curves' lengths differ.
     """
-    x = series.checked_axis(curves.orders, "orders")
+    x = style.checked_axis(curves.orders, "orders")
     names = ("measured", "before", "floor", *(n for n in ("after", "structural_db") if len(getattr(curves, n))))
     for name in names:
-        series.checked_values(getattr(curves, name), len(x), name)
+        style.checked_values(getattr(curves, name), len(x), name)
     figure, (above, below) = style.panels((2.3, 1.5), top_in=0.66, share_x=True)
     keys = _draw_spectra(above, x, curves, compared_with)
     _draw_gap(below, x, curves, marked=marked)
@@ -68,7 +66,7 @@ def gap_orders_figure(
         below, "order of the driver's shaft", "gap (dB)", f"measured over {compared_with}, against the floors"
     )
     style.no_offset(below)
-    series.head(figure, title or curves.label, keys)
+    style.head(figure, title or curves.label, keys)
     return figure
 
 
@@ -138,9 +136,9 @@ def gap_lines_figure(curves: SpectrumCurves, order: float | None = None, *, titl
     InputError
         If the curves' lengths differ.
     """
-    x = series.checked_axis(curves.orders, "orders")
-    measured = series.checked_values(curves.measured, len(x), "measured")
-    floor = series.checked_values(curves.floor, len(x), "floor")
+    x = style.checked_axis(curves.orders, "orders")
+    measured = style.checked_values(curves.measured, len(x), "measured")
+    floor = style.checked_values(curves.floor, len(x), "floor")
     figure, (axes,) = style.panels((2.6,), top_in=0.66)
     # The envelope's mean and its slow drift do not set the height.
     top = 1.15 * float(measured[x >= 0.1 * (order or 0.0)].max(initial=0.0)) or 1.0
@@ -156,7 +154,7 @@ def gap_lines_figure(curves: SpectrumCurves, order: float | None = None, *, titl
     axes.set_ylim(0.0, top)
     style.label_axes(axes, "order", with_unit("peak amplitude", curves.unit))
     style.no_offset(axes)
-    series.head(figure, title or curves.label, keys)
+    style.head(figure, title or curves.label, keys)
     return figure
 
 
@@ -179,9 +177,9 @@ def gap_teeth_figure(curves: AngleCurves, *, mark: AngleMark | None = None) -> F
     Figure
         Angle clockwise from the top. Teeth have numbers only where the shaft has a mark.
     """
-    angle = series.checked_axis(curves.angle_deg, "angle_deg")
+    angle = style.checked_axis(curves.angle_deg, "angle_deg")
     every = [
-        (name, series.checked_values(energy, len(angle), name), colour, width)
+        (name, style.checked_values(energy, len(angle), name), colour, width)
         for name, energy, colour, width in (
             ("measured", curves.measured, style.MEASURED, 1.2),
             ("simulated before", curves.before, style.QUIET, 1.0),
@@ -254,9 +252,9 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
     InputError
         If the curves' lengths differ.
     """
-    angle = series.checked_axis(curves.angle_deg, "angle_deg")
-    measured = series.checked_values(curves.measured, len(angle), "measured")
-    reference = series.checked_values(curves.reference, len(angle), "reference")
+    angle = style.checked_axis(curves.angle_deg, "angle_deg")
+    measured = style.checked_values(curves.measured, len(angle), "measured")
+    reference = style.checked_values(curves.reference, len(angle), "reference")
     change = measured - reference
     shaft, sensor = plain(curves.shaft, 24), plain(curves.channel, 24)
     figure, (above, below) = style.panels((1.35, 1.35), top_in=0.66, row_gap_in=0.42, share_x=True)
@@ -283,7 +281,7 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
     style.label_axes(above, "", with_unit("average", curves.unit))
     style.label_axes(below, f"angle of shaft {shaft} (deg)", with_unit("change", curves.unit))
     heading = f"average over shaft {shaft} without mesh harmonics, sensor {sensor}: recording against reference"
-    series.head(figure, title or heading, [new, old, *changed])
+    style.head(figure, title or heading, [new, old, *changed])
     return figure
 
 
@@ -392,8 +390,8 @@ def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Fig
     axes.set_xlim(panel.limits)
     style.label_axes(axes, panel.x)
     style.no_offset(axes)
-    series.head(figure, title)
-    series.legend_row(figure, keys, left_in=3.6)
+    style.head(figure, title)
+    style.legend_row(figure, keys, left_in=3.6)
     return figure
 
 
@@ -537,7 +535,7 @@ def confusion_figure(true: Sequence[str], answers: Sequence[str], counts: np.nda
     axes.tick_params(length=0)
     axes.grid(visible=False)
     style.label_axes(axes, "said")
-    series.head(figure, title)
+    style.head(figure, title)
     return figure
 
 
@@ -567,7 +565,7 @@ def calibration_figure(
     style.label_axes(axes, "probability of the likeliest cause (%)", "right (%)")
     if curves:
         axes.legend(loc="upper left", frameon=False, fontsize=style.SMALL_PT)
-    series.head(figure, title)
+    style.head(figure, title)
     return figure
 
 

@@ -1,22 +1,22 @@
-"""Simulated gear pairs: stiffness, load and friction over the mesh; of flexible ones maps, sweeps and spectra."""
+"""Simulated gear pairs: stiffness, load, friction over the mesh; how they answer; maps and sweeps of flexible ones."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array
+from gearsig.checks import FloatArray, count, frozen_array, positive
 from gearsig.errors import InputError
 from gearsig.formatting import counted
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._panels import UNDER_A_LINE
-from gearsig.plot._series import thin
-from gearsig.plot._style import MICRO
+from gearsig.plot._style import MICRO, MILLI, thin
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
@@ -55,15 +55,15 @@ def mesh_stiffness_figure(
     InputError
         On wrong lengths, or a region without two points of the axis.
     """
-    x = series.checked_axis(mesh_cycles, "mesh_cycles")
-    curves = series.checked_curves(stiffness_n_per_m, len(x), "stiffness_n_per_m")
+    x = style.checked_axis(mesh_cycles, "mesh_cycles")
+    curves = style.checked_curves(stiffness_n_per_m, len(x), "stiffness_n_per_m")
     shown = {label: values / STIFFNESS_UNIT for label, values in curves.items()}
     label = "mesh stiffness (10⁸ N/m)"
     figure, (axes, *close) = style.panels((2.1,), (1.0,) if single_pair is None else (1.7, 1.0), top_in=0.65)
-    lines = series.plot_curves(axes, x, shown, 1.4)
-    style.label_axes(axes, series.CYCLES, label)
+    lines = style.plot_curves(axes, x, shown, 1.4)
+    style.label_axes(axes, style.CYCLES, label)
     if single_pair is not None:
-        low, high = series.checked_limits(single_pair, "single_pair")
+        low, high = style.checked_limits(single_pair, "single_pair")
         inside = (x >= low) & (x <= high)
         if (n_inside := int(np.count_nonzero(inside))) < 2:
             raise InputError(
@@ -72,14 +72,14 @@ def mesh_stiffness_figure(
                 remedy="give a finer axis or a region on it",
             )
         zoom = close[0]
-        series.plot_curves(zoom, x[inside], {label: values[inside] for label, values in shown.items()}, 1.4)
+        style.plot_curves(zoom, x[inside], {label: values[inside] for label, values in shown.items()}, 1.4)
         zoom.set_xlim(low, high)
         zoom.locator_params(axis="x", nbins=4)
-        series.shade(axes, (low, high))
+        style.shade(axes, (low, high))
         style.label_axes(zoom, "mesh cycles", label)
-        series.write(zoom, (low + high) / 2, 1.01, "one pair in contact (shaded)")
+        style.write(zoom, (low + high) / 2, 1.01, "one pair in contact (shaded)")
     style.no_offset(axes, *close)
-    series.head(figure, title, lines, heading)
+    style.head(figure, title, lines, heading)
     return figure
 
 
@@ -106,22 +106,22 @@ def load_sharing_figure(
     -------
     Figure
     """
-    x = series.checked_axis(mesh_cycles, "mesh_cycles")
-    forces = series.checked_curves(pair_forces_n, len(x), "pair_forces_n")
-    errors = series.checked_curves(transmission_error_m, len(x), "transmission_error_m")
+    x = style.checked_axis(mesh_cycles, "mesh_cycles")
+    forces = style.checked_curves(pair_forces_n, len(x), "pair_forces_n")
+    errors = style.checked_curves(transmission_error_m, len(x), "transmission_error_m")
     figure, (upper, lower) = style.panels((1.6, 1.5), top_in=0.55, share_x=True)
     highest = max(float(force.max()) for force in forces.values())
-    for label, force, colour in series.coloured(forces):
+    for label, force, colour in style.coloured(forces):
         upper.plot(x, _touching(force), color=colour, linewidth=1.6, label=label)
         if force.max() > 0.95 * highest:
             plateau = x[force > 0.98 * force.max()]
-            series.write(upper, float(plateau.mean()), 1.02, label, colour=colour)
+            style.write(upper, float(plateau.mean()), 1.02, label, colour=colour)
     upper.set_ylim(0.0, 1.06 * highest or 1.0)
-    cases = series.plot_curves(lower, x, {label: error * MICRO for label, error in errors.items()}, 1.4)
+    cases = style.plot_curves(lower, x, {label: error * MICRO for label, error in errors.items()}, 1.4)
     style.label_axes(upper, "", "force of a pair (N)")
-    style.label_axes(lower, series.CYCLES, "transmission error (µm)")
-    series.legend_row(figure, cases, top_in=2.46)
-    series.head(figure, title)
+    style.label_axes(lower, style.CYCLES, "transmission error (µm)")
+    style.legend_row(figure, cases, top_in=2.46)
+    style.head(figure, title)
     return figure
 
 
@@ -168,13 +168,13 @@ def friction_figure(
     InputError
         If a case holds no number, or lengths differ.
     """
-    x = series.checked_axis(mesh_cycles, "mesh_cycles")
-    curves = series.checked_curves(coefficients, len(x), "coefficients", gaps=True)
+    x = style.checked_axis(mesh_cycles, "mesh_cycles")
+    curves = style.checked_curves(coefficients, len(x), "coefficients", gaps=True)
     for label, values in curves.items():
         if np.isnan(values).all():
             raise InputError(f"coefficients[{label!r}] holds no number", remedy="leave the case out")
     figure, (axes,) = style.panels((2.0,), top_in=0.82)
-    lines = series.plot_curves(axes, x, curves)
+    lines = style.plot_curves(axes, x, curves)
     signed = any(bool((values < 0.0).any()) for values in curves.values())
     if signed:
         axes.axhline(0.0, color=style.QUIET, linewidth=0.7, zorder=1)
@@ -183,14 +183,14 @@ def friction_figure(
     name = "friction coefficient × direction (–)" if signed else "friction coefficient (–)"
     style.label_axes(axes, "mesh cycles since the pair's entry (tooth passages)", name)
     if single_pair is not None:
-        series.shade(axes, series.checked_limits(single_pair, "single_pair"))
+        style.shade(axes, style.checked_limits(single_pair, "single_pair"))
     if pitch_point is not None:
         axes.axvline(pitch_point, color=style.QUIET, linewidth=0.8, linestyle="--", zorder=1)
-        series.write(axes, pitch_point, 1.01, "pitch point")
-        series.write(axes, (float(x[0]) + pitch_point) / 2, 1.01, "approach")
-        series.write(axes, (float(x[-1]) + pitch_point) / 2, 1.01, "recess")
+        style.write(axes, pitch_point, 1.01, "pitch point")
+        style.write(axes, (float(x[0]) + pitch_point) / 2, 1.01, "approach")
+        style.write(axes, (float(x[-1]) + pitch_point) / 2, 1.01, "recess")
     style.no_offset(axes)
-    series.head(figure, title, lines, heading)
+    style.head(figure, title, lines, heading)
     return figure
 
 
@@ -232,10 +232,10 @@ def backlash_figure(
     InputError
         On names that differ, or frequencies that begin at 0.
     """
-    t = series.checked_axis(time_s, "time_s")
-    f = series.checked_axis(frequency_hz, "frequency_hz")
-    curves = series.checked_curves(backlash_m, len(t), "backlash_m")
-    spectra = series.checked_curves(amplitude_m, len(f), "amplitude_m")
+    t = style.checked_axis(time_s, "time_s")
+    f = style.checked_axis(frequency_hz, "frequency_hz")
+    curves = style.checked_curves(backlash_m, len(t), "backlash_m")
+    spectra = style.checked_curves(amplitude_m, len(f), "amplitude_m")
     if f[0] <= 0.0:
         raise InputError(f"frequency_hz begins at {f[0]:g} Hz", allowed="above 0: the axis is logarithmic")
     if list(curves) != list(spectra):
@@ -244,9 +244,9 @@ def backlash_figure(
             allowed="the same names in the same order",
         )
     figure, (upper, lower) = style.panels((1.6, 1.55), top_in=0.7, row_gap_in=0.9)
-    drawn = series.plot_curves(upper, t, {label: values * MICRO for label, values in curves.items()}, 1.0)
+    drawn = style.plot_curves(upper, t, {label: values * MICRO for label, values in curves.items()}, 1.0)
     style.label_axes(upper, "time (s)", "half backlash (µm)")
-    for i, (_, values, colour) in enumerate(series.coloured(spectra)):
+    for i, (_, values, colour) in enumerate(style.coloured(spectra)):
         if values.max() > 0.0:
             lower.plot(*thin(f, values * MICRO), color=colour, linewidth=1.1, zorder=3 - 0.01 * i)
     lower.set_xscale("log")
@@ -255,13 +255,13 @@ def backlash_figure(
     lower.set_ylim(0.0, 1.08 * MICRO * max(float(values.max()) for values in spectra.values()) or 1.0)
     for line in (line for line in lines_hz if f[0] <= line <= f[-1]):
         lower.axvline(line, color=style.QUIET, linewidth=0.7, linestyle=":", zorder=1)
-        series.write(lower, line, 1.02, f"{line:.4g}")
+        style.write(lower, line, 1.02, f"{line:.4g}")
     if mesh_frequency_hz is not None:
         lower.axvline(mesh_frequency_hz, color=style.MESH, linewidth=1.0, zorder=1)
-        series.write(lower, 1.02 * mesh_frequency_hz, 0.9, "mesh", colour=style.MESH, ha="left")
+        style.write(lower, 1.02 * mesh_frequency_hz, 0.9, "mesh", colour=style.MESH, ha="left")
     style.label_axes(lower, "frequency (Hz)", "amplitude (µm peak)")
     style.no_offset(upper, lower)
-    series.head(figure, title, drawn, heading)
+    style.head(figure, title, drawn, heading)
     return figure
 
 
@@ -295,9 +295,9 @@ def mesh_maps_figure(
     InputError
         On axes that do not ascend, a map of another shape, or more than three.
     """
-    x, y = series.checked_axis(mesh_cycles, "mesh_cycles"), series.checked_axis(torque_nm, "torque_nm")
+    x, y = style.checked_axis(mesh_cycles, "mesh_cycles"), style.checked_axis(torque_nm, "torque_nm")
     n = len(maps)
-    series.check_number(n, f"{n} maps", 3)
+    style.check_number(n, f"{n} maps", 3)
     figure, panels = style.panels((2.6,), (1.0,) * n, left_in=0.7, right_in=0.95, top_in=0.75)
     for axes, (name, values) in zip(panels, maps.items(), strict=True):
         array = frozen_array(values, name, ndim=2)
@@ -315,8 +315,8 @@ def mesh_maps_figure(
             bar.hlines(levels, 0.0, 1.0, colors=inks, linewidths=0.7, transform=bar.get_yaxis_transform())
             bar.set_yticks([float(f"{level:.3g}") for level in levels])
         style.put_text(axes, 0.0, 1.03, name, colour=style.INK, fontsize=style.TEXT_PT, transform=axes.transAxes)
-        style.label_axes(axes, series.CYCLES if n < 3 else "mesh cycles", "torque (N·m)" if axes is panels[0] else "")
-    series.head(figure, title)
+        style.label_axes(axes, style.CYCLES if n < 3 else "mesh cycles", "torque (N·m)" if axes is panels[0] else "")
+    style.head(figure, title)
     return figure
 
 
@@ -343,12 +343,12 @@ def speed_sweep_figure(
     -------
     Figure
     """
-    series.check_number(len(sweeps), f"{len(sweeps)} sweeps")
+    style.check_number(len(sweeps), f"{len(sweeps)} sweeps")
     figure, (axes,) = style.panels((2.2,), top_in=0.85)
     lines = []
-    for (name, mesh_hz, up, down), colour in zip(sweeps, series.series_colours(len(sweeps)), strict=True):
-        x = series.checked_axis(mesh_hz, f"mesh_hz of {name}")
-        rows = [series.checked_values(v, len(x), f"rms of {name}") * MICRO for v in (up, down)]
+    for (name, mesh_hz, up, down), colour in zip(sweeps, style.series_colours(len(sweeps)), strict=True):
+        x = style.checked_axis(mesh_hz, f"mesh_hz of {name}")
+        rows = [style.checked_values(v, len(x), f"rms of {name}") * MICRO for v in (up, down)]
         lines += axes.plot(x, rows[0], color=colour, linewidth=1.5, label=name if len(sweeps) > 1 else "sweep up")
         falling = axes.plot(x, rows[1], color=colour, linewidth=1.3, linestyle=(0, (4, 2)), label="sweep down")
         lines += falling if len(sweeps) == 1 else []
@@ -357,9 +357,9 @@ def speed_sweep_figure(
     natural = {} if natural_hz is None else {"ωₙ": natural_hz, "ωₙ/2": natural_hz / 2, "ωₙ/3": natural_hz / 3}
     for word, hertz in {**natural, **(jumps_hz or {})}.items():
         axes.axvline(hertz, color=style.FLOOR, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1)
-        series.write(axes, hertz, 1.01, word)
+        style.write(axes, hertz, 1.01, word)
     style.label_axes(axes, "mesh frequency (Hz)", "dynamic transmission error, rms (µm)")
-    series.head(figure, title, lines, "full: up, dashed: down" if len(sweeps) > 1 else "")
+    style.head(figure, title, lines, "full: up, dashed: down" if len(sweeps) > 1 else "")
     return figure
 
 
@@ -388,8 +388,8 @@ def speed_spectra_figure(
     -------
     Figure
     """
-    x = series.checked_axis(frequency_hz, "frequency_hz")
-    curves = series.checked_curves(spectra_m, len(x), "spectra_m")
+    x = style.checked_axis(frequency_hz, "frequency_hz")
+    curves = style.checked_curves(spectra_m, len(x), "spectra_m")
     figure, panels = style.panels((0.97,) * len(curves), top_in=0.45, row_gap_in=0.08, share_x=True)
     largest_um = max(float(c.max()) for c in curves.values()) * MICRO
     floor = 1e-5 * largest_um  # five decades below the greatest amplitude
@@ -407,7 +407,7 @@ def speed_spectra_figure(
             axes.axvline(natural_hz, color=style.FAULT, linewidth=0.9, linestyle=(0, (3, 2)), zorder=1)
         style.put_text(axes, 0.995, 0.93, name, colour=style.INK, transform=axes.transAxes, ha="right", va="top")
         style.label_axes(axes, "frequency (Hz)" if axes is panels[-1] else "", "transmission error (µm)")
-    series.head(figure, title)
+    style.head(figure, title)
     return figure
 
 
@@ -430,7 +430,7 @@ def frequency_curves_figure(
     InputError
         If the rows are not as many as mesh angles.
     """
-    x = series.checked_axis(mesh_cycles, "mesh_cycles")
+    x = style.checked_axis(mesh_cycles, "mesh_cycles")
     curves = frozen_array(frequencies_hz, "frequencies_hz", ndim=2)
     if curves.shape[0] != len(x):
         raise InputError(f"frequencies_hz has {curves.shape[0]} rows, its axis {len(x)}", allowed="equal lengths")
@@ -450,8 +450,8 @@ def frequency_curves_figure(
         named.setdefault("without contact", line[0])
     axes.set_xlim(float(x[0]), float(x[-1]))
     axes.set_ylim(bottom=0.0)
-    style.label_axes(axes, series.CYCLES, "natural frequency (kHz)")
-    series.head(figure, title, () if uncoupled_hz is None else list(named.values()))
+    style.label_axes(axes, style.CYCLES, "natural frequency (kHz)")
+    style.head(figure, title, () if uncoupled_hz is None else list(named.values()))
     return figure
 
 
@@ -467,10 +467,279 @@ def contact_spreading_figure(
         Name of the way, e.g. "line of nodes" → array, (n_c,).
     title : str
     """
-    x = series.checked_axis(mesh_cycles, "mesh_cycles")
-    curves = series.checked_curves(frequency_hz, len(x), "frequency_hz")
+    x = style.checked_axis(mesh_cycles, "mesh_cycles")
+    curves = style.checked_curves(frequency_hz, len(x), "frequency_hz")
     figure, (axes,) = style.panels((2.2,), top_in=0.85)
-    lines = series.plot_curves(axes, x, curves)
-    style.label_axes(axes, series.CYCLES, "torsional mode (Hz)")
-    series.head(figure, title, lines)
+    lines = style.plot_curves(axes, x, curves)
+    style.label_axes(axes, style.CYCLES, "torsional mode (Hz)")
+    style.head(figure, title, lines)
+    return figure
+
+
+# --------------------
+# How a gear answers: time signal, spectrum, phase portrait and Poincaré section of several cases below each other.
+# --------------------
+
+
+@dataclass(frozen=True)
+class ResponseCase:
+    """One row of a response figure.
+
+    Parameters
+    ----------
+    name : str
+        E.g. "Rq 0.45 µm".
+    time_s, displacement_m, velocity_mps : arrays, (n,)
+        In the steady state; time ascending.
+    frequency_hz, amplitude_m : arrays, (m,)
+        Spectrum of the displacement, peak amplitudes.
+    poincare_displacement_m, poincare_velocity_mps : arrays, (k,)
+        State once per period (stroboscopic); may be empty.
+    """
+
+    name: str
+    time_s: FloatArray
+    displacement_m: FloatArray
+    velocity_mps: FloatArray
+    frequency_hz: FloatArray
+    amplitude_m: FloatArray
+    poincare_displacement_m: FloatArray
+    poincare_velocity_mps: FloatArray
+
+    def __post_init__(self) -> None:
+        groups = (
+            ("time_s", "displacement_m", "velocity_mps"),
+            ("frequency_hz", "amplitude_m"),
+            ("poincare_displacement_m", "poincare_velocity_mps"),
+        )
+        for group in groups:
+            for field in group:
+                object.__setattr__(self, field, frozen_array(getattr(self, field), f"{field} of {self.name!r}", ndim=1))
+            lengths = {field: len(getattr(self, field)) for field in group}
+            if len(set(lengths.values())) > 1:
+                field_lengths = ", ".join(f"{field} {n}" for field, n in lengths.items())
+                raise InputError(f"lengths of {self.name!r} differ: {field_lengths}", allowed="equal lengths")
+        style.checked_axis(self.time_s, f"time_s of {self.name!r}")
+        style.checked_axis(self.frequency_hz, f"frequency_hz of {self.name!r}")
+
+
+def response_figure(
+    cases: Sequence[ResponseCase],
+    *,
+    mesh_frequency_hz: float,
+    limits_hz: tuple[float, float] = (0.0, 2000.0),
+    n_periods: int = 20,
+    lines_hz: Sequence[float] = (),
+    title: str = "",
+) -> Figure:
+    """Draw one row per case: signal over time, spectrum, phase portrait with the Poincaré points, and these enlarged.
+
+    Axes of a column are alike in all rows, so that rows compare.
+
+    Parameters
+    ----------
+    cases : sequence of ResponseCase
+        1 to 8.
+    mesh_frequency_hz : float
+        Its harmonics are marked in the spectra.
+    limits_hz : (float, float)
+        Of the spectra.
+    n_periods : int
+        Mesh periods of the time signal that are drawn; the phase portrait has all of it.
+    lines_hz : sequence of float
+        Other expected lines, e.g. of a fractal profile: small marks along the top of the spectra.
+    title : str
+        Says what moves, and which way.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InputError
+        Without cases, or if no line of a spectrum lies inside the limits.
+    """
+    style.check_number(len(cases), f"{len(cases)} cases")
+    mesh_hz = positive(mesh_frequency_hz, "mesh_frequency_hz", "Hz")
+    count(n_periods, "n_periods")
+    limits = style.checked_limits(limits_hz, "limits_hz")
+    figure, panels = style.panels(
+        (1.22,) * len(cases), (1.75, 1.9, 1.2, 1.17), left_in=0.7, top_in=0.62, row_gap_in=0.4, column_gap_in=0.71
+    )
+    rows = [panels[i : i + 4] for i in range(0, len(panels), 4)]
+    for case, (time, spectrum, phase, section) in zip(cases, rows, strict=True):
+        shown = case.time_s <= case.time_s[0] + n_periods / mesh_hz
+        line = thin(case.time_s[shown], case.displacement_m[shown] * MICRO, 2000)
+        time.plot(*line, color=style.MEASURED, linewidth=0.9)
+        time.set_xlim(float(case.time_s[0]), float(case.time_s[0]) + n_periods / mesh_hz)
+        style.label_axes(time, "", "displacement (µm)", case.name)
+
+        inside = _inside(case, limits)
+        for harmonic in range(1, int(limits[1] / mesh_hz) + 1):
+            spectrum.axvline(harmonic * mesh_hz, color=style.MESH, linewidth=0.9, alpha=0.45, zorder=1)
+        line = thin(case.frequency_hz[inside], np.maximum(case.amplitude_m[inside] * MICRO, 1e-12), 2000)
+        spectrum.plot(*line, color=style.MEASURED, linewidth=0.8)
+        spectrum.set_yscale("log")
+        spectrum.set_xlim(*limits)
+        expected = [hertz for hertz in lines_hz if limits[0] <= hertz <= limits[1]]
+        marks = {"color": style.SHAFT, "markersize": 3.5, "linestyle": "none", "markeredgewidth": 0.0}
+        heights = np.full(len(expected), 0.97)
+        spectrum.plot(expected, heights, "v", transform=spectrum.get_xaxis_transform(), **marks)  # type: ignore[arg-type]
+        style.label_axes(spectrum, "", "amplitude (µm)")
+
+        path = (case.displacement_m * MICRO, case.velocity_mps * MILLI)
+        phase.plot(*path, color=style.MEASURED, linewidth=0.5, alpha=0.35)
+        for axes in (phase, section):
+            style.label_axes(axes, "", "velocity (mm/s)")
+        dots = (case.poincare_displacement_m * MICRO, case.poincare_velocity_mps * MILLI)
+        for axes, size in ((phase, 2.4), (section, 2.0)):
+            axes.plot(*dots, "o", color=style.FAULT, markersize=size, markeredgewidth=0.0, zorder=3)
+    _give_columns_one_scale(rows, cases, limits)
+    names = ("time (s)", "frequency (Hz)", "displacement (µm)", "displacement (µm)")
+    for axes, name in zip(rows[-1], names, strict=True):
+        style.label_axes(axes, name, axes.get_ylabel(), axes.get_title(loc="left"))
+    _, spectrum, phase, section = rows[0]
+    for harmonic in range(1, int(limits[1] / mesh_hz) + 1):
+        if harmonic * mesh_hz > limits[0]:
+            name = "mesh" if harmonic == 1 else f"{harmonic}×"
+            style.write(spectrum, harmonic * mesh_hz, 1.02, name, colour=style.MESH)
+    for axes, name in ((phase, "once per period"), (section, "these, enlarged")):
+        axes.set_title(name, loc="right", color=style.FAULT, fontsize=style.SMALL_PT)
+    style.head(figure, title)
+    return figure
+
+
+def _give_columns_one_scale(
+    rows: Sequence[Sequence[Axes]], cases: Sequence[ResponseCase], limits: tuple[float, float]
+) -> None:
+    y, v = (np.concatenate(parts) for parts in ([c.displacement_m for c in cases], [c.velocity_mps for c in cases]))
+    dots_y = np.concatenate([case.poincare_displacement_m for case in cases]) * MICRO
+    dots_v = np.concatenate([case.poincare_velocity_mps for case in cases]) * MILLI
+    lines = [case.amplitude_m[_inside(case, limits)] * MICRO for case in cases]
+    top = max(float(amplitude.max()) for amplitude in lines) or 1.0
+    # The floor: what most lines of the richest case lie above, at most six decades down.
+    richest = max(float(np.median(amplitude)) for amplitude in lines)
+    bottom = min(max(richest / 30.0, top * 1e-6), top / 10.0)
+    for time, spectrum, phase, section in rows:
+        time.set_ylim(*style.padded(y * MICRO))
+        time.locator_params(axis="x", nbins=4)
+        spectrum.set_ylim(bottom, 2.0 * top)
+        phase.set_xlim(*style.padded(y * MICRO))
+        phase.set_ylim(*style.padded(v * MILLI))
+        if dots_y.size:
+            section.set_xlim(*style.padded(dots_y))
+            section.set_ylim(*style.padded(dots_v))
+        for axes in (phase, section):
+            axes.locator_params(nbins=4)
+        for axes in (time, spectrum, phase, section):
+            axes.tick_params(labelbottom=time is rows[-1][0])
+            style.no_offset(axes)
+
+
+def _inside(case: ResponseCase, limits: tuple[float, float]) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    inside = (case.frequency_hz >= limits[0]) & (case.frequency_hz <= limits[1]) & (case.frequency_hz > 0.0)
+    if not inside.any():
+        raise InputError(f"no line of {case.name!r} lies within {limits[0]:g} to {limits[1]:g} Hz", where="limits_hz")
+    return np.asarray(inside)
+
+
+def crack_comparison_figure(
+    revolutions: FloatArray,
+    acceleration_mps2: Mapping[str, FloatArray],
+    *,
+    impacts_rev: Sequence[float],
+    n_teeth: int,
+    change_mps2: Mapping[str, FloatArray] | None = None,
+    reach_cycles: Mapping[str, float] | None = None,
+    zoom_cycles: tuple[float, float] = (-3.0, 12.0),
+    title: str = "",
+) -> Figure:
+    """Draw the acceleration over some revolutions, one row per crack depth, and a close view of one impact.
+
+    The first case is the one to compare with: the healthy gear.
+
+    Parameters
+    ----------
+    revolutions : array, (n,)
+        Of the cracked gear, ascending.
+    acceleration_mps2 : mapping
+        Name of the case → array, (n,).
+    impacts_rev : sequence of float
+        Where the cracked tooth enters the mesh; those on the axis are marked, the middle one is enlarged.
+    n_teeth : int
+        Of the cracked gear: mesh cycles per revolution.
+    change_mps2 : mapping or None
+        Name of the case → its acceleration less that of the first case at the same angle, (n,), for all but the first.
+        Given: close views show its magnitude on a logarithmic axis, and that of the first case's acceleration itself.
+        None: they show the acceleration.
+    reach_cycles : mapping or None
+        Name of the case → mesh cycles from the entry over which the impact is felt; shaded.
+    zoom_cycles : (float, float)
+        Close view, from the entry.
+    title : str
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    InputError
+        If no impact lies on the axis, or a change or reach names a case that is not there.
+    """
+    x = style.checked_axis(revolutions, "revolutions")
+    cases = style.checked_curves(acceleration_mps2, len(x), "acceleration_mps2")
+    z = count(n_teeth, "n_teeth", minimum=3)
+    limits = style.checked_limits(zoom_cycles, "zoom_cycles")
+    marked = [float(at) for at in impacts_rev if x[0] <= at <= x[-1]]
+    if not marked:
+        raise InputError(
+            f"no impact lies on the axis, {x[0]:g} to {x[-1]:g} revolutions",
+            where="impacts_rev",
+            remedy="give at least one revolution of signal with the cracked tooth in it",
+        )
+    for parameter, value in (("change_mps2", change_mps2), ("reach_cycles", reach_cycles)):
+        if unknown := set(value or ()) - set(cases):
+            raise InputError(f"{parameter} names {min(unknown)!r}", allowed=", ".join(cases))
+    changes = style.checked_curves(change_mps2, len(x), "change_mps2") if change_mps2 else {}
+    cycles = (x - marked[len(marked) // 2]) * z
+    near = (cycles >= limits[0]) & (cycles <= limits[1])
+    if np.count_nonzero(near) < 2:
+        raise InputError("zoom_cycles holds fewer than two points", remedy="give a wider view or a finer axis")
+    largest = max(float(np.max(np.abs(values))) for values in cases.values()) or 1.0
+    closest = max(float(np.max(np.abs(values[near]))) for values in cases.values()) or 1.0
+    figure, panels = style.panels((1.08,) * len(cases), (3.95, 3.25), top_in=0.62, row_gap_in=0.32, column_gap_in=0.85)
+    for i, (name, values) in enumerate(cases.items()):
+        whole, close = panels[2 * i : 2 * i + 2]
+        for at in marked:
+            whole.axvline(at, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
+        whole.plot(*thin(x, values, 1600), color=style.MEASURED, linewidth=0.6)
+        whole.set_xlim(float(x[0]), float(x[-1]))
+        whole.set_ylim(-1.08 * largest, 1.08 * largest)
+        style.label_axes(whole, "", "a (m/s²)", name)
+        close.axvline(0.0, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
+        close.set_xlim(*limits)
+        if changes:
+            # A change of nothing is drawn below every axis: a logarithm needs a bottom.
+            size = np.maximum(np.abs(changes.get(name, values)[near]), 1e-12)
+            close.plot(cycles[near], size, color=style.FAULT if name in changes else style.MEASURED, linewidth=0.9)
+            style.label_axes(close, "", "|change| (m/s²)" if name in changes else "|a| (m/s²)")
+            close.set_yscale("log")
+            close.set_ylim(closest * 10.0**-3.5, 2.0 * closest)
+        else:
+            close.plot(cycles[near], values[near], color=style.MEASURED, linewidth=0.9)
+            close.set_ylim(-1.08 * closest, 1.08 * closest)
+        if (reach := (reach_cycles or {}).get(name, 0.0)) > 0.0:
+            style.shade(close, (0.0, reach), style.FAULT, 0.12)
+            style.write(close, limits[1], 1.02, f"felt for {reach:.1f} cycles", colour=style.FAULT, ha="right")
+        for axes in (whole, close):
+            axes.tick_params(labelbottom=i == len(cases) - 1)
+            style.no_offset(axes)
+    for axes, label in zip(
+        panels[-2:], ("revolutions of the cracked gear", "mesh cycles since the cracked tooth's entry"), strict=True
+    ):
+        axes.set_xlabel(label, color=style.INK, fontsize=style.TEXT_PT)
+    style.write(panels[0], marked[len(marked) // 2], 1.02, "cracked tooth enters", colour=style.FAULT)
+    style.head(figure, title)
     return figure

@@ -11,7 +11,6 @@ from gearsig.checks import FloatArray, positive
 from gearsig.errors import InputError
 from gearsig.formatting import readable
 from gearsig.orders import OrderMap
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
 from gearsig.plot._style import decibels
@@ -67,7 +66,7 @@ def order_map_figure(
     draw(axes, place(cursors, limits, style.size_in(axes)[0]), through=False)
     style.label_axes(axes, order_map.axis_label)
     style.label_axes(speed, "speed (rpm)", "time (s)")
-    series.head(figure, order_map.source)
+    style.head(figure, order_map.source)
     style.no_offset(speed)
     return figure
 
@@ -273,7 +272,7 @@ def coherence_figure(
     below.set_xlim(float(x[0]), float(x[-1]))
     below.set_ylim(float(y[0]), float(y[-1]))
     style.number_decades(style.colour_bar(below, mesh, "squared coherence γ²").yaxis, n_digits=4)
-    at, _, high = series.envelope(mean.spectrum.positions[shown], mean.spectrum.values[shown], 1200)
+    at, _, high = style.envelope(mean.spectrum.positions[shown], mean.spectrum.values[shown], 1200)
     above.plot(at, high, color=style.MEASURED, linewidth=0.9)
     above.axhline(mean.level, color=style.FLOOR, linewidth=1.0, linestyle=(0, (4, 3)))
     # A slow change of level stands at the first lines: it must not squeeze the others.
@@ -287,10 +286,9 @@ def coherence_figure(
     below.plot([1.004, 1.004], mean.band_hz, transform=below.get_yaxis_transform(), color=style.MEASURED, clip_on=False)
     style.label_axes(below, coherence.alpha_label, "carrier (Hz)")
     style.label_axes(above, "", "mean γ²")
-    series.head(figure, f"spectral coherence of {coherence.source}")
+    style.head(figure, f"spectral coherence of {coherence.source}")
     noise = f"noise: 1 line in {1 / mean.probability:.4g} above the dashed line"
-    right, top = 1.0 - right_in / style.WIDTH_IN, 1.0 - 0.08 / figure.get_size_inches()[1]
-    style.put_text(figure, right, top, noise, ha="right", va="top")
+    style.put_text(figure, *style.upper_right(figure, right_in), noise, ha="right", va="top")
     return figure
 
 

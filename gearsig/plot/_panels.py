@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import Cursor
 from gearsig.plot._maps import draw_level_map
@@ -298,7 +297,7 @@ def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") 
                     borderaxespad=0.0,
                 )
         style.label_axes(place, panel.x, panel.y)
-    series.head(figure, title)
+    style.head(figure, title)
     return figure
 
 
@@ -315,7 +314,7 @@ def line_colour(colour: int | str) -> str:
 def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> None:
     colour = line_colour(line.colour)
     if line.peaks and _has_many_ascending(line.x):
-        x, _, y = series.envelope(line.x, line.y, series.N_POINTS // 2)
+        x, _, y = style.envelope(line.x, line.y, style.N_POINTS // 2)
     else:
         x, y = _thinned(line.x, line.y) if thinned else (line.x, line.y)
     if line.band is not None:
@@ -697,12 +696,12 @@ def curves_figure(
     lines: list[Line2D] = []
     # a curve has the same colour in a panel that shows some of another's
     most = max(panels, key=lambda panel: len(panel.curves)).curves
-    colours = {name: colour for name, _, colour in series.coloured(most)}
+    colours = {name: colour for name, _, colour in style.coloured(most)}
     for place, panel in zip(axes, panels, strict=False):
-        series.check_number(len(panel.curves), f"{len(panel.curves)} curves in one panel")
+        style.check_number(len(panel.curves), f"{len(panel.curves)} curves in one panel")
         lines = []
         some = panel.curves.keys() <= colours.keys()
-        for k, (name, values, own) in enumerate(series.coloured(panel.curves)):
+        for k, (name, values, own) in enumerate(style.coloured(panel.curves)):
             colour = colours[name] if some else own
             if len(values) != len(panel.x):
                 raise InputError(f"{name} has {len(values)} points, its axis {len(panel.x)}", allowed="equal lengths")
@@ -714,14 +713,14 @@ def curves_figure(
             place.legend(fontsize=style.SMALL_PT, frameon=False, labelcolor=style.INK)
     for unused in axes[len(panels) :]:
         unused.set_visible(False)
-    series.head(figure, title, lines if named else (), heading)
+    style.head(figure, title, lines if named else (), heading)
     return figure
 
 
 def _thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fewer points where x ascends; what runs to and fro is drawn whole."""
-    return series.thin(x, y) if _has_many_ascending(x) else (x, y)
+    return style.thin(x, y) if _has_many_ascending(x) else (x, y)
 
 
 def _has_many_ascending(x: FloatArray) -> bool:
-    return len(x) > series.N_POINTS and bool((x[1:] > x[:-1]).all())
+    return len(x) > style.N_POINTS and bool((x[1:] > x[:-1]).all())

@@ -25,7 +25,6 @@ from gearsig.phase import (
     points_between,
     step_of,
 )
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._style import with_unit
 
@@ -186,7 +185,7 @@ def divergence_figure(exponent: LyapunovExponent, *, title: str = "") -> Figure:
     axes.axhline(unrelated, color=style.MESH, linewidth=0.8, linestyle="--", label="unrelated points")
     words = f"no exponent, {exponent.verdict}"
     if isfinite(exponent.exponent_per_s):
-        series.shade(axes, exponent.fit_s)
+        style.shade(axes, exponent.fit_s)
         inside = (exponent.times_s >= exponent.fit_s[0]) & (exponent.times_s <= exponent.fit_s[1])
         t, s = exponent.times_s[inside], exponent.log_distance[inside]
         fitted = s.mean() + exponent.exponent_per_s * (t - t.mean())
@@ -210,7 +209,7 @@ def chaos_test_figure(test: ChaosTest, walk: FloatArray, c_rad: float, *, title:
     left.set_ylim(-1.05, 1.05)
     style.label_axes(left, "c (rad)", "K", title or test.source or "0–1 test")
     words = f"K = {test.k:.2f}, {test.verdict}, {test.n_values} values"
-    series.write(left, 0.5 * sum(left.get_xlim()), 0.05 if test.k > 0.0 else 0.95, words)
+    style.write(left, 0.5 * sum(left.get_xlim()), 0.05 if test.k > 0.0 else 0.95, words)
     right.plot(walk[:, 0], walk[:, 1], color=style.MEASURED, linewidth=0.6)
     right.set_aspect("equal", adjustable="datalim")
     style.label_axes(right, "p", "q")
@@ -288,7 +287,7 @@ def bifurcation_figure(
         lines.append(_draw_branch(panels[0], branch, factor, (name, colour, size, filled)))
         for start, stop, period in _runs_of_equal_period(branch):
             ink = style.QUIET if down is None else colour
-            series.write(panels[0], 0.5 * (start + stop), height, f"period {period}", colour=ink)
+            style.write(panels[0], 0.5 * (start + stop), height, f"period {period}", colour=ink)
     style.label_axes(panels[0], "", with_unit(diagram.axis_name, unit))
     if with_size:
         largest = max(float(branch.extents.max()) for branch in branches)
@@ -305,15 +304,15 @@ def bifurcation_figure(
         ranges = coexistence_ranges(diagram, down) if with_size else ()
         for panel in panels if ranges else ():
             for apart in ranges:
-                series.shade(panel, (apart.low, apart.high))
+                style.shade(panel, (apart.low, apart.high))
         if ranges:
             step = f"step {step_of(diagram, down):.4g} {diagram.parameter_unit}".strip()
             beyond = any(apart.begins_with_sweep or apart.ends_with_sweep for apart in ranges)
             more = "; they may go on beyond the sweep" if beyond else ""
             style.note(panels[-1], f"two motions at the values tried, {step}{more}")
             lines.append(Line2D([], [], color=style.FLOOR, alpha=0.3, linewidth=9.0, label="shaded: two motions"))
-        series.legend_row(figure, lines, heading=diagram.parameter_name)
-    series.head(figure, title or f"{diagram.axis_name} once per {diagram.section}, over {diagram.parameter_name}")
+        style.legend_row(figure, lines, heading=diagram.parameter_name)
+    style.head(figure, title or f"{diagram.axis_name} once per {diagram.section}, over {diagram.parameter_name}")
     style.no_offset(*panels)
     return figure
 

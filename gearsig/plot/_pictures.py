@@ -22,7 +22,6 @@ from gearsig.checks import FloatArray
 from gearsig.fleet import Trend
 from gearsig.formatting import readable, unit_text
 from gearsig.orders import SynchronousAverage
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import AngleMark, Cursor
 from gearsig.plot._panels import ChartLine, LevelPanel, LinePanel, cell_limits, line_colour, pooled_levels
@@ -458,7 +457,7 @@ def _padded_range(curves: Sequence[FloatArray], *, logarithmic: bool) -> tuple[f
     if logarithmic and (values > 0).any():
         high = float(values.max())
         return max(float(np.percentile(values[values > 0], 5)), high * 1e-6) / 2, 2 * high
-    return series.padded(values)
+    return style.padded(values)
 
 
 def _ticks(low: float, high: float, n: int) -> list[float]:

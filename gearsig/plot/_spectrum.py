@@ -13,12 +13,10 @@ from gearsig.checks import FloatArray, one_of
 from gearsig.decompose import Modes, mode_spectra
 from gearsig.errors import InputError
 from gearsig.formatting import axis_unit, unit_text
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
 from gearsig.plot._panels import UNDER_A_LINE, ChartLine, LinePanel
-from gearsig.plot._series import N_POINTS, envelope, thin
-from gearsig.plot._style import Scale, above_zero, decibel_text, decibels, plain, with_unit
+from gearsig.plot._style import N_POINTS, Scale, above_zero, decibel_text, decibels, envelope, plain, thin, with_unit
 from gearsig.recording import Recording
 from gearsig.spectra import Scaling, Spectrum
 
@@ -79,7 +77,7 @@ def spectrum_figure(
     _draw_lines(axes, spectrum, floor, (low, high), scale, marked)
     draw(axes, placed)
     style.label_axes(axes, spectrum.axis_label, _value_label(spectrum, scale))
-    series.head(figure, title or spectrum.source)
+    style.head(figure, title or spectrum.source)
     return figure
 
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gearsig import motion as motions
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.plot import _series as series
 from gearsig.plot import _style as style
-from gearsig.plot._series import thin
-from gearsig.plot._style import KILO, MICRO, MILLI
+from gearsig.plot._style import KILO, MICRO, MILLI, thin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +52,7 @@ def start_stop_figure(examined: motions.StartStop, *, title: str = "") -> Figure
     _draw_speeds(over, drawn, title or examined.motion.source or "start–stop motion")
     for segment in examined.segments.segments:
         if not segment.direction:
-            series.shade(over, (segment.start_s, segment.end_s))
+            style.shade(over, (segment.start_s, segment.end_s))
     if examined.impacts:
         _draw_impact_speeds(figure, over, examined.impacts)
     _draw_planes(plane, drawn)
@@ -94,7 +92,7 @@ def start_stop_pair_figure(
     style.label_axes(profile, "part of the mesh cycle", "compression (µm)", "drive flank over the mesh cycle")
     if curves_um is None:
         profile.set_yticks([])
-        series.write(profile, 0.5, 0.5, "no starts and stops to tell it from")
+        style.write(profile, 0.5, 0.5, "no starts and stops to tell it from")
     for curve, (_, colour) in zip(curves_um or (), drawn, strict=False):
         place = (np.arange(len(curve)) + 0.5) / len(curve)
         profile.plot(place, curve, color=colour, linewidth=1.2, marker=".", markersize=4)
@@ -102,7 +100,7 @@ def start_stop_pair_figure(
     style.label_axes(teeth, "tooth of the driver", "yields more by (µm)", "teeth one by one")
     for (examined, colour), shift in zip(drawn, (-0.2, 0.2), strict=True):
         if examined.teeth is None:
-            series.write(teeth, 0.5, 0.5, "teeth cannot be told one by one")
+            style.write(teeth, 0.5, 0.5, "teeth cannot be told one by one")
             break
         extra = examined.teeth.extra_um
         teeth.bar(np.arange(1, len(extra) + 1) + shift, np.nan_to_num(extra), width=0.4, color=colour)
@@ -135,11 +133,9 @@ def _draw_speeds(axes: Axes, drawn: Drawn, title: str) -> None:
 def _draw_impact_speeds(figure: Figure, over: Axes, impacts: Sequence[motions.Impact]) -> None:
     axes = over.twinx()
     for flank, (colour, name, _) in FLANKS.items():
-        times, speeds = (
-            [i.time_s for i in impacts if i.flank == flank],
-            [i.speed_mps for i in impacts if i.flank == flank],
-        )
-        if times:
+        chosen = [impact for impact in impacts if impact.flank == flank]
+        if chosen:
+            times, speeds = [impact.time_s for impact in chosen], [impact.speed_mps for impact in chosen]
             axes.vlines(times, 0.0, speeds, color=colour, linewidth=1.0, label=f"impact, {name}")
     axes.set_ylim(0.0, 1.6 * max(i.speed_mps for i in impacts))
     axes.tick_params(colors=style.QUIET, labelcolor=style.INK, labelsize=style.SMALL_PT)
@@ -151,11 +147,8 @@ def _draw_impact_speeds(figure: Figure, over: Axes, impacts: Sequence[motions.Im
 
 def _legend(figure: Figure, handles: Sequence[object]) -> None:
     """Name the colours in the upper right corner."""
-    corner = (1.0 - 0.2 / style.WIDTH_IN, 1.0 - 0.08 / float(figure.get_size_inches()[1]))
-    figure.legend(
-        handles=handles, loc="upper right", bbox_to_anchor=corner, ncols=2, fontsize=style.SMALL_PT, frameon=False,
-        labelcolor=style.INK,
-    )  # fmt: skip
+    looks: dict[str, Any] = {"fontsize": style.SMALL_PT, "frameon": False, "labelcolor": style.INK}
+    figure.legend(handles=handles, loc="upper right", bbox_to_anchor=style.upper_right(figure), ncols=2, **looks)
 
 
 def _key(colour: str, **looks: object) -> Line2D:
@@ -168,7 +161,7 @@ def _draw_planes(axes: Axes, drawn: Drawn) -> None:
     style.label_axes(axes, "compression (µm)", "its rate (mm/s)", "phase plane of the teeth")
     for examined, colour in drawn:
         if examined.portrait is None:
-            series.write(axes, 0.5, 0.5, "the middle of the play is not known")
+            style.write(axes, 0.5, 0.5, "the middle of the play is not known")
             return
         _draw_path(axes, examined.portrait.points * (MICRO, MILLI), colour)
     plays = [f"{examined.backlash.backlash_um:.4g}" for examined, _ in drawn if examined.backlash is not None]
@@ -180,7 +173,7 @@ def _draw_loops(axes: Axes, drawn: Drawn) -> None:
     style.label_axes(axes, "twist at the driver (mrad)", "torque (N·m)", "torque over twist")
     for examined, colour in drawn:
         if examined.loop is None:
-            series.write(axes, 0.5, 0.5, "no torque was measured")
+            style.write(axes, 0.5, 0.5, "no torque was measured")
             return
         _draw_path(axes, np.stack([examined.loop.twist_rad * MILLI, examined.loop.torque_nm], axis=1), colour)
 
@@ -215,7 +208,7 @@ def motion_profile_figure(examined: motions.StartStop, *, title: str = "") -> Fi
         style.label_axes(axes, "time (s)" if axes is every[-1] else "", label)
         style.no_offset(axes)
         for phase in phases:
-            series.shade(axes, (phase.start_s, phase.end_s), PHASES[phase.name], alpha)
+            style.shade(axes, (phase.start_s, phase.end_s), PHASES[phase.name], alpha)
     every[0].set_xlim(0.0, float(motion.time_s[-1]))
     if examined.portrait is not None and examined.backlash is not None:
         play_um = examined.backlash.backlash_um
@@ -224,7 +217,7 @@ def motion_profile_figure(examined: motions.StartStop, *, title: str = "") -> Fi
         style.note(every[-1], f"dashed: where the flanks touch, {play_um:.4g} µm apart")
     present = {phase.name for phase in phases}
     keys = [_key(colour, alpha=2 * alpha, linewidth=7.0, label=n) for n, colour in PHASES.items() if n in present]
-    series.head(figure, title or motion.source or "start–stop motion", keys)
+    style.head(figure, title or motion.source or "start–stop motion", keys)
     return figure
 
 
@@ -283,7 +276,7 @@ def impacts_figure(
     if restitution is not None:
         bounce.axhline(restitution, color=style.FLOOR, linewidth=0.9, linestyle="--")
         style.note(bounce, f"dashed: the rig's, {restitution:g}")
-    series.head(figure, title or f"{len(impacts)} impacts of the flanks", lines)
+    style.head(figure, title or f"{len(impacts)} impacts of the flanks", lines)
     return figure
 
 
@@ -330,11 +323,9 @@ def force_figure(estimate: motions.ForceEstimate, reference: str = "", *, title:
             style.no_offset(panel)
         style.label_axes(upper, "", "" if column else "force (kN)", "around the lowest force" if column else "")
         style.label_axes(lower, "time (s)", "" if column else "error (kN)")
-    series.head(figure, title or estimate.motion.source or "force between the teeth", lines)
+    style.head(figure, title or estimate.motion.source or "force between the teeth", lines)
     rms = ", ".join(f"{m}: {100.0 * estimate.error(m, name).relative_rms:.3g} % rms" for m in models)
-    style.put_text(
-        figure, 1.0 - 0.2 / style.WIDTH_IN, 1.0 - 0.08 / figure.get_size_inches()[1], rms, ha="right", va="top"
-    )
+    style.put_text(figure, *style.upper_right(figure), rms, ha="right", va="top")
     return figure
 
 
@@ -354,5 +345,5 @@ def noise_figure(study: motions.NoiseStudy, *, title: str = "") -> Figure:
         axes.axvline(study.crossover_um, color=style.FLOOR, linewidth=0.9)
         style.note(axes, f"grey line: no longer nearer from {study.crossover_um:.3g} µm on")
     style.label_axes(axes, "noise added to the compression (µm rms)", f"rms error against {study.reference} (kN)")
-    series.head(figure, title or "error over noise", lines)
+    style.head(figure, title or "error over noise", lines)
     return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -483,12 +483,26 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
 
 
 def _channel_group(analysis: Analysis, channel: ChannelAnalysis, *, detailed: bool) -> PictureGroup:
-    makers: list[Callable[[Analysis, ChannelAnalysis], Iterator[Picture]]] = [_spectrum]
+    wide, small = [_spectrum(analysis, channel)], []
     if detailed:
-        makers += [_mesh, _envelope, _order_levels, _map, _frequency]
-    wide = tuple(picture for maker in makers for picture in maker(analysis, channel))
-    small = tuple(_rings(analysis, channel)) if detailed else ()
-    return PictureGroup(f"Channel {channel.channel}", wide, small, is_folded=not detailed)
+        wide += _detailed_pictures(analysis, channel)
+        shafts = dict.fromkeys(shaft for shaft, _ in channel.averages)
+        small = [ring_picture(analysis, VerdictPicture("tooth", channel, shaft)) for shaft in shafts]
+    return PictureGroup(f"Channel {channel.channel}", tuple(wide), tuple(small), is_folded=not detailed)
+
+
+def _detailed_pictures(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
+    """Yield the surroundings of each mesh, envelope, levels over speed, map, and the spectrum over frequency."""
+    if channel.order_spectrum is not None:
+        yield from _meshes(analysis, channel, channel.order_spectrum)
+    if channel.envelope_spectrum is not None:
+        yield envelope_picture(analysis, channel, channel.envelope_spectrum)
+    if channel.order_levels:
+        yield _order_levels(analysis, channel)
+    if channel.order_map is not None:
+        yield _map(analysis, channel, channel.order_map)
+    if channel.order_spectrum is not None:  # else it is shown already
+        yield _frequency_picture(analysis, channel)
 
 
 def spectrum_svg(
@@ -515,16 +529,15 @@ def spectrum_svg(
     return plot.svg_panel(panel, marked=points, height=height)
 
 
-def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    """The order spectrum where the speed is known, else the spectrum over frequency."""
+def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
+    """Return the order spectrum where the speed is known, else the spectrum over frequency."""
     spectrum = channel.order_spectrum
     if spectrum is None:
-        yield _frequency_picture(analysis, channel)
-        return
+        return _frequency_picture(analysis, channel)
     highest = highest_order_of_interest(analysis, spectrum)
     cursors = line_cursors(analysis, spectrum, n_sidebands=0)
     marked = marked_positions(analysis, spectrum, channel.channel)
-    yield Picture.of_svg(
+    return Picture.of_svg(
         spectrum_svg(spectrum, cursors, (0.0, highest), marked),
         "Look whether the mesh harmonics stand alone or carry sidebands, and whether a tall line lies off every mark."
         if any(cursor.kind == "mesh" for cursor in cursors)
@@ -533,11 +546,7 @@ def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]
     )
 
 
-def _mesh(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    """The surroundings of each mesh."""
-    spectrum = channel.order_spectrum
-    if spectrum is None:
-        return
+def _meshes(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spectrum) -> Iterator[Picture]:
     for pair, low, high in mesh_windows(analysis, spectrum):
         cursors = line_cursors(analysis, spectrum, n_sidebands=4)
         marked = marked_positions(analysis, spectrum, channel.channel)
@@ -546,11 +555,6 @@ def _mesh(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
             "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear.",
             f"Order spectrum of {channel.channel} from order {low:.4g} to {high:.4g}, around the mesh of {pair}.",
         )
-
-
-def _frequency(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    if channel.order_spectrum is not None:  # else it is shown already
-        yield _frequency_picture(analysis, channel)
 
 
 def _frequency_picture(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
@@ -566,11 +570,6 @@ def _frequency_picture(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
         f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}",
         f"Amplitude spectrum of {channel.channel} over frequency.",
     )
-
-
-def _envelope(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    if channel.envelope_spectrum is not None:
-        yield envelope_picture(analysis, channel, channel.envelope_spectrum)
 
 
 def envelope_picture(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spectrum) -> Picture:
@@ -606,17 +605,14 @@ def level_panel(analysis: Analysis, channel: ChannelAnalysis) -> tuple[LinePanel
     return panel, [(rpm, float(np.interp(rpm, x.speed_rpm, x.amplitude))) for rpm, x in at if low <= rpm <= high]
 
 
-def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    levels = channel.order_levels
-    if not levels:
-        return
-    largest = []
+def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
+    levels, largest = channel.order_levels, []
     for level in levels:
         amplitude, rpm, hertz = level.largest
         unit = f" {unit_text(level.unit)}" if level.unit else ""
         largest.append(f"{level.name} {readable(amplitude, 3)}{unit} at {rpm:.0f} rpm ({hertz:.4g} Hz)")
     panel, marked = level_panel(analysis, channel)
-    yield Picture.of_svg(
+    return Picture.of_svg(
         plot.svg_panel(panel, marked=marked),
         "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance. "
         f"Largest: {'; '.join(largest)}.",
@@ -624,10 +620,7 @@ def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Pict
     )
 
 
-def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    order_map = channel.order_map
-    if order_map is None:
-        return
+def _map(analysis: Analysis, channel: ChannelAnalysis, order_map: OrderMap) -> Picture:
     highest = highest_order_of_interest(analysis, order_map) if order_map.axis == "order" else np.inf
     kept = order_map.positions <= highest
     panel = plot.LevelPanel(
@@ -639,16 +632,11 @@ def _map(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
         plot.decibel_text(order_map.unit),
         cursors=[c for c in line_cursors(analysis, order_map, n_sidebands=0) if c.position <= highest],
     )
-    yield Picture.of_svg(
+    return Picture.of_svg(
         plot.svg_panel(panel),
         "Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.",
         f"Levels of {channel.channel} over {order_map.axis} and time.",
     )
-
-
-def _rings(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    for shaft in dict.fromkeys(shaft for shaft, _ in channel.averages):
-        yield ring_picture(analysis, VerdictPicture("tooth", channel, shaft))
 
 
 def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
@@ -677,8 +665,7 @@ def picture_of_verdict(analysis: Analysis) -> Picture | None:
     spectrum = shown.channel.envelope_spectrum
     if shown.about == "bearing" and spectrum is not None:
         return envelope_picture(analysis, shown.channel, spectrum)
-    makers = _order_levels if shown.about == "resonance" else _spectrum
-    return next(makers(analysis, shown.channel), None)
+    return (_order_levels if shown.about == "resonance" else _spectrum)(analysis, shown.channel)
 
 
 def teeth_of_shaft(analysis: Analysis, shaft: str) -> int | None:
