@@ -110,9 +110,7 @@ def crack(
 
 
 def demo(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the pages.")] = Path(
-        "demo-report"
-    ),
+    output: Annotated[Path, options.output_option("Folder for the pages.")] = Path("demo-report"),
 ) -> None:
     """Diagnose the sample recordings, write their report, and say where to look."""
     from app.cli.report import make_report

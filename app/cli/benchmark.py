@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli.console import progress_bar, stopped, typed_command
+from app.cli.options import output_option
 from gearsig.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ benchmark_app = typer.Typer(
 
 @benchmark_app.command("gap")
 def gap(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the report.")],
+    output: Annotated[Path, output_option("Folder for the report.")],
     cases: Annotated[int, typer.Option("--cases", min=1, max=100_000, help="Blind cases.")] = 200,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Decides the cases.")] = 1,
     role: Annotated[
@@ -97,9 +98,7 @@ def gap(
 
 @benchmark_app.command("speed")
 def speed(
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for speed.md and speed.csv as well.")
-    ] = None,
+    output: Annotated[Path | None, output_option("Folder for speed.md and speed.csv as well.")] = None,
     only: Annotated[
         list[str] | None, typer.Option("--only", metavar="WORD", help="Methods with this in their name; repeatable.")
     ] = None,
@@ -176,7 +175,7 @@ def _paper_names(incomplete: str) -> list[str]:
 
 def papers(
     name: Annotated[str, typer.Argument(help="cracked, reduced-fe or forging.", autocompletion=_paper_names)],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for page and figures.")],
+    output: Annotated[Path, output_option("Folder for page and figures.")],
 ) -> None:
     """Draw the figures of a publication that the model can answer, and judge each statement of its text by numbers.
 

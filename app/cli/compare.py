@@ -34,9 +34,7 @@ def compare(
     simulation: Annotated[Path, typer.Argument(help="Simulated signals: any file that gearsig reads.")],
     recording: Annotated[Path, typer.Argument(help="The recording to compare with.")],
     rig: options.RigOption = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {PAGE}, {DATA} and {TABLE}.")
-    ] = None,
+    output: Annotated[Path | None, options.output_option(f"Folder for {PAGE}, {DATA} and {TABLE}.")] = None,
     channel: Annotated[
         list[str] | None,
         typer.Option(

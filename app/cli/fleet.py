@@ -232,7 +232,7 @@ def trend(
 
 @fleet_app.command()
 def export(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help=".csv, .parquet or .jsonl.")],
+    output: Annotated[Path, options.output_option(".csv, .parquet or .jsonl.", "FILE")],
     table: Annotated[
         str, typer.Option("--table", help="indicators, recordings, trends (limits and alarms) or status.")
     ] = "indicators",
@@ -253,7 +253,7 @@ def export(
 
 @fleet_app.command()
 def report(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The page, e.g. fleet.html.")],
+    output: Annotated[Path, options.output_option("The page, e.g. fleet.html.", "FILE")],
     store: StoreOption = DEFAULT_STORE,
     since: Annotated[
         datetime | None, typer.Option("--since", help="UTC. Default: since the last report of this fleet.")

@@ -25,7 +25,7 @@ MODEL = "reduced-fe"
 
 
 def flexible(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures and tables.")],
+    output: Annotated[Path, options.output_option("Folder for figures and tables.")],
     preset: options.PresetOption = "",
     settings: options.SetOption = None,
     effects: options.EffectOption = None,
@@ -93,7 +93,7 @@ SPRINGS = {"radial": "2e8N/m", "axial": "1e8N/m", "tilt": "1e5Nm/rad", "twist": 
 
 
 def gear_body(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures and files.")],
+    output: Annotated[Path, options.output_option("Folder for figures and files.")],
     teeth: Annotated[int, typer.Option("--teeth")] = 50,
     module: Annotated[str, typer.Option("--module", metavar="LENGTH")] = "3mm",
     pressure_angle: Annotated[float, typer.Option("--pressure-angle", help="Degrees.")] = 20.0,
@@ -188,7 +188,7 @@ CRACKED = "cracked"
 
 
 def growth(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figure, CSV and JSON.")],
+    output: Annotated[Path, options.output_option("Folder for figure, CSV and JSON.")],
     depth: Annotated[str, typer.Option("--depth", metavar="LENGTH", help="Present depth: 1mm, or 1..1.6mm.")],
     preset: options.PresetOption = "",
     settings: options.SetOption = None,

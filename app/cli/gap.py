@@ -18,6 +18,7 @@ from app.cli.options import (
     SpeedOption,
     clear_other_versions,
     open_cluster,
+    output_option,
 )
 from gearsig.errors import InputError
 
@@ -84,9 +85,7 @@ def gap(
         ),
     ] = None,
     list_effects: Annotated[bool, typer.Option("--list-effects", help="Show the effects that are looked for.")] = False,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder for gap.html, gap.json and twin.toml.")
-    ] = None,
+    output: Annotated[Path | None, output_option("Folder for gap.html, gap.json and twin.toml.")] = None,
     cluster: ClusterOption = "",
 ) -> None:
     """Say where recordings differ from the simulation of their rig, which effect causes it, how far it shrinks then.

@@ -32,9 +32,7 @@ def start_stop(
     unwrap: options.UnwrapOption = False,
     fs: options.SamplingRateOption = None,
     json: options.JsonOption = False,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {DATA} and {PICTURE}.")
-    ] = None,
+    output: Annotated[Path | None, options.output_option(f"Folder for {DATA} and {PICTURE}.")] = None,
 ) -> None:
     """Find starts and stops, the backlash, every impact of the flanks, and the loop of torque over twist.
 
@@ -104,10 +102,7 @@ def force(
     ] = False,
     fs: options.SamplingRateOption = None,
     json: options.JsonOption = False,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help=f"Folder for {FORCE_DATA}, {TABLE}, {FORCE_PICTURE}."),
-    ] = None,
+    output: Annotated[Path | None, options.output_option(f"Folder for {FORCE_DATA}, {TABLE}, {FORCE_PICTURE}.")] = None,
 ) -> None:
     """Estimate the force between the teeth by the piecewise model, by Hunt–Crossley and by Kelvin–Voigt.
 
@@ -196,8 +191,7 @@ def identify(
     fs: options.SamplingRateOption = None,
     json: options.JsonOption = False,
     output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Rig file (.toml) to write, with all that was identified."),
+        Path | None, options.output_option("Rig file (.toml) to write, with all that was identified.", "FILE")
     ] = None,
 ) -> None:
     """Fit the contact of the teeth and the load to a recording, with 95 % intervals and what it cannot tell.

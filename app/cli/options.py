@@ -32,6 +32,11 @@ RigOption = Annotated[
 ]
 
 
+def output_option(about: str, metavar: str = "DIR") -> Any:
+    """Return the option for the folder or file that a command writes."""
+    return typer.Option("--output", "-o", metavar=metavar, help=about)
+
+
 def rate_option(name: str, about: str) -> Any:
     """Return an option for a sampling rate, in Hz or with its unit."""
 

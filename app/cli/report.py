@@ -20,7 +20,7 @@ def report(
     files: Annotated[
         list[Path], typer.Argument(help="Recordings, or folders with their sub-folders, or 'FOLDER/*.csv'.")
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the pages.")],
+    output: Annotated[Path, options.output_option("Folder for the pages.")],
     rig: options.RigOption = None,
     fs: options.SamplingRateOption = None,
     speed_rpm: options.SpeedOption = None,

@@ -41,10 +41,7 @@ def _common(
         ),
     ] = 2.0,
     json: options.JsonOption = False,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help="Folder for METHOD.png, .svg, .csv, .h5 and .json."),
-    ] = None,
+    output: Annotated[Path | None, options.output_option("Folder for METHOD.png, .svg, .csv, .h5 and .json.")] = None,
 ) -> None:
     """Hold what every method takes."""
 

@@ -35,10 +35,7 @@ def simulate(
     fs: options.RateOption = "",
     seed: options.SeedOption = 0,
     fresh: options.FreshOption = False,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Recording: .csv .h5 .parquet .wav or .mat."),
-    ] = None,
+    output: Annotated[Path | None, options.output_option("Recording: .csv .h5 .parquet .wav or .mat.", "FILE")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
     listing: Annotated[
         bool, typer.Option("--list", help="Show models, presets, parameters with units and ranges, effects.")

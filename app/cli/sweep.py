@@ -37,7 +37,7 @@ def sweep(
             "torque=20,50,110Nm; repeatable. NAME is speed, torque, a parameter or an effect.",
         ),
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the recordings.")],
+    output: Annotated[Path, options.output_option("Folder for the recordings.")],
     preset: options.PresetOption = "",
     settings: options.SetOption = None,
     effects: options.EffectOption = None,
@@ -97,9 +97,7 @@ def bifurcation(
             "root_crack=0..4mm:20. NAME is speed, torque, a parameter or an effect.",
         ),
     ],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figure, table and summary.")
-    ],
+    output: Annotated[Path, options.output_option("Folder for figure, table and summary.")],
     preset: options.PresetOption = "",
     settings: options.SetOption = None,
     effects: options.EffectOption = None,

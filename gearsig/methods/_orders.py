@@ -11,7 +11,7 @@ from gearsig import plot
 from gearsig.diagnosis import RecordBlocks
 from gearsig.errors import GearsigError
 from gearsig.formatting import counted, power_of_ten, readable, unit_text
-from gearsig.methods._spectra import cursors_of, highest_order
+from gearsig.methods._spectra import cursors_of
 from gearsig.methods._table import (
     HIGHEST,
     SHAFT,
@@ -39,6 +39,9 @@ RESIDUAL = "residual without all chosen orders"
 def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, highest: float | None) -> MethodAnswer:
     over = "order" if levels.axis == "order" else "frequency"
     caption = f"{over} map: spectra of consecutive blocks"
+    cursors = cursors_of(prepared, levels)
+    if highest is None and over == "order":
+        highest = plot.highest_of_interest(levels, cursors)
     kept = levels.positions <= (np.inf if highest is None else highest)
     values, positions = levels.values[:, kept], levels.positions[kept]
     table = {"time (s)": levels.time_s, "speed (rpm)": levels.speed_rpm}
@@ -50,13 +53,13 @@ def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, hig
         levels.axis_label,
         "time (s)",
         decibel_text(levels.unit),
-        cursors=[c for c in cursors_of(prepared, levels) if c.kind != "sideband"],
+        cursors=[c for c in cursors if c.kind != "sideband"],
     )
     numbers = {"resolution": levels.resolution, "scaling": levels.scaling, "unit": levels.unit, "shaft": levels.shaft}
     return MethodAnswer(
         channel,
         caption,
-        lambda: plot.order_map_figure(levels, cursors_of(prepared, levels), highest=highest),
+        lambda: plot.order_map_figure(levels, cursors, highest=highest),
         table | lines,
         matrices={"levels": values},
         axes={**table, over: positions},
@@ -68,7 +71,7 @@ def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, hig
 def _order_map(prepared: PreparedRecording, channel: str, shaft: str, highest: float | None) -> MethodAnswer:
     signal = prepared.over_angle(shaft, [channel])
     levels = order_map(signal, channel, revolutions_per_block=max(1, min(10, int(signal.n_revolutions) // 8)))
-    return _map_answer(prepared, channel, levels, highest_order(prepared, levels) if highest is None else highest)
+    return _map_answer(prepared, channel, levels, highest)
 
 
 def _frequency_map(prepared: PreparedRecording, channel: str, highest: float | None) -> MethodAnswer:
@@ -89,7 +92,7 @@ def _order_map_in_blocks(
     blocks: RecordBlocks, prepared: PreparedRecording, channel: str, shaft: str, highest: float | None
 ) -> MethodAnswer:
     levels = blocks.order_map(channel, prepared.angle_of(shaft))
-    return _map_answer(prepared, channel, levels, highest_order(prepared, levels) if highest is None else highest)
+    return _map_answer(prepared, channel, levels, highest)
 
 
 def _frequency_map_in_blocks(

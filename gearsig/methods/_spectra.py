@@ -78,12 +78,6 @@ LONGEST_ECHO_S = 0.005
 """Below this quefrency a cepstrum shows the path and the floor's shape, a hundred times as large as any family."""
 
 
-def highest_order(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> float:
-    """Return an order past the third harmonic of the fastest mesh; 50 orders where none is known."""
-    meshes = [cursor.position for cursor in cursors_of(prepared, shown) if cursor.kind == "mesh"]
-    return min(float(shown.positions[-1]), 1.12 * max(meshes) if meshes else 50.0)
-
-
 def columns_of(spectrum: Spectrum) -> dict[str, Any]:
     """Return a spectrum as a table."""
     return {spectrum.axis_label: spectrum.positions, with_unit(spectrum.scaling, spectrum.unit): spectrum.values}
@@ -117,23 +111,15 @@ def _spectrum_answer(
     caption: str,
     lowest: float | None,
     highest: float | None,
-) -> MethodAnswer:
-    cursors = periods_of(prepared) if spectrum.axis == "quefrency" else cursors_of(prepared, spectrum)
-    return _marked_spectrum(channel, spectrum, caption, cursors, lowest, highest)
-
-
-def _marked_spectrum(
-    channel: str,
-    spectrum: Spectrum,
-    caption: str,
-    cursors: tuple[Cursor, ...],
-    lowest: float | None,
-    highest: float | None,
+    *,
+    of_envelope: bool = False,
 ) -> MethodAnswer:
     low = lowest or 0.0
     high = float(spectrum.positions[-1]) if highest is None else highest
     limits = (low, min(high, float(spectrum.positions[-1])))
     is_quefrency = spectrum.axis == "quefrency"
+    cursors = periods_of(prepared) if is_quefrency else cursors_of(prepared, spectrum)
+    cursors = modulation_cursors(cursors) if of_envelope else cursors
     inside = (spectrum.positions >= low) & (spectrum.positions <= high)
     numbers = {"resolution": spectrum.resolution, "scaling": spectrum.scaling, "unit": spectrum.unit}
     part = {name: column[inside] for name, column in columns_of(spectrum).items()}
@@ -176,7 +162,7 @@ def _order_spectrum(
     prepared: PreparedRecording, channel: str, shaft: str, lowest: float | None, highest: float | None
 ) -> MethodAnswer:
     spectrum = order_spectrum(prepared.over_angle(shaft, [channel]), channel)
-    top = highest_order(prepared, spectrum) if highest is None else highest
+    top = plot.highest_of_interest(spectrum, cursors_of(prepared, spectrum)) if highest is None else highest
     return _spectrum_answer(prepared, channel, spectrum, "order spectrum", lowest, top)
 
 
@@ -238,7 +224,7 @@ def _envelope(
     low, high = banded.envelope.band_hz
     text = f"spectrum of the envelope of {readable(low)} to {readable(high)} Hz"
     top = min(float(banded.spectrum.positions[-1]), (high - low) / 2, usual_hz) if highest is None else highest
-    answer = _marked_spectrum(channel, banded.spectrum, text, modulations_of(prepared, banded.spectrum), lowest, top)
+    answer = _spectrum_answer(prepared, channel, banded.spectrum, text, lowest, top, of_envelope=True)
     numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}
     facts = (*answer.facts, *([f"Band: {banded.reason}"] if banded.reason else []))
     return replace(answer, numbers={**answer.numbers, **numbers}, facts=facts, warnings=banded.warnings)
@@ -261,7 +247,7 @@ def _envelope_in_blocks(
     spectrum = blocks.envelope_density(channel, band_hz)
     text = f"power density of the squared envelope of {readable(band_hz[0])} to {readable(band_hz[1])} Hz"
     top = highest if highest is not None else min(float(spectrum.positions[-1]), (band_hz[1] - band_hz[0]) / 2)
-    answer = _marked_spectrum(channel, spectrum, text, modulations_of(prepared, spectrum), lowest, top)
+    answer = _spectrum_answer(prepared, channel, spectrum, text, lowest, top, of_envelope=True)
     return replace(answer, numbers={**answer.numbers, "band_hz": list(band_hz)})
 
 
@@ -625,9 +611,8 @@ def _average_in_blocks(blocks: RecordBlocks, prepared: PreparedRecording, channe
 
 
 def _average_answer(prepared: PreparedRecording, channel: str, average: SynchronousAverage) -> MethodAnswer:
-    rig, shaft = prepared.rig, average.shaft
-    sides = [side for p in rig.pairs for side in ((p.driver, p.driver_teeth), (p.driven, p.driven_teeth))]
-    teeth = next((n for name, n in sides if name == shaft), None)
+    shaft = average.shaft
+    teeth = next((pair.teeth(shaft) for pair in prepared.rig.pairs_on(shaft)), None)
     table = {
         "angle (°)": 360.0 * np.arange(len(average.values)) / len(average.values),
         with_unit("average", average.unit): average.values,

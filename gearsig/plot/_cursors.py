@@ -123,6 +123,21 @@ def rig_cursors(
     return order_cursors(order_lines(rig, base, n_sidebands=n_sidebands), scale)
 
 
+WITHOUT_MESH = 50.0  # highest order shown where no mesh is known
+
+
+def highest_of_interest(shown: Spectrum | OrderMap, cursors: Iterable[Cursor]) -> float:
+    """Return where a spectrum or map may end: past the third harmonic of the fastest mesh among its cursors.
+
+    Where there is none, one over orders may end at 50, one over frequency at its own end.
+    """
+    end = float(shown.positions[-1])
+    meshes = [cursor.position for cursor in cursors if cursor.kind == "mesh"]
+    without_mesh = WITHOUT_MESH if shown.axis == "order" else end
+    highest = 1.12 * max(meshes) if meshes else without_mesh
+    return min(end, highest) if shown.resolution < highest else end
+
+
 def modulation_cursors(cursors: Iterable[Cursor]) -> tuple[Cursor, ...]:
     """Return what an envelope may show: shaft lines, and three harmonics of each bearing line."""
     result: list[Cursor] = []

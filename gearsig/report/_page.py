@@ -41,7 +41,6 @@ from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 CLAIMED = (Kind.FAULT, Kind.SUSPICION, Kind.DATA_PROBLEM)
 """Kinds of findings that are read first; the others are a click away."""
-WITHOUT_MESH = 50.0  # highest order shown where no mesh is known
 
 
 def speed_is_constant(analysis: Analysis) -> bool:
@@ -77,11 +76,7 @@ def highest_order_of_interest(analysis: Analysis, spectrum: Spectrum | OrderMap)
 
     Where none is known, an order spectrum may end at 50, one over frequency at its own end.
     """
-    end = float(spectrum.positions[-1])
-    meshes = [cursor.position for cursor in line_cursors(analysis, spectrum) if cursor.kind == "mesh"]
-    without_mesh = WITHOUT_MESH if spectrum.axis == "order" else end
-    highest = 1.12 * max(meshes) if meshes else without_mesh
-    return min(end, highest) if spectrum.resolution < highest else end
+    return plot.highest_of_interest(spectrum, line_cursors(analysis, spectrum))
 
 
 def mesh_windows(analysis: Analysis, spectrum: Spectrum) -> list[tuple[str, float, float]]:
