@@ -11,7 +11,15 @@ from gearsig.report._comparison import (
     orders_csv,
     shown_orders,
 )
-from gearsig.report._files import Section, benchmark_html, check_writable, page_names, recording_mark
+from gearsig.report._files import (
+    Section,
+    benchmark_html,
+    check_pdf,
+    check_writable,
+    page_names,
+    recording_mark,
+    write_pdf,
+)
 from gearsig.report._fleet import fleet_page_html, fleet_page_pdf, write_fleet_page
 from gearsig.report._gap_page import (
     CHECK_FIRST,
@@ -70,6 +78,7 @@ from gearsig.report._page import (
     line_cursors,
     marked_positions,
     page_html,
+    page_pdf,
     sidebands_of,
     speed_is_constant,
     start_stop_figures,
@@ -77,7 +86,6 @@ from gearsig.report._page import (
     verdict_picture,
     write_page,
 )
-from gearsig.report._pdf import check_pdf, page_pdf, write_pdf
 from gearsig.report._sections import (
     FindingCard,
     analysis_text,

@@ -1,20 +1,25 @@
-"""Names of report files, what is checked before they are written, and how they are rendered; a benchmark's page."""
+"""Report files: their names, what is checked before they are written, how HTML and PDF are made; pages of sections."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import secrets
+from base64 import b64decode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from gearsig import __version__
+from gearsig.cache import write_whole
 from gearsig.errors import InputError
-from gearsig.plot import Picture
+from gearsig.plot import Picture, font_folder
 from gearsig.recording import without_condition
 from gearsig.rig import recording_stem
 
@@ -135,6 +140,67 @@ def _environment() -> Environment:
 def date_text(date: datetime | None = None) -> str:
     """Return when a page was made, as pages say it; None: now."""
     return (date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip()
+
+
+# --------------------
+# PDF, set by typst: a program in a wheel, which loads nothing from the network.
+# --------------------
+
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
+
+
+def write_pdf(path: str | Path, content: bytes) -> Path:
+    """Write a PDF beside its place and move it there when it is complete.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    return write_whole(Path(path), lambda file: file.write(content))
+
+
+def check_pdf() -> None:
+    """Check, before long work, that PDFs can be made.
+
+    Raises
+    ------
+    InputError
+        If typst is not installed.
+    """
+    try:
+        import typst  # noqa: F401
+    except ImportError:
+        raise InputError("PDF needs the package typst", remedy="pip install 'gearsig[pdf]'") from None
+
+
+def compiled(template: str, data: Mapping[str, Any], pictures: Mapping[str, bytes]) -> bytes:
+    """Return the PDF that a template makes of data; fonts are matplotlib's, so that every machine sets it alike."""
+    check_pdf()
+    import typst
+
+    source = files("gearsig.report").joinpath("templates", template).read_bytes()
+    content = json.dumps(data, ensure_ascii=False, default=str).encode()
+    with TemporaryDirectory(prefix="gearsig-") as folder:
+        for name, part in {"main.typ": source, "data.json": content, **pictures}.items():
+            (Path(folder) / name).write_bytes(part)
+        main, fonts = Path(folder) / "main.typ", [font_folder()]
+        made = typst.compile(main, root=Path(folder), font_paths=fonts, ignore_system_fonts=True)
+    return bytes(made)
+
+
+def put_picture(picture: Picture, pictures: dict[str, bytes]) -> dict[str, object]:
+    """Add a picture to the files, and return what the template says of it."""
+    if picture.svg:
+        name = f"picture{len(pictures)}.svg"
+        pictures[name] = picture.svg.replace("<svg", SVG, 1).replace("system-ui, ", "").encode()
+    else:
+        kind, _, content = picture.uri.partition(";base64,")
+        name = f"picture{len(pictures)}.{'svg' if 'svg' in kind else 'png'}"
+        pictures[name] = b64decode(content)
+    square = picture.width_px == picture.height_px
+    return {"file": name, "caption": picture.caption, "alternative": picture.alternative, "square": square}
 
 
 # --------------------

@@ -14,8 +14,7 @@ from gearsig.errors import InputError
 from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, counts_text, fleet_changes, trends_text
 from gearsig.formatting import readable, unit_text
 from gearsig.plot import Picture, fleet_trend_picture
-from gearsig.report._files import date_text, render
-from gearsig.report._pdf import compiled, put_picture, write_pdf
+from gearsig.report._files import compiled, date_text, put_picture, render, write_pdf
 
 LEVEL_CLASSES = {"alarm": "fault", "warning": "suspicion", "unknown": "cannot-tell", "ok": "no-fault"}
 MAX_ROWS, MAX_POINTS, MAX_PICTURES = 60, 200, 8

@@ -20,8 +20,7 @@ from gearsig.fleet import date_in_name
 from gearsig.formatting import csv_rows, percent, readable, spreadsheet_cell, unit_text
 from gearsig.indicators import Indicator
 from gearsig.plot import with_unit
-from gearsig.report._files import date_text, render
-from gearsig.report._pdf import compiled, write_pdf
+from gearsig.report._files import compiled, date_text, render, write_pdf
 from gearsig.report._sections import css_class, headline_of
 from gearsig.severity import CrackEstimate
 
