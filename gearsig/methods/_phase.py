@@ -113,14 +113,13 @@ def _phase_plane(
             raise
     caption = "velocity over displacement" + (", a point once per cycle" if section is not None else "")
     numbers: dict[str, Any] = {"band_hz": list(portrait.band_hz)}
-    names = [with_unit(n, u) for n, u in zip(portrait.axis_names, portrait.units, strict=True)]
     table: dict[str, Any] = {"time (s)": portrait.start_s + np.arange(len(portrait.points)) / portrait.sampling_rate_hz}
-    table |= {name: portrait.points[:, i] for i, name in enumerate(names)}
+    table |= _columns(portrait)
     if section is not None:
         numbers["scatter"] = [float(v) for v in section.points.std(axis=0) / section.extent]
         numbers["section"], numbers["points"] = section.section, len(section.points)
         if section_only:
-            table = {"time (s)": section.times_s, names[0]: section.points[:, 0], names[1]: section.points[:, 1]}
+            table = {"time (s)": section.times_s, **_columns(replace(portrait, points=section.points))}
     angle, n_drawn = angle_or_none(prepared), N_DRAWN
     if angle is not None:
         per_turn = 60.0 * portrait.sampling_rate_hz / max(angle.mean_speed_rpm, 1e-9)

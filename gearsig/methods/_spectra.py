@@ -135,17 +135,15 @@ def _spectrum_answer(
     )
 
 
-def _spectrum(prepared: PreparedRecording, channel: str, **lines: float | None) -> MethodAnswer:
+def _spectrum(prepared: PreparedRecording, channel: str, **lines: Any) -> MethodAnswer:
     return _spectrum_answer(prepared, channel, prepared.spectrum(channel), "amplitude spectrum", **lines)
 
 
-def _density(prepared: PreparedRecording, channel: str, **lines: float | None) -> MethodAnswer:
+def _density(prepared: PreparedRecording, channel: str, **lines: Any) -> MethodAnswer:
     return _spectrum_answer(prepared, channel, prepared.power_density(channel), "power spectral density", **lines)
 
 
-def _density_in_blocks(
-    blocks: RecordBlocks, prepared: PreparedRecording, channel: str, **lines: float | None
-) -> MethodAnswer:
+def _density_in_blocks(blocks: RecordBlocks, prepared: PreparedRecording, channel: str, **lines: Any) -> MethodAnswer:
     return _spectrum_answer(prepared, channel, blocks.power_density(channel), "power spectral density", **lines)
 
 

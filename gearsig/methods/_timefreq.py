@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
@@ -214,14 +215,10 @@ def _ridges(
     ]
     if len(ridges) < n_ridges:
         notes.insert(0, f"The map shows only {len(ridges)} of {n_ridges} ridges.")
-    return MethodAnswer(
-        channel,
-        f"{len(ridges)} ridges: {answer.caption}",
-        answer.draw,
-        table,
-        matrices=answer.matrices,
-        axes=answer.axes,
-        numbers=answer.numbers,
+    return replace(
+        answer,
+        caption=f"{len(ridges)} ridges: {answer.caption}",
+        table=table,
         panels=(*answer.panels, *profiles),
         notes=notes,
         waveforms=waveforms_of(prepared, channel, signal, columns, step, residual=RESIDUAL),
@@ -274,14 +271,10 @@ def _packets(
     label = "frequency of the nodes (Hz)" if unit == "Hz" else "order of the nodes"
     panel = LinePanel([steps], label, "share of the energy (%)", (0.0, 1.06 * shares.max()))
     rms = f"{np.sqrt(packets.energies.sum() / packets.n_samples):.4g} {unit_text(packets.unit)}".strip()
-    return MethodAnswer(
-        channel,
-        f"wavelet packets: {answer.caption}",
-        answer.draw,
-        table,
-        matrices=answer.matrices,
-        axes=answer.axes,
-        numbers=answer.numbers,
+    return replace(
+        answer,
+        caption=f"wavelet packets: {answer.caption}",
+        table=table,
         panels=(panel, *answer.panels),
         facts=(
             (
