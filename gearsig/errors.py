@@ -107,7 +107,7 @@ def _with_options(text: str, names: Mapping[str, str]) -> str:
     return re.sub(r"--[a-z-]*[a-z]", lambda found: names.get(found[0], found[0]), text)
 
 
-def unexpected_text(error: Exception) -> str:
+def unexpected_text(error: BaseException) -> str:
     """Say in one line that a program error stopped the work on one of many files."""
     return f"unexpected error, please report: {type(error).__name__}: {' '.join(str(error).split())}"
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from gearsig.cache import remove_parts, write_text
 from gearsig.checks import count, one_of, positive
-from gearsig.errors import GearsigError, InputError
+from gearsig.errors import GearsigError, InputError, unexpected_text
 from gearsig.formatting import csv_rows
 from gearsig.processes import killed_text, n_processors, run_jobs
 from gearsig.recording import WRITERS
@@ -335,8 +335,7 @@ def _run_one(job: SweepJob) -> SweepOutcome:
     except GearsigError as error:
         return SweepOutcome(point, None, str(error))
     except Exception as error:  # noqa: BLE001 - one point must not stop the others; the reason is passed on
-        text = f"{type(error).__name__}: {' '.join(str(error).split())}"
-        return SweepOutcome(point, None, f"unexpected error, please report: {text}")
+        return SweepOutcome(point, None, unexpected_text(error))
     return SweepOutcome(point, names.recording)
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from app.benchmark.diagnosers import VisibleCase, diagnoser, read_visible
 from gearsig.cache import write_text
-from gearsig.errors import GearsigError
+from gearsig.errors import GearsigError, unexpected_text
 from gearsig.gap import GapCause, GapPlace, GapReport, Shrinkage
 from gearsig.report import from_plain
 
@@ -95,8 +95,7 @@ def answered(name: str, case: VisibleCase) -> Answer:
     except GearsigError as error:
         answer = Answer("", error=str(error))
     except (Exception, SystemExit) as error:  # noqa: BLE001 - one case must not stop the others; the reason is passed on
-        text = f"unexpected error: {type(error).__name__}: {' '.join(str(error).split())}"
-        answer = Answer("", error=text)
+        answer = Answer("", error=unexpected_text(error))
     return replace(answer, seconds=time.perf_counter() - started, cpu_seconds=_cpu_s() - cpu)
 
 

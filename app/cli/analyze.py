@@ -129,16 +129,8 @@ def demo(
         "beside their healthy machine where there is one:"
     )
     healthy = {s.recording: s.reference for s in chosen if s.reference is not None}
-    make_report(
-        [s.recording for s in chosen],
-        output,
-        None,
-        None,
-        None,
-        None,
-        command=f"gearsig demo -o {output}",
-        reference=healthy,
-    )
+    recordings = [sample.recording for sample in chosen]
+    make_report(recordings, output, command=f"gearsig demo -o {output}", reference=healthy)
     typer.echo("Next: `gearsig rig example` for a rig file of your own, `gearsig dashboard` to explore.")
 
 

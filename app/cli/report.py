@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
 from app.cli import options
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED, EXIT_SOME_FAILED, progress_bar, typed_command
 from gearsig.errors import InputError
-
-if TYPE_CHECKING:
-    from gearsig.rig import SpeedSource
 
 
 def report(
@@ -58,14 +54,14 @@ def report(
         files,
         output,
         rig,
-        fs,
-        speed,
         jobs,
+        cluster,
         command=typed_command(),
+        sampling_rate_hz=fs,
+        speed=speed,
         reference=reference,
         reference_rate_hz=reference_fs,
         torque_nm=options.torque_of(torque),
-        cluster=cluster,
         memory_bytes=1e9 * memory,
         pdf=pdf,
         methods=[] if methods == ["none"] else methods,
@@ -75,23 +71,9 @@ def report(
 
 
 def make_report(
-    files: list[Path],
-    output: Path,
-    rig: Path | None,
-    fs: float | None,
-    speed: SpeedSource | None,
-    jobs: int | None,
-    command: str,
-    reference: Path | Mapping[Path, Path] | None = None,
-    reference_rate_hz: float | None = None,
-    torque_nm: float | None = None,
-    cluster: str = "",
-    *,
-    memory_bytes: float = 2e9,
-    pdf: bool = False,
-    methods: list[str] | None = None,
+    files: list[Path], output: Path, rig: Path | None = None, jobs: int | None = None, cluster: str = "", **how: Any
 ) -> int:
-    """Write the pages with their progress; return the exit code."""
+    """Write the pages with their progress, by what else `report_many` takes; return the exit code."""
     from gearsig.batch import report_many
 
     before, so_far = output.exists(), "0"
@@ -108,18 +90,10 @@ def make_report(
                     files,
                     output,
                     rig=options.open_rig(rig),
-                    sampling_rate_hz=fs,
-                    speed=speed,
                     n_processes=workers.n_workers if workers else jobs,
                     executor=workers.executor if workers else None,
                     on_progress=advance,
-                    command=command,
-                    reference=reference,
-                    reference_rate_hz=reference_rate_hz,
-                    torque_nm=torque_nm,
-                    memory_bytes=memory_bytes,
-                    pdf=pdf,
-                    methods=methods,
+                    **how,
                 )
         except KeyboardInterrupt:
             typer.echo(f"gearsig: stopped after {so_far} files; {_present_text(output, before)}", err=True)
