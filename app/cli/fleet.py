@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import datetime
@@ -99,7 +99,7 @@ def add(
             "recordings": [_origin_json(origin) for origin in listed],
             "passed_over": _passed_over_json(passed_over),
         }
-        typer.echo(json_text.dumps(answer, indent=1, ensure_ascii=False))
+        _print_json(answer)
     else:
         _show_origins(listed, len(listed) if dry_run else N_SHOWN, err=not dry_run)
     if passed_over:
@@ -127,8 +127,7 @@ def add(
                 reference_rate_hz=reference_fs,
                 torque_nm=options.torque_of(torque),
                 memory_bytes=1e9 * memory,
-                n_processes=workers.n_workers if workers else jobs,
-                executor=workers.executor if workers else None,
+                **options.on_workers(workers, jobs),
                 on_progress=advance,
             )
         except KeyboardInterrupt:
@@ -152,7 +151,7 @@ def status(
     if machine:
         table = table[table["machine"] == machine]
     if json:
-        typer.echo(table.to_json(orient="records", date_format="iso", indent=1, force_ascii=False))
+        _print_records(table)
         return
     shown = table if all_points else table.head(40)
     rows = [
@@ -167,7 +166,7 @@ def status(
         )
         for row in shown.to_dict("records")
     ]
-    _table(("", "machine", "point", "last", "recordings", "diagnosis", "trends"), rows, styles=_STYLES)
+    _table(("", "machine", "point", "last", "recordings", "diagnosis", "trends"), rows)
     more = f"; {len(table) - len(shown)} more with --all" if len(shown) < len(table) else ""
     typer.echo(f"{counts_text(table)}{more}")
 
@@ -201,12 +200,11 @@ def trend(
             raise InputError(f"--over {over} is of one indicator", remedy="name it after the machine")
         table = fleet.series(machine, point)
         if json:
-            typer.echo(table.to_json(orient="records", date_format="iso", indent=1, force_ascii=False))
+            _print_records(table)
             return
         _table(
             ("", "indicator", "of", "last", "expected", "limit", "change", "since", "limits"),
             [_series_row(row) for row in table.to_dict("records")],
-            styles=_STYLES,
         )
         return
     if over != "time":
@@ -214,7 +212,7 @@ def trend(
         return
     trends = fleet.trend(machine, indicator, point=point, channel=channel)
     if json:
-        typer.echo(json_text.dumps([_trend_json(t) for t in trends], indent=1, ensure_ascii=False))
+        _print_json([_trend_json(t) for t in trends])
         return
     for series in trends:
         typer.echo(f"{series!r}. {series.text}")
@@ -227,7 +225,7 @@ def trend(
             for row in series.table.to_dict("records")
         ]
         unit = f" ({unit_text(series.unit)})" if series.unit else ""
-        _table(("", "date", f"{series.name}{unit}", "expected", "limit", "alarm", "rpm", "N m"), rows, styles=_STYLES)
+        _table(("", "date", f"{series.name}{unit}", "expected", "limit", "alarm", "rpm", "N m"), rows)
 
 
 @fleet_app.command()
@@ -355,8 +353,7 @@ def watch(
                 interval_s=interval,
                 settle_s=settle,
                 once=once,
-                n_processes=workers.n_workers if workers else jobs,
-                executor=workers.executor if workers else None,
+                **options.on_workers(workers, jobs),
                 pattern=pattern,
                 machine=machine,
                 point=point,
@@ -388,8 +385,20 @@ def _say(text: str) -> None:
     typer.echo(f"gearsig: {text}", err=True)
 
 
+def _print_json(answer: object) -> None:
+    typer.echo(json_text.dumps(answer, indent=1, ensure_ascii=False))
+
+
+def _print_records(table: DataFrame) -> None:
+    typer.echo(table.to_json(orient="records", date_format="iso", indent=1, force_ascii=False))
+
+
 def _table(
-    headings: tuple[str, ...], rows: Sequence[tuple[str, ...]], *, styles: dict[str, str], err: bool = False
+    headings: tuple[str, ...],
+    rows: Sequence[tuple[str, ...]],
+    styles: Mapping[str, str] = _STYLES,
+    *,
+    err: bool = False,
 ) -> None:
     from rich.console import Console
     from rich.table import Table
@@ -436,7 +445,7 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
             "passed_over": _passed_over_json(result.passed_over),
             "ran": ran,
         }
-        typer.echo(json_text.dumps(summary, indent=1, ensure_ascii=False))
+        _print_json(summary)
         return
     for failure in result.failures:
         typer.echo(f"{failure.origin.path}: not analysed: {failure.verdict}", err=True)
@@ -479,7 +488,7 @@ def _show_over(trends: Sequence[OperatingTrend], *, json: bool) -> None:
     from gearsig.formatting import unit_text
 
     if json:
-        typer.echo(json_text.dumps([_over_json(shown) for shown in trends], indent=1, ensure_ascii=False))
+        _print_json([_over_json(shown) for shown in trends])
         return
     for shown in trends:
         typer.echo(f"{shown!r}. {shown.text}")
@@ -490,7 +499,7 @@ def _show_over(trends: Sequence[OperatingTrend], *, json: bool) -> None:
             (row["level"], *(_number(row[name]) for name in columns), f"{row['date']:%Y-%m-%d %H:%M}")
             for row in shown.table.to_dict("records")
         ]
-        _table(("", *(headings.get(name, str(name)) for name in columns), "date"), rows, styles=_STYLES)
+        _table(("", *(headings.get(name, str(name)) for name in columns), "date"), rows)
 
 
 def _over_json(shown: OperatingTrend) -> dict[str, Any]:

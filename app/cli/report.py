@@ -90,8 +90,7 @@ def make_report(
                     files,
                     output,
                     rig=options.open_rig(rig),
-                    n_processes=workers.n_workers if workers else jobs,
-                    executor=workers.executor if workers else None,
+                    **options.on_workers(workers, jobs),
                     on_progress=advance,
                     **how,
                 )
