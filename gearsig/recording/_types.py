@@ -105,6 +105,19 @@ def plain_name(name: str) -> str:
     return re.sub(r"[\s_\-]+", "", name.rpartition(".")[2].casefold())
 
 
+def stated_rate_hz(name: str, value: float) -> float | None:
+    """Return the sampling rate that a number of some name states: itself, or 1 over an interval above 0; None: none.
+
+    Examples
+    --------
+    >>> stated_rate_hz("fs", 1000.0), stated_rate_hz("dt", 0.001), stated_rate_hz("gain", 10.0)
+    (1000.0, 1000.0, None)
+    """
+    if plain_name(name) in RATE_NAMES:
+        return value
+    return 1.0 / value if plain_name(name) in INTERVAL_NAMES and value > 0 else None
+
+
 def split_unit(header: str) -> tuple[str, str]:
     """Split "acc [m/s^2]" or "acc (g)" into name and unit; round brackets only where they hold a known unit.
 

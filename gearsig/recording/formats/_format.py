@@ -55,6 +55,11 @@ class FileFormat:
     length: Callable[[Path], int] | None = None
 
 
+def begins(kind: str, *marks: bytes) -> Callable[[bytes], str]:
+    """Return the `sniff` of a format whose files begin with one of some marks."""
+    return lambda head: kind if head.startswith(marks) else ""
+
+
 # --------------------
 # What gearsig writes beside the samples, as one JSON text that every format can carry.
 # --------------------

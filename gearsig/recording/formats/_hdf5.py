@@ -12,8 +12,8 @@ import numpy as np
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_decoded
 from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
-from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, Recording, plain_name
-from gearsig.recording.formats._format import OWN_NAME, FileFormat, metadata_json, table_from_metadata
+from gearsig.recording._types import Recording, stated_rate_hz
+from gearsig.recording.formats._format import OWN_NAME, FileFormat, begins, metadata_json, table_from_metadata
 
 READER = "gearsig HDF5 reader"
 OWN_SAMPLES = "samples"
@@ -154,11 +154,8 @@ def _rates_of(attributes: Any, path: str) -> dict[str, float]:
     for name, value in ((name, attributes[name]) for name in numbers):
         if np.size(value) != 1:
             continue
-        number = float(np.reshape(value, -1)[0])
-        if plain_name(name) in RATE_NAMES:
-            rates[f"{path}@{name}"] = number
-        elif plain_name(name) in INTERVAL_NAMES and number > 0:
-            rates[f"{path}@{name}"] = 1.0 / number
+        if (rate_hz := stated_rate_hz(name, float(np.reshape(value, -1)[0]))) is not None:
+            rates[f"{path}@{name}"] = rate_hz
     return rates
 
 
@@ -194,10 +191,13 @@ def write_hdf5(recording: Recording, path: Path) -> None:
         raise OSError(str(error)) from error
 
 
-def _sniff(head: bytes) -> str:
-    return "HDF5" if head.startswith(b"\x89HDF\r\n\x1a\n") else ""
-
-
 HDF5 = FileFormat(
-    "HDF5", (".h5", ".hdf5", ".hdf"), _sniff, read_hdf5, write_hdf5, (".h5", ".hdf5"), read_hdf5, hdf5_length
+    "HDF5",
+    (".h5", ".hdf5", ".hdf"),
+    begins("HDF5", b"\x89HDF\r\n\x1a\n"),
+    read_hdf5,
+    write_hdf5,
+    (".h5", ".hdf5"),
+    read_hdf5,
+    hdf5_length,
 )

@@ -18,7 +18,7 @@ from gearsig.errors import InputError
 from gearsig.processes import call_apart
 from gearsig.recording._limits import FREE_BYTES, MAX_RATIO, check_memory
 from gearsig.recording._table import NumberArray, RawColumn, RawTable
-from gearsig.recording.formats._format import FileFormat
+from gearsig.recording.formats._format import FileFormat, begins
 
 READER = "gearsig MF4 reader"
 
@@ -111,8 +111,4 @@ def _columns(signals: list[Any]) -> tuple[RawColumn, ...]:
     )
 
 
-def _sniff(head: bytes) -> str:
-    return "MF4" if head.startswith((b"MDF     ", b"UnFinMF ")) else ""
-
-
-MF4 = FileFormat("MF4", (".mf4", ".mdf"), _sniff, read_mf4)
+MF4 = FileFormat("MF4", (".mf4", ".mdf"), begins("MF4", b"MDF     ", b"UnFinMF "), read_mf4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,8 @@ import numpy as np
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_decoded
 from gearsig.recording._table import NumberArray, RawColumn, RawTable
-from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, Recording, plain_name, split_unit
-from gearsig.recording.formats._format import OWN_NAME, FileFormat, metadata_json, table_from_metadata
+from gearsig.recording._types import Recording, split_unit, stated_rate_hz
+from gearsig.recording.formats._format import OWN_NAME, FileFormat, begins, metadata_json, table_from_metadata
 
 READER = "gearsig Parquet reader"
 
@@ -109,15 +110,10 @@ def _chunks(group: Any, names: Set[str]) -> list[Any]:
 
 def _stated_rate(metadata: Mapping[bytes, bytes]) -> float | None:
     for key, value in metadata.items():
-        name = plain_name(key.decode("utf-8", errors="replace"))
-        try:
-            number = float(value)
-        except ValueError:
-            continue
-        if name in RATE_NAMES:
-            return number
-        if name in INTERVAL_NAMES and number > 0:
-            return 1.0 / number
+        with suppress(ValueError):
+            rate_hz = stated_rate_hz(key.decode("utf-8", errors="replace"), float(value))
+            if rate_hz is not None:
+                return rate_hz
     return None
 
 
@@ -135,10 +131,13 @@ def write_parquet(recording: Recording, path: Path) -> None:
     parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=facts)), path)
 
 
-def _sniff(head: bytes) -> str:
-    return "Parquet" if head.startswith(b"PAR1") else ""
-
-
 PARQUET = FileFormat(
-    "Parquet", (".parquet", ".pq"), _sniff, read_parquet, write_parquet, (".parquet",), read_parquet, parquet_length
+    "Parquet",
+    (".parquet", ".pq"),
+    begins("Parquet", b"PAR1"),
+    read_parquet,
+    write_parquet,
+    (".parquet",),
+    read_parquet,
+    parquet_length,
 )

@@ -14,7 +14,7 @@ from gearsig.errors import InputError
 from gearsig.recording._limits import check_decoded, check_memory
 from gearsig.recording._table import NamedArrays, RawTable, table_from_arrays
 from gearsig.recording._types import RATE_NAMES, plain_name
-from gearsig.recording.formats._format import FileFormat
+from gearsig.recording.formats._format import FileFormat, begins
 
 READER = "gearsig TDMS reader"
 
@@ -114,8 +114,4 @@ def _stated_rates(properties: Any, owner: str) -> dict[str, float]:
     }
 
 
-def _sniff(head: bytes) -> str:
-    return "TDMS" if head.startswith(b"TDSm") else ""
-
-
-TDMS = FileFormat("TDMS", (".tdms",), _sniff, read_tdms, read_part=read_tdms, length=tdms_length)
+TDMS = FileFormat("TDMS", (".tdms",), begins("TDMS", b"TDSm"), read_tdms, read_part=read_tdms, length=tdms_length)
