@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, replace
 from datetime import datetime
 from math import isfinite
 from pathlib import Path
@@ -50,24 +50,7 @@ NO_CASES = "–"
 """A cell without a case."""
 
 
-@dataclass(frozen=True)
-class Table:
-    """Cells of a table.
-
-    Parameters
-    ----------
-    title, note : str
-    header : tuple of str
-    rows : tuple of tuple of str
-    """
-
-    title: str
-    note: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-
-def main_table(result: BenchmarkResult) -> Table:
+def main_table(result: BenchmarkResult) -> Section:
     """Return the figures that have targets or matter beside them, with and without reference."""
     parts = {name: result.part(name).scores for name in (WITHOUT, WITH)}
     rows = []
@@ -79,13 +62,13 @@ def main_table(result: BenchmarkResult) -> Table:
         if any(scores[figure.key].n for scores in parts.values()):
             rows.append(tuple(row))
     header = ("", WITHOUT, "target", WITH, "target")
-    return Table("Against the targets", _BASIS, header, tuple(rows))
+    return Section("Against the targets", _BASIS, header, tuple(rows))
 
 
-def same_table(result: BenchmarkResult) -> Table | None:
-    """Return the figures of the diagnosing simulator's own cases and the drop from them; None if there are none."""
+def same_table(result: BenchmarkResult) -> tuple[Section, ...]:
+    """Return the figures of the diagnosing simulator's own cases and the drop from them, if there are any."""
     if not result.request.plan.same_simulator:
-        return None
+        return ()
     rows = []
     for figure in FIGURES:
         row = [figure.title]
@@ -95,22 +78,22 @@ def same_table(result: BenchmarkResult) -> Table | None:
         if any(text != NO_CASES for text in row[1::2]):
             rows.append(tuple(row))
     note = "The same plan of cases, made by the diagnosing simulator; drop: from there to the independent rig."
-    return Table("Same simulator", note, ("", WITHOUT, "drop", WITH, "drop"), tuple(rows))
+    return (Section("Same simulator", note, ("", WITHOUT, "drop", WITH, "drop"), tuple(rows)),)
 
 
 def figures_table(
     result: BenchmarkResult, title: str, note: str, columns: Mapping[str, Part], *, with_n: bool = True
-) -> Table:
+) -> Section:
     """Return the figures of some parts of the cases side by side, without those that no case has."""
     rows = []
     for figure in result.figures:
         of_parts = [part.scores[figure.key] for part in columns.values()]
         if any(score.n for score in of_parts):
             rows.append((figure.title, *(cell(figure, score, with_n=with_n) for score in of_parts)))
-    return Table(title, note, ("", *columns), tuple(rows))
+    return Section(title, note, ("", *columns), tuple(rows))
 
 
-def alternatives_table(result: BenchmarkResult) -> Table:
+def alternatives_table(result: BenchmarkResult) -> Section:
     """Return the same figures of the diagnosers beside, on the very same cases."""
     names = result.request.diagnosers
     parts = (("without", WITHOUT), ("with", WITH))
@@ -121,7 +104,7 @@ def alternatives_table(result: BenchmarkResult) -> Table:
     return figures_table(result, "Beside other diagnosers", text, columns, with_n=False)
 
 
-def parts_table(result: BenchmarkResult) -> Table:
+def parts_table(result: BenchmarkResult) -> Section:
     """Return the figures of one and two conditions, and of faults of every strength."""
     columns = {name: result.part(name) for name in ("one condition", "two conditions")} | {
         "every strength, without": result.part(WITHOUT, strong=False),
@@ -169,16 +152,12 @@ _BASIS = (
 def markdown(result: BenchmarkResult, command: str, date: datetime) -> str:
     """Return the tables for a README, with date, version and command."""
     plan = result.request.plan
-    same = same_table(result)
-    text = [
-        f"{plan.n_cases} blind cases, {plan.role}; gearsig {__version__}, {date:%d %B %Y}; `{command}`.",
-        titled_table(main_table(result)) + ("" if same is None else f"\n{titled_table(same)}"),
-        titled_table(alternatives_table(result)) + "\n".join(["", *cost_lines(result), ""]),
-    ]
-    return "\n\n".join(text)
+    head = f"{plan.n_cases} blind cases, {plan.role}; gearsig {__version__}, {date:%d %B %Y}; `{command}`.\n"
+    tables = (main_table(result), *same_table(result), alternatives_table(result))
+    return "\n".join([head, *map(titled_table, tables), *cost_lines(result), ""])
 
 
-def titled_table(table: Table) -> str:
+def titled_table(table: Section) -> str:
     """Return a table in Markdown, its title and note above."""
     return f"**{table.title}.** {table.note}\n\n{markdown_table(table.header, table.rows)}"
 
@@ -208,7 +187,7 @@ LEVELS = (("weak", 0.0, 1 / 3), ("middle", 1 / 3, 2 / 3), ("strong", 2 / 3, 1.01
 MAX_CONFUSIONS = 12
 
 
-def effects_table(result: BenchmarkResult) -> Table:
+def effects_table(result: BenchmarkResult) -> Section:
     """Return, for each effect, how often the likeliest cause was right, by level, strength and reference."""
     rows = [r for r in result.rows[result.judged] if r.source == BLIND]
     table = [_effect_row(name, [r for r in rows if r.kind == "single" and r.effects == (name,)]) for name in CATALOGUE]
@@ -229,7 +208,7 @@ def effects_table(result: BenchmarkResult) -> Table:
         f"{STRONG:g} structural floors on. Strength: the middle, in structural floors. For effects outside the "
         "catalogue “unknown” is right."
     )
-    return Table("Effect by effect", note, header, tuple(row for row in table if row))
+    return Section("Effect by effect", note, header, tuple(row for row in table if row))
 
 
 def _effect_row(name: str, rows: Sequence[Row]) -> tuple[str, ...]:
@@ -252,7 +231,7 @@ def _right(rows: Sequence[Row]) -> str:
     return f"{sum(r.is_right for r in rows)} of {len(rows)}" if rows else "–"
 
 
-def confusions_table(result: BenchmarkResult) -> Table:
+def confusions_table(result: BenchmarkResult) -> Section:
     """Return the commonest wrong answers, and in which kinds of features both effects show."""
     confusions = Counter(
         (r.truths[0] if r.kind != "unknown" else r.effects[0], r.first)
@@ -262,7 +241,7 @@ def confusions_table(result: BenchmarkResult) -> Table:
     table = [
         (true, answer or "no answer", str(n), _common(true, answer)) for (true, answer), n in confusions.most_common()
     ]
-    return Table(
+    return Section(
         "What was taken for what",
         "In common: kinds of features in which theory expects both.",
         ("it was", "said", "cases", "in common"),
@@ -399,14 +378,14 @@ def _number(value: float) -> str:
 def page(result: BenchmarkResult, command: str, date: datetime) -> str:
     """Return report.html."""
     sections = [
-        _section(main_table(result)),
+        main_table(result),
         Section("What was taken for what", pictures=(_confusion_picture(result),)),
-        _section(confusions_table(result), title="The commonest confusions"),
+        replace(confusions_table(result), title="The commonest confusions"),
         Section("Are the probabilities true?", " ".join(cost_lines(result)[1:]), pictures=_calibration(result)),
-        _section(effects_table(result)),
-        _section(parts_table(result)),
-        _section(alternatives_table(result)),
-        *([_section(same)] if (same := same_table(result)) is not None else []),
+        effects_table(result),
+        parts_table(result),
+        alternatives_table(result),
+        *same_table(result),
         _failures(result),
     ]
     return benchmark_html(
@@ -416,10 +395,6 @@ def page(result: BenchmarkResult, command: str, date: datetime) -> str:
         _provenance(result, command),
         date,
     )
-
-
-def _section(table: Table, title: str = "") -> Section:
-    return Section(title or table.title, table.note, table.header, table.rows)
 
 
 def _summary(result: BenchmarkResult) -> str:

@@ -262,10 +262,11 @@ FIGURES = (
 
 def write_drive_results(result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str) -> Path:
     """Write table, scores, cases and labels beside the answers, each whole or not at all; return the table's path."""
-    from app.benchmark.results import TABLE, Table, figures_table, titled_table, write_files
+    from app.benchmark.results import TABLE, figures_table, titled_table, write_files
+    from gearsig.report import Section
 
     parts = {name: result.part(name) for name in PARTS}
-    tables = (figures_table(result, "Blind start–stop cases", "", parts), Table(*_by_effect(result)))
+    tables = (figures_table(result, "Blind start–stop cases", "", parts), Section(*_by_effect(result)))
     text = "\n".join([*(titled_table(table) for table in tables), f"`{command}`\n"])
     write_files(result, cases, folder, command, text)
     return folder / TABLE
