@@ -1,7 +1,6 @@
 """Spectra over time: STFT, wavelets, synchrosqueezing, over time or shaft angle."""
 
-from gearsig.timefreq._cwt import cwt, cwt_map, squeezed_cwt, squeezed_cwt_map
-from gearsig.timefreq._inverse import component, inverse
+from gearsig.timefreq._cwt import component, cwt, cwt_map, inverse, squeezed_cwt, squeezed_cwt_map
 from gearsig.timefreq._packets import WaveletPackets, node_path, packet_inverse, wavelet_packet_map, wavelet_packets
 from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, tops_of_parted_paths, untangled
 from gearsig.timefreq._squeezing import SqueezeEngine, squeeze_lines

@@ -7,8 +7,18 @@ Kelvin–Voigt damping that fades in with depth; Coulomb–Stribeck friction; va
 """
 
 from sims.blind_drive._case import Chain, DriveCase, MadeCase, draw_case, label_of, record_case, run
-from sims.blind_drive._kernel import N_STATES, march
-from sims.blind_drive._machine import CATALOGUE, GEARS, OUTSIDE, ROLES, BlindDrive, build, changed, draw_drawing
+from sims.blind_drive._machine import (
+    CATALOGUE,
+    GEARS,
+    N_STATES,
+    OUTSIDE,
+    ROLES,
+    BlindDrive,
+    build,
+    changed,
+    draw_drawing,
+    march,
+)
 
 __all__ = [
     "CATALOGUE",

@@ -86,7 +86,7 @@ def draw_chain(rng: np.random.Generator) -> Chain:
 
 def run(machine: BlindDrive, chain: Chain, duration_s: float, rng: np.random.Generator) -> Recording:
     """Run a machine from rest and measure it; the pinion stands anywhere at the beginning."""
-    from sims.blind_drive._kernel import N_STATES, march
+    from sims.blind_drive._machine import N_STATES, march
 
     n = machine.numbers
     y = np.zeros(N_STATES)

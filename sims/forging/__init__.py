@@ -14,7 +14,6 @@ from sims.forging._drive import (
     schedule,
 )
 from sims.forging._kernels import bristle, position, reach, weight, younger_pair
-from sims.forging._measure import record, sensors
 from sims.forging._respond import DriveResponse, FirstState, check_convergence, drive_numbers, respond
 from sims.forging._simulator import (
     NAME,
@@ -22,6 +21,8 @@ from sims.forging._simulator import (
     ForgingManipulator,
     ForgingTwin,
     PreparedDrive,
+    record,
+    sensors,
     with_effects,
 )
 

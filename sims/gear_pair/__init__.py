@@ -5,10 +5,15 @@ from sims.gear_pair._bearing import (
     bearing_fields,
     bearing_loads_n,
     carried_part,
+    contact_n_per_m15,
+    element_forces,
+    element_loads_n,
     foot,
+    shaft_place_m,
+    stiffness_under_load_n_per_m,
     tilting_shares,
 )
-from sims.gear_pair._build import build_machine, build_rig, gear_geometry
+from sims.gear_pair._build import PARAMETERS, build_machine, build_rig, gear_geometry
 from sims.gear_pair._drive import (
     FRICTION_FIELDS,
     MACHINE_FIELDS,
@@ -19,16 +24,17 @@ from sims.gear_pair._drive import (
     total_inertia_kg_m2,
 )
 from sims.gear_pair._installed import Installed, completed_bearing
-from sims.gear_pair._measurement import COORDINATES, MIN_MOTION_HZ, YIELDS, MeasuredRun, Measurement
-from sims.gear_pair._parameters import PARAMETERS
-from sims.gear_pair._rolling import (
-    contact_n_per_m15,
-    element_forces,
-    element_loads_n,
-    shaft_place_m,
-    stiffness_under_load_n_per_m,
+from sims.gear_pair._run import (
+    COORDINATES,
+    MIN_MOTION_HZ,
+    YIELDS,
+    MeasuredRun,
+    Measurement,
+    PairResponse,
+    RunPlan,
+    StepConvergence,
+    profile_points,
 )
-from sims.gear_pair._run import PairResponse, RunPlan, StepConvergence, profile_points
 from sims.gear_pair._simulator import (
     BODY_KG,
     BODY_SHAPES,

@@ -1,18 +1,22 @@
-"""A run of a gear pair: its signals on an even grid of time, integrated in parts that can be interrupted."""
+"""A run of a gear pair, integrated in parts that can be interrupted: signals on an even grid, and their measurement."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import ceil
-from typing import Generic, TypeVar
+from dataclasses import dataclass, field, replace
+from math import ceil, floor
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.recording import Recording
 from gearsig.results import Result
-from sims.machine import Profile
+from gearsig.rig import Rig
+from sims.gear_pair._drive import governor_nm_s_per_rad, total_inertia_kg_m2
+from sims.machine import Machine, Profile
+from sims.measure import MeasurementChain, Motion
 
 State = TypeVar("State")
 March = Callable[[float, int, FloatArray, FloatArray], int]
@@ -193,3 +197,255 @@ class StepConvergence:
 def profile_points(profile: Profile, factor: float) -> FloatArray:
     """Times and values as kernels take them, (2, n)."""
     return np.ascontiguousarray(np.vstack((profile.times_s, factor * np.asarray(profile.values))), dtype=np.float64)
+
+
+# --------------------
+# From the motion to a recording: what the measurement chain needs of a model, and what it makes of it.
+# --------------------
+
+
+COORDINATES = (
+    "input rotor angle",
+    "driver angle",
+    "driven angle",
+    "output rotor angle",
+    "driver x",
+    "driver y",
+    "driven x",
+    "driven y",
+    *(f"bearing {i} {axis}" for i in (1, 2, 3, 4) for axis in ("x", "y")),
+)
+"""Places in rad and m; models give their velocities and accelerations, too."""
+ANGLES = COORDINATES[1:3]
+YIELDS = tuple(f"{name} yield" for name in COORDINATES[8:])
+"""By how much each bearing's spring is pressed, in m: its force over its stiffness without clearance, or over that at
+the load where balls carry one by one. That force moves the housing; where rolling elements pass, the shaft follows,
+and little of its motion reaches the housing."""
+POSITIONS = (*COORDINATES[4:], *YIELDS)
+"""Places whose acceleration a path can start from, each with its direction."""
+POINTS_PER_CYCLE = 6
+"""Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
+MIN_MOTION_HZ = 80_000.0
+"""Rate of that motion at least: what the model still holds above half of it would fold back."""
+GOES_ON_S = 0.1
+"""Of the lead-in that a run has to itself where it goes on from another."""
+SETTLING = 6.0
+"""Time constants of the slowest start-up motion that are left out ahead of the recording."""
+
+
+@dataclass(frozen=True)
+class MeasuredRun(Generic[State]):
+    """What is asked of a run that is measured.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Two streams are made of it, one for the machine and one for the chain: the same seed gives the same noise
+        whatever the machine draws.
+    sampling_rate_hz, duration_s : float
+        Of the recording.
+    rig : Rig or None
+        Goes with the recording.
+    truth : mapping
+        What was asked for; the model adds what it knows of machine and solver.
+    step_s : float or None
+        Longest step of the integrator; None: the model's. It is shortened to what the model needs, and to a whole part
+        of the sampling interval.
+    also : sequence of str
+        Signals of the model wanted in the motion besides those that are measured.
+    first : state of the model or None
+        Where the lead-in starts; None: at the static balance.
+    before : PairResponse or None
+        `Measurement.lead_in` of the same machine in another state: the run goes on from its end, as a tooth breaks.
+    min_motion_hz : float
+        Rate of the motion at least that is handed to the measurement chain.
+    noise_rng : numpy.random.Generator or None
+        For the chain, instead of the stream made of `rng`: the same machine with other noise.
+    on_progress : callable or None
+        Called now and then with the part of the motion that is done, 0 to 1.
+    """
+
+    rng: np.random.Generator
+    sampling_rate_hz: float
+    duration_s: float
+    rig: Rig | None = None
+    truth: Mapping[str, Any] = field(default_factory=dict)
+    step_s: float | None = None
+    also: Sequence[str] = ()
+    first: State | None = None
+    before: PairResponse[State] | None = None
+    min_motion_hz: float = MIN_MOTION_HZ
+    noise_rng: np.random.Generator | None = None
+    on_progress: Callable[[float], None] | None = None
+
+    def streams(self) -> tuple[np.random.Generator, np.random.Generator]:
+        """Return the generators of the machine and of the chain; to be called once."""
+        machine_rng, chain_rng = self.rng.spawn(2)
+        return machine_rng, chain_rng if self.noise_rng is None else self.noise_rng
+
+
+@dataclass(frozen=True)
+class Measurement(Generic[State]):
+    """How a machine is run to be measured, and the recording of it; time 0 of its profiles is a sample.
+
+    Parameters
+    ----------
+    machine : Machine
+    run : MeasuredRun
+    chain : MeasurementChain
+        At the sampling rate of the recording.
+    lead_in_s : float
+        Of what goes before the recording.
+    step_s : float
+        Of the integrator, a whole part of the sampling interval.
+    stride : int
+        Every how many steps a point is kept.
+    positions : tuple of str
+        Places that the channels' paths start from.
+    """
+
+    machine: Machine
+    run: MeasuredRun[State]
+    chain: MeasurementChain
+    lead_in_s: float
+    step_s: float
+    stride: int
+    positions: tuple[str, ...]
+
+    @classmethod
+    def of(cls, machine: Machine, run: MeasuredRun[State], longest_step_s: float) -> Measurement[State]:
+        """Plan a recording; the step is `longest_step_s`, or less where the chain needs it.
+
+        Raises
+        ------
+        InputError
+            If rate, duration or step are not above 0.
+        """
+        positive(run.duration_s, "duration_s", "s")
+        rate = positive(run.sampling_rate_hz, "sampling_rate_hz", "Hz")
+        chain = replace(machine.chain, sampling_rate_hz=rate)
+        rate_hz = motion_rate_hz(chain, run.min_motion_hz)
+        per_sample = ceil(max(1.0 / positive(longest_step_s, "step_s", "s"), rate_hz) / rate - 1e-9)
+        return cls(
+            machine,
+            run,
+            chain,
+            ceil(lead_in_s(machine, chain) * rate) / rate,
+            1.0 / (rate * per_sample),
+            max(floor(rate * per_sample / rate_hz + 1e-9), 1),
+            used_positions(chain),
+        )
+
+    @property
+    def motion(self) -> dict[str, Any]:
+        """How the model is to respond, by the names of its parameters: times, steps, signals, first state."""
+        needed = [name for position in self.positions for name in self._signals_at(position)]
+        return {
+            "duration_s": self.chain.simulated_s(self.run.duration_s, self.lead_in_s)
+            + 4.0 / self.chain.sampling_rate_hz,
+            "signals": tuple(dict.fromkeys((*ANGLES, *needed, *self.run.also))),
+            "start_s": -self.lead_in_s,
+            "step_s": self.step_s,
+            "stride": self.stride,
+            "first": self.run.first,
+            "on_progress": self.run.on_progress,
+        }
+
+    @property
+    def lead_in(self) -> dict[str, Any] | None:
+        """The same up to `GOES_ON_S` before the recording, if it begins earlier: runs in another state go on there."""
+        n_points = floor((self.lead_in_s - GOES_ON_S) / (self.step_s * self.stride))
+        return {**self.motion, "duration_s": n_points * self.step_s * self.stride} if n_points > 0 else None
+
+    @property
+    def rest(self) -> dict[str, Any]:
+        """The same from where the run before it ended."""
+        before = self.run.before
+        if before is None:
+            return self.motion
+        at_s = before.ends_s
+        duration_s = self.motion["duration_s"] - (at_s + self.lead_in_s)
+        return {**self.motion, "start_s": at_s, "duration_s": duration_s, "first": before.last}
+
+    def _signals_at(self, position: str) -> tuple[str, ...]:
+        place = position.removesuffix(" yield")
+        return (f"{place} acceleration", *((place, position) if self._rolls(position) else ()))
+
+    def _rolls(self, position: str) -> bool:
+        """Whether a bearing's shaft moves by itself as its rolling elements pass, else as the spring yields."""
+        return position in YIELDS and self.machine.bearings[YIELDS.index(position) // 2].elements_pass
+
+    def _acceleration(self, response: PairResponse[State], position: str) -> FloatArray:
+        """Return a place's acceleration; of a yield by differences of what it is less than the shaft's motion."""
+        place = position.removesuffix(" yield")
+        acceleration = response[f"{place} acceleration"]
+        if not self._rolls(position):
+            return acceleration
+        less = np.pad(np.diff(response[position] - response[place], 2), 1)
+        return acceleration + less / response.interval_s**2
+
+    def record(
+        self,
+        response: PairResponse[State],
+        rng: np.random.Generator,
+        *,
+        known: Mapping[str, Any],
+        notes: Sequence[str],
+        source: str,
+        reader: str,
+    ) -> Recording:
+        """Return the recording of a run that began at −`lead_in_s`; see `MeasurementChain.record`.
+
+        Parameters
+        ----------
+        response : PairResponse
+        rng : numpy.random.Generator
+            Of the chain.
+        known : mapping
+            What the model adds to the truth.
+        notes : sequence of str
+            Where formulas are used outside their range: warnings of the recording.
+        source, reader : str
+            For its provenance.
+        """
+        motion = Motion(
+            response.interval_s,
+            self.positions,
+            np.column_stack([self._acceleration(response, name) for name in self.positions]),
+            dict(zip(self.machine.shaft_names, (response[name] for name in ANGLES), strict=True)),
+        )
+        recording = self.chain.record(
+            motion,
+            rng=rng,
+            rig=self.run.rig,
+            duration_s=self.run.duration_s,
+            lead_in_s=self.lead_in_s,
+            truth={**self.run.truth, **known},
+            source=source,
+            reader=reader,
+        )
+        return replace(recording, warnings=(*recording.warnings, *notes))
+
+
+def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
+    """Time ahead of the recording: filters, the drive's governor, and the least damped start-up ringing settle."""
+    recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
+    return max(chain.lead_in_s, SETTLING * recovery, 0.1)
+
+
+def motion_rate_hz(chain: MeasurementChain, min_motion_hz: float) -> float:
+    """Points per second that the chain needs of the motion at least."""
+    modes = [mode.frequency_hz for channel in chain.channels for mode in channel.path.modes]
+    sensors = [channel.accelerometer.resonance_hz or 0.0 for channel in chain.channels]
+    return max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), min_motion_hz, 4.0 * chain.sampling_rate_hz)
+
+
+def used_positions(chain: MeasurementChain) -> tuple[str, ...]:
+    """Places that the channels' paths start from, in the model's order; unknown ones last, for the chain to refuse."""
+    used = {
+        name
+        for channel in chain.channels
+        for gains in (channel.path.direct, *(mode.gains for mode in channel.path.modes))
+        for name in gains
+    }
+    return tuple(name for name in POSITIONS if name in used) or POSITIONS[:1]

@@ -30,7 +30,7 @@ from sims.gear_pair._installed import (
     installed_of_rig,
     table_of,
 )
-from sims.gear_pair._measurement import MeasuredRun
+from sims.gear_pair._run import MeasuredRun
 from sims.machine import (
     Machine,
     Nominal,

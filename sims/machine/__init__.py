@@ -9,6 +9,8 @@ from sims.machine._machine import (
     Drive,
     Lubrication,
     Machine,
+    Operation,
+    Profile,
     RaceDefect,
     Roughness,
     ShaftLine,
@@ -17,6 +19,9 @@ from sims.machine._machine import (
     WeakTooth,
     Wheel,
     bearing_index,
+    profile_value,
+    set_speed,
+    torque_ripple,
 )
 from sims.machine._nominal import (
     Nominal,
@@ -27,7 +32,6 @@ from sims.machine._nominal import (
     runout_tolerance_um,
     usual_mass_kg,
 )
-from sims.machine._operation import Operation, Profile, profile_value, set_speed, torque_ripple
 
 __all__ = [
     "BEARING_LAWS",

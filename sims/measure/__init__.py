@@ -5,13 +5,17 @@ from sims.measure._sensors import (
     Accelerometer,
     ColouredNoise,
     Converter,
+    Encoder,
     MainsHum,
     ModalPath,
     PathMode,
+    PulseCounter,
+    Tachometer,
     apply,
+    disc_edges,
     discrete,
+    pulse_voltage,
 )
-from sims.measure._tachometer import Encoder, PulseCounter, Tachometer, disc_edges, pulse_voltage
 
 __all__ = [
     "Accelerometer",

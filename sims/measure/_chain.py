@@ -14,8 +14,18 @@ from gearsig.checks import FloatArray, frozen_array, known_name, not_negative, p
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Provenance, Recording
 from gearsig.rig import EncoderChannel, PulseTimes, Rig, SpeedSource, TachometerChannel
-from sims.measure._sensors import Accelerometer, ColouredNoise, Converter, MainsHum, ModalPath
-from sims.measure._tachometer import Encoder, PulseCounter, Tachometer, disc_edges, pulse_voltage
+from sims.measure._sensors import (
+    Accelerometer,
+    ColouredNoise,
+    Converter,
+    Encoder,
+    MainsHum,
+    ModalPath,
+    PulseCounter,
+    Tachometer,
+    disc_edges,
+    pulse_voltage,
+)
 
 # What a simulator hands to the measurement chain.
 

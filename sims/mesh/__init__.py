@@ -1,7 +1,5 @@
 """Shared gear physics: involute geometry, flanks, faults, friction and mesh stiffness of spur and helical pairs."""
 
-from sims.mesh._body import BODIES, arc_compliance, body_compliance
-from sims.mesh._deviation import FlankDeviation, wear_profile
 from sims.mesh._faults import (
     CRACK_LAWS,
     RootCrack,
@@ -18,6 +16,20 @@ from sims.mesh._faults import (
     effective_flank_mm,
     highest_chip_mm,
     spans_face,
+)
+from sims.mesh._flank import (
+    MAX_SLICES,
+    STRAIGHT,
+    FlankDeviation,
+    FlankRoughness,
+    FractalSurface,
+    Lead,
+    TimeLockedRoughness,
+    advance,
+    height_now,
+    normal_section,
+    transverse_section,
+    wear_profile,
 )
 from sims.mesh._friction import (
     COEFFICIENTS,
@@ -42,13 +54,6 @@ from sims.mesh._geometry import (
     involute,
     involute_outline,
     root_half_angle_rad,
-)
-from sims.mesh._lead import (
-    MAX_SLICES,
-    STRAIGHT,
-    Lead,
-    normal_section,
-    transverse_section,
 )
 from sims.mesh._mesh_stiffness import (
     MAX_CYCLES,
@@ -78,11 +83,13 @@ from sims.mesh._pair import (
     flank_length_mm,
     part_inside,
 )
-from sims.mesh._roughness import FlankRoughness, FractalSurface, TimeLockedRoughness, advance, height_now
 from sims.mesh._stiffness import (
+    BODIES,
     HEALTHY,
     GearMesh,
     ToothFaults,
+    arc_compliance,
+    body_compliance,
     cracked_tooth_compliance,
     foundation_compliance,
     foundation_factors,

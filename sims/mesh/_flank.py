@@ -1,0 +1,548 @@
+"""How flanks depart from the involute, positive where metal is missing: relief, wear, helix, crowning, roughness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan, cos, pi, radians, tan
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gearsig.checks import FloatArray, count, frozen_array, not_negative, positive, within
+from gearsig.compiled import njit
+from gearsig.errors import InputError
+from sims.mesh._geometry import GearGeometry
+from sims.mesh._pair import PairGeometry, contact_ends_mm
+
+
+@dataclass(frozen=True)
+class FlankDeviation:
+    """Deviation shared by all teeth of a gear, along the line of action, plus one value per tooth.
+
+    Parameters
+    ----------
+    tip_relief_um : float
+        Metal taken off at the tip, 0 for none.
+    tip_relief_length_mm : float
+        Length of the relief along the line of action, from the tip down.
+    tip_relief_exponent : float
+        1: straight; 2: parabolic.
+    profile_um : tuple of float
+        Measured profile deviation at equal steps of roll from the end of the fillet to the tip; straight between them.
+        Empty: none.
+    pitch_um : tuple of float
+        Cumulative pitch deviation of each tooth, as many as the gear has teeth. Empty: none.
+    wear_um : float
+        Greatest depth of wear by sliding, 0 for none; see `sims.mesh` for its shape over the flank.
+    """
+
+    tip_relief_um: float = 0.0
+    tip_relief_length_mm: float = 1.0
+    tip_relief_exponent: float = 1.0
+    profile_um: tuple[float, ...] = ()
+    pitch_um: tuple[float, ...] = ()
+    wear_um: float = 0.0
+
+    def __post_init__(self) -> None:
+        not_negative(self.tip_relief_um, "tip_relief_um", "µm")
+        positive(self.tip_relief_length_mm, "tip_relief_length_mm", "mm")
+        positive(self.tip_relief_exponent, "tip_relief_exponent")
+        not_negative(self.wear_um, "wear_um", "µm")
+        frozen_array(self.profile_um, "profile_um", ndim=1)
+        frozen_array(self.pitch_um, "pitch_um", ndim=1)
+        if len(self.profile_um) == 1:
+            raise InputError("profile_um holds one value", allowed="none, or at least two from fillet to tip")
+
+
+IDEAL_FLANK = FlankDeviation()
+"""An involute without deviation."""
+
+
+def check_deviation(gear: GearGeometry, deviation: FlankDeviation) -> None:
+    """Refuse a relief longer than the flank and a number of pitch deviations that is not the number of teeth."""
+    flank = (gear.tip_roll_rad - gear.form_roll_rad) * gear.base_radius_mm
+    if deviation.tip_relief_um > 0.0 and deviation.tip_relief_length_mm > flank:
+        raise InputError(
+            f"tip_relief_length_mm is {deviation.tip_relief_length_mm:g} mm on a flank of {flank:.3g} mm",
+            allowed=f"at most {flank:.3g} mm along the line of action",
+        )
+    if deviation.pitch_um and len(deviation.pitch_um) != gear.teeth:
+        raise InputError(f"pitch_um holds {len(deviation.pitch_um)} values", allowed=f"one per tooth, {gear.teeth}")
+
+
+def flank_separation_m(gear: GearGeometry, deviation: FlankDeviation, roll_length_mm: FloatArray) -> FloatArray:
+    """Missing metal at the given places of the flank, in m; without wear, which depends on the mate.
+
+    Parameters
+    ----------
+    roll_length_mm : array
+        ρ of the gear, distance from its base tangent point. Beyond the tip the relief goes on growing.
+    """
+    rho = np.asarray(roll_length_mm, dtype=np.float64)
+    tip = gear.tip_roll_rad * gear.base_radius_mm
+    into = np.maximum(rho - (tip - deviation.tip_relief_length_mm), 0.0) / deviation.tip_relief_length_mm
+    total = deviation.tip_relief_um * into**deviation.tip_relief_exponent
+    if deviation.profile_um:
+        places = np.linspace(gear.form_roll_rad * gear.base_radius_mm, tip, len(deviation.profile_um))
+        total = total + np.interp(rho, places, np.asarray(deviation.profile_um))
+    result: FloatArray = total * 1e-6
+    return result
+
+
+def pitch_separation_m(gear: GearGeometry, deviation: FlankDeviation) -> FloatArray:
+    """One value per tooth, in m."""
+    if not deviation.pitch_um:
+        return np.zeros(gear.teeth)
+    return np.asarray(deviation.pitch_um, dtype=np.float64) * 1e-6
+
+
+# Wear of all flanks of a gear by sliding.
+
+MIN_RADIUS = 0.1
+"""In modules: below this radius of curvature specific sliding no longer grows, as the zone of contact is wider."""
+
+
+def wear_profile(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> FloatArray:
+    """Depth of wear over the flank, 1 where it is greatest, 0 at the pitch point.
+
+    h ∝ p · s = |1 − u_mate/u_own|,  u = ω ρ
+
+    By Archard's law a point wears in proportion to pressure times the distance slid past it. A zone of contact of width
+    2a rolls over the point at its own surface's speed u_own, while the surfaces slide at |u_own − u_mate|: s = 2a |1 −
+    u_mate/u_own|. Mean pressure times width is the load per width, F/b, taken here as the same all along the path of
+    contact. What is left is the specific sliding: 0 in pure rolling at the pitch point, rising to both ends, the more
+    so to the root, where a flank is slow. The law's constant is in the depth that is given.
+
+    Parameters
+    ----------
+    pair : PairGeometry
+    side : int
+        1 for the driver's flanks, 2 for the driven gear's.
+    roll_length_mm : array
+        ρ of that gear. Beyond the path of contact the depth stays that of its end.
+
+    Notes
+    -----
+    Load sharing and the change of pressure as the flank wears are left out: in truth double contact halves the wear at
+    the ends.
+
+    Source: J. F. Archard, Contact and rubbing of flat surfaces, Journal of Applied Physics 24 (1953), for the law.
+    """
+    ends = contact_ends_mm(pair, side)
+    largest = float(np.max(_specific_sliding(pair, side, np.array(ends))))
+    result: FloatArray = _specific_sliding(pair, side, np.clip(roll_length_mm, *ends)) / largest
+    return result
+
+
+def _specific_sliding(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> FloatArray:
+    gear, mate = (pair.driver, pair.driven) if side == 1 else (pair.driven, pair.driver)
+    rho = np.maximum(np.asarray(roll_length_mm, dtype=np.float64), MIN_RADIUS * gear.module_mm)
+    result: FloatArray = np.abs(1.0 - gear.teeth / mate.teeth * (pair.action_length_mm - rho) / rho)
+    return result
+
+
+# --------------------
+# Along the face width: helix, crowning and misalignment, each slice of the face with its own phase and gap.
+# --------------------
+
+
+MAX_SLICES = 64
+"""Of the face width; compiled code holds as many."""
+
+
+@dataclass(frozen=True)
+class Lead:
+    """How the flanks of a pair run along the face width, both gears together.
+
+    Parameters
+    ----------
+    helix_angle_deg : float
+        β on the reference circle, −45 to 45; above 0: the driver is right-handed. The gears of the pair are those of
+        the transverse section, see `transverse_section`.
+    crowning_um : float
+        Metal taken off at both ends of the face, a parabola from its middle; along the line of action.
+    error_um : float
+        Misalignment: by how much the flanks are further apart at the far end of the face (+z) than at the near one,
+        in the plane of action (F_β of ISO 6336-1).
+    n_slices : int
+        Of equal width; 1 for straight, even flanks.
+
+    Notes
+    -----
+    Slices yield each for themselves, as in ISO 6336-1: a slice that carries does not bend its neighbours.
+    """
+
+    helix_angle_deg: float = 0.0
+    crowning_um: float = 0.0
+    error_um: float = 0.0
+    n_slices: int = 1
+
+    def __post_init__(self) -> None:
+        within(self.helix_angle_deg, "helix_angle_deg", -45.0, 45.0, "°")
+        not_negative(self.crowning_um, "crowning_um", "µm")
+        within(self.crowning_um, "crowning_um", 0.0, 500.0, "µm")
+        within(self.error_um, "lead_error_um", -500.0, 500.0, "µm")
+        count(self.n_slices, "face_slices", maximum=MAX_SLICES)
+
+    @property
+    def even(self) -> bool:
+        """Whether all of the face carries alike: no helix, no crowning, no misalignment."""
+        return self.helix_angle_deg == 0.0 and self.crowning_um == 0.0 and self.error_um == 0.0
+
+    @property
+    def places(self) -> FloatArray:
+        """Middles of the slices from one end of the face to the other, −½ to ½, (n_slices,)."""
+        return (np.arange(self.n_slices) + 0.5) / self.n_slices - 0.5
+
+    def gap_m(self, places: FloatArray) -> FloatArray:
+        """Missing metal by crowning and misalignment at places −½ to ½ of the face; 0 in its middle."""
+        result: FloatArray = 1e-6 * (self.crowning_um * (2.0 * places) ** 2 + self.error_um * places)
+        return result
+
+    def late(self, pair: PairGeometry, places: FloatArray) -> FloatArray:
+        """Base pitches by which places −½ to ½ of the face enter after the end that enters first, 0 to ε_β.
+
+        The driver turns counter-clockwise, seen from +z: the far end of a right-handed tooth runs ahead.
+        """
+        hand = 1.0 if self.helix_angle_deg >= 0.0 else -1.0
+        result: FloatArray = self.overlap_ratio(pair) * (0.5 - hand * places)
+        return result
+
+    def overlap_ratio(self, pair: PairGeometry) -> float:
+        """ε_β = b tan β/(π m_t), how many pitches one end of the face is behind the other."""
+        turn = pair.face_width_mm * tan(radians(abs(self.helix_angle_deg)))
+        return turn / (pi * pair.driver.module_mm)
+
+    def base_helix_rad(self, pair: PairGeometry) -> float:
+        """β_b of tan β_b = tan β cos α_t."""
+        return atan(tan(radians(self.helix_angle_deg)) * cos(pair.driver.pressure_angle_rad))
+
+    def axial_share(self, pair: PairGeometry) -> float:
+        """Axial force over the force along the line of action, tan β_b: F_a = F_bt tan β_b = F_t tan β."""
+        return tan(self.base_helix_rad(pair))
+
+
+STRAIGHT = Lead()
+"""A spur pair whose flanks touch all along the face."""
+
+
+def transverse_section(
+    teeth: int,
+    normal_module_mm: float,
+    normal_pressure_angle_deg: float,
+    helix_angle_deg: float,
+    **normal: float | None,
+) -> GearGeometry:
+    """Return the transverse section of a helical gear that a rack of normal sizes cuts.
+
+    m_t = m_n/cos β,  tan α_t = tan α_n/cos β; profile shift, addendum, dedendum and the tip round keep their lengths.
+
+    Parameters
+    ----------
+    teeth, normal_module_mm, normal_pressure_angle_deg, helix_angle_deg
+        z, m_n, α_n, β.
+    **normal
+        Further fields of `GearGeometry`, in normal modules or mm.
+
+    Notes
+    -----
+    In the transverse section the rack's round tip is an ellipse; a circle of the same radius stands for it.
+
+    Source: ISO 21771, *Gears – Cylindrical involute gears and gear pairs* (2007).
+    """
+    c = cos(radians(within(helix_angle_deg, "helix_angle_deg", -45.0, 45.0, "°")))
+    if helix_angle_deg == 0.0:  # exactly the spur gear's
+        angle_deg = normal_pressure_angle_deg
+    else:
+        angle_deg = float(np.degrees(atan(tan(radians(normal_pressure_angle_deg)) / c)))
+    sizes = {"profile_shift": 0.0, "addendum": 1.0, "dedendum": 1.25, "tool_tip_radius": 0.38} | normal
+    for name in ("profile_shift", "addendum", "dedendum", "tool_tip_radius"):
+        sizes[name] = c * float(sizes[name] or 0.0)
+    return GearGeometry(teeth, normal_module_mm / c, angle_deg, **sizes)  # type: ignore[arg-type]  # fields by name
+
+
+@dataclass(frozen=True)
+class NormalSection(GearGeometry):
+    """Spur gear whose teeth are those of a helical gear's normal section; see `normal_section`.
+
+    Its number of teeth is no whole number, and nothing is checked: the gear that it stands for has been.
+    """
+
+    teeth: float  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        """Leave it as it is."""
+
+
+def normal_section(gear: GearGeometry, helix_angle_deg: float) -> GearGeometry:
+    """Return the virtual spur gear of a helical one: z_n = z/(cos²β_b cos β), m_n = m_t cos β, tan α_n = tan α_t cos β.
+
+    Parameters
+    ----------
+    gear : GearGeometry
+        The transverse section.
+    helix_angle_deg : float
+
+    Notes
+    -----
+    The bore is as large a part of the root circle as in the gear itself: so the body below a tooth keeps its shape.
+
+    Source: ISO 6336-3, *Calculation of tooth bending strength* (2019), for the virtual spur gear.
+    """
+    if helix_angle_deg == 0.0:
+        return gear
+    beta = radians(helix_angle_deg)
+    c, base = cos(beta), atan(tan(beta) * cos(gear.pressure_angle_rad))
+    virtual = NormalSection(
+        gear.teeth / (cos(base) ** 2 * c),
+        gear.module_mm * c,
+        float(np.degrees(atan(tan(gear.pressure_angle_rad) * c))),
+        gear.profile_shift / c,
+        gear.face_width_mm,
+        gear.addendum / c,
+        gear.dedendum / c,
+        gear.tool_tip_radius / c,
+    )
+    object.__setattr__(virtual, "bore_radius_mm", gear.bore_mm / gear.root_radius_mm * virtual.root_radius_mm)
+    return virtual
+
+
+def normal_roll_rad(gear: GearGeometry, virtual: GearGeometry, roll_rad: FloatArray) -> FloatArray:
+    """Roll angle on the virtual gear at the height where the transverse section has `roll_rad`."""
+    if virtual is gear:
+        return roll_rad
+    height = gear.base_radius_mm * np.hypot(1.0, roll_rad) - gear.pitch_radius_mm
+    ratio = (virtual.pitch_radius_mm + height) / virtual.base_radius_mm
+    result: FloatArray = np.sqrt(np.maximum(ratio**2 - 1.0, 0.0))
+    return result
+
+
+# --------------------
+# Roughness: a Weierstrass–Mandelbrot profile, locked to time or to the flank. Source: A. Majumdar, B. Bhushan, *Role of
+# fractal geometry in roughness characterization and contact mechanics of surfaces*, Journal of Tribology 112 (1990).
+# --------------------
+
+
+LISTED_TRAVEL_MPS = 1.0312
+"""Speed along the profile that puts lines 7 … 18 at 17.6 … 1524 Hz: γⁿ cycles per metre times this.
+
+Derived from a published list of lines, whose lowest is 17.9 Hz. It is near the entrainment speed of a 55/75 pair of
+module 2 at 500 rpm, 0.95 to 1.02 m/s.
+"""
+
+
+@dataclass(frozen=True)
+class FractalSurface:
+    """z(h) = G^(D-1) Σ γ^(-(2-D)n) cos(2πγⁿh + κ_n), n = n_first … n_last.
+
+    Parameters
+    ----------
+    scale_m : float
+        G, not below 0; 0 is a smooth flank.
+    dimension : float
+        D, above 1 and below 2: low for wavy, high for jagged profiles.
+    n_first, n_last : int
+        Lines; γⁿ is in cycles per metre, so that 7 … 18 are wavelengths of 59 mm … 0.68 mm.
+    gamma : float
+        γ, 1.5 unless there is a reason.
+    """
+
+    scale_m: float
+    dimension: float = 1.5
+    n_first: int = 7
+    n_last: int = 18
+    gamma: float = 1.5
+
+    def __post_init__(self) -> None:
+        not_negative(self.scale_m, "scale_m of the roughness", "m")
+        within(self.dimension, "dimension of the roughness", 1.001, 1.999)
+        within(self.gamma, "gamma of the roughness", 1.01, 10.0)
+        if not (isinstance(self.n_first, int) and isinstance(self.n_last, int) and self.n_first <= self.n_last):
+            raise InputError(
+                f"lines {self.n_first} to {self.n_last} of the roughness",
+                allowed="whole numbers, the first not above the last",
+            )
+
+    @classmethod
+    def of_roughness(cls, rms_um: float, dimension: float = 1.5) -> FractalSurface:
+        """Return the surface whose rms height is `rms_um` (Rq); solves the rms formula for G.
+
+        G = (Rq √2/√Σγ^(-2(2-D)n))^(1/(D-1)).
+
+        Examples
+        --------
+        >>> f"{FractalSurface.of_roughness(0.45).scale_m:.3g}"
+        '2.32e-12'
+        """
+        unit = cls(1.0, dimension)
+        rms_m = 1e-6 * not_negative(rms_um, "rms_um of the roughness", "um")
+        return cls((rms_m / unit.rms_m) ** (1.0 / (dimension - 1.0)), dimension)
+
+    @property
+    def cycles_per_metre(self) -> FloatArray:
+        """γⁿ, (n_lines,)."""
+        lines: FloatArray = self.gamma ** np.arange(self.n_first, self.n_last + 1, dtype=np.float64)
+        return lines
+
+    @property
+    def amplitudes_m(self) -> FloatArray:
+        """Peak amplitude of each line, (n_lines,)."""
+        amplitudes: FloatArray = self.scale_m ** (self.dimension - 1) * self.cycles_per_metre ** -(2 - self.dimension)
+        return amplitudes
+
+    @property
+    def rms_m(self) -> float:
+        """Root mean square height, √(G^(2(D-1))/2 · Σγ^(-2(2-D)n)): of a long profile, or over phases."""
+        return float(np.sqrt(0.5 * np.sum(self.amplitudes_m**2)))
+
+    def draw_phases(self, rng: np.random.Generator, n_profiles: int = 1) -> FloatArray:
+        """Uniform phases κ, (n_profiles, n_lines)."""
+        n_lines = self.n_last - self.n_first + 1
+        phases: FloatArray = rng.uniform(0.0, 2 * np.pi, (n_profiles, n_lines))
+        return phases
+
+
+@dataclass(frozen=True)
+class TimeLockedRoughness:
+    """Δb(t) = z(vt): the flanks met one after the other, spliced to one endless profile.
+
+    Its lines stand at fixed frequencies γⁿv, whatever the shaft does, and it never comes back with a tooth: it shows a
+    roughness's strength, not its place. Where a line must follow a gear, use `FlankRoughness`.
+
+    Parameters
+    ----------
+    surface : FractalSurface
+    phases_rad : array, (n_lines,)
+    travel_mps : float
+        v, above 0.
+    """
+
+    surface: FractalSurface
+    phases_rad: FloatArray
+    travel_mps: float = LISTED_TRAVEL_MPS
+
+    def __post_init__(self) -> None:
+        positive(self.travel_mps, "travel_mps of the roughness", "m/s")
+        object.__setattr__(self, "phases_rad", _phases(self.phases_rad, 1, len(self.surface.amplitudes_m)))
+
+    @classmethod
+    def draw(cls, surface: FractalSurface, rng: np.random.Generator) -> TimeLockedRoughness:
+        """Draw the phases."""
+        return cls(surface, surface.draw_phases(rng)[0])
+
+    @property
+    def frequencies_hz(self) -> FloatArray:
+        """γⁿ v, (n_lines,)."""
+        return self.surface.cycles_per_metre * self.travel_mps
+
+    def height_m(self, time_s: ArrayLike) -> FloatArray:
+        """Δb at the given times."""
+        return _cosines(self.surface.amplitudes_m, 2 * np.pi * self.frequencies_hz, self.phases_rad, time_s)
+
+    def phasors(self, step_s: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """What `roughness_kernel.height_now` and `advance` work on, from time 0.
+
+        Returns
+        -------
+        real, imaginary, omega_rad_s, step_cos, step_sin : arrays, (n_lines,)
+            For steps of `step_s`, which is half the solver's step for a fourth-order Runge–Kutta method.
+        """
+        positive(step_s, "step_s", "s")
+        omega, a = 2 * np.pi * self.frequencies_hz, self.surface.amplitudes_m
+        return (
+            a * np.cos(self.phases_rad),
+            a * np.sin(self.phases_rad),
+            omega,
+            np.cos(omega * step_s),
+            np.sin(omega * step_s),
+        )
+
+
+@dataclass(frozen=True, eq=False)  # two drawn profiles are never the same, and arrays compare element by element
+class FlankRoughness:
+    """z of every tooth of one gear over the position on its flank: it returns with the tooth.
+
+    The lines of a whole gear are orders of its shaft. Wavelengths longer than the flank act as pitch errors.
+
+    Parameters
+    ----------
+    surface : FractalSurface
+    phases_rad : array, (n_teeth, n_lines)
+    """
+
+    surface: FractalSurface
+    phases_rad: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "phases_rad", _phases(self.phases_rad, 2, len(self.surface.amplitudes_m)))
+
+    @classmethod
+    def draw(cls, surface: FractalSurface, n_teeth: int, rng: np.random.Generator) -> FlankRoughness:
+        """Draw the phases of every tooth."""
+        return cls(surface, surface.draw_phases(rng, count(n_teeth, "n_teeth")))
+
+    @property
+    def n_teeth(self) -> int:
+        """Teeth of the gear."""
+        return int(self.phases_rad.shape[0])
+
+    def height_m(self, tooth: NDArray[np.integer] | int, position_m: ArrayLike) -> FloatArray:
+        """Height of a tooth's flank, above 0 into the gap; tooth numbers count on through revolutions.
+
+        Parameters
+        ----------
+        tooth : int or array
+            Any whole number; taken modulo the number of teeth.
+        position_m : array
+            Arc length along the flank, from the root end of the contact, in the shape of `tooth` or one that goes with
+            it.
+        """
+        s = np.asarray(position_m, dtype=np.float64)
+        row = np.mod(tooth, self.n_teeth)
+        total = np.zeros(np.broadcast_shapes(np.shape(row), s.shape))
+        # cos(ks + φ) by the cosines and sines of both: one profile of positions serves all teeth.
+        for n, cycles in enumerate(self.surface.cycles_per_metre):
+            place, phase = 2 * np.pi * cycles * s, self.phases_rad[row, n]
+            a = self.surface.amplitudes_m[n]
+            total += a * np.cos(phase) * np.cos(place)
+            total -= a * np.sin(phase) * np.sin(place)
+        return total
+
+
+def _cosines(amplitudes: FloatArray, omega: FloatArray, phases: FloatArray, time_s: ArrayLike) -> FloatArray:
+    t = np.asarray(time_s, dtype=np.float64)
+    total = np.zeros(t.shape)
+    for a, w, phase in zip(amplitudes, omega, phases, strict=True):  # line by line: no (time × line) matrix
+        total += a * np.cos(w * t + phase)
+    return total
+
+
+def _phases(phases_rad: FloatArray, ndim: int, n_lines: int) -> FloatArray:
+    phases = frozen_array(phases_rad, "phases_rad of the roughness", ndim=ndim)
+    if phases.shape[-1] != n_lines:
+        raise InputError(
+            f"{phases.shape[-1]} phases", where="phases_rad of the roughness", allowed=f"{n_lines}, per line"
+        )
+    return phases
+
+
+# Compiled roughness for right-hand sides: phasors stepped in time, tables looked up on the flank.
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def height_now(real, imaginary, omega_rad_s):  # type: ignore[no-untyped-def]
+    """(Σ Re p_n, -Σ ω_n Im p_n): height and its rate from the phasors p_n = a_n exp(i(ω_n t + κ_n))."""
+    height, rate = 0.0, 0.0
+    for n in range(real.shape[0]):
+        height += real[n]
+        rate -= omega_rad_s[n] * imaginary[n]
+    return height, rate
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def advance(real, imaginary, step_cos, step_sin):  # type: ignore[no-untyped-def]
+    """Turn the phasors by one step, in place; exact up to rounding, about 1e-16 per step."""
+    for n in range(real.shape[0]):
+        re = real[n] * step_cos[n] - imaginary[n] * step_sin[n]
+        imaginary[n] = real[n] * step_sin[n] + imaginary[n] * step_cos[n]
+        real[n] = re
