@@ -9,6 +9,7 @@ from gearsig.motion._force import (
     PIECEWISE,
     TEETH,
     TOOTH_FORCE,
+    ForceEstimate,
     NoiseStudy,
     acceleration_limit_rad_s2,
     depth,
@@ -29,12 +30,16 @@ from gearsig.motion._identify import (
 from gearsig.motion._impacts import Impact, find_impacts, fit_flight, reduced_mass_kg
 from gearsig.motion._measure import (
     LocalPolynomial,
+    PairMotion,
     channel_scale,
     check_angle,
+    check_turns,
     check_wrap,
     find_roles,
     local_polynomial,
     measure_motion,
+    median_deviation,
+    refuse_standing,
 )
 from gearsig.motion._segments import (
     AT_REST,
@@ -54,7 +59,6 @@ from gearsig.motion._segments import (
 )
 from gearsig.motion._start_stop import StartStop, examine_start_stop
 from gearsig.motion._transmission_error import AngleSource, TransmissionError, transmission_error
-from gearsig.motion._types import ForceEstimate, PairMotion, check_turns, median_deviation, refuse_standing
 
 __all__ = [
     "AS_PRINTED",

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
+from gearsig.motion._measure import PairMotion, median_deviation
 from gearsig.motion._segments import MotionSegments
-from gearsig.motion._types import PairMotion, median_deviation
 from gearsig.results import Result
 
 MIN_SAMPLES = 12

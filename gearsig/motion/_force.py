@@ -4,15 +4,106 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, frozen_array, number
+from gearsig.checks import FloatArray, count, freeze, frozen_array, number
 from gearsig.errors import InputError, RefusalError
-from gearsig.motion._measure import find_roles, measure_motion, role_values
-from gearsig.motion._types import Datum, ForceError, ForceEstimate, PairMotion, check_motion, median_deviation
+from gearsig.motion._measure import PairMotion, check_motion, find_roles, measure_motion, median_deviation, role_values
 from gearsig.recording import Recording
+from gearsig.results import Result
 from gearsig.rig import Rig, ToothContact, contact_pair, path_of_contact
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+@dataclass(frozen=True)
+class Datum:
+    """Zero of the compression: where it is when the teeth stand in the middle of the backlash.
+
+    Parameters
+    ----------
+    compression_m : float
+    uncertainty_m : float
+        One standard deviation; nan where it was given.
+    method : str
+    """
+
+    compression_m: float
+    uncertainty_m: float
+    method: str
+
+
+@dataclass(frozen=True)
+class ForceError:
+    """How far a model's force is from the reference.
+
+    Parameters
+    ----------
+    model, reference : str
+    rms_n, bias_n, largest_n : float
+        Root mean square, mean and largest magnitude of model − reference.
+    relative_rms : float
+        Root mean square over that of the reference.
+    correlation : float
+    """
+
+    model: str
+    reference: str
+    rms_n: float
+    relative_rms: float
+    bias_n: float
+    largest_n: float
+    correlation: float
+
+
+@dataclass(frozen=True)
+class ForceEstimate(Result):
+    """Force between the teeth from their motion, by several models.
+
+    Parameters
+    ----------
+    motion : PairMotion
+    datum : Datum
+    depth_m : array, (n,)
+        g: depth of the contact with the flank's sign, 0 in the backlash.
+    n_pairs : array, (n,)
+    forces_n : mapping
+        Model → (n,).
+    references_n : mapping
+        "torque / base radius" or "tooth force" → (n,); empty where nothing was measured.
+    errors : tuple of ForceError
+        Of every model against every reference it can be compared with.
+    descriptions : mapping
+        Model → formula with its numbers.
+    """
+
+    motion: PairMotion
+    datum: Datum
+    depth_m: FloatArray
+    n_pairs: FloatArray
+    forces_n: Mapping[str, FloatArray]
+    references_n: Mapping[str, FloatArray]
+    errors: tuple[ForceError, ...]
+    descriptions: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        freeze(self, "depth_m", "n_pairs")
+
+    def to_frame(self) -> DataFrame:
+        """Return time, references, models, depth and pairs in contact as a pandas table, one row a sample."""
+        from pandas import DataFrame
+
+        forces = {f"{name} [N]": values for name, values in {**self.references_n, **self.forces_n}.items()}
+        return DataFrame(
+            {"time_s": self.motion.time_s, **forces, "depth [um]": 1e6 * self.depth_m, "pairs in contact": self.n_pairs}
+        )
+
+    def error(self, model: str, reference: str) -> ForceError:
+        """Return the error of one model against one reference."""
+        return next(e for e in self.errors if (e.model, e.reference) == (model, reference))
 
 
 def depth(compression_m: FloatArray, half_backlash_m: float) -> FloatArray:

@@ -13,7 +13,7 @@ from gearsig.errors import RefusalError
 from gearsig.motion._backlash import MIN_SAMPLES, dependence, estimate_backlash
 from gearsig.motion._force import find_datum, friction_share
 from gearsig.motion._impacts import meeting_speeds
-from gearsig.motion._types import PairMotion, median_deviation
+from gearsig.motion._measure import PairMotion, median_deviation
 from gearsig.results import Result
 from gearsig.rig import damping_ratio_s_per_m
 

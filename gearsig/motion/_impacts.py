@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import RefusalError
 from gearsig.motion._force import depth
-from gearsig.motion._types import PairMotion, median_deviation
+from gearsig.motion._measure import PairMotion, median_deviation
 
 MAX_SAMPLES = 60
 

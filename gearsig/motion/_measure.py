@@ -11,9 +11,152 @@ import numpy as np
 from gearsig.checks import FloatArray, count, instance_of, known_name, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
-from gearsig.motion._types import PairMotion, median_deviation, stands
 from gearsig.recording import Channel, Recording, check_recording
-from gearsig.rig import SIDES, EncoderChannel, GearPair, PathOfContact, Rig, check_rig, contact_pair, path_of_contact
+from gearsig.results import Result
+from gearsig.rig import (
+    SIDES,
+    EncoderChannel,
+    GearPair,
+    PathOfContact,
+    Rig,
+    ToothContact,
+    check_rig,
+    contact_pair,
+    path_of_contact,
+)
+
+
+@dataclass(frozen=True)
+class PairMotion(Result, columns=("time_s", "driver_angle_rad", "driven_angle_rad")):
+    """Measured motion of both gears.
+
+    Parameters
+    ----------
+    sampling_rate_hz : float
+    driver_angle_rad, driven_angle_rad : array, (n,)
+        Each in its own direction, so that both rise in forward motion.
+    driver_speed_rad_s, driven_speed_rad_s : array, (n,)
+    driver_acceleration_rad_s2, driven_acceleration_rad_s2 : array, (n,)
+    path : PathOfContact
+    contact : ToothContact
+    methods : mapping
+        Where each came from: a channel, or the filter that made it.
+    torque_nm : array or None
+        On the driver's shaft.
+    force_n : array or None
+        Of the teeth, where something else measured or simulated it.
+    source : str
+    notes : tuple of str
+    """
+
+    sampling_rate_hz: float
+    driver_angle_rad: FloatArray
+    driven_angle_rad: FloatArray
+    driver_speed_rad_s: FloatArray
+    driven_speed_rad_s: FloatArray
+    driver_acceleration_rad_s2: FloatArray
+    driven_acceleration_rad_s2: FloatArray
+    path: PathOfContact
+    contact: ToothContact
+    methods: Mapping[str, str] = field(default_factory=dict)
+    torque_nm: FloatArray | None = None
+    force_n: FloatArray | None = None
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Times of the samples from 0."""
+        return np.arange(len(self.driver_angle_rad)) / self.sampling_rate_hz
+
+    @property
+    def compression_m(self) -> FloatArray:
+        """Distance r_b1 θ1 − r_b2 θ2 between the flanks along the line of action, against an unknown zero."""
+        return self._difference(self.driver_angle_rad, self.driven_angle_rad)
+
+    @property
+    def compression_rate_mps(self) -> FloatArray:
+        """Its rate."""
+        return self._difference(self.driver_speed_rad_s, self.driven_speed_rad_s)
+
+    @property
+    def compression_acceleration_mps2(self) -> FloatArray:
+        """Its acceleration."""
+        return self._difference(self.driver_acceleration_rad_s2, self.driven_acceleration_rad_s2)
+
+    @property
+    def shaft_force_n(self) -> FloatArray | None:
+        """Measured torque over the base radius, τ/r_b1."""
+        return None if self.torque_nm is None else self.torque_nm / self.path.base_radii_m[0]
+
+    @property
+    def tooth_force_from_torque_n(self) -> FloatArray | None:
+        """(τ − J1 α1)/r_b1: what is left of the torque for the teeth, with their friction."""
+        return None if self.torque_nm is None else self.torque_and_tooth_force()[1]
+
+    def torque_and_tooth_force(self) -> tuple[FloatArray, FloatArray]:
+        """Return the torque in N m and the tooth force from it in N, (n,) each.
+
+        Raises
+        ------
+        RefusalError
+            If no torque was measured.
+        """
+        if self.torque_nm is None:
+            raise RefusalError("no torque was measured", remedy="record the torque of the driver's shaft")
+        inertia = self.contact.driver_inertia_kg_m2 * self.driver_acceleration_rad_s2
+        return self.torque_nm, (self.torque_nm - inertia) / self.path.base_radii_m[0]
+
+    def _difference(self, driver: FloatArray, driven: FloatArray) -> FloatArray:
+        r1, r2 = self.path.base_radii_m
+        return r1 * driver - r2 * driven
+
+
+def median_deviation(values: FloatArray) -> float:
+    """Return the standard deviation of Gaussian values about 0 by their median magnitude: outliers do not count."""
+    return 1.4826 * float(np.median(np.abs(values)))
+
+
+def stands(driver_angle_rad: FloatArray, path: PathOfContact, contact: ToothContact) -> bool:
+    """Say whether the driver turns by less than its play and a quarter of a tooth pitch."""
+    # A machine that turns by less than that stands, though a blow may rattle it.
+    return float(np.ptp(driver_angle_rad)) < _play_rad(path, contact) + 2.0 * pi / path.teeth[0] * 0.25
+
+
+def check_motion(value: object) -> None:
+    """Raise unless the value is the motion of a pair."""
+    instance_of(value, PairMotion, "motion", remedy="gearsig.measure_motion(recording, rig) makes one")
+
+
+def check_turns(motion: PairMotion) -> None:
+    """Refuse a record in which the driver turns by less than its play and a quarter of a tooth pitch.
+
+    Raises
+    ------
+    RefusalError
+        If the machine stands.
+    """
+    check_motion(motion)
+    refuse_standing(motion.driver_angle_rad, motion.path, motion.contact, motion.sampling_rate_hz, motion.source)
+
+
+def refuse_standing(
+    driver_angle_rad: FloatArray, path: PathOfContact, contact: ToothContact, sampling_rate_hz: float, source: str
+) -> None:
+    """Refuse the angle of a driver that stands; see `check_turns`."""
+    if not stands(driver_angle_rad, path, contact):
+        return
+    turned, duration_s = float(np.ptp(driver_angle_rad)), len(driver_angle_rad) / sampling_rate_hz
+    raise RefusalError(
+        f"{source or 'the recording'}: the driver turns by {1e3 * turned:.3g} mrad in {duration_s:.4g} s, against a "
+        f"play of {1e3 * _play_rad(path, contact):.3g} mrad: the machine stands, its stop is longer than the record",
+        remedy="record a start and a braked stop",
+    )
+
+
+def _play_rad(path: PathOfContact, contact: ToothContact) -> float:
+    return 2e-6 * contact.half_backlash_um / path.base_radii_m[0]
+
 
 QUANTITY_OF = {"angle": ("angle", "encoder"), "speed": ("rotational_speed",), "acceleration": ("angular_acceleration",)}
 ROLES = (*(f"{side} {what}" for what in QUANTITY_OF for side in SIDES), "torque", "force")

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
-from gearsig.motion._measure import local_polynomial
-from gearsig.motion._types import median_deviation
+from gearsig.motion._measure import local_polynomial, median_deviation
 from gearsig.results import Result
 from gearsig.spectra import Spectrum, amplitude_spectrum
 

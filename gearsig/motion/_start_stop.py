@@ -13,8 +13,8 @@ from gearsig.motion._backlash import BacklashEstimate, TorqueTwist, estimate_bac
 from gearsig.motion._force import find_datum
 from gearsig.motion._identify import YieldingTeeth, tooth_compliance
 from gearsig.motion._impacts import Impact, find_impacts
+from gearsig.motion._measure import PairMotion, check_turns
 from gearsig.motion._segments import MotionSegments, motion_segments
-from gearsig.motion._types import PairMotion, check_turns
 from gearsig.phase import PhasePortrait
 from gearsig.results import Result
 

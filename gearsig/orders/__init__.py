@@ -1,7 +1,9 @@
 """Spectra and averages over shaft angle: orders, maps, tracked orders, synchronous averages."""
 
 from gearsig.orders._average import (
+    AverageLines,
     SeparatedShafts,
+    SynchronousAverage,
     average_lines,
     first_whole_sample,
     mean_and_error,
@@ -10,9 +12,8 @@ from gearsig.orders._average import (
     whole_revolutions,
 )
 from gearsig.orders._separate import SeparatedAverage, band_passed_mesh, check_average, mesh_modulation, separate
-from gearsig.orders._spectrum import frequency_map, order_map, order_spectrum
-from gearsig.orders._track import amplitude_at_speeds, track_order_bands, track_orders
-from gearsig.orders._types import AverageLines, OrderMap, SynchronousAverage, TrackedOrder
+from gearsig.orders._spectrum import OrderMap, frequency_map, order_map, order_spectrum
+from gearsig.orders._track import TrackedOrder, amplitude_at_speeds, track_order_bands, track_orders
 from gearsig.orders.vold_kalman._filter import track_vold_kalman
 from gearsig.orders.vold_kalman._tracks import FrequencyTrack, Generation, OrderSeparation, SeparatedOrder
 

@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, freeze, instance_of, listed
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
-from gearsig.orders._types import SynchronousAverage
+from gearsig.orders._average import SynchronousAverage
 from gearsig.results import Result
 
 PartKind = Literal["residual", "difference", "regular", "band-passed mesh"]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle, check_shaft_angle
-from gearsig.checks import FloatArray, count, one_of, positive
+from gearsig.checks import FloatArray, count, freeze, one_of, positive
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import axis_label
 from gearsig.orders._average import block_times, first_whole_sample, over_angle, unit_of, whole_revolutions
-from gearsig.orders._types import OrderMap
 from gearsig.recording import Recording
+from gearsig.results import Result
 from gearsig.spectra import (
     BlockPlan,
     Scaling,
@@ -24,6 +26,49 @@ from gearsig.spectra import (
     scaled_unit,
     spectrum_of_blocks,
 )
+
+
+@dataclass(frozen=True)
+class OrderMap(Result, matrix=("values", "time_s", "positions")):
+    """Spectra along speed or time.
+
+    Parameters
+    ----------
+    values : array, (n_blocks, n_lines)
+    positions : array, (n_lines,)
+        Orders or frequencies (Hz), see `axis`.
+    time_s, speed_rpm : arrays, (n_blocks,)
+        Middle of each block, mean speed in it.
+    axis : str
+        "order" or "frequency".
+    scaling, unit, resolution, source, shaft
+        As in `Spectrum`.
+    """
+
+    values: FloatArray
+    positions: FloatArray
+    time_s: FloatArray
+    speed_rpm: FloatArray
+    axis: Literal["order", "frequency"]
+    scaling: Scaling
+    unit: str
+    resolution: float
+    source: str
+    shaft: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "values", ndim=2)
+        freeze(self, "positions", "time_s", "speed_rpm")
+        if self.values.shape != (len(self.time_s), len(self.positions)):
+            raise InputError(
+                f"values of shape {self.values.shape} for {len(self.time_s)} blocks × {len(self.positions)} lines"
+            )
+
+    @property
+    def axis_label(self) -> str:
+        """Name of the axis of lines, with its unit."""
+        return axis_label(self.axis, self.shaft)
+
 
 MANY_REVOLUTIONS = 500
 """From there on, some at the end are left out for a fast transform."""

@@ -3,17 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, frozen_array, instance_of, listed_numbers, not_negative, positive
+from gearsig.checks import FloatArray, freeze, frozen_array, instance_of, listed_numbers, not_negative, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._average import block_times, over_angle, unit_of
-from gearsig.orders._types import TrackedOrder
 from gearsig.recording import Recording
+from gearsig.results import Result
 from gearsig.spectra import BATCH_SAMPLES, BlockPlan, ComplexArray, plan_blocks
+
+
+@dataclass(frozen=True)
+class TrackedOrder(Result, columns=("time_s", "speed_rpm", "amplitude", "phase_rad")):
+    """Level and phase of one order along speed.
+
+    Parameters
+    ----------
+    order : float
+        Cycles per revolution of `shaft`.
+    time_s, speed_rpm : arrays, (n,)
+    amplitude : array, (n,)
+        Peak amplitude of the order in `unit`.
+    phase_rad : array, (n,)
+        Of the cosine against the shaft angle, -π to π.
+    bandwidth_orders : float
+        Width over which the order's energy was collected.
+    unit, source, shaft : str
+        Of the amplitude; the channel; the shaft that the order counts on.
+    """
+
+    order: float
+    time_s: FloatArray
+    speed_rpm: FloatArray
+    amplitude: FloatArray
+    phase_rad: FloatArray
+    unit: str
+    bandwidth_orders: float
+    source: str
+    shaft: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "time_s", "speed_rpm", "amplitude", "phase_rad")
 
 
 def track_orders(

@@ -1,8 +1,23 @@
 """Motion in its phase space: portraits, Poincaré sections, embedding, Lyapunov exponents."""
 
-from gearsig.phase._bifurcation import TwoMotions, bifurcation_diagram, coexistence_ranges, step_of, values_apart
-from gearsig.phase._embedding import average_mutual_information, delay_embedding, delay_vectors, embedding_dimension
+from gearsig.phase._bifurcation import (
+    BifurcationDiagram,
+    TwoMotions,
+    bifurcation_diagram,
+    coexistence_ranges,
+    step_of,
+    values_apart,
+)
+from gearsig.phase._embedding import (
+    EmbeddingDimension,
+    MutualInformation,
+    average_mutual_information,
+    delay_embedding,
+    delay_vectors,
+    embedding_dimension,
+)
 from gearsig.phase._kind import (
+    ChaosTest,
     MotionKind,
     kind_of_motion,
     mean_square_displacement,
@@ -10,28 +25,18 @@ from gearsig.phase._kind import (
     zero_one_test,
     zero_one_test_of_section,
 )
-from gearsig.phase._lyapunov import largest_lyapunov_exponent
+from gearsig.phase._lyapunov import LyapunovExponent, largest_lyapunov_exponent
 from gearsig.phase._neighbours import nearest_apart, spaced
-from gearsig.phase._plane import MotionQuantity, lowest_low_cut_hz, phase_plane
-from gearsig.phase._recurrence import recurrence_measures, recurrence_plot
+from gearsig.phase._plane import MotionQuantity, PhasePortrait, lowest_low_cut_hz, phase_plane
+from gearsig.phase._recurrence import RecurrenceMeasures, RecurrencePlot, recurrence_measures, recurrence_plot
 from gearsig.phase._section import (
     CycleLock,
+    PoincareSection,
     constant_period_lock,
     find_lock,
     poincare_section,
     points_between,
     section_period,
-)
-from gearsig.phase._types import (
-    BifurcationDiagram,
-    ChaosTest,
-    EmbeddingDimension,
-    LyapunovExponent,
-    MutualInformation,
-    PhasePortrait,
-    PoincareSection,
-    RecurrenceMeasures,
-    RecurrencePlot,
 )
 
 __all__ = [

@@ -3,14 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count
+from gearsig.checks import FloatArray, count, freeze
 from gearsig.errors import InputError
-from gearsig.phase._section import section_period
-from gearsig.phase._types import BifurcationDiagram, PoincareSection
+from gearsig.phase._section import PoincareSection, section_period
+from gearsig.results import Result
+
+
+@dataclass(frozen=True)
+class BifurcationDiagram(Result, columns=("parameter", "points")):
+    """One coordinate of the Poincaré points over a parameter.
+
+    Parameters
+    ----------
+    parameter : array, (n_points,)
+        Value of the parameter for each point, ascending.
+    points : array, (n_points,)
+    parameter_name, parameter_unit, axis_name, unit : str
+    values : array, (n_values,)
+        The parameter values that have points, ascending.
+    periods : tuple of int, (n_values,)
+        Cycles after which the section repeats at each value; 0 where it does not repeat within the longest looked for.
+    section : str
+    extents : array, (n_values,)
+        Standard deviation of the whole path along the drawn axis at each value; empty where it is not known.
+    """
+
+    parameter: FloatArray
+    points: FloatArray
+    parameter_name: str
+    parameter_unit: str
+    axis_name: str
+    unit: str
+    values: FloatArray
+    periods: tuple[int, ...]
+    section: str
+    extents: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        freeze(self, "parameter", "points", "values", "extents")
+        if len(self.parameter) != len(self.points) or len(self.values) != len(self.periods):
+            raise InputError(f"{len(self.parameter)} parameter values for {len(self.points)} points")
+        if len(self.extents) not in (0, len(self.values)):
+            raise InputError(f"{len(self.extents)} extents for {len(self.values)} values")
+
 
 DIFFERS = 0.1
 """Two branches are apart where their sizes differ by more than this share."""

@@ -2,24 +2,100 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import ceil
+from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, positive, within
+from gearsig.checks import FloatArray, count, freeze, positive, within
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent, seconds_text
 from gearsig.phase._neighbours import nearest_apart, spaced
-from gearsig.phase._types import (
-    EmbeddingDimension,
-    MutualInformation,
-    PhasePortrait,
-    checked_series,
-    mean_period_samples,
-)
+from gearsig.phase._plane import PhasePortrait, checked_series, mean_period_samples
 from gearsig.recording import Recording
+from gearsig.results import Result
 from gearsig.spectra import named_signal
+
+
+@dataclass(frozen=True)
+class MutualInformation(Result, columns=("delays_s", "information_nats")):
+    """Average mutual information of a signal and its delayed self, and the delay chosen from it.
+
+    Parameters
+    ----------
+    information_nats : array, (n_delays,)
+        At delays of 0, 1, 2, … × `step_samples`.
+    step_samples : int
+    sampling_rate_hz : float
+    delay_samples : int
+        The delay chosen.
+    rule : str
+        How: "first minimum", or what stood in for it.
+    n_bins : int
+        Of the histogram, per axis.
+    source : str
+    """
+
+    information_nats: FloatArray
+    step_samples: int
+    sampling_rate_hz: float
+    delay_samples: int
+    rule: str
+    n_bins: int
+    source: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "information_nats")
+
+    @property
+    def delays_s(self) -> FloatArray:
+        """Delays, (n_delays,)."""
+        return np.arange(len(self.information_nats)) * (self.step_samples / self.sampling_rate_hz)
+
+    @property
+    def delay_s(self) -> float:
+        """The delay chosen."""
+        return self.delay_samples / self.sampling_rate_hz
+
+
+@dataclass(frozen=True)
+class EmbeddingDimension(Result):
+    """How many delayed values unfold a signal's path.
+
+    Parameters
+    ----------
+    dimensions : tuple of int
+        1, 2, …
+    false_fraction : array, (n_dimensions,)
+        Share of nearest neighbours that are false at each dimension (Kennel).
+    growth : array, (n_dimensions - 1,)
+        Cao's E1(d): reaches 1 where the path is unfolded.
+    determinism : array, (n_dimensions - 1,)
+        Cao's E2(d): 1 at every d for a random signal.
+    dimension : int
+        The one chosen; 0 where no dimension unfolds the path.
+    verdict : str
+        "deterministic", or "stochastic": no dimension up to the largest tried unfolds it.
+    threshold : float
+        Share of false neighbours that still counts as unfolded.
+    delay_samples : int
+    source : str
+    """
+
+    dimensions: tuple[int, ...]
+    false_fraction: FloatArray
+    growth: FloatArray
+    determinism: FloatArray
+    dimension: int
+    verdict: Literal["deterministic", "stochastic"]
+    threshold: float
+    delay_samples: int
+    source: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "false_fraction", "growth", "determinism")
 
 
 def delay_embedding(

@@ -7,24 +7,56 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, not_negative
+from gearsig.checks import FloatArray, count, freeze, not_negative
 from gearsig.errors import InputError, answer_or_none
 from gearsig.formatting import counted
-from gearsig.phase._embedding import chosen_delay, delay_embedding, embedding_dimension
-from gearsig.phase._lyapunov import largest_lyapunov_exponent
+from gearsig.phase._embedding import EmbeddingDimension, chosen_delay, delay_embedding, embedding_dimension
+from gearsig.phase._lyapunov import LyapunovExponent, largest_lyapunov_exponent
 from gearsig.phase._neighbours import GOLDEN
-from gearsig.phase._section import CycleLock, check_lock, poincare_section, section_period
-from gearsig.phase._types import (
-    ChaosTest,
-    ChaosVerdict,
-    EmbeddingDimension,
-    LyapunovExponent,
-    PhasePortrait,
-    PoincareSection,
-    checked_series,
-    mean_period_samples,
-)
+from gearsig.phase._plane import PhasePortrait, checked_series, mean_period_samples
+from gearsig.phase._section import CycleLock, PoincareSection, check_lock, poincare_section, section_period
 from gearsig.results import Result
+
+ChaosVerdict = Literal["regular", "irregular", "undecided"]
+
+
+@dataclass(frozen=True)
+class ChaosTest(Result, columns=("c_rad", "k_of_c")):
+    """Result of the 0–1 test.
+
+    Parameters
+    ----------
+    k : float
+        Median of `k_of_c`: near 0 for regular motion, near 1 for chaos (and for noise: the test presumes determinism).
+    k_of_c, c_rad : arrays, (n_frequencies,)
+    damping : float
+        Weight of the term that keeps weak noise from being read as chaos; 0: the plain modified test.
+    n_values : int
+    verdict : str
+        "regular" (k < 0.2), "irregular" (k > 0.8), "undecided" between and where the values are oversampled.
+    oversampled : bool
+        Whether neighbouring values are so close that the test would read chaos as regular motion.
+    source : str
+    every : int
+        Every so-many-th value was used.
+    reason : str
+        Why it is undecided; empty otherwise.
+    """
+
+    k: float
+    k_of_c: FloatArray
+    c_rad: FloatArray
+    damping: float
+    n_values: int
+    verdict: ChaosVerdict
+    oversampled: bool
+    source: str
+    every: int = 1
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        freeze(self, "k_of_c", "c_rad")
+
 
 MIN_VALUES, MAX_VALUES = 200, 20_000
 LOWEST_C, HIGHEST_C = np.pi / 5.0, 4.0 * np.pi / 5.0

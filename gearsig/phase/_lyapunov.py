@@ -7,12 +7,60 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, one_of
+from gearsig.checks import FloatArray, count, freeze, one_of
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.phase._neighbours import GOLDEN, IndexArray, nearest_apart, spaced
-from gearsig.phase._types import LyapunovExponent, PhasePortrait, check_portrait, checked_series, mean_period_samples
+from gearsig.phase._plane import PhasePortrait, check_portrait, checked_series, mean_period_samples
+from gearsig.results import Result
+
+
+@dataclass(frozen=True)
+class LyapunovExponent(Result, columns=("times_s", "log_distance")):
+    """Largest Lyapunov exponent, with the divergence curve it was read from.
+
+    Parameters
+    ----------
+    exponent_per_s, uncertainty_per_s : float
+        Slope of the curve and one standard deviation of it: scatter between segments of the signal, and dependence on
+        where the line is fitted. Not numbers in what a `RefusalError` looked at.
+    log_distance : array, (n_steps,)
+        Mean logarithm of the distance of neighbours after 0, 1, 2, … steps of `step_s`.
+    step_s : float
+    fit_s : (float, float)
+        Segment of the curve that was fitted.
+    saturation_log_distance : float
+        Mean logarithm of the distance of points that have nothing to do with each other.
+    verdict : str
+        "diverging": the exponent is above twice its uncertainty and distances grow by e or more; "not diverging": they
+        do not, although there was room; "undecided".
+    method : str
+        "rosenstein", "transverse" or "kantz".
+    n_references, theiler_samples : int
+    source : str
+    """
+
+    exponent_per_s: float
+    uncertainty_per_s: float
+    log_distance: FloatArray
+    step_s: float
+    fit_s: tuple[float, float]
+    saturation_log_distance: float
+    verdict: Literal["diverging", "not diverging", "undecided"]
+    method: str
+    n_references: int
+    theiler_samples: int
+    source: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "log_distance")
+
+    @property
+    def times_s(self) -> FloatArray:
+        """Times of the divergence curve, (n_steps,)."""
+        return np.arange(len(self.log_distance)) * self.step_s
+
 
 N_LIBRARY, N_REFERENCES, N_BLOCKS = 100_000, 4_000, 12
 MAX_NEIGHBOURS = 10

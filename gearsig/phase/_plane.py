@@ -1,18 +1,155 @@
-"""The phase plane of one measured channel: displacement and velocity."""
+"""Portraits of motion in phase space, what is asked of any of them, and the phase plane."""
 
 from __future__ import annotations
 
-from math import ceil
+from dataclasses import dataclass, replace
+from math import ceil, floor
 from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, positive, within
+from gearsig.checks import FloatArray, freeze, frozen_array, instance_of, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
-from gearsig.phase._types import PhasePortrait, checked_series
 from gearsig.recording import Recording, si_factor
+from gearsig.results import Result
 from gearsig.spectra import named_signal
+
+PortraitKind = Literal["phase plane", "delay embedding", "states"]
+
+
+@dataclass(frozen=True)
+class PhasePortrait(Result, matrix=("points", "times_s", "axis_names")):
+    """A path through phase space, sampled at a constant rate.
+
+    Parameters
+    ----------
+    points : array, (n_points, n_axes)
+        Sample i lies at `start_s` + i / `sampling_rate_hz` of the recording's time.
+    sampling_rate_hz : float
+    axis_names, units : tuples of str
+        One per axis.
+    kind : str
+        "phase plane": displacement and velocity; "delay embedding": x(t), x(t + τ), …; "states": as a model gave them.
+    source : str
+        Channel, and what was done to it.
+    start_s : float
+    band_hz : (float, float)
+        Frequencies that the axes hold in full; (0, half the sampling rate) where nothing was filtered.
+    delay_samples : int
+        Of a delay embedding; 0 otherwise.
+    """
+
+    points: FloatArray
+    sampling_rate_hz: float
+    axis_names: tuple[str, ...]
+    units: tuple[str, ...]
+    kind: PortraitKind
+    source: str
+    start_s: float = 0.0
+    band_hz: tuple[float, float] = (0.0, float("inf"))
+    delay_samples: int = 0
+
+    def __post_init__(self) -> None:
+        freeze(self, "points", ndim=2)
+        positive(self.sampling_rate_hz, "sampling_rate_hz", "Hz")
+        if not self.points.shape[1] == len(self.axis_names) == len(self.units):
+            raise InputError(
+                f"{len(self.axis_names)} axis names and {len(self.units)} units for {self.points.shape[1]} axes"
+            )
+
+    @property
+    def n_points(self) -> int:
+        """Samples of the path."""
+        return int(self.points.shape[0])
+
+    @property
+    def n_axes(self) -> int:
+        """Dimension of the space."""
+        return int(self.points.shape[1])
+
+    @property
+    def times_s(self) -> FloatArray:
+        """Time of each sample, (n_points,)."""
+        return self.start_s + np.arange(self.n_points) / self.sampling_rate_hz
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last sample."""
+        return self.start_s + (self.n_points - 1) / self.sampling_rate_hz
+
+    @property
+    def extent(self) -> FloatArray:
+        """Standard deviation along each axis, (n_axes,): the size that distances are compared with."""
+        deviation: FloatArray = np.std(self.points, axis=0, dtype=np.float64)
+        return deviation
+
+    def between(self, start_s: float, end_s: float) -> PhasePortrait:
+        """Return the samples from `start_s` to `end_s`, both included.
+
+        Raises
+        ------
+        InputError
+            If fewer than two lie there.
+        """
+        first = max(0, ceil((start_s - self.start_s) * self.sampling_rate_hz - 1e-6))
+        last = min(self.n_points - 1, floor((end_s - self.start_s) * self.sampling_rate_hz + 1e-6))
+        if last <= first:
+            raise InputError(
+                f"there are no samples from {start_s:g} to {end_s:g} s", allowed=f"{self.start_s:g} to {self.end_s:g} s"
+            )
+        start = self.start_s + first / self.sampling_rate_hz
+        return replace(self, points=self.points[first : last + 1], start_s=start)
+
+
+def check_portrait(value: object) -> None:
+    """Raise unless the value is a path in phase space."""
+    remedy = "gearsig.phase_plane and gearsig.delay_embedding(recording, channel) make one"
+    instance_of(value, PhasePortrait, "portrait", remedy=remedy)
+
+
+def checked_series(values: FloatArray, *, minimum: int, name: str = "values") -> FloatArray:
+    """Return a finite float64 series of at least `minimum` samples that is not constant.
+
+    Raises
+    ------
+    InputError
+        On NaN, a wrong shape, or too few samples.
+    RefusalError
+        If the series is constant: there is no motion to look at.
+    """
+    x = frozen_array(values, name, ndim=1)
+    if len(x) < minimum:
+        raise InputError(
+            f"{name} has {counted(len(x), 'sample')}",
+            allowed=f"at least {minimum}",
+            remedy="record longer or ask for less",
+        )
+    low, high = float(x.min()), float(x.max())
+    if high - low <= 8.0 * np.finfo(x.dtype).eps * max(abs(low), abs(high)):
+        raise RefusalError(
+            f"{name} is constant at {low:g}: nothing moves, so there is nothing to embed",
+            remedy="check the sensor, or take a channel or a segment that vibrates",
+        )
+    return np.asarray(x, dtype=np.float64)
+
+
+def mean_period_samples(x: FloatArray) -> float:
+    """Return one over the mean frequency of the power spectrum, in samples; at least 2.
+
+    T = Σ|X(f)|² / Σ f |X(f)|², the mean taken off before.
+
+    Source: M. T. Rosenstein, J. J. Collins, C. J. De Luca, *A practical method for calculating largest Lyapunov
+    exponents from small data sets*, Physica D 65 (1993).
+    """
+    from scipy import fft
+
+    part = x[: 1 << 20]
+    lines = fft.rfft(part - part.mean(), fft.next_fast_len(len(part), real=True))
+    power = np.square(lines.real) + np.square(lines.imag)
+    frequency = np.arange(len(power)) / (2.0 * (len(power) - 1))
+    return max(2.0, float(power.sum() / np.dot(frequency, power)))
+
 
 SETTLING_PERIODS, MIN_PERIODS = 5.0, 4.0
 """Periods of the low cut after which the result has settled at either end, and that must be left between the ends."""

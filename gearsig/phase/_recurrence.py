@@ -2,13 +2,90 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
-from gearsig.checks import FloatArray, count, positive, within
+import numpy as np
+from numpy.typing import NDArray
+
+from gearsig.checks import FloatArray, count, freeze, positive, within
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.phase._neighbours import GOLDEN
-from gearsig.phase._types import PhasePortrait, RecurrenceMeasures, RecurrencePlot, check_portrait, mean_period_samples
+from gearsig.phase._plane import PhasePortrait, check_portrait, mean_period_samples
+from gearsig.results import Result
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class RecurrencePlot(Result, matrix=("recurrent", "times_s", "times_s")):
+    """Which points of a path lie close to which.
+
+    Parameters
+    ----------
+    recurrent : array of bool, (n, n)
+        Symmetric; read-only.
+    times_s : array, (n,)
+    radius : float
+        Points closer than this are recurrent; in standard deviations of the axes.
+    stride : int
+        Every so-many-th point of the portrait was taken.
+    source : str
+    """
+
+    recurrent: BoolArray
+    times_s: FloatArray
+    radius: float
+    stride: int
+    source: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "recurrent", ndim=None)
+        freeze(self, "times_s")
+
+
+@dataclass(frozen=True)
+class RecurrenceMeasures(Result):
+    """Recurrence quantification; lengths in seconds, shares from 0 to 1.
+
+    Parameters
+    ----------
+    recurrence_rate : float
+        RR: share of recurrent pairs.
+    determinism : float
+        DET: share of the recurrent points that lie on diagonal lines of `shortest_line` points or more.
+    mean_line_s, longest_line_s : float
+        L and Lmax of these lines.
+    entropy_nats : float
+        ENTR: Shannon entropy of their lengths.
+    laminarity : float
+        LAM: share of the recurrent points on vertical lines of `shortest_line` points or more.
+    trapping_time_s : float
+        TT: mean length of these.
+    radius : float
+        In standard deviations of the axes.
+    shortest_line, theiler_points, stride, n_points : int
+        In points taken; every `stride`-th sample was.
+    duration_s : float
+        Length of the segment.
+    source : str
+    """
+
+    recurrence_rate: float
+    determinism: float
+    mean_line_s: float
+    longest_line_s: float
+    entropy_nats: float
+    laminarity: float
+    trapping_time_s: float
+    radius: float
+    shortest_line: int
+    theiler_points: int
+    stride: int
+    n_points: int
+    duration_s: float
+    source: str
+
 
 N_PAIRS = 200_000
 MAX_PLOT_POINTS, MAX_MEASURE_POINTS = 3_000, 20_000

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -16,11 +17,52 @@ from gearsig.angle import (
     interpolate,
     times_of_revolutions,
 )
-from gearsig.checks import FloatArray, count, frozen_array, instance_of, positive, read_only
+from gearsig.checks import FloatArray, count, freeze, frozen_array, instance_of, positive, read_only
 from gearsig.errors import InputError, RefusalError
-from gearsig.phase._types import PhasePortrait, PoincareSection, check_portrait
+from gearsig.phase._plane import PhasePortrait, check_portrait
 from gearsig.recording import Recording, check_recording
+from gearsig.results import Result
 from gearsig.rig import Rig, check_rig
+
+
+@dataclass(frozen=True)
+class PoincareSection(Result, matrix=("points", "times_s", "axis_names")):
+    """Points at which a path meets its section.
+
+    Parameters
+    ----------
+    points : array, (n_points, n_axes)
+        Interpolated between the samples, in the order of time.
+    times_s : array, (n_points,)
+    axis_names, units : tuples of str
+    extent : array, (n_axes,)
+        Standard deviation of the whole path along each axis.
+    kind : str
+        "locked": once per cycle of a mesh or a shaft; "geometric": where the path crosses a plane.
+    section : str
+        What it is locked to, or the plane.
+    source : str
+    """
+
+    points: FloatArray
+    times_s: FloatArray
+    axis_names: tuple[str, ...]
+    units: tuple[str, ...]
+    extent: FloatArray
+    kind: Literal["locked", "geometric"]
+    section: str
+    source: str
+
+    def __post_init__(self) -> None:
+        freeze(self, "points", ndim=2)
+        freeze(self, "times_s", "extent")
+        if len(self.points) != len(self.times_s) or self.points.shape[1] != len(self.extent):
+            raise InputError(f"points of shape {self.points.shape} for {len(self.times_s)} times")
+
+    @property
+    def n_points(self) -> int:
+        """Crossings."""
+        return int(self.points.shape[0])
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gearsig.angle import AngleSignal, ShaftAngle, times_of_revolutions
 from gearsig.checks import FloatArray, count, freeze, frozen_array, listed, positive, short
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders._types import TrackedOrder
+from gearsig.orders._track import TrackedOrder
 from gearsig.orders.vold_kalman._kernels import lowest_frequency
 from gearsig.results import Result
 from gearsig.rig import Rig
