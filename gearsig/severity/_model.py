@@ -187,10 +187,8 @@ class DepthModel:
 CRACKED, CHIPPED, SPALLED = KINDS = ("cracked", "chipped", "spalled")
 OTHER_DAMAGE = "chipped or spalled"
 
-_OF_SIZE = ("band_excess", "line_excess", "prominence", "pattern_excess")
-"""How large the event is and how far it stands out: a deep crack is no chip for being large."""
-
-_USED = [i for i, name in enumerate(FEATURES) if name not in (*RELIEF, *_OF_SIZE)]
+# Not how large the event is and how far it stands out: a deep crack is no chip for being large.
+_USED = [i for i, name in enumerate(FEATURES) if name not in (*RELIEF, *RISING)]
 KIND_FEATURES = (*(FEATURES[i] for i in _USED), *SHAPE)
 
 

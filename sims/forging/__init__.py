@@ -13,8 +13,18 @@ from sims.forging._drive import (
     build_rig,
     schedule,
 )
-from sims.forging._kernels import bristle, position, reach, weight, younger_pair
-from sims.forging._respond import DriveResponse, FirstState, check_convergence, drive_numbers, respond
+from sims.forging._respond import (
+    DriveResponse,
+    FirstState,
+    bristle,
+    check_convergence,
+    drive_numbers,
+    position,
+    reach,
+    respond,
+    weight,
+    younger_pair,
+)
 from sims.forging._simulator import (
     NAME,
     WITH_MEANING,
