@@ -1,8 +1,17 @@
 """Signals taken apart: variational modes, wavelet denoising."""
 
 from gearsig.decompose._suggestion import ModeSuggestion, ModeTrial, noise_width, suggest_modes
-from gearsig.decompose._types import ModeAxis, Modes, StartName, VmdEngine, VmdSettings
-from gearsig.decompose._vmd import mode_spectra, modes_by_block, peak_centres, vmd
+from gearsig.decompose._vmd import (
+    ModeAxis,
+    Modes,
+    StartName,
+    VmdEngine,
+    VmdSettings,
+    mode_spectra,
+    modes_by_block,
+    peak_centres,
+    vmd,
+)
 from gearsig.decompose._wavelet_denoising import (
     Denoised,
     DenoiseSettings,

@@ -8,8 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearsig.checks import FloatArray, count, positive
-from gearsig.decompose._types import SAMPLES_PER_MODE, ModeAxis, Modes, VmdSettings, check_supported, half_gain_distance
-from gearsig.decompose._vmd import modes_of_whole
+from gearsig.decompose._vmd import (
+    SAMPLES_PER_MODE,
+    ModeAxis,
+    Modes,
+    VmdSettings,
+    check_supported,
+    half_gain_distance,
+    modes_of_whole,
+)
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import axis_unit, counted
 from gearsig.results import Result

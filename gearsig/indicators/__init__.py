@@ -1,18 +1,5 @@
 """Condition indicators."""
 
-from gearsig.indicators._amplitude import (
-    Indicator,
-    clearance_factor,
-    crest_factor,
-    impulse_factor,
-    kurtosis,
-    peak,
-    peak_to_peak,
-    rms,
-    shape_factor,
-    skewness,
-    time_indicators,
-)
 from gearsig.indicators._gear import (
     energy_operator,
     energy_ratio,
@@ -40,10 +27,21 @@ from gearsig.indicators._lines import (
     over_orders,
     shaft_indicators,
 )
-from gearsig.indicators._overall import (
+from gearsig.indicators._signal import (
     ZONE_LIMITS_MM_PER_S,
+    Indicator,
+    clearance_factor,
+    crest_factor,
+    impulse_factor,
+    kurtosis,
     overall_indicators,
     overall_velocity_mm_per_s,
+    peak,
+    peak_to_peak,
+    rms,
+    shape_factor,
+    skewness,
+    time_indicators,
     velocity_band_hz,
     velocity_shares,
     vibration_zone,

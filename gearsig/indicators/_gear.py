@@ -30,7 +30,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count
 from gearsig.errors import InputError
 from gearsig.formatting import counted
-from gearsig.indicators._amplitude import Indicator, is_constant, standardised_moment
+from gearsig.indicators._signal import Indicator, is_constant, standardised_moment
 from gearsig.orders import SynchronousAverage, check_average
 
 # Gear indicators that compare with earlier records of the same gear.

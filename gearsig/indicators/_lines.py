@@ -10,8 +10,8 @@ import numpy as np
 
 from gearsig.checks import count, positive, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.indicators._amplitude import Indicator
 from gearsig.indicators._gear import line_amplitude
+from gearsig.indicators._signal import Indicator
 from gearsig.orders import SynchronousAverage
 from gearsig.rig import Bearing, GearPair, Rig
 from gearsig.spectra import Spectrum
