@@ -315,8 +315,8 @@ def _both_angles(
         elif (stated := _stated_pulses(recording, rig, shaft)) is not None:
             angles[side] = stated
     for side, opposite in (SIDES, SIDES[::-1]):
-        channels = [] if side in angles else _tachometers(recording, pair, side)
-        if len(channels) == 1 and opposite in angles:
+        channels = [c for c in recording.channels if c.quantity == "tachometer" and side_of(c, pair) == side]
+        if side not in angles and len(channels) == 1 and opposite in angles:
             ratio = (pair.driven_teeth or 1) / (pair.driver_teeth or 1)
             angles[side] = _counted(
                 recording, channels[0], angles[opposite], ratio if side == "driver" else 1.0 / ratio
@@ -359,10 +359,6 @@ def _from_encoder(angle_rad: FloatArray, recording: Recording, name: str) -> Ang
     per_revolution = 2.0 * pi / count_rad if whole else float("nan")
     source = AngleSource(name, "encoder", per_revolution, max(scatter, count_rad / sqrt(12.0) if whole else 0.0))
     return np.arange(len(angle)) * step_s, angle, source
-
-
-def _tachometers(recording: Recording, pair: GearPair, side: str) -> list[Channel]:
-    return [c for c in recording.channels if c.quantity == "tachometer" and side_of(c, pair) == side]
 
 
 def _stated_pulses(recording: Recording, rig: Rig, shaft: str) -> Angle | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from math import gcd, lcm, log10, pi, radians, sin, sqrt
 
 import numpy as np
@@ -115,14 +116,6 @@ def _race(scene: Scene, severity: float, choice: np.random.Generator, *, is_inne
     return {"shaft": SHAFTS[shaft], "bearing": bearing.name, "order": round(order, 4)}
 
 
-def _outer(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    return _race(scene, severity, choice, is_inner=False)
-
-
-def _inner(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    return _race(scene, severity, choice, is_inner=True)
-
-
 def _clearance(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
     shaft = int(choice.integers(2))
     scene.clearance_m[shaft] += severity * 1e-6
@@ -130,8 +123,8 @@ def _clearance(scene: Scene, severity: float, choice: np.random.Generator) -> Pl
 
 
 BEARING_CHANGES = (
-    Change("bearing_outer_race", "bearing", "mm", steady(0.06, 6.0), _outer),
-    Change("bearing_inner_race", "bearing", "mm", steady(0.08, 6.0), _inner),
+    Change("bearing_outer_race", "bearing", "mm", steady(0.06, 6.0), partial(_race, is_inner=False)),
+    Change("bearing_inner_race", "bearing", "mm", steady(0.08, 6.0), partial(_race, is_inner=True)),
     Change("bearing_clearance", "bearing", "um", steady(3.0, 60.0), _clearance),
 )
 

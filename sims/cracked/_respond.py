@@ -488,7 +488,8 @@ def respond(
     ready = prepare(machine, operation, rng, start_s, first)
     q, v = ready.q.copy(), ready.v.copy()  # the kernel overwrites them
     set_angle = q[:1].copy() if first is None else np.array([first.set_angle_rad])
-    select = np.array([_place(name) for name in signals], dtype=np.int64)
+    known = [known_name(name, SIGNALS, f"there is no signal {name!r}") for name in signals]
+    select = np.array([SIGNALS.index(name) for name in known], dtype=np.int64)
     phasors = ready.roughness.phasors(step / 2.0)
 
     def march(time_s: float, n_steps: int, rows: FloatArray, energies: FloatArray) -> int:
@@ -529,10 +530,6 @@ def _checked(state: PairState) -> tuple[FloatArray, FloatArray]:
             f"a state of {state.q.size} coordinates", where="first", allowed=f"{N_COORDINATES}: another run's last"
         )
     return state.q, state.v
-
-
-def _place(name: str) -> int:
-    return SIGNALS.index(known_name(name, SIGNALS, f"there is no signal {name!r}"))
 
 
 TOLERANCE = 1e-4

@@ -225,13 +225,8 @@ def completed_bearing(bearing: Bearing, size: float) -> Bearing:
         n = max(round((outer or 0.0) / USUAL_SPLIT or (inner or 0.0) / (1.0 - USUAL_SPLIT)), 3)
         share = 1.0 - 2.0 * outer / n if outer is not None else 2.0 * (inner or 0.0) / n - 1.0
     pitch = PITCH_MM * size
-    ball = min(max(share, 0.05), 0.9 * _closest(n)) * pitch
+    ball = min(max(share, 0.05), 0.9 * sin(pi / n)) * pitch  # at sin π/n they touch each other
     return replace(bearing, n_rolling_elements=n, rolling_element_diameter_mm=ball, pitch_diameter_mm=pitch)
-
-
-def _closest(n: int) -> float:
-    """Diameter at which n balls touch each other, over the pitch diameter."""
-    return sin(pi / n)
 
 
 def _spare(rig: Rig, shaft: str, number: int, size: float) -> Bearing:
