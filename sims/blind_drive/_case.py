@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.checks import FloatArray, one_of
 from gearsig.recording import Channel, Provenance, Recording
 from gearsig.rig import EncoderChannel, Sensor
-from sims.blind_drive._machine import CATALOGUE, OUTSIDE, BlindDrive, build, changed, draw_drawing
+from sims.blind_drive._machine import CATALOGUE, N_STATES, OUTSIDE, BlindDrive, build, changed, draw_drawing, march
 
 # --------------------
 # From a drive's motion to a recording: encoders that round, noise, sensors that are not there.
@@ -86,8 +86,6 @@ def draw_chain(rng: np.random.Generator) -> Chain:
 
 def run(machine: BlindDrive, chain: Chain, duration_s: float, rng: np.random.Generator) -> Recording:
     """Run a machine from rest and measure it; the pinion stands anywhere at the beginning."""
-    from sims.blind_drive._machine import N_STATES, march
-
     n = machine.numbers
     y = np.zeros(N_STATES)
     y[0] = y[2] = rng.uniform(0.0, 2.0 * pi)

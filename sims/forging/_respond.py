@@ -215,8 +215,6 @@ class _DriveRun:
         cls, drive: ForgingDrive, start: FirstState, signals: Sequence[str], duration_s: float, interval_s: float
     ) -> _DriveRun:
         """Make room for the signals, and put the drive into its first state."""
-        from sims.forging._respond import open_contact, reach
-
         n = ceil(duration_s / interval_s - 1e-9)
         if n > MAX_POINTS:
             raise InputError(f"{n} points are wanted", allowed=f"up to {MAX_POINTS}", remedy="shorten the run")
@@ -233,8 +231,6 @@ class _DriveRun:
 
     def advance(self, begin_s: float, end_s: float, profile: FloatArray, tolerance: float) -> None:
         """Integrate over one segment of straight profiles."""
-        from sims.forging._respond import DONE, integrate
-
         absolute = ABSOLUTE * (tolerance / TOLERANCE)
         self.step_s, status = integrate(
             self.k, self.y, self.mode, begin_s, end_s, min(self.step_s, 1e-5), profile, absolute, tolerance,
@@ -253,7 +249,6 @@ class _DriveRun:
 
 
 def _failure(status: int, before_s: float) -> RefusalError:
-
     reasons = {
         TOO_MANY_CONTACTS: "flanks touch and part more often than any rattle",
         STUCK: "no step is short enough for the motion",

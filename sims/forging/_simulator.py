@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, pi, radians
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from sims.forging._drive import (
     gear_pair,
     schedule,
 )
-from sims.forging._respond import CONTACT_COLUMNS, DriveResponse, respond
+from sims.forging._respond import CONTACT_COLUMNS, DriveResponse, ForgingConvergence, check_convergence, respond
 from sims.machine import Operation, Profile, WeakTooth
 from sims.measure import (
     Accelerometer,
@@ -255,10 +255,6 @@ def _truth(motion: DriveResponse) -> dict[str, Any]:
 # --------------------
 
 
-if TYPE_CHECKING:
-    from sims.forging._respond import ForgingConvergence
-
-
 WITH_MEANING = tuple(name for name, each in effects().items() if each.on_drive)
 """Effects that the drive can have; a wrong load inertia is `piece_mass_kg` or `wheel_inertia_kg_m2`."""
 
@@ -367,8 +363,6 @@ class ForgingManipulator(Simulator):
         The operation's torque is that of the open valve, its speed the pinion's that the flow allows (0: no limit).
         Vibration is recorded from 5 kHz on. A stop that is longer than the record is an error.
         """
-        from sims.forging._simulator import record, sensors
-
         within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
         within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
         if sampling_rate_hz * duration_s > MAX_SAMPLES:
@@ -396,8 +390,6 @@ class ForgingManipulator(Simulator):
 
     def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> ForgingConvergence:
         """Tell how far shorter steps change the motion of this very drive, which nothing random enters."""
-        from sims.forging._respond import check_convergence
-
         del rng
         ready = self.prepare(setup)
         return check_convergence(ready.drive, ready.cycle, ready.operation.torque_nm)
