@@ -135,8 +135,18 @@ def tidy_later() -> None:
 
 
 def _tidy() -> None:
+    """Collect garbage, and give back what is free.
+
+    Each computation has a thread of its own, each thread a heap of its own in glibc, and what is freed in there stays with
+    the process: of 1.1 GB after 200 uploads only 0.4 GB were in use.
+    """
     _is_tidied_soon.clear()
     gc.collect()
+    if _give_back is not None:
+        _give_back(0)
+
+
+_give_back = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
 
 
 class Kept(Generic[P, R]):

@@ -1,11 +1,13 @@
 """Work beside a page: computed once for equal requests, cancelled where nobody waits for it."""
 
 import gc
+import os
 import sys
 from pathlib import Path
 from threading import Event
 from time import sleep
 
+import numpy as np
 import pytest
 from streamlit.testing.v1 import AppTest
 
@@ -153,6 +155,21 @@ def test_garbage_is_collected_once_for_many_runs_of_a_page(monkeypatch: pytest.M
     tidy_later()
     assert len(waiting) == 2
     beside._is_tidied_soon.clear()
+
+
+@pytest.mark.skipif(beside._give_back is None, reason="no glibc")
+def test_tidying_gives_memory_back() -> None:
+    blocks = Work(lambda: [np.ones(5000) for _ in range(2500)])  # 100 MB in a heap of the thread's own
+    blocks.wait()
+    rows = blocks.result()
+    del blocks, rows[:-1]  # the last holds the heap
+    before_mb = _resident_mb()
+    beside._tidy()
+    assert _resident_mb() < before_mb - 60.0
+
+
+def _resident_mb() -> float:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def _quick_page() -> None:
