@@ -122,7 +122,7 @@ def gap(
     )
     check_folder(output)
     if cache is not None:
-        check_writable(cache)
+        check_writable(cache, "--cache")
     if fresh and model == "reduced-fe":
         clear_other_versions(model)
     with open_cluster(cluster) as workers:

@@ -137,8 +137,8 @@ def tidy_later() -> None:
 def _tidy() -> None:
     """Collect garbage, and give back what is free.
 
-    Each computation has a thread of its own, each thread a heap of its own in glibc, and what is freed in there stays with
-    the process: of 1.1 GB after 200 uploads only 0.4 GB were in use.
+    Each computation has a thread of its own, each thread a heap of its own in glibc, and what is freed in there stays
+    with the process: of 1.1 GB after 200 uploads only 0.4 GB were in use.
     """
     _is_tidied_soon.clear()
     gc.collect()

@@ -60,8 +60,14 @@ def recording_mark(source: str | Path) -> str:
     return hashlib.sha256(str(Path(source).absolute()).encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
-def check_writable(folder: Path) -> None:
+def check_writable(folder: Path, option: str = "-o") -> None:
     """Check, before long work, that files can be written into a folder, which need not exist yet.
+
+    Parameters
+    ----------
+    folder : Path
+    option : str
+        By which it was given.
 
     Raises
     ------
@@ -71,17 +77,17 @@ def check_writable(folder: Path) -> None:
     probe = f".{secrets.token_hex(4)}"
     try:
         if folder.exists() and not folder.is_dir():
-            raise InputError("is a file", where=str(folder), remedy="choose a folder with -o")
+            raise InputError("is a file", where=str(folder), remedy=f"choose a folder with {option}")
         existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
         (existing / probe).mkdir()  # permissions alone do not tell: there are folders that nothing can be made in
         (existing / probe).rmdir()
     except OSError as error:
-        raise _unwritable(folder, error) from None
+        raise _unwritable(folder, error, option) from None
 
 
-def _unwritable(path: Path, error: OSError) -> InputError:
+def _unwritable(path: Path, error: OSError, option: str = "-o") -> InputError:
     return InputError(
-        f"cannot be written ({error.strerror or error})", where=str(path), remedy="choose another folder with -o"
+        f"cannot be written ({error.strerror or error})", where=str(path), remedy=f"choose another folder with {option}"
     )
 
 

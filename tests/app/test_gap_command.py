@@ -269,6 +269,10 @@ def test_the_cache_is_the_users_own_or_a_given_one_and_can_be_made_anew(capsys, 
     assert not stub.given["fresh"]
     run(capsys, CRACKED, "-o", tmp_path / "gap", "--cache", tmp_path / "mine")
     assert stub.given["cache"] == tmp_path / "mine"
+    (tmp_path / "file").touch()
+    _, _, err = run(capsys, CRACKED, "-o", tmp_path / "gap", "--cache", tmp_path / "file")
+    assert "--cache" in err
+    assert "-o" not in err.split()
     run(capsys, CRACKED, "-o", tmp_path / "gap", "--fresh")
     assert (stub.given["cache"], stub.given["fresh"]) == (cache_folder("gap"), True)
 

@@ -39,13 +39,15 @@ def opened(page: playwright.Page, address: str) -> str:
     return text
 
 
-@pytest.mark.parametrize("path", PAGES)
+@pytest.mark.parametrize("path", [*PAGES, "analysis?sample=two_stage&view=Machine"])
 def test_a_page_fits_a_narrow_window_in_light_and_dark(page: playwright.Page, address: str, path: str) -> None:
     page.set_viewport_size({"width": 800, "height": 900})
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
         assert len(opened(page, address + path)) > 100
         assert page.evaluate("document.documentElement.scrollWidth") <= 800
+        editors = "[...document.querySelectorAll('.dvn-scroller')]"
+        assert not page.evaluate(f"{editors}.filter(e => e.scrollWidth > e.clientWidth + 2).length")
         paper = page.evaluate("getComputedStyle(document.querySelector('[data-testid=stApp]')).backgroundColor")
         lightness = sum(map(float, paper.removeprefix("rgb(").removesuffix(")").split(",")[:3])) / (3 * 255)
         assert (lightness > 0.8) == (scheme == "light")

@@ -30,6 +30,22 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "bearing": ("name", "shaft", "bearing", "n_rolling_elements", "rolling_element_diameter_mm", "pitch_diameter_mm"),
     "sensor": ("channel", "quantity", "unit", "position", "scale"),
 }
+LEAST_WIDTHS_PX: dict[str, tuple[int, ...]] = {
+    "shaft": (120, 90),
+    "pair": (64, 80, 70, 80, 70, 54, 60),
+    "bearing": (80, 82, 88, 84, 68, 76),
+    "sensor": (84, 96, 64, 166, 70),
+}
+"""Of the columns: together they fit a window of 800 pixels, beside the sidebar; where there is more room, they grow."""
+SHORT_LABELS = {
+    "driver_teeth": "teeth",
+    "driven_teeth": "teeth",
+    "module_mm": "m",
+    "face_width_mm": "b",
+    "rolling_element_diameter_mm": "d",
+    "pitch_diameter_mm": "D",
+}
+"""Of narrow columns, which tell their whole names under the pointer and the unit of a length in the cell."""
 SPEED_SOURCES: dict[str, tuple[str, ...]] = {
     "none": (),
     "constant": ("speed_rpm",),
@@ -246,7 +262,7 @@ def _rows(frame: DataFrame, before: list[Table]) -> list[Table]:
 
 
 def _config(kind: str, rig: Table, channels: Sequence[str]) -> dict[str, Any]:
-    column, label = st.column_config, FORM_LABELS.get
+    column = st.column_config
     shafts = [str(row["name"]) for row in rig.get("shaft", []) if row.get("name")]
     choices: dict[str, dict[str, Sequence[str]]] = {
         "shaft": {"direction": ("ccw", "cw")},
@@ -255,13 +271,18 @@ def _config(kind: str, rig: Table, channels: Sequence[str]) -> dict[str, Any]:
         "sensor": {"quantity": QUANTITIES} | ({"channel": channels} if channels else {}),
     }
     made: dict[str, Any] = {}
-    for name in COLUMNS[kind]:
+    for name, width in zip(COLUMNS[kind], LEAST_WIDTHS_PX[kind], strict=True):
+        whole = FORM_LABELS.get(name, name)
+        looks: dict[str, Any] = {"label": SHORT_LABELS.get(name, whole), "width": width}
+        looks |= {"help": whole} if name in SHORT_LABELS else {}
         if name in choices[kind]:
-            made[name] = column.SelectboxColumn(label(name, name), options=list(choices[kind][name]))
+            made[name] = column.SelectboxColumn(**looks, options=list(choices[kind][name]))
         elif name.endswith(("_teeth", "elements")):
-            made[name] = column.NumberColumn(label(name, name), step=1, format="%d")
+            made[name] = column.NumberColumn(**looks, step=1, format="%d")
         elif name in _numbers(kind):
-            made[name] = column.NumberColumn(label(name, name))
+            made[name] = column.NumberColumn(**looks, format="%g mm" if name.endswith("_mm") else None)
+        else:
+            made[name] = column.Column(**looks)
     return made
 
 
