@@ -269,6 +269,8 @@ class Effect:
     profile_varies_with: str = ""
 
     def __post_init__(self) -> None:
+        if not self.name.isidentifier():  # it stands in --effect NAME=SEVERITY, in addresses and in tables
+            raise InputError(f"an effect is called {self.name!r}", allowed="letters, digits and underscores")
         one_of(self.group, f"group of {self.name}", GROUPS)
         one_of(
             self.profile_varies_with,

@@ -79,6 +79,28 @@ def test_every_effect_has_a_slider_that_switches_it_on() -> None:
             assert found.title.lower() in title, name
 
 
+def _pull_marked_effect() -> None:
+    from dataclasses import replace
+
+    from app.dashboard.laboratory.setup import _choose_severity
+    from sims.effects import effect
+    from sims.presets import preset
+
+    wear = effect("tooth_wear")
+    severity = replace(wear.severity, unit="$x^2$", meaning=":smile:")
+    marked = replace(wear, title="**b**", severity=severity, changes="[l](x)", options=())
+    _choose_severity(marked, preset("cracked", "small_30_25"), start=1.0)
+
+
+def test_texts_of_an_effect_of_ones_own_are_no_markup(monkeypatch) -> None:
+    monkeypatch.setattr(controls, "is_user_effect", lambda _: True)
+    page = AppTest.from_function(_pull_marked_effect).run()
+    assert not page.exception
+    (of_effect,) = page.slider
+    assert "b" in of_effect.label
+    assert not any(text in of_effect.label + of_effect.help for text in ("**b**", "$x^2$", ":smile:", "[l](x)"))
+
+
 @pytest.mark.slow
 def test_two_effects_at_once() -> None:
     page = opened()

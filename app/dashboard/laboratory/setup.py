@@ -15,11 +15,11 @@ import streamlit as st
 
 import sims
 from app.dashboard import address
-from app.dashboard.theme import capitalised
+from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.work import let_user_act
 from gearsig.errors import InputError
 from gearsig.recording import Recording
-from sims.effects import Effect, EffectSetting, Option, effect, effects
+from sims.effects import Effect, EffectSetting, Option, effect, effects, is_user_effect
 from sims.presets import Preset, presets
 from sims.registry import simulator
 from sims.simulator import ParameterValue, SimulationSetup, parameter
@@ -346,16 +346,16 @@ def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSe
 
 def _choose_severity(chosen: Effect, preset: Preset, *, start: float) -> EffectSetting:
     s = chosen.severity
-    unit = shown_unit(s.unit)
+    unit = _as_written(chosen, shown_unit(s.unit))
     high = greatest_severity(preset, chosen.name, min(s.high, WIDEST * s.typical), _options_so_far(chosen))
-    title = capitalised(chosen.title)
+    title = _as_written(chosen, capitalised(chosen.title))
     severity = choose_number(
         f"{title} ({unit + ', ' if unit else ''}typical {s.typical:g})",
         f"severity of {chosen.name}",
         min(start, high),
         high,
-        about=f"{capitalised(s.meaning)}; {s.low:g} to {s.high:g} {unit}, as far as the machine "
-        f"allows.\n\n{chosen.changes}",
+        about=f"{_as_written(chosen, capitalised(s.meaning))}; {s.low:g} to {s.high:g} {unit}, as far as the machine "
+        f"allows.\n\n{_as_written(chosen, chosen.changes)}",
     )
     options: dict[str, float | str] = {}
     if chosen.options and severity != 0:
@@ -363,6 +363,11 @@ def _choose_severity(chosen: Effect, preset: Preset, *, start: float) -> EffectS
             values = {option.name: _choose_option(chosen, option) for option in chosen.options}
         options = {name: value for name, value in values.items() if value is not None}
     return EffectSetting(chosen.name, severity, options)
+
+
+def _as_written(of: Effect, text: str) -> str:
+    """Return a text of an effect as Markdown; the catalogue's hold no marks, and screen readers tell escapes."""
+    return as_typed(text) if is_user_effect(of.name) else text
 
 
 def _options_so_far(of: Effect) -> tuple[tuple[str, float | str], ...]:
@@ -379,8 +384,8 @@ def _choose_option(of: Effect, option: Option) -> float | str | None:
     """Return the value of an option; None where it is left to be drawn."""
     unit = shown_unit(option.unit)
     words = option.name.removesuffix("_deg").removesuffix("_percent").removesuffix("_um").removesuffix("_hz")
-    label = words.replace("_", " ").capitalize() + (f" ({unit})" if unit else "")
-    looks: dict[str, Any] = {"key": _option_key(of, option), "help": option.meaning}
+    label = _as_written(of, words.replace("_", " ").capitalize() + (f" ({unit})" if unit else ""))
+    looks: dict[str, Any] = {"key": _option_key(of, option), "help": _as_written(of, option.meaning)}
     looks["name"] = f"{of.name}-{option.name}"
     if isinstance(option.default, str):
         choices = option.choices or tuple(f"bearing {i + 1}" for i in range(4))

@@ -98,6 +98,7 @@ def test_a_twin_tries_it_about_its_typical_severity_on_each_gear(file: Path) -> 
         ("x = ", "does not run .SyntaxError"),
         ("1 / 0", "does not run .ZeroDivisionError"),
         (FILE.replace("NAME", "clipping"), "an effect 'clipping' already"),
+        (FILE.replace("NAME", "<b>a, b</b>"), "allowed: letters, digits and underscores"),
     ],
 )
 def test_a_file_of_no_use_is_an_error_and_leaves_the_catalogue_as_it_was(file: Path, text: str, said: str) -> None:
