@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from errno import ENOSPC
+from typing import IO
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import pytest
 from app.studies.drawn_rigs import DrawnRig, simulate_rig
 from app.studies.gap import rows as independent
 from app.studies.gap.machines import draw_machine
+from app.studies.gap.population import pack
 from app.studies.gap.rows import PopulationSample, write
 from gearsig.errors import InputError
 from gearsig.gap import (
@@ -124,3 +127,25 @@ def test_a_damaged_population_is_named(tmp_path) -> None:
     assert read_learned(tmp_path / "population.npz") is None
     with pytest.raises(InputError, match=r"population\.npz: the population is not there, or damaged"):
         load_population(tmp_path / "population.npz")
+
+
+def test_a_full_disk_leaves_the_library_as_it_was(tmp_path, monkeypatch) -> None:
+    raw, to = tmp_path / "raw.npz", tmp_path / "library" / "population.npz"
+    table = np.zeros((2, 3), np.float32)
+    names = ("change", "change_scatter", "features", "feature_scatter", "simulated", "simulated_scatter")
+    texts = np.array(["a", "b"])
+    of_rows = {"rig": np.arange(2), "load_n_per_mm": np.ones(2)} | dict.fromkeys(
+        ("simulator", "label", "detail"), texts
+    )
+    np.savez(raw, **dict.fromkeys(names, table), **of_rows, change_names=texts, feature_names=texts)
+    pack([raw], to)
+    whole = to.read_bytes()
+
+    def fill(file: IO[bytes], **_: object) -> None:
+        file.write(b"half")
+        raise OSError(ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", fill)
+    with pytest.raises(InputError, match="No space left"):
+        pack([raw], to)
+    assert (to.read_bytes(), list(to.parent.iterdir())) == (whole, [to])

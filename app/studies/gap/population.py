@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import typer
@@ -26,6 +27,7 @@ from app.studies import answers_of
 from app.studies.gap.lumped import LUMPED, lumped_samples
 from app.studies.gap.quasi_static import QUASI_STATIC, static_samples
 from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
+from gearsig.cache import write_whole
 from gearsig.gap import BY_HAND, INDEPENDENT, LEARNED_FILE, learn, load_population, population_file, write_learned
 
 MACHINES = {CRACKED.name: 36, REDUCED.name: 21, INDEPENDENT: 195, QUASI_STATIC: 122, LUMPED: 46}
@@ -117,20 +119,17 @@ def pack(paths: Sequence[Path], to: Path) -> None:
     simulated_rigs, first = np.unique(rigs, return_index=True)  # one twin for all recordings of a machine
     for name in ("simulated", "simulated_scatter"):
         tables[name] = _rounded(np.concatenate([sample[name] for sample in raw])[first])
-    to.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(
-        to,
-        allow_pickle=False,
-        rigs=rigs,
-        simulated_rigs=simulated_rigs,
-        simulators=np.concatenate([sample["simulator"] for sample in raw]),
-        causes=np.concatenate([sample["label"] for sample in raw]),
-        by_hand=np.concatenate([sample["detail"] for sample in raw]) == BY_HAND,
-        loads_n_per_mm=np.concatenate([sample["load_n_per_mm"] for sample in raw]).astype(np.float32),
-        change_names=raw[0]["change_names"],
-        feature_names=raw[0]["feature_names"],
-        **tables,
-    )
+    arrays: dict[str, Any] = {
+        "rigs": rigs,
+        "simulated_rigs": simulated_rigs,
+        "simulators": np.concatenate([sample["simulator"] for sample in raw]),
+        "causes": np.concatenate([sample["label"] for sample in raw]),
+        "by_hand": np.concatenate([sample["detail"] for sample in raw]) == BY_HAND,
+        "loads_n_per_mm": np.concatenate([sample["load_n_per_mm"] for sample in raw]).astype(np.float32),
+        "change_names": raw[0]["change_names"],
+        "feature_names": raw[0]["feature_names"],
+    }
+    write_whole(to, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays, **tables))
     typer.echo(f"{len(tables['changes'])} recordings; {to.stat().st_size / 1e6:.1f} MB")
 
 
