@@ -95,7 +95,9 @@ def detect_bearings(
     findings += [
         _unnamed_finding(signals, c) if c.bearing is None else _named_finding(signals, c, 1) for c in families.trains
     ]
-    claimed = any(f.is_claim for f in findings)
+    # A train of another machine's explains a part as well: then it is said that the bearings are not known to be good.
+    of_trains = findings[len(families.named) :]
+    claimed = any(f.is_claim for f in findings if not (f in of_trains and f.where.bearing))
     if not claimed and signals.rig.bearings and cleaned:
         fixed = cleaned[: len(envelopes)]  # where a damage rings is not known beforehand; an own band follows it
         findings += _none_shows(signals, fixed, families)
@@ -112,7 +114,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     slip, only_stated = candidate.comb.fundamental / candidate.expected - 1, speed_is_only_stated(signals)
     is_beyond_slip = only_stated and abs(slip) > signals.settings.bearing_slip
     times = factor_left_open(signals)
-    is_shared = candidate.name == "FTF" or n_parts > MAX_PARTS
+    is_shared = candidate.name == "FTF" or candidate.in_train or n_parts > MAX_PARTS
     is_hunting = _is_among_hunting_lines(signals, candidate)
 
     confidence = from_p_value(candidate.p_value) * candidate.share
@@ -143,6 +145,8 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         evidence.append("The speed is a stated one that no line of a shaft or mesh confirms.")
     if candidate.name == "FTF":
         evidence.append("Belts and other machines at the same rate look the same: lines at the cage's order alone.")
+    elif candidate.in_train:
+        evidence.append("The rate is that of a train of lines: another machine's or a belt's would look the same.")
     if is_hunting:
         evidence.append("A multiple of a hunting-tooth order is there too: teeth that differ from each other do it.")
     if n_parts > MAX_PARTS:
@@ -308,9 +312,10 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
         if (times := factor_left_open(signals)) > 1:
             why = _other_speed_text(times)
         return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
-    rival = next((r for c in families.named for r in c.rivals), "")
+    named_here = (*families.named, *(c for c in families.trains if c.bearing is not None))
+    rival = next((r for c in named_here for r in c.rivals), "")
     for seen, but in (
-        (families.named, f"{rival} would show there as well" if rival else "something else explains them as well"),
+        (named_here, f"{rival} would show there as well" if rival else "something else explains them as well"),
         (families.unclear, "families beside it are as clear"),
     ):
         if seen:
@@ -321,8 +326,8 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
         races = ", ".join(dict.fromkeys(part_text(c.name, c.bearing.name) for c in doubtful if c.bearing))
         why = f"lines stand at the order of the {races}, and the chance of so many is {p_text(doubtful[0].p_value)}"
         return [_undecided(why, "A longer recording, or another sensor.", where)]
-    for k, on_shaft in parts_on_shaft(signals, envelopes).items():
-        why = f"impacts come {k} times a turn, which is the order of the {' or '.join(on_shaft)} within its slip"
+    for (k, shaft), on_shaft in parts_on_shaft(signals, envelopes).items():
+        why = f"impacts come {k} times a turn of {named('shaft', shaft)}, which is the order of the {' or '.join(on_shaft)} within its slip"
         return [_undecided(why, "A recording at another load: slip parts a bearing from the shaft.", where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
     expected = expected_parts(signals)

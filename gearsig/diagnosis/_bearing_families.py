@@ -209,7 +209,7 @@ class Families:
     named : tuple of Candidate
         Parts of known bearings, surest first.
     trains : tuple of Candidate
-        Other periodic impacts; without a bearing, or with the one whose cage turns at their rate.
+        Other periodic impacts; without a bearing, or with the one whose part strikes at their rate.
     unclear : tuple of Candidate
         Families at a part's order that are no clearer than those beside them.
     """
@@ -358,7 +358,7 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
         return None
     train = underlying_impulse_train(best.envelope.excess, best.comb, tuple(signals.known_shaft_orders.values()))
     if train is not None:
-        return _as_cage(signals, replace(best, comb=train, in_train=True))
+        return _as_part(signals, replace(best, comb=train, in_train=True))
     known = _known_multiple(signals, best)
     if known is None:
         return _where_it_is_strongest(envelopes, best)
@@ -523,15 +523,22 @@ def _train_of(signals: AnalysisSignals, candidate: Candidate) -> Candidate | Non
     if candidate.name == "BSF" and abs(2 * train.fundamental / candidate.comb.fundamental - 1) < SAME_FAMILY:
         return None  # an element that strikes one race harder than the other has lines at its spin, too
     free = replace(candidate, comb=train, bearing=None, name="", expected=0.0, rivals=(), share=1.0, in_train=True)
-    return _as_cage(signals, free)
+    return _as_part(signals, free)
 
 
-def _as_cage(signals: AnalysisSignals, train: Candidate) -> Candidate:
-    """Return the train with the cage's name, if it is one that turns at the train's rate."""
-    for bearing, name, order in expected_parts(signals):
-        if name == "FTF" and abs(train.comb.fundamental / order - 1) <= signals.settings.bearing_slip:
-            return _with_rivals(signals, replace(train, bearing=bearing, name=name, expected=order))
-    return train
+def _as_part(signals: AnalysisSignals, train: Candidate) -> Candidate:
+    """Return the train with the name of the likeliest part that strikes at its rate, if there is one.
+
+    A cage turns slower than all else. Of a slower shaft's race or element the first multiples run into those of its
+    shaft in a short record, and the higher ones fall on the orders of a like bearing on the faster shaft.
+    """
+    fitting = [
+        replace(train, bearing=bearing, name=name, expected=order)
+        for bearing, name, order in expected_parts(signals)
+        if abs(train.comb.fundamental / order - 1) <= signals.settings.bearing_slip
+    ]
+    likeliest = max(fitting, key=lambda one: _own_weight(signals, one), default=None)
+    return train if likeliest is None else _with_rivals(signals, likeliest)
 
 
 def _stands_out(signals: AnalysisSignals, candidate: Candidate) -> bool:
@@ -659,17 +666,21 @@ def _amplitude_beside(spectrum: Spectrum, place: float, own: float) -> float:
     return float(spectrum.values[near].max(initial=0.0))
 
 
-def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[int, list[str]]:
-    """Name the races that impacts so many times a turn may be of: within its slip, a race's order is a whole number.
+def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[tuple[int, str], list[str]]:
+    """Name the races that impacts so many times a turn of a shaft may be of: within its slip, the order is whole.
 
     The k-fold order of the shaft and its next two multiples stand out of the envelope, and twice as high as all other
     multiples of the shaft between them, but for the first and for sidebands at one order beside: none exceeds its own.
+    A k-fold order that is a smaller multiple of another shaft is that one's: each modulates its own mesh.
     """
-    parts: dict[int, list[str]] = {}
+    parts: dict[tuple[int, str], list[str]] = {}
+    turns = tuple(signals.known_shaft_orders.values())
     for bearing, name, order in expected_parts(signals):
         shaft = signals.rig.ratio(bearing.shaft)
         k = round(order / shaft) if shaft else 0
         if k < 2 or not shaft or name not in RACES or abs(order / (k * shaft) - 1) > slip_of(signals):
+            continue
+        if any(abs(j * turn / (k * shaft) - 1) < SAME_BEARING_ORDER for turn in turns for j in range(1, k)):
             continue
         multiples = np.arange(2, 3 * k + 2)
         own = multiples % k == 0
@@ -685,7 +696,7 @@ def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) 
             beside = np.maximum(heights[np.maximum(carriers - 1, 0)], heights[carriers + 1])
             is_alone = heights[own].min() >= 2 * highest_between and bool(np.all(heights[own] >= beside))
             if over_floor_db.min() >= 12.0 and is_alone:
-                parts.setdefault(k, []).append(part_text(name, bearing.name))
+                parts.setdefault((k, bearing.shaft), []).append(part_text(name, bearing.name))
                 break
     return parts
 

@@ -193,6 +193,16 @@ def _speed_off(signals: AnalysisSignals, reference: AnalysisSignals) -> float:
     return signals.frequency_per_order_hz / reference.frequency_per_order_hz - 1.0
 
 
+def _meets_other_speeds(signals: AnalysisSignals, reference: AnalysisSignals) -> bool:
+    """Whether either record has speeds at which its levels differ for that alone; a speed that wanders has none."""
+    for one, other in ((signals, reference), (reference, signals)):
+        if one.angle is not None and other.angle is not None:
+            ends = np.array(one.angle.speed_range_rpm) / other.angle.mean_speed_rpm
+            if np.abs(ends - 1.0).max() > OTHER_SPEED:
+                return True
+    return False
+
+
 def _in_common(a: tuple[float, float], b: tuple[float, float]) -> float:
     """Return the part that two bands share of what they cover together."""
     return float(max(min(a[1], b[1]) - max(a[0], b[0]), 0.0) / (max(a[1], b[1]) - min(a[0], b[0])))
@@ -448,7 +458,7 @@ def change_findings(
     off = _speed_off(signals, reference)
     risen = _largest([c for c in changed if c.change_db > 0 and _matters(c, rest)])
     headline = _changed(_largest(changed), off)
-    if abs(off) > OTHER_SPEED or signals.speed_varies or reference.speed_varies:
+    if _meets_other_speeds(signals, reference):
         return [*findings, replace(headline, kind=Kind.NOTICE)]
     claimed = {f.where.bearing for f in named if f.is_claim}
     meanings = _meanings(risen, rest, signals, claimed)

@@ -83,7 +83,9 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
     if isinstance(answer, CannotTell):
         surer = answer.remedy[:1].upper() + answer.remedy[1:] + "." if answer.remedy else ""
         title = f"The depth of a root crack cannot be told: {answer.reason}."
-        return [*findings, cannot_tell(DEPTH_UNKNOWN, title, surer=surer)]
+        finding = cannot_tell(DEPTH_UNKNOWN, title, surer=surer)
+        # Of several pairs no depth is ever told: that hinders nothing that the reference was given for.
+        return [*findings, replace(finding, kind=Kind.INFORMATION) if len(rig.pairs) > 1 else finding]
     if isinstance(answer, NoCrackSeen):
         # Both gears of the pair are looked at: if a crack through half of the root would have shown, the teeth count as
         # examined.

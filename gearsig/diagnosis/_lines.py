@@ -318,8 +318,11 @@ def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | 
     mesh = signals.rig.mesh_order(pair)
     if mesh is None or not signals.order_excess:
         return None
-    # The pair's shafts, as far as their orders are known without its own teeth; the contact may be this pair's.
-    without = replace(signals.rig, pairs=tuple(p for p in signals.rig.pairs if p is not pair), contact=None)
+    # The pair's shafts, as far as their orders are known without its own teeth; the contact may be this pair's. The pair
+    # stays: without a middle stage the gear train would be no longer one.
+    toothless = replace(pair, driver_teeth=None, driven_teeth=None)
+    pairs = tuple(toothless if p is pair else p for p in signals.rig.pairs)
+    without = replace(signals.rig, pairs=pairs, contact=None)
     steps = [without.ratio(shaft, to=signals.rig.reference_shaft) for shaft in (pair.driver, pair.driven)]
     near = max(3.0 * excess.spectrum.resolution for excess in signals.order_excess.values())
     meshes = [other for other in signals.known_mesh_orders.values() if abs(other - mesh) > near]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from math import log10
 
 import numpy as np
@@ -364,8 +365,9 @@ def _is_part_of(spacing: float, orders: Sequence[float], resolution: float) -> b
 CLOSEST_LINES = 8.0
 """Spacing, in lines, below which the lines of a family leave none beside them to stand out of."""
 
-COMBINATIONS = ((1, 1), (1, 2), (2, 1))
-"""j and k of the sidebands at j·a ± k·b of a mesh that both its shafts, of orders a and b, modulate."""
+COMBINATIONS = ((1, 1), (1, 2), (2, 1), (1, 3), (2, 2), (3, 1))
+"""j and k of the sidebands at j·a ± k·b of a mesh that two shafts, of orders a and b, modulate: its own, or one of them
+and the next, whose load comes through the train."""
 
 
 def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, trains: Sequence[float]) -> Comb | None:
@@ -386,10 +388,9 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
         wide = foot if order >= 4 * foot else 0.0
         excess = excess.without_multiples(order, half_width=wide)
         excess = excess.without_multiples(order, start=mesh, half_width=wide)
-    driver, driven = (signals.known_shaft_orders.get(shaft) for shaft in (pair.driver, pair.driven))
-    if driver is not None and driven is not None:
+    for one, other in combinations(signals.known_shaft_orders.values(), 2):
         for j, k in COMBINATIONS:
-            for start in (j * driver + k * driven, j * driver - k * driven):
+            for start in (j * one + k * other, j * one - k * other):
                 excess = excess.without_multiples(mesh, start=start).without_multiples(mesh, start=-start)
     if hunting is not None:
         excess = excess.without_multiples(hunting)  # of both gears together, and the mesh is one of them

@@ -306,8 +306,12 @@ def _periods(signals: AnalysisSignals, shaft: ShaftSignals) -> set[int]:
     return periods - {1}
 
 
+CARRIES = 0.25
+"""Part of the highest class's event from which a class carries it: the next tooth's mates take it up unequally."""
+
+
 def _share(energies: FloatArray, period: int) -> float:
-    """Return the part of the revolutions of a period that carry the event: mean over maximum of the classes' means."""
+    """Return the part of the revolutions of a period that carry the event, each class of them by its mean."""
     if len(energies) < 4 * period:
         return 1.0
     classes = np.array([energies[i::period].mean() for i in range(period)])
@@ -316,7 +320,7 @@ def _share(energies: FloatArray, period: int) -> float:
     highest = float(classes.max())
     if highest - float(classes.min()) < 4 * scatter or highest <= 0:
         return 1.0
-    return max(float(classes.mean()), 0.0) / highest
+    return float(np.mean(classes >= CARRIES * highest))
 
 
 def _single(energies: FloatArray) -> int | None:

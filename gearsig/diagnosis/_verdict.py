@@ -74,7 +74,7 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
 
 def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     outcome = outcome_of(findings)
-    unused = [f for f in findings if f.code == DEPTH_UNKNOWN]
+    unused = [f for f in findings if f.code == DEPTH_UNKNOWN and f.kind is Kind.CANNOT_TELL]
     if outcome in (Outcome.FAULT, Outcome.SUSPICION):
         kind = Kind.FAULT if outcome is Outcome.FAULT else Kind.SUSPICION
         first, *more = (f for f in findings if f.kind is kind)

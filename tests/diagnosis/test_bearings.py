@@ -16,7 +16,7 @@ from gearsig.diagnosis import (
 from gearsig.errors import RefusalError
 from gearsig.prepared import LinesOverFloor, best_comb, lines_over_noise_floor, refined_angle
 from gearsig.recording import Channel, Recording
-from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft, SpeedChannel
+from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft, SpeedChannel
 from gearsig.spectra import amplitude_spectrum
 from sims.measure import ColouredNoise
 from tests.diagnosis.machines import GOOD, RIG, SAMPLING_RATE_HZ, codes, finding, motor, record
@@ -73,6 +73,30 @@ def test_impacts_are_placed_where_they_stand_out_most(gain: float, noise: float)
     found = finding(analyze(recording), "non-synchronous-impacts")
     assert found.where.channels == ("near",)
     assert found.where.order == pytest.approx(107.6 / 22, rel=1e-3)
+
+
+def _on_a_slow_shaft(rate_order: float) -> Recording:
+    """Return impacts beside noise that the fast shaft modulates; like bearings stand on both shafts, three to one."""
+    shafts, pair = (Shaft("in"), Shaft("out")), GearPair("stage", "in", "out", 16, 48)
+    bearings = tuple(Bearing(name, shaft, bpfo_order=3.05) for name, shaft in (("front", "in"), ("rear", "out")))
+    rng, n = np.random.default_rng(0), round(4.0 * SAMPLING_RATE_HZ)
+    turn = 2 * np.pi * 22.0 * np.arange(n) / SAMPLING_RATE_HZ
+    x = (1 + 0.4 * np.cos(turn) + 0.2 * np.cos(2 * turn) + 0.1 * np.cos(3 * turn)) * rng.normal(size=n)
+    x += 5.0 * np.cos(16 * turn) + np.cos(turn)
+    machine = Rig(shafts=shafts, pairs=(pair,), bearings=bearings)
+    quiet = Recording(x[None], SAMPLING_RATE_HZ, (Channel("a1"),), ConstantSpeed(1320.0, "in"), rig=machine)
+    return with_impacts(quiet, 22.0 * rate_order, 12.0) if rate_order else quiet
+
+
+def test_a_part_of_a_slow_shaft_is_named_where_its_lines_are_those_of_the_fast_ones() -> None:
+    """In 4 s its first multiples run into those of its shaft: every third is the like bearing's, and the rest a train."""
+    analysis = analyze(_on_a_slow_shaft(3.02 / 3))
+    assert "non-synchronous-impacts" not in codes(analysis)
+    assert finding(analysis, "bearing-outer-race").where.shaft == "out"
+
+
+def test_a_turn_of_the_fast_shaft_is_no_race_of_the_slow_ones() -> None:
+    assert not any("times a turn" in f.title for f in analyze(_on_a_slow_shaft(0.0)).findings)
 
 
 def test_a_damaged_race_beside_slow_impacts_is_named() -> None:

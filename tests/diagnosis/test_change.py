@@ -9,7 +9,7 @@ from scipy.signal import resample_poly
 
 from gearsig.diagnosis import Analysis, Kind, LevelChange, Outcome, analyze
 from gearsig.recording import Channel, Recording
-from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft
+from gearsig.rig import Bearing, ConstantSpeed, PulseTimes, Rig, Shaft
 from tests.diagnosis.machines import MOTOR_RATE_HZ, codes, finding, motor
 
 ROTOR = Rig(shafts=(Shaft("rotor"),), bearings=(Bearing("front", "rotor", 9, 7.94, 39.04),))
@@ -116,6 +116,19 @@ def test_at_another_speed_a_change_is_told_but_means_nothing_yet() -> None:
     analysis = beside_healthy(HEALTHY | {1.0: 0.5}, speed_rpm=1800.0)
     assert finding(analysis, "changed-since-reference").kind is Kind.NOTICE
     assert "unbalance" not in codes(analysis)
+
+
+def test_a_speed_that_wanders_by_a_percent_is_one_speed() -> None:
+    """What changed means as much as at a steady speed: no force grows by the square of 1.01, 6 dB."""
+    t = np.arange(int(SECONDS * SAMPLING_RATE_HZ)) / SAMPLING_RATE_HZ
+    turns = 25.0 * (t - 0.01 / np.pi * np.cos(np.pi * t))
+    pulses = PulseTimes(np.interp(np.arange(np.ceil(turns[0]), turns[-1]), turns, t), shaft="rotor")
+
+    def wandering(once: float, seed: int) -> Recording:
+        x = 0.02 * np.random.default_rng(seed).standard_normal(len(t)) + once * np.cos(2 * np.pi * turns)
+        return Recording(x[None, :], SAMPLING_RATE_HZ, (Channel("a1", "acceleration"),), pulses, rig=ROTOR)
+
+    assert "unbalance" in codes(analyze(wandering(0.5, 1), reference=wandering(0.1, 2)), Kind.SUSPICION)
 
 
 def test_a_smaller_level_is_told_and_no_suspicion() -> None:

@@ -116,3 +116,5 @@ def test_a_refusal_is_told_only_to_who_asked() -> None:
     assert isinstance(answer, CannotTell)
     assert "module_mm" in answer.reason
     assert with_crack([], answer, RIG)[0].kind is Kind.CANNOT_TELL
+    two_pairs = replace(RIG, shafts=(*RIG.shafts, Shaft("end")), pairs=(*RIG.pairs, GearPair("second", "out", "end")))
+    assert with_crack([], answer, two_pairs)[0].kind is Kind.INFORMATION  # no reference would help, and none is wanted

@@ -276,6 +276,18 @@ def test_sidebands_of_both_shafts_together_are_no_unknown_shafts() -> None:
     assert not found(analyze(with_mesh(8.0, 29, modulation)), "sidebands-of-unknown-shaft")
 
 
+def test_sidebands_of_a_shaft_and_of_the_next_but_one_are_no_unknown_shafts() -> None:
+    def modulation(t: FloatArray) -> FloatArray:
+        driver, end = 2 * pi * 22.0 * t, 2 * pi * 22.0 * 29 / 47 * 31 / 53 * t
+        return (1 + 0.4 * np.cos(driver)) * (1 + 0.4 * np.cos(end) + 0.1 * np.cos(2 * end)) - 1
+
+    stages = (GearPair("second", "out", "third", 31, 53), GearPair("last", "third", "end", 17, 60))
+    one = rig(29, 47)
+    train = replace(one, shafts=(*one.shafts, Shaft("third"), Shaft("end")), pairs=(*one.pairs, *stages))
+    analysis = analyze(replace(with_mesh(8.0, 29, modulation), rig=train))
+    assert not found(analysis, "sidebands-of-unknown-shaft")
+
+
 def test_pulses_of_which_there_are_twice_as_many_are_doubted() -> None:
     model = replace(
         MODEL,

@@ -60,6 +60,10 @@ def test_a_single_shock_is_told_as_one() -> None:
 def test_an_event_of_every_second_revolution_is_no_tooth() -> None:
     analysis = analyze(with_knocks(record(STEADY), np.arange(0.01, 5.0, 2 / SHAFT_HZ)))
     assert "event-in-some-revolutions" in codes(analysis, Kind.CANNOT_TELL)
+    # A tooth's mates take its load over unequally: it knocks less in the revolutions between, and is damaged all the same.
+    knocks = np.arange(0.01, 5.0, 1 / SHAFT_HZ)
+    unequal = with_knocks(with_knocks(record(STEADY), knocks[::2], size=60.0), knocks[1::2], size=25.0)
+    assert "tooth-local-damage" in codes(analyze(unequal))
     assert "tooth-local-damage" not in codes(analysis)
     assert "no-tooth-local-damage" not in codes(analysis)
 
