@@ -327,7 +327,8 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
         why = f"lines stand at the order of the {races}, and the chance of so many is {p_text(doubtful[0].p_value)}"
         return [_undecided(why, "A longer recording, or another sensor.", where)]
     for (k, shaft), on_shaft in parts_on_shaft(signals, envelopes).items():
-        why = f"impacts come {k} times a turn of {named('shaft', shaft)}, which is the order of the {' or '.join(on_shaft)} within its slip"
+        races = f"the order of the {' or '.join(on_shaft)} within its slip"
+        why = f"impacts come {k} times a turn of {named('shaft', shaft)}, which is {races}"
         return [_undecided(why, "A recording at another load: slip parts a bearing from the shaft.", where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
     expected = expected_parts(signals)

@@ -318,8 +318,8 @@ def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | 
     mesh = signals.rig.mesh_order(pair)
     if mesh is None or not signals.order_excess:
         return None
-    # The pair's shafts, as far as their orders are known without its own teeth; the contact may be this pair's. The pair
-    # stays: without a middle stage the gear train would be no longer one.
+    # The pair's shafts, as far as their orders are known without its own teeth; the contact may be this pair's. The
+    # pair stays: without a middle stage the gear train would fall apart.
     toothless = replace(pair, driver_teeth=None, driven_teeth=None)
     pairs = tuple(toothless if p is pair else p for p in signals.rig.pairs)
     without = replace(signals.rig, pairs=pairs, contact=None)

@@ -333,6 +333,9 @@ def _single(energies: FloatArray) -> int | None:
 WORTH_SAYING, CLEAR = (0.01, 8.0), (0.001, 10.0)
 """p-value at most, and dB of the window over the median window at least."""
 
+DOUBTFUL = (0.05, 8.0)
+"""The same of an event besides which "no damage shows" is not said: the chance that statistics is used to."""
+
 SMALLEST_SHARE, SMALLEST_SIGNIFICANCE = 0.05, 3.0
 """Rms in the window against that of the whole average, and against the average's standard error there: below, an event
 is too small to matter, or is made by the ends of the record."""
@@ -545,7 +548,8 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
     if signals.rig.assumed:
         return _undecided(examined, f"on assumed data ({', '.join(signals.rig.assumed)}): damage may not show")
     withheld = [e for e in examined if e.is_withheld]
-    examined = [e for e in examined if e not in withheld]
+    doubtful = [e for e in examined if e.is_steady and e.reaches(DOUBTFUL)]
+    examined = [e for e in examined if e not in withheld and e not in doubtful]
     sharp = [e for e in examined if e.smallest_visible <= 0.5 * e.event.average_rms]
     # Of the others the median tooth's part of the difference signal may be mostly noise that the average has left.
     noisy = [e for e in examined if e not in sharp and e.event.median_rms <= SMALLEST_SIGNIFICANCE * e.event.error_rms]
@@ -566,8 +570,20 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
             )
         )
     findings += [_withheld(one) for one in withheld]
+    findings += [_doubtful(one) for one in doubtful]
     findings += _undecided(noisy, "noise would hide an event of half the average's size")
     return findings + _undecided(uneven, "they differ so much from each other that damage may hide among them")
+
+
+def _doubtful(examined: _Examined) -> Finding:
+    place = examined.event.place
+    title = (
+        f"Whether a tooth of shaft {examined.shaft.shaft} is damaged cannot be told: one stands out by "
+        f"{place.ratio_db:.1f} dB, as one does by chance on {percent(examined.p_value)} of sound gears."
+    )
+    where = Where((examined.event.channel,), shaft=examined.shaft.shaft, angle_deg=360 * place.angle_rev)
+    evidence = tuple(_evidence(examined))
+    return cannot_tell("tooth-damage-undecided", title, where, evidence=evidence, surer=_surer(examined.signals))
 
 
 def _withheld(examined: _Examined) -> Finding:

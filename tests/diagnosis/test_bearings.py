@@ -89,7 +89,7 @@ def _on_a_slow_shaft(rate_order: float) -> Recording:
 
 
 def test_a_part_of_a_slow_shaft_is_named_where_its_lines_are_those_of_the_fast_ones() -> None:
-    """In 4 s its first multiples run into those of its shaft: every third is the like bearing's, and the rest a train."""
+    """In 4 s its first multiples run into those of its shaft, and every third is the like bearing's."""
     analysis = analyze(_on_a_slow_shaft(3.02 / 3))
     assert "non-synchronous-impacts" not in codes(analysis)
     assert finding(analysis, "bearing-outer-race").where.shaft == "out"

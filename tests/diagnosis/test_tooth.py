@@ -48,6 +48,12 @@ def test_equal_gears_cannot_be_told_apart_and_are_both_named() -> None:
     assert "in or out" in claims[0].title
 
 
+def test_beside_an_event_that_chance_hardly_explains_no_tooth_is_called_sound() -> None:
+    analysis = analyze(with_knocks(record(STEADY), np.arange(0.01, 5.0, 1 / SHAFT_HZ), size=0.8))
+    assert "one stands out by" in finding(analysis, "tooth-damage-undecided").title
+    assert analysis.outcome is Outcome.CANNOT_TELL
+
+
 def test_a_single_shock_is_told_as_one() -> None:
     analysis = analyze(with_knocks(record(STEADY), np.array([2.345]), size=3000.0))
     found = finding(analysis, "single-shock")
@@ -60,7 +66,7 @@ def test_a_single_shock_is_told_as_one() -> None:
 def test_an_event_of_every_second_revolution_is_no_tooth() -> None:
     analysis = analyze(with_knocks(record(STEADY), np.arange(0.01, 5.0, 2 / SHAFT_HZ)))
     assert "event-in-some-revolutions" in codes(analysis, Kind.CANNOT_TELL)
-    # A tooth's mates take its load over unequally: it knocks less in the revolutions between, and is damaged all the same.
+    # A tooth's mates take its load over unequally: it knocks less in the revolutions between, and is damaged as well.
     knocks = np.arange(0.01, 5.0, 1 / SHAFT_HZ)
     unequal = with_knocks(with_knocks(record(STEADY), knocks[::2], size=60.0), knocks[1::2], size=25.0)
     assert "tooth-local-damage" in codes(analyze(unequal))
