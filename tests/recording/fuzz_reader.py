@@ -15,6 +15,7 @@ import sys
 import time
 import traceback
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -290,12 +291,15 @@ def memory_bytes(process, what):
 
 def reset_peaks():
     """Begin anew for this process and those in which it lets others' readers run; return what each takes now."""
-    children = [path.read_text().split() for path in Path("/proc/self/task").glob("*/children")]
-    processes = {process: memory_bytes(process, "VmRSS") for some in (["self"], *children) for process in some}
-    running = {process: n_bytes for process, n_bytes in processes.items() if n_bytes}
-    for process in running:
-        Path(f"/proc/{process}/clear_refs").write_text("5")
-    return running
+    processes, running = ["self"], {}
+    for children in Path("/proc/self/task").glob("*/children"):
+        with suppress(OSError):  # the thread has ended
+            processes += children.read_text().split()
+    for process in processes:
+        with suppress(OSError):  # the process has ended
+            Path(f"/proc/{process}/clear_refs").write_text("5")
+            running[process] = memory_bytes(process, "VmRSS")
+    return {process: n_bytes for process, n_bytes in running.items() if n_bytes}
 
 
 def decoded_bytes(path, result):
