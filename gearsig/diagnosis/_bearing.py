@@ -92,12 +92,12 @@ def detect_bearings(
         order, band_hz = candidate.comb.fundamental, candidate.envelope.band_hz
         witnesses = witness_text(kurtogram_bands, candidate.envelope.channel, band_hz, order)
         findings.append(replace(finding, evidence=(*finding.evidence, *witnesses)))
-    findings += [
+    trains = [
         _unnamed_finding(signals, c) if c.bearing is None else _named_finding(signals, c, 1) for c in families.trains
     ]
     # A train of another machine's explains a part as well: then it is said that the bearings are not known to be good.
-    of_trains = findings[len(families.named) :]
-    claimed = any(f.is_claim for f in findings if not (f in of_trains and f.where.bearing))
+    claimed = any(f.is_claim for f in (*findings, *(f for f in trains if not f.where.bearing)))
+    findings += trains
     if not claimed and signals.rig.bearings and cleaned:
         fixed = cleaned[: len(envelopes)]  # where a damage rings is not known beforehand; an own band follows it
         findings += _none_shows(signals, fixed, families)

@@ -375,6 +375,11 @@ class _Examined:
         return self.reaches(CLEAR) and is_large and not self.is_steady
 
     @property
+    def is_doubtful(self) -> bool:
+        """Whether the event may be a tooth's, though chance explains it as well."""
+        return self.is_steady and self.reaches(DOUBTFUL)
+
+    @property
     def smallest_visible(self) -> float:
         """Rms in a window from which an event stands out from teeth that merely differ.
 
@@ -548,8 +553,8 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
     if signals.rig.assumed:
         return _undecided(examined, f"on assumed data ({', '.join(signals.rig.assumed)}): damage may not show")
     withheld = [e for e in examined if e.is_withheld]
-    doubtful = [e for e in examined if e.is_steady and e.reaches(DOUBTFUL)]
-    examined = [e for e in examined if e not in withheld and e not in doubtful]
+    doubtful = [e for e in examined if e.is_doubtful]
+    examined = [e for e in examined if not (e.is_withheld or e.is_doubtful)]
     sharp = [e for e in examined if e.smallest_visible <= 0.5 * e.event.average_rms]
     # Of the others the median tooth's part of the difference signal may be mostly noise that the average has left.
     noisy = [e for e in examined if e not in sharp and e.event.median_rms <= SMALLEST_SIGNIFICANCE * e.event.error_rms]
@@ -576,29 +581,26 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
 
 
 def _doubtful(examined: _Examined) -> Finding:
-    place = examined.event.place
-    title = (
-        f"Whether a tooth of shaft {examined.shaft.shaft} is damaged cannot be told: one stands out by "
-        f"{place.ratio_db:.1f} dB, as one does by chance on {percent(examined.p_value)} of sound gears."
-    )
-    where = Where((examined.event.channel,), shaft=examined.shaft.shaft, angle_deg=360 * place.angle_rev)
-    evidence = tuple(_evidence(examined))
-    return cannot_tell("tooth-damage-undecided", title, where, evidence=evidence, surer=_surer(examined.signals))
+    by_chance = f"as one does by chance on {percent(examined.p_value)} of sound gears"
+    return _left_open(examined, by_chance, tuple(_evidence(examined)), _surer(examined.signals))
 
 
 def _withheld(examined: _Examined) -> Finding:
     event, place = examined.event, examined.event.place
-    title = (
-        f"Whether a tooth of shaft {examined.shaft.shaft} is damaged cannot be told: one stands out by "
-        f"{place.ratio_db:.1f} dB, but not alike from turn to turn."
-    )
     significance = event.rms / max(event.error_rms, 1e-300)
     scatter = (
         f"correlate there by {place.repeatability:.2f}; its rms is {significance:.1f} standard errors of the average"
     )
     evidence = (f"Odd and even revolutions {scatter}.", _visible_text(examined))
-    where = Where((event.channel,), shaft=examined.shaft.shaft, angle_deg=360 * place.angle_rev)
     surer = "A longer recording, and a tachometer whose pulses the shaft's own torsion does not shift."
+    return _left_open(examined, "but not alike from turn to turn", evidence, surer)
+
+
+def _left_open(examined: _Examined, why: str, evidence: tuple[str, ...], surer: str) -> Finding:
+    event, shaft = examined.event, examined.shaft.shaft
+    stands_out = f"one stands out by {event.place.ratio_db:.1f} dB, {why}"
+    title = f"Whether a tooth of shaft {shaft} is damaged cannot be told: {stands_out}."
+    where = Where((event.channel,), shaft=shaft, angle_deg=360 * event.place.angle_rev)
     return cannot_tell("tooth-damage-undecided", title, where, evidence=evidence, surer=surer)
 
 

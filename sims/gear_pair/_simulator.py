@@ -460,10 +460,9 @@ class PairTwin:
         """Return the specimen `seed` with its effects as a preset."""
         drawn = np.random.default_rng([seed, 1])
         values = usual_parameters(self.nominal) | specimen_parameters(self.nominal, drawn)
-        housing = usual_housing(drawn)
         if self.is_quiet:
             values |= dict.fromkeys(_NOISES, 0.0) | {name: EVEN * float(values[name]) for name in _UNEVEN}
-            housing = body_on_mounts(self.nominal)
+        housing = body_on_mounts(self.nominal) if self.is_quiet else usual_housing(drawn)
         used = [str(a.options["bearing"]) for a in added if "bearing" in a.options]
         installed = installed_of_rig(self.rig, self.nominal.size, housing, used)
         installed = replace(installed, sensors=(*installed.sensors, *self.further))

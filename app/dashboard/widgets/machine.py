@@ -24,19 +24,29 @@ if TYPE_CHECKING:
     from streamlit.delta_generator import DeltaGenerator
 
 Table = dict[str, Any]
-COLUMNS: dict[str, tuple[str, ...]] = {
-    "shaft": ("name", "direction"),
-    "pair": ("name", "driver", "driver_teeth", "driven", "driven_teeth", "module_mm", "face_width_mm"),
-    "bearing": ("name", "shaft", "bearing", "n_rolling_elements", "rolling_element_diameter_mm", "pitch_diameter_mm"),
-    "sensor": ("channel", "quantity", "unit", "position", "scale"),
+COLUMNS: dict[str, dict[str, int]] = {
+    "shaft": {"name": 120, "direction": 90},
+    "pair": {
+        "name": 64,
+        "driver": 80,
+        "driver_teeth": 70,
+        "driven": 80,
+        "driven_teeth": 70,
+        "module_mm": 54,
+        "face_width_mm": 60,
+    },
+    "bearing": {
+        "name": 80,
+        "shaft": 82,
+        "bearing": 88,
+        "n_rolling_elements": 84,
+        "rolling_element_diameter_mm": 68,
+        "pitch_diameter_mm": 76,
+    },
+    "sensor": {"channel": 84, "quantity": 96, "unit": 64, "position": 166, "scale": 70},
 }
-LEAST_WIDTHS_PX: dict[str, tuple[int, ...]] = {
-    "shaft": (120, 90),
-    "pair": (64, 80, 70, 80, 70, 54, 60),
-    "bearing": (80, 82, 88, 84, 68, 76),
-    "sensor": (84, 96, 64, 166, 70),
-}
-"""Of the columns: together they fit a window of 800 pixels, beside the sidebar; where there is more room, they grow."""
+"""Least width of each column, in pixels: together they fit a window of 800, beside the sidebar; with more room they
+grow."""
 SHORT_LABELS = {
     "driver_teeth": "teeth",
     "driven_teeth": "teeth",
@@ -271,7 +281,7 @@ def _config(kind: str, rig: Table, channels: Sequence[str]) -> dict[str, Any]:
         "sensor": {"quantity": QUANTITIES} | ({"channel": channels} if channels else {}),
     }
     made: dict[str, Any] = {}
-    for name, width in zip(COLUMNS[kind], LEAST_WIDTHS_PX[kind], strict=True):
+    for name, width in COLUMNS[kind].items():
         whole = FORM_LABELS.get(name, name)
         looks: dict[str, Any] = {"label": SHORT_LABELS.get(name, whole), "width": width}
         looks |= {"help": whole} if name in SHORT_LABELS else {}

@@ -363,6 +363,14 @@ def order_one(unbalance_g_mm: float, machine: CrackedTwin) -> float:
     return float(driver_orders(Added("unbalance", unbalance_g_mm, {"gear": "driver"}), machine)[1])
 
 
+def test_a_quiet_machine_has_no_resonances_that_were_drawn() -> None:
+    highest_hz = [
+        max(mode["frequency_hz"] for mode in made.preset(POINT).installed["modes"]) for made in (twin(), twin().quiet())
+    ]
+    assert highest_hz[0] > 600.0
+    assert highest_hz[1] < 10.0  # that of its mounts
+
+
 @pytest.mark.slow
 def test_on_its_mounts_a_quiet_machine_shakes_as_force_over_mass_and_in_proportion_to_an_unbalance() -> None:
     quiet = twin().quiet()
