@@ -17,6 +17,7 @@ ARRAYS = {"about": np.array('{"key": 1}'), "values": np.random.default_rng(0).no
 ENOUGH = 1_000_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("save", [np.savez_compressed, np.savez])
 def test_no_damaged_byte_gets_through(tmp_path: Path, save: Callable[..., None]) -> None:
     path = tmp_path / "kept.npz"

@@ -35,6 +35,7 @@ def pills(page: AppTest, label: str) -> Any:
     return next(w for w in page.get("button_group") if w.label == label)
 
 
+@pytest.mark.slow
 def test_a_view_that_is_sent_opens_with_its_channel_scale_and_cursors() -> None:
     page = analysis(view="Spectrum")
     assert choices(page) == {}  # nothing differs from what everybody begins with
@@ -243,6 +244,7 @@ def test_all_that_a_run_changes_is_one_step_of_back(monkeypatch: pytest.MonkeyPa
     assert len(sent) == 1
 
 
+@pytest.mark.slow
 def test_the_described_machine_of_a_sample_survives_a_reload() -> None:
     page = analysis("damaged_tooth", view="Machine")
     labelled(page, "text_input", "Machine").set_value("Mill 3").run()
@@ -314,6 +316,7 @@ def test_a_comparison_is_restored() -> None:
     assert page.query_params == {**asked, "align": "marks"}
 
 
+@pytest.mark.slow
 def test_the_choices_of_the_laboratory_are_restored() -> None:
     asked = {"machine": "small_30_25", "root_crack": "1.5", "root_crack-gear": "driven", "length": "0.5"}
     asked |= {"view": "Time", "signal": "mesh force", "shown": "all", "friction": "0", "seed": "7"}

@@ -186,6 +186,7 @@ def test_what_is_varied_is_named_for_people(name, words):
     assert parameter_words(branch(name, (value,))) == words
 
 
+@pytest.mark.slow
 def test_signals_of_the_model_and_channels_of_the_chain():
     for signal, period in (("transmission_error_m", 1), ("driver y", 1), ("mesh_force_n", 1)):
         one = branch(values=(20.0,), signal=signal)

@@ -228,6 +228,7 @@ def test_the_file_without_a_tachometer_is_named_once(capsys: pytest.CaptureFixtu
     assert err.count("const.csv") == 1
 
 
+@pytest.mark.slow
 def test_a_reference_has_the_channels_and_the_speed_source_of_its_own_rig_file(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -1,5 +1,6 @@
 """The page *Comparison*, run without a browser."""
 
+import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
@@ -18,6 +19,7 @@ def opened(recording: str = "root_crack_3mm", simulation: str = "root_crack_0mm"
     return turned_to(page, "compare")
 
 
+@pytest.mark.slow
 def test_two_samples_are_compared_in_every_view() -> None:
     page = opened()
     assert not page.exception

@@ -60,6 +60,7 @@ def test_every_sample_opens_in_every_view(name: str) -> None:
     assert SAMPLES[name].recording.name in shown_text(page)
 
 
+@pytest.mark.slow
 def test_views_draw_what_they_promise() -> None:
     page = opened()
     drawn = {}
@@ -121,6 +122,7 @@ def test_the_machine_can_be_changed_as_text_and_a_wrong_one_is_mended() -> None:
     assert 31.0 in set(orders["order of input"])
 
 
+@pytest.mark.slow
 def test_the_form_of_the_machine_makes_the_rig_of_its_file() -> None:
     """Opened and left alone, the form changes nothing; a constant speed replaces the tachometer."""
     page = opened(tab="Machine")
@@ -168,6 +170,7 @@ def test_what_a_recording_lacks_is_said_in_the_words_of_the_form() -> None:
     assert "sampling_rate_hz" not in shown_text(page)
 
 
+@pytest.mark.slow
 def test_units_are_written_as_in_print() -> None:
     page = opened(tab="Machine")  # whose rig file says m/s^2
     assert any("unit" in table.value and "m/s²" in set(table.value["unit"]) for table in page.dataframe)
@@ -406,6 +409,7 @@ def test_a_zoomed_ring_of_teeth_is_kept_in_the_address_and_reads_off_its_values(
     assert page.query_params["zoom"].endswith("_200_300_100_200")
 
 
+@pytest.mark.slow
 def test_the_average_of_a_crack_opens_on_what_changed_since_the_reference() -> None:
     page = opened("root_crack_3mm", tab="Average")
     (ring,) = sent_to(page, "picture")

@@ -114,6 +114,7 @@ def test_modes_open_with_the_waveform_that_the_text_speaks_of_and_notes_are_a_li
     assert len(notes.splitlines()) > 1
 
 
+@pytest.mark.slow
 def test_deconvolution_opens_at_the_rate_that_the_analysis_found() -> None:
     page = opened_at("Deconvolution", "two_stage")
     rate = labelled(page, "number_input", "Impacts per second")
@@ -143,6 +144,7 @@ def test_other_engines_answer_for_short_segments(method: str, engine: str) -> No
     assert len(figures(page)) >= 3
 
 
+@pytest.mark.slow
 def test_a_ridge_has_the_frequency_and_amplitude_that_was_put_in() -> None:
     """The machine's order 5 has 50 Hz and an amplitude of 3."""
     page = opened_machine("Ridges")
@@ -166,6 +168,7 @@ def test_a_channel_that_is_no_motion_is_one_message(quantity: str, n_errors: int
     assert len(opened_machine("Phase plane", quantity=quantity).error) == n_errors
 
 
+@pytest.mark.slow
 def test_the_depth_of_a_crack_against_the_healthy_sample_at_the_torque_that_is_stated() -> None:
     page = opened_at("Crack severity", "root_crack_3mm")
     next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("None").run()
@@ -202,6 +205,7 @@ def test_only_the_chosen_method_is_computed(monkeypatch: pytest.MonkeyPatch) -> 
         assert not page.exception
 
 
+@pytest.mark.slow
 def test_every_transform_draws_its_map_and_zooming_is_of_its_own_lines() -> None:
     page = opened_machine("Time–frequency")
     for over, chosen in (("Time", TRANSFORMS), ("Shaft angle", TRANSFORMS[1:2])):
@@ -237,6 +241,7 @@ def test_orders_have_the_amplitudes_that_were_put_in() -> None:
     assert not page.error
 
 
+@pytest.mark.slow
 def test_orders_that_make_no_sense_are_one_message() -> None:
     page = opened_machine("Orders (Vold–Kalman)")
     for orders in (["five"], ["5", "5.0"], ["-2"], ["1e9"], ["nan"]):
@@ -288,6 +293,7 @@ def test_modes_that_share_their_lines_are_warned_of() -> None:
     assert any("share the same lines" in w.value for w in page.warning)
 
 
+@pytest.mark.slow
 def test_modes_of_envelopes_and_over_angle() -> None:
     page = opened_machine("Modes")
     envelope = labelled(page, "slider", "Envelope of the band")
@@ -442,6 +448,7 @@ def test_the_reference_may_be_an_own_file_of_a_rate_that_is_stated(monkeypatch: 
     assert [request.sampling_rate_hz for request in asked] == [20480.0]
 
 
+@pytest.mark.slow
 def test_what_crack_severity_cannot_tell_is_said() -> None:
     page = opened_at("Crack severity", "two_stage")
     assert not page.error

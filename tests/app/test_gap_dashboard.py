@@ -202,6 +202,7 @@ def test_own_files_survive_a_reload() -> None:
     assert again.query_params == page.query_params
 
 
+@pytest.mark.slow
 def test_the_report_is_looked_at_before_it_is_taken() -> None:
     page = opened()
     page.session_state[_FINISHED] = finished(effect_report())

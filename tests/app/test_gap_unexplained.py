@@ -47,6 +47,7 @@ def test_healthy_gears_have_nothing_strange() -> None:
     assert seen(record()) == ([], [], [])
 
 
+@pytest.mark.slow
 def test_a_line_that_a_family_explains_is_no_remark() -> None:
     def struck_and_humming(order: float) -> list[str]:
         def vibration(time: FloatArray, revolutions: FloatArray) -> FloatArray:

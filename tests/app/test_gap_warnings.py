@@ -111,6 +111,7 @@ def test_a_healthy_reference_that_fits_the_teeth_lifts_the_doubt_of_them() -> No
     assert wrong_teeth(unlike, "now", gathered(0, 1)) == []
 
 
+@pytest.mark.slow
 def test_without_a_mark_on_the_shaft_its_teeth_are_not_counted() -> None:
     """The average over a shaft whose angle was found by the teeth holds for those teeth only."""
     assert wrong_teeth(replace(with_wrong_teeth(), marks=(False, False)), "now") == []

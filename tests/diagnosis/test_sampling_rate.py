@@ -66,6 +66,7 @@ def test_one_element_at_the_stated_rate_asks_for_no_mistake() -> None:
     assert CODE not in codes(analyze(replace(motor("", 1), samples=x[None, :], rig=rig)))
 
 
+@pytest.mark.slow
 def test_a_wrong_speed_is_as_likely_as_a_wrong_rate_but_for_the_mains() -> None:
     recording = replace(motor("BPFI", 1), sampling_rate_hz=1.1 * MOTOR_RATE_HZ)  # 33 Hz: no multiple is near 50 Hz
     t = np.arange(recording.n_samples) / recording.sampling_rate_hz

@@ -83,6 +83,7 @@ def test_a_knock_at_one_tooth_stands_out_on_its_own_gear(healthy: ReducedRecordi
     assert changes["change.driver.width"] == pytest.approx(0.0, abs=2.0)  # about one pitch
 
 
+@pytest.mark.slow
 def test_hum_and_swing_are_told_from_the_gears(healthy: ReducedRecording) -> None:
     hum = as_dict(change_features(reduced(lambda t, _: 0.02 * np.sin(2 * np.pi * 50.0 * t), seed=1), healthy))
     assert hum["hum"] > 6.0

@@ -56,6 +56,7 @@ def tone(order: float, amplitude: float) -> Added:
     return lambda _, r: amplitude * np.cos(2 * np.pi * order * r + 0.3)
 
 
+@pytest.mark.slow
 def test_another_record_of_the_same_machine_differs_nowhere() -> None:
     assert places_of() == ()
 
@@ -130,6 +131,7 @@ def test_a_tone_that_fills_a_band_is_no_noise() -> None:
     assert not [place for place in places if place.kind is PlaceKind.BAND]
 
 
+@pytest.mark.slow
 def test_hum_swing_and_noise_are_named() -> None:
     hum = places_of(lambda t, _: 0.1 * np.sin(2 * np.pi * 50.0 * t))[0]
     assert (hum.kind, "50 Hz" in hum.title) == (PlaceKind.LINE, True)

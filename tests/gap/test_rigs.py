@@ -64,6 +64,7 @@ def test_teeth_alone_are_enough_and_a_stated_torque_says_how_large_the_gears_are
     assert modules[2] / modules[0] == pytest.approx(10.0, rel=0.1)  # the torque grows with the cube of the module
 
 
+@pytest.mark.slow
 def test_lines_of_the_other_pair_are_background() -> None:
     train = with_stage(TRAIN, "stage")
     mesh = 19 * TEETH[0] / TEETH[1]

@@ -65,6 +65,7 @@ def test_noise_is_called_stochastic():
     assert any("no dimension" in sentence for sentence in found.evidence)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("per_period", "n_periods"), [(32, 600), further(128, 300)])
 def test_clean_chaos_whose_usual_delay_is_too_long_is_not_called_stochastic(per_period, n_periods):
     rate = per_period / DUFFING_PERIOD_S
@@ -75,6 +76,7 @@ def test_clean_chaos_whose_usual_delay_is_too_long_is_not_called_stochastic(per_
     assert found.kind == "chaotic"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smooth", [0.5, 0.95])
 @pytest.mark.parametrize("seed", [0, further(2)])
 def test_filtered_noise_stays_stochastic(smooth, seed):
@@ -92,6 +94,7 @@ def test_what_cannot_be_answered_is_said():
         kind_of_motion(path, constant_period_lock(5.0, 10.0))
 
 
+@pytest.mark.slow
 def test_a_model_without_noise_needs_no_exponent_to_be_regular(monkeypatch):
     """Where neighbours cannot be followed, the 0–1 test calls a deterministic motion regular, but never chaotic."""
 

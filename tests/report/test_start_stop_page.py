@@ -23,6 +23,7 @@ def test_the_page_shows_course_planes_impacts_and_force(examined: Analysis) -> N
     assert len(html) < 3_000_000
 
 
+@pytest.mark.slow
 def test_what_was_not_measured_has_no_picture() -> None:
     motion = analyze(without(start_stop(), "torque")).motion
     assert motion is not None

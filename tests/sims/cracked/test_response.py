@@ -134,6 +134,7 @@ def change_per_cycle(machine: Machine, depth_mm: float, name: str) -> NDArray[np
     return np.abs(change - np.median(change)).max(axis=(0, 2)) / np.ptp(healthy)
 
 
+@pytest.mark.slow
 def test_crack_strikes_once_per_revolution_and_harder_with_depth() -> None:
     """The change lies where tooth 0 carries, c = 0 … ε and shortly after, and grows with depth."""
     peaks = []

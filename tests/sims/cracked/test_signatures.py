@@ -181,6 +181,7 @@ def test_a_stiff_coupling_bends_the_shaft_beyond_what_torque_does() -> None:
     assert found == pytest.approx((2 * OMEGA) ** 2 * force / 2e8, rel=0.05)
 
 
+@pytest.mark.slow
 def test_misalignment_twists_with_the_square_of_the_angle() -> None:
     single, double = (faulty("misalignment", angle, shaft="driven") for angle in (1.0, 2.0))
     order = 2 * OUTPUT_ORDER
@@ -188,6 +189,7 @@ def test_misalignment_twists_with_the_square_of_the_angle() -> None:
     assert single.line(FORCE, order) > 100 * max(healthy().line(FORCE, order), single.line(FORCE, OUTPUT_ORDER))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [6.0, 2.4])
 def test_torque_ripple_is_a_line_of_the_mesh_force_at_its_order(order: float) -> None:
     """The mesh passes on what the inertias behind it leave: J₂*/(J₁ + J₂*) of the ripple, J₂* seen from the driver."""
@@ -207,6 +209,7 @@ def test_speed_fluctuation_swings_the_speed_by_its_amount() -> None:
     assert healthy().line("driver angle velocity", order) < 1e-5 * swing
 
 
+@pytest.mark.slow
 def test_backlash_shows_only_where_teeth_separate() -> None:
     """Loaded, the run is the same to the last bit; without torque, teeth rattle from flank to flank."""
     loaded = faulty("backlash", 100.0)
@@ -239,6 +242,7 @@ def test_a_race_defect_knocks_at_its_passing_order(race: str, order: float) -> N
     assert strongest == pytest.approx(order, abs=0.1)
 
 
+@pytest.mark.slow
 def test_only_the_inner_race_is_modulated_by_its_shaft() -> None:
     """It turns through the load zone once per revolution; the outer race stands in it."""
     ratio = {}
@@ -250,6 +254,7 @@ def test_only_the_inner_race_is_modulated_by_its_shaft() -> None:
     assert ratio["outer"] < 0.05
 
 
+@pytest.mark.slow
 def test_slip_and_jitter_move_and_smear_the_passing_order() -> None:
     ill = faulty("bearing_outer_race", 2.0, jitter_percent=0.0, slip_percent=3.0)
     assert ill.line(ACCELERATION, 4 * 0.97 * BPFO) > 30 * ill.line(ACCELERATION, 4 * BPFO)
@@ -289,6 +294,7 @@ def spectrum(recording: Recording) -> FloatArray:
     return result
 
 
+@pytest.mark.slow
 def test_a_path_mode_raises_what_lies_in_its_band() -> None:
     """|1 + 2ζA/(1 − r² + 2jζr)| at every mesh harmonic."""
     added = EffectSetting("transfer_path", 8.0, {"frequency_hz": 3300.0, "damping_ratio": 0.05})
@@ -308,6 +314,7 @@ def test_hum_stands_at_its_frequency_whatever_the_speed() -> None:
         assert spectrum(recorded(speed_rpm=speed_rpm))[[50, 100, 150]].max() < 1e-3
 
 
+@pytest.mark.slow
 def test_clipping_cuts_the_tail_of_the_amplitudes() -> None:
     healthy, clipped = (recorded(*s).samples[0] for s in ((), (EffectSetting("clipping", 10.0),)))
     level = np.quantile(np.abs(healthy), 0.9)

@@ -50,6 +50,7 @@ def run(added: tuple[Added, ...] = (), *, seed: int = 0, noise: int = 0, duratio
     return twin().run(POINT, added, seed=seed, noise=noise, duration_s=duration_s, sampling_rate_hz=FS)
 
 
+@pytest.mark.slow
 def test_a_tooth_breaks_while_the_healthy_machine_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is recorded then is what a machine records that was broken from its static balance on."""
     made, crack = twin().quiet(), (Added("root_crack", 2.0, {"gear": "driver", "tooth": 3.0}),)

@@ -97,6 +97,7 @@ def test_effects_of_the_model_have_candidates(twin):
         assert twin.draw(name, np.random.default_rng(1)).name == name
 
 
+@pytest.mark.slow
 def test_the_preset_of_a_diagnosis_runs_again(twin, tmp_path):
     path = tmp_path / "twin.toml"
     path.write_text(twin.preset_toml(POINT, (CRACK,), (), seed=0), encoding="utf-8")
