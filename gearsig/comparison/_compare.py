@@ -36,7 +36,6 @@ from gearsig.comparison._sides import (
     common_machine,
     make_side,
     pair_channels,
-    teeth_on,
     time_halves,
     usable_speed,
 )
@@ -155,7 +154,7 @@ def compare(
             "no shaft has a mark (one tachometer pulse per revolution) in both records", remedy="align by correlation"
         )
     alignments = tuple(
-        align(shaft, *pair, teeth_on(rig, shaft), by_marks=shaft in marked and align_by != "correlation")
+        align(shaft, *pair, rig.teeth_on(shaft), by_marks=shaft in marked and align_by != "correlation")
         for shaft, pair in lines.items()
     )
     turned = {a.shaft: (lines[a.shaft][0].turned(a.shift_deg / 360.0), lines[a.shaft][1]) for a in alignments}
@@ -267,7 +266,7 @@ def _compare_shaft(
     rig: Rig, shaft: str, i: int, pair: ChannelPair, lines: tuple[HalvedLines, HalvedLines]
 ) -> ShaftComparison:
     simulated, recorded = lines
-    n_lines, teeth = simulated.first.shape[1], teeth_on(rig, shaft)
+    n_lines, teeth = simulated.first.shape[1], rig.teeth_on(shaft)
     every = slice(1, n_lines)
     # Enough angles for the highest order, and some more, so that the average's peaks are drawn as they are.
     n_angles = int(next_fast_len(max(4 * n_lines, 360), real=True) // 2 * 2)

@@ -341,11 +341,6 @@ def usable_speed(rig: Rig, recording: Recording) -> SpeedSource | None:
     return source if source.channel in recording.channel_names else None
 
 
-def teeth_on(rig: Rig, shaft: str) -> int | None:
-    """Return the teeth of the first gear on a shaft whose teeth are known."""
-    return next((teeth for pair in rig.pairs_on(shaft) if (teeth := pair.teeth(shaft)) is not None), None)
-
-
 def _shaft_names(simulated: Rig, recorded: Rig) -> dict[str, str]:
     if not simulated.pairs or not recorded.pairs:
         if set(simulated.shaft_names) == set(recorded.shaft_names):

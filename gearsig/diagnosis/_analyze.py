@@ -329,12 +329,11 @@ def _indicators(
 def _of_gears(
     rig: Rig, shaft: str, parts: SeparatedAverage | None, before: SeparatedAverage | None
 ) -> Iterator[indicators.Indicator]:
-    if parts is not None and before is not None and before.average.unit != parts.average.unit:
+    if parts is None:
+        return
+    if before is not None and before.average.unit != parts.average.unit:
         before = None
-    for pair in rig.pairs_on(shaft):
-        teeth = pair.teeth(shaft)
-        if parts is None or teeth is None:
-            continue
+    for pair, teeth in rig.gear_teeth(shaft).items():
         band, band_before = _mesh_band(parts, teeth), None if before is None else _mesh_band(before, teeth)
         yield from indicators.gear_indicators(
             parts.average,
@@ -342,7 +341,7 @@ def _of_gears(
             parts.difference,
             band,
             teeth=teeth,
-            gear=f"{pair.name}/{shaft}",
+            gear=f"{pair}/{shaft}",
             history=() if before is None else (before.residual,),
             band_history=() if band_before is None else (band_before,),
         )

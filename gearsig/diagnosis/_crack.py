@@ -171,8 +171,7 @@ def _is_same_tooth(finding: Finding, crack: CrackEstimate, rig: Rig) -> bool:
         return False
     if finding.where.shaft != crack.shaft:  # gears that show it alike: the event is on one, the crack on the other
         return not crack.gear_is_certain
-    pair = _pair(crack, rig)
-    teeth = pair.teeth(crack.shaft) if pair is not None else None
+    teeth = rig.teeth_of(crack.gear)
     off = (finding.where.angle_deg - crack.angle_deg + 180.0) % 360.0 - 180.0
     return teeth is not None and abs(off) <= 1.5 * 360.0 / teeth
 

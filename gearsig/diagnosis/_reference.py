@@ -307,9 +307,7 @@ def _names_tooth(old: Finding, new: Finding) -> bool:
 def _is_same_tooth(then: Where, now: Where, rig: Rig | None) -> bool:
     """Whether two teeth are the same or neighbours: either place is good to about one tooth."""
     off = abs((then.tooth or 0) - (now.tooth or 0))
-    teeth = next(
-        (pair.teeth(now.shaft) for pair in (rig.pairs if rig else ()) if now.gear == f"{pair.name}/{now.shaft}"), None
-    )
+    teeth = rig.teeth_of(now.gear) if rig is not None else None
     return min(off, teeth - off if teeth is not None else off) <= 1
 
 

@@ -243,7 +243,7 @@ def compute_signals(
 def _one_shaft(prepared: PreparedRecording, shaft: str, names: Sequence[str]) -> ShaftSignals:
     signal = prepared.over_angle(shaft, names)
     averages = {name: prepared.average(shaft, name) for name in names}
-    teeth = tuple(z for pair in prepared.rig.pairs_on(shaft) if (z := pair.teeth(shaft)) is not None)
+    teeth = tuple(prepared.rig.gear_teeth(shaft).values())
     separated, halves = {}, {}
     for name, average in averages.items():
         visible = tuple(z for z in teeth if z <= average.highest_line)

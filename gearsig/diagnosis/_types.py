@@ -325,6 +325,18 @@ class Analysis(Result, rows="findings"):
         """What the findings come to, in one word."""
         return outcome_of(self.findings)
 
+    @property
+    def top_claim(self) -> Finding | None:
+        """The first fault, or without one the first suspicion: what the verdict is about; None without either."""
+        claims = (finding for finding in self.findings if finding.is_claim)
+        return min(claims, key=lambda finding: finding.kind is not Kind.FAULT, default=None)
+
+    def teeth_on(self, shaft: str) -> int | None:
+        """Return the teeth of the gear on a shaft; of the gear that a finding names, where there are several."""
+        gears = self.rig.gear_teeth(shaft) if self.rig is not None else {}
+        pairs = (f.where.gear.rpartition("/")[0] for f in self.findings if f.where.gear.endswith(f"/{shaft}"))
+        return gears.get(next((pair for pair in pairs if pair in gears), next(iter(gears), "")))
+
     def _repr_html_(self) -> str:
         """Return verdict and findings for notebooks; texts may come from files."""
         rows = [(f.kind.value, f.title, f"{f.confidence:.2g}") for f in self.findings]

@@ -243,12 +243,10 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
 
 def _facts(analysis: Analysis, options: AnalysisOptions) -> Row:
     from gearsig.angle import ShaftAngle
-    from gearsig.diagnosis import Kind
     from gearsig.severity import CrackEstimate
 
     recording, rig, angle = analysis.recording, analysis.rig, analysis.shaft_angle
-    claims = [f for f in analysis.findings if f.is_claim]
-    top = min(claims, key=lambda finding: finding.kind is not Kind.FAULT, default=None)
+    top = analysis.top_claim
     judged = rig is not None and any(f.code == "vibration-zone" for f in analysis.findings)
     machine = rig.machine if rig is not None and judged else None
     load = options.torque_nm

@@ -610,7 +610,7 @@ def _average_in_blocks(blocks: RecordBlocks, prepared: PreparedRecording, channe
 
 def _average_answer(prepared: PreparedRecording, channel: str, average: SynchronousAverage) -> MethodAnswer:
     shaft = average.shaft
-    teeth = next((pair.teeth(shaft) for pair in prepared.rig.pairs_on(shaft)), None)
+    teeth = prepared.rig.teeth_on(shaft)
     table = {
         "angle (°)": 360.0 * np.arange(len(average.values)) / len(average.values),
         with_unit("average", average.unit): average.values,

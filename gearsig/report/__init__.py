@@ -82,7 +82,6 @@ from gearsig.report._page import (
     sidebands_of,
     speed_is_constant,
     start_stop_figures,
-    teeth_of_shaft,
     verdict_picture,
     write_page,
 )
@@ -181,7 +180,6 @@ __all__ = [
     "start_stop_json",
     "start_stop_text",
     "step_rows",
-    "teeth_of_shaft",
     "verdict_picture",
     "verdict_rows",
     "write_answer",

@@ -15,7 +15,7 @@ from urllib.parse import quote
 
 from gearsig import __version__
 from gearsig.cache import write_text
-from gearsig.diagnosis import Analysis, Kind, Outcome
+from gearsig.diagnosis import Analysis, Outcome
 from gearsig.fleet import date_in_name
 from gearsig.formatting import csv_rows, percent, readable, spreadsheet_cell, unit_text
 from gearsig.indicators import Indicator
@@ -80,8 +80,7 @@ class Failure:
 
 def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
     """Sum up an analysis for the index page."""
-    claims = (f for f in analysis.findings if f.is_claim)
-    top = min(claims, key=lambda finding: finding.kind is not Kind.FAULT, default=None)
+    top = analysis.top_claim
     crack_mm, crack = None, analysis.crack
     if isinstance(crack, CrackEstimate) and not crack.likelier_other and top is not None:
         is_of_crack = (top.where.gear, top.where.angle_deg) == (crack.gear, crack.angle_deg)

@@ -233,7 +233,7 @@ def _change_by_crack(analysis: Analysis, shaft: str) -> SynchronousAverage | Non
     crack = analysis.crack
     if not isinstance(crack, CrackEstimate) or not crack.with_reference or crack.shaft != shaft:
         return None
-    beside = _beside_reference(analysis, crack, teeth_of_shaft(analysis, shaft))
+    beside = _beside_reference(analysis, crack, analysis.teeth_on(shaft))
     name, now, then = beside if beside is not None else ("", None, None)
     if now is None or then is None:
         return None
@@ -257,8 +257,7 @@ def crack_picture(analysis: Analysis) -> Picture | None:
     crack = analysis.crack
     if not isinstance(crack, CrackEstimate) or analysis.rig is None:
         return None
-    pair = next((p for p in analysis.rig.pairs if crack.gear == f"{p.name}/{crack.shaft}"), None)
-    teeth = pair.teeth(crack.shaft) if pair is not None else None
+    teeth = analysis.rig.teeth_of(crack.gear)
     beside = _beside_reference(analysis, crack, teeth) if teeth is not None else None
     if teeth is None or beside is None:
         return None
@@ -637,7 +636,7 @@ def _map(analysis: Analysis, channel: ChannelAnalysis, order_map: OrderMap) -> P
 def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
     """Return the ring of teeth of a shaft."""
     average, shaft = picture.average, picture.shaft
-    teeth = teeth_of_shaft(analysis, shaft)
+    teeth = analysis.teeth_on(shaft)
     marks = plot.marks_of(analysis.findings, shaft, teeth)
     seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
     return Picture.of_svg(
@@ -661,18 +660,6 @@ def picture_of_verdict(analysis: Analysis) -> Picture | None:
     if shown.about == "bearing" and spectrum is not None:
         return envelope_picture(analysis, shown.channel, spectrum)
     return (_order_levels if shown.about == "resonance" else _spectrum)(analysis, shown.channel)
-
-
-def teeth_of_shaft(analysis: Analysis, shaft: str) -> int | None:
-    """Return the teeth of the gear on a shaft; of the gear that a finding names, where there are several."""
-    if analysis.rig is None:
-        return None
-    gears = {pair.name: pair.teeth(shaft) for pair in analysis.rig.pairs_on(shaft)}
-    for finding in analysis.findings:
-        pair, _, on = finding.where.gear.rpartition("/")
-        if on == shaft and gears.get(pair):
-            return gears[pair]
-    return next((teeth for teeth in gears.values() if teeth), None)
 
 
 def write_page(

@@ -634,6 +634,18 @@ class Rig:
         """Return the pairs that have a gear on a shaft."""
         return tuple(pair for pair in self.pairs if shaft in (pair.driver, pair.driven))
 
+    def gear_teeth(self, shaft: str) -> dict[str, int]:
+        """Return the teeth of the gears on a shaft by their pairs' names, as far as they are known."""
+        return {pair.name: teeth for pair in self.pairs_on(shaft) if (teeth := pair.teeth(shaft)) is not None}
+
+    def teeth_on(self, shaft: str) -> int | None:
+        """Return the teeth of the first gear on a shaft whose teeth are known; None without one."""
+        return next(iter(self.gear_teeth(shaft).values()), None)
+
+    def teeth_of(self, gear: str) -> int | None:
+        """Return the teeth of a gear, "pair/shaft" as in findings; None if it or they are not known."""
+        return {f"{p.name}/{shaft}": p.teeth(shaft) for p in self.pairs for shaft in (p.driver, p.driven)}.get(gear)
+
     @property
     def teeth_text(self) -> str:
         """Teeth of all pairs, driver's first, e.g. "29/71, ?/40"; empty without pairs."""

@@ -223,9 +223,7 @@ def _mean_residual(
 
 
 def _teeth(recording: Recording, estimate: CrackEstimate) -> int:
-    name = estimate.gear.rpartition("/")[0]
-    pairs = recording.rig.pairs if recording.rig is not None else ()
-    teeth = next((pair.teeth(estimate.shaft) for pair in pairs if pair.name == name), None)
+    teeth = recording.rig.teeth_of(estimate.gear) if recording.rig is not None else None
     if teeth is None:
         raise RefusalError("there is no figure: the teeth of the gear are not known", remedy="complete the rig file")
     return teeth

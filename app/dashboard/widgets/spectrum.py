@@ -231,8 +231,7 @@ def show_revolutions(curves: Mapping[str, FloatArray], shaft: str, y: str, key: 
 
 def teeth_choice(analysis: Analysis, shaft: str) -> int | None:
     """Return the teeth of the gear on a shaft; the user chooses where there are several."""
-    pairs = analysis.rig.pairs_on(shaft) if analysis.rig is not None else ()
-    gears = {pair.name: teeth for pair in pairs if (teeth := pair.teeth(shaft)) is not None}
+    gears = analysis.rig.gear_teeth(shaft) if analysis.rig is not None else {}
     if len(gears) < 2:
         return next(iter(gears.values()), None)
     named = [f.where.gear.rpartition("/")[0] for f in analysis.findings if f.where.gear.rpartition("/")[2] == shaft]

@@ -29,7 +29,6 @@ from gearsig.report import (
     marked_positions,
     reference_text,
     sidebands_of,
-    teeth_of_shaft,
     verdict_picture,
 )
 from gearsig.spectra import LARGEST_SLIP
@@ -138,7 +137,7 @@ def show_verdict_picture(analysis: Analysis) -> None:
         return
     channel, place = picture.channel, f"verdict {picture.about}"
     if picture.about == "tooth":
-        teeth = teeth_of_shaft(analysis, picture.shaft)
+        teeth = analysis.teeth_on(picture.shaft)
         marks = marks_of(analysis.findings, picture.shaft, teeth)
         stand_out = f"{enumerated([mark.label for mark in marks])} {'stand' if len(marks) > 1 else 'stands'} out"
         words = f"Mean revolution of {picture.shaft}: {stand_out if marks else 'no tooth stands out'}"
