@@ -15,6 +15,7 @@ from gearsig.angle._types import ShaftAngle
 from gearsig.checks import FloatArray, listed, positive
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
+from gearsig.peaks import parabola_vertex
 from gearsig.recording import Recording, check_recording
 from gearsig.rig import Rig, check_rig, shaft_ratios
 
@@ -420,9 +421,8 @@ def _line_at(evidence: LineEvidence, position: float) -> tuple[float, float] | N
     p = k - 1 + int(np.argmax(x[k - 1 : k + 3]))
     if x[p] < 3.0 or x[p] < x[p - 1] or x[p] < x[p + 1]:
         return None
-    bend = x[p - 1] - 2 * x[p] + x[p + 1]
-    shift = 0.5 * (x[p - 1] - x[p + 1]) / bend if bend < 0 else 0.0
-    return float((p + shift) * evidence.bin_width), float(x[p])
+    offset, _ = parabola_vertex(*x[p - 1 : p + 2])
+    return float((p + offset) * evidence.bin_width), float(x[p])
 
 
 def _sure(value: float, zero: float, scale: float) -> float:

@@ -19,6 +19,7 @@ from scipy.optimize import minimize_scalar
 
 from gearsig.checks import FloatArray
 from gearsig.compiled import njit
+from gearsig.peaks import parabola_vertex
 from gearsig.spectra import ComplexArray, Spectrum, noise_floor
 
 LOG_RATIO_LIMIT = 6.0
@@ -455,10 +456,8 @@ def peak_position(spectrum: Spectrum, i: int) -> float:
     """Return the vertex of the parabola through the logarithms of a line and its neighbours."""
     if not 0 < i < len(spectrum.values) - 1:
         return float(spectrum.positions[i])
-    a, b, c = np.log(np.maximum(spectrum.values[i - 1 : i + 2], 1e-300))
-    curvature = a - 2 * b + c
-    offset = 0.5 * (a - c) / curvature if curvature < 0 else 0.0
-    return float(spectrum.positions[i] + np.clip(offset, -0.5, 0.5) * spectrum.resolution)
+    offset, _ = parabola_vertex(*np.log(np.maximum(spectrum.values[i - 1 : i + 2], 1e-300)))
+    return float(spectrum.positions[i] + offset * spectrum.resolution)
 
 
 # --------------------

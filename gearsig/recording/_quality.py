@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.formatting import counted, percent, signed
+from gearsig.peaks import parabola_vertex
 from gearsig.recording._types import Channel, Recording
 
 
@@ -490,8 +491,7 @@ def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | No
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft((x[:n] - np.mean(x[:n], dtype=np.float64)) * window))
     i, step_hz = int(np.argmax(spectrum[1:-1])) + 1, rate_hz / n
-    below, peak, above = spectrum[i - 1 : i + 2]
-    line_hz = (i + 0.5 * (above - below) / max(2 * peak - below - above, 1e-300)) * step_hz
+    line_hz = (i + float(parabola_vertex(*spectrum[i - 1 : i + 2])[0])) * step_hz
     share = float(np.sum(spectrum[max(i - 2, 0) : i + 3] ** 2) / max(float(np.sum(spectrum**2)), 1e-300))
     for mains_hz in MAINS_HZ:
         multiple = round(line_hz / mains_hz)

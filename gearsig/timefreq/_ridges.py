@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, count, not_negative, positive
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
+from gearsig.peaks import parabola_vertex
 from gearsig.timefreq._types import Coefficients, Ridge, TimeFrequencyMap
 
 SQUEEZED_REACH = 2
@@ -473,9 +474,8 @@ def _read(grid: _Grid, path: FloatArray) -> tuple[FloatArray, FloatArray]:
     best = near[np.argmax(power[near, columns[None, :]], axis=0), columns]
     lowest = float(np.finfo(np.float64).tiny)
     a, b, c = (np.log(np.maximum(power[best + shift, columns], lowest)) for shift in (-1, 0, 1))
-    bend = a - 2 * b + c
-    shift = np.where(bend < 0, np.clip((a - c) / 2 / np.where(bend < 0, bend, -1.0), -0.5, 0.5), 0.0)
-    return best + shift, np.exp(b - (a - c) * shift / 4)
+    offset, height = parabola_vertex(a, b, c)
+    return best + offset, np.exp(height)
 
 
 def _along(table: NDArray[Any], path: FloatArray) -> FloatArray:
