@@ -1,13 +1,5 @@
 """Motion in its phase space: portraits, Poincaré sections, embedding, Lyapunov exponents."""
 
-from gearsig.phase._bifurcation import (
-    BifurcationDiagram,
-    TwoMotions,
-    bifurcation_diagram,
-    coexistence_ranges,
-    step_of,
-    values_apart,
-)
 from gearsig.phase._embedding import (
     EmbeddingDimension,
     MutualInformation,
@@ -30,13 +22,19 @@ from gearsig.phase._neighbours import nearest_apart, spaced
 from gearsig.phase._plane import MotionQuantity, PhasePortrait, lowest_low_cut_hz, phase_plane
 from gearsig.phase._recurrence import RecurrenceMeasures, RecurrencePlot, recurrence_measures, recurrence_plot
 from gearsig.phase._section import (
+    BifurcationDiagram,
     CycleLock,
     PoincareSection,
+    TwoMotions,
+    bifurcation_diagram,
+    coexistence_ranges,
     constant_period_lock,
     find_lock,
     poincare_section,
     points_between,
     section_period,
+    step_of,
+    values_apart,
 )
 
 __all__ = [
