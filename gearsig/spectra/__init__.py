@@ -10,7 +10,6 @@ from gearsig.spectra._amplitude import (
     prepared_signal,
     spectrum_of_blocks,
 )
-from gearsig.spectra._bands import LARGEST_SLIP, BandChoice, coherence_band, compare_bands
 from gearsig.spectra._cepstrum import cepstrum, lifter_families
 from gearsig.spectra._coherence import (
     EnhancedEnvelope,
@@ -27,11 +26,15 @@ from gearsig.spectra._deconvolution import (
     multipoint_norms,
 )
 from gearsig.spectra._envelope import (
+    LARGEST_SLIP,
     PERIODS_OF_EDGE,
+    BandChoice,
     ChosenBand,
     Envelope,
     EnvelopeKind,
     band_envelope,
+    coherence_band,
+    compare_bands,
     edged_band,
     envelope_recording,
     envelope_spectrum,
