@@ -1,8 +1,16 @@
 """A simulation beside a recording: aligned in angle, compared by order, band and angle. Names no cause."""
 
-from gearsig.comparison._averages import HalvedLines, frac, tooth_powers, waveform
 from gearsig.comparison._compare import ALIGN, compare
-from gearsig.comparison._lines import band_powers, order_band_limits, third_octave_limits, third_octaves
+from gearsig.comparison._lines import (
+    HalvedLines,
+    band_powers,
+    frac,
+    order_band_limits,
+    third_octave_limits,
+    third_octaves,
+    tooth_powers,
+    waveform,
+)
 from gearsig.comparison._sides import SIMULATION_OPTIONS, for_simulation
 from gearsig.comparison._types import (
     BEYOND,

@@ -10,24 +10,22 @@ from scipy.fft import next_fast_len
 
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray, one_of
-from gearsig.comparison._averages import (
+from gearsig.comparison._lines import (
     HalvedLines,
     agreement,
     align,
+    band_powers,
     correlation,
     halved_lines,
-    reliability,
-    repeated,
-    tooth_levels,
-    waveform,
-)
-from gearsig.comparison._lines import (
-    band_powers,
     line_levels,
     order_band_limits,
     order_bands,
     other_lines,
+    reliability,
+    repeated,
     third_octaves,
+    tooth_levels,
+    waveform,
 )
 from gearsig.comparison._sides import (
     ChannelPair,
