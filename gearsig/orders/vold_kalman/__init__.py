@@ -16,8 +16,8 @@ from gearsig.orders.vold_kalman._joint import (
     solve_envelopes,
     solve_waveforms,
 )
-from gearsig.orders.vold_kalman._kernels import cosine_and_sine, envelope_weight, settling_time, waveform_weight
 from gearsig.orders.vold_kalman._single import envelope_alone, oscillator, waveform_alone
+from gearsig.orders.vold_kalman._tracks import cosine_and_sine, envelope_weight, settling_time, waveform_weight
 
 __all__ = [
     "accuracy_of",

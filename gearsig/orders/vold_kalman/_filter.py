@@ -14,8 +14,8 @@ from gearsig.checks import FloatArray, count, one_of
 from gearsig.errors import InputError
 from gearsig.orders._average import angle_of, as_recording, over_angle, unit_of
 from gearsig.orders.vold_kalman._joint import Group, Problem, solve_groups
-from gearsig.orders.vold_kalman._kernels import HALF_POWER, settling_time
 from gearsig.orders.vold_kalman._tracks import (
+    HALF_POWER,
     BoolArray,
     FrequencyTrack,
     Generation,
@@ -25,6 +25,7 @@ from gearsig.orders.vold_kalman._tracks import (
     Tracks,
     bandwidths_of,
     named_orders,
+    settling_time,
     tracks_of_orders,
     tracks_over_angle,
     valid_parts,

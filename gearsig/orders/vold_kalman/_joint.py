@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.compiled import njit
 from gearsig.errors import RefusalError
-from gearsig.orders.vold_kalman._kernels import (
+from gearsig.orders.vold_kalman._single import envelope_alone, waveform_alone
+from gearsig.orders.vold_kalman._tracks import (
     HALF_POWER,
+    Generation,
     cosine_and_sine,
     envelope_weight,
     waveform_weight,
@@ -23,8 +25,6 @@ from gearsig.orders.vold_kalman._kernels import (
     write_modulated,
     write_phasors,
 )
-from gearsig.orders.vold_kalman._single import envelope_alone, waveform_alone
-from gearsig.orders.vold_kalman._tracks import Generation
 
 Array = NDArray[Any]
 ComplexArray = NDArray[np.complex128]

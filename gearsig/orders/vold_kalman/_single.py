@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.compiled import njit
 from gearsig.errors import RefusalError
-from gearsig.orders.vold_kalman._kernels import HALF_POWER, cosine_and_sine
+from gearsig.orders.vold_kalman._tracks import HALF_POWER, cosine_and_sine
 
 Array = NDArray[Any]
 ComplexArray = NDArray[np.complex128]
