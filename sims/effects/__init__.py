@@ -33,7 +33,7 @@ from sims.effects._effect import (
     PlausibleRange,
     Severity,
 )
-from sims.effects._shared import (
+from sims.effects._parts import (
     ANGLE_OPTION,
     BEARING_OPTION,
     GEARS,

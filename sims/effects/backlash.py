@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from sims.effects import textbook as book
 from sims.effects._effect import DriveEffect, DriveParameters, Effect, Options, PlausibleRange, Severity
-from sims.effects._shared import module_mm
+from sims.effects._parts import module_mm
 from sims.machine import Machine
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from sims.effects import textbook as book
 from sims.effects._effect import Effect, Options, PlausibleRange, Severity
-from sims.effects._shared import BEARING_OPTION, any_bearing, chosen_bearing, each_bearing, module_mm, with_bearing
+from sims.effects._parts import BEARING_OPTION, any_bearing, chosen_bearing, each_bearing, module_mm, with_bearing
 from sims.machine import Machine
 
 

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from sims.effects import _shared as shared
+from sims.effects import _parts as parts
 from sims.effects._effect import Effect
 from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, race_impacts
 
@@ -20,16 +20,16 @@ EFFECT = Effect(
     name="bearing_inner_race",
     group="bearing",
     title="spall on an inner race",
-    severity=shared.RACE_SEVERITY,
+    severity=parts.RACE_SEVERITY,
     changes="Rolling elements sink into a gap of the turning race and strike its far edge, hardest in the load zone.",
     signature="Knocks at n(1 + d cos α/D)/2 per revolution of the bearing's shaft, a little more with slip, strong "
     "while the defect turns through the load zone and weak outside: envelope lines of that order and its multiples "
     "with sidebands of one shaft order, and order 1 itself. Slightly random, so that a synchronous average takes it "
     "away.",
-    shows_in=shared.RACE_SHOWS_IN,
-    change=partial(shared.with_race_defect, "inner"),
-    options=shared.RACE_OPTIONS,
-    plausible=shared.race_range("inner", "as on the outer race"),
+    shows_in=parts.RACE_SHOWS_IN,
+    change=partial(parts.with_race_defect, "inner"),
+    options=parts.RACE_OPTIONS,
+    plausible=parts.race_range("inner", "as on the outer race"),
     textbook=Textbook(
         (("envelope.inner", UP),),
         "envelope lines at the ball pass order of the inner race",

@@ -6,7 +6,7 @@ from math import log
 
 import numpy as np
 
-from sims.effects import _shared as shared
+from sims.effects import _parts as parts
 from sims.effects import textbook as book
 from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, Options, PlausibleRange, Severity
 from sims.machine import Machine
@@ -16,8 +16,8 @@ from sims.mesh import ToothChip
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the chip."""
     del rng
-    chip = ToothChip(severity, shared.loaded_width_mm(machine, options), shared.tooth_number(machine, options))
-    return shared.with_tooth_fault(machine, "chips", shared.gear_index(options), chip)
+    chip = ToothChip(severity, parts.loaded_width_mm(machine, options), parts.tooth_number(machine, options))
+    return parts.with_tooth_fault(machine, "chips", parts.gear_index(options), chip)
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
@@ -62,10 +62,10 @@ EFFECT = Effect(
         LOW,
         HIGH,
         "of the module: a broken corner to half of the tooth's height; smaller chips lie in double contact",
-        shared.module_mm,
-        lambda machine: shared.first_teeth(machine, width_percent=85.0),
+        parts.module_mm,
+        lambda machine: parts.first_teeth(machine, width_percent=85.0),
         lambda machine, rng: {
-            **shared.any_tooth(machine, rng),
+            **parts.any_tooth(machine, rng),
             "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0))),
         },
         # Without its whole tip a tooth carries nothing there; with most of it left, nearly as much as ever. The height
@@ -78,7 +78,7 @@ EFFECT = Effect(
                 (85.0, (EVEN_HEIGHTS[1], *EVEN_HEIGHTS[3:-1])),
                 (100.0, EVEN_HEIGHTS),
             )
-            for options in shared.first_teeth(machine, width_percent=percent)
+            for options in parts.first_teeth(machine, width_percent=percent)
         ],
     ),
     textbook=book.Textbook(

@@ -8,7 +8,7 @@ from math import log10
 import numpy as np
 
 from sims.effects._effect import Effect, Options, PlausibleRange, Severity
-from sims.effects._shared import with_each_channel
+from sims.effects._parts import with_each_channel
 from sims.effects.textbook import DOWN, SIZES, UP, Signature, SyntheticScene, Textbook
 from sims.machine import Machine
 from sims.measure import MeasuredChannel

@@ -7,7 +7,7 @@ from math import radians, sin
 
 import numpy as np
 
-from sims.effects import _shared as shared
+from sims.effects import _parts as parts
 from sims.effects._effect import GEAR_OPTION, Effect, Options, PlausibleRange, Severity
 from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, draw_side, modulated
 from sims.machine import Machine, runout_tolerance_um
@@ -15,14 +15,14 @@ from sims.machine import Machine, runout_tolerance_um
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with run-out, and the unbalance that goes with it."""
-    index, angle = shared.gear_index(options), shared.angle_or_drawn_deg(options, rng)
+    index, angle = parts.gear_index(options), parts.angle_or_drawn_deg(options, rng)
     wheel = machine.wheels[index]
-    runout, runout_angle = shared.vector_sum(wheel.runout_um, wheel.runout_angle_deg, severity, angle)
+    runout, runout_angle = parts.vector_sum(wheel.runout_um, wheel.runout_angle_deg, severity, angle)
     # The body is concentric with the pitch circle, so its centre of mass moves along: 1 kg µm = 1 g mm.
-    unbalance, unbalance_angle = shared.vector_sum(
+    unbalance, unbalance_angle = parts.vector_sum(
         wheel.unbalance_g_mm, wheel.unbalance_angle_deg, wheel.mass_kg * severity, angle
     )
-    wheels = shared.replaced_item(
+    wheels = parts.replaced_item(
         machine.wheels,
         index,
         runout_um=runout,
@@ -71,14 +71,14 @@ EFFECT = Effect(
     "those further out: a smooth modulation all round the revolution and no pulse. Weak while the torque is steady.",
     shows_in=("shaft_orders", "mesh_sidebands"),
     change=change,
-    options=(GEAR_OPTION, shared.ANGLE_OPTION),
+    options=(GEAR_OPTION, parts.ANGLE_OPTION),
     plausible=PlausibleRange(
         1.0,
         8.0,
         "half of the run-out over F_r of class 5: gears of class 7 to 13, or a bent shaft",
-        shared.tolerance_of(runout_tolerance_um),
-        shared.either_gear,
-        shared.any_gear,
+        parts.tolerance_of(runout_tolerance_um),
+        parts.either_gear,
+        parts.any_gear,
         lambda machine, _options: largest_um(machine.play_um, machine.nominal.pressure_angle_deg),
     ),
     textbook=Textbook(

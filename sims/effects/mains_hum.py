@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.errors import InputError
 from gearsig.recording import MAINS_HZ
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
-from sims.effects._shared import with_each_channel
+from sims.effects._parts import with_each_channel
 from sims.effects.textbook import UP, Textbook
 from sims.machine import Machine
 from sims.measure import MainsHum, MeasuredChannel

@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.checks import within
 from sims.effects import textbook as book
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
-from sims.effects._shared import GEARS, gear_index, replaced_item
+from sims.effects._parts import GEARS, gear_index, replaced_item
 from sims.machine import Machine
 
 _MAX_DEG = 5.0  # of a ShaftLine

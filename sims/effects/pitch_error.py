@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import FloatArray
-from sims.effects import _shared as shared
+from sims.effects import _parts as parts
 from sims.effects._effect import (
     GEAR_OPTION,
     TOOTH_OPTION,
@@ -43,17 +43,17 @@ ISO 1328-1:2013 judges the single deviation by the worst tooth and the cumulativ
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with pitch errors added to those it has: of all teeth, or of one."""
-    index = shared.gear_index(options)
-    flank: FlankDeviation = shared.mesh_field(machine, "flank", index)
-    n_teeth = shared.gear_geometry(machine, index).teeth
+    index = parts.gear_index(options)
+    flank: FlankDeviation = parts.mesh_field(machine, "flank", index)
+    n_teeth = parts.gear_geometry(machine, index).teeth
     if "tooth" in options:
         behind = 1.0 if options["stands"] == "behind" else -1.0
-        pattern: FloatArray = behind * np.eye(n_teeth)[shared.tooth_number(machine, options)]
+        pattern: FloatArray = behind * np.eye(n_teeth)[parts.tooth_number(machine, options)]
     else:
         pattern = cumulative_pitch(n_teeth, rng)
     added = severity * pattern
     total = added + np.asarray(flank.pitch_um) if flank.pitch_um else added
-    return shared.with_mesh_field(machine, "flank", index, replace(flank, pitch_um=tuple(total.tolist())))
+    return parts.with_mesh_field(machine, "flank", index, replace(flank, pitch_um=tuple(total.tolist())))
 
 
 def cumulative_pitch(n_teeth: int, rng: np.random.Generator) -> FloatArray:
@@ -102,8 +102,8 @@ def pitch_of_all_teeth(scene: SyntheticScene, size: float, rng: np.random.Genera
 def _drawn(machine: MachineFacts, rng: np.random.Generator) -> Options:
     """Return a gear, or one tooth of it."""
     if rng.uniform() >= ONE_TOOTH_SHARE:
-        return shared.any_gear(machine, rng)
-    return {**shared.any_tooth(machine, rng), "stands": str(rng.choice(STANDS))}
+        return parts.any_gear(machine, rng)
+    return {**parts.any_tooth(machine, rng), "stands": str(rng.choice(STANDS))}
 
 
 STANDS = ("behind", "ahead")
@@ -133,12 +133,12 @@ EFFECT = Effect(
         0.4,
         3.0,
         "standard deviation over the pitch tolerance of class 5, which is a limit: of classes 5 to 11",
-        shared.tolerance_of(pitch_tolerance_um),
-        shared.either_gear,
+        parts.tolerance_of(pitch_tolerance_um),
+        parts.either_gear,
         _drawn,
         # The teeth's deviations are drawn; what a small one of them changes, each changes. A large one parts its tooth.
         further_settings=lambda machine: [
-            (options, (0, 2)) for stands in STANDS for options in shared.first_teeth(machine, stands=stands)
+            (options, (0, 2)) for stands in STANDS for options in parts.first_teeth(machine, stands=stands)
         ],
     ),
     textbook=Textbook(

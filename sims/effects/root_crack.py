@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gearsig.checks import within
-from sims.effects import _shared as shared
+from sims.effects import _parts as parts
 from sims.effects import textbook as book
 from sims.effects._effect import (
     GEAR_OPTION,
@@ -26,9 +26,9 @@ from sims.mesh import GearMesh, RootCrack, deepest_crack_mm, mesh_stiffness
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the crack."""
     del rng  # nothing is drawn
-    tooth, width_mm = shared.tooth_number(machine, options), shared.part_of_width_mm(machine, options)
+    tooth, width_mm = parts.tooth_number(machine, options), parts.part_of_width_mm(machine, options)
     crack = RootCrack(severity, float(options["angle_deg"]), tooth, width_mm)
-    return shared.with_tooth_fault(machine, "cracks", shared.gear_index(options), crack)
+    return parts.with_tooth_fault(machine, "cracks", parts.gear_index(options), crack)
 
 
 def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
@@ -38,9 +38,9 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
     """
     if severity == 0.0:
         return DriveEffect()
-    gear, pair = shared.gear_index(options), drive.gear_pair()
+    gear, pair = parts.gear_index(options), drive.gear_pair()
     n_teeth = (pair.driver, pair.driven)[gear].teeth
-    tooth = int(within(float(options["tooth"]), f"tooth of the {shared.GEARS[gear]} gear", 1, n_teeth)) - 1
+    tooth = int(within(float(options["tooth"]), f"tooth of the {parts.GEARS[gear]} gear", 1, n_teeth)) - 1
     percent = float(options["width_percent"])
     width = None if percent == 100.0 else percent / 100.0 * pair.face_width_mm
     crack = RootCrack(severity, float(options["angle_deg"]), tooth, width)
@@ -54,7 +54,7 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
 
 
 def _deepest_mm(machine: MachineFacts, options: Options) -> float:
-    return deepest_crack_mm(machine.gears[shared.gear_index(options)], float(options.get("angle_deg", 45.0)))
+    return deepest_crack_mm(machine.gears[parts.gear_index(options)], float(options.get("angle_deg", 45.0)))
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
@@ -100,8 +100,8 @@ EFFECT = Effect(
         0.85,
         "of the deepest crack that the tooth bears; below a fifth the stiffness hardly changes",
         _deepest_mm,
-        shared.first_teeth,
-        lambda machine, rng: {**shared.any_tooth(machine, rng), "angle_deg": float(rng.uniform(35.0, 75.0))},
+        parts.first_teeth,
+        lambda machine, rng: {**parts.any_tooth(machine, rng), "angle_deg": float(rng.uniform(35.0, 75.0))},
         lambda machine, options: 0.95 * _deepest_mm(machine, options),
     ),
     on_drive=on_drive,

@@ -6,7 +6,7 @@ import numpy as np
 
 from sims.effects import textbook as book
 from sims.effects._effect import GEAR_OPTION, TOOTH_OPTION, Effect, Option, Options, PlausibleRange, Severity
-from sims.effects._shared import any_tooth, first_teeth, gear_index, tooth_number, with_tooth_fault
+from sims.effects._parts import any_tooth, first_teeth, gear_index, tooth_number, with_tooth_fault
 from sims.machine import Machine, log_uniform
 from sims.mesh import ToothSpall
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from sims.effects import textbook as book
 from sims.effects._effect import GEAR_OPTION, DriveEffect, DriveParameters, Effect, Options, PlausibleRange, Severity
-from sims.effects._shared import any_gear, either_gear, gear_index, mesh_field, tolerance_of, with_mesh_field
+from sims.effects._parts import any_gear, either_gear, gear_index, mesh_field, tolerance_of, with_mesh_field
 from sims.machine import Machine, profile_tolerance_um
 from sims.mesh import FlankDeviation
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sims.effects._effect import Effect, Option, Options, PlausibleRange, Severity
-from sims.effects._shared import with_each_channel
+from sims.effects._parts import with_each_channel
 from sims.effects.textbook import EITHER, Textbook
 from sims.machine import Machine, log_uniform
 from sims.measure import MeasuredChannel, ModalPath, PathMode

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.checks import within
-from sims.effects import _shared as shared
+from sims.effects import _parts as parts
 from sims.effects._effect import GEAR_OPTION, Effect, MachineFacts, Options, PlausibleRange, Severity
 from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, draw_side, modulated, partly
 from sims.machine import Machine, usual_mass_kg
@@ -18,25 +18,25 @@ _LARGEST_OFFSET = 0.1
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
     """Return the machine with the unbalance added."""
-    index, angle = shared.gear_index(options), shared.angle_or_drawn_deg(options, rng)
+    index, angle = parts.gear_index(options), parts.angle_or_drawn_deg(options, rng)
     wheel = machine.wheels[index]
-    length, direction = shared.vector_sum(wheel.unbalance_g_mm, wheel.unbalance_angle_deg, severity, angle)
-    largest = _LARGEST_OFFSET * shared.gear_geometry(machine, index).pitch_radius_mm * wheel.mass_kg * 1e3
-    within(length, f"unbalance_g_mm of the {shared.GEARS[index]} gear", 0.0, largest, "g mm")
-    wheels = shared.replaced_item(machine.wheels, index, unbalance_g_mm=length, unbalance_angle_deg=direction)
+    length, direction = parts.vector_sum(wheel.unbalance_g_mm, wheel.unbalance_angle_deg, severity, angle)
+    largest = _LARGEST_OFFSET * parts.gear_geometry(machine, index).pitch_radius_mm * wheel.mass_kg * 1e3
+    within(length, f"unbalance_g_mm of the {parts.GEARS[index]} gear", 0.0, largest, "g mm")
+    wheels = parts.replaced_item(machine.wheels, index, unbalance_g_mm=length, unbalance_angle_deg=direction)
     return replace(machine, wheels=wheels)
 
 
 def _mesh_force_g_mm(machine: MachineFacts, options: Options) -> float:
     """Unbalance whose force at the nominal speed is the static mesh force."""
     omega = machine.nominal.speed_rpm * np.pi / 30.0
-    if shared.gear_index(options) == 1:
+    if parts.gear_index(options) == 1:
         omega *= machine.nominal.teeth[0] / machine.nominal.teeth[1]
     return float(machine.nominal.mesh_force_n / omega**2 * 1e6)
 
 
 def _largest_g_mm(machine: MachineFacts, options: Options) -> float:
-    side = shared.gear_index(options)
+    side = parts.gear_index(options)
     radius = 0.5 * machine.diameter_mm(side)
     return 0.8 * _LARGEST_OFFSET * radius * usual_mass_kg(machine.nominal, side) * 1e3
 
@@ -65,14 +65,14 @@ EFFECT = Effect(
     "of mass. Faint at low speed.",
     shows_in=("shaft_orders",),
     change=change,
-    options=(GEAR_OPTION, shared.ANGLE_OPTION),
+    options=(GEAR_OPTION, parts.ANGLE_OPTION),
     plausible=PlausibleRange(
         0.01,
         0.15,
         "its force at the nominal speed over the static mesh force; less is lost beside the mesh",
         _mesh_force_g_mm,
-        shared.either_gear,
-        shared.any_gear,
+        parts.either_gear,
+        parts.any_gear,
         _largest_g_mm,
     ),
     textbook=Textbook(

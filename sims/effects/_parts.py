@@ -1,4 +1,4 @@
-"""What effects share: how a machine's parts are chosen and changed, and option sets worth a try on it."""
+"""Parts of a machine, as effects choose and change them, and option sets worth a try on each."""
 
 from __future__ import annotations
 
