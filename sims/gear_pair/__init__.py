@@ -14,18 +14,11 @@ from sims.gear_pair._bearing import (
     tilting_shares,
 )
 from sims.gear_pair._build import PARAMETERS, build_machine, build_rig, gear_geometry
-from sims.gear_pair._drive import (
-    FRICTION_FIELDS,
-    MACHINE_FIELDS,
-    draw_roughness,
-    friction_fields,
-    governor_nm_s_per_rad,
-    machine_fields,
-    total_inertia_kg_m2,
-)
 from sims.gear_pair._installed import Installed, completed_bearing
 from sims.gear_pair._run import (
     COORDINATES,
+    FRICTION_FIELDS,
+    MACHINE_FIELDS,
     MIN_MOTION_HZ,
     YIELDS,
     MeasuredRun,
@@ -33,7 +26,12 @@ from sims.gear_pair._run import (
     PairResponse,
     RunPlan,
     StepConvergence,
+    draw_roughness,
+    friction_fields,
+    governor_nm_s_per_rad,
+    machine_fields,
     profile_points,
+    total_inertia_kg_m2,
 )
 from sims.gear_pair._simulator import (
     BODY_KG,
