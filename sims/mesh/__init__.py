@@ -47,12 +47,18 @@ from sims.mesh._geometry import (
     GearGeometry,
     Material,
     Outline,
+    PairGeometry,
+    arc_length_mm,
+    corner_separation_m,
+    curvature_radius_mm,
     disc_inertia_kg_m2,
     disc_mass_kg,
     fillet_outline,
+    flank_length_mm,
     inverse_involute,
     involute,
     involute_outline,
+    part_inside,
     root_half_angle_rad,
 )
 from sims.mesh._mesh_stiffness import (
@@ -74,14 +80,6 @@ from sims.mesh._mesh_stiffness import (
     separation_table,
     share_torque,
     tooth_rows,
-)
-from sims.mesh._pair import (
-    PairGeometry,
-    arc_length_mm,
-    corner_separation_m,
-    curvature_radius_mm,
-    flank_length_mm,
-    part_inside,
 )
 from sims.mesh._stiffness import (
     BODIES,

@@ -10,17 +10,21 @@ import numpy as np
 
 from gearsig.checks import FloatArray, count, not_negative, one_of, positive, within
 from gearsig.errors import InputError
-from sims.mesh._geometry import GearGeometry, Material, fillet_outline, involute_outline, tip_point_mm
-from sims.mesh._pair import (
+from sims.mesh._geometry import (
+    GearGeometry,
+    Material,
     PairGeometry,
     arc_length_mm,
     contact_ends_mm,
     contact_half_width_mm,
     corner_separation_m,
     curvature_radius_mm,
+    fillet_outline,
     flank_length_mm,
+    involute_outline,
     part_inside,
     pitch_point_mm,
+    tip_point_mm,
 )
 
 MIN_SECTION = 0.1

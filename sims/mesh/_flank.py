@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from gearsig.checks import FloatArray, count, frozen_array, not_negative, positive, within
 from gearsig.compiled import njit
 from gearsig.errors import InputError
-from sims.mesh._geometry import GearGeometry
-from sims.mesh._pair import PairGeometry, contact_ends_mm
+from sims.mesh._geometry import GearGeometry, PairGeometry, contact_ends_mm
 
 
 @dataclass(frozen=True)

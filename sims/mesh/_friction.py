@@ -12,9 +12,8 @@ from gearsig.checks import FloatArray, positive
 from gearsig.compiled import njit
 from gearsig.errors import InputError
 from gearsig.results import Result
-from sims.mesh._geometry import Material
+from sims.mesh._geometry import Material, flexibility_per_pa
 from sims.mesh._mesh_stiffness import MeshTable, share_torque
-from sims.mesh._pair import flexibility_per_pa
 from sims.mesh._stiffness import GearMesh
 
 MAX_FRICTION = 0.3

@@ -15,7 +15,7 @@ from gearsig.errors import InputError
 from gearsig.results import Result
 from sims.mesh._faults import chip_separation_m, spall_separation_m
 from sims.mesh._flank import FlankRoughness, flank_separation_m, pitch_separation_m, wear_profile
-from sims.mesh._pair import arc_length_mm, contact_ends_mm
+from sims.mesh._geometry import arc_length_mm, contact_ends_mm
 from sims.mesh._stiffness import GearMesh
 
 

@@ -37,14 +37,18 @@ from sims.mesh._flank import (
 )
 from sims.mesh._geometry import (
     STEEL,
+    WORKING_PRESSURE_PA,
     GearGeometry,
     Material,
+    PairGeometry,
+    contact_half_width_mm,
     fillet_outline,
+    flexibility_per_pa,
     involute_outline,
     root_half_angle_rad,
     root_point_mm,
+    smooth_step,
 )
-from sims.mesh._pair import WORKING_PRESSURE_PA, PairGeometry, contact_half_width_mm, flexibility_per_pa, smooth_step
 
 # --------------------
 # The gear body below the teeth: neighbouring teeth move each other through it.
