@@ -14,7 +14,6 @@ from sims.reduced_fe._contact import (
     solve_contacts,
     static_table,
 )
-from sims.reduced_fe._eigenfrequencies import SpreadingCheck, eigenfrequencies_hz, spreading_check
 from sims.reduced_fe._growth import (
     STEEL_IN_AIR,
     CrackGrowth,
@@ -41,11 +40,14 @@ from sims.reduced_fe._respond import (
     TRANSMISSION_ERROR,
     FlexResponse,
     SpeedSweep,
+    SpreadingCheck,
     check_convergence,
+    eigenfrequencies_hz,
     followed_step_s,
     growth,
     respond,
     speed_sweep,
+    spreading_check,
     start_state,
 )
 from sims.reduced_fe._simulator import (

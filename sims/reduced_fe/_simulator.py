@@ -35,9 +35,16 @@ from sims.machine import Machine, Nominal, Operation
 from sims.measure import plain
 from sims.mesh import Material, corner_separation_m
 from sims.reduced_fe._contact import MARGIN
-from sims.reduced_fe._eigenfrequencies import eigenfrequencies_hz
 from sims.reduced_fe._pair import FlexiblePair, FlexiblePairConstants, constants, torsional_mode
-from sims.reduced_fe._respond import STEP_S, FlexResponse, FlexState, check_convergence, followed_step_s, respond
+from sims.reduced_fe._respond import (
+    STEP_S,
+    FlexResponse,
+    FlexState,
+    check_convergence,
+    eigenfrequencies_hz,
+    followed_step_s,
+    respond,
+)
 from sims.simulator import Parameter, ParameterValue, ParameterValues, SimulationRequest, Values
 
 # The parameters of the flexible pair: those it shares with the 16-DOF pair, and those of its gear bodies.
