@@ -9,6 +9,7 @@ from sims.machine._machine import (
     Drive,
     Lubrication,
     Machine,
+    Nominal,
     Operation,
     Profile,
     RaceDefect,
@@ -19,17 +20,14 @@ from sims.machine._machine import (
     WeakTooth,
     Wheel,
     bearing_index,
-    profile_value,
-    set_speed,
-    torque_ripple,
-)
-from sims.machine._nominal import (
-    Nominal,
     log_uniform,
     nominal_of,
     pitch_tolerance_um,
     profile_tolerance_um,
+    profile_value,
     runout_tolerance_um,
+    set_speed,
+    torque_ripple,
     usual_mass_kg,
 )
 
