@@ -8,8 +8,7 @@ from math import cos, sin
 
 import numpy as np
 
-from gearsig.compiled import njit
-from sims.compiled import copy
+from gearsig.compiled import copy, njit
 from sims.gear_pair import carried_part, element_forces, foot
 from sims.machine import profile_value, set_speed, torque_ripple
 from sims.mesh import (

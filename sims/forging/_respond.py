@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from scipy.integrate import RK45
 
 from gearsig.checks import FloatArray, known_name, one_of, positive, within
-from gearsig.compiled import njit
+from gearsig.compiled import copy, njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
 from gearsig.rig import damping_ratio_s_per_m
-from sims.compiled import copy
 from sims.forging._drive import CONTINUOUS, Cycle, ForgingDrive, Schedule, schedule
 from sims.machine import Profile
 

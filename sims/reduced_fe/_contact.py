@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, frozen_array
-from gearsig.compiled import njit
+from gearsig.compiled import UNCOUNTED, njit
 from gearsig.errors import InputError, RefusalError
-from sims.compiled import UNCOUNTED
 from sims.fe_gear import ReducedGear, crack_added_m_per_n
 from sims.mesh import (
     HEALTHY,

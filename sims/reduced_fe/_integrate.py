@@ -25,8 +25,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gearsig.checks import FloatArray, one_of, positive
-from gearsig.compiled import njit
-from sims.compiled import UNCOUNTED
+from gearsig.compiled import UNCOUNTED, njit
 from sims.gear_pair import foot
 from sims.machine import profile_value, set_speed, torque_ripple
 from sims.mesh import contact_friction_n, out_of_place
