@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import typer
 
-from app.cli.analyze import analyze, crack, demo, rig_app
+from app.cli.analyze import analyze, crack, demo, report, rig_app
 from app.cli.benchmark import benchmark_app, papers
 from app.cli.compare import compare
 from app.cli.console import EXIT_INPUT_ERROR, EXIT_INTERRUPTED
@@ -18,10 +18,8 @@ from app.cli.fleet import fleet_app
 from app.cli.flexible import flexible, gear_body, growth
 from app.cli.gap import gap
 from app.cli.motion import force, identify, start_stop
-from app.cli.report import report
 from app.cli.show import modes, show
-from app.cli.simulate import simulate
-from app.cli.sweep import bifurcation, sweep
+from app.cli.simulate import bifurcation, simulate, sweep
 from gearsig import __version__
 from gearsig.errors import InputError, RefusalError
 

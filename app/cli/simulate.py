@@ -1,24 +1,30 @@
-"""`gearsig simulate`: a recording from a model, with its rig file and its truth."""
+"""`gearsig simulate`: a recording from a model; `sweep`: a grid of them; `bifurcation`: how the motion changes."""
 
 from __future__ import annotations
 
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.cli import options
+from app.cli.console import EXIT_INPUT_ERROR, EXIT_SOME_FAILED, progress_bar, stopped
+from app.cli.quantities import quantity, span, split_quantity
+from gearsig.checks import within
 from gearsig.errors import InputError
+from gearsig.formatting import percent
 
 if TYPE_CHECKING:
+    from app.bifurcation import BifurcationRequest, Values
     from sims.effects import Effect, Option
     from sims.presets import Preset
     from sims.registry import Simulation
     from sims.simulator import Parameter, Simulator
+    from sims.sweep import Axis, Sweep
 
 
 def simulate(
@@ -191,3 +197,241 @@ def _wrapped(text: str, first: str, later: str) -> str:
     if sys.stdout.isatty():
         width = max(60, min(width, shutil.get_terminal_size().columns))
     return textwrap.fill(text, width, initial_indent=first, subsequent_indent=later, break_on_hyphens=False)
+
+
+# --------------------
+# `gearsig sweep` and `gearsig bifurcation`: many simulations.
+# --------------------
+
+
+MAX_REASONS = 5
+"""Failures that are printed; the files hold them all."""
+
+
+def sweep(
+    model: options.ModelArgument,
+    vary: Annotated[
+        list[str],
+        typer.Option(
+            "--vary",
+            metavar="NAME=VALUES",
+            help="speed=300..1500rpm:10 (from, to, how many), root_crack=0..4mm:5,gear=driven or "
+            "torque=20,50,110Nm; repeatable. NAME is speed, torque, a parameter or an effect.",
+        ),
+    ],
+    output: Annotated[Path, options.output_option("Folder for the recordings.")],
+    preset: options.PresetOption = "",
+    settings: options.SetOption = None,
+    effects: options.EffectOption = None,
+    speed: options.SimulatedSpeedOption = None,
+    torque: options.SimulatedTorqueOption = None,
+    duration: options.DurationOption = "5s",
+    fs: options.RateOption = "",
+    seed: options.SeedOption = 0,
+    common_seed: Annotated[
+        bool,
+        typer.Option(
+            "--common-seed",
+            help="Draw the same noise and tolerances at every point, to compare points. Default: each its own.",
+        ),
+    ] = False,
+    extension: Annotated[str, typer.Option("--format", metavar="EXT", help="csv, h5, parquet, wav or mat.")] = "h5",
+    jobs: options.JobsOption = None,
+    cluster: options.ClusterOption = "",
+) -> None:
+    """Simulate a grid of conditions and faults on all processors, into a folder with an index.
+
+    It can be stopped with Ctrl-C at any time; the same command goes on from what is complete. The exit code is 1 if
+    some points could not be simulated (2 if none could); the index says why.
+
+    Example: gearsig sweep cracked --vary speed=300..1500rpm:10 --vary root_crack=0..4mm:10 --duration 1s -o grid
+    """
+    request = options.read_request(model, preset, settings, effects, speed, torque, duration, fs, seed)
+    planned = sweep_of(request, vary, common_seed, f".{extension.lstrip('.')}")
+    from sims.sweep import n_complete, run_sweep
+
+    n_points = planned.n_points
+    try:
+        with options.open_cluster(cluster) as workers, progress_bar("simulating", n_points) as show:
+            result = run_sweep(planned, output, n_processes=jobs, on_progress=lambda n_done, _n, _outcome: show(n_done))
+            ran = f" It ran {workers.text()}." if workers else ""
+    except KeyboardInterrupt:
+        raise stopped(f"{n_complete(planned, output)} of {n_points} points are in {output}") from None
+    for failure in result.failures[:MAX_REASONS]:
+        typer.echo(f"point {failure.point.index}: {failure.reason}", err=True)
+    if len(result.failures) > MAX_REASONS:
+        typer.echo(f"… and {len(result.failures) - MAX_REASONS} more points: see the index", err=True)
+    n_made = len(result.outcomes) - len(result.failures)
+    kept = f"; {result.n_found} were there already" if result.n_found else ""
+    typer.echo(f"{result.n_points} points, {n_made} simulated{kept}. They are listed in {result.index_path}.{ran}")
+    if result.failures:
+        raise typer.Exit(EXIT_SOME_FAILED if n_made + result.n_found else EXIT_INPUT_ERROR)
+
+
+def bifurcation(
+    model: options.ModelArgument,
+    vary: Annotated[
+        str,
+        typer.Option(
+            "--vary",
+            metavar="NAME=VALUES",
+            help="speed=600..3000rpm:100 (from, to, how many), torque=5..50Nm:40, half_backlash_um=0..60:40, "
+            "root_crack=0..4mm:20. NAME is speed, torque, a parameter or an effect.",
+        ),
+    ],
+    output: Annotated[Path, options.output_option("Folder for figure, table and summary.")],
+    preset: options.PresetOption = "",
+    settings: options.SetOption = None,
+    effects: options.EffectOption = None,
+    speed: options.SimulatedSpeedOption = None,
+    torque: options.SimulatedTorqueOption = None,
+    section: Annotated[
+        str,
+        typer.Option("--section", metavar="CYCLE", help="A point once per mesh cycle (mesh) or revolution (shaft)."),
+    ] = "mesh",
+    phase: Annotated[float, typer.Option("--phase", help="Place in the cycle at which the point lies, 0 to 1.")] = 0.0,
+    signal: Annotated[
+        str,
+        typer.Option(
+            "--signal",
+            help="transmission_error_m, 'driver y', mesh_force_n …, or a channel with its noise: a1.",
+        ),
+    ] = "transmission_error_m",
+    points: Annotated[
+        int | None, typer.Option("--points", help="Points at each value; default 100, 400 with --kind.")
+    ] = (None),
+    direction: Annotated[
+        str,
+        typer.Option(
+            "--direction",
+            help="up or down, each value from where the last one ended; both shows hysteresis; rest: each from rest.",
+        ),
+    ] = "both",
+    kind: Annotated[
+        bool,
+        typer.Option(
+            "--kind",
+            help="Also the kind of motion at each value, told over ranges: Lyapunov exponent, 0–1 test. Takes longer.",
+        ),
+    ] = False,
+    fs: options.RateOption = "20480Hz",
+    seed: options.SeedOption = 0,
+    jobs: options.JobsOption = None,
+    cluster: options.ClusterOption = "",
+) -> None:
+    """Draw a bifurcation diagram: Poincaré points of the steady motion over speed, load, backlash, or anything else.
+
+    At each value the transient is left out: 8 time constants of the machine's slowest decay. It can be stopped with
+    Ctrl-C at any time; the same command goes on from what is complete.
+
+    Example: gearsig bifurcation cracked --preset symmetric_50_50 --torque 20Nm --vary speed=1600..2400rpm:41 -o jump
+    """
+    from app import bifurcation as study
+    from sims.continuation import Branch
+
+    request = options.read_request(model, preset, settings, effects, speed, torque, "1s", fs, seed)
+    n_points = points if points is not None else study.MIN_FOR_KIND if kind else 100
+    varied = sweep_of(request, [vary], common_seed=True, extension=".h5")
+    study_request = study.BifurcationRequest(Branch(varied, signal, section, n_points), direction, phase, kind)
+    study_request.branch.check_signal()
+    try:
+        with options.open_cluster(cluster) as workers, progress_bar("simulating", study_request.n_values) as show:
+            values = study.run_folder(study_request, output, n_processes=jobs, on_progress=show)
+            ran = workers.text() if workers else ""
+    except KeyboardInterrupt:
+        n = study.n_complete(study_request, output)
+        if n:
+            _print_bifurcation(study_request, study.complete(study_request, output), output)
+        raise stopped(f"{n} of {study_request.n_values} values are in {output}") from None
+    _print_bifurcation(study_request, values, output)
+    if ran:
+        typer.echo(f"It ran {ran}.")
+
+
+def _print_bifurcation(request: BifurcationRequest, values: Values, output: Path) -> None:
+    """Write the results and say what they show."""
+    from app import bifurcation as study
+
+    paths = study.write_results(request, values, output)
+    reasons = [(name, point) for name, kept in values.items() for point in kept if point.reason]
+    for name, point in reasons[:MAX_REASONS]:
+        typer.echo(f"{study.NAMES[name]}, {point.value:g}: {point.reason}", err=True)
+    if len(reasons) > MAX_REASONS:
+        typer.echo(f"… and {len(reasons) - MAX_REASONS} more: see {paths[2].name}", err=True)
+    unit = study.parameter_words(request.branch)[1]
+    for name, kept in values.items():
+        points = study.measured_of(kept)
+        periods = sorted({point.period for point in points})
+        period_text = ", ".join("none within 16 cycles" if p == 0 else str(p) for p in periods)
+        largest = max((point.separated_share for point in points), default=0.0)
+        typer.echo(
+            f"{study.NAMES[name]}: {len(points)} values; periods in cycles: {period_text}; "
+            f"teeth apart up to {percent(largest)}"
+        )
+        for line in study.motion_lines(kept, unit):
+            typer.echo(f"  {line}")
+    for line in study.coexistence_lines(study.summary(request, values), unit):
+        typer.echo(line)
+    typer.echo(f"{paths[0]} (figure), {paths[1].name} (points), {paths[2].name} (values).")
+
+
+def sweep_of(request: Simulation, vary: Sequence[str], common_seed: bool, extension: str) -> Sweep:
+    """Return the sweep that the options ask for."""
+    from sims.registry import simulator
+    from sims.sweep import Sweep
+
+    model = simulator(request.model)
+    axes = tuple(read_axis(model, text) for text in vary)
+    varied = [axis.name for axis in axes]
+    for name, value in (("speed_rpm", request.speed_rpm), ("torque_nm", request.torque_nm)):
+        if name in varied and value is not None:
+            raise InputError(
+                f"{name} is given, and varied", remedy=f"leave one of --{name.split('_')[0]} and --vary out"
+            )
+    return Sweep(axes=axes, common_seed=common_seed, extension=extension, **vars(request))
+
+
+def read_axis(model: Simulator, text: str) -> Axis:
+    """Return the axis of "speed=300..1500rpm:10" or "root_crack=0,1,2mm,gear=driven"."""
+    from sims.effects import effect
+    from sims.simulator import parameter
+    from sims.sweep import Axis
+
+    name, sign, values_text = text.partition("=")
+    name = {"speed": "speed_rpm", "torque": "torque_nm"}.get(name.strip(), name.strip())
+    if not sign:
+        raise InputError(
+            f"{text!r} is not NAME=VALUES", where="--vary", remedy="write for example speed=300..1500rpm:10"
+        )
+    items = [item.strip() for item in values_text.split(",")]
+    settings = [item for item in items if "=" in item]
+    values = [item for item in items if "=" not in item]
+    if name in model.effects:
+        unit = effect(name).severity.unit
+        return Axis(name, read_values(values, unit, name), options.read_effect_options(effect(name), settings))
+    unit = {"speed_rpm": "rpm", "torque_nm": "N m"}.get(name, "")
+    if not unit:
+        varied = parameter(model.parameters, name)
+        if varied.choices:
+            raise InputError(f"{name} is a word", where="--vary", allowed="numbers", remedy="give it with --set")
+        unit = varied.unit
+    if settings:
+        raise InputError(f"{name} has no options", where="--vary", remedy=f"leave out {settings[0]}")
+    return Axis(name, read_values(values, unit, name))
+
+
+def read_values(items: Sequence[str], unit: str, name: str) -> tuple[float, ...]:
+    """Return the values of ["0..4mm:5"] or ["0", "1", "2mm"]; the last one's unit holds for those without."""
+    if len(items) == 1 and ".." in items[0]:
+        reach, sign, number = items[0].rpartition(":")
+        if not sign or not number.strip().isdigit() or int(number) < 2:
+            raise InputError(
+                f"{name} is {items[0]!r}", where="--vary", allowed="FROM..TO:COUNT with a count of at least 2"
+            )
+        first, last = span(reach, unit, name)
+        from sims.sweep import MAX_POINTS
+
+        n = within(float(number), f"number of values of {name}", 2, MAX_POINTS)
+        return tuple(first + (last - first) * i / (n - 1) for i in range(int(n)))
+    later = split_quantity(items[-1], unit, name)[1] if items else ""
+    return tuple(quantity(t if split_quantity(t, unit, name)[1] else f"{t}{later}", unit, name) for t in items)
