@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.studies.gap.machines import Ordinary
+from app.studies.gap.gearboxes import Ordinary
 from gearsig.gap import change_once, once, reduce_recording
 from tests.gap.synthetic import RATE_HZ, RIG, SPEED_HZ, TEETH, record
 

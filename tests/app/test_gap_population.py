@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from app.studies.drawn_rigs import DrawnRig, simulate_rig
-from app.studies.gap import rows as independent
-from app.studies.gap.machines import draw_machine
+from app.studies.gap import gearboxes as independent
+from app.studies.gap.gearboxes import PopulationSample, draw_machine, write
 from app.studies.gap.population import pack
-from app.studies.gap.rows import PopulationSample, write
 from gearsig.errors import InputError
 from gearsig.gap import (
     BY_HAND,

@@ -20,10 +20,9 @@ import typer
 
 from app.studies import answers_of
 from app.studies.gap.by_hand import with_foreign_vibration
-from app.studies.gap.machines import MOUNTED_ANEW_SHARE
-from app.studies.gap.quasi_static import EFFECTS, QUASI_STATIC, QuasiStaticDay, StaticMachine, record
-from app.studies.gap.rows import (
+from app.studies.gap.gearboxes import (
     CRACKED,
+    MOUNTED_ANEW_SHARE,
     Made,
     PopulationModel,
     PopulationSample,
@@ -33,6 +32,7 @@ from app.studies.gap.rows import (
     samples_of,
     write,
 )
+from app.studies.gap.quasi_static import EFFECTS, QUASI_STATIC, QuasiStaticDay, StaticMachine, record
 from gearsig.checks import FloatArray
 from gearsig.gap import (
     INDEPENDENT,

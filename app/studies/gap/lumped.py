@@ -13,6 +13,7 @@ from math import pi
 
 import numpy as np
 
+from app.studies.gap.gearboxes import SEED, Made, PopulationSample, Recorded, put_in_by_hand, reduced_twin, samples_of
 from app.studies.gap.lumped_rig import (
     N_PATH,
     LumpedDay,
@@ -21,7 +22,6 @@ from app.studies.gap.lumped_rig import (
     LumpedRig,
     record,
 )
-from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, put_in_by_hand, reduced_twin, samples_of
 from gearsig.checks import FloatArray
 from gearsig.gap import NONE, UNKNOWN
 from sims.effects import ONE_TOOTH_SHARE

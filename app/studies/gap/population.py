@@ -24,9 +24,9 @@ import typer
 from numpy.typing import NDArray
 
 from app.studies import answers_of
+from app.studies.gap.gearboxes import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
 from app.studies.gap.lumped import LUMPED, lumped_samples
 from app.studies.gap.quasi_static import QUASI_STATIC, static_samples
-from app.studies.gap.rows import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
 from gearsig.cache import write_whole
 from gearsig.gap import BY_HAND, INDEPENDENT, LEARNED_FILE, learn, load_population, population_file, write_learned
 

@@ -21,8 +21,16 @@ from math import cos, pi, radians, sqrt, tan
 import numpy as np
 
 from app.studies.drawn_rigs import DrawnRig
-from app.studies.gap.machines import draw_machine
-from app.studies.gap.rows import SEED, Made, PopulationSample, Recorded, put_in_by_hand, reduced, samples_of
+from app.studies.gap.gearboxes import (
+    SEED,
+    Made,
+    PopulationSample,
+    Recorded,
+    draw_machine,
+    put_in_by_hand,
+    reduced,
+    samples_of,
+)
 from gearsig.checks import FloatArray
 from gearsig.gap import NONE, OperatingCondition
 from gearsig.recording import Channel, Recording
