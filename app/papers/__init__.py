@@ -1,5 +1,187 @@
-"""The figures of three publications beside the model's own, with what their texts state and what the model gives."""
+"""Three publications: their figures beside the model's own, each statement judged by numbers, and the page of both."""
 
-from app.papers.gallery import PAPERS, Claim, Paper, PaperFigure, judged, paper, within_part, write_paper
+from __future__ import annotations
 
-__all__ = ["PAPERS", "Claim", "Paper", "PaperFigure", "judged", "paper", "within_part", "write_paper"]
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from gearsig.checks import one_of
+from gearsig.formatting import with_minus
+from gearsig.plot import embed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Verdict = Literal["agrees", "agrees in part", "does not"]
+SIGNS: Mapping[Verdict, str] = {"agrees": "✓", "agrees in part": "≈", "does not": "✗"}
+Progress = Callable[[str, float], object]
+
+PAPERS: Mapping[str, str] = {
+    "cracked": "Spur pair with root crack, friction and fractal backlash",
+    "reduced-fe": "Flexible gear wheels of reduced finite elements",
+    "forging": "Start–stop drive of a forging manipulator",
+}
+"""The publications by the names that the command knows them by."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the publication and what the model gives.
+
+    Parameters
+    ----------
+    statement : str
+        With its number.
+    found : str
+        The model's number.
+    verdict : str
+    because : str
+        Where it does not agree, or in part: why.
+    """
+
+    statement: str
+    found: str
+    verdict: Verdict
+    because: str = ""
+
+    @property
+    def judgement(self) -> str:
+        """The verdict with its sign and its reason."""
+        fails = self.verdict == "does not"
+        text = f"{SIGNS[self.verdict]} {self.verdict}{' agree' if fails else ''}"
+        joint = ", because " if fails else ": "
+        return f"{text}{joint}{self.because}" if self.because and self.verdict != "agrees" else text
+
+
+def judged(statement: str, found: str, *, agrees: bool, partly: bool = False, because: str = "") -> Claim:
+    """Return a claim with the verdict that two comparisons of numbers give."""
+    return Claim(
+        statement,
+        with_minus(found),
+        "agrees" if agrees else "agrees in part" if partly else "does not",
+        with_minus(because),
+    )
+
+
+def within_part(statement: str, published: float, value: float, unit: str, *, part: float, because: str = "") -> Claim:
+    """Return a claim that agrees within a part of the published number, and in part within three times that."""
+    away = abs(value / published - 1.0)
+    more_percent = 100.0 * (value / published - 1.0)
+    text = f"{value:.4g} {unit} ({more_percent:{'+.2g' if abs(more_percent) < 99.5 else '+.0f'}} %)"
+    return judged(statement, text, agrees=away <= part, partly=away <= 3.0 * part, because=because)
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """One figure of the model that answers one or more of the publication's.
+
+    Parameters
+    ----------
+    name : str
+        Of its file.
+    answers : str
+        The publication's figures, e.g. "Figures 10 and 11".
+    title : str
+    figure : Figure
+    claims : tuple of Claim
+    """
+
+    name: str
+    answers: str
+    title: str
+    figure: Figure
+    claims: tuple[Claim, ...]
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A publication as the model answers it.
+
+    Parameters
+    ----------
+    name, title, source : str
+    machine : str
+        The preset, and what it assumes.
+    figures : tuple of PaperFigure
+    unanswered : mapping
+        Figure of the publication → why there is none of the model.
+    """
+
+    name: str
+    title: str
+    source: str
+    machine: str
+    figures: tuple[PaperFigure, ...]
+    unanswered: Mapping[str, str]
+
+    @property
+    def summary(self) -> str:
+        """How many statements agree."""
+        verdicts = [claim.verdict for figure in self.figures for claim in figure.claims]
+        n = len(verdicts)
+        agree, part = verdicts.count("agrees"), verdicts.count("agrees in part")
+        return f"{agree} of {n} statements agree, {part} in part, {n - agree - part} do not."
+
+
+def paper(name: str, on_progress: Progress = lambda _stage, _done: None) -> Paper:
+    """Compute the figures of a publication.
+
+    Parameters
+    ----------
+    name : str
+        One of `PAPERS`.
+    on_progress : callable
+        Told what is computed and how much is done, 0 to 1.
+    """
+    one_of(name, "paper", tuple(PAPERS))
+    module = import_module(f"app.papers.{name.replace('-', '_')}")
+    made: Paper = module.compute(on_progress)
+    return made
+
+
+def write_paper(found: Paper, folder: Path, *, command: str = "") -> tuple[Path, ...]:
+    """Write each figure as PNG and SVG, the claims as JSON, and the page that shows them beside each other."""
+    from gearsig.cache import made_folder, write_text
+    from gearsig.report import Section, benchmark_html
+
+    made_folder(folder)
+    paths = []
+    for item in found.figures:
+        for ending in (".png", ".svg"):
+            paths.append(folder / f"{item.name}{ending}")
+            item.figure.savefig(paths[-1], dpi=160)
+    paths.append(write_text(folder / "claims.json", _claims_json(found)))
+    header = ("the publication says", "the model gives", "verdict")
+    sections = [
+        Section(
+            f"{item.answers}: {item.title}",
+            header=header,
+            rows=tuple((claim.statement, claim.found, claim.judgement) for claim in item.claims),
+            pictures=(embed(item.figure, "", f"{item.title}, as the model gives it"),),
+            is_prose=True,
+        )
+        for item in found.figures
+    ]
+    rows = tuple(found.unanswered.items())
+    sections.append(Section("Figures without an answer", header=("figure", "why"), rows=rows, is_prose=True))
+    facts = [("publication", found.source), ("machine", found.machine), *([("command", command)] if command else [])]
+    page = benchmark_html(found.title, found.summary, sections, facts, datetime.now().astimezone())
+    paths.append(write_text(folder / "index.html", page))
+    return tuple(paths)
+
+
+def _claims_json(paper: Paper) -> str:
+    def rows() -> Iterator[dict[str, str]]:
+        for item in paper.figures:
+            for claim in item.claims:
+                yield {"figure": item.name, "answers": item.answers, **vars(claim)}
+
+    about = {"paper": paper.name, "source": paper.source, "machine": paper.machine, "summary": paper.summary}
+    return json.dumps(
+        {**about, "claims": list(rows()), "unanswered": dict(paper.unanswered)}, ensure_ascii=False, indent=2
+    )

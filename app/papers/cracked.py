@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import resample_poly
 
-from app.papers.gallery import Paper, PaperFigure, Progress, judged, within_part
+from app.papers import Paper, PaperFigure, Progress, judged, within_part
 from gearsig import plot
 from gearsig.checks import FloatArray
 from gearsig.decompose import VmdSettings, vmd

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
-from app.papers.gallery import Claim, Paper, PaperFigure, Progress, judged, within_part
+from app.papers import Claim, Paper, PaperFigure, Progress, judged, within_part
 from gearsig import plot
 from gearsig.motion import (
     AS_PRINTED,

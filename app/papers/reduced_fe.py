@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from app.flexible import RANGE, Study, figures, flexible_study
-from app.papers.gallery import Claim, Paper, PaperFigure, Progress, judged, within_part
+from app.papers import Claim, Paper, PaperFigure, Progress, judged, within_part
 from gearsig import plot
 from gearsig.checks import FloatArray
 from gearsig.formatting import percent

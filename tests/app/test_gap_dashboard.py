@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from app.dashboard.gap import view
+from app.dashboard import gap as view
+from app.dashboard.gap import _FINISHED, _JOB, Finished
 from app.dashboard.gap.choice import Choice, common_rig, files_of, own_rig
-from app.dashboard.gap.view import _FINISHED, _JOB, Finished
 from app.dashboard.state import ChosenFile
 from app.gap_job import JSON
 from app.samples import sample_folder
