@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, count, freeze, not_negative, one_of, positive, within
 from gearsig.compiled import njit
-from gearsig.engines import engine_module
-from gearsig.errors import InputError, RefusalError
+from gearsig.errors import InputError, RefusalError, engine_module
 from gearsig.formatting import axis_unit, percent
 from gearsig.results import Result
 from gearsig.spectra import Spectrum, amplitude_spectrum

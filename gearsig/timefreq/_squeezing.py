@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray, one_of
 from gearsig.compiled import njit
-from gearsig.engines import engine_module
-from gearsig.errors import InputError
+from gearsig.errors import InputError, engine_module
 from gearsig.timefreq._types import Spacing, UniformSignal
 
 MIN_SHARE = 1e-6
