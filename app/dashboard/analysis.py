@@ -16,15 +16,14 @@ from app.dashboard import address, state
 from app.dashboard.cached import analysis_of, channel_problems, command_of, report_page, safe_file_name
 from app.dashboard.components import component_of
 from app.dashboard.state import AnalysisRequest, Chosen, ChosenFile
-from app.dashboard.theme import as_typed, is_dark
+from app.dashboard.theme import is_dark
 from app.dashboard.widgets.charts import download, offer_page, show_figure, show_lines, show_map, show_panel
 from app.dashboard.widgets.chooser import choose_recording
 from app.dashboard.widgets.crack import show_crack
 from app.dashboard.widgets.machine import show_machine
-from app.dashboard.widgets.messages import in_page_words, show_error, show_unknown_speed
 from app.dashboard.widgets.method import MethodPage, cached, show_method
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
-from app.dashboard.widgets.tables import show_facts, show_table
+from app.dashboard.widgets.texts import as_typed, in_page_words, show_error, show_facts, show_table, show_unknown_speed
 from app.dashboard.widgets.verdict import show_verdict
 from gearsig import plot
 from gearsig.angle import resample_to_angle

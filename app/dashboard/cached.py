@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import streamlit as st
 
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
-from app.dashboard.theme import one_line
+from app.dashboard.widgets.texts import one_line
 from app.dashboard.work import kept
 from gearsig.errors import options_named
 

@@ -13,7 +13,6 @@ from app.dashboard import address, state
 from app.dashboard.cached import recorded, stated_options
 from app.dashboard.laboratory.setup import MODEL, Setup, shown_name
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
-from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import (
     download,
     looked_at,
@@ -30,9 +29,8 @@ from app.dashboard.widgets.chooser import (
     choose_sample,
     simulated_file,
 )
-from app.dashboard.widgets.messages import show_checks, show_warnings
 from app.dashboard.widgets.spectrum import show_revolutions, show_spectrum
-from app.dashboard.widgets.tables import show_table, show_words
+from app.dashboard.widgets.texts import as_typed, capitalised, show_checks, show_table, show_warnings, show_words
 from app.dashboard.work import kept
 from gearsig.comparison import (
     ALIGN,

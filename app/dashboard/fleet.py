@@ -14,10 +14,9 @@ import streamlit as st
 
 from app.dashboard import address, state
 from app.dashboard.state import ChosenFile
-from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import QUIET, padded_limits, show_lines
 from app.dashboard.widgets.chooser import open_file
-from app.dashboard.widgets.tables import show_table
+from app.dashboard.widgets.texts import as_typed, show_table
 from app.dashboard.widgets.verdict import COLOURS
 from app.dashboard.work import kept
 from app.samples import EXAMPLE_PATTERN, write_example_fleet

@@ -12,9 +12,9 @@ from app import flexible as pair_study
 from app import gear_body
 from app.dashboard import address
 from app.dashboard.components import component_of
-from app.dashboard.theme import as_typed, capitalised, is_dark
+from app.dashboard.theme import is_dark
 from app.dashboard.widgets.charts import download, packed, show_figure, show_map
-from app.dashboard.widgets.tables import show_words
+from app.dashboard.widgets.texts import as_typed, capitalised, show_words
 from app.dashboard.work import kept
 from app.gear_body import GearBodyStudy
 from app.papers import PAPERS, Paper, paper

@@ -9,7 +9,7 @@ from pathlib import Path
 import streamlit as st
 
 from app.dashboard import address, state, work
-from app.dashboard.widgets.messages import show_error
+from app.dashboard.widgets.texts import show_error
 from gearsig.errors import GearsigError
 
 FOLDER = Path(__file__).parent

@@ -10,8 +10,8 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.cached import kept_file
 from app.dashboard.state import ChosenFile
-from app.dashboard.theme import as_typed
 from app.dashboard.widgets.chooser import choose_with_rig, open_file, open_sample
+from app.dashboard.widgets.texts import as_typed
 from app.samples import samples
 from gearsig.checks import FloatArray
 from gearsig.recording import FORMAT_NAMES

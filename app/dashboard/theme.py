@@ -1,8 +1,7 @@
-"""The page's colours in the terms of Streamlit's settings; imports nothing, so that the command line stays quick."""
+"""The page's colours: in the terms of Streamlit's settings, and of its own figures on light and dark ground."""
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import streamlit as st
@@ -55,40 +54,3 @@ def is_dark() -> bool:
 def palette() -> Palette:
     """Return the colours for the user's page."""
     return DARK if is_dark() else LIGHT
-
-
-# --------------------
-# Text from strangers, shown as it was typed: file, channel and machine names are never markup.
-# --------------------
-
-
-_MARKUP = re.compile(r"([!-/:-@\[-`{-~])")  # ASCII punctuation, all of which Markdown lets a backslash escape
-# Streamlit and its Markdown dialect replace these after the escapes are gone: emoji and icons (:name:), arrows (->),
-# addresses (http:, www., a@b). A word joiner, which has no width, breaks the pattern and leaves the looks.
-_REPLACED = re.compile(r"(?<=[:@])(?=\S)|(?<=[-<>~=])(?=[-<>~=])|(?<=www)(?=\.)|(?<=www\.)", re.IGNORECASE)
-_JOINER = "\u2060"
-# Marks that turn the direction of the text around them, and invisible ones, may make a name look like another.
-_INVISIBLE = re.compile(r"[\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff]")
-_UNIT = re.compile(r"(?<=\d) (?=(?:%|dB|k?Hz|rpm|[mµ]?m|m/s|N·m|k?N|m?s|J|g|of)(?![\w·]))")
-
-
-def as_typed(text: object) -> str:
-    r"""Return Markdown that shows `text` letter by letter; where it wraps, numbers stay with their units.
-
-    Examples
-    --------
-    >>> as_typed("*a1*: 2.3 mm (34 %) at 1500 rpm, 12 of 29")
-    '\\*a1\\*\\: 2\\.3\xa0mm \\(34\xa0\\%\\) at 1500\xa0rpm\\, 12\xa0of 29'
-    """
-    return _MARKUP.sub(r"\\\1", _REPLACED.sub(_JOINER, _UNIT.sub("\u00a0", one_line(text))))
-
-
-def one_line(text: object) -> str:
-    """Return `text` on one line without control characters."""
-    line = "".join(c if c.isprintable() else " " for c in _INVISIBLE.sub(" ", str(text)))
-    return " ".join(line.split())
-
-
-def capitalised(text: str) -> str:
-    """Return `text` with a capital first letter, the others as they are."""
-    return text[:1].upper() + text[1:]

@@ -11,7 +11,7 @@ from streamlit.testing.v1 import AppTest
 from app.dashboard import state
 from app.dashboard.analysis import VIEWS
 from app.dashboard.state import ChosenFile
-from app.dashboard.widgets.messages import in_page_words
+from app.dashboard.widgets.texts import in_page_words
 from gearsig.recording import write_recording
 from gearsig.rig import write_rig
 from sims import simulate

@@ -14,8 +14,8 @@ from markdown_it import MarkdownIt
 from app.dashboard.analysis import indicator_frame
 from app.dashboard.cached import command_of, read_and_analyze, read_content, read_rig_text, safe_file_name
 from app.dashboard.state import AnalysisRequest
-from app.dashboard.theme import as_typed, one_line
 from app.dashboard.widgets.charts import csv_text, picture_bytes
+from app.dashboard.widgets.texts import as_typed, one_line
 from app.samples import samples
 from gearsig.errors import InputError
 from gearsig.indicators import Indicator

@@ -1,4 +1,4 @@
-"""The gap page: from recordings and a simulator to the effect that is missing in it; where, which, how far, what next."""
+"""The gap page: from recordings and a simulator to the effect that it lacks; where, which, how far, what next."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ import streamlit as st
 import gearsig.gap
 from app.dashboard import address, state
 from app.dashboard.gap.choice import Choice, choose, files_of, set_alike, simulator_title
-from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import (
     QUIET,
     Ring,
@@ -32,9 +31,8 @@ from app.dashboard.widgets.charts import (
     show_picture,
     show_rows,
 )
-from app.dashboard.widgets.messages import show_checks, show_warnings
 from app.dashboard.widgets.spectrum import show_revolutions
-from app.dashboard.widgets.tables import show_words
+from app.dashboard.widgets.texts import as_typed, capitalised, show_checks, show_warnings, show_words
 from app.dashboard.widgets.verdict import Colour
 from app.gap_job import JSON, PAGE, TWIN, Job, private_folder
 from gearsig.cache import cache_folder, keep

@@ -15,9 +15,8 @@ from app.bifurcation import NAMES, BifurcationRequest, KeptValue, figure_of, mea
 from app.dashboard import address
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import MODEL, WIDEST, Setup, shown_unit
-from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import download, show_figure
-from app.dashboard.widgets.messages import show_error
+from app.dashboard.widgets.texts import as_typed, capitalised, show_error
 from gearsig.errors import GearsigError, InputError
 from sims.continuation import DECAYS, RAMP_S, SECTIONS, Branch
 from sims.cracked import slowest_decay_s

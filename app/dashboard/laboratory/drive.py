@@ -19,9 +19,8 @@ from app.dashboard.laboratory.setup import (
     shown_unit,
 )
 from app.dashboard.laboratory.views import say_sliders, show_metrics, show_title
-from app.dashboard.theme import as_typed, capitalised
 from app.dashboard.widgets.charts import show_figure
-from app.dashboard.widgets.tables import show_table
+from app.dashboard.widgets.texts import as_typed, capitalised, show_table
 from app.dashboard.work import kept
 from gearsig import motion as motions
 from gearsig import plot

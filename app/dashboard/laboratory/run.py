@@ -19,7 +19,7 @@ from app.dashboard import state
 from app.dashboard.laboratory.setup import MODEL, Setup, preset_number
 from app.dashboard.state import AnalysisRequest, Chosen
 from app.dashboard.widgets.charts import download
-from app.dashboard.widgets.messages import show_error
+from app.dashboard.widgets.texts import show_error
 from app.dashboard.work import kept
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError

@@ -15,7 +15,7 @@ import streamlit as st
 
 import sims
 from app.dashboard import address
-from app.dashboard.theme import as_typed, capitalised
+from app.dashboard.widgets.texts import as_typed, capitalised
 from app.dashboard.work import let_user_act
 from gearsig.errors import InputError
 from gearsig.recording import Recording

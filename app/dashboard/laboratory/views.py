@@ -16,9 +16,10 @@ from app.dashboard.laboratory import run as runs
 from app.dashboard.laboratory.bifurcation import show_bifurcation
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import Setup, effect_text, slider_values
-from app.dashboard.theme import as_typed, capitalised, palette
+from app.dashboard.theme import palette
 from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, packed, padded_limits, show_lines
 from app.dashboard.widgets.spectrum import show_spectrum
+from app.dashboard.widgets.texts import as_typed, capitalised
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.formatting import with_minus

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from app.dashboard import address, state
 from app.dashboard.components import component_of, element_key
-from app.dashboard.theme import DARK_PAPER, DASHES, Palette, as_typed, is_dark, one_line, palette
+from app.dashboard.theme import DARK_PAPER, DASHES, Palette, is_dark, palette
+from app.dashboard.widgets.texts import as_typed, one_line
 from gearsig.checks import FloatArray
 from gearsig.formatting import csv_text
 from gearsig.plot import (

@@ -10,8 +10,8 @@ import streamlit as st
 from app.dashboard import address, state
 from app.dashboard.cached import kept_file, remember_file, sha256_of_upload
 from app.dashboard.state import Chosen, ChosenFile
-from app.dashboard.theme import as_typed
 from app.dashboard.widgets.machine import describe, machine_text, stated, text_as_stated, text_of
+from app.dashboard.widgets.texts import as_typed
 from app.samples import SampleRecording, samples
 from gearsig.errors import InputError
 from gearsig.recording import FORMAT_NAMES, FORMAT_OF_EXTENSION, sha256_of

@@ -10,12 +10,10 @@ import streamlit as st
 
 from app.dashboard import state
 from app.dashboard.cached import recorded
-from app.dashboard.theme import as_typed
 from app.dashboard.widgets.charts import show_figure, show_lines
 from app.dashboard.widgets.chooser import choose_file, choose_reference_rate, choose_sample
-from app.dashboard.widgets.messages import show_error
 from app.dashboard.widgets.method import MethodPage, cached
-from app.dashboard.widgets.tables import show_facts, show_table
+from app.dashboard.widgets.texts import as_typed, show_error, show_facts, show_table
 from gearsig.angle import find_shaft_angle, resample_to_angle
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis

@@ -11,10 +11,9 @@ import tomli_w
 
 from app.dashboard import state
 from app.dashboard.state import ChosenFile
-from app.dashboard.theme import one_line, palette
+from app.dashboard.theme import palette
 from app.dashboard.widgets.charts import download
-from app.dashboard.widgets.messages import FORM_LABELS, FORM_TABLES, show_error
-from app.dashboard.widgets.tables import show_table
+from app.dashboard.widgets.texts import FORM_LABELS, FORM_TABLES, one_line, show_error, show_table
 from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import unit_text
 from gearsig.rig import QUANTITIES, Rig, bearing_catalogue, order_lines, parse_toml, rig_from_dict

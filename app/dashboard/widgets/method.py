@@ -18,10 +18,18 @@ import streamlit as st
 
 from app.dashboard import address, state
 from app.dashboard.cached import safe_file_name
-from app.dashboard.theme import as_typed, capitalised, one_line, palette
+from app.dashboard.theme import palette
 from app.dashboard.widgets import charts
-from app.dashboard.widgets.messages import in_page_words, show_error, show_unknown_speed, show_warnings
-from app.dashboard.widgets.tables import show_table
+from app.dashboard.widgets.texts import (
+    as_typed,
+    capitalised,
+    in_page_words,
+    one_line,
+    show_error,
+    show_table,
+    show_unknown_speed,
+    show_warnings,
+)
 from app.dashboard.work import Kept, kept
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, with_known_angle

@@ -10,7 +10,7 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard import address, state
-from app.dashboard.theme import as_typed, capitalised, palette
+from app.dashboard.theme import palette
 from app.dashboard.widgets.charts import (
     N_COLUMNS,
     Ring,
@@ -19,6 +19,7 @@ from app.dashboard.widgets.charts import (
     show_lines,
     show_svg,
 )
+from app.dashboard.widgets.texts import as_typed, capitalised
 from gearsig.checks import FloatArray
 from gearsig.diagnosis import Analysis, ChannelAnalysis
 from gearsig.formatting import readable, unit_text

@@ -9,10 +9,9 @@ from typing import Literal
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.theme import as_typed, one_line
 from app.dashboard.widgets.charts import show_lines
-from app.dashboard.widgets.messages import in_page_words
 from app.dashboard.widgets.spectrum import offer_ring, show_ring, show_spectrum
+from app.dashboard.widgets.texts import as_typed, in_page_words, one_line
 from gearsig.diagnosis import BEARING_PARTS, CHANGED, Analysis, Finding, Kind, Outcome
 from gearsig.formatting import counted, enumerated, signed
 from gearsig.plot import marks_of

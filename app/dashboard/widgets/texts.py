@@ -1,15 +1,64 @@
-"""Messages on a page: an error with what is allowed and what to do; warnings of an answer."""
+"""Texts on a page: names from strangers as they were typed, errors in the page's words, warnings, tables, facts."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from math import isnan
+from typing import TYPE_CHECKING, Any, Literal
 
 import streamlit as st
 
-from app.dashboard.theme import as_typed
 from gearsig.diagnosis import CannotTell
 from gearsig.errors import GearsigError, InputError
+from gearsig.formatting import with_minus
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+# --------------------
+# Text from strangers, shown as it was typed: file, channel and machine names are never markup.
+# --------------------
+
+
+_MARKUP = re.compile(r"([!-/:-@\[-`{-~])")  # ASCII punctuation, all of which Markdown lets a backslash escape
+# Streamlit and its Markdown dialect replace these after the escapes are gone: emoji and icons (:name:), arrows (->),
+# addresses (http:, www., a@b). A word joiner, which has no width, breaks the pattern and leaves the looks.
+_REPLACED = re.compile(r"(?<=[:@])(?=\S)|(?<=[-<>~=])(?=[-<>~=])|(?<=www)(?=\.)|(?<=www\.)", re.IGNORECASE)
+_JOINER = "\u2060"
+# Marks that turn the direction of the text around them, and invisible ones, may make a name look like another.
+_INVISIBLE = re.compile(r"[\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff]")
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|dB|k?Hz|rpm|[mµ]?m|m/s|N·m|k?N|m?s|J|g|of)(?![\w·]))")
+
+
+def as_typed(text: object) -> str:
+    r"""Return Markdown that shows `text` letter by letter; where it wraps, numbers stay with their units.
+
+    Examples
+    --------
+    >>> as_typed("*a1*: 2.3 mm (34 %) at 1500 rpm, 12 of 29")
+    '\\*a1\\*\\: 2\\.3\xa0mm \\(34\xa0\\%\\) at 1500\xa0rpm\\, 12\xa0of 29'
+    """
+    return _MARKUP.sub(r"\\\1", _REPLACED.sub(_JOINER, _UNIT.sub("\u00a0", one_line(text))))
+
+
+def one_line(text: object) -> str:
+    """Return `text` on one line without control characters."""
+    line = "".join(c if c.isprintable() else " " for c in _INVISIBLE.sub(" ", str(text)))
+    return " ".join(line.split())
+
+
+def capitalised(text: str) -> str:
+    """Return `text` with a capital first letter, the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
+# --------------------
+# Messages: an error with what is allowed and what to do; warnings of an answer.
+# --------------------
+
 
 FORM_TABLES = {"shaft": "Shafts", "pair": "Gear pairs", "bearing": "Bearings", "sensor": "Sensors"}
 """What the form of the machine calls the lists of a rig file."""
@@ -139,3 +188,64 @@ def show_unknown_speed(reason: CannotTell) -> None:
     remedy = f"\n\nWhat would give it: {as_typed(in_page_words(reason.remedy))}" if reason.remedy else ""
     hint = "\n\nA constant speed can be given under *Machine*."
     st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
+
+
+# --------------------
+# Tables of results that are sorted and searched, tables of words whose cells wrap, and single facts.
+# --------------------
+
+
+def show_table(
+    columns: DataFrame | Mapping[str, Any] | Sequence[Mapping[str, Any]],
+    *,
+    formats: Mapping[str, str | Callable[[float], str]] | None = None,
+    number: str = ".5g",
+    **looks: Any,
+) -> None:
+    """Show a table that is sorted by its numbers, however they are written: with the minus sign of axes and texts.
+
+    Parameters
+    ----------
+    columns : DataFrame, mapping of columns, or sequence of rows
+    formats : mapping or None
+        Format of single columns, or what writes their numbers.
+    number : str
+        Format of the other numbers.
+    **looks
+        As `streamlit.dataframe` takes them.
+    """
+    import pandas as pd
+
+    frame = pd.DataFrame(columns)
+    named = {name: number for name in frame if frame[name].dtype.kind in "fiu"} | dict(formats or {})
+    written: dict[Any, Any] = {
+        name: form if callable(form) else partial(number_text, form=form) for name, form in named.items()
+    }
+    st.dataframe(frame.style.format(written, na_rep=""), hide_index=True, **looks)
+
+
+def number_text(value: float, form: str) -> str:
+    """Write a number; nothing where it is not known, which the table marks itself.
+
+    Examples
+    --------
+    >>> number_text(-1.5e-07, ".4g"), number_text(3.0, "+.1f"), number_text(float("nan"), ".3g")
+    ('−1.5e−07', '+3.0', '')
+    """
+    return "" if value is None or isnan(value) else with_minus(format(value, form)).replace("e-", "e−")
+
+
+def show_words(columns: Mapping[str, Sequence[Any]], *, border: bool | Literal["horizontal"] = True) -> None:
+    """Show a short table whose cells wrap; nothing where it has no rows. Texts may come from files."""
+    import pandas as pd
+
+    frame = pd.DataFrame({name: [as_typed(text) for text in texts] for name, texts in columns.items()})
+    if len(frame):
+        st.table(frame, border=border, hide_index=True)
+
+
+def show_facts(columns: Iterable[Any], facts: Mapping[str, str]) -> None:
+    """Show names with what is known of them, one in each column; texts may come from files."""
+    for column, (name, text) in zip(columns, facts.items(), strict=True):
+        column.caption(name)
+        column.markdown(f"**{as_typed(text)}**")
