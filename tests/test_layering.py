@@ -127,7 +127,7 @@ def test_blind_drives_are_for_benchmark_and_studies_alone() -> None:
     own = ("gearsig.rig", "gearsig.recording", "gearsig.checks", "gearsig.errors", blind)
 
     def wrong(name: str, modules: set[str]) -> set[str]:
-        if name.startswith("sims/blind_drive/"):
+        if name == "sims/blind_drive.py":
             return starts_with(modules, "sims", "gearsig", "app") - starts_with(modules, *own) - {"gearsig"}
         return set() if name.startswith(("app/benchmark/", "app/studies/")) else starts_with(modules, blind)
 
@@ -231,10 +231,7 @@ def test_modules_of_the_library_import_each_other_one_way() -> None:
                 ahead += uses[now]
         return seen
 
-    assert {module for module in files if module in reached(module)} <= {
-        "gearsig.fleet._changes",
-        "gearsig.fleet._fleet",
-    }
+    assert not {module for module in files if module in reached(module)}
 
 
 def test_faces_list_what_they_offer() -> None:
