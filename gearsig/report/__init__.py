@@ -61,7 +61,7 @@ from gearsig.report._json import (
     write_json,
 )
 from gearsig.report._methods import answer_json, fitting_methods, named_method, write_answer
-from gearsig.report._motion_text import (
+from gearsig.report._motion import (
     force_csv,
     force_json,
     force_text,
