@@ -13,16 +13,7 @@ from gearsig.fleet._changes import (
     series_level,
     trends_text,
 )
-from gearsig.fleet._fleet import (
-    LEVEL_NAMES,
-    STATUS_LEVELS,
-    TABLES,
-    DiagnosisChange,
-    Fleet,
-    OperatingTrend,
-    Trend,
-    open_fleet,
-)
+from gearsig.fleet._fleet import TABLES, DiagnosisChange, Fleet, open_fleet
 from gearsig.fleet._origin import (
     FilePattern,
     Origin,
@@ -46,7 +37,18 @@ from gearsig.fleet._statistics import (
     regressors,
     standardised_innovations,
 )
-from gearsig.fleet._trends import CONDITIONS, AlarmEvent, Baseline, PointTrends, TrendSettings, events_of
+from gearsig.fleet._trends import (
+    CONDITIONS,
+    LEVEL_NAMES,
+    STATUS_LEVELS,
+    AlarmEvent,
+    Baseline,
+    OperatingTrend,
+    PointTrends,
+    Trend,
+    TrendSettings,
+    events_of,
+)
 from gearsig.fleet._watch import WatchEvent, watch
 
 __all__ = [

@@ -9,8 +9,8 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from gearsig.cache import write_whole
-from gearsig.fleet._fleet import LEVEL_NAMES, STATUS_LEVELS, DiagnosisChange, Fleet, level_name
-from gearsig.fleet._trends import events_of
+from gearsig.fleet._fleet import DiagnosisChange, Fleet
+from gearsig.fleet._trends import LEVEL_NAMES, STATUS_LEVELS, events_of, level_name
 from gearsig.formatting import counted, readable, signed
 
 if TYPE_CHECKING:

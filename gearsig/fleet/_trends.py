@@ -1,4 +1,4 @@
-"""From the stored results of a measuring point to limits, alarms and change points of each of its indicators."""
+"""Trends: from the stored results of a measuring point to limits, alarms and change points of its indicators."""
 
 from __future__ import annotations
 
@@ -32,6 +32,7 @@ from gearsig.fleet._statistics import (
     standardised_innovations,
 )
 from gearsig.fleet._store import SERIES
+from gearsig.formatting import counted, readable
 from gearsig.rig import read_toml
 
 if TYPE_CHECKING:
@@ -52,6 +53,16 @@ CLEARED_ZONE = 0.9
 
 ISO, STATISTICAL, NONE = "ISO 20816-3", "statistical", "none"
 """What limits rest on."""
+
+LEVEL_NAMES = {OK: "ok", WARNING: "warning", ALARM: "alarm"}
+STATUS_LEVELS = ("alarm", "warning", "unknown", "ok")
+"""The worst first. Unknown is a measuring point without a baseline whose last recording allowed no answer, and an
+indicator without limits."""
+
+
+def level_name(level: int, basis: str) -> str:
+    """Return what a level is called, by what its limits rest on."""
+    return "unknown" if basis == NONE else LEVEL_NAMES[level]
 
 
 @dataclass(frozen=True)
@@ -528,3 +539,169 @@ def events_of(text: str) -> list[AlarmEvent]:
         )
         for e in entries
     ]
+
+
+# --------------------
+# One indicator of a measuring point, over time and over load or speed.
+# --------------------
+
+
+@dataclass(frozen=True)
+class Trend:
+    """One indicator of a measuring point over time, with its limits.
+
+    Parameters
+    ----------
+    machine, point, name, channel, place, computed_on, band, unit : str
+    table : DataFrame
+        By date: value, speed_rpm, load_nm, expected, low, high, alarm (limits), level, in_baseline.
+    basis : str
+        "ISO 20816-3", "statistical" or "none".
+    level : str
+        Of `STATUS_LEVELS`, after the last recording.
+    changed : datetime or None
+        Since when it is another level than before.
+    normalised : tuple of str
+        What the expected value depends on: "speed", "load".
+    false_alarm_rate : float
+        Of one value of this series; of an unchanged machine.
+    """
+
+    machine: str
+    point: str
+    name: str
+    channel: str
+    place: str
+    computed_on: str
+    band: str
+    unit: str
+    table: DataFrame
+    basis: str
+    level: str
+    changed: datetime | None
+    normalised: tuple[str, ...]
+    false_alarm_rate: float
+
+    @property
+    def text(self) -> str:
+        """What the limits rest on, and how often they are wrong, in a few sentences."""
+        n = int(self.table["in_baseline"].sum())
+        if self.basis == NONE:
+            parts = [f"No limits yet: the baseline has {counted(n, 'recording')}."]
+        elif self.basis != STATISTICAL:
+            parts = [f"Limits are the zones of {self.basis}."]
+        else:
+            parts = [f"Limits from the {counted(n, 'recording')} of the baseline.", _false_alarms(self)]
+        if self.normalised:
+            parts.append(f"What is expected follows {' and '.join(self.normalised)}.")
+        return " ".join(parts)
+
+    def __repr__(self) -> str:
+        of = " ".join(part for part in (self.machine, self.point, self.place, self.channel) if part)
+        since = f", changed since {self.changed:%Y-%m-%d}" if self.changed is not None else ""
+        state = "no limits yet" if self.basis == NONE else f"{self.level} ({self.basis} limits)"
+        return f"Trend {self.name!r} of {of}: {counted(len(self.table), 'recording')}, {state}{since}"
+
+
+@dataclass(frozen=True)
+class OperatingTrend:
+    """One indicator of a measuring point over load or speed, with the limits that the baseline's dependence gives.
+
+    Parameters
+    ----------
+    trend : Trend
+        The same over time.
+    over : str
+        "load" or "speed".
+    table : DataFrame
+        By load_nm or speed_rpm: date, value, adjusted, expected, low, high, alarm (limits), level.
+        `adjusted` is the value as it would be at the other quantity's `held` value. `level` is that of the value by
+        itself: "baseline", "ok", "warning", "alarm", or "not judged" beyond the baseline's range.
+    curve : DataFrame
+        load_nm or speed_rpm, expected, low, high, alarm along it; empty without a baseline.
+    held : float
+        Speed or load for which both are; nan where the indicator does not follow it.
+    """
+
+    trend: Trend
+    over: str
+    table: DataFrame
+    curve: DataFrame
+    held: float
+
+    @property
+    def follows(self) -> bool:
+        """Whether what is expected depends on it: the baseline covers enough of it to tell."""
+        return self.over in self.trend.normalised
+
+    @property
+    def text(self) -> str:
+        """What is shown, and how often its limits are wrong, in a few sentences."""
+        other = "speed" if self.over == "load" else "load"
+        unit = "rpm" if other == "speed" else "N m"
+        parts = []
+        if self.curve.empty:
+            parts.append("No limits yet: the baseline is not complete.")
+        elif self.trend.basis != STATISTICAL:
+            parts.append(f"Limits are the zones of {self.trend.basis}, the same at any {self.over}.")
+        elif self.follows:
+            parts.append(f"Limits follow the baseline's dependence on {self.over}.")
+        else:
+            parts.append(f"The {self.over} varies too little over the baseline: limits do not depend on it.")
+        if np.isfinite(self.held) and self.trend.basis == STATISTICAL:
+            parts.append(f"Values are moved to {readable(self.held, 4)} {unit} along its dependence on {other}.")
+        if not self.curve.empty and self.trend.basis == STATISTICAL:
+            parts.append(_false_alarms(self.trend, "at most one"))
+        n = int((self.table["level"] == "not judged").sum())
+        if n and not self.curve.empty:
+            parts.append(f"{counted(n, 'recording')} too far beyond the baseline's range: not judged.")
+        return " ".join(parts)
+
+    def __repr__(self) -> str:
+        n = int(self.table["level"].isin(["warning", "alarm"]).sum())
+        beyond = "no limits yet" if self.curve.empty else f"{n} beyond the limits"
+        return f"{self.trend!r}; over {self.over}: {counted(len(self.table), 'recording')}, {beyond}"
+
+
+def _false_alarms(trend: Trend, how_often: str = "one") -> str:
+    return f"An unchanged machine leaves them in {how_often} of {readable(1 / trend.false_alarm_rate)} recordings."
+
+
+def last_level(trends: PointTrends, column: int) -> str:
+    """Return the level of an indicator after the last recording, of `STATUS_LEVELS`."""
+    return level_name(int(trends.levels[-1, column]), trends.basis[column])
+
+
+def trend_of(trends: PointTrends, column: int, machine: str, point: str) -> Trend:
+    """Return one indicator of a measuring point over time."""
+    import pandas as pd
+
+    known = np.isfinite(trends.values[:, column])
+    dates = trends.recordings["date"]
+    table = pd.DataFrame(
+        {
+            "date": dates,
+            "value": trends.values[:, column],
+            "speed_rpm": trends.recordings["speed_rpm"],
+            "load_nm": trends.recordings["load_nm"],
+            "expected": trends.expected[:, column],
+            "low": trends.low[:, column],
+            "high": trends.high[:, column],
+            "alarm": trends.alarm[:, column],
+            "level": [level_name(int(level), trends.basis[column]) for level in trends.levels[:, column]],
+            "in_baseline": trends.baseline,
+        }
+    )[known].reset_index(drop=True)
+    row = {str(key): str(value) for key, value in trends.series.iloc[column].items()}
+    began = int(trends.began[column])
+    return Trend(
+        machine,
+        point,
+        **row,
+        table=table,
+        basis=trends.basis[column],
+        level=last_level(trends, column),
+        changed=dates.iloc[began].to_pydatetime() if began >= 0 else None,
+        normalised=trends.normalised,
+        false_alarm_rate=trends.false_alarm_rate,
+    )
