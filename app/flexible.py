@@ -128,9 +128,9 @@ def flexible_study(
     }
     cycles = (np.arange(N_ANGLES) + 0.5) / N_ANGLES
     loaded = Operation.steady(last_rpm, torque_nm)
-    own = reduced_fe.constants(pair, loaded)
-    at_angle = reduced_fe.eigenfrequencies_hz(pair, loaded, cycles, ready=own)
-    uncoupled = np.sort(np.concatenate([side.omega_rad_s[side.moving] for side in own.sides])) / (2.0 * np.pi)
+    ready = reduced_fe.constants(pair, loaded)
+    at_angle = reduced_fe.eigenfrequencies_hz(pair, loaded, cycles, ready=ready)
+    uncoupled = np.sort(np.concatenate([side.omega_rad_s[side.moving] for side in ready.sides])) / (2.0 * np.pi)
     spreading = None
     if check_spreading:
         on_progress("contact at nodes and patches", (n - 1) / n)
@@ -322,11 +322,11 @@ def _pair_stiffness(study: Study, title: str) -> Figure:
     twice = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0, maps.mesh_cycles + 2.0))
     slot = np.floor(twice + reduced_fe.MARGIN).astype(np.int64) - 1
     place = np.tile(np.arange(len(maps.mesh_cycles)), 3)
-    there = (slot >= 0) & (slot < maps.pair_forces_n.shape[2])
+    in_mesh = (slot >= 0) & (slot < maps.pair_forces_n.shape[2])
 
     def of_pair(values: FloatArray) -> FloatArray:
-        found = values[place, :, np.clip(slot, 0, values.shape[2] - 1)]
-        return np.where(there[:, None], found, 0.0) / 1e8
+        of_slot = values[place, :, np.clip(slot, 0, values.shape[2] - 1)]
+        return np.where(in_mesh[:, None], of_slot, 0.0) / 1e8
 
     kinds = {
         "tangent contact stiffness (10⁸ N/m)": of_pair(maps.contact_tangent_n_per_m),

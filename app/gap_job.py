@@ -91,8 +91,8 @@ def check_folder(folder: Path) -> None:
     """
     check_writable(folder)
     if folder.is_dir():
-        found = [path for path in folder.iterdir() if path.name not in (JSON, PAGE, TWIN)]
-        if found or (any(folder.iterdir()) and not _is_ours(folder / JSON)):
+        foreign = [path for path in folder.iterdir() if path.name not in (JSON, PAGE, TWIN)]
+        if foreign or (any(folder.iterdir()) and not _is_ours(folder / JSON)):
             raise InputError(
                 "holds files that belong to no gap diagnosis", where=str(folder), remedy="choose another with -o"
             )
@@ -140,10 +140,10 @@ def _move(unfinished: Path, target: Path) -> None:
 
 def _is_ours(path: Path) -> bool:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return isinstance(found, dict) and found.get("schema") == "gearsig.gap"
+    return isinstance(content, dict) and content.get("schema") == "gearsig.gap"
 
 
 REQUEST, PROGRESS, ERROR, RESULTS, LOG = "request.json", "progress.json", "error.json", "results", "log.txt"
@@ -199,10 +199,10 @@ class Job:
     def progress(self) -> tuple[str, float]:
         """What is being done, and which share of the whole is complete."""
         try:
-            found = json.loads((self.folder / PROGRESS).read_text(encoding="utf-8"))
+            content = json.loads((self.folder / PROGRESS).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return "starting", 0.0
-        return str(found["stage"]), min(max(float(found["done"]), 0.0), 1.0)
+        return str(content["stage"]), min(max(float(content["done"]), 0.0), 1.0)
 
     def stop(self) -> None:
         """End the process and what it started; there is no result then."""

@@ -180,7 +180,7 @@ def figures(study: GearBodyStudy) -> dict[str, Figure]:
     across = 0.95 * np.pi * g.module_mm
     quality = study.quality.scaled_jacobian[view.cells]
     shapes = {label(study, k): _motion(study, view, k) for k in range(min(N_SHOWN, len(study.modes.frequencies_hz)))}
-    found = {
+    figures = {
         "mesh": gear_mesh_figure(
             view.outlines_mm,
             quality,
@@ -192,8 +192,8 @@ def figures(study: GearBodyStudy) -> dict[str, Figure]:
         ),
     }
     if mesh.size.order > 1:
-        found["stress"] = _stress(study, (*near, -across, across), name)
-    return found
+        figures["stress"] = _stress(study, (*near, -across, across), name)
+    return figures
 
 
 def lines(study: GearBodyStudy) -> list[str]:
@@ -383,19 +383,19 @@ def growth_study(
             allowed=f"above 0, below {0.98 * deepest:.3g} mm: as far as the finite elements follow at {angle_deg:g}°",
         )
     depth = np.linspace(first_mm[0], deepest, N_DEPTHS)
-    found = stress_intensity(gear, mesh, side, torque_nm * load_factor, depth, angle_deg)
+    intensity = stress_intensity(gear, mesh, side, torque_nm * load_factor, depth, angle_deg)
     interval = None if first_mm[0] == first_mm[1] else first_mm
     # Cracks turn to where most energy is released: K does not fall as it does along the straight line.
-    k = np.maximum.accumulate(found.k_mpa_sqrt_m)
+    k = np.maximum.accumulate(intensity.k_mpa_sqrt_m)
     grown = crack_growth(depth, k, law, np.random.default_rng(seed), first_mm=interval)
     turns = speed_rpm * (1.0 if side == 1 else mesh.pair.driver.teeth / mesh.pair.driven.teeth)
-    return GrowthStudy(found, grown, law, torque_nm, load_factor, speed_rpm, side, turns, first_mm)
+    return GrowthStudy(intensity, grown, law, torque_nm, load_factor, speed_rpm, side, turns, first_mm)
 
 
 def gear_of(mesh: GearMesh, side: int) -> ReducedGear:
     """Finite elements of a gear: ready-made, kept, or made now."""
-    own = mesh.side(side)
-    return reduced_gear(GearBlank(own.gear, material=own.material), DOF_PER_TOOTH * own.gear.teeth)
+    toothed = mesh.side(side)
+    return reduced_gear(GearBlank(toothed.gear, material=toothed.material), DOF_PER_TOOTH * toothed.gear.teeth)
 
 
 def growth_figure(study: GrowthStudy) -> Figure:
@@ -430,7 +430,7 @@ def write_growth(study: GrowthStudy, folder: Path) -> list[Path]:
     columns = ["depth_mm", "k_mpa_sqrt_m", "turns_5", "turns_50", "turns_95"]
     rows = zip(study.growth.depth_mm, study.growth.k_mpa_sqrt_m, *study.growth.turns, strict=True)
     table = csv_rows(columns, ([f"{value:.6g}" for value in row] for row in rows))
-    found = {
+    content = {
         "verdict": study.verdict,
         "remaining_turns": [t if isfinite(t) else None for t in study.growth.remaining_turns],
         "probabilities": [0.05, 0.5, 0.95],
@@ -444,5 +444,5 @@ def write_growth(study: GrowthStudy, folder: Path) -> list[Path]:
         "assumptions": list(ASSUMPTIONS),
     }
     write_text(folder / "growth.csv", table)
-    write_text(folder / "growth.json", json.dumps(found, indent=1, ensure_ascii=False) + "\n")
+    write_text(folder / "growth.json", json.dumps(content, indent=1, ensure_ascii=False) + "\n")
     return [*paths, folder / "growth.csv", folder / "growth.json"]

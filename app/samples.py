@@ -72,14 +72,14 @@ def sample_folder() -> Path:
 @cache
 def samples() -> tuple[SampleRecording, ...]:
     """Return the samples, the most telling first; each recording stands beside a rig file of the same stem."""
-    found = []
+    listed = []
     for rig in sorted(sample_folder().glob("*.toml")):
         recordings = [p for p in rig.parent.iterdir() if recording_stem(p.name) == rig.stem and p.suffix != ".toml"]
         title, about, reference = _SHOWN.get(rig.stem, (rig.stem.replace("_", " ").capitalize(), "", ""))
         healthy = rig.parent / reference if reference else None
-        found += [SampleRecording(path, rig, title, about, healthy) for path in recordings]
+        listed += [SampleRecording(path, rig, title, about, healthy) for path in recordings]
     order = list(_SHOWN)
-    return tuple(sorted(found, key=lambda s: order.index(s.rig.stem) if s.rig.stem in order else len(order)))
+    return tuple(sorted(listed, key=lambda s: order.index(s.rig.stem) if s.rig.stem in order else len(order)))
 
 
 _MACHINES = {"Mixer 1": "damaged_tooth", "Mixer 2": "outer_race", "Mixer 3": "healthy"}

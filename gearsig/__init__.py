@@ -58,8 +58,8 @@ def _compiled_code_folder() -> None:
 
 def _can_be_written(folder: Path) -> bool:
     """Whether files can be made in a folder, which may have to be made first."""
-    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
+    existing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    return existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
 
 
 _compiled_code_folder()

@@ -258,8 +258,8 @@ def _report_one(job: _Job) -> Entry | Failure:
     from gearsig.report import Entry, entry_of, from_plain, page_pdf, plain, recording_mark, write_page, write_pdf
 
     try:
-        found = job.options.analyze(job.path)
-        analysis = found.as_one() if isinstance(found, LongAnalysis) else found
+        result = job.options.analyze(job.path)
+        analysis = result.as_one() if isinstance(result, LongAnalysis) else result
         mark = recording_mark(job.path)
         write_page(analysis, job.page, command=job.command, index="index.html", methods=job.methods, mark=mark)
         if job.pdf:

@@ -155,10 +155,10 @@ def n_processors() -> int:
     return os.cpu_count() or 1
 
 
-def can_be_sent(thing: object) -> bool:
+def can_be_sent(value: object) -> bool:
     """Return whether fresh processes understand a thing: it can be pickled, and is not of the caller's own script."""
     try:
-        return _MAIN.encode() not in pickle.dumps(thing)
+        return _MAIN.encode() not in pickle.dumps(value)
     except (pickle.PicklingError, AttributeError, TypeError):
         return False
 

@@ -114,8 +114,8 @@ def verdict_html(verdict: Sequence[str], head: Sequence[str], rows: Iterable[Seq
     cell = "<{0} style='text-align:left'>{1}</{0}>"
     lines = [("th", head), *(("td", row) for row in rows)]
     table = "".join(f"<tr>{''.join(cell.format(kind, escape(text)) for text in line)}</tr>" for kind, line in lines)
-    said = "".join(f"<p><strong>{escape(text)}</strong></p>" for text in verdict)
-    return f"{said}<table>{table}</table>" if len(lines) > 1 else said
+    paragraphs = "".join(f"<p><strong>{escape(text)}</strong></p>" for text in verdict)
+    return f"{paragraphs}<table>{table}</table>" if len(lines) > 1 else paragraphs
 
 
 def to_frame(result: object) -> DataFrame:
@@ -163,8 +163,8 @@ def _frame_of_items(items: Sequence[Any]) -> DataFrame:
     if not parts or len(parts) < len(items):
         return DataFrame(rows)
     # What tells the items apart: their own numbers and texts, not those of results in them.
-    own = [n for n, v in rows[0].items() if "." not in n and not isinstance(v, tuple)]
-    leading = [n for n in own if any(row[n] != rows[0][n] for row in rows)]
+    plain = [n for n, v in rows[0].items() if "." not in n and not isinstance(v, tuple)]
+    leading = [n for n in plain if any(row[n] != rows[0][n] for row in rows)]
     for row, part in zip(rows, parts, strict=True):
         for at, name in enumerate(leading):
             part.insert(at, name, row[name], allow_duplicates=True)

@@ -143,15 +143,15 @@ class Sweep(Simulation):
 
     def at(self, point: SweepPoint) -> Simulation:
         """Return the simulation of a point."""
-        one = {f.name: getattr(self, f.name) for f in fields(Simulation)} | {"seed": point.seed}
+        values = {f.name: getattr(self, f.name) for f in fields(Simulation)} | {"seed": point.seed}
         for axis, value in zip(self.axes, point.values, strict=True):
             if axis.name in OPERATION_AXES:
-                one[axis.name] = Profile.constant(value)
+                values[axis.name] = Profile.constant(value)
             elif axis.name in all_effects():
-                one["effects"] = (*one["effects"], EffectSetting(axis.name, value, axis.options))
+                values["effects"] = (*values["effects"], EffectSetting(axis.name, value, axis.options))
             else:
-                one["parameters"] = {**one["parameters"], axis.name: value}
-        return Simulation(**one)
+                values["parameters"] = {**values["parameters"], axis.name: value}
+        return Simulation(**values)
 
     def _check_axes(self) -> None:
         """Refuse names that do not exist and values out of their ranges; what the machine allows, each point tells."""

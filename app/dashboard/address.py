@@ -109,8 +109,8 @@ def _in_address() -> dict[str, list[str]]:
 
 
 def _asked() -> dict[str, list[str]]:
-    found: dict[str, list[str]] = st.session_state.setdefault(_ASKED, _in_address())
-    return found
+    kept: dict[str, list[str]] = st.session_state.setdefault(_ASKED, _in_address())
+    return kept
 
 
 def asked(name: str) -> str:
@@ -184,8 +184,8 @@ def chosen(key: str, name: str, options: Collection[str], first: str) -> str:
         Where neither names one of them.
     """
     held, texts = st.session_state.get(key), _asked().pop(name, [])
-    wanted: list[str | None] = [*texts] if follows(key) else [held, *texts]
-    choice = next((text for text in wanted if text is not None and text in options), first)
+    candidates: list[str | None] = [*texts] if follows(key) else [held, *texts]
+    choice = next((text for text in candidates if text is not None and text in options), first)
     st.session_state[key] = choice
     put(name, choice)
     return choice
@@ -302,7 +302,7 @@ def keep(name: str, value: Any, first: Any) -> None:
 
 
 def _texts(value: Any) -> list[str]:
-    return [text_of(one) for one in value] or [""] if isinstance(value, list) else [text_of(value)]
+    return [text_of(item) for item in value] or [""] if isinstance(value, list) else [text_of(value)]
 
 
 def text_of(value: Any) -> str:
@@ -314,7 +314,7 @@ def text_of(value: Any) -> str:
     ('0.25', '4', '1', '0_1.5', '')
     """
     if isinstance(value, tuple):
-        return "_".join(text_of(one) for one in value)
+        return "_".join(text_of(item) for item in value)
     if isinstance(value, bool | float):
         return f"{value:.12g}"
     return "" if value is None else str(value)
@@ -342,7 +342,7 @@ def one_of(options: Iterable[Any]) -> Read:
     return lambda texts: by_text[texts[0]]
 
 
-def some_of(options: Iterable[str], *, most: int | None = None) -> Read:
+def some_of(options: Iterable[str], *, maximum: int | None = None) -> Read:
     """Read several of some options; what is none of them is left out.
 
     Examples
@@ -353,10 +353,10 @@ def some_of(options: Iterable[str], *, most: int | None = None) -> Read:
     known = set(options)
 
     def read(texts: list[str]) -> list[str]:
-        found = [text for text in dict.fromkeys(texts) if text in known]
-        if not found and texts != [""]:
+        chosen = [text for text in dict.fromkeys(texts) if text in known]
+        if not chosen and texts != [""]:
             raise ValueError(texts)
-        return found[:most]
+        return chosen[:maximum]
 
     return read
 

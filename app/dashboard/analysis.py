@@ -105,7 +105,7 @@ def _tile(name: str, analysis: Analysis, channel: ChannelAnalysis | None) -> dic
         return {"path": ICONS.get(name, "")}
     if name == "Speed":
         angle = analysis.shaft_angle
-        return {"path": "" if isinstance(angle, CannotTell) else _line(angle.speed_rev_per_s, least=0.02)}
+        return {"path": "" if isinstance(angle, CannotTell) else _line(angle.speed_rev_per_s, min_span=0.02)}
     if name in ("Spectrum", "Order spectrum", "Envelope"):
         return {"path": _spectrum(name, analysis, channel), "fill": True}
     values = np.asarray(analysis.recording.values(channel.channel)[:N_LOOKED_AT], dtype=np.float64)
@@ -120,16 +120,16 @@ def _points(x: FloatArray, y: FloatArray) -> str:
     return "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True))
 
 
-def _scaled(values: FloatArray, *, least: float = 0.0) -> FloatArray:
-    """Return heights of values in the picture; a span below `least` of their mean is not blown up."""
+def _scaled(values: FloatArray, *, min_span: float = 0.0) -> FloatArray:
+    """Return heights of values in the picture; a span below `min_span` of their mean is not blown up."""
     low, high = float(np.min(values)), float(np.max(values))
-    half = max((high - low) / 2, least * abs(low + high) / 2) or 1.0
+    half = max((high - low) / 2, min_span * abs(low + high) / 2) or 1.0
     return HEIGHT / 2 - (values - (low + high) / 2) / half * (HEIGHT / 2 - 3)
 
 
-def _line(values: FloatArray, *, least: float = 0.0) -> str:
+def _line(values: FloatArray, *, min_span: float = 0.0) -> str:
     chosen = values[np.linspace(0, len(values) - 1, N).astype(int)]
-    return _points(np.linspace(0, WIDTH, N), _scaled(chosen, least=least))
+    return _points(np.linspace(0, WIDTH, N), _scaled(chosen, min_span=min_span))
 
 
 def _columns(values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -176,8 +176,8 @@ def _map(channel: ChannelAnalysis, values: FloatArray, *, over_orders: bool) -> 
         levels = levels[:, : levels.shape[1] // (2 if over_orders else 1)]
     if not over_orders:
         levels = levels.T  # time goes to the right
-    for axis, most in ((0, 44), (1, 100)):
-        starts = np.linspace(0, levels.shape[axis], min(most, levels.shape[axis]) + 1).astype(int)[:-1]
+    for axis, n_max in ((0, 44), (1, 100)):
+        starts = np.linspace(0, levels.shape[axis], min(n_max, levels.shape[axis]) + 1).astype(int)[:-1]
         levels = np.maximum.reduceat(levels, starts, axis=axis)
     decibels = 20 * np.log10(np.maximum(levels, float(levels.max()) * 1e-3 or 1.0))
     top = np.percentile(decibels, 99)
@@ -333,7 +333,7 @@ def show_channels(analysis: Analysis) -> None:
         key=state.view_key("channels shown", analysis),
         name="channels",
         first=list(recording.channel_names[:4]),
-        read=address.some_of(recording.channel_names, most=MOST_CHANNELS),
+        read=address.some_of(recording.channel_names, maximum=MOST_CHANNELS),
         max_selections=MOST_CHANNELS,
     )
     time = np.arange(recording.n_samples) / recording.sampling_rate_hz
@@ -557,7 +557,7 @@ OF_RECORDING: dict[str, Whole] = {
     "Speed": show_speed,
     "Indicators": show_indicators,
 }
-_OWN: dict[str, dict[str, Of]] = {
+_BUILT_IN: dict[str, dict[str, Of]] = {
     "Spectrum": {"Spectrum": show_frequency_spectrum},
     "Order spectrum": {"Order spectrum": show_order_spectrum},
     "Map": {"Map": show_map_over_time},
@@ -567,7 +567,7 @@ _OWN: dict[str, dict[str, Of]] = {
     "Modes": {},
     "Phase": {},
 }
-OF_CHANNEL = {view: own | _methods(view) for view, own in _OWN.items()}
+OF_CHANNEL = {view: built_in | _methods(view) for view, built_in in _BUILT_IN.items()}
 MACHINE, REPORT = "Machine", "Report"
 VIEWS = (MACHINE, "Waveform", "Speed", *OF_CHANNEL, "Indicators", REPORT)
 

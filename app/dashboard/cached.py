@@ -161,8 +161,8 @@ def read_and_analyze(request: AnalysisRequest, content: Content, reference: Cont
             read = read_usual_part(path, its_rig, **{**given, "sampling_rate_hz": rate_hz})
             then = _named(read, request.reference_name)
     with _as_file(content, request.name) as path:
-        found = analyze_file(path, rig, reference=then, torque_nm=request.torque_nm, **given)
-    analysis = found.as_one() if isinstance(found, LongAnalysis) else found
+        result = analyze_file(path, rig, reference=then, torque_nm=request.torque_nm, **given)
+    analysis = result.as_one() if isinstance(result, LongAnalysis) else result
     return replace(analysis, recording=_named(analysis.recording, request.name, request.sha256))
 
 

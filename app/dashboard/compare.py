@@ -343,7 +343,7 @@ def show_alike(comparison: Comparison, rig: Rig | None) -> None:
         pairs = (f"{pair.driver_teeth}/{pair.driven_teeth}" for pair in rig.pairs)
         facts.insert(0, (True, f"Teeth: {', '.join(pairs)} in both"))
     aligned = zip(comparison.alignments, alignment_texts(comparison), strict=False)
-    facts += [(not one.is_doubted, f"Aligned: {text}") for one, text in aligned]
+    facts += [(not alignment.is_doubted, f"Aligned: {text}") for alignment, text in aligned]
     show_checks(facts)
     lengths = ", ".join(
         f"{name} {side.duration_s:.4g} s, {side.n_revolutions:.4g} revolutions"

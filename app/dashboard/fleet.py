@@ -275,14 +275,14 @@ def _show_trend(fleet: Fleet, row: Row, over: str) -> None:
     machine, name, is_dated = row["machine"], row["name"], over == "date"
     if is_dated:
         trends = fleet.trend(machine, name, **only)
-        trend = next((one for one in trends if one.band == row["band"]), trends[0])
+        trend = next((candidate for candidate in trends if candidate.band == row["band"]), trends[0])
         table = limits = trend.table
         at = along = table["date"].to_numpy("datetime64[s]").astype(float) / 86400.0
         changed = f" The level changed on {trend.changed:%Y-%m-%d}." if trend.changed is not None else ""
         x, text, margin = "date", trend.text + changed, 0.5
     else:
         related = fleet.trend_over(over, machine, name, **only)
-        shown = next((one for one in related if one.trend.band == row["band"]), related[0])
+        shown = next((candidate for candidate in related if candidate.trend.band == row["band"]), related[0])
         trend, table, limits, text = shown.trend, shown.table, shown.curve, shown.text
         at, along = table.iloc[:, 0].to_numpy(float), limits.iloc[:, 0].to_numpy(float)
         x, margin = ("load (N·m)" if over == "load" else "speed (rpm)"), 1e-3 * float(at.max())

@@ -60,9 +60,9 @@ def solid_view(study: GearBodyStudy) -> SolidView:
     faces = fe_gear.outer_faces(study.mesh)
     nodes, inverse = np.unique(faces, return_inverse=True)
     n_teeth = study.mesh.blank.n_teeth
-    one = np.broadcast_to(study.mesh.points_m[nodes] * 1e3, (n_teeth, len(nodes), 3))
+    tooth_mm = np.broadcast_to(study.mesh.points_m[nodes] * 1e3, (n_teeth, len(nodes), 3))
     quads = inverse.reshape(1, -1, 4) + (len(nodes) * np.arange(n_teeth))[:, None, None]
-    return SolidView(nodes, gear_body.in_the_whole_gear(study.mesh, one), quads.reshape(-1, 4))
+    return SolidView(nodes, gear_body.in_the_whole_gear(study.mesh, tooth_mm), quads.reshape(-1, 4))
 
 
 @kept(3, "Meshing the gear, finding its modes …")
@@ -171,8 +171,8 @@ def show_pair() -> None:
     else:
         show_figure(drawn[name], VIEWS[name][1], f"pair {name}")
     for row in pair_study.summary(study)["sweeps"]:  # type: ignore[attr-defined]  # a list of mappings
-        said = {way: row[f"jump_{way}_hz"] for way in ("up", "down")}
-        jumps = ", ".join(f"{way}: {'no jump' if hz is None else f'jump at {hz:.0f} Hz'}" for way, hz in said.items())
+        jumps_hz = {way: row[f"jump_{way}_hz"] for way in ("up", "down")}
+        jumps = ", ".join(f"{way}: {f'jump at {hz:.0f} Hz' if hz else 'no jump'}" for way, hz in jumps_hz.items())
         st.caption(f"Torsional mode {row['torsional_mode_hz']:.0f} Hz. Sweep {jumps}. {row['n_steps']:,} steps.")
     st.caption("Short sweeps load the teeth by the rotors' inertia, more on the way up than on the way down.")
     download("Sweeps as CSV", pair_study.sweeps_csv(study).encode(), "sweeps.csv")
@@ -205,9 +205,9 @@ def show_publications() -> None:
     if not address.ask(st.toggle, "Compute its figures", **looks):
         st.caption("Takes one to two minutes, once.")
         return
-    found = computed(name)
-    st.markdown(f"**{found.summary}** {as_typed(found.source)}")
-    for item in found.figures:
+    publication = computed(name)
+    st.markdown(f"**{publication.summary}** {as_typed(publication.source)}")
+    for item in publication.figures:
         st.subheader(as_typed(capitalised(f"{item.answers}: {item.title}")), anchor=False)
         show_figure(item.figure, item.title, f"publication {name} {item.answers}")
         show_words(
@@ -217,9 +217,9 @@ def show_publications() -> None:
                 "verdict": [claim.judgement for claim in item.claims],
             }
         )
-    if found.unanswered:
+    if publication.unanswered:
         st.subheader("Figures without an answer", anchor=False)
-        show_words({"figure": list(found.unanswered), "why": list(found.unanswered.values())})
+        show_words({"figure": list(publication.unanswered), "why": list(publication.unanswered.values())})
 
 
 TABS = {"One gear": show_gear, "Pair": show_pair, "Publications": show_publications}

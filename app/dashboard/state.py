@@ -91,8 +91,8 @@ class ChosenFile:
 
 def pages() -> dict[str, StreamlitPage]:
     """Return the pages of the dashboard by their modules, as this run of `main` lists them."""
-    found: dict[str, StreamlitPage] = st.session_state.setdefault(_PAGES, {})
-    return found
+    kept: dict[str, StreamlitPage] = st.session_state.setdefault(_PAGES, {})
+    return kept
 
 
 def go_to(page: str) -> None:
@@ -121,8 +121,8 @@ def tokens(kind: str) -> tuple[str, ...]:
 
 
 def _tokens() -> dict[tuple[str, str], str]:
-    found: dict[tuple[str, str], str] = st.session_state.setdefault(_TOKENS, {})
-    return found
+    kept: dict[tuple[str, str], str] = st.session_state.setdefault(_TOKENS, {})
+    return kept
 
 
 def remember(chosen: Chosen | None) -> None:
@@ -192,8 +192,8 @@ def kept_files(kind: str) -> tuple[ChosenFile, ...]:
 
 def zooms() -> dict[str, list[float]]:
     """Return what the figures of this session were zoomed to, by their keys."""
-    found: dict[str, list[float]] = st.session_state.setdefault(ZOOMS, {})
-    return found
+    kept: dict[str, list[float]] = st.session_state.setdefault(ZOOMS, {})
+    return kept
 
 
 def source_key(name: str, source: str) -> str:

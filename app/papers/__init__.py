@@ -144,18 +144,18 @@ def paper(name: str, on_progress: Progress = lambda _stage, _done: None) -> Pape
     return made
 
 
-def write_paper(found: Paper, folder: Path, *, command: str = "") -> tuple[Path, ...]:
+def write_paper(publication: Paper, folder: Path, *, command: str = "") -> tuple[Path, ...]:
     """Write each figure as PNG and SVG, the claims as JSON, and the page that shows them beside each other."""
     from gearsig.cache import made_folder, write_text
     from gearsig.report import Section, benchmark_html
 
     made_folder(folder)
     paths = []
-    for item in found.figures:
+    for item in publication.figures:
         for ending in (".png", ".svg"):
             paths.append(folder / f"{item.name}{ending}")
             item.figure.savefig(paths[-1], dpi=160)
-    paths.append(write_text(folder / "claims.json", _claims_json(found)))
+    paths.append(write_text(folder / "claims.json", _claims_json(publication)))
     header = ("the publication says", "the model gives", "verdict")
     sections = [
         Section(
@@ -165,12 +165,13 @@ def write_paper(found: Paper, folder: Path, *, command: str = "") -> tuple[Path,
             pictures=(embed(item.figure, "", f"{item.title}, as the model gives it"),),
             is_prose=True,
         )
-        for item in found.figures
+        for item in publication.figures
     ]
-    rows = tuple(found.unanswered.items())
+    rows = tuple(publication.unanswered.items())
     sections.append(Section("Figures without an answer", header=("figure", "why"), rows=rows, is_prose=True))
-    facts = [("publication", found.source), ("machine", found.machine), *([("command", command)] if command else [])]
-    page = benchmark_html(found.title, found.summary, sections, facts, datetime.now().astimezone())
+    facts = [("publication", publication.source), ("machine", publication.machine)]
+    facts += [("command", command)] if command else []
+    page = benchmark_html(publication.title, publication.summary, sections, facts, datetime.now().astimezone())
     paths.append(write_text(folder / "index.html", page))
     return tuple(paths)
 

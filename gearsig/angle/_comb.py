@@ -108,7 +108,7 @@ def comb_of_stages(stages: Stages) -> CombLines:
     taken: list[float] = []  # sorted
     for place, (order, presence) in ranked:
         at = bisect_left(taken, order)
-        if order > 0.05 and all(abs(order - other) > _SAME for other in taken[max(at - 1, 0) : at + 1]):
+        if order > 0.05 and all(abs(order - neighbour) > _SAME for neighbour in taken[max(at - 1, 0) : at + 1]):
             taken.insert(at, order)
             orders.append(order)
             classes.append(presence)
@@ -121,12 +121,12 @@ def with_other_teeth(comb: CombLines) -> list[CombLines]:
 
     A series of harmonics that has no mesh in it, such as a bearing's, fits them all alike.
     """
-    others = []
+    combs = []
     for change in (-4, -3, -2, -1, 1, 2, 3, 4):
         stages = tuple((m + change * (shafts[0] if shafts else 1.0), shafts) for m, shafts in comb.stages)
         if all(m > 0 for m, _ in stages):
-            others.append(comb_of_stages(stages))
-    return others
+            combs.append(comb_of_stages(stages))
+    return combs
 
 
 # How much each frequency looks like a line: height over the local floor, as log likelihood ratio by rank.
@@ -364,7 +364,7 @@ def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> 
     # Within three bins of the lowest mesh line it is the same comb; of a slow machine these reach down to zero.
     same = min(1.0, 3.0 * evidence.bin_width / (comb.meshes[0] * speed))
     elsewhere = np.where(np.abs(speeds / speed - 1.0) > same, scores, -np.inf)
-    other = int(np.argmax(elsewhere))
+    runner_up = int(np.argmax(elsewhere))
     rng = np.random.default_rng(20_230_501)  # fixed: the same recording gives the same answer
     tried = speeds if len(speeds) <= 200_000 else speeds[:: len(speeds) // 200_000 + 1]
     moved = [comb.orders * np.exp(rng.uniform(-0.12, 0.12, len(comb.orders))) for _ in range(16)]
@@ -378,8 +378,8 @@ def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> 
         score=float(scores[best]),
         chance_mean=float(np.mean(chance)),
         chance_deviation=max(float(np.std(chance, ddof=1)), 1.0),
-        runner_up_speed=float(speeds[other]) if np.isfinite(elsewhere[other]) else 0.0,
-        runner_up_score=float(elsewhere[other]),
+        runner_up_speed=float(speeds[runner_up]) if np.isfinite(elsewhere[runner_up]) else 0.0,
+        runner_up_score=float(elsewhere[runner_up]),
         other_teeth_score=max((float(score) for score in teeth), default=-np.inf),
         side_score=float(evidence.ratios[comb.presence[side], places[side]].sum()),
         narrow=high / low <= NARROW,

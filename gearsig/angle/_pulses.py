@@ -415,9 +415,9 @@ def late_pulses(t: FloatArray, counts: FloatArray, tick_s: float) -> IntArray:
     neighbours too.
     """
     n = len(t)
-    others = np.array([-2, -1, 1, 2])
+    neighbours = np.array([-2, -1, 1, 2])
     at = np.arange(2, n - 2)
-    nodes, values = t[at[:, None] + others], counts[at[:, None] + others].astype(np.float64)
+    nodes, values = t[at[:, None] + neighbours], counts[at[:, None] + neighbours].astype(np.float64)
     gaps = nodes[:, :, None] - nodes[:, None, :] + np.eye(4)
     reach = t[at][:, None] - nodes
     lagrange = np.prod(reach, axis=1)[:, None] / (reach * np.prod(gaps, axis=2))

@@ -258,8 +258,8 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
     # With the scale open, half, double and triple speed are refined as well and have to lose.
     mean = best.angle.mean_speed_rpm / 60.0
     factors = [factor for factor in (2.0, 0.5, 3.0, 1.0 / 3.0) if search.low <= factor * mean <= search.high]
-    others = [_refined(search, best.angle.of_shaft(best.angle.shaft, factor)) for factor in factors]
-    return max([best, *(o for o in others if o is not None and abs(o.decision.speed - 1.0) <= 0.02)], key=_rank)
+    alternatives = [_refined(search, best.angle.of_shaft(best.angle.shaft, factor)) for factor in factors]
+    return max([best, *(o for o in alternatives if o is not None and abs(o.decision.speed - 1.0) <= 0.02)], key=_rank)
 
 
 def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[ShaftAngle]:

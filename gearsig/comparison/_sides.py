@@ -246,9 +246,9 @@ def _factor(unit: str, target_unit: str, quantity: str) -> float | None:
     if unit == target_unit:
         return 1.0
     for name in (quantity,) if quantity != "unknown" else tuple(SI_FACTORS):
-        own, target = si_factor(name, unit), si_factor(name, target_unit)
-        if own is not None and target is not None:
-            return own / target
+        given, target = si_factor(name, unit), si_factor(name, target_unit)
+        if given is not None and target is not None:
+            return given / target
     return None
 
 

@@ -113,12 +113,12 @@ def differing_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
     """Return the further lines whose difference is no accident and not the mesh harmonics' own, largest first."""
     lines, gain_db = further_lines(channel), common_gain_db(channel)
     needed = times_scatter(len(lines))
-    found = [
+    differing = [
         line
         for line in lines
         if abs(line.level.difference_db - gain_db) > max(WORTH_DB, needed * line.level.repeatability_db)
     ]
-    return tuple(sorted(found, key=lambda line: -power_difference(line.level, gain_db)))
+    return tuple(sorted(differing, key=lambda line: -power_difference(line.level, gain_db)))
 
 
 def common_gain_db(channel: ChannelComparison) -> float:
@@ -177,8 +177,8 @@ def differing_average(channel: ChannelComparison) -> ShaftComparison | None:
 
     shafts = [shaft for shaft in channel.shafts if shaft.best_correlation >= MIN_REPEATED]
     needed = times_scatter(len(shafts))
-    found = [s for s in shafts if lack(s) > max(WORTH_CORRELATION, needed * s.correlation.repeatability)]
-    return max(found, key=lack, default=None)
+    lacking = [s for s in shafts if lack(s) > max(WORTH_CORRELATION, needed * s.correlation.repeatability)]
+    return max(lacking, key=lack, default=None)
 
 
 # --------------------
@@ -247,8 +247,8 @@ def _elsewhere_text(channel: ChannelComparison, alignments: Sequence[Alignment])
     line_powers = [power_difference(line.level, gain_db) for line in lines]
     if tooth is not None and tooth.power >= max(line_powers, default=0.0):
         off = plus_minus(abs(tooth.off_db), BEYOND * tooth.level.repeatability_db)
-        others = " against the other teeth" if tooth.is_beside_others else ""
-        where = f"at {tooth.place}, where the simulation is too {_word(tooth.off_db)} by {off} dB{others}"
+        beside = " against the other teeth" if tooth.is_beside_others else ""
+        where = f"at {tooth.place}, where the simulation is too {_word(tooth.off_db)} by {off} dB{beside}"
         return f"The averages over angle differ most {where}.", tooth.power
     if lines:
         return f"{_most_text(channel, lines[0], gain_db)}.", line_powers[0]

@@ -159,8 +159,8 @@ def suggest_modes(
         raise InputError("penalties is empty", allowed="one or more values above zero")
     part = replace(x, values=_middle(x.values, count(longest, "longest", minimum=64)))
     check_supported(part.values, 1)
-    most = min(max_modes, part.n_samples // SAMPLES_PER_MODE)
-    trials = tuple(trial for penalty in alphas for trial in _trials(part, most, penalty))
+    n_max = min(max_modes, part.n_samples // SAMPLES_PER_MODE)
+    trials = tuple(trial for penalty in alphas for trial in _trials(part, n_max, penalty))
     good = [t for t in trials if not t.objection]
     if not good:
         raise RefusalError(

@@ -263,7 +263,7 @@ def denoise(
     x = values.astype(np.float64)
     settings = _with_levels(settings or DenoiseSettings(), x)
     n_levels, n_shifts = settings.n_levels or 1, settings.n_shifts
-    found = np.zeros((n_levels, 3))  # noise, threshold, kept share
+    totals = np.zeros((n_levels, 3))  # noise, threshold, kept share
     clean = np.zeros_like(x)
     # A power of two leaves every digit as it is, and keeps squares of very small or large values in range.
     scale = 2.0 ** np.floor(np.log2(np.abs(x).max()))
@@ -271,9 +271,9 @@ def denoise(
     for shift in range(n_shifts):
         part, numbers = _denoise_shifted(x / scale, shift, n_levels, noise_rms, settings)
         clean += part * (scale / n_shifts)
-        found += numbers * (np.array([scale, scale, 1.0]) / n_shifts)
+        totals += numbers * (np.array([scale, scale, 1.0]) / n_shifts)
     levels = tuple(
-        DenoisedLevel(j, (fs / 2 ** (j + 1), fs / 2**j), *(float(v) for v in found[j - 1]))
+        DenoisedLevel(j, (fs / 2 ** (j + 1), fs / 2**j), *(float(v) for v in totals[j - 1]))
         for j in range(1, n_levels + 1)
     )
     return Denoised(clean, x - clean, fs, levels, levels[0].noise, settings, unit, source)

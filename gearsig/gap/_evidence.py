@@ -307,7 +307,7 @@ _BURST_WORDS = (
     | {f"echo.{i}": f"autocorrelation at lag {lag:.2f} pitches" for i, lag in enumerate(ECHO_LAGS_PITCHES)}
     | {"elsewhere": "share further away"}
 )
-_OTHER = {
+_SINGLE_FEATURES = {
     "mesh.total": "mesh harmonics together",
     "mesh.half": "half mesh orders",
     "apart.mesh": "mesh harmonics, difference between sensors",
@@ -332,8 +332,8 @@ _OTHER = {
 
 def feature_words(name: str, frame: GearFrame) -> str:
     """Return a feature's name in words, e.g. "input shaft: sidebands 6 to 12"."""
-    if name in _OTHER:
-        return _OTHER[name]
+    if name in _SINGLE_FEATURES:
+        return _SINGLE_FEATURES[name]
     first, _, remainder = name.partition(".")
     side, _, detail = remainder.partition(".")
     if first == "mesh":

@@ -589,8 +589,8 @@ def burst_features(lines: ComplexArray, noise: FloatArray, teeth: int) -> Iterat
         energy, width = np.mean(by_channel, axis=0), round(PEAK_PITCHES * STEPS_PER_PITCH)
         within = uniform_filter1d(energy, width, mode="wrap", origin=-(width // 2))  # from each step on
         energy = np.roll(energy, -int(np.argmax(within)))
-        course = _cut(energy, COURSE_PITCHES).reshape(N_QUARTERS, width).sum(axis=1)
-        shares = course / max(float(course.sum()), 1e-300)
+        profile = _cut(energy, COURSE_PITCHES).reshape(N_QUARTERS, width).sum(axis=1)
+        shares = profile / max(float(profile.sum()), 1e-300)
         for i, share in enumerate(shares):
             yield f"burst.{way}.course.{i}", decibel(share + MIN_BURST_SHARE)
         smooth = convolve1d(_cut(energy, ECHO_PITCHES), _window(SMOOTH_STEPS), mode="reflect")

@@ -179,10 +179,10 @@ def find_impacts(
     flights = _Flights(motion, q, a, (noise, scatter_of(rate)))
     runs = _runs(np.where(np.abs(g) > 0.0, np.sign(g), 0.0).astype(np.int64), g, NOISE_DEPTH * noise)
     impacts = []
-    for before, this, after in zip(runs[:-1], runs[1:], [*runs[2:], None][: len(runs) - 1], strict=True):
-        if this[0] == 0 or before[0] != 0 or before[2] - before[1] < MIN_FLIGHT_SAMPLES:
+    for before, run, after in zip(runs[:-1], runs[1:], [*runs[2:], None][: len(runs) - 1], strict=True):
+        if run[0] == 0 or before[0] != 0 or before[2] - before[1] < MIN_FLIGHT_SAMPLES:
             continue
-        impact = _impact(motion, flights, g, before, this, after)
+        impact = _impact(motion, flights, g, before, run, after)
         if impact.speed_mps > slowest:
             impacts.append(impact)
     return tuple(impacts)
@@ -199,11 +199,11 @@ def meeting_speeds(motion: PairMotion, datum_m: float, half_backlash_m: float) -
     g = depth(q, half_backlash_m)
     speeds = np.full(len(q), motion.contact.impact_speed_floor_mps)
     runs = _runs(np.sign(g).astype(np.int64), g, NOISE_DEPTH * scatter[0])
-    for before, this in pairwise(runs):
-        if this[0] != 0:
+    for before, run in pairwise(runs):
+        if run[0] != 0:
             long_enough = before[0] == 0 and before[2] - before[1] >= MIN_FLIGHT_SAMPLES
-            speed = flights.meets(before, this[0])[1] if long_enough else np.nan
-            speeds[this[1] : this[2]] = np.maximum(speed, motion.contact.impact_speed_floor_mps)
+            speed = flights.meets(before, run[0])[1] if long_enough else np.nan
+            speeds[run[1] : run[2]] = np.maximum(speed, motion.contact.impact_speed_floor_mps)
     return speeds
 
 
@@ -274,8 +274,8 @@ class _Flights:
         )
 
 
-def _impact(motion: PairMotion, flights: _Flights, g: FloatArray, before: Run, this: Run, after: Run | None) -> Impact:
-    flank, first, last = this
+def _impact(motion: PairMotion, flights: _Flights, g: FloatArray, before: Run, run: Run, after: Run | None) -> Impact:
+    flank, first, last = run
     time, speed = flights.meets(before, flank)
     step = 1.0 / motion.sampling_rate_hz
     mass = reduced_mass_kg(motion)

@@ -486,11 +486,11 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
     limits = axes.get_xlim()
     named = _names_of_upright_lines(axes)
 
-    def take(x: Any, y: Any, colour: Any, own: str = "", **looks: Any) -> None:
+    def take(x: Any, y: Any, colour: Any, label: str = "", **looks: Any) -> None:
         is_quiet = isinstance(number := _number_of(name := _colour(colour)), int) and number < 0
         by_looks = names.get((name, looks.get("dotted", False)), "") or names.get((name, False), "")
         # a legend of the whole figure may name a line of another panel in the same colour
-        about = own or ("" if is_quiet else by_looks)
+        about = label or ("" if is_quiet else by_looks)
         lines.append(ChartLine(np.asarray(x, float), np.asarray(y, float), about, number, **looks))
 
     for line in axes.lines:
@@ -695,14 +695,14 @@ def curves_figure(
     )
     lines: list[Line2D] = []
     # a curve has the same colour in a panel that shows some of another's
-    most = max(panels, key=lambda panel: len(panel.curves)).curves
-    colours = {name: colour for name, _, colour in style.coloured(most)}
+    fullest = max(panels, key=lambda panel: len(panel.curves)).curves
+    colours = {name: colour for name, _, colour in style.coloured(fullest)}
     for place, panel in zip(axes, panels, strict=False):
         style.check_number(len(panel.curves), f"{len(panel.curves)} curves in one panel")
         lines = []
         some = panel.curves.keys() <= colours.keys()
-        for k, (name, values, own) in enumerate(style.coloured(panel.curves)):
-            colour = colours[name] if some else own
+        for k, (name, values, series_colour) in enumerate(style.coloured(panel.curves)):
+            colour = colours[name] if some else series_colour
             if len(values) != len(panel.x):
                 raise InputError(f"{name} has {len(values)} points, its axis {len(panel.x)}", allowed="equal lengths")
             lines += place.plot(*_thinned(panel.x, values), color=colour, lw=1.3, label=name, zorder=3 - 0.01 * k)

@@ -63,8 +63,8 @@ def start_stop_figure(examined: motions.StartStop, *, title: str = "") -> Figure
     if examined.loop is not None and examined.loop.n_cycles:
         lost, work = examined.loop.loss_per_cycle_j, examined.loop.work_per_cycle_j
         uncertain = examined.loop.loss_uncertainty_j
-        least = f"{lost:.3g}" if lost > uncertain else f"at most {max(abs(lost), uncertain):.2g}"
-        style.note(loop, f"{least} of {work:.3g} J lost a cycle")
+        loss = f"{lost:.3g}" if lost > uncertain else f"at most {max(abs(lost), uncertain):.2g}"
+        style.note(loop, f"{loss} of {work:.3g} J lost a cycle")
     return figure
 
 

@@ -254,8 +254,8 @@ def _channel_table(comparison: Comparison, channel: ChannelComparison) -> list[s
     rows += [_level_row(line.label, line.level, missing_words(line)) for line in lines]
     tooth = differing_tooth(channel, comparison.alignments)
     if tooth is not None:
-        others = f"the other teeth {signed(tooth.level.difference_db - tooth.off_db)}" if tooth.is_beside_others else ""
-        rows.append(_level_row(tooth.place, tooth.level, others))
+        beside = f"the other teeth {signed(tooth.level.difference_db - tooth.off_db)}" if tooth.is_beside_others else ""
+        rows.append(_level_row(tooth.place, tooth.level, beside))
     for shaft in channel.shafts:
         frac = shaft.agreement
         rows.append(

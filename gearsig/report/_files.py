@@ -50,9 +50,10 @@ def page_names(sources: Iterable[str | Path], folder: Path | None = None) -> tup
     >>> page_names(["runs.mat#2", "runs.mat#3", "runs.mat"])
     ('runs_2', 'runs_3', 'runs')
     """
-    there = {} if folder is None else {page.stem.lower(): (page.stem, _mark_of(page)) for page in folder.glob("*.html")}
+    pages = () if folder is None else folder.glob("*.html")
+    present = {page.stem.lower(): (page.stem, _mark_of(page)) for page in pages}
     taken = set(_RESERVED)
-    return tuple(_unique(_safe(str(source)), taken, there, recording_mark(source)) for source in sources)
+    return tuple(_unique(_safe(str(source)), taken, present, recording_mark(source)) for source in sources)
 
 
 def recording_mark(source: str | Path) -> str:
@@ -98,13 +99,13 @@ def _safe(source: str) -> str:
     return (name[: LONGEST_NAME - len(ending)].strip(".-_") or "recording") + ending
 
 
-def _unique(name: str, taken: set[str], there: Mapping[str, tuple[str, str]], mark: str) -> str:
+def _unique(name: str, taken: set[str], present: Mapping[str, tuple[str, str]], mark: str) -> str:
     """Return the first free name, or that of the page of this mark; the names `taken` are lower case and grow."""
     named_alike = re.compile(rf"{re.escape(name)}(-\d+)?", re.IGNORECASE)
-    own = [page for page, of in there.values() if of == mark and named_alike.fullmatch(page)]
-    choice = next((page for page in own if page.lower() not in taken), name)
+    pages = [page for page, of in present.values() if of == mark and named_alike.fullmatch(page)]
+    choice = next((page for page in pages if page.lower() not in taken), name)
     number = 1
-    while choice.lower() in taken or (choice not in own and choice.lower() in there):
+    while choice.lower() in taken or (choice not in pages and choice.lower() in present):
         number += 1
         choice = f"{name}-{number}"
     taken.add(choice.lower())
@@ -115,10 +116,10 @@ def _mark_of(page: Path) -> str:
     """Return the mark that a page bears; empty where it has none, as pages of other makers."""
     try:
         with page.open("rb") as file:
-            found = _MARK.search(file.read(_HEAD_BYTES))
+            match = _MARK.search(file.read(_HEAD_BYTES))
     except OSError:
         return ""
-    return found[1].decode() if found is not None else ""
+    return match[1].decode() if match is not None else ""
 
 
 def render(template: str, **values: Any) -> str:

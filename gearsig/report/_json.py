@@ -357,9 +357,9 @@ def _crack(answer: CrackEstimate | NoCrackSeen | CannotTell | None) -> Json | No
         return None
     if isinstance(answer, CannotTell):
         return {"answer": "cannot tell", **plain(answer, arrays=False)}
-    kind, told = "crack" if isinstance(answer, CrackEstimate) else "none seen", plain(answer, arrays=False)
-    told.pop("searched", None)  # of the figure
-    return {"answer": kind, "text": answer.text, **told}
+    kind, content = "crack" if isinstance(answer, CrackEstimate) else "none seen", plain(answer, arrays=False)
+    content.pop("searched", None)  # of the figure
+    return {"answer": kind, "text": answer.text, **content}
 
 
 def _reference(reference: Analysis | None) -> Json | None:

@@ -224,8 +224,8 @@ def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
         if (about := _shown_by(finding, channel)) is not None:
             return VerdictPicture(about, channel, "", finding)
     # that of what stands beside it in words
-    told = [name for f in analysis.findings if f.kind is not Kind.INFORMATION for name in f.where.channels]
-    return VerdictPicture("lines", channels[next((name for name in told if name in channels), next(iter(channels)))])
+    named = [name for f in analysis.findings if f.kind is not Kind.INFORMATION for name in f.where.channels]
+    return VerdictPicture("lines", channels[next((name for name in named if name in channels), next(iter(channels)))])
 
 
 def _change_by_crack(analysis: Analysis, shaft: str) -> SynchronousAverage | None:
@@ -420,13 +420,13 @@ def gallery(analysis: Analysis, methods: Sequence[str] | None = None) -> Gallery
     groups.append(PictureGroup("Further methods", further))
     groups.append(PictureGroup("Recording", tuple(_recording_pictures(analysis))))
     left_out, others = ordered[N_CHANNELS:], ordered[len(detailed) : N_CHANNELS]
-    remarks = []
+    notes = []
     if others:
-        remarks.append(f"{', '.join(others)}: spectrum only; {', '.join(detailed)} in detail.")
+        notes.append(f"{', '.join(others)}: spectrum only; {', '.join(detailed)} in detail.")
     if left_out:
-        remarks.append(f"There are no pictures of {', '.join(left_out)}; their numbers are in the table.")
-    remarks += [f"{reason}." for reason in reasons]
-    return Gallery(tuple(group for group in groups if group.wide or group.small), " ".join(remarks))
+        notes.append(f"There are no pictures of {', '.join(left_out)}; their numbers are in the table.")
+    notes += [f"{reason}." for reason in reasons]
+    return Gallery(tuple(group for group in groups if group.wide or group.small), " ".join(notes))
 
 
 def _further_methods(

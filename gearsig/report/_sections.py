@@ -75,12 +75,12 @@ def finding_card(finding: Finding) -> FindingCard:
 
 def finding_cards(findings: Sequence[Finding]) -> tuple[FindingCard, ...]:
     """Put findings into words; what would make several of them surer is said of the first."""
-    said: set[str] = set()
+    stated: set[str] = set()
     cards = []
     for finding in findings:
         card = finding_card(finding)
-        cards.append(replace(card, surer="") if card.surer in said else card)
-        said.add(card.surer)
+        cards.append(replace(card, surer="") if card.surer in stated else card)
+        stated.add(card.surer)
     return tuple(cards)
 
 
@@ -218,8 +218,8 @@ def split_verdict(verdict: str) -> tuple[str, str]:
     """
     if len(verdict) <= LONGEST_HEADLINE:
         return verdict, ""
-    found = re.match(r"(.+?\.) +(.+)", verdict)
-    return (found[1], found[2].strip()) if found else (verdict, "")
+    match = re.match(r"(.+?\.) +(.+)", verdict)
+    return (match[1], match[2].strip()) if match else (verdict, "")
 
 
 def machine_rows(rig: Rig | None) -> Rows:
@@ -442,10 +442,10 @@ def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
         fill(analysis.verdict, WIDTH),
         "",
     ]
-    said: set[str] = set()
+    stated: set[str] = set()
     for number, finding in enumerate(analysis.findings, 1):
-        lines += _finding_lines(number, finding, says_surer=finding.surer not in said)
-        said.add(finding.surer)
+        lines += _finding_lines(number, finding, says_surer=finding.surer not in stated)
+        stated.add(finding.surer)
     if with_indicators:
         lines += ["", *_indicator_lines(analysis)]
     return "\n".join(lines)

@@ -138,10 +138,10 @@ class GearBlank:
                 remedy="take a thinner web, or leave it out for a full disc",
             )
         space = g.root_radius_mm - g.bore_mm
-        least = MIN_RIM * g.module_mm
+        min_mm = MIN_RIM * g.module_mm
         for name in ("rim_thickness_mm", "hub_thickness_mm"):
             if getattr(self, name) is not None:
-                within(getattr(self, name), name, least, space, "mm")
+                within(getattr(self, name), name, min_mm, space, "mm")
         if self.rim_radius_mm - self.hub_radius_mm < 0.5 * g.module_mm:
             raise InputError(
                 f"hub and rim leave {self.rim_radius_mm - self.hub_radius_mm:.3g} mm for the web",
@@ -354,11 +354,11 @@ def check_fillet(blank: GearBlank, size: MeshSize) -> None:
     if size.order == 1:
         return
     error = outline_error_mm(blank.geometry, size.n_gap, size.n_up)
-    most = MAX_OUTLINE_ERROR * blank.geometry.module_mm
-    if error > most:
+    max_error_mm = MAX_OUTLINE_ERROR * blank.geometry.module_mm
+    if error > max_error_mm:
         raise InputError(
             f"the mesh is too coarse for the fillet: its edges lie up to {error:.3g} mm off it",
-            allowed=f"at most {most:.3g} mm",
+            allowed=f"at most {max_error_mm:.3g} mm",
             remedy=f"ask for more degrees of freedom (cells: more than n_up = {size.n_up}, n_gap = {size.n_gap}), or a "
             "rounder tool",
         )
@@ -369,16 +369,16 @@ def check_reducible(blank: GearBlank, size: MeshSize) -> None:
 
     Its modes may be looked at all the same: they hardly depend on the fillet.
     """
-    most = MAX_STRAIGHT_ERROR * blank.geometry.module_mm
+    max_error_mm = MAX_STRAIGHT_ERROR * blank.geometry.module_mm
 
-    def error_mm(wanted: MeshSize) -> float:
-        return outline_error_mm(blank.geometry, wanted.n_gap, wanted.n_up, wanted.order)
+    def error_mm(candidate: MeshSize) -> float:
+        return outline_error_mm(blank.geometry, candidate.n_gap, candidate.n_up, candidate.order)
 
-    if size.order == 1 and error_mm(size) > most:
-        enough = next((n_dof_of(blank, finer) for finer in COARSE if error_mm(finer) <= most), None)
+    if size.order == 1 and error_mm(size) > max_error_mm:
+        enough = next((n_dof_of(blank, finer) for finer in COARSE if error_mm(finer) <= max_error_mm), None)
         raise InputError(
             f"the mesh is too coarse for the fillet: its straight edges lie up to {error_mm(size):.2g} mm off it",
-            allowed=f"at most {most:.2g} mm in a gear that is to be reduced",
+            allowed=f"at most {max_error_mm:.2g} mm in a gear that is to be reduced",
             remedy=f"ask for {'more' if enough is None else f'at least {enough}'} degrees of freedom",
         )
 
@@ -430,17 +430,17 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
     InputError
         If even the coarsest has more.
     """
-    wanted = count(n_dof, "n_dof", minimum=MIN_DOF)
-    if wanted > MAX_DOF:
-        raise InputError(f"n_dof is {wanted}", allowed=f"{MIN_DOF} to {MAX_DOF}", remedy="take fewer")
+    target = count(n_dof, "n_dof", minimum=MIN_DOF)
+    if target > MAX_DOF:
+        raise InputError(f"n_dof is {target}", allowed=f"{MIN_DOF} to {MAX_DOF}", remedy="take fewer")
     sizes = [_size(blank, blank.geometry.module_mm * 2.5 * 0.97**k) for k in range(110)]
     sizes += [replace(size, n_up=size.n_up - 1) for size in sizes if size.n_up > _minimum_cells(blank)[1]]
-    best = min(sizes, key=lambda size: abs(n_dof_of(blank, size) - wanted))
-    if n_dof_of(blank, best) > 1.2 * wanted:
-        best = min(COARSE, key=lambda size: abs(n_dof_of(blank, size) - wanted))
-    if n_dof_of(blank, best) > 1.5 * wanted:
+    best = min(sizes, key=lambda size: abs(n_dof_of(blank, size) - target))
+    if n_dof_of(blank, best) > 1.2 * target:
+        best = min(COARSE, key=lambda size: abs(n_dof_of(blank, size) - target))
+    if n_dof_of(blank, best) > 1.5 * target:
         raise InputError(
-            f"n_dof is {wanted}: too few for {blank.n_teeth} teeth",
+            f"n_dof is {target}: too few for {blank.n_teeth} teeth",
             allowed=f"at least {n_dof_of(blank, best)}",
             remedy="ask for more degrees of freedom",
         )
@@ -450,9 +450,9 @@ def mesh_size_for(blank: GearBlank, n_dof: int) -> MeshSize:
 @lru_cache(maxsize=16)
 def _minimum_cells(blank: GearBlank) -> tuple[int, int]:
     """Fewest cells in the gap, and rows of the tooth, that follow the fillet."""
-    g, most = blank.geometry, MAX_OUTLINE_ERROR * blank.geometry.module_mm
-    gap = next((n for n in range(1, 4) if outline_error_mm(g, n, 12) <= most), 4)
-    return gap, next((n for n in range(1, 12) if outline_error_mm(g, 4, n) <= most), 12)
+    g, max_error_mm = blank.geometry, MAX_OUTLINE_ERROR * blank.geometry.module_mm
+    gap = next((n for n in range(1, 4) if outline_error_mm(g, n, 12) <= max_error_mm), 4)
+    return gap, next((n for n in range(1, 12) if outline_error_mm(g, 4, n) <= max_error_mm), 12)
 
 
 def _size(blank: GearBlank, cell_mm: float) -> MeshSize:

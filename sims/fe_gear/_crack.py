@@ -443,8 +443,8 @@ def _shipped(gear: ReducedGear, angle_deg: float, place: int) -> FloatArray | No
         return None
     cracks = _ready_cracks()
     same = all(
-        np.array_equal(cracks[f"{name}_{axis}"], own)
-        for axis, own in (("roll_rad", gear.grid.roll_rad), ("z_m", gear.grid.z_m))
+        np.array_equal(cracks[f"{name}_{axis}"], points)
+        for axis, points in (("roll_rad", gear.grid.roll_rad), ("z_m", gear.grid.z_m))
     )
     return cracks[name][place] if same and place < len(cracks[name]) else None
 

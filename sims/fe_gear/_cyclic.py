@@ -547,26 +547,26 @@ def _lowest(problem: _Problem, n_shapes: int) -> tuple[FloatArray, ComplexArray]
 
 
 def _below(
-    gear: CyclicGear, n: int, held: Held, wanted: int, limit_hz: float, elastic: bool
+    gear: CyclicGear, n: int, held: Held, n_modes: int, limit_hz: float, elastic: bool
 ) -> list[tuple[float, int, ComplexArray]]:
     """Modes of one nodal diameter below a limit."""
     problem = _problem(gear, n, held)
-    n_shapes = min(6, 2 + wanted // 2) if n < 2 else 3
+    n_shapes = min(6, 2 + n_modes // 2) if n < 2 else 3
     while True:
         frequencies, shapes = _lowest(problem, n_shapes)
         # Without a limit, more shapes than are wanted in all cannot be needed.
-        if frequencies[-1] > limit_hz or n_shapes >= wanted + 2 or n_shapes > shapes.shape[0] // 4:
+        if frequencies[-1] > limit_hz or n_shapes >= n_modes + 2 or n_shapes > shapes.shape[0] // 4:
             break
         n_shapes = 2 * n_shapes
     indices = range(len(frequencies))
-    least = RIGID_HZ if elastic else -1.0
-    return [(float(frequencies[k]), n, shapes[:, k]) for k in indices if least < frequencies[k] <= limit_hz]
+    above_hz = RIGID_HZ if elastic else -1.0
+    return [(float(frequencies[k]), n, shapes[:, k]) for k in indices if above_hz < frequencies[k] <= limit_hz]
 
 
-def _limit(modes: list[tuple[float, int, ComplexArray]], wanted: int, n_sectors: int) -> float:
+def _limit(modes: list[tuple[float, int, ComplexArray]], n_modes: int, n_sectors: int) -> float:
     """Frequency of the last wanted mode so far; infinite while there are too few."""
     repeated = sorted(f for f, n, _ in modes for _ in range(_multiplicity(n, n_sectors)))
-    return repeated[wanted - 1] if len(repeated) >= wanted else np.inf
+    return repeated[n_modes - 1] if len(repeated) >= n_modes else np.inf
 
 
 def _multiplicity(n: int, n_sectors: int) -> int:
@@ -607,8 +607,8 @@ def rigid_part(gear: CyclicGear, modes: CyclicModes, which: int) -> str:
     moving = np.asarray(gear.mass.at(gear.phase_rad(n)) @ modes.shapes[:, which])
     energy = float(np.vdot(modes.shapes[:, which], moving).real)
     part = np.abs(gear.rigid(n).conj().T @ moving) ** 2 / energy
-    most = int(np.argmax(part))
-    return RIGID[n][most] if part[most] > MOSTLY else ""
+    largest = int(np.argmax(part))
+    return RIGID[n][largest] if part[largest] > MOSTLY else ""
 
 
 def mode_field(gear: CyclicGear, modes: CyclicModes, which: int, *, sine: bool = False) -> FloatArray:

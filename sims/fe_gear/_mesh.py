@@ -399,23 +399,23 @@ def outer_faces(mesh: SectorMesh) -> IntArray:
     """
     last = mesh.cells.shape[1] - 1
     corners = mesh.cells[:, ::last, ::last, ::last]
-    faces = []
+    sides = []
     for axis in range(3):
         low, high = (np.take(corners, end, axis=axis + 1).reshape(-1, 4)[:, [0, 1, 3, 2]] for end in (0, 1))
-        faces += [low, high]
-    every = np.concatenate(faces)
+        sides += [low, high]
+    every = np.concatenate(sides)
     _, first, times = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_counts=True)
     outer = every[first[times == 1]]
     beside = np.isin(outer, mesh.low_side).all(axis=1) | np.isin(outer, mesh.high_side).all(axis=1)
-    found: IntArray = outer[~beside]
+    free: IntArray = outer[~beside]
     # Outwards is away from the middle of the face's own cell.
     owner = np.tile(np.arange(len(mesh.cells)), 6)[first[times == 1]][~beside]
     middle = mesh.points_m[mesh.cells[owner].reshape(len(owner), -1)].mean(axis=1)
-    p = mesh.points_m[found]
+    p = mesh.points_m[free]
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     inwards = np.einsum("ni,ni->n", normal, p.mean(axis=1) - middle) < 0.0
-    found[inwards] = found[inwards][:, ::-1]
-    return found
+    free[inwards] = free[inwards][:, ::-1]
+    return free
 
 
 def _foremost(mesh: SectorMesh) -> IntArray:

@@ -485,9 +485,9 @@ class StaticCompliance(NamedTuple):
     hub: FloatArray
 
 
-def plan_for(blank: GearBlank, n_dof: int, **wanted: int | Spread) -> ReductionPlan:
+def plan_for(blank: GearBlank, n_dof: int, **settings: int | Spread) -> ReductionPlan:
     """Return a plan with a mesh of about `n_dof` degrees of freedom."""
-    return ReductionPlan(mesh_size_for(blank, n_dof), **wanted)  # type: ignore[arg-type]  # checked by the plan
+    return ReductionPlan(mesh_size_for(blank, n_dof), **settings)  # type: ignore[arg-type]  # checked by the plan
 
 
 def reduce_gear(blank: GearBlank, plan: ReductionPlan) -> ReducedGear:

@@ -339,7 +339,7 @@ def friction_over_mesh(
     modulus_pa = reduced_modulus_pa(mesh.material_1, mesh.material_2)
     pressure = line_contact_pressure_gpa(normal, mesh.face_width_m, radius_m, modulus_pa)
 
-    def found(where: NDArray[np.bool_]) -> FrictionResult:
+    def friction_where(where: NDArray[np.bool_]) -> FrictionResult:
         return friction_coefficient(
             (sliding / entrainment)[where],
             pressure[where],
@@ -349,9 +349,9 @@ def friction_over_mesh(
             radius_m=radius_m[where],
         )
 
-    coefficient = found(np.ones(normal.shape, dtype=np.bool_)).coefficient.reshape(normal.shape)
+    coefficient = friction_where(np.ones(normal.shape, dtype=np.bool_)).coefficient.reshape(normal.shape)
     # A pair that takes up its load passes every small pressure, of which there is nothing to say.
-    notes = found(normal >= MIN_PART * normal.sum(axis=1, keepdims=True)).notes
+    notes = friction_where(normal >= MIN_PART * normal.sum(axis=1, keepdims=True)).notes
     friction = coefficient * normal * np.sign(sliding)
     return MeshFriction(shared.mesh_cycles, coefficient, friction, normal, sliding, notes)
 

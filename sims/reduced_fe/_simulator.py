@@ -125,7 +125,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     *_DYNAMICS,
 )
 """All of them."""
-OWN = frozenset(p.name for p in (*_bodies(), *_DYNAMICS))
+FLEXIBLE = frozenset(p.name for p in (*_bodies(), *_DYNAMICS))
 """Those that the 16-DOF pair does not have."""
 
 NAME = "reduced-fe"
@@ -311,7 +311,7 @@ def healthy_machine(
 ) -> Machine:
     """Return the machine without effects: that of the 16-DOF pair, with masses and inertias of gears and hubs."""
     parameters = ParameterValues(values)
-    shared: Values = {name: value for name, value in values.items() if name not in OWN}
+    shared: Values = {name: value for name, value in values.items() if name not in FLEXIBLE}
     shared.update(MEANINGLESS)
     for side, gear in zip(SIDES, gears, strict=True):
         shared[f"mass_{side}_kg"] = gear.mass_kg + parameters.number(f"hub_mass_{side}_kg")

@@ -330,7 +330,7 @@ def test_the_choices_of_the_laboratory_are_restored() -> None:
 def test_no_text_of_an_address_breaks_a_reader(texts: list[str]) -> None:
     readers = (
         address.one_of(["a", None, 2.5, False]),
-        address.some_of(["a", "b"], most=1),
+        address.some_of(["a", "b"], maximum=1),
         address.number(0.0, 5.0),
         address.number(whole=True),
         address.span(0.0, 5.0),

@@ -153,11 +153,11 @@ def show_running(choice: Choice) -> Finished | None:
         _show_progress(running)
     elif st.session_state.pop(_STOPPED, False):
         st.info("Stopped. Nothing was kept but what had been prepared for this rig.", icon=":material/stop_circle:")
-    found: Finished | None = st.session_state.get(_FINISHED)
-    if running is None and choice.recordings and (found is None or found.key != choice.key):
-        found = kept_result(choice) or found
-        st.session_state[_FINISHED] = found
-    return found
+    finished: Finished | None = st.session_state.get(_FINISHED)
+    if running is None and choice.recordings and (finished is None or finished.key != choice.key):
+        finished = kept_result(choice) or finished
+        st.session_state[_FINISHED] = finished
+    return finished
 
 
 def forget() -> None:
@@ -205,7 +205,7 @@ def _take(running: _Running) -> None:
     del st.session_state[_JOB]
     try:
         report = job.report()
-        files = {name: found for name in (PAGE, JSON, TWIN) if (found := job.result(name)) is not None}
+        files = {name: content for name in (PAGE, JSON, TWIN) if (content := job.result(name)) is not None}
         st.session_state[_FINISHED] = _finished(running.choice, report, files)
         _keep_result(running.choice, files)
     finally:
@@ -246,7 +246,7 @@ def _keep_result(choice: Choice, files: Mapping[str, bytes]) -> None:
 
     keep(path, write)
     with suppress(OSError):
-        for old in sorted(path.parent.glob("*.zip"), key=lambda one: one.stat().st_mtime)[:-N_KEPT]:
+        for old in sorted(path.parent.glob("*.zip"), key=lambda earlier: earlier.stat().st_mtime)[:-N_KEPT]:
             old.unlink(missing_ok=True)
 
 
@@ -309,14 +309,14 @@ def _show_verdict(report: GapReport) -> None:
 
 LIKELY = 0.05
 """Effects of the kind that are named with it."""
-N_BARS, LEAST = 5, 0.01
+N_BARS, MIN_PROBABILITY = 5, 0.01
 TABS = ("Where", "Which", "How far", "Next and facts")
 TAB = "gap tab"
 
 
 def _show_panels(report: GapReport) -> None:
     """Show where, which and how far side by side, each as bars with its sentence, and the way to all of it."""
-    said = dict(verdict_rows(report))
+    sentences = dict(verdict_rows(report))
     places = [
         ChartRow(place.title, 0.0, 100.0 * place.share, beside=percent(place.share))
         for place in report.places
@@ -325,7 +325,7 @@ def _show_panels(report: GapReport) -> None:
     causes = [
         ChartRow(cause.title, 0.0, 100.0 * cause.probability, beside=odds_text(cause.probability))
         for cause in report.causes
-        if cause.probability >= LEAST
+        if cause.probability >= MIN_PROBABILITY
     ]
     steps = [
         ChartRow(
@@ -355,9 +355,9 @@ def _show_panels(report: GapReport) -> None:
                 show_rows(panel, f"gap {title.lower()} panel", words, has_names_above=True)
             if panel.rows and title in about:
                 st.caption(about[title])
-            st.markdown(as_typed(said.get(title, "")))
-    if said.get("Next"):
-        st.markdown(f"**Next.** {as_typed(said['Next'])}")
+            st.markdown(as_typed(sentences.get(title, "")))
+    if sentences.get("Next"):
+        st.markdown(f"**Next.** {as_typed(sentences['Next'])}")
 
 
 def _open_tab(title: str) -> None:
@@ -522,17 +522,17 @@ def _show_which(finished: Finished) -> None:
 
 def _show_evidence(row: CauseRow, finished: Finished) -> None:
     st.markdown("\n".join(f"- {as_typed(sentence)}" for sentence in row.statements))
-    for one in finished.figures:
-        if one.of == row.name:
-            _show_figure(finished, one)
+    for figure in finished.figures:
+        if figure.of == row.name:
+            _show_figure(finished, figure)
     if row.evidence:
         show_words(
             {
-                "feature": [one.feature for one in row.evidence],
-                "predicted (dB)": [one.predicted for one in row.evidence],
-                "observed (dB)": [one.observed for one in row.evidence],
-                "floor (dB)": [one.floor for one in row.evidence],
-                "evidence": [f"{one.sign} {one.stance.removeprefix('speaks ')}" for one in row.evidence],
+                "feature": [item.feature for item in row.evidence],
+                "predicted (dB)": [item.predicted for item in row.evidence],
+                "observed (dB)": [item.observed for item in row.evidence],
+                "floor (dB)": [item.floor for item in row.evidence],
+                "evidence": [f"{item.sign} {item.stance.removeprefix('speaks ')}" for item in row.evidence],
             }
         )
 
@@ -574,27 +574,27 @@ def _show_next(finished: Finished) -> None:
 
 
 def _show_figures(finished: Finished, question: Question) -> None:
-    chosen = [one for one in finished.figures if one.question == question and not one.of]
-    for one in chosen:
-        if not one.is_small:
-            _show_figure(finished, one)
-    small = [one for one in chosen if one.is_small]
+    chosen = [figure for figure in finished.figures if figure.question == question and not figure.of]
+    for figure in chosen:
+        if not figure.is_small:
+            _show_figure(finished, figure)
+    small = [figure for figure in chosen if figure.is_small]
     if small:
         columns = st.container(key=f"panels of {question}").columns(max(2, len(small)))
-        for one, column in zip(small, columns, strict=False):
+        for figure, column in zip(small, columns, strict=False):
             with column:
-                _show_figure(finished, one)
+                _show_figure(finished, figure)
 
 
-def _show_figure(finished: Finished, one: GapFigure) -> None:
-    number = finished.figures.index(one)
+def _show_figure(finished: Finished, figure: GapFigure) -> None:
+    number = finished.figures.index(figure)
     key = f"gap-{number} of {finished.key}"
-    if isinstance(one.data, RowPanel):
-        show_rows(one.data, key, one.shows)
+    if isinstance(figure.data, RowPanel):
+        show_rows(figure.data, key, figure.shows)
     else:
-        ring = None if one.data is None else ring_of(one.data)
-        show_picture(finished.picture(number), one.figure, one.shows, key, ring=ring)
-    st.caption(as_typed(one.look))
+        ring = None if figure.data is None else ring_of(figure.data)
+        show_picture(finished.picture(number), figure.figure, figure.shows, key, ring=ring)
+    st.caption(as_typed(figure.look))
 
 
 def ring_of(curves: AngleCurves) -> Ring:
@@ -607,10 +607,10 @@ def ring_of(curves: AngleCurves) -> Ring:
 def show() -> None:
     """Choose, run, show."""
     choice = choose()
-    names = ", ".join(one.name for one in choice.recordings)
+    names, references = (", ".join(file.name for file in files) for files in (choice.recordings, choice.references))
     st.subheader("Gap between simulation and recording", anchor=False)
     if choice.recordings:
-        against = f", against {', '.join(one.name for one in choice.references)}" if choice.references else ""
+        against = f", against {references}" if references else ""
         st.caption(as_typed(f"{names}{against}; simulator of {simulator_title(choice.model)}"))
     finished = show_running(choice)
     if finished is None:

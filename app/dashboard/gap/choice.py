@@ -102,12 +102,12 @@ def set_alike(choice: Choice) -> tuple[str, ...]:
     if rig is None:
         return ()
     pairs = ", ".join(f"{pair.driver_teeth}/{pair.driven_teeth}" for pair in rig.pairs)
-    said = [f"Teeth: {pairs}, as in the rig file"] if pairs else []
-    said.append("Speed: each recording's own, by its revolutions")
-    said.append("Angle: turned until the same teeth meet, by marks where there are any")
+    facts = [f"Teeth: {pairs}, as in the rig file"] if pairs else []
+    facts.append("Speed: each recording's own, by its revolutions")
+    facts.append("Angle: turned until the same teeth meet, by marks where there are any")
     if choice.references:
-        said.append("Compared with the same machine when it was healthy: only what has changed since counts")
-    return tuple(said)
+        facts.append("Compared with the same machine when it was healthy: only what has changed since counts")
+    return tuple(facts)
 
 
 def own_rig(source: ChosenFile, rigs: tuple[ChosenFile, ...]) -> ChosenFile | None:

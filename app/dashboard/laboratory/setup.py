@@ -324,12 +324,12 @@ def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSe
     The root crack's slider is always there, and stands at 0 first; others start at their typical value.
     """
     crack = _choose_severity(effect(CRACK), preset, start=0.0)
-    others = {name: known for name, known in effects().items() if name in meaningful and name != CRACK}
-    address.begin(EFFECTS, "effects", [], lambda texts: [name for name in others if name in texts[0].split(",")])
+    further = {name: known for name, known in effects().items() if name in meaningful and name != CRACK}
+    address.begin(EFFECTS, "effects", [], lambda texts: [name for name in further if name in texts[0].split(",")])
     names = st.multiselect(
         "More effects",
-        list(others),
-        format_func=lambda name: f"{GROUP_WORDS.get(others[name].group, others[name].group)}: {others[name].title}",
+        list(further),
+        format_func=lambda name: f"{GROUP_WORDS.get(further[name].group, further[name].group)}: {further[name].title}",
         key=EFFECTS,
         placeholder="Choose what is wrong …",
         persist_state="session",
@@ -337,9 +337,7 @@ def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSe
     )
     address.keep("effects", ",".join(names), "")
     chosen = [
-        _choose_severity(other, preset, start=other.severity.typical)
-        for other in others.values()
-        if other.name in names
+        _choose_severity(more, preset, start=more.severity.typical) for more in further.values() if more.name in names
     ]
     return [crack, *chosen] if crack.severity != 0 else chosen
 

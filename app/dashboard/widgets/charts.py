@@ -72,8 +72,8 @@ def show_differences(
     if not len(at):
         return
     lines = [
-        stems(at[chosen], off[chosen], said, colour)
-        for chosen, said, colour in ((~beyond, "within the floor", QUIET), (beyond, "beyond the floor", FAULT))
+        stems(at[chosen], off[chosen], label, colour)
+        for chosen, label, colour in ((~beyond, "within the floor", QUIET), (beyond, "beyond the floor", FAULT))
         if chosen.any()
     ]
     panel = LinePanel(lines, name, f"{words} (dB)", padded_limits([off, np.zeros(1)]), x_limits=shown)

@@ -332,8 +332,8 @@ def _choose_reference(file: ChosenFile) -> tuple[ChosenFile | None, float | None
     """Return the same machine when it was healthy, and the sampling rate in Hz that is stated of an own file of it."""
     source = file.sha256
     offered = {s.title: s for s in samples() if s.recording.name != file.name}
-    own = next((s.reference for s in samples() if s.recording == file.content), None)
-    first = next((name for name, s in offered.items() if s.recording == own), NO_REFERENCE)
+    sample_reference = next((s.reference for s in samples() if s.recording == file.content), None)
+    first = next((name for name, s in offered.items() if s.recording == sample_reference), NO_REFERENCE)
     names = [NO_REFERENCE, FILE, *offered]
     name = address.ask_one(
         st.selectbox,

@@ -124,7 +124,7 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
         first, follows = st.columns((5, 8), gap="medium")
         edited = _form(file, table, text, channels, first)
         with follows:
-            _show_consequences(edited, told=_rig_of(table) if is_told else None)
+            _show_consequences(edited, shown_already=_rig_of(table) if is_told else None)
     if _rig_of(edited) != _rig_of(table) or (edited != table and isinstance(_rig_of(edited), str)):
         changed = tomli_w.dumps(edited)
         with st.container(horizontal=True):
@@ -255,7 +255,7 @@ def _rows(frame: DataFrame, before: list[Table]) -> list[Table]:
     """Return the rows of an edited table as a rig file has them: what is empty is left out, whole numbers are whole."""
     from pandas import isna
 
-    found = []
+    rows = []
     for index, values in frame.iterrows():
         known = before[index] if isinstance(index, int) and index < len(before) else {}
         row = {name: value for name, value in known.items() if name not in frame.columns}
@@ -266,8 +266,8 @@ def _rows(frame: DataFrame, before: list[Table]) -> list[Table]:
             row[str(name)] = int(value) if whole else value
         if "unit" in row and row["unit"] == unit_text(str(known.get("unit", ""))):  # it was not changed
             row["unit"] = known["unit"]
-        found.append(row)
-    return found
+        rows.append(row)
+    return rows
 
 
 def _config(kind: str, rig: Table, channels: Sequence[str]) -> dict[str, Any]:
@@ -322,12 +322,12 @@ def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: S
 # --------------------
 
 
-def _show_consequences(table: Table, *, told: Rig | str | None) -> None:
-    """Show what follows from a machine, or what is wrong with it where `told` is not that already."""
+def _show_consequences(table: Table, *, shown_already: Rig | str | None) -> None:
+    """Show what follows from a machine, or what is wrong with it where `shown_already` is not that already."""
     try:
         rig = rig_from_dict(table)
     except GearsigError as error:
-        if str(error) != told:
+        if str(error) != shown_already:
             show_error(error)
         return
     if not rig.shafts:
@@ -352,11 +352,11 @@ def train_svg(rig: Rig, ink: str) -> str:
     radii = {
         (pair.name, shaft): gap
         * abs(order[pair.driven] - order[pair.driver])
-        * (own or 30)
-        / ((own or 30) + (mate or 30))
+        * (teeth or 30)
+        / ((teeth or 30) + (mate_teeth or 30))
         for order in [{name: i for i, name in enumerate(rig.shaft_names)}]
         for pair in rig.pairs
-        for shaft, own, mate in (
+        for shaft, teeth, mate_teeth in (
             (pair.driver, pair.driver_teeth, pair.driven_teeth),
             (pair.driven, pair.driven_teeth, pair.driver_teeth),
         )

@@ -455,13 +455,13 @@ def _show(name: str, page: MethodPage) -> None:
     more = st.expander("Segment and further settings", icon=":material/tune:")
     with more:
         start, stop = page.segment(n_first=method.n_first)
-    said = st.empty()
+    analysed = st.empty()
     with few:
         options = ask_options(page, method, part_of(whole, start / rate, stop / rate), more)
     # what takes longer than a few seconds is cut, which is said
     end = min(stop, start + (method.n_max if method.limit is None else min(method.n_max, method.limit(options))))
     text = f"Analysed: {start / rate:.4g} to {end / rate:.4g} s of {recording.duration_s:.4g} s, {end - start} samples"
-    said.caption(f"{text}{'; a longer one would take too long.' if end < stop else '.'}")
+    analysed.caption(f"{text}{'; a longer one would take too long.' if end < stop else '.'}")
     part = part_of(whole, start / rate, end / rate, page.channel.channel)
     angle = angle_or_none(part) or (
         analysis.shaft_angle

@@ -158,17 +158,17 @@ def in_page_words(text: str) -> str:
     """
     for option, place in _PLACES.items():
         text = text.replace(option, place)
-    text = _ROW.sub(lambda found: place_in_form(found[0]), text)
-    text = _TABLE.sub(lambda found: f"{'a row of ' if found[1] else ''}{FORM_TABLES.get(found[2], found[2])}", text)
-    return _KEY.sub(lambda found: FORM_LABELS[found[0]], text)
+    text = _ROW.sub(lambda match: place_in_form(match[0]), text)
+    text = _TABLE.sub(lambda match: f"{'a row of ' if match[1] else ''}{FORM_TABLES.get(match[2], match[2])}", text)
+    return _KEY.sub(lambda match: FORM_LABELS[match[0]], text)
 
 
 def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
     """Show what an answer says about itself, as one warning or quietly as small print; names in it come from files."""
     if not warnings:
         return
-    said = [as_typed(in_page_words(text)) for text in warnings]
-    text = said[0] if len(said) == 1 else "\n".join(f"- {one}" for one in said)
+    lines = [as_typed(in_page_words(text)) for text in warnings]
+    text = lines[0] if len(lines) == 1 else "\n".join(f"- {line}" for line in lines)
     if quiet:
         st.caption(text)
     else:
