@@ -84,8 +84,10 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
         surer = answer.remedy[:1].upper() + answer.remedy[1:] + "." if answer.remedy else ""
         title = f"The depth of a root crack cannot be told: {answer.reason}."
         finding = cannot_tell(DEPTH_UNKNOWN, title, surer=surer)
-        # Of several pairs no depth is ever told: that hinders nothing that the reference was given for.
-        return [*findings, replace(finding, kind=Kind.INFORMATION) if len(rig.pairs) > 1 else finding]
+        # Of several pairs, or of teeth whose size is not known, no depth is ever told: that hinders nothing that the
+        # reference was given for. What has changed at the teeth is told without it.
+        is_never_told = len(rig.pairs) > 1 or any(None in (p.module_mm, p.face_width_mm) for p in rig.pairs)
+        return [*findings, replace(finding, kind=Kind.INFORMATION) if is_never_told else finding]
     if isinstance(answer, NoCrackSeen):
         # Both gears of the pair are looked at: if a crack through half of the root would have shown, the teeth count as
         # examined.

@@ -115,6 +115,8 @@ def test_a_refusal_is_told_only_to_who_asked() -> None:
     answer = crack_depth(recording, RIG, record(seed=1), None)
     assert isinstance(answer, CannotTell)
     assert "module_mm" in answer.reason
-    assert with_crack([], answer, RIG)[0].kind is Kind.CANNOT_TELL
-    two_pairs = replace(RIG, shafts=(*RIG.shafts, Shaft("end")), pairs=(*RIG.pairs, GearPair("second", "out", "end")))
+    assert with_crack([], answer, RIG)[0].kind is Kind.INFORMATION  # without the teeth's size nobody asks for a depth
+    sized = replace(RIG, pairs=tuple(replace(pair, module_mm=2.0, face_width_mm=20.0) for pair in RIG.pairs))
+    assert with_crack([], answer, sized)[0].kind is Kind.CANNOT_TELL  # a torque, or another reference, would do
+    two_pairs = replace(RIG, shafts=(*RIG.shafts, Shaft("end")), pairs=(*sized.pairs, GearPair("second", "out", "end")))
     assert with_crack([], answer, two_pairs)[0].kind is Kind.INFORMATION  # no reference would help, and none is wanted
