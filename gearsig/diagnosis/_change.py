@@ -573,6 +573,10 @@ def _changed(changes: Sequence[LevelChange], off: float) -> Finding:
 # monitoring – Part 3: Guidelines for vibration diagnosis"; R. B. Randall, 2021, ch. 2.
 
 _FIT = "how well the textbook's signs fit, one sensor's levels alone; not calibrated"
+BENT_SHAFT, NOT_OF_UNBALANCE = 0.3, 0.3
+"""How likely a bent shaft is beside an unbalance, where nothing tells; and how likely each sign is of an unbalance that
+a linear machine would not make of it."""
+
 OTHER_CAUSES = 0.3
 """Weight of all that no textbook's pattern covers, beside those it does."""
 
@@ -605,23 +609,23 @@ def _meanings(
 
 SHAFT_CAUSES: Mapping[str, tuple[str, str]] = {
     "unbalance": (
-        "Perhaps unbalance",
+        "unbalance",
         "1× largest in radial direction, 90° apart between horizontal and vertical, growing with the speed's square.",
     ),
     "bent-shaft": (
-        "Perhaps a bent shaft",
+        "a bent shaft",
         "1× large in axial direction, 180° apart between the shaft's ends; run-out when it is turned by hand.",
     ),
     "misalignment": (
-        "Perhaps misalignment",
+        "misalignment",
         "2× large in axial direction, 180° apart across the coupling; a change with temperature or after aligning.",
     ),
     "looseness": (
-        "Perhaps looseness",
+        "looseness",
         "A wandering phase; levels that differ between foot and foundation, or change when bolts are tightened.",
     ),
     "rub": (
-        "Perhaps a rub",
+        "a rub",
         "Halves and thirds of the shaft's order come and go with speed and temperature; marks at seals.",
     ),
 }
@@ -633,7 +637,9 @@ def _of_shaft(
     """Yield what a shaft's own orders mean by their share of what has been added.
 
     Unbalance adds 1× alone; misalignment 2×, of half of 1× or more; a bent shaft both; looseness many harmonics and
-    halves; a rub halves, thirds and noise.
+    halves; a rub halves, thirds and noise. A force that turns with the shaft makes no 2× but through a stiffness that
+    bends, and shakes little in axial direction, where a bent shaft shakes most. Without a sensor there unbalance and a
+    bent shaft are one finding, as nothing tells them apart.
     """
     own = [c for c in risen if c.where.shaft == shaft and c.kind in ("shaft", "subharmonic")]
     added = {c.harmonic: _velocity(c, signals, since=True) for c in own}
@@ -651,25 +657,45 @@ def _of_shaft(
     fractions = sum(c.kind == "subharmonic" for c in own)
     noise = any(c.kind == "noise" for c in risen)
     loose = min(1.0, many + 0.25 * fractions)  # with many harmonics, the first two say nothing by themselves
+    axial = [c for c in changes if c.where.shaft == shaft and c.harmonic == 1.0 and _is_axial(c, signals)]
+    shakes_axially = any(c.is_change and c.change_db > 0 for c in axial)
+    bend = BENT_SHAFT if not axial else 1.0 if shakes_axially else BENT_SHAFT**2
     weights = {
-        "unbalance": first**2 * (1.0 - loose),
-        "bent-shaft": 0.3 * first * (1.0 + (second > 0)) * (1.0 - loose),
+        "unbalance": first**2 * (1.0 - loose) * NOT_OF_UNBALANCE ** (shakes_axially + (second > 0)),
+        "bent-shaft": bend * first * (1.0 + (second > 0)) * (1.0 - loose),
         "misalignment": min(1.0, second / 0.2) * min(1.0, doubled / 0.5) * (1.0 - loose),
         "looseness": loose,
         "rub": min(1.0, 0.2 * fractions * (1 + noise)),
     }
     whole = sum(weights.values()) + OTHER_CAUSES
-    for cause, weight in sorted(weights.items(), key=lambda item: -item[1]):
-        share = weight / whole
+    place = max(own, key=lambda c: added[c.harmonic]).where
+    name = f" of {place.shaft}" if place.shaft else ""
+    text = "Of what has been added in velocity, " + ", ".join(
+        f"{percent(power / total)} is at {c.label}" for c in own if (power := added[c.harmonic]) >= 0.01 * total
+    )
+    for causes in _told_apart(weights, are_told=bool(axial)):
+        share = sum(weights[cause] for cause in causes) / whole
         if share >= 0.1:
-            title, confirm = SHAFT_CAUSES[cause]
-            place = max(own, key=lambda c: added[c.harmonic]).where
+            titles, confirms = zip(*(SHAFT_CAUSES[cause] for cause in causes), strict=True)
+            title, confirm = f"Perhaps {' or '.join(titles)}{name}.", " Or ".join(confirms)
             likely = Kind.SUSPICION if share >= 0.3 else Kind.NOTICE
-            name = f" of {place.shaft}" if place.shaft else ""
-            text = "Of what has been added in velocity, " + ", ".join(
-                f"{percent(power / total)} is at {c.label}" for c in own if (power := added[c.harmonic]) >= 0.01 * total
-            )
-            yield Finding(cause, likely, f"{title}{name}.", place, None, share, _FIT, (f"{text}.",), confirm)
+            yield Finding(causes[0], likely, title, place, None, share, _FIT, (f"{text}.",), confirm)
+
+
+def _told_apart(weights: Mapping[str, float], *, are_told: bool) -> list[list[str]]:
+    """Return the causes, likeliest first; unbalance and a bent shaft in one where nothing tells them apart."""
+    causes = sorted(weights, key=lambda cause: -weights[cause])
+    of_one_turn = [cause for cause in causes if cause in ("unbalance", "bent-shaft")]
+    if are_told:
+        return [[cause] for cause in causes]
+    groups = [of_one_turn, *([cause] for cause in causes if cause not in of_one_turn)]
+    return sorted(groups, key=lambda group: -sum(weights[cause] for cause in group))
+
+
+def _is_axial(change: LevelChange, signals: AnalysisSignals) -> bool:
+    """Whether the name or the position of a level's channel says that it looks along the shaft."""
+    channel = signals.recording.channels[signals.recording.index(change.where.channels[0])]
+    return "axial" in f"{channel.position} {channel.name}".lower()
 
 
 def _velocity(change: LevelChange, signals: AnalysisSignals, *, since: bool = False) -> float:

@@ -39,7 +39,7 @@ def level(analysis: Analysis, label: str) -> LevelChange:
 @pytest.mark.parametrize(
     ("lines", "cause"),
     [
-        (HEALTHY | {1.0: 0.5}, "unbalance"),
+        (HEALTHY | {1.0: 0.5, 2.0: 0.2}, "bent-shaft"),
         (HEALTHY | {2.0: 0.3}, "misalignment"),
         (HEALTHY | {k / 2: 0.2 for k in range(1, 17)}, "looseness"),
     ],
@@ -52,6 +52,19 @@ def test_what_changed_is_the_first_finding_and_its_likeliest_cause_the_second(
     assert analysis.verdict.startswith(analysis.findings[0].title)
     assert finding(analysis, cause).surer
     assert analysis.outcome is Outcome.SUSPICION
+
+
+def test_an_axial_sensor_tells_a_bent_shaft_from_an_unbalance() -> None:
+    """Of a radial one alone 1× may be either, and is said to be."""
+    of_radial = beside_healthy(HEALTHY | {1.0: 0.5})
+    assert finding(of_radial, "unbalance").title == "Perhaps unbalance or a bent shaft of rotor."
+    axial = Channel("a2", "acceleration", "m/s^2", "front bearing, axial")
+    now, healthy = rotor(HEALTHY | {1.0: 0.5}, seed=1), rotor(HEALTHY, seed=2)
+    now, healthy = (
+        replace(one, samples=np.vstack([one.samples, one.samples]), channels=(*one.channels, axial))
+        for one in (now, healthy)
+    )
+    assert finding(analyze(now, reference=healthy), "bent-shaft").title == "Perhaps a bent shaft of rotor."
 
 
 def test_what_rests_on_a_line_that_the_mains_make_as_well_is_half_as_sure() -> None:
