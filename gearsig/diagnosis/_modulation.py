@@ -365,9 +365,37 @@ def _is_part_of(spacing: float, orders: Sequence[float], resolution: float) -> b
 CLOSEST_LINES = 8.0
 """Spacing, in lines, below which the lines of a family leave none beside them to stand out of."""
 
-COMBINATIONS = ((1, 1), (1, 2), (2, 1), (1, 3), (2, 2), (3, 1))
-"""j and k of the sidebands at j·a ± k·b of a mesh that two shafts, of orders a and b, modulate: its own, or one of them
-and the next, whose load comes through the train."""
+LARGEST_SPACING, SPACINGS = 1.9, 3
+"""Widest spacing of sidebands that is looked for, and how many of them to either side of the mesh."""
+
+
+def _without_combinations(excess: LinesOverFloor, mesh: float, shafts: Sequence[float]) -> LinesOverFloor:
+    """Return lines without the sidebands at j·a ± k·b of a mesh that two shafts, of orders a and b, modulate.
+
+    They are its own, or one of them and the next, whose load comes through the train. Teeth that differ modulate by all
+    multiples of their shaft's order, and the other shaft each of those by its first two, as an eccentric or oval gear
+    does. Where a shaft's multiples lie so close that most lines would go, its further ones are left.
+    """
+    spectrum = excess.spectrum
+    reach, farthest = APART_LINES * spectrum.resolution, SPACINGS * LARGEST_SPACING
+    pairs: set[tuple[int, int]] = set()
+    slowest = min((order for order in shafts if order >= 4 * reach), default=farthest)
+    for j in range(1, int((farthest + max(shafts, default=0.0)) / slowest) + 1):
+        pairs |= {(1, j), (j, 1), (2, j), (j, 2)}
+    places = {
+        abs(j * one + side * k * other)
+        for one, other in combinations(shafts, 2)
+        for j, k in pairs
+        for side in (-1, 1)
+        if (j <= 3 or one >= 4 * reach) and (k <= 3 or other >= 4 * reach)
+    }
+    if not places:
+        return excess
+    beside = np.abs(spectrum.positions - mesh * np.rint(spectrum.positions / mesh))
+    known = np.array([-np.inf, *sorted(places), np.inf])
+    after = np.searchsorted(known, beside)
+    near = np.minimum(known[after] - beside, beside - known[after - 1]) <= reach
+    return replace(excess, masked=excess.masked | near)
 
 
 def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, trains: Sequence[float]) -> Comb | None:
@@ -388,10 +416,7 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
         wide = foot if order >= 4 * foot else 0.0
         excess = excess.without_multiples(order, half_width=wide)
         excess = excess.without_multiples(order, start=mesh, half_width=wide)
-    for one, other in combinations(signals.known_shaft_orders.values(), 2):
-        for j, k in COMBINATIONS:
-            for start in (j * one + k * other, j * one - k * other):
-                excess = excess.without_multiples(mesh, start=start).without_multiples(mesh, start=-start)
+    excess = _without_combinations(excess, mesh, tuple(signals.known_shaft_orders.values()))
     if hunting is not None:
         excess = excess.without_multiples(hunting)  # of both gears together, and the mesh is one of them
     for train in trains:  # with each shaft's sidebands
@@ -402,7 +427,8 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
     if len(centres) == 0:
         return None
     lowest = max(0.05, CLOSEST_LINES * excess.spectrum.resolution, 3 * foot)
-    return best_comb(excess, lowest, 1.9, offsets=np.array([-3, -2, -1, 1, 2, 3]), centres=centres)
+    offsets = np.array([k for k in range(-SPACINGS, SPACINGS + 1) if k])
+    return best_comb(excess, lowest, LARGEST_SPACING, offsets=offsets, centres=centres)
 
 
 def _is_family(comb: Comb, mesh: float) -> bool:

@@ -72,6 +72,15 @@ def found(analysis: Analysis, code: str) -> list[Finding]:
     return [f for f in analysis.findings if f.code == code]
 
 
+def test_products_of_two_gears_patterns_are_no_third_shafts_sidebands() -> None:
+    """Four times one shaft less the other: teeth that differ on a gear that an eccentric one modulates."""
+    recording = record(seconds=4.0)
+    for order in (sign * (4 - 27 / 43) for sign in (-1, 1)):
+        for h in (1, 2, 3):
+            recording = with_tone(recording, 0.15, 22.0 * (27 * h + order))
+    assert not found(analyze(recording), "sidebands-of-unknown-shaft")
+
+
 @cache
 def excess_of(am: float, pm: float, k: int, noise: float = 1e-3, tone_order: float = 0.0) -> LinesOverFloor:
     angle_rev = np.arange(N_REV * PER_REV) / PER_REV
