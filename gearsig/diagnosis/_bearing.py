@@ -21,6 +21,7 @@ from gearsig.diagnosis._bearing_families import (
     mains_beside,
     part_text,
     parts_on_shaft,
+    races_in_vibration,
     slip_of,
     speed_is_only_stated,
     underlying_impulse_train,
@@ -307,29 +308,8 @@ def _modulation_text(candidate: Candidate) -> str:
 def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], families: Families) -> list[Finding]:
     """State that nothing shows as far as it would have shown, and which parts could not have shown."""
     where = Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes)))
-    if not speed_is_confirmed(signals):
-        why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
-        if (times := factor_left_open(signals)) > 1:
-            why = _other_speed_text(times)
-        return [_undecided(why, "A tachometer, or a sensor nearer to the gears.", where)]
-    named_here = (*families.named, *(c for c in families.trains if c.bearing is not None))
-    rival = next((r for c in named_here for r in c.rivals), "")
-    for seen, but in (
-        (named_here, f"{rival} would show there as well" if rival else "something else explains them as well"),
-        (families.unclear, "families beside it are as clear"),
-    ):
-        if seen:
-            parts = ", ".join(part_text(c.name, c.bearing.name) for c in seen if c.bearing)
-            why = f"lines stand at the order of the {parts}, but {but}"
-            return [_undecided(why, "A longer recording, or another sensor.", where)]
-    if doubtful := doubtful_races(signals, list(envelopes)):
-        races = ", ".join(dict.fromkeys(part_text(c.name, c.bearing.name) for c in doubtful if c.bearing))
-        why = f"lines stand at the order of the {races}, and the chance of so many is {p_text(doubtful[0].p_value)}"
-        return [_undecided(why, "A longer recording, or another sensor.", where)]
-    for (k, shaft), on_shaft in parts_on_shaft(signals, envelopes).items():
-        races = f"the order of the {' or '.join(on_shaft)} within its slip"
-        why = f"impacts come {k} times a turn of {named('shaft', shaft)}, which is {races}"
-        return [_undecided(why, "A recording at another load: slip parts a bearing from the shaft.", where)]
+    for why, surer in _reasons_to_leave_open(signals, envelopes, families):
+        return [_undecided(why, surer, where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
     expected = expected_parts(signals)
     probability = signals.settings.false_alarm_probability / max(1, len(expected) * len(envelopes))
@@ -364,6 +344,40 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
         surer=surer,
     )
     return [no_damage, *_not_examined(signals, depths, where)]
+
+
+def _reasons_to_leave_open(
+    signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], families: Families
+) -> Iterator[tuple[str, str]]:
+    """Yield why no damage is not called none, and what would tell."""
+    longer = "A longer recording, or another sensor."
+    if not speed_is_confirmed(signals):
+        why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
+        if (times := factor_left_open(signals)) > 1:
+            why = _other_speed_text(times)
+        yield why, "A tachometer, or a sensor nearer to the gears."
+    named_here = (*families.named, *(c for c in families.trains if c.bearing is not None))
+    rival = next((r for c in named_here for r in c.rivals), "")
+    for seen, but in (
+        (named_here, f"{rival} would show there as well" if rival else "something else explains them as well"),
+        (families.unclear, "families beside it are as clear"),
+    ):
+        if seen:
+            parts = ", ".join(part_text(c.name, c.bearing.name) for c in seen if c.bearing)
+            yield f"lines stand at the order of the {parts}, but {but}", longer
+    if doubtful := doubtful_races(signals, list(envelopes)):
+        races = ", ".join(dict.fromkeys(part_text(c.name, c.bearing.name) for c in doubtful if c.bearing))
+        chance = f"the chance of so many is {p_text(doubtful[0].p_value)}"
+        yield f"lines stand at the order of the {races}, and {chance}", longer
+    for channel, race, comb in races_in_vibration(signals):
+        why = (
+            f"{len(comb.positions)} multiples of the order of the {race} stand in {channel} itself, and in no envelope"
+        )
+        yield why, "A higher sampling rate, or a sensor nearer to the bearing: shocks show in an envelope then."
+    for (k, shaft), on_shaft in parts_on_shaft(signals, envelopes).items():
+        races = f"the order of the {' or '.join(on_shaft)} within its slip"
+        why = f"impacts come {k} times a turn of {named('shaft', shaft)}, which is {races}"
+        yield why, "A recording at another load: slip parts a bearing from the shaft."
 
 
 def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float]) -> list[str]:

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._lines import magnetic_pull_at
-from gearsig.diagnosis._signals import MINIMUM_LINES, SEEN_THERE, AnalysisSignals, BandEnvelope, is_of_tones
+from gearsig.diagnosis._signals import (
+    MINIMUM_LINES,
+    SEEN_THERE,
+    AnalysisSignals,
+    BandEnvelope,
+    is_of_tones,
+    without_shafts,
+)
 from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at
 from gearsig.rig import Bearing
 from gearsig.spectra import Spectrum
@@ -464,6 +471,31 @@ def doubtful_races(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> l
     """Return families at races' orders that chance hardly explains, and which were no finding all the same."""
     found = _at_parts(signals, envelopes)
     return [c for c in found if c.name in RACES and c.p_value <= DOUBTFUL]
+
+
+IN_VIBRATION, SEEN_IN_VIBRATION = 24, 6
+"""Multiples of a race's order that are looked for in the vibration itself, and how many of them must be seen: a smooth
+tone, as of elements that differ, has two or three."""
+
+
+def races_in_vibration(signals: AnalysisSignals) -> list[tuple[str, str, Comb]]:
+    """Return channel, race and lines of trains of impacts that stand in the order spectra themselves, surest first.
+
+    Envelopes are searched for the first six lines of a family. Those may run into multiples of a slow shaft, and a
+    resonance that rings from one impact to the next, or a sampling rate below all others, leaves an envelope little.
+    The further lines of the same train are apart from the shaft's then, and among those of the gears no chance.
+    """
+    races = [(part_text(name, b.name), order) for b, name, order in expected_parts(signals) if name in RACES]
+    multiples, slip = np.arange(1, IN_VIBRATION + 1), slip_of(signals)
+    found = []
+    for channel, lines in signals.order_excess.items():
+        free = without_shafts(signals, lines)
+        for race, order in races:
+            comb = best_comb(free, order * (1 - slip), order * (1 + slip), offsets=multiples)
+            if comb is not None and len(comb.positions) >= SEEN_IN_VIBRATION:
+                found.append((channel, race, comb))
+    allowed = signals.settings.false_alarm_probability / max(len(races) * len(signals.order_excess), 1)
+    return sorted((one for one in found if one[2].p_value <= allowed), key=lambda one: one[2].p_value)
 
 
 def _chance_among_others(

@@ -500,6 +500,20 @@ def test_a_race_that_chance_hardly_explains_is_not_called_sound() -> None:
     assert "lines stand at the order of the outer race of drive end, and the chance" in undecided.title
 
 
+def test_a_race_that_shows_in_no_envelope_but_in_the_vibration_itself_is_not_called_sound() -> None:
+    """Its slip takes the first multiples to those of a slow shaft, of which only the further ones part."""
+    rig = replace(RIG, pairs=(GearPair("stage", "in", "out", 20, 58),))
+    order = 10 * 20 / 58 + 0.3 / 176  # at 22 Hz for 8 s the spectrum has a line each 1/176
+    rig = replace(rig, bearings=(replace(outer_race_at(order * 1.006, 9, "front"), shaft="in"),))
+    quiet = replace(GOOD, speed=ConstantProfile(1320.0), channels=(SensorChannel("a1", noise=ColouredNoise(0.1)),))
+    sound = record(quiet, seconds=SECONDS, rig=rig)
+    turns = 22.0 * np.arange(sound.n_samples) / SAMPLING_RATE_HZ
+    phases = np.random.default_rng(5).uniform(0, 2 * np.pi, 24)
+    train = sum(np.cos(2 * np.pi * k * order * turns + phase) for k, phase in enumerate(phases, 1))
+    analysis = analyze(replace(sound, samples=sound.samples + 0.1 * train))
+    assert "multiples of the order of the outer race of front" in finding(analysis, "bearings-undecided").title
+
+
 def test_of_two_like_bearings_the_one_at_the_loudest_sensor_is_named() -> None:
     recording = at_sensors(3.5848, (2.0, 6.0))
     samples = np.array(recording.samples)
