@@ -43,7 +43,8 @@ class Localisation:
         Energy in it over the median window's, summed over channels that are each scaled to unit energy.
     p_value : float
         The larger of two: the share of surrogates (same spectra, same relations between the channels, random phases)
-        with as high a ratio, and the chance of it among teeth that differ as the teeth of a good gear do.
+        with as high a ratio, and the chance of it among teeth that differ as those of a good gear may, or as the others
+        of this one do.
     repeatability : float
         Correlation of odd and even revolutions within the window, -1 to 1; about 0 for noise, for impacts that are
         not tied to this shaft, and for a single event in one revolution.
@@ -71,7 +72,9 @@ def localise(
 
     Surrogates know nothing of teeth. On a good gear each tooth is a little stronger or weaker than its neighbours, over
     its whole engagement and in all harmonics at once, so that energies per tooth scatter like the square of one normal
-    number (chi-square with one degree of freedom), which is more than surrogates do: that is the second test.
+    number (chi-square with one degree of freedom), which is more than surrogates do: that is the second test. Where
+    many harmonics and channels make a tooth's energy, teeth scatter far less, and one that passes among such unequal
+    ones does not among its own neighbours: that is the third. The better of the last two counts, at twice its chance.
 
     Parameters
     ----------
@@ -92,7 +95,8 @@ def localise(
     References
     ----------
     J. Theiler, S. Eubank, A. Longtin, B. Galdrikian, J. D. Farmer, "Testing for nonlinearity in time series: the
-    method of surrogate data", 1992. J. Besag, P. Clifford, "Sequential Monte Carlo p-values", 1991.
+    method of surrogate data", 1992. J. Besag, P. Clifford, "Sequential Monte Carlo p-values", 1991. F. E. Grubbs,
+    "Sample criteria for testing outlying observations", 1950.
     """
     from scipy.fft import irfft
 
@@ -102,7 +106,8 @@ def localise(
     used = scale[:, 0] > 0
     x = signals[used] / scale[used]
     energies = sliding_mean(x**2, width)
-    start, ratio = strongest_window(energies.sum(axis=0))
+    together = energies.sum(axis=0)
+    start, ratio = strongest_window(together)
     lines, drawn = np.fft.rfft(x, axis=1).astype(np.complex64), np.empty(0)
     # In portions that bound the memory: 256 × 4 channels × 4096 angles in single precision are 17 MB. With 30
     # surrogates as high the p-value is known to a fifth of itself, and is no small one. Six digits are enough for what
@@ -125,7 +130,10 @@ def localise(
         start_rev=start / n,
         width_rev=width / n,
         ratio_db=10 * float(np.log10(ratio)),
-        p_value=max(_p_among_surrogates(ratio, drawn), _p_among_teeth(ratio, n / width)),
+        p_value=max(
+            _p_among_surrogates(ratio, drawn),
+            min(1.0, 2.0 * min(_p_among_teeth(ratio, n / width), _p_among_these(together, start, width))),
+        ),
         repeatability=float(np.sum(odd * even)) / size if size > 0 else 0.0,
         channel_shares=tuple(shares.tolist()),
     )
@@ -151,6 +159,27 @@ def _p_among_teeth(ratio: float, n_teeth: float) -> float:
 
     median = 0.4549364  # of the chi-square distribution with one degree of freedom
     single = float(erfc(np.sqrt(ratio * median / 2)))
+    return float(-np.expm1(n_teeth * np.log1p(-min(single, 1 - 1e-12))))
+
+
+def _p_among_these(energies: FloatArray, start: int, width: int) -> float:
+    """Return P(largest of the teeth's energies stands as far over the others), by how these scatter.
+
+    Logarithms of energies scatter to the right no more than normally: those of chi-square numbers of any degree less.
+    With mean and deviation of the other teeth, but for the two neighbours into which a knock rings, the largest
+    is Student's.
+    """
+    from scipy.stats import t as student
+
+    n_teeth = max(round(len(energies) / width), 1)
+    starts = start + np.rint(np.arange(n_teeth) * len(energies) / n_teeth).astype(np.int64)
+    teeth = np.log(np.maximum(energies[starts % len(energies)], 1e-12 * energies[start]))
+    others = teeth[2:-1]
+    scatter = float(others.std(ddof=1)) if len(others) > 2 else 0.0
+    if scatter == 0.0:
+        return 1.0
+    distance = (teeth[0] - others.mean()) / (scatter * np.sqrt(1 + 1 / len(others)))
+    single = float(student.sf(distance, len(others) - 1))
     return float(-np.expm1(n_teeth * np.log1p(-min(single, 1 - 1e-12))))
 
 
@@ -330,7 +359,14 @@ def _single(energies: FloatArray) -> int | None:
     return i if total > 0 and len(energies) >= 4 and float(energies[i]) > 0.5 * total else None
 
 
-WORTH_SAYING, CLEAR = (0.01, 8.0), (0.001, 10.0)
+UNEQUAL_DB = 14.7
+"""Of some forty teeth the largest is so far over the median one on one gear in a hundred, where they scatter as much as
+teeth do: chi-square, one degree."""
+
+ONE_ODD_TOOTH = 0.5
+"""Factor below that: a gear that is made with one odd tooth among equal ones shows as much."""
+
+WORTH_SAYING, CLEAR = (0.01, 8.0), (0.001, UNEQUAL_DB)
 """p-value at most, and dB of the window over the median window at least."""
 
 DOUBTFUL = (0.05, 8.0)
@@ -372,7 +408,7 @@ class _Examined:
     def is_withheld(self) -> bool:
         """Whether the event is no chance, of some size, and yet no tooth's: it differs from turn to turn."""
         is_large = self.event.rms >= SMALLEST_SHARE * self.event.average_rms
-        return self.reaches(CLEAR) and is_large and not self.is_steady
+        return self.reaches((CLEAR[0], WORTH_SAYING[1])) and is_large and not self.is_steady
 
     @property
     def is_doubtful(self) -> bool:
@@ -381,11 +417,8 @@ class _Examined:
 
     @property
     def smallest_visible(self) -> float:
-        """Rms in a window from which an event stands out from teeth that merely differ.
-
-        Of some forty teeth the largest is 14.7 dB over the median one on one gear in a hundred: chi-square, one degree.
-        """
-        return self.event.median_rms * float(10 ** (14.7 / 20))
+        """Rms in a window from which an event stands out from teeth that merely differ."""
+        return self.event.median_rms * float(10 ** (UNEQUAL_DB / 20))
 
     @property
     def strength(self) -> Strength:
@@ -488,6 +521,7 @@ def _damage(examined: _Examined) -> Finding:
     # One in ten once-per-revolution events on a shaft with gears is no tooth's, but a key's, a coupling's or a rub's.
     confidence = from_p_value(examined.p_value) * 0.9
     confidence *= WITH_ASSUMED_DATA if assumed or examined.is_at_mark else 1.0
+    confidence *= ONE_ODD_TOOTH if place.ratio_db < UNEQUAL_DB else 1.0
     clear = examined.reaches(CLEAR) and not assumed and not examined.is_at_mark
     tooth = int(place.angle_rev * shaft.teeth[0]) + 1 if len(shaft.teeth) == 1 and examined.has_mark else None
     at = f"at {360 * place.angle_rev:.0f}°, tooth {tooth} of {shaft.teeth[0]}," if tooth else "at one place"
@@ -525,6 +559,8 @@ def _evidence(examined: _Examined) -> Iterator[str]:
     yield f"Its rms is {percent(event.rms / event.average_rms)} of the whole average's."
     if len(event.peaks_rev) > 1:
         yield f"It is the largest of {len(event.peaks_rev)} local events: several teeth, or another cause."
+    if event.place.ratio_db < UNEQUAL_DB:
+        yield "It stands out of teeth that are alike: a gear made with one odd tooth shows as much."
     if examined.is_at_mark:
         yield "It is at the tachometer's mark: cross-talk from its cable would look the same."
     if not examined.has_mark:

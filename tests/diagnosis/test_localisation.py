@@ -66,6 +66,19 @@ def test_teeth_that_merely_differ_are_no_damage() -> None:
     assert sum(value <= 0.05 for value in p) <= 7
 
 
+def test_a_tooth_that_would_pass_among_unequal_ones_stands_out_of_its_own_neighbours() -> None:
+    """12 dB over the median tooth is usual where energies scatter as the square of one number, not where by 1 dB."""
+    rng = np.random.default_rng(4)
+    strength = np.sqrt(rng.uniform(0.8, 1.25, 32))
+    p = []
+    for damaged in (1.0, 4.0):
+        amplitude = np.repeat(strength * np.where(np.arange(32) == 9, damaged, 1.0), N // 32)
+        x = (amplitude * rng.normal(size=N))[None, :]
+        p.append(localise(x, halves_of(x, 0.01, rng), 1 / 32, 999, rng).p_value)
+    assert p[0] > 0.05
+    assert p[1] < 1e-3
+
+
 def test_channels_that_agree_stand_out_more_than_one_alone() -> None:
     rng = np.random.default_rng(3)
     quiet = healthy(rng)

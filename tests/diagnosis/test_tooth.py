@@ -18,14 +18,14 @@ SHAFT_HZ = 22.0
 STEADY = replace(GOOD, speed=ConstantProfile(60 * SHAFT_HZ))
 
 
-def with_knocks(recording: Recording, times_s: np.ndarray, size: float = 10.0) -> Recording:
-    """Add ring-downs that no gear makes."""
+def with_knocks(recording: Recording, times_s: np.ndarray, size: float | np.ndarray = 10.0) -> Recording:
+    """Add ring-downs that no gear makes, all of one size or each of its own."""
     t = np.arange(recording.n_samples) / recording.sampling_rate_hz
     samples = np.array(recording.samples)
-    for start in times_s:
-        after = t >= start
+    for start, own in zip(times_s, np.broadcast_to(size, len(times_s)), strict=True):
+        after = slice(*np.searchsorted(t, [start, start + 0.05]))
         decay = np.exp(-400 * (t[after] - start))
-        samples[0, after] += size * decay * np.sin(2 * np.pi * 3000 * (t[after] - start))
+        samples[0, after] += own * decay * np.sin(2 * np.pi * 3000 * (t[after] - start))
     return replace(recording, samples=samples)
 
 
@@ -49,9 +49,16 @@ def test_equal_gears_cannot_be_told_apart_and_are_both_named() -> None:
 
 
 def test_beside_an_event_that_chance_hardly_explains_no_tooth_is_called_sound() -> None:
-    analysis = analyze(with_knocks(record(STEADY), np.arange(0.01, 5.0, 1 / SHAFT_HZ), size=0.8))
+    """Each tooth knocks, the largest twice as hard as usual; where all others are still, it is a suspicion."""
+    sizes = 0.5 * np.exp(0.4 * np.random.default_rng(3).standard_normal(27))
+    sizes[3] = 0.95
+    times = np.arange(0.01, 4.95, 1 / 27 / SHAFT_HZ)
+    analysis = analyze(with_knocks(record(STEADY), times, np.resize(sizes, len(times))))
     assert "one stands out by" in finding(analysis, "tooth-damage-undecided").title
     assert analysis.outcome is Outcome.CANNOT_TELL
+    alone = finding(analyze(with_knocks(record(STEADY), times[::27], size=0.95)), "tooth-local-damage")
+    assert alone.kind is Kind.SUSPICION
+    assert alone.confidence < 0.5
 
 
 def test_a_single_shock_is_told_as_one() -> None:
