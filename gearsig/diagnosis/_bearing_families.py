@@ -473,9 +473,10 @@ def doubtful_races(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> l
     return [c for c in found if c.name in RACES and c.p_value <= DOUBTFUL]
 
 
-IN_VIBRATION, SEEN_IN_VIBRATION = 24, 6
-"""Multiples of a race's order that are looked for in the vibration itself, and how many of them must be seen: a smooth
-tone, as of elements that differ, has two or three."""
+IN_VIBRATION, SEEN_IN_VIBRATION, WITHOUT_GAPS = 24, 6, 0.75
+"""Multiples of a race's order that are looked for in the vibration itself, how many of them must be seen, as a smooth
+tone of elements that differ has two or three, and which part of those from the first to the last that are seen: impacts
+leave no gaps, whereas strong lines of gears, together no chance either, lie here and there."""
 
 
 def races_in_vibration(signals: AnalysisSignals) -> list[tuple[str, str, Comb]]:
@@ -492,7 +493,11 @@ def races_in_vibration(signals: AnalysisSignals) -> list[tuple[str, str, Comb]]:
         free = without_shafts(signals, lines)
         for race, order in races:
             comb = best_comb(free, order * (1 - slip), order * (1 + slip), offsets=multiples)
-            if comb is not None and len(comb.positions) >= SEEN_IN_VIBRATION:
+            if comb is None or len(comb.positions) < SEEN_IN_VIBRATION:
+                continue
+            first, last = (round(position / comb.fundamental) for position in (comb.positions[0], comb.positions[-1]))
+            between = free.free_lines_at(comb.fundamental * np.arange(first, last + 1))
+            if len(comb.positions) >= WITHOUT_GAPS * len(between):
                 found.append((channel, race, comb))
     allowed = signals.settings.false_alarm_probability / max(len(races) * len(signals.order_excess), 1)
     return sorted((one for one in found if one[2].p_value <= allowed), key=lambda one: one[2].p_value)

@@ -398,6 +398,17 @@ def _without_combinations(excess: LinesOverFloor, mesh: float, shafts: Sequence[
     return replace(excess, masked=excess.masked | near)
 
 
+def _knots(signals: AnalysisSignals) -> tuple[float, ...]:
+    """Return how often a turn an angle that was found from the vibration is known; of others, nothing.
+
+    It follows what a shaft modulates the phase by, and interpolated between its points it has images of that.
+    """
+    angle = signals.angle
+    if angle is None or angle.method != "tachless":
+        return ()
+    return ((len(angle.revolutions) - 1) / float(angle.revolutions[-1] - angle.revolutions[0]),)
+
+
 def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, trains: Sequence[float]) -> Comb | None:
     """Return the best family of sidebands of a pair's mesh that neither its shafts nor anything else known makes.
 
@@ -416,7 +427,7 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
         wide = foot if order >= 4 * foot else 0.0
         excess = excess.without_multiples(order, half_width=wide)
         excess = excess.without_multiples(order, start=mesh, half_width=wide)
-    excess = _without_combinations(excess, mesh, tuple(signals.known_shaft_orders.values()))
+    excess = _without_combinations(excess, mesh, (*signals.known_shaft_orders.values(), *_knots(signals)))
     if hunting is not None:
         excess = excess.without_multiples(hunting)  # of both gears together, and the mesh is one of them
     for train in trains:  # with each shaft's sidebands
